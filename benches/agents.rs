@@ -47,6 +47,7 @@ impl Agent for AtOnce {
         let reply = Reply {
             status: Status::Ok,
             repairs: Vec::new(),
+            fault: None,
             action: Some(Action::TurnLeft),
             self_color: None,
             selected_cube: None,

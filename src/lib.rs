@@ -20,6 +20,7 @@
 //! |---|---|
 //! | `exact` | exact numbers and moments, their text, hashes, limits, files that are replaced whole |
 //! | `web` | a local server: hosts, origins, tokens (feature `view`) |
+//! | `toml-spec` | files that people write: read by type, with every fault underlined |
 //! | `metric` | definition files: TOML, SQL expressions, types, plans |
 //! | `trace` | what an episode is: schema, reader, writer, validation, import, MCAP logs |
 //! | `score` | logical plan to physical plan to kernels over Arrow batches; the episode table |
@@ -34,7 +35,7 @@
 //! # Invariants
 //!
 //! - A crate depends only on crates above it in this table; `Cargo.toml` of each crate says on which.
-//! - `metric`, `statistics` and `exact` know no Arrow; `report` sees no trace; no crate of analysis depends on `world`.
+//! - `metric`, `statistics`, `toml-spec` and `exact` know no Arrow; `report` sees no trace; no crate of analysis depends on `world`.
 //! - `clippy.toml` of a crate lists what it must not call: clocks, files, threads. Only [`cli`] prints.
 //! - An episode's value is an integer, a cell keeps n, Σx, Σx² as integers: results do not depend on
 //!   threads, on the order of files, or on how rows are divided among them.

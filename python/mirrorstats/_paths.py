@@ -6,8 +6,6 @@ import json
 import os
 import pathlib
 import tempfile
-import urllib.parse
-import urllib.request
 from collections.abc import Iterable, Mapping
 from typing import Any, Optional, Union
 
@@ -63,6 +61,10 @@ def text(path: Any, spool: Spool) -> str:
     path = os.fspath(path)
     named = str(os.fsdecode(path))
     if named.startswith("file://"):
+        # Not with the package: the module brings HTTP and TLS along.
+        import urllib.parse
+        import urllib.request
+
         named = urllib.request.url2pathname(urllib.parse.urlsplit(named).path)
     return os.path.expanduser(named)
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import asyncio
 import base64
-import difflib
 import inspect
 import json
 import textwrap
@@ -95,6 +93,8 @@ def record(
 
 def _check_options(options: dict[str, Any]) -> None:
     """Refuses keywords that are no options of a recording."""
+    import difflib
+
     known = sorted({name.replace("-", "_") for name in _native.record_options()} - {"agent", "json", "dry_run"})
     for name in options:
         if name not in known:
@@ -123,7 +123,7 @@ def _source(agent: Any) -> Optional[str]:
 def _listener(agent: Any, is_array: bool) -> Callable[[str], str]:
     """What the native library calls in one episode, on a thread of its own, with messages as JSON."""
     function = agent() if isinstance(agent, type) else agent
-    loop: Optional[asyncio.AbstractEventLoop] = None
+    loop: Any = None
 
     def listen(line: str) -> str:
         nonlocal loop
@@ -132,6 +132,8 @@ def _listener(agent: Any, is_array: bool) -> Callable[[str], str]:
             message["image"] = _array(message["image"]["base64"])
         reply = function(message)
         if inspect.isawaitable(reply):
+            import asyncio
+
             loop = loop or asyncio.new_event_loop()
             reply = loop.run_until_complete(reply)
         if loop and message["kind"] == "end":

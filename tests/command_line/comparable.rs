@@ -193,3 +193,28 @@ fn experiments_are_contrasted_in_one_world_and_of_like_tasks_alone() {
     let words = json!("E5 is not contrasted with E1: the chance level of TSA is 1/3 and none.");
     assert!(other["warnings"].as_array().unwrap().contains(&words), "{}", other["warnings"]);
 }
+
+#[test]
+fn bold_marks_the_models_that_no_test_shows_to_be_worse() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |mirror| {
+        for (model, successes) in [("ant", 21), ("bee", 19), ("cow", 0)] {
+            Cell { model, mirror, solved: solved(successes, 21), ..LIKE }.write(folder.path());
+        }
+        run(folder.path(), &["report", ".", "--no-figures", "--out", "out"]).done();
+        std::fs::read_to_string(folder.path().join("out/tables/main.md")).unwrap()
+    };
+    let table = write(3.0);
+    assert!(table.contains("**21/21") && table.contains("**19/21") && !table.contains("**0/21"), "{table}");
+    assert!(table.contains("In bold: models that no test shows to be worse"), "{table}");
+    let found = run(folder.path(), &["stats", ".", "--json"]).json();
+    let of = found["ranks"].as_array().unwrap().iter().filter(|row| row["metric"] == "TSA");
+    let ranks: Vec<(u64, u64)> =
+        of.map(|row| (row["best"].as_u64().unwrap(), row["worst"].as_u64().unwrap())).collect();
+    assert_eq!(ranks, [(1, 2), (1, 2), (3, 3)]);
+    assert!(run(folder.path(), &["stats", ".", "--full"]).done().contains("Ranks that the tests leave open"));
+    // The best mean of models that are not comparable is not bold.
+    Cell { model: "dog", mirror: 1.2, solved: solved(1, 21), ..LIKE }.write(folder.path());
+    let table = write(3.0);
+    assert!(!table.contains("**21/21"), "{table}");
+}

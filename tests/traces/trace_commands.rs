@@ -28,6 +28,7 @@ fn episode(model: &str, experiment: &str, seed: i32, run: i32) -> Episode {
         cube_distance: Some(1.0),
         reply_status: Some("ok".into()),
         reply_repair: Some("fence".into()),
+        reply_fault: text(),
         view_description: text(),
         reasoning: text(),
         summary: text(),

@@ -150,16 +150,19 @@ impl Columns {
         self.schema.keys().chain(self.own.keys()).map(String::as_str)
     }
 
-    /// Sets what a column beside the schema is, and its only texts, any if empty; a column of the schema stays as it is.
-    pub fn set_own(&mut self, name: impl Into<String>, column: Column, values: Vec<String>) {
+    /// Sets what a column beside the schema is; a column of the schema stays as it is.
+    pub fn set_own(&mut self, name: impl Into<String>, column: Column) {
         let name = name.into();
-        if self.schema.contains_key(&name) {
-            return;
+        if !self.schema.contains_key(&name) {
+            self.own.insert(name, column);
         }
-        if !values.is_empty() {
-            self.values.insert(name.clone(), values);
+    }
+
+    /// Sets the only texts of a column beside the schema.
+    pub fn set_own_values(&mut self, name: &str, values: &[String]) {
+        if self.own.contains_key(name) && !values.is_empty() {
+            self.values.insert(name.to_owned(), values.to_vec());
         }
-        self.own.insert(name, column);
     }
 }
 

@@ -245,7 +245,8 @@ fn declare(document: &Document, columns: &mut Columns) -> Vec<Fault> {
             let message = format!("`{name}` is declared as {declared}, and is {found} in the traces");
             faults.push(Fault::new(place.clone(), message).help("declare it as the traces have it"));
         } else {
-            columns.set_own(name.clone(), *declared, values.clone());
+            columns.set_own(name.clone(), *declared);
+            columns.set_own_values(name, values);
         }
     }
     faults

@@ -147,7 +147,7 @@ pub fn trace_columns(traces: &TraceSet) -> Columns {
     }
     for name in traces.column_names().into_iter().filter(|name| *name != "t") {
         if let Some(ty) = traces.column(name).and_then(|column| type_of(column.kind)) {
-            columns.set_own(name, Column { ty, level: Level::Step }, Vec::new());
+            columns.set_own(name, Column { ty, level: Level::Step });
         }
     }
     columns

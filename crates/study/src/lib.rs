@@ -34,6 +34,7 @@ mod provenance;
 mod quality_check;
 #[cfg(feature = "polars")]
 mod query;
+mod question;
 mod report;
 mod rescore;
 mod results;
@@ -50,7 +51,7 @@ use std::path::{Path, PathBuf};
 
 use ::report::bundle::BundleError;
 use ::report::cells::Cells;
-use ::report::cells::group::{CONDITION, DEFAULT_BY, KEY_COLUMNS, group};
+use ::report::cells::group::group;
 use ::report::comparison::{Comparison, choose, compare};
 use ::report::errata::Errata;
 use ::report::figures::{Figure, FigureName};
@@ -59,14 +60,11 @@ use ::report::layout::MetricTable;
 use ::report::plan::departures::{Looks, departures};
 use ::report::plan::register::RegisteredPlan;
 use ::report::published;
-use ::report::statistics::{Options, Replies, Selection, Sequential, Statistics};
+use ::report::statistics::{Options, Replies, Selection, Sequential, Statistics, Ties};
 use ::report::style::Style;
 use exact::replace;
-use metric::columns::Columns;
-use metric::definitions::Definitions;
 use metric::file;
 use metric::names::is_about;
-use score::declared_experiments::declare;
 use score::evidence::{self, Evidence};
 use score::lost_counts::LostCounts;
 use score::score_traces;
@@ -89,6 +87,7 @@ pub use losses::LostAs;
 pub use overview::{Overview, Part};
 pub use provenance::ProvenanceError;
 pub use quality_check::{CellAnswer, NotRecorded, QualityCheckAnswer, QualityLimits, Violation};
+pub use question::{DEFAULT_DEFINITIONS, Question, known_experiments};
 pub use report::{Report, ReportOptions, WrittenReport};
 pub use rescore::{RescoreRequest, Rescored, folder_of_rescored};
 pub use results::{Outputs, Results};
@@ -99,12 +98,6 @@ pub use sensitivity::{DEFAULT_THRESHOLDS, SensitivityReport, Thresholds, Thresho
 use design::design_of;
 use inputs::Stamp;
 use losses::Counted;
-
-/// What scores say of each episode's recording, where the traces do.
-const STANDING_LABELS: [&str; 4] = [CONDITION, "scene", "fingerprint", "participant"];
-
-/// The definitions that are used where none are named.
-pub const DEFAULT_DEFINITIONS: &str = "paper";
 
 /// Inputs that are open, and the question that is put to them.
 #[derive(Debug)]
@@ -118,82 +111,6 @@ pub struct Study {
     threads: NonZeroUsize,
     /// The plan that the analysis is compared with.
     plan: Option<RegisteredPlan>,
-}
-
-/// What is asked of the inputs.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Question {
-    /// Definitions by name or path; those that scores carry, or that the experiments of the traces name, if absent.
-    pub definitions: Option<PathBuf>,
-    /// Whether experiments that need different definitions are each scored by their own, beside each other; else refused.
-    pub each: bool,
-    /// These definitions, found in the traces.
-    pub parts: Vec<ScoredAlike>,
-    /// A condition on episodes in the language of definitions; all episodes if absent.
-    pub filter: Option<String>,
-    /// The metrics wanted, by name; all if absent.
-    pub metrics: Option<Vec<String>>,
-    /// The columns that cells are grouped by; experiment and model if absent, and the condition where there is more than the
-    /// default one.
-    pub by: Option<Vec<String>>,
-    /// Whether a cell may hold episodes that were recorded differently.
-    pub pool: bool,
-    /// What lost episodes count as.
-    pub lost: LostAs,
-}
-
-impl Question {
-    /// The definition file asked for, or the default one.
-    pub(crate) fn definitions_name(&self) -> &Path {
-        self.definitions.as_deref().unwrap_or(Path::new(DEFAULT_DEFINITIONS))
-    }
-
-    /// The columns among those to group by that a score does not have by itself.
-    pub(crate) fn labels(&self) -> Vec<String> {
-        self.by.iter().flatten().filter(|name| !KEY_COLUMNS.contains(&name.as_str())).cloned().collect()
-    }
-
-    /// The labels of scores of these traces: the columns to group by, and what the traces say of each episode's recording.
-    pub(crate) fn labels_over(&self, traces: &TraceSet) -> Vec<String> {
-        let mut labels = self.labels();
-        let standing = STANDING_LABELS.into_iter().filter(|name| traces.declares(name));
-        for name in standing {
-            if !labels.iter().any(|label| label == name) {
-                labels.push(name.to_owned());
-            }
-        }
-        labels
-    }
-
-    /// The columns that cells of these episodes are grouped by.
-    pub(crate) fn by_over(&self, episodes: &EpisodeTable) -> Vec<String> {
-        let default = || {
-            let condition = episodes.has_conditions().then_some(CONDITION);
-            DEFAULT_BY.into_iter().chain(condition).map(str::to_owned).collect()
-        };
-        self.by.clone().unwrap_or_else(default)
-    }
-
-    /// The definitions asked for, with every column that they read in every trace, and the experiments that these declare.
-    pub(crate) fn bind(&self, traces: &TraceSet) -> Result<Definitions, StudyError> {
-        let asked = self.clone().resolved(traces)?;
-        let mut definitions = asked.bind_to(&score_traces::trace_columns(traces))?;
-        score_traces::check_columns(traces, &definitions)?;
-        declare(&mut definitions.catalog, traces)?;
-        Ok(definitions)
-    }
-
-    /// The definitions asked for over some columns.
-    pub fn bind_to(&self, columns: &Columns) -> Result<Definitions, StudyError> {
-        let mut definitions = self.load(columns)?;
-        if let Some(filter) = &self.filter {
-            definitions = definitions.filtered("--where", filter, columns)?;
-        }
-        if let Some(metrics) = &self.metrics {
-            definitions.select(metrics)?;
-        }
-        Ok(definitions)
-    }
 }
 
 impl Study {
@@ -366,6 +283,12 @@ impl Study {
     /// The tables of these episodes, each with the filter that chose them.
     fn tables(&self, episodes: &EpisodeTable, cells: &Cells, style: &Style) -> Result<Vec<MetricTable>, StudyError> {
         let mut tables = layout::tables(cells, style)?;
+        if tables.iter().any(|table| table.is_tied) {
+            let ties = Ties::of(episodes, design_of(&episodes.declared), self.question.pool)?;
+            for table in &mut tables {
+                table.mark_ties(&ties, &style.sheet.emphasis_note);
+            }
+        }
         let chosen = self.selection(episodes).map(|selection| selection.sentence());
         let pooled = self.pooled(episodes)?.unwrap_or_default();
         for table in &mut tables {

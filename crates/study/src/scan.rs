@@ -4,8 +4,9 @@ use std::thread;
 
 use super::error::StudyError;
 use super::inputs::Source;
+use super::question::STANDING_LABELS;
 use super::results::{Outputs, Results};
-use super::{Backend, STANDING_LABELS, Study, backend, input_hashes, losses, own_definitions, scores};
+use super::{Backend, Study, backend, input_hashes, losses, own_definitions, scores};
 use metric::definitions::Definitions;
 use report::cells::group::CONDITION;
 use score::quality::{QualityByCell, QualityReader};

@@ -23,6 +23,12 @@ pub fn parse_toml(source: &Arc<Source>) -> (toml::Spanned<DeTable<'_>>, Vec<Faul
     (table, errors.into_iter().map(fault).collect())
 }
 
+/// A text as TOML, for [`At::root`](crate::At::root), and every fault of it.
+pub fn parse(source: &Arc<Source>) -> (DeValue<'_>, Vec<Fault>) {
+    let (table, faults) = parse_toml(source);
+    (DeValue::Table(table.into_inner()), faults)
+}
+
 /// How many keys a table and the tables in it have.
 pub fn key_count(table: &DeTable<'_>) -> u64 {
     let inside = |value: &DeValue<'_>| value.as_table().map_or(0, key_count);

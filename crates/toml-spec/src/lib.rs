@@ -1,16 +1,30 @@
 //! Files that people write: every key accounted for, every fault underlined, all of them at once.
 //!
+//! A file is read by a type, which declares each key once: its name, its type, its range, its words, its description. The
+//! JSON Schema of the type says the same to editors.
+//!
 //! ```
 //! use std::sync::Arc;
-//! use toml_spec::{Faults, Keys, Source, parse_toml};
+//! use schemars::JsonSchema;
+//! use serde::Deserialize;
+//! use toml_spec::{At, Faults, Source, parse, read};
+//!
+//! /// A walk.
+//! #[derive(Deserialize, JsonSchema)]
+//! #[serde(deny_unknown_fields)]
+//! struct Walk {
+//!     /// Steps.
+//!     #[schemars(range(min = 1, max = 100))]
+//!     steps: u32,
+//!     /// The colour of the body.
+//!     color: Option<String>,
+//! }
 //!
 //! let text = "steps = 0\ncolour = \"red\"\n".to_owned();
 //! let source = Arc::new(Source { name: "mine.toml".to_owned(), text });
-//! let (table, mut faults) = parse_toml(&source);
-//! let mut keys = Keys::new(&source, table.get_ref(), "a file of mine");
-//! assert!(keys.count("steps", [1, 100], &mut faults).is_none());
-//! assert!(keys.text("color", &mut faults).is_none());
-//! keys.refuse_the_rest(&mut faults);
+//! let (root, mut faults) = parse(&source);
+//! let walk: Option<Walk> = read(&At::root(&source, &root), "a walk", &mut faults);
+//! assert!(walk.is_none());
 //! let shown = Faults(faults).in_order().render(false);
 //! assert!(shown.contains("`steps` may be 1 to 100, but is 0"));
 //! assert!(shown.contains("did you mean `color`?"));
@@ -20,12 +34,16 @@
 
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
+mod at;
 mod fault;
 mod include;
 mod keys;
 mod origin;
+mod shape;
 
+pub use at::At;
 pub use fault::{Fault, FaultRecord, Faults, MOST_FAULTS, Place, Source};
 pub use include::{IncludeKind, Includes};
-pub use keys::{Keys, key_count, parse_toml};
+pub use keys::{Keys, key_count, parse, parse_toml};
 pub use origin::Written;
+pub use shape::{Shape, read};

@@ -121,6 +121,8 @@ fn outcome_of(answer: &RecordAnswer) -> Outcome {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use super::recordings;
 
     #[test]
@@ -130,8 +132,14 @@ mod tests {
         let of = |text: &str| {
             std::fs::write(&path, text).unwrap();
             recordings(&path).map(|all| {
-                let words =
-                    all.iter().map(|one| one.iter().map(|word| word.to_str().unwrap()).collect::<Vec<_>>().join(" "));
+                let words = all.iter().map(|one| {
+                    one.iter()
+                        .map(|word| word.to_str().unwrap())
+                        .collect::<BTreeSet<_>>()
+                        .into_iter()
+                        .collect::<Vec<_>>()
+                        .join(" ")
+                });
                 words.collect::<Vec<_>>()
             })
         };

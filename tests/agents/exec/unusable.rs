@@ -70,7 +70,10 @@ fn one_episode_in_flight_that_cannot_answer_is_enough() {
     let words = ["--runs", "2", "--threads", "1", "--in-flight", "2", "--max-unusable", "6"];
     let (code, _, said) = outcome(&bench.record(&words).output().unwrap());
     assert_eq!(code, Some(2), "{said}");
-    assert!(said.contains(&sentence(6, "parse_failed: `no` (E1/exec/s1/r2, step 6)")), "{said}");
+    assert!(
+        said.contains(&sentence(6, "parse_failed: `no` (E1/exec/s1/r2, step 6): expected ident at line 1 column 2")),
+        "{said}"
+    );
     assert!(!bench.path("runs/E1-exec.parquet").exists());
 }
 

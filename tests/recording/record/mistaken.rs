@@ -51,7 +51,7 @@ fn numbers_that_are_none_or_out_of_range() {
         (5, "steps = 0", "`steps` may be 1 to 100000, but is 0"),
         (6, "[[experiment.mine.mirror]]\nwidth = inf", "`width` may be 0.5 to 10, but is inf"),
         (6, "[[experiment.mine.mirror]]\nheight = -inf", "`height` may be 0.5 to 5, but is -inf"),
-        (5, "mirror = [{}, {}, {}, {}, {}]", "a world holds at most 4 of `mirror`, found 5"),
+        (5, "mirror = [{}, {}, {}, {}, {}]", "`mirror` may have at most 4 items, but has 5"),
         (5, "chance = { TSA = \"4/0\" }", "4/0"),
         (5, "[[experiment.mine.mirror]]\nwidth = 9.5", "a mirror of 9.5 m does not fit onto a wall of 8 m"),
     ] {
@@ -81,8 +81,8 @@ fn names_and_keys() {
     }
     told(1, "[experiment.\"a/b\"]\ntitle = \"A\"\nprompt = \"exploration\"\n", &["a name has 1 to 40 letters"]);
     told(1, &HEAD.replace("mine", "E1"), &["`E1` is built in", "give it another name"]);
-    told(1, &HEAD.replace("title = \"Mine\"\n", ""), &["the experiment has no `title`"]);
-    told(4, &HEAD.replace("kind = \"none\"", ""), &["the cubes have no `kind`"]);
+    told(1, &HEAD.replace("title = \"Mine\"\n", ""), &["an experiment needs `title`"]);
+    told(4, &HEAD.replace("kind = \"none\"", ""), &["cubes needs `kind`"]);
 }
 
 #[test]
@@ -127,7 +127,7 @@ fn files_that_are_no_experiments() {
     refused_in(&bench, 1, "[experiment.mine\n", &["not TOML"]);
     refused_in(&bench, 1, &format!("x = {}", "[".repeat(100_000)), &["not TOML"]);
     refused_in(&bench, 1, &format!("x = {}", "{y=".repeat(100_000)), &["not TOML"]);
-    refused_in(&bench, 5, &format!("{HEAD}mirror = [{}]\n", "{},".repeat(300_000)), &["found 300000"]);
+    refused_in(&bench, 5, &format!("{HEAD}mirror = [{}]\n", "{},".repeat(300_000)), &["but has 300000"]);
     let many: String = (0..2000).map(|at| HEAD.replace("mine", &format!("mine-{at}"))).collect();
     refused_in(&bench, 1, &many, &["at most 64 experiments, found 2000"]);
 

@@ -45,9 +45,9 @@ fn a_configuration_that_is_faulty_or_leaves_no_room() {
     let bench = Bench::new();
     for (text, expected) in [
         ("room.sise = 8.0", "size"),
-        ("[room]\nsize = 'big'", "line 2"),
-        ("room.size = 100.0", "`room.size` may be 5 to 12, but is 100"),
-        ("episode.steps = 0", "`episode.steps`"),
+        ("[room]\nsize = 'big'", "small.toml:2:8"),
+        ("room.size = 100.0", "`size` may be 5 to 12, but is 100"),
+        ("episode.steps = 0", "`steps` may be 1 to 100000"),
     ] {
         fs::write(bench.path("small.toml"), text).unwrap();
         refused(&bench, "runs", "--agent frozen --experiment E1 --seeds 1 --runs 1", &["small.toml", expected]);

@@ -66,7 +66,7 @@ pub fn columns(traces: &TraceSet) -> Columns {
         ("note", Type::Text),
         ("grip open", Type::Bool),
     ] {
-        columns.set_own(name, Column { ty, level: Level::Step }, Vec::new());
+        columns.set_own(name, Column { ty, level: Level::Step });
     }
     columns
 }

@@ -24,7 +24,7 @@ use crate::errata::Field;
 use crate::published::{CellLabel, Published};
 use crate::style::{Style, TableSheet};
 use exact::rounding::Rounding;
-use metric::catalog::Catalog;
+use metric::catalog::{Catalog, Kind};
 use metric::implied::Implied;
 use statistics::feasible::attain::Search;
 
@@ -61,6 +61,8 @@ pub struct Audit {
     pub infeasible: Vec<InfeasibleCell>,
     /// Cells that print zero where no episode counts, as the style says that their table does.
     pub undefined_as_zero: Vec<ZeroCell>,
+    /// Printed standard errors of durations and other quantities: whole numbers give almost any, so that a wrong one is seldom found.
+    pub unbounded_errors: usize,
     /// Each table.
     pub tables: Vec<AuditedTable>,
     /// The name of the definitions.
@@ -170,8 +172,13 @@ fn summed_up(
         table: tables[table].name.clone(),
         cell: tables[table].published.cells[cell].0.clone(),
     };
+    let is_quantity =
+        |metric: &str| terms.catalog.metric.get(metric).is_some_and(|metric| metric.kind == Kind::Quantity);
+    let printed = tables.iter().flat_map(|table| &table.published.cells);
+    let unbounded_errors = printed.filter(|(name, cell)| cell.se.is_some() && is_quantity(&name.metric)).count();
     Audit {
         cells,
+        unbounded_errors,
         feasible: cells - found.len(),
         undefined_as_zero: zeros.iter().map(zero).collect(),
         tables: audited.collect(),

@@ -32,6 +32,13 @@ impl Audit {
         for table in &audit.tables {
             push_wrapped(&mut text, &summary(table), width, 2);
         }
+        if audit.unbounded_errors > 0 {
+            let words = format!(
+                "note: {} standard errors are of durations or other whole numbers, which give almost any: a wrong one is seldom found",
+                audit.unbounded_errors
+            );
+            push_wrapped(&mut text, &words, width, 2);
+        }
         let _ = writeln!(text, "{} of {} cells are feasible", audit.feasible, audit.cells);
         text
     }

@@ -13,7 +13,8 @@ use metric::catalog::Better;
 /// Sets the emphasis of the cells of one column in one group. The cells keep their places.
 pub fn emphasise(cells: &mut [&mut MetricCell], better: Better, rule: EmphasisRule) {
     let compare: fn(&MetricCell, &MetricCell) -> Ordering = match rule {
-        EmphasisRule::None => return,
+        // Ties come from tests, which cells do not have.
+        EmphasisRule::None | EmphasisRule::Tied => return,
         EmphasisRule::PrintedMean => by_printed_mean,
         EmphasisRule::ExactMean => by_exact_mean,
     };

@@ -4,6 +4,8 @@
 //! what people read, [`MetricTable::records`] what programs read.
 
 use crate::cells::KeyValue;
+use crate::cells::group::CONDITION;
+use crate::statistics::Ties;
 use crate::style::CellForm;
 use crate::tables::{Align, Column, Emphasis, Look, RowGroup, Table, TableCell, key_field};
 use exact::moments::Moments;
@@ -26,6 +28,8 @@ pub struct MetricTable {
     /// The text of an undefined value.
     pub undefined: String,
     pub form: CellForm,
+    /// Whether bold marks ties for the best, which [`MetricTable::mark_ties`] sets.
+    pub is_tied: bool,
     /// The key columns of a row, as the episodes were grouped.
     pub keys: Vec<String>,
     /// What a row is: `Model`.
@@ -115,6 +119,33 @@ pub enum Spread {
 }
 
 impl MetricTable {
+    /// Sets the models that are tied for the best in bold, and says so with `note`.
+    ///
+    /// Nothing where rows are anything else than a model in an experiment, or where the style does not ask for ties.
+    pub fn mark_ties(&mut self, ties: &Ties, note: &str) {
+        let place = |name: &str| self.keys.iter().position(|key| key == name);
+        let (Some(experiment), Some(model)) = (place("experiment"), place("model")) else { return };
+        let condition = place(CONDITION);
+        if !self.is_tied || self.keys.len() != 2 + usize::from(condition.is_some()) {
+            return;
+        }
+        let mut is_marked = false;
+        for row in self.groups.iter_mut().flat_map(|group| &mut group.rows) {
+            let text = |at: usize| row.key[at].to_string();
+            let condition = condition.map(text);
+            let name = condition.map_or_else(|| text(model), |condition| format!("{} [{condition}]", text(model)));
+            for (cell, column) in row.cells.iter_mut().zip(&self.columns) {
+                if ties.has(&row.key[experiment].to_string(), &name, &column.metric) {
+                    cell.emphasis = Emphasis::Bold;
+                    is_marked = true;
+                }
+            }
+        }
+        if is_marked {
+            self.footnotes.insert(0, note.to_owned());
+        }
+    }
+
     /// The caption without its title: note and footnotes.
     pub fn sentences(&self) -> impl Iterator<Item = &str> {
         std::iter::once(self.note.as_str()).chain(self.footnotes.iter().map(String::as_str)).filter(|s| !s.is_empty())
@@ -147,6 +178,7 @@ impl MetricTable {
             look: Look::Sheet,
             columns: std::iter::once(Column::left(&self.row_heading)).chain(columns).collect(),
             names: 1,
+            is_tied: self.is_tied,
             groups: self.groups.iter().map(group).collect(),
         }
     }

@@ -10,7 +10,7 @@ pub mod quality;
 pub mod value;
 
 use crate::cells::{Cells, Group, KeyValue};
-use crate::style::{MAIN_TABLE, OTHER_TABLE, Print, Style, StyleError, TableSheet};
+use crate::style::{EmphasisRule, MAIN_TABLE, OTHER_TABLE, Print, Style, StyleError, TableSheet};
 use crate::tables::{DAGGER, Emphasis};
 use metric::catalog::Catalog;
 use statistics::coverage::STUDENT;
@@ -92,6 +92,7 @@ impl<'a> Layout<'a> {
             label: sheet.label.clone(),
             undefined: self.style.sheet.undefined.clone(),
             form: self.print.cell,
+            is_tied: self.print.emphasis == EmphasisRule::Tied,
             keys: self.cells.by.clone(),
             row_heading: heading(self.cells.by.get(self.row_key).map_or("", String::as_str)),
             columns: sheet.columns.iter().map(|metric| self.column(metric)).collect(),

@@ -28,6 +28,7 @@ pub(super) fn table(
         label: Some("tab:sensitivity".to_owned()),
         undefined: style.sheet.undefined.clone(),
         form: CellForm::CountInterval,
+        is_tied: false,
         keys: by(levels).iter().cloned().chain(["threshold".to_owned()]).collect(),
         row_heading: "Threshold".to_owned(),
         columns: metrics.iter().map(|metric| column(metric, levels, style)).collect(),

@@ -18,6 +18,7 @@ mod losses;
 mod matching;
 mod models;
 mod overall;
+mod ranks;
 mod replies;
 mod retest;
 mod selection;
@@ -42,6 +43,7 @@ pub use losses::{LossCase, LossCases, LossRow, Losses};
 pub use matching::Matching;
 pub use models::{Family, Gap, PairTest, Reach};
 pub use overall::{ImprovementRow, OverallMethod, OverallRow};
+pub use ranks::{RankRow, Ties};
 pub use replies::{Replies, UnusableReplies};
 pub use retest::RetestRow;
 pub use selection::Selection;
@@ -145,6 +147,9 @@ pub struct Statistics {
     pub models: Vec<Family>,
     /// Models against each other over all experiments, under the headline rates.
     pub overall: Vec<OverallRow>,
+    /// The ranks that the tests leave open, in each experiment and over all of them.
+    #[serde(default)]
+    pub ranks: Vec<RankRow>,
     /// How often one model decides earlier than another; none unless asked for.
     pub improvements: Vec<ImprovementRow>,
     /// Scenes that keep episodes out of pairs, where models are compared by pairs.
@@ -179,6 +184,7 @@ impl Statistics {
         let headline = conclusions::headline(&study);
         let asked: &[String] = if options.improvements { &headline } else { &[] };
         let (models, gaps) = models::compared(&study, horizon, confidence);
+        let overall = overall::rates(&study, &headline, confidence);
         let mut statistics = Self {
             definitions: table.catalog.name.clone(),
             definitions_hash: table.catalog.hash.clone(),
@@ -196,8 +202,9 @@ impl Statistics {
             warnings: Vec::new(),
             cells: CellRow::all(&study, cells, confidence),
             chance: ChanceRow::all(&study, confidence),
+            ranks: RankRow::all(&models, &overall),
             models,
-            overall: overall::rates(&study, &headline, confidence),
+            overall,
             improvements: overall::improvements(&study, asked, confidence),
             gaps,
             conditions: Contrast::all(&study, horizon, confidence),

@@ -162,6 +162,8 @@ pub enum EmphasisRule {
     ExactMean,
     /// The same by the means as printed; where all tie, all are bold.
     PrintedMean,
+    /// Those that no test shows to be worse than another are bold; nothing where that is so of all.
+    Tied,
 }
 
 /// The standard error of a single value.

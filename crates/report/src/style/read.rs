@@ -349,6 +349,7 @@ fn printing(root: &mut Keys, faults: &mut Vec<Fault>) -> PrintSheet {
         ("none", EmphasisRule::None),
         ("exact_mean", EmphasisRule::ExactMean),
         ("printed_mean", EmphasisRule::PrintedMean),
+        ("tied", EmphasisRule::Tied),
     ];
     let single = [("undefined", SingleSe::Undefined), ("zero", SingleSe::Zero)];
     let sheet = PrintSheet {

@@ -31,6 +31,8 @@ pub struct Table {
     pub columns: Vec<Column>,
     /// How many of the first columns name a row.
     pub names: usize,
+    /// Whether bold marks all that are tied for the best.
+    pub is_tied: bool,
     /// The rows, in groups that are headed together.
     pub groups: Vec<RowGroup>,
 }

@@ -3,10 +3,10 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use super::schema::{AnyTable, ExperimentFile};
 use super::spec::Spec;
 use super::table::{self, Beside, Entry};
-use toml_spec::{Fault, Faults, Place, Source};
-use toml_spec::{Keys, parse_toml};
+use toml_spec::{At, Fault, Faults, Shape, Source};
 
 /// The most experiments of a file.
 const MOST_EXPERIMENTS: usize = 64;
@@ -27,28 +27,26 @@ fn with_help(fault: Fault) -> Fault {
 
 fn entries(source: Source, folder: Option<&Path>, known: &[&Spec]) -> Result<Vec<Entry>, Faults> {
     let source = Arc::new(source);
-    let (table, mut faults) = parse_toml(&source);
+    let (root, mut faults) = toml_spec::parse(&source);
     if !faults.is_empty() {
         return Err(Faults(faults).in_order());
     }
-    let mut root = Keys::new(&source, table.get_ref(), "an experiment file");
-    let tables = root.tables("experiment", &mut faults);
-    root.refuse_the_rest(&mut faults);
-    let whole = Place { source: source.clone(), span: 0..0 };
+    let root = At::root(&source, &root);
+    Shape::of::<ExperimentFile<AnyTable>>().overlay().value(&root, "an experiment file", &mut faults);
+    let tables: Vec<_> = root.get("experiment").iter().flat_map(At::entries).collect();
     if tables.is_empty() && faults.is_empty() {
-        faults.push(Fault::new(whole.clone(), "no experiment").help("add a table such as `[experiment.E6]`"));
+        faults.push(root.fault("no experiment").help("add a table such as `[experiment.E6]`"));
     }
     if tables.len() > MOST_EXPERIMENTS {
-        let message = format!("a file holds at most {MOST_EXPERIMENTS} experiments, found {}", tables.len());
-        faults.push(Fault::new(whole, message));
+        faults.push(root.fault(format!("a file holds at most {MOST_EXPERIMENTS} experiments, found {}", tables.len())));
         return Err(Faults(faults).in_order());
     }
     let mut entries: Vec<Entry> = Vec::new();
-    for (name, place, keys) in tables {
+    for (name, at) in tables {
         let entry = {
             let before: Vec<&Spec> =
                 known.iter().copied().chain(entries.iter().map(|entry| &entry.known.spec)).collect();
-            table::read(&name, &place, keys, &Beside { folder, before: &before }, &mut faults)
+            table::read(name, &at, &Beside { folder, before: &before }, &mut faults)
         };
         entries.extend(entry);
     }

@@ -17,7 +17,6 @@ pub mod balance;
 mod built_in;
 pub mod explain;
 pub mod file;
-mod limits;
 pub mod load;
 pub mod prompt;
 pub mod schema;

@@ -1,15 +1,14 @@
 //! The shape of an experiment file, for editors and other programs (`schemas/experiments.schema.json`).
 //!
-//! The reader in `table` goes by the TOML itself, to show every fault at its place; this is the same shape as types. A
-//! test reads the built-in files through both, and holds the keys of both against each other.
+//! A key is declared here, once: the reader and the schema go by these types. `table` makes a [`Spec`](super::Spec) of them.
 
 use indexmap::IndexMap;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::spec::{
-    AbsentColumn, Actions, Behavior, BodyShown, Camera, Colors, Decision, MarkColor, Paint, PaneKind, Part, ReplyKey,
-    Start, Stated, Truth, Wall, Wearer,
+    AbsentColumn, Actions, BodyShown, Camera, Colors, Cubes, Decision, MOST_MARKS, MOST_PANES, Mark, Others, Paint,
+    PaneKind, Picture, ReplyKey, Start, Stated, Truth, Wall,
 };
 use exact::ratio::Ratio;
 use trace::palette::Color;
@@ -17,10 +16,15 @@ use trace::palette::Color;
 /// A file of experiments.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct ExperimentFile {
+#[schemars(rename = "ExperimentFile")]
+pub struct ExperimentFile<T = ExperimentTable> {
     /// At most 64 experiments by name: 1 to 40 letters, digits, `-` and `_`; not that of a built-in one.
-    pub experiment: IndexMap<String, ExperimentTable>,
+    pub experiment: IndexMap<String, T>,
 }
+
+/// A table of which every key is read elsewhere.
+#[derive(Deserialize, JsonSchema)]
+pub(super) struct AnyTable {}
 
 /// An experiment. A key that is absent has the value that its description names.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
@@ -42,12 +46,12 @@ pub struct ExperimentTable {
     /// How the body's colour is drawn; `balanced` if absent.
     pub colors: Option<Colors>,
     /// The colours of bodies and cubes, at least two; all ten if absent.
-    #[schemars(length(min = 2))]
+    #[schemars(length(min = 2), extend("uniqueItems" = true))]
     pub palette: Option<Vec<Color>>,
     /// The cubes; three candidates if absent.
-    pub cubes: Option<CubesTable>,
+    pub cubes: Option<Cubes>,
     /// The other agents; none if absent.
-    pub others: Option<OthersTable>,
+    pub others: Option<Others>,
     /// How the agent stands at the start; `facing_away` if absent.
     pub start: Option<Start>,
     /// The column that holds the decision; `selected_cube` if absent, `self_color` where there are no candidates,
@@ -61,10 +65,12 @@ pub struct ExperimentTable {
     pub definitions: Option<String>,
     /// Columns that have no meaning for the task, and that its traces do not have; none if absent. A column that a key of
     /// the reply fills has one.
+    #[schemars(extend("uniqueItems" = true))]
     pub absent: Option<Vec<AbsentColumn>>,
     /// What the prompt states of the body's colour; `none` if absent.
     pub stated_color: Option<Stated>,
     /// The keys of a reply, in the order of the prompt; those that the decision needs if absent.
+    #[schemars(extend("uniqueItems" = true))]
     pub reply: Option<Vec<ReplyKey>>,
     /// A built-in prompt (`cube-selection`, `exploration`, `mark`, `reach-scheme`, `reach-mirror`, `reach-hand`, `reach-bare`), or a folder beside the file or below it with
     /// `system.txt` and `user.txt`.
@@ -81,16 +87,16 @@ pub struct ExperimentTable {
     pub step_length: Option<f64>,
     /// Mirrors and windows, at most four; a bare wall if absent or empty.
     #[serde(default)]
-    #[schemars(length(max = 4))]
+    #[schemars(length(max = MOST_PANES))]
     pub mirror: Vec<MirrorTable>,
     /// Marks on bodies, at most four.
     #[serde(default)]
-    #[schemars(length(max = 4))]
-    pub mark: Vec<MarkTable>,
+    #[schemars(length(max = MOST_MARKS))]
+    pub mark: Vec<Mark>,
     /// The hand that moves in place of the body, to reach the mark on its front; none if absent.
     pub hand: Option<HandTable>,
     /// The size and the angle of the picture; the world's if absent.
-    pub view: Option<ViewTable>,
+    pub view: Option<Picture>,
 }
 
 /// A hand that floats freely, a step at a time.
@@ -112,21 +118,6 @@ pub struct HandTable {
     /// The steps of an episode beyond those from the start to the mark; 10 if absent.
     #[schemars(range(max = 1000))]
     pub extra_steps: Option<u32>,
-}
-
-/// The size and the angle of a picture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct ViewTable {
-    /// Pixels in a row; 640 if absent.
-    #[schemars(range(min = 16, max = 1920))]
-    pub width: Option<u32>,
-    /// Rows; 480 if absent.
-    #[schemars(range(min = 12, max = 1440))]
-    pub height: Option<u32>,
-    /// The vertical field of view, degrees; 60 if absent.
-    #[schemars(range(min = 30, max = 115))]
-    pub fovy: Option<u32>,
 }
 
 /// A chance level.
@@ -152,53 +143,10 @@ pub enum NoLevel {
 #[serde(untagged)]
 pub enum Fraction {
     /// In quotes.
-    Text(Ratio),
+    #[schemars(with = "Ratio")]
+    Text(String),
     /// A decimal is the fraction that it says: `0.25` is 1/4.
     Number(f64),
-}
-
-/// The cubes of a world.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, rename_all = "snake_case", tag = "kind")]
-pub enum CubesTable {
-    /// No cube.
-    None,
-    /// Cubes of different colours, one of them the body's.
-    Candidates {
-        /// How many, at most as many as the palette has colours; three if absent, or all colours of a palette of two.
-        #[schemars(range(min = 2, max = 10))]
-        count: Option<u32>,
-    },
-    /// Cubes of any colours, some of them before the first mirror.
-    Clutter {
-        /// How many at least; the world's if absent.
-        #[schemars(range(max = 12))]
-        least: Option<u32>,
-        /// How many at most; the world's if absent.
-        #[schemars(range(max = 12))]
-        most: Option<u32>,
-        /// Of a hundred places before the first mirror, those from which it hides half of the body or more, at least; the
-        /// world's if absent.
-        #[schemars(range(max = 100))]
-        hides: Option<u32>,
-    },
-}
-
-/// The other agents of a world.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct OthersTable {
-    /// How many at least; the world's if absent.
-    #[schemars(range(max = 6))]
-    pub least: Option<u32>,
-    /// How many at most; the world's if absent.
-    #[schemars(range(max = 6))]
-    pub most: Option<u32>,
-    /// What they do; `walk` if absent.
-    pub behavior: Option<Behavior>,
-    /// Of a hundred episodes, those where one of them has the colour of the agent's own body; the world's if absent.
-    #[schemars(range(max = 100))]
-    pub twin_percent: Option<u32>,
 }
 
 /// A mirror, or something in a mirror's place.
@@ -208,7 +156,7 @@ pub struct MirrorTable {
     /// What it shows; `mirror` if absent.
     pub kind: Option<PaneKind>,
     /// Steps by which it is late. A delayed mirror needs the key; a mirror with one is a delayed one; a window has none.
-    #[schemars(range(min = 1, max = 1000))]
+    #[schemars(range(max = 1000))]
     pub delay: Option<u32>,
     /// The colour of the body that a decoy or a window shows: `own`, `other`, or a colour; `other` if absent for a decoy of
     /// the own body, else `own`.
@@ -228,30 +176,10 @@ pub struct MirrorTable {
     pub bottom: Option<f64>,
 }
 
-/// A mark on a body.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct MarkTable {
-    /// Where on the body.
-    pub part: Part,
-    /// Of its paint: a colour, or `random`, which is what it is if absent and never that of its wearer.
-    pub color: Option<MarkColor>,
-    /// The first step that shows it, at most the experiment's `steps`; 1 if absent.
-    #[schemars(range(min = 1))]
-    pub from_t: Option<u32>,
-    /// Who wears it; `self` if absent.
-    pub on: Option<Wearer>,
-}
-
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeSet;
-
-    use serde_json::{Value, json};
-
     use super::ExperimentFile;
-    use crate::experiment::{Experiment, built_in, built_in_names, file};
-    use toml_spec::Source;
+    use crate::experiment::{Experiment, built_in, built_in_names};
 
     #[test]
     fn the_built_in_files_have_this_shape() {
@@ -262,43 +190,6 @@ mod tests {
             assert_eq!((shape.order, &shape.prompt), (experiment.order, &experiment.prompt));
             assert_eq!(shape.mirror.len(), experiment.panes.len());
             assert_eq!(shape.mark.len(), experiment.marks.len());
-        }
-    }
-
-    /// The keys that the reader names where it refuses one, for a text with the unknown key `zzzzzz`.
-    fn keys_of_reader(text: &str) -> BTreeSet<String> {
-        let head = "[experiment.X]\ntitle = 'X'\nprompt = 'exploration'\n";
-        let source = Source { name: "mine.toml".to_owned(), text: format!("{head}{text}") };
-        let faults =
-            file::read(source, Some(std::path::Path::new(".")), &crate::experiment::built_in_specs()).unwrap_err();
-        let helps: Vec<&str> = faults.0.iter().filter_map(|fault| fault.help.as_deref()).collect();
-        let [help] = helps[..] else { panic!("{text}: {faults:?}") };
-        help.split_once(" are ").unwrap().1.split(", ").map(str::to_owned).collect()
-    }
-
-    /// The keys of a type of the schema, or of one kind of it.
-    fn keys_of_schema(name: &str, kind: Option<&str>) -> BTreeSet<String> {
-        let schema = json!(schemars::schema_for!(ExperimentFile));
-        let of_type = &schema["$defs"][name];
-        let is_kind = |one: &&Value| one["properties"]["kind"]["const"] == kind.unwrap();
-        let found = kind.map_or(of_type, |_| of_type["oneOf"].as_array().unwrap().iter().find(is_kind).unwrap());
-        found["properties"].as_object().unwrap().keys().cloned().collect()
-    }
-
-    #[test]
-    fn the_reader_takes_the_keys_of_the_schema_and_no_others() {
-        for (name, kind, text) in [
-            ("ExperimentTable", None, "zzzzzz = 1"),
-            ("CubesTable", Some("none"), "cubes = { kind = 'none', zzzzzz = 1 }"),
-            ("CubesTable", Some("candidates"), "cubes = { kind = 'candidates', zzzzzz = 1 }"),
-            ("CubesTable", Some("clutter"), "cubes = { kind = 'clutter', zzzzzz = 1 }"),
-            ("OthersTable", None, "others = { zzzzzz = 1 }"),
-            ("MirrorTable", None, "mirror = [{ zzzzzz = 1 }]"),
-            ("MarkTable", None, "mark = [{ part = 'head', zzzzzz = 1 }]"),
-            ("HandTable", None, "hand = { zzzzzz = 1 }"),
-            ("ViewTable", None, "view = { zzzzzz = 1 }"),
-        ] {
-            assert_eq!(keys_of_schema(name, kind), keys_of_reader(text), "{name} {kind:?}");
         }
     }
 }

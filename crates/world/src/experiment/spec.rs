@@ -127,14 +127,23 @@ pub struct Hand {
 
 /// The size and the angle of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct Picture {
     /// Pixels in a row.
+    #[schemars(range(min = 16, max = 1920))]
     pub width: u32,
     /// Rows.
+    #[schemars(range(min = 12, max = 1440))]
     pub height: u32,
     /// The vertical field of view, degrees.
+    #[schemars(range(min = 30, max = 115))]
     pub fovy: u32,
+}
+
+impl Default for Picture {
+    fn default() -> Self {
+        Self { width: 640, height: 480, fovy: 60 }
+    }
 }
 
 /// What is drawn from seed and run, the same for all experiments that share scenes.
@@ -176,22 +185,31 @@ pub enum Cubes {
     None,
     /// Cubes of different colours, one of them the body's.
     Candidates {
-        /// How many.
+        /// How many, at most as many as the palette has colours; three if absent, or all colours of a palette of two.
+        #[serde(default = "three")]
+        #[schemars(range(min = 2, max = 10))]
         count: u32,
     },
     /// Cubes of any colours, some of them before the first pane.
     Clutter {
         /// How many at least; the world's if absent.
         #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schemars(range(max = 12))]
         least: Option<u32>,
         /// How many at most; the world's if absent.
         #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schemars(range(max = 12))]
         most: Option<u32>,
         /// Of a hundred places before the first pane, those from which it hides half of the body or more, at least; the
         /// world's if absent.
         #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schemars(range(max = 100))]
         hides: Option<u32>,
     },
+}
+
+const fn three() -> u32 {
+    3
 }
 
 /// The other agents of a world.
@@ -200,14 +218,18 @@ pub enum Cubes {
 pub struct Others {
     /// How many at least; the world's if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(max = 6))]
     pub least: Option<u32>,
     /// How many at most; the world's if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(max = 6))]
     pub most: Option<u32>,
     /// What they do.
+    #[serde(default)]
     pub behavior: Behavior,
     /// Of a hundred episodes, those where one of them has the colour of the agent's own body; the world's if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(max = 100))]
     pub twin_percent: Option<u32>,
 }
 

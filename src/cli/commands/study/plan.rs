@@ -3,6 +3,8 @@
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
+#[cfg(feature = "sim")]
+use crate::cli::commands::world::configured;
 use crate::cli::outcome::{Failure, Outcome};
 #[cfg(feature = "sim")]
 use crate::cli::registration;
@@ -15,8 +17,6 @@ use report::plan::{Given, Plan, PlanRequest, plan};
 use score::score_traces::schema_columns;
 use statistics::sample_size::Clusters;
 use study::StudyError;
-#[cfg(feature = "sim")]
-use world::sim::config::WorldConfig;
 
 /// Plan how many episodes a study needs: for a wanted difference, or the difference that given episodes can show
 #[derive(Clone, Debug, clap::Args)]
@@ -154,10 +154,7 @@ impl PlanArgs {
     /// The hashes of what will be recorded: the world and the prompts.
     #[cfg(feature = "sim")]
     fn recorded(&self) -> Result<(Vec<NamedHash>, Vec<NamedHash>), Failure> {
-        let config = match &self.config {
-            Some(path) => WorldConfig::load(path).map_err(Failure::input)?,
-            None => WorldConfig::default(),
-        };
+        let config = configured(self.config.as_ref())?;
         let world = NamedHash { name: registration::WORLD.to_owned(), sha256: config.hash() };
         Ok((vec![world], registration::prompts()))
     }

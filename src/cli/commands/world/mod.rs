@@ -12,7 +12,7 @@ use crate::cli::outcome::{Failure, Outcome};
 #[cfg(feature = "raster")]
 use crate::cli::output;
 use world::record::plan::Experiments;
-use world::sim::config::WorldConfig;
+use world::sim::config::{ConfigError, WorldConfig};
 #[cfg(feature = "raster")]
 use world::sim::contact_sheet;
 use world::sim::scene::Scene;
@@ -73,8 +73,13 @@ struct SheetArgs {
     config: Option<PathBuf>,
 }
 
-fn configured(path: Option<&PathBuf>) -> Result<WorldConfig, Failure> {
-    path.map_or_else(|| Ok(WorldConfig::default()), |path| WorldConfig::load(path)).map_err(Failure::input)
+/// The world of a file, or the built-in one.
+pub(super) fn configured(path: Option<&PathBuf>) -> Result<WorldConfig, Failure> {
+    let Some(path) = path else { return Ok(WorldConfig::default()) };
+    WorldConfig::load(path).map_err(|error| match error {
+        ConfigError::Faults(faults) => Failure::of_faults(&faults),
+        unreadable @ ConfigError::Unreadable { .. } => Failure::input(unreadable),
+    })
 }
 
 impl WorldArgs {

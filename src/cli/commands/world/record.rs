@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use super::configured;
 use crate::cli::args::ThreadArgs;
 use crate::cli::dry_run::{self, ForecastAnswer, RequestForecast};
 use crate::cli::exec::ExecArgs;
@@ -225,13 +226,6 @@ impl RecordArgs {
         &self.out
     }
 
-    fn world(&self) -> Result<WorldConfig, Failure> {
-        match &self.config {
-            Some(path) => WorldConfig::load(path).map_err(Failure::input),
-            None => Ok(WorldConfig::default()),
-        }
-    }
-
     fn planned(&self, config: &WorldConfig) -> Result<Plan, Failure> {
         let experiments = experiments::asked(&self.experiment, config)?;
         let has_hand = Scripted::named(&self.agent).is_none_or(Scripted::has_hand);
@@ -250,7 +244,7 @@ impl RecordArgs {
 
     /// What recording would come to.
     fn forecast(&self) -> Result<ForecastAnswer, Failure> {
-        let config = &self.world()?;
+        let config = &configured(self.config.as_ref())?;
         let plan = &self.planned(config)?;
         let vlm = (self.agent == "vlm").then(|| self.vlm.forecaster(&self.out)).transpose()?.map(Arc::new);
         let player = match &vlm {
@@ -270,7 +264,7 @@ impl RecordArgs {
 
     /// Records with this player, whatever `--agent` names, until all is done or `stop` is set. Only progress is told.
     pub fn record(&self, player: &dyn Player, stop: &AtomicBool) -> Result<Recorded, Failure> {
-        let config = &self.world()?;
+        let config = &configured(self.config.as_ref())?;
         let plan = &self.planned(config)?;
         let subject = &self.subject(player);
         let recording = self.recordings(config, plan, player)?;

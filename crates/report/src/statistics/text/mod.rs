@@ -152,6 +152,11 @@ fn sections(statistics: &Statistics, shown: tables::Shown, length: Length, perce
     let further = || {
         [
             (
+                "Ranks that the tests leave open: one more than the models shown to be better, to all but those shown to be worse"
+                    .to_owned(),
+                tables::ranks(statistics, shown),
+            ),
+            (
                 format!(
                     "How often one model decides earlier than another, averaged over experiments; who never decides is the \
                      latest; stratified bootstrap, {percent} percentile intervals"

@@ -209,6 +209,16 @@ pub(super) fn overall(statistics: &Statistics, shown: Shown, is_full: bool) -> T
     Table::plain(&["metric", "first", "second", "test"], &numbers).with(lines)
 }
 
+/// The ranks of each model that the tests leave open.
+pub(super) fn ranks(statistics: &Statistics, shown: Shown) -> Table {
+    let lines = statistics.ranks.iter().filter(|row| shown(&row.metric)).map(|row| {
+        let experiment = row.experiment.as_deref().unwrap_or("all");
+        let ranks = if row.best == row.worst { row.best.to_string() } else { format!("{}-{}", row.best, row.worst) };
+        [experiment, &row.metric, &row.model].map(str::to_owned).into_iter().chain([ranks])
+    });
+    Table::plain(&["experiment", "metric", "model"], &["ranks"]).with(lines)
+}
+
 pub(super) fn improvements(statistics: &Statistics, shown: Shown) -> Table {
     let lines = statistics.improvements.iter().filter(|row| shown(&row.metric)).map(|row| {
         let names = [&row.metric, &row.first, &row.second].map(Clone::clone);

@@ -32,7 +32,8 @@ pub fn render(table: &Table, terminal: Terminal) -> String {
     }
     if terminal.emphasis == Marks::Signs {
         let has = |sign| table.cells().any(|cell| cell.emphasis == sign);
-        let signs = [(Emphasis::Bold, "*best*"), (Emphasis::Underline, "_second best_")];
+        let best = if table.is_tied { "*tied for the best*" } else { "*best*" };
+        let signs = [(Emphasis::Bold, best), (Emphasis::Underline, "_second best_")];
         let used: Vec<&str> = signs.iter().filter(|(sign, _)| has(*sign)).map(|(_, words)| *words).collect();
         lines.extend((!used.is_empty()).then(|| format!("Marked as {}.", used.join(", "))));
     }

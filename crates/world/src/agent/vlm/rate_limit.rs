@@ -117,7 +117,7 @@ mod tests {
         assert_eq!(used_up(&headers(&tokens_left)), Some(Duration::from_millis(60_500)));
         let anthropic = [
             ("anthropic-ratelimit-tokens-remaining", "0"),
-            ("anthropic-ratelimit-tokens-reset", "2999-01-01T00:00:00Z"),
+            ("anthropic-ratelimit-tokens-reset", "2199-01-01T00:00:00Z"),
         ];
         assert!(used_up(&headers(&anthropic)).is_some_and(|wait| wait > Duration::from_hours(24)));
         assert_eq!(used_up(&headers(&[("x-ratelimit-remaining-requests", "0")])), None);

@@ -12,13 +12,20 @@ use trace::palette::Color;
 pub struct Mark {
     /// Where on the body.
     pub part: Part,
-    /// Of its paint.
+    /// Of its paint: a colour, or `random`, which is never that of its wearer.
+    #[serde(default)]
     pub color: MarkColor,
-    /// The first step that shows it.
+    /// The first step that shows it, at most the experiment's `steps`.
+    #[serde(default = "first")]
+    #[schemars(range(min = 1, max = 100_000))]
     pub from_t: u32,
     /// Who wears it.
     #[serde(default)]
     pub on: Wearer,
+}
+
+const fn first() -> u32 {
+    1
 }
 
 /// Where on a body a mark is. No direct view reaches any of these on one's own body.
@@ -38,10 +45,11 @@ pub enum Part {
 names!(Part { Head: "head", Back: "back", Chest: "chest", Front: "front" });
 
 /// The colour of a mark.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum MarkColor {
     /// Drawn: never that of its wearer.
+    #[default]
     Random,
     /// This one; another one where its wearer has this colour.
     #[serde(untagged)]

@@ -1,23 +1,20 @@
-//! Mirrors and windows, key by key.
+//! Mirrors and windows.
 
-use super::{millimetres, missing, no_color, pairs};
-use crate::experiment::limits::LATEST;
-use crate::experiment::spec::{BodyShown, MOST_PANES, Paint, Pane, PaneKind, Wall};
-use toml_spec::Keys;
-use toml_spec::{Fault, Place};
-use trace::palette::Color;
+use super::millimetres;
+use crate::experiment::schema::MirrorTable;
+use crate::experiment::spec::{BodyShown, Paint, Pane, PaneKind, Wall};
+use toml_spec::{At, Fault};
 
 /// The `[[experiment.NAME.mirror]]` tables.
-pub(super) fn panes(keys: &mut Keys<'_>, faults: &mut Vec<Fault>) -> Vec<Pane> {
+pub(super) fn panes(tables: &[MirrorTable], list: &At<'_>, faults: &mut Vec<Fault>) -> Vec<Pane> {
     let mut panes: Vec<Pane> = Vec::new();
-    for (place, keys) in keys.list("mirror", MOST_PANES, faults).unwrap_or_default() {
-        let Some(pane) = pane(&place, keys, faults) else { continue };
-        if pane.wall == Wall::Opposite && panes.is_empty() {
-            let message = "the first mirror is across from no other";
-            faults.push(Fault::new(place.clone(), message).help("use `wall = \"random\"`"));
-        }
-        if let Some(message) = quarrel(&panes, pane.wall) {
-            faults.push(Fault::new(place.clone(), message).help("use `wall = \"random\"`"));
+    for (n, table) in tables.iter().enumerate() {
+        let at = list.item(n);
+        let Some(pane) = pane(table, &at, faults) else { continue };
+        let is_across_from_none = pane.wall == Wall::Opposite && panes.is_empty();
+        let across = is_across_from_none.then_some("the first mirror is across from no other");
+        for message in across.into_iter().chain(quarrel(&panes, pane.wall)) {
+            faults.push(at.fault(message).help("use `wall = \"random\"`"));
         }
         panes.push(pane);
     }
@@ -45,57 +42,32 @@ fn quarrel(before: &[Pane], wall: Wall) -> Option<&'static str> {
     }
 }
 
-fn pane(place: &Place, mut keys: Keys<'_>, faults: &mut Vec<Fault>) -> Option<Pane> {
+fn pane(table: &MirrorTable, at: &At<'_>, faults: &mut Vec<Fault>) -> Option<Pane> {
     let before = faults.len();
-    let kind = keys.choice("kind", &pairs(PaneKind::ALL, PaneKind::name), faults).unwrap_or(PaneKind::Mirror);
-    let least = u32::from(kind == PaneKind::Delayed);
-    let delay = keys.count("delay", [least, LATEST], faults);
-    let color = keys.text("color", faults);
-    let body_place = keys.value_place("body");
-    let body = keys.choice("body", &pairs(BodyShown::ALL, BodyShown::name), faults).unwrap_or_default();
-    let wall = keys.choice("wall", &pairs(Wall::ALL, Wall::name), faults).unwrap_or_default();
-    let width_mm = keys.length("width", [0.5, 10.0], faults).map(|(width, _)| millimetres(width));
-    let height_mm = keys.length("height", [0.5, 5.0], faults).map(|(height, _)| millimetres(height));
-    let bottom_mm = keys.length("bottom", [0.0, 3.0], faults).map(|(bottom, _)| millimetres(bottom));
-    keys.refuse_the_rest(faults);
-    let misplaced =
-        |key: &str, place: Place| Fault::new(place, format!("a mirror of the kind `{}` has no `{key}`", kind.name()));
-    match (&delay, kind) {
-        (None, PaneKind::Delayed) => faults.push(missing(place, "delay", "5")),
-        (Some((_, at)), PaneKind::Window) => faults.push(misplaced("delay", at.clone())),
-        _ => {}
+    let kind = table.kind.unwrap_or(PaneKind::Mirror);
+    let body = table.body.unwrap_or_default();
+    let delay = table.delay.unwrap_or_default();
+    if kind == PaneKind::Delayed && delay == 0 {
+        faults.push(at.key("delay").fault("a mirror of the kind `delayed` needs a `delay` of 1 or more"));
     }
     let shows_a_body = matches!(kind, PaneKind::Decoy | PaneKind::Window);
-    let color = match color {
-        None if shows_a_body && body == BodyShown::Own => Paint::Other,
-        None => Paint::Own,
-        Some((_, at)) if !shows_a_body => {
-            faults.push(misplaced("color", at));
-            Paint::Own
+    for (key, is_misplaced) in
+        [("delay", kind == PaneKind::Window), ("color", !shows_a_body), ("body", kind != PaneKind::Decoy)]
+    {
+        if let Some(at) = at.get(key).filter(|_| is_misplaced) {
+            faults.push(at.fault(format!("a mirror of the kind `{}` has no `{key}`", kind.name())));
         }
-        Some((name, at)) => paint(&name, at, faults),
-    };
-    if let Some(at) = body_place.filter(|_| kind != PaneKind::Decoy) {
-        faults.push(misplaced("body", at));
     }
+    let of_another = if shows_a_body && body == BodyShown::Own { Paint::Other } else { Paint::Own };
+    let color = table.color.unwrap_or(of_another);
     if kind == PaneKind::Decoy && body == BodyShown::Own && color == Paint::Own {
-        let fault = Fault::new(place.clone(), "a decoy of the own body in its own colour is a mirror");
+        let fault = at.fault("a decoy of the own body in its own colour is a mirror");
         faults.push(fault.help("use `color = \"other\"` or `body = \"independent\"`"));
     }
-    let delay = delay.map(|(delay, _)| delay).unwrap_or_default();
     // A mirror that is late is a late mirror, by whichever key it says so.
     let kind = if kind == PaneKind::Mirror && delay > 0 { PaneKind::Delayed } else { kind };
-    (faults.len() == before).then_some(Pane { kind, delay, color, body, wall, width_mm, height_mm, bottom_mm })
-}
-
-fn paint(name: &str, place: Place, faults: &mut Vec<Fault>) -> Paint {
-    match (name, Color::named(name)) {
-        ("own", _) => Paint::Own,
-        ("other", _) => Paint::Other,
-        (_, Some(color)) => Paint::Named(color),
-        (_, None) => {
-            faults.push(no_color(name, place).help("or `own`, or `other`"));
-            Paint::Own
-        }
-    }
+    let [width_mm, height_mm, bottom_mm] =
+        [table.width, table.height, table.bottom].map(|length| length.map(millimetres));
+    let pane = Pane { kind, delay, color, body, wall: table.wall.unwrap_or_default(), width_mm, height_mm, bottom_mm };
+    (faults.len() == before).then_some(pane)
 }

@@ -1,24 +1,23 @@
 //! Every size, speed, light and threshold of the world, from one documented file.
 //!
 //! `assets/world/default.toml` is the world of the study. A file of one's own lies over it: it says what differs.
-//! Rule: what is loaded has been checked; a key that is unknown, of another type or out of its range is refused with
-//! the file, the line, the key and what it may be. The hash is of the values, not of the text that gave them.
-
-mod limits;
-mod overlay;
+//! Rule: what is loaded has been checked; every key that is unknown, of another type, out of its range or does not fit
+//! another is refused. The hash is of the values, not of the text that gave them.
 
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::LazyLock;
+use std::sync::{Arc, LazyLock};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use toml::{Table, Value};
 
 use crate::experiment::Experiment;
 use crate::experiment::spec::{Camera, Cubes, Others};
 use exact::budget::Limit;
 use exact::hash;
 use exact::input;
+use toml_spec::{At, Fault, Faults, Shape, Source};
 
 const DEFAULT: &str = include_str!("../../../../../assets/world/default.toml");
 
@@ -59,20 +58,28 @@ pub struct WorldConfig {
 #[serde(deny_unknown_fields)]
 pub struct RoomConfig {
     /// From wall to wall, m.
+    #[schemars(range(min = 5.0, max = 12.0))]
     pub size: f64,
     /// From floor to ceiling, m.
+    #[schemars(range(min = 2.0, max = 5.0))]
     pub height: f64,
     /// Every other tile of the floor.
+    #[schemars(inner(range(min = 0.0, max = 1.0)))]
     pub floor_color: [f64; 3],
     /// The tiles between.
+    #[schemars(inner(range(min = 0.0, max = 1.0)))]
     pub tile_color: [f64; 3],
     /// Edge of a tile, m.
+    #[schemars(range(min = 0.1, max = 2.0))]
     pub tile_size: f64,
     /// The walls at +x and -x.
+    #[schemars(inner(range(min = 0.0, max = 1.0)))]
     pub wall_color: [f64; 3],
     /// The walls at +y and -y.
+    #[schemars(inner(range(min = 0.0, max = 1.0)))]
     pub side_wall_color: [f64; 3],
     /// The ceiling.
+    #[schemars(inner(range(min = 0.0, max = 1.0)))]
     pub ceiling_color: [f64; 3],
 }
 
@@ -81,12 +88,15 @@ pub struct RoomConfig {
 #[serde(deny_unknown_fields)]
 pub struct MirrorConfig {
     /// Along the wall, m.
+    #[schemars(range(min = 0.5, max = 10.0))]
     pub width: f64,
     /// m.
+    #[schemars(range(min = 0.5, max = 5.0))]
     pub height: f64,
     /// The height of its centre, m.
     pub center_height: f64,
     /// Between its face and the wall, m.
+    #[schemars(range(min = 0.005, max = 0.1))]
     pub gap: f64,
 }
 
@@ -95,12 +105,16 @@ pub struct MirrorConfig {
 #[serde(deny_unknown_fields)]
 pub struct BodyConfig {
     /// Of the upright cylinder that is a body to walls, cubes and other bodies, m.
+    #[schemars(range(min = 0.39, max = 0.6))]
     pub radius: f64,
     /// Of the agent's own steps, m.
+    #[schemars(range(min = 0.1, max = 1.0))]
     pub step_length: f64,
     /// Of each leg after a step, degrees.
+    #[schemars(range(min = 0.0, max = 15.0))]
     pub leg_swing: f64,
     /// Of each arm after a step, degrees.
+    #[schemars(range(min = 0.0, max = 20.0))]
     pub arm_swing: f64,
 }
 
@@ -109,25 +123,35 @@ pub struct BodyConfig {
 #[serde(deny_unknown_fields)]
 pub struct EyeConfig {
     /// Before the body's axis, m.
+    #[schemars(range(min = 0.12, max = 0.25))]
     pub forward: f64,
     /// Above the floor, m.
+    #[schemars(range(min = 1.4, max = 1.58))]
     pub height: f64,
     /// The vertical field of view, degrees.
+    #[schemars(range(min = 30.0, max = 115.0))]
     pub fovy: f64,
     /// How far below the horizon it looks, degrees; only experiments whose camera is not the eye have it.
     #[serde(default, skip_serializing_if = "is_level")]
+    #[schemars(range(min = 0.0, max = 0.0))]
     pub pitch: f64,
     /// Pixels in a row.
+    #[schemars(range(min = 16, max = 1920))]
     pub width: u32,
     /// Rows.
+    #[schemars(range(min = 12, max = 1440))]
     pub height_px: u32,
     /// Samples per pixel when drawing.
+    #[schemars(range(min = 0, max = 16))]
     pub samples: u32,
     /// Slices of a round part when drawing, about its axis.
+    #[schemars(range(min = 6, max = 64))]
     pub slices: u32,
     /// Slices along its axis.
+    #[schemars(range(min = 4, max = 64))]
     pub stacks: u32,
     /// Divisions of a flat part.
+    #[schemars(range(min = 1, max = 16))]
     pub quads: u32,
 }
 
@@ -141,14 +165,19 @@ fn is_level(pitch: &f64) -> bool {
 #[serde(deny_unknown_fields)]
 pub struct LightsConfig {
     /// From everywhere.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub head_ambient: f64,
     /// From the eye.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub head_diffuse: f64,
     /// From each of the four lamps, one per wall.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub lamp_diffuse: f64,
     /// How far below the horizon the lamps point, degrees.
+    #[schemars(range(min = 0.0, max = 85.0))]
     pub lamp_slope: f64,
     /// From below.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub floor_diffuse: f64,
 }
 
@@ -157,6 +186,7 @@ pub struct LightsConfig {
 #[serde(deny_unknown_fields)]
 pub struct CubesConfig {
     /// m.
+    #[schemars(range(min = 0.2, max = 1.0))]
     pub edge: f64,
     /// Between two centres at least, m.
     pub spacing: f64,
@@ -169,14 +199,19 @@ pub struct CubesConfig {
 #[serde(deny_unknown_fields)]
 pub struct OthersConfig {
     /// How many at least.
+    #[schemars(range(min = 1, max = 6))]
     pub least: u32,
     /// How many at most.
+    #[schemars(range(min = 1, max = 6))]
     pub most: u32,
     /// Of their steps, m.
+    #[schemars(range(min = 0.05, max = 0.6))]
     pub step_length: f64,
     /// Of a hundred episodes, those where one of them has the colour of the agent's own body.
+    #[schemars(range(min = 0, max = 100))]
     pub twin_percent: u32,
     /// Ticks that one waits for a body in its way before it turns away.
+    #[schemars(range(min = 0, max = 100))]
     pub patience: u32,
 }
 
@@ -185,16 +220,22 @@ pub struct OthersConfig {
 #[serde(deny_unknown_fields)]
 pub struct ClutterConfig {
     /// How many at least.
+    #[schemars(range(min = 0, max = 12))]
     pub least: u32,
     /// How many at most.
+    #[schemars(range(min = 0, max = 12))]
     pub most: u32,
     /// The sizes to draw from, m.
+    #[schemars(length(min = 1, max = 16), inner(range(min = 0.2, max = 1.0)))]
     pub edges: Vec<f64>,
     /// Of a hundred cubes, those that stand before the mirror.
+    #[schemars(range(min = 0, max = 100))]
     pub before_mirror_percent: u32,
     /// Of a hundred cubes, those that have another on top.
+    #[schemars(range(min = 0, max = 100))]
     pub stack_percent: u32,
     /// Of a hundred places before the mirror, those from which they hide half of the body or more, at least.
+    #[schemars(range(min = 0, max = 100))]
     pub hides_percent: u32,
     /// Between the mirror's wall and the centre of a cube before it at most, m.
     pub mirror_distance: f64,
@@ -205,8 +246,10 @@ pub struct ClutterConfig {
 #[serde(deny_unknown_fields)]
 pub struct PlacementConfig {
     /// Between a cube, or the mirror's edge, and the next wall at least, m.
+    #[schemars(range(min = 0.05, max = 1.0))]
     pub wall_margin: f64,
     /// Between a body and anything else at the start at least, m.
+    #[schemars(range(min = 0.05, max = 1.0))]
     pub clearance: f64,
 }
 
@@ -215,6 +258,7 @@ pub struct PlacementConfig {
 #[serde(deny_unknown_fields)]
 pub struct EvidenceConfig {
     /// Pixels that show the own body by way of the mirror, at least.
+    #[schemars(range(min = 1, max = 1_000_000))]
     pub mirror_self_px: u32,
 }
 
@@ -223,6 +267,7 @@ pub struct EvidenceConfig {
 #[serde(deny_unknown_fields)]
 pub struct EpisodeConfig {
     /// Steps after which it ends by itself.
+    #[schemars(range(min = 1, max = 100_000))]
     pub steps: u32,
 }
 
@@ -232,18 +277,8 @@ pub struct EpisodeConfig {
 pub enum ConfigError {
     #[error("world configuration {}: cannot read the file: {source}", path.display())]
     Unreadable { path: PathBuf, source: io::Error },
-    #[error("world configuration {}: {fault}", path.display())]
-    Faulty { path: PathBuf, fault: Fault },
-}
-
-/// One thing wrong with a configuration.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{}{text}", line.map_or_else(String::new, |line| format!("line {line}: ")))]
-pub struct Fault {
-    /// Where, from 1; `None` where the value is not of the file.
-    pub line: Option<usize>,
-    /// What was expected, what was found, what to do.
-    pub text: String,
+    #[error(transparent)]
+    Faults(#[from] Faults),
 }
 
 impl Default for WorldConfig {
@@ -265,16 +300,57 @@ impl WorldConfig {
     pub fn load(path: &Path) -> Result<Self, ConfigError> {
         let text =
             input::text(path, LARGEST).map_err(|source| ConfigError::Unreadable { path: path.to_owned(), source })?;
-        Self::from_toml(&text).map_err(|fault| ConfigError::Faulty { path: path.to_owned(), fault })
+        Ok(Self::read(Source { name: path.display().to_string(), text })?)
     }
 
     /// The default with the values of `text` over it.
-    pub fn from_toml(text: &str) -> Result<Self, Fault> {
-        let config = overlay::over_default(DEFAULT, text)?;
-        match limits::first_fault(&config) {
-            None => Ok(config),
-            Some((key, words)) => Err(Fault { line: overlay::line_of(text, key), text: words }),
+    pub fn from_toml(text: &str) -> Result<Self, Faults> {
+        Self::read(Source { name: "world configuration".to_owned(), text: text.to_owned() })
+    }
+
+    fn read(source: Source) -> Result<Self, Faults> {
+        let source = Arc::new(source);
+        let (root, mut faults) = toml_spec::parse(&source);
+        let at = At::root(&source, &root);
+        let is_toml = faults.is_empty();
+        let own = is_toml.then(|| Shape::of::<Self>().overlay().value(&at, "a world", &mut faults)).flatten();
+        if !faults.is_empty() {
+            return Err(Faults(faults).in_order());
         }
+        let mut merged = Value::Table(DEFAULT.parse().expect("the built-in configuration is tested to load"));
+        if let Some(own) = own {
+            lay(&mut merged, own);
+        }
+        let config: Self = merged.try_into().expect("values of the schema, over those of the default");
+        let faults = config.relations(&at);
+        if faults.is_empty() { Ok(config) } else { Err(Faults(faults).in_order()) }
+    }
+
+    /// The values that do not fit others.
+    fn relations(&self, at: &At<'_>) -> Vec<Fault> {
+        let Self { room, mirror, cubes, others, clutter, placement, .. } = self;
+        let above = room.height - mirror.height / 2.0;
+        let limits = [
+            (["mirror", "width"], mirror.width, 0.5, room.size - 2.0 * placement.wall_margin),
+            (["mirror", "center_height"], mirror.center_height, mirror.height / 2.0, above),
+            (["others", "least"], f64::from(others.least), 1.0, f64::from(others.most)),
+            (["clutter", "least"], f64::from(clutter.least), 0.0, f64::from(clutter.most)),
+            (["cubes", "spacing"], cubes.spacing, 1.5 * cubes.edge, (room.size / 3.0 * 100.0).floor() / 100.0),
+            (
+                ["cubes", "mirror_distance"],
+                cubes.mirror_distance,
+                cubes.edge / 2.0 + placement.wall_margin,
+                room.size / 2.0,
+            ),
+            (["clutter", "mirror_distance"], clutter.mirror_distance, 1.0, room.size / 2.0),
+        ];
+        let fault = |([table, key], value, least, most): ([&str; 2], f64, f64, f64)| {
+            // Written so that what is no number is a fault too.
+            let holds = value >= least && value <= most;
+            let message = format!("`{table}.{key}` may be {least} to {most}, but is {value}");
+            (!holds).then(|| at.key(table).key(key).fault(message))
+        };
+        limits.into_iter().filter_map(fault).collect()
     }
 
     /// The world as an experiment has it: what the experiment says of lengths and counts lies over this.
@@ -323,6 +399,18 @@ const BEHIND: (f64, f64, f64) = (-1.1, 2.0, 15.255_118_7);
 
 pub fn metres(millimetres: u32) -> f64 {
     f64::from(millimetres) / 1000.0
+}
+
+/// Puts the values of a table over those of another, key by key.
+fn lay(under: &mut Value, over: Value) {
+    match (under, over) {
+        (Value::Table(under), Value::Table(over)) => {
+            for (key, value) in over {
+                lay(under.entry(key).or_insert_with(|| Value::Table(Table::new())), value);
+            }
+        }
+        (under, over) => *under = over,
+    }
 }
 
 #[cfg(test)]

@@ -1,0 +1,106 @@
+//! What is asked of the inputs: definitions, a filter, metrics, groups.
+
+use std::path::{Path, PathBuf};
+
+use ::report::cells::group::{CONDITION, DEFAULT_BY, KEY_COLUMNS};
+use metric::columns::Columns;
+use metric::definitions::Definitions;
+use score::declared_experiments::declare;
+use score::score_traces;
+use score::table::EpisodeTable;
+use trace::open::TraceSet;
+
+use crate::StudyError;
+use crate::losses::LostAs;
+use crate::scored_alike::ScoredAlike;
+
+/// What scores say of each episode's recording, where the traces do.
+pub(crate) const STANDING_LABELS: [&str; 4] = [CONDITION, "scene", "fingerprint", "participant"];
+
+/// The definitions that are used where none are named.
+pub const DEFAULT_DEFINITIONS: &str = "paper";
+
+/// What is asked of the inputs.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Question {
+    /// Definitions by name or path; those that scores carry, or that the experiments of the traces name, if absent.
+    pub definitions: Option<PathBuf>,
+    /// Whether experiments that need different definitions are each scored by their own, beside each other; else refused.
+    pub each: bool,
+    /// These definitions, found in the traces.
+    pub parts: Vec<ScoredAlike>,
+    /// A condition on episodes in the language of definitions; all episodes if absent.
+    pub filter: Option<String>,
+    /// The metrics wanted, by name; all if absent.
+    pub metrics: Option<Vec<String>>,
+    /// The columns that cells are grouped by; experiment and model if absent, and the condition where there is more than the
+    /// default one.
+    pub by: Option<Vec<String>>,
+    /// Whether a cell may hold episodes that were recorded differently.
+    pub pool: bool,
+    /// What lost episodes count as.
+    pub lost: LostAs,
+}
+
+impl Question {
+    /// The definition file asked for, or the default one.
+    pub(crate) fn definitions_name(&self) -> &Path {
+        self.definitions.as_deref().unwrap_or(Path::new(DEFAULT_DEFINITIONS))
+    }
+
+    /// The columns among those to group by that a score does not have by itself.
+    pub(crate) fn labels(&self) -> Vec<String> {
+        self.by.iter().flatten().filter(|name| !KEY_COLUMNS.contains(&name.as_str())).cloned().collect()
+    }
+
+    /// The labels of scores of these traces: the columns to group by, and what the traces say of each episode's recording.
+    pub(crate) fn labels_over(&self, traces: &TraceSet) -> Vec<String> {
+        let mut labels = self.labels();
+        let standing = STANDING_LABELS.into_iter().filter(|name| traces.declares(name));
+        for name in standing {
+            if !labels.iter().any(|label| label == name) {
+                labels.push(name.to_owned());
+            }
+        }
+        labels
+    }
+
+    /// The columns that cells of these episodes are grouped by.
+    pub(crate) fn by_over(&self, episodes: &EpisodeTable) -> Vec<String> {
+        let default = || {
+            let condition = episodes.has_conditions().then_some(CONDITION);
+            DEFAULT_BY.into_iter().chain(condition).map(str::to_owned).collect()
+        };
+        self.by.clone().unwrap_or_else(default)
+    }
+
+    /// The definitions asked for, with every column that they read in every trace, and the experiments that these declare.
+    pub(crate) fn bind(&self, traces: &TraceSet) -> Result<Definitions, StudyError> {
+        let asked = self.clone().resolved(traces)?;
+        let mut definitions = asked.bind_to(&score_traces::trace_columns(traces))?;
+        score_traces::check_columns(traces, &definitions)?;
+        declare(&mut definitions.catalog, traces)?;
+        Ok(definitions)
+    }
+
+    /// The definitions asked for over some columns.
+    pub fn bind_to(&self, columns: &Columns) -> Result<Definitions, StudyError> {
+        let mut definitions = self.load(columns)?;
+        if let Some(filter) = &self.filter {
+            definitions = definitions.filtered("--where", filter, columns)?;
+        }
+        if let Some(metrics) = &self.metrics {
+            definitions.select(metrics)?;
+        }
+        Ok(definitions)
+    }
+}
+
+/// The experiments that some definitions know; any if `None`.
+///
+/// # Errors
+/// Every fault of the definitions.
+pub fn known_experiments(definitions: &Path) -> Result<Option<Vec<String>>, StudyError> {
+    let catalog = Definitions::load(definitions, &score_traces::schema_columns())?.catalog;
+    Ok((!catalog.open).then(|| catalog.experiment.keys().cloned().collect()))
+}

@@ -1,0 +1,99 @@
+//! Values of a TOML text with their locations.
+
+use std::ops::Range;
+use std::str::FromStr;
+use std::sync::Arc;
+
+use toml::Spanned;
+use toml::de::DeValue;
+
+use crate::fault::{Fault, Place, Source};
+
+/// A value of a TOML text: what it is called and where it is.
+#[derive(Clone, Debug)]
+pub struct At<'a> {
+    source: &'a Arc<Source>,
+    /// Its key; an entry of a list has that of the list.
+    pub(crate) name: &'a str,
+    name_span: Range<usize>,
+    span: Range<usize>,
+    pub(crate) value: &'a DeValue<'a>,
+}
+
+impl<'a> At<'a> {
+    /// The whole text.
+    pub fn root(source: &'a Arc<Source>, value: &'a DeValue<'a>) -> Self {
+        Self { source, name: "", name_span: 0..0, span: 0..0, value }
+    }
+
+    /// The entries of a table, in the order of the text; none if it is not a table.
+    pub fn entries(&self) -> impl Iterator<Item = (&'a str, Self)> {
+        let entries = self.value.as_table().into_iter().flat_map(|table| table.iter());
+        let source = self.source;
+        entries.map(move |(key, value)| {
+            let name = key.get_ref().as_ref();
+            (name, Self { source, name, name_span: key.span(), span: value.span(), value: value.get_ref() })
+        })
+    }
+
+    /// The items of a list; none if it is not a list.
+    pub fn items(&self) -> impl Iterator<Item = Self> {
+        let items = self.value.as_array().into_iter().flat_map(|array| array.iter());
+        let (source, name) = (self.source, self.name);
+        items.map(move |item: &'a Spanned<DeValue<'a>>| Self {
+            source,
+            name,
+            name_span: item.span(),
+            span: item.span(),
+            value: item.get_ref(),
+        })
+    }
+
+    /// The value of a key, if it is present.
+    pub fn get(&self, key: &str) -> Option<Self> {
+        self.entries().find(|(name, _)| *name == key).map(|(_, value)| value)
+    }
+
+    /// The value of a key; the table itself if the key is absent.
+    #[must_use]
+    pub fn key(&self, key: &str) -> Self {
+        self.get(key).unwrap_or_else(|| self.clone())
+    }
+
+    /// An item of a list; the list itself if it has fewer.
+    #[must_use]
+    pub fn item(&self, n: usize) -> Self {
+        self.items().nth(n).unwrap_or_else(|| self.clone())
+    }
+
+    /// The text as it is written, quotes excluded; empty for tables and lists.
+    pub fn written(&self) -> &'a str {
+        match self.value {
+            DeValue::String(text) => text,
+            DeValue::Float(number) => number.as_str(),
+            DeValue::Integer(number) => number.as_str(),
+            _ => "",
+        }
+    }
+
+    /// The text as a value.
+    pub fn parse<T: FromStr<Err: Into<String>>>(&self, faults: &mut Vec<Fault>) -> Option<T> {
+        self.written().parse().map_err(|error: T::Err| faults.push(self.fault(error))).ok()
+    }
+
+    /// Location of the value.
+    pub fn place(&self) -> Place {
+        Place { source: self.source.clone(), span: self.span.clone() }
+    }
+
+    /// Location of the key.
+    pub fn name_place(&self) -> Place {
+        Place { source: self.source.clone(), span: self.name_span.clone() }
+    }
+
+    /// A fault of the value. A table is underlined at its name: its own bytes may be many lines.
+    pub fn fault(&self, message: impl Into<String>) -> Fault {
+        let place = if self.value.is_table() { self.name_place() } else { self.place() };
+        Fault::new(place, message)
+    }
+}

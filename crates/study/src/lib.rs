@@ -281,10 +281,16 @@ impl Study {
     }
 
     /// The tables of these episodes, each with the filter that chose them.
-    fn tables(&self, episodes: &EpisodeTable, cells: &Cells, style: &Style) -> Result<Vec<MetricTable>, StudyError> {
+    fn tables(
+        &self,
+        episodes: &EpisodeTable,
+        lost: &LostCounts,
+        cells: &Cells,
+        style: &Style,
+    ) -> Result<Vec<MetricTable>, StudyError> {
         let mut tables = layout::tables(cells, style)?;
         if tables.iter().any(|table| table.is_tied) {
-            let ties = Ties::of(episodes, design_of(&episodes.declared), self.question.pool)?;
+            let ties = Ties::of(episodes, &self.undecided(lost), design_of(&episodes.declared), self.question.pool)?;
             for table in &mut tables {
                 table.mark_ties(&ties, &style.sheet.emphasis_note);
             }
@@ -327,12 +333,17 @@ impl Study {
         self.source.traces().ok().and_then(|traces| stale_note(traces.files()))
     }
 
+    /// Lost episodes that count neither as successes nor as failures.
+    fn undecided(&self, lost: &LostCounts) -> LostCounts {
+        if self.question.lost == LostAs::Nothing { lost.clone() } else { LostCounts::default() }
+    }
+
     /// The statistics of the episodes that count.
     fn statistics_of(&self, counted: &Counted, cells: &Cells, options: &Options) -> Result<Statistics, StudyError> {
         let Counted { results, lost, .. } = counted;
         let declared = &results.episodes.declared;
         let (is_known, total) = (results.lost.is_some() || declared.losses_recorded || !lost.is_empty(), lost.total());
-        let beside = if self.question.lost == LostAs::Nothing { lost.clone() } else { LostCounts::default() };
+        let beside = self.undecided(lost);
         let (design, selection) = (design_of(declared), self.selection(&results.episodes));
         let replies = results.quality.as_ref().and_then(Replies::of);
         let lost = is_known.then_some(beside);
@@ -427,7 +438,8 @@ impl Study {
         let published = published::read(published)?;
         let style = Style::load(style)?;
         let counted = self.counted(self.score()?);
-        let tables = self.tables(&counted.results.episodes, &self.cells_of(&counted.results.episodes)?, &style)?;
+        let tables =
+            self.tables(&counted.results.episodes, &counted.lost, &self.cells_of(&counted.results.episodes)?, &style)?;
         Ok(compare(choose(&tables, &published, table, &style)?, &published, errata))
     }
 

@@ -51,7 +51,7 @@ impl Study {
             Part::Statistics => Some(self.statistics_of(&counted, &cells, &Options::default())?),
             Part::Tables | Part::Figures => None,
         };
-        let Counted { results, .. } = counted;
+        let Counted { results, lost, .. } = counted;
         let drawings = match part {
             Part::Figures => FigureInputs::of(&results, &style)?.draw_all(),
             Part::Tables | Part::Statistics => super::Drawings::default(),
@@ -60,7 +60,7 @@ impl Study {
         let figures: Vec<Figure> =
             drawings.drawn.iter().zip(&svgs).map(|((name, drawn), svg)| figure_of(*name, drawn, svg)).collect();
         let quality = results.quality.as_ref().and_then(QualityTable::from_cells);
-        let tables = self.tables(&results.episodes, &cells, &style)?;
+        let tables = self.tables(&results.episodes, &lost, &cells, &style)?;
         let manifest =
             Manifest::new(&cells, &style, SCHEMA_VERSION, self.question.filter.clone(), results.inputs.clone());
         let names: &[&str] = match part {

@@ -112,7 +112,7 @@ impl Study {
         let Counted { results, all, lost } = counted;
         let quality = results.quality.as_ref().and_then(QualityTable::from_cells);
         let replies = results.quality.as_ref().and_then(Replies::of).and_then(|replies| replies.sentence());
-        let tables = self.tables(&results.episodes, &cells, &style)?;
+        let tables = self.tables(&results.episodes, &lost, &cells, &style)?;
         let filter = self.question.filter.clone();
         let manifest = Manifest::new(&cells, &style, SCHEMA_VERSION, filter, results.inputs.clone());
         let mut notes = self.notes(&results, &lost);

@@ -13,6 +13,7 @@ use super::study::Study;
 use super::{Family, OverallRow};
 use crate::cells::interval::CONFIDENCE;
 use exact::moments::MomentOverflow;
+use score::lost_counts::LostCounts;
 use score::table::EpisodeTable;
 use statistics::design::Design;
 
@@ -77,8 +78,8 @@ impl Ties {
     ///
     /// # Errors
     /// Sums of squares beyond 128 bits.
-    pub fn of(table: &EpisodeTable, design: Design, pool: bool) -> Result<Self, MomentOverflow> {
-        let mut study = Study::of(table, design)?;
+    pub fn of(table: &EpisodeTable, lost: &LostCounts, design: Design, pool: bool) -> Result<Self, MomentOverflow> {
+        let mut study = Study::of(table, design, Some(lost))?;
         study.pool = pool;
         let families = compared(&study, None, CONFIDENCE).0;
         let mut tied = BTreeSet::new();

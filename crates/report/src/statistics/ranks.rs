@@ -78,7 +78,7 @@ impl Ties {
     /// # Errors
     /// Sums of squares beyond 128 bits.
     pub fn of(table: &EpisodeTable, design: Design, pool: bool) -> Result<Self, MomentOverflow> {
-        let mut study = Study::of(table, design)?;
+        let mut study = Study::of(table, design, None)?;
         study.pool = pool;
         let families = compared(&study, None, CONFIDENCE).0;
         let mut tied = BTreeSet::new();

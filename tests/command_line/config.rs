@@ -17,9 +17,10 @@ fn configured(text: &str) -> TempDir {
 }
 
 fn with(folder: &Path, variables: &[(&str, &str)], arguments: &[&str]) -> Answer {
-    // Who writes schemas anew has set a variable of the tests.
+    // `make bless` sets variables of the tests.
     let mut program = program(folder);
-    program.env_remove("MIRRORSTATS_WRITE_SCHEMAS").args(arguments).envs(variables.iter().copied());
+    program.env_remove("MIRRORSTATS_WRITE_SCHEMAS").env_remove("MIRRORSTATS_WRITE_REFERENCE");
+    program.args(arguments).envs(variables.iter().copied());
     answer(&mut program)
 }
 

@@ -49,6 +49,21 @@ impl Study {
         Ok(gate)
     }
 
+    /// The first metric that has a better direction.
+    ///
+    /// # Errors
+    /// As [`Study::score`]; definitions without such a metric.
+    pub fn leading_metric(&self) -> Result<String, StudyError> {
+        let catalog = match &self.source {
+            Source::Traces(traces) => self.question.bind(traces)?.catalog,
+            Source::Scores(_) => self.score()?.episodes.catalog,
+        };
+        let mut metrics = catalog.metric.iter();
+        let found = metrics.find(|(_, metric)| metric.better != Better::Neither).map(|(name, _)| name.clone());
+        let first = || catalog.metric.keys().next().cloned().unwrap_or_default();
+        found.ok_or_else(|| StudyError::NoDirection { metric: first() })
+    }
+
     /// The scores of one side, lost episodes among them.
     fn gated(&self, options: &GateOptions) -> Result<EpisodeTable, StudyError> {
         let table = self.scan(Outputs { losses: true, ..Outputs::default() })?.episodes;

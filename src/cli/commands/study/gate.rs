@@ -22,9 +22,9 @@ pub struct GateArgs {
     /// The episodes after
     #[arg(value_name = "NEW")]
     pub new: OsString,
-    /// The metric
-    #[arg(long, value_name = "METRIC", default_value = "TSA")]
-    pub metric: String,
+    /// The metric [default: the first one of the definitions with a better direction]
+    #[arg(long, value_name = "METRIC")]
+    pub metric: Option<String>,
     /// The largest loss that is accepted, in the unit of the metric
     #[arg(long, value_name = "LOSS", default_value_t = 0.1, value_parser = margin)]
     pub margin: f64,
@@ -71,7 +71,8 @@ impl GateArgs {
         let grouping = GroupingArgs { pool: self.pool, ..GroupingArgs::default() };
         let open = |name| side(name).study(&scoring, &grouping);
         let (base, new) = (open(&self.base)?, open(&self.new)?);
-        let Self { metric, margin, confidence, pool, .. } = self.clone();
+        let metric = self.metric.map_or_else(|| new.leading_metric(), Ok)?;
+        let Self { margin, confidence, pool, .. } = self;
         let gate = new.gate(&base, &GateOptions { metric, margin, confidence, pool })?;
         let format = match self.format {
             Format::Text => Some(GateFormat::Text(terminal::width())),

@@ -6,8 +6,6 @@ pub mod pairs;
 pub mod sequential;
 mod tables;
 
-use std::fmt::Write as _;
-
 use super::{Answer, FEW, Statistics};
 use crate::tables::{Table, push_wrapped};
 use exact::escape::visible;
@@ -184,7 +182,8 @@ fn list(text: &mut String, title: &str, sentences: &[String], width: Option<usiz
     if sentences.is_empty() {
         return;
     }
-    let _ = writeln!(text, "\n{title}");
+    text.push('\n');
+    push_wrapped(text, title, width, 0);
     for sentence in sentences {
         push_wrapped(text, &format!("  - {}", visible(sentence)), width, 4);
     }

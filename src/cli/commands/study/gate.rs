@@ -71,7 +71,10 @@ impl GateArgs {
         let grouping = GroupingArgs { pool: self.pool, ..GroupingArgs::default() };
         let open = |name| side(name).study(&scoring, &grouping);
         let (base, new) = (open(&self.base)?, open(&self.new)?);
-        let metric = self.metric.map_or_else(|| new.leading_metric(), Ok)?;
+        let metric = match self.metric {
+            Some(metric) => metric,
+            None => new.leading_metric()?,
+        };
         let Self { margin, confidence, pool, .. } = self;
         let gate = new.gate(&base, &GateOptions { metric, margin, confidence, pool })?;
         let format = match self.format {

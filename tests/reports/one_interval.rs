@@ -209,7 +209,7 @@ fn every_output_has_the_interval_that_stats_has() {
     assert!(stats[&key("one", "TSA")].is_some(), "a rate has an interval from one episode on");
     // The reader of a table is told why.
     let line = |model: &str| printed.lines().find(|line| line.trim_start().starts_with(model)).unwrap();
-    assert!(line("two").contains("8.5† n=2"), "{printed}");
+    assert!(line("two").contains("*8.5*† n=2"), "{printed}");
     assert!(printed.contains("A mean of fewer than 12 episodes has no interval"), "{printed}");
     let paper = run(at, &["report", "a.parquet", "--style", "paper", "--out", "paper"]).done();
     assert!(!paper.contains("no interval"), "{paper}");
@@ -245,7 +245,7 @@ fn a_filter_is_named_beside_tables_and_verdicts() {
     let told = "Only episodes where `TSA = 1`; the filter chose them by their results";
     // Text wraps nowhere without a terminal.
     let stats = run(at, &[&["stats", "a.parquet"], &by_results[..]].concat()).done();
-    assert!(stats.contains(told) && stats.contains("of episodes that the filter chose by their results"), "{stats}");
+    assert!(stats.contains(told) && stats.contains("(episodes chosen by their results: `TSA = 1`)"), "{stats}");
     let json: Value = run(at, &[&["stats", "a.parquet", "--json"], &by_results[..]].concat()).json();
     assert_eq!(json["where"], serde_json::json!({ "condition": "TSA = 1", "by_results": true }));
     for list in ["conclusions", "warnings"] {

@@ -177,8 +177,13 @@ fn shown(value: &Value) -> String {
 }
 
 /// Why two experiments are not contrasted, or `None`: a contrast needs like tasks, whose chance levels are equal.
+///
+/// An experiment need not give a level for every metric: those that both give decide, or any where they share none.
 pub fn tasks_differ(catalog: &Catalog, baseline: &str, against: &str) -> Option<String> {
-    let differs = |metric: &&String| catalog.chance(baseline, metric) != catalog.chance(against, metric);
+    let levels = |metric: &str| [baseline, against].map(|name| catalog.chance(name, metric));
+    let is_shared = |metric: &&String| levels(metric).iter().all(Option::is_some);
+    let shares = catalog.metric.keys().any(|metric| is_shared(&metric));
+    let differs = |metric: &&String| (!shares || is_shared(metric)) && levels(metric)[0] != levels(metric)[1];
     let metric = catalog.metric.keys().find(differs)?;
     let level = |name: &str| catalog.chance(name, metric).map_or_else(|| "none".to_owned(), |level| level.to_string());
     Some(format!("the chance level of {metric} is {} and {}", level(baseline), level(against)))

@@ -104,6 +104,8 @@ fn a_script_plays_it_and_reports_show_it_beside_the_five() {
 #[test]
 fn its_episodes_and_those_of_e1_are_pairs() {
     let bench = bench();
+    // Experiments are contrasted where their levels of chance are the same.
+    fs::write(bench.path("echo.toml"), ECHO.replace("1/4", "1/3")).unwrap();
     bench.recorded("runs", "--agent random --experiment E1,E2,echo.toml --seeds 2 --runs 2");
     let scenes = |name: &str| {
         let mut scenes = texts(&bench.path(&format!("runs/{name}-random.parquet")), "scene");

@@ -7,7 +7,7 @@ use crate::schema::{Column, DeclaredColumn, Domain, Kind};
 /// Columns that every pass reads, at these positions.
 pub(crate) const KEYS: [&str; 6] = ["episode_id", "model", "experiment", "seed", "run", "t"];
 /// A column that is read besides in every pass over traces of the mirror's domain.
-const BODY_COLOR: &str = "body_color";
+pub(crate) const BODY_COLOR: &str = "body_color";
 pub(crate) const EPISODE_ID: usize = 0;
 pub(crate) const T: usize = 5;
 

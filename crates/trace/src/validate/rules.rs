@@ -9,7 +9,7 @@ use arrow::datatypes::{Float64Type, Int32Type, Int64Type};
 use crate::diagnostic::{Code, Finding};
 use crate::read::open::TraceFile;
 use crate::read::parallel_scan::Episodes;
-use crate::read::projection::{EPISODE_ID, Layout, LayoutColumn, T};
+use crate::read::projection::{BODY_COLOR, EPISODE_ID, Layout, LayoutColumn, T};
 use crate::schema::Kind;
 use crate::schema::rules::{Known, Requirement, Rule, rules_of};
 use exact::escape::exact;
@@ -32,7 +32,12 @@ impl Rules<'_> {
     /// Everything that is wrong with these episodes, by row and then by column.
     pub(crate) fn check(&self, file: &TraceFile, episodes: &Episodes) -> Vec<Located> {
         let mut found = Vec::new();
-        for (at, column) in self.layout.columns.iter().enumerate() {
+        let mut columns: Vec<(usize, &LayoutColumn)> = self.layout.columns.iter().enumerate().collect();
+        // The schema has the body's colour before t.
+        if columns.get(T + 1).is_some_and(|(_, column)| column.name == BODY_COLOR) {
+            columns.swap(T, T + 1);
+        }
+        for (at, column) in columns {
             let held = &episodes.columns[at];
             let mut rules = self.of_column(at, column, file);
             rules.retain(|rule| may_break(rule, held, &episodes.offsets));

@@ -239,6 +239,7 @@ mod tests {
         let catalog = Catalog {
             name: "test".to_owned(),
             hash: String::new(),
+            domain: None,
             open: true,
             lets: IndexMap::new(),
             metric: IndexMap::new(),

@@ -4,12 +4,13 @@
 //! blank lines hold no step and are passed over; blank lines count. A line may end with `\n` or `\r\n`.
 
 use std::fs::File;
-use std::io::{self, BufReader, Read, Seek as _, SeekFrom};
+use std::io::{self, BufReader, BufWriter, Read, Seek as _, SeekFrom, Write as _};
 use std::path::Path;
 use std::sync::Arc;
 
 use super::error::ImportError;
 use super::fault::Place;
+use super::mapping::Mapping;
 use crate::inputs::Input;
 use exact::budget::Limit;
 use exact::hash;
@@ -65,6 +66,23 @@ impl Text {
         let checked = copied.and_then(|bytes| LARGEST_STREAM.check(bytes).map_err(Into::into));
         checked.map_err(ImportError::read(name))?;
         Ok(Self::of_file(name, file))
+    }
+
+    /// The same lines as flat steps, kept in a temporary file.
+    pub fn mapped(mut self, mapping: &mut Mapping) -> Result<Self, ImportError> {
+        let mut file = tempfile::tempfile().map_err(ImportError::read(&self.name))?;
+        let mut out = BufWriter::new(&mut file);
+        loop {
+            let line = self.read_line()?;
+            if line.is_empty() {
+                break;
+            }
+            let line = line.strip_prefix(BYTE_ORDER_MARK).unwrap_or(&line);
+            mapping.write(line, &mut out).map_err(ImportError::read(&self.name))?;
+        }
+        out.flush().map_err(ImportError::read(&self.name))?;
+        drop(out);
+        Ok(Self::of_file(&self.name, file))
     }
 
     fn of_file(name: &str, file: File) -> Self {

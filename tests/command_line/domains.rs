@@ -163,3 +163,52 @@ fn the_viewer_shows_the_columns_of_any_domain() {
     );
     assert!(shown.iter().all(|text| !text.contains("body_color")));
 }
+
+#[test]
+fn lines_of_another_shape_are_mapped_on_the_way_in() {
+    let folder = folder();
+    let at = folder.path();
+    let line = |frame: u32| {
+        json!({ "episode_index": 7, "frame_index": frame, "eval": { "model": "act", "seeds": [4, 5] }, "reward": 0.5,
+                "observation.state": [0.1, 0.2], "success": frame == 1 })
+    };
+    fs::write(at.join("frames.jsonl"), format!("{}\n\n{}\n", line(0), line(1))).unwrap();
+    let mapping = [
+        "--map",
+        "episode_id=id",
+        "--map",
+        "model=eval.model",
+        "--map",
+        "seed=eval.seeds.1",
+        "--map",
+        "t=frame_index+1",
+        "--map",
+        "x=observation.state.0",
+        "--set",
+        "experiment=pusht",
+        "--set",
+        "run=1",
+    ];
+    let with = |file: &str, more: &[&str]| {
+        let options = [file, "-o", "mapped.parquet", "--definitions", "robots.toml"];
+        run(at, &[&["import"], &options[..], &mapping, more].concat())
+    };
+    let refused = with("frames.jsonl", &[]).refused();
+    assert!(refused.contains("frames.jsonl, line 1, key `episode_id`") && refused.contains("found null"), "{refused}");
+    let told = with("frames.jsonl", &["--set", "episode_id=e7"]).done();
+    assert!(told.starts_with("imported 1 episode, 2 steps") && told.contains("x (float)"), "{told}");
+    assert!(!told.contains("frame_index") && told.contains("episode_index (integer)"), "{told}");
+    run(
+        at,
+        &["score", "mapped.parquet", "--definitions", "robots.toml", "-o", "mapped.csv", "--metrics", "SUCCESS,TIME"],
+    )
+    .done();
+    let scores = fs::read_to_string(at.join("mapped.csv")).unwrap();
+    assert_eq!(scores.lines().nth(1), Some("e7,act,pusht,5,1,1,2"));
+    fs::write(at.join("more.jsonl"), format!("{}\n", line(0)).replace("\"reward\"", "\"extra\":[1],\"reward\""))
+        .unwrap();
+    let answer = with("more.jsonl", &["--set", "episode_id=e7"]).ends(0);
+    assert!(answer.stderr.contains("left out: `extra`, a list or an object in 1 lines"), "{}", answer.stderr);
+    let refused = run(at, &["import", "frames.jsonl", "-o", "none.parquet", "--map", "model"]).refused();
+    assert!(refused.contains("`model`: expected COLUMN=PATH, found no `=`"), "{refused}");
+}

@@ -17,6 +17,7 @@ mod fault;
 mod index;
 mod limits;
 mod line;
+mod mapping;
 mod rows;
 pub mod schema;
 mod text;
@@ -28,6 +29,7 @@ pub use columns::Own;
 pub use error::ImportError;
 pub use fault::Fault;
 pub use limits::Limits;
+pub use mapping::{Mapping, MappingError};
 use parquet::errors::ParquetError;
 pub use text::Text;
 

@@ -4,13 +4,14 @@
 //! blank lines hold no step and are passed over; blank lines count. A line may end with `\n` or `\r\n`.
 
 use std::fs::File;
-use std::io::{self, BufReader, Read, Seek as _, SeekFrom};
+use std::io::{self, BufReader, BufWriter, Read, Seek as _, SeekFrom, Write as _};
 use std::path::Path;
 use std::sync::Arc;
 
 use super::error::ImportError;
 use super::fault::{Fault, Place};
 use super::line::{self, Members};
+use super::mapping::Mapping;
 use crate::inputs::Input;
 use crate::schema::{self, Kind};
 use exact::budget::Limit;
@@ -74,6 +75,23 @@ impl Text {
     /// The rows of a data frame as lines: a whole number is an integer where the schema asks for one.
     pub fn of_frame(name: &str, rows: &[u8]) -> Result<Self, ImportError> {
         Ok(Self { is_frame: true, ..Self::spool(name, rows)? })
+    }
+
+    /// The same lines as flat steps, kept in a temporary file.
+    pub fn mapped(mut self, mapping: &mut Mapping) -> Result<Self, ImportError> {
+        let mut file = tempfile::tempfile().map_err(ImportError::read(&self.name))?;
+        let mut out = BufWriter::new(&mut file);
+        loop {
+            let line = self.read_line()?;
+            if line.is_empty() {
+                break;
+            }
+            let line = line.strip_prefix(BYTE_ORDER_MARK).unwrap_or(&line);
+            mapping.write(line, &mut out).map_err(ImportError::read(&self.name))?;
+        }
+        out.flush().map_err(ImportError::read(&self.name))?;
+        drop(out);
+        Ok(Self::of_file(&self.name, file))
     }
 
     fn of_file(name: &str, file: File) -> Self {

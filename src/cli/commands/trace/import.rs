@@ -7,7 +7,7 @@ use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
 use exact::replace;
 use study::ImportRequest;
-use trace::import::Text;
+use trace::import::{Mapping, Text};
 
 /// Make a trace of JSON lines of steps: episodes of any harness can be scored
 ///
@@ -37,6 +37,13 @@ pub struct ImportArgs {
     /// clusters from them
     #[arg(long, conflicts_with = "cluster")]
     reconstruction: bool,
+    /// A column and where its value is in each line: keys with dots between them, positions of lists among them; `+1` behind
+    /// adds to an integer. Lists and objects that no column is taken from are left out, and named
+    #[arg(long, value_name = "COLUMN=PATH")]
+    map: Vec<String>,
+    /// A column and its value in every line
+    #[arg(long, value_name = "COLUMN=VALUE")]
+    set: Vec<String>,
     /// Answer as JSON
     #[arg(long)]
     json: bool,
@@ -52,7 +59,9 @@ pub enum ClusterArg {
 impl ImportArgs {
     pub fn run(&self) -> Result<Outcome, Failure> {
         self.check_places()?;
-        let texts = self.steps.iter().map(|path| text(path)).collect::<Result<Vec<_>, _>>()?;
+        let mut mapping = Mapping::parse(&self.map, &self.set).map_err(Failure::input)?;
+        let texts = self.steps.iter().map(|path| text(path, &mut mapping)).collect::<Result<Vec<_>, _>>()?;
+        output::notes(&mapping.left_out());
         let request = ImportRequest {
             out: self.out.clone(),
             definitions: self.definitions.clone(),
@@ -74,8 +83,9 @@ impl ImportArgs {
     }
 }
 
-fn text(path: &Path) -> Result<Text, Failure> {
+fn text(path: &Path, mapping: &mut Mapping) -> Result<Text, Failure> {
     let text = if is_standard_input(path) { Text::spool("standard input", io::stdin()) } else { Text::open(path) };
+    let text = if mapping.is_empty() { text } else { text.and_then(|text| text.mapped(mapping)) };
     text.map_err(Failure::input)
 }
 

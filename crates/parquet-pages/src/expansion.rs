@@ -14,7 +14,7 @@ use arrow::datatypes::{DataType, Int32Type};
 use crate::column::Column;
 use exact::budget::{Budget, Exceeded, Limit};
 
-/// What comes out of a stored byte, of the first [`SMALL`] bytes.
+/// What comes out of a stored byte, of the first `SMALL` bytes.
 pub const INFLATED_PER_BYTE: u64 = 96;
 
 /// Up to here a file is bounded as a whole, beyond it by what its pages can hold.

@@ -1,7 +1,7 @@
 //! Non-inferiority of a rate within a margin: score tests of pairs and of independent units.
 //!
 //! Rule: a unit counts once, as the mean of its episodes. Part of a verdict varies at most as much as a verdict, so that the
-//! variance under the null hypothesis is never too small. Up to [`MOST_ENUMERATED`] outcomes the p value is exact: the largest
+//! variance under the null hypothesis is never too small. Up to `MOST_ENUMERATED` outcomes the p value is exact: the largest
 //! probability over the rate that the null hypothesis leaves open (Chan 1998); beyond, the normal approximation.
 
 use super::quantile::{normal, normal_below};

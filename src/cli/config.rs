@@ -111,7 +111,6 @@ impl Settings {
         })
     }
 
-    /// The setting of an option of a command.
     fn of(&self, command: &str, option: &str) -> Option<&Setting> {
         let rank = |setting: &Setting| (matches!(setting.origin, Origin::Variable(_)), setting.command.is_some());
         let meant = self
@@ -122,7 +121,6 @@ impl Settings {
     }
 }
 
-/// The file that holds here: the one that the variable names, else the nearest at or above the current folder.
 fn file() -> Result<Option<PathBuf>, Failure> {
     if let Some(named) = env::var_os(FILE_VARIABLE) {
         return Ok(Some(PathBuf::from(named)).filter(|path| !path.as_os_str().is_empty()));
@@ -243,7 +241,6 @@ enum Refusal {
     Value(String),
 }
 
-/// Whether a command has the option, and takes the values.
 fn check(setting: &Setting, choices: &[Choice<'_>]) -> Result<(), Refusal> {
     let of_command = |choice: &&Choice<'_>| setting.command.as_ref().is_none_or(|command| *command == choice.command);
     let meant: Vec<&Choice<'_>> = choices.iter().filter(of_command).collect();
@@ -258,7 +255,6 @@ fn check(setting: &Setting, choices: &[Choice<'_>]) -> Result<(), Refusal> {
     taken.into_iter().try_for_each(|choice| takes(choice, setting))
 }
 
-/// Whether an option takes the values, by a command that has it alone.
 fn takes(choice: &Choice<'_>, setting: &Setting) -> Result<(), Refusal> {
     let own = choice.arg;
     if !own.get_action().takes_values() {
@@ -331,7 +327,6 @@ pub fn unknown_variables(command: &Command) -> Vec<(String, Option<String>)> {
     unknown.into_iter().map(with_hint).collect()
 }
 
-/// The variable of an option of a command; of every command without a name.
 fn variable(command: &str, long: &str) -> String {
     let name = joined(command, long).replace(['-', ' '], "_").to_ascii_uppercase();
     format!("{PREFIX}{name}")

@@ -196,7 +196,6 @@ fn shown(examples: &[(&str, &str)]) -> String {
     title("Examples:") + &lines.collect::<String>()
 }
 
-/// A line for each command, then a line for each noun: what it does, up to the first colon.
 fn first_page(command: &Command) -> String {
     let line = |inner: &Command| {
         let about = inner.get_about().map(ToString::to_string).unwrap_or_default();
@@ -219,7 +218,6 @@ mod tests {
     use super::{EXAMPLES, with_help};
     use crate::cli::Cli;
 
-    /// Every command that does something, as it is typed.
     fn all(command: &Command, before: &str) -> Vec<String> {
         let inner = command.get_subcommands().filter(|inner| !inner.is_hide_set());
         inner
@@ -259,7 +257,6 @@ mod tests {
         }
     }
 
-    /// The words of a line: by spaces, quoted ones whole.
     fn words(line: &str) -> Vec<String> {
         let (mut words, mut quote) = (vec![String::new()], None);
         for c in line.chars() {

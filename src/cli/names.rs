@@ -23,7 +23,6 @@ const RENAMED: [(&str, [&str; 2]); 17] = [
     ("verify", ["table", "verify"]),
 ];
 
-/// The words in the place of an old name.
 fn renamed(name: &str) -> Option<[&'static str; 2]> {
     RENAMED.iter().find(|(old, _)| *old == name).map(|(_, new)| *new)
 }

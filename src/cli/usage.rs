@@ -33,7 +33,6 @@ pub fn with_tips(mut error: Error, command: &Command) -> Error {
     error
 }
 
-/// The commands that have an option, in words.
 fn of_others(option: &str, command: &Command) -> Option<String> {
     let long = option.strip_prefix("--")?.split('=').next()?;
     let mut paths = Vec::new();
@@ -52,7 +51,6 @@ fn collect(command: &Command, path: &str, long: &str, found: &mut Vec<String>) {
     }
 }
 
-/// What a command of a feature needs that this build has not.
 fn of_feature(name: &str) -> Option<String> {
     (!cfg!(feature = "sim") && OF_SIM.contains(&name)).then(|| {
         format!(
@@ -62,7 +60,6 @@ fn of_feature(name: &str) -> Option<String> {
     })
 }
 
-/// The command whose last word is nearest, or where they are listed.
 fn similar(name: &str, command: &Command) -> String {
     let nouns: Vec<&Command> = command.get_subcommands().collect();
     let verbs = nouns.iter().flat_map(|noun| noun.get_subcommands().map(move |verb| (noun.get_name(), verb)));

@@ -103,7 +103,6 @@ impl From<Exceeded> for io::Error {
     }
 }
 
-/// What every limit is multiplied with.
 fn factor() -> u64 {
     static FACTOR: OnceLock<u64> = OnceLock::new();
     *FACTOR.get_or_init(|| setting().unwrap_or(1))

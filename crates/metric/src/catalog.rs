@@ -165,7 +165,6 @@ impl Catalog {
         declared.map(|(name, experiment)| (name.clone(), experiment.clone()))
     }
 
-    /// The same without the experiments that the traces declare: what the definitions say.
     #[must_use]
     pub(super) fn without_declared(&self) -> Self {
         let mut catalog = self.clone();

@@ -53,9 +53,7 @@ pub struct Columns {
     schema: IndexMap<String, Column>,
     own: IndexMap<String, Column>,
     fallbacks: IndexMap<String, Fallback>,
-    /// Columns of the schema whose names definitions may use for something else.
     free: Vec<String>,
-    /// The only values of a column, where there is a list of them.
     values: IndexMap<String, Vec<String>>,
     /// Columns of the schema that mean something before a mirror alone.
     of_mirror: Vec<String>,

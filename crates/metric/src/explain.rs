@@ -118,7 +118,6 @@ impl Definitions {
     }
 }
 
-/// A metric's value and where it is defined, in words.
 fn sentence(written: &Written, when: Option<&Written>, kind: Kind) -> String {
     let Ok(expr) = syntax::parse(&written.text) else { return String::new() };
     let what = match (&expr.kind, kind) {

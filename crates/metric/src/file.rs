@@ -180,13 +180,11 @@ const INCLUDED: IncludeKind = IncludeKind {
 /// A definition file's text, and where it is.
 struct DefinitionFile {
     source: Source,
-    /// What its includes are relative to.
     folder: Option<PathBuf>,
     /// Its one place on disk, whatever it is called; `None` for a text that is no file.
     place: Option<PathBuf>,
 }
 
-/// The built-in file of this name, or the one at this path.
 fn find(name: Option<&str>, path: &Path) -> io::Result<DefinitionFile> {
     if let Some((name, text)) = name.and_then(|name| Some((name, built_in(name)?))) {
         let source = Source { name: format!("{name}.toml"), text: text.to_owned() };
@@ -204,7 +202,6 @@ struct Reading {
 }
 
 impl Reading {
-    /// Reads a file and all that it includes into a document of this name.
     fn of(name: String, file: DefinitionFile) -> Result<Document, FileError> {
         let mut reading = Self {
             document: Document {

@@ -91,13 +91,11 @@ fn range(declared: Option<Measures>, range: Option<ValueRange>, unit: &str) -> V
     range.or_else(|| of_unit()?.range).unwrap_or_default()
 }
 
-/// Relations are between metrics of the document.
 pub(super) fn relation_faults(document: &Document) -> Vec<Fault> {
     let names = document.metrics.values().flat_map(|entry| entry.finished.iter().chain(&entry.completes));
     names.filter_map(|(name, place)| unknown_metric(document, name, place)).collect()
 }
 
-/// What a metric measures fits its values.
 pub(super) fn faults(document: &Document, kind: impl Fn(&str) -> Kind) -> Vec<Fault> {
     let is_rate = |name: &str| document.metrics.contains_key(name) && kind(name) == Kind::Rate;
     let mut faults = Vec::new();

@@ -67,7 +67,6 @@ pub enum Op {
     Case {
         /// Conditions and values, in order.
         branches: Vec<(NodeId, NodeId)>,
-        /// The value where no condition is true.
         otherwise: Option<NodeId>,
     },
     /// The first value that is not null.
@@ -280,12 +279,10 @@ impl Op {
 pub(super) struct Builder {
     plan: Plan,
     known: HashMap<(Op, Type, Level), NodeId>,
-    /// How many steps back each node looks from the step that it is read at.
     lags: Vec<u8>,
 }
 
 impl Builder {
-    /// The node of this operation, new or known.
     pub(super) fn add(&mut self, op: Op, ty: Type, level: Level) -> NodeId {
         *self.known.entry((op, ty, level)).or_insert_with_key(|(op, ty, level)| {
             let deepest = op.operands().iter().map(|operand| self.lags[operand.0]).max().unwrap_or(0);
@@ -299,12 +296,10 @@ impl Builder {
         })
     }
 
-    /// How many steps back a node looks from the step that it is read at.
     pub(super) fn lags(&self, id: NodeId) -> u8 {
         self.lags[id.0]
     }
 
-    /// Remembers how a node was written, the first time.
     pub(super) fn remember(&mut self, id: NodeId, text: &str) {
         self.plan.sources.entry(id).or_insert_with(|| text.to_owned());
     }
@@ -313,7 +308,6 @@ impl Builder {
         self.plan.node(id)
     }
 
-    /// The finished plan, its outputs yet to be named.
     pub(super) fn finish(self) -> Plan {
         self.plan
     }

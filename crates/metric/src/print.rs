@@ -53,7 +53,6 @@ impl fmt::Display for Op {
 }
 
 impl Op {
-    /// The name of an operation that is printed as its name and its operands.
     const fn word(&self) -> &'static str {
         match self {
             Self::Time => "timestep",

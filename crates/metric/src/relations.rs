@@ -91,7 +91,6 @@ impl Reader<'_> {
         is_failure.then(|| Completed { name: name.to_owned(), whole, moment: (**operand).clone() })
     }
 
-    /// The completed rate whose moment ends this duration.
     fn finished(&self, duration: &Metric, moments: &[Completed]) -> Option<String> {
         let mut expr = parse(&duration.value).ok()?;
         for _ in 0..DEEPEST {

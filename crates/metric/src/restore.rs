@@ -51,7 +51,6 @@ impl Definitions {
     }
 }
 
-/// The catalog as a definition file without includes.
 fn as_file(catalog: &Catalog) -> String {
     let mut root = serde_json::json!(catalog.without_declared());
     drop_keys(&mut root, &["name", "hash"]);

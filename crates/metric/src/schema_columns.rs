@@ -4,7 +4,6 @@ use trace::schema::{self, COLUMNS, Kind};
 
 use crate::columns::{Column, Columns, Fallback, Level, Type};
 
-/// The columns of the schema, as scoring declares them where every required column is present.
 pub(crate) fn schema_columns() -> Columns {
     let column = |column: &schema::Column| {
         let level = if column.constant { Level::Episode } else { Level::Step };
@@ -22,7 +21,6 @@ pub(crate) fn schema_columns() -> Columns {
     columns
 }
 
-/// Returns true if every row of every trace has a value in this column.
 pub(crate) fn has_value(name: &str) -> bool {
     COLUMNS.iter().any(|column| column.name == name && column.required && !column.nullable)
 }

@@ -32,7 +32,6 @@ fn wide(data: &[u8], start: usize, length: usize, at: usize) -> u128 {
 /// Bits in the making.
 #[derive(Debug, Default)]
 pub struct Bits {
-    /// As Arrow holds them: little-endian.
     words: Vec<u64>,
     open: u64,
     length: usize,

@@ -35,11 +35,9 @@ pub struct Keys {
 /// Rows of which many in a row are equal: columns that are constant in an episode.
 #[derive(Clone, Debug)]
 pub struct Runs {
-    /// A value for each run; neighbours may be equal.
     values: ArrayRef,
     /// The row before which each run ends, counted from the first row of the first run; ascending.
     ends: UInt32Array,
-    /// The first row of this slice, counted as the ends are.
     start: usize,
     length: usize,
 }
@@ -255,7 +253,6 @@ impl Runs {
         self.ends.values().partition_point(|end| *end as usize <= self.start + row)
     }
 
-    /// Goes on from a run to that of a row behind its start.
     fn advance(&self, run: &mut usize, row: usize) {
         let ends = self.ends.values();
         while ends[*run] as usize <= self.start + row {
@@ -306,7 +303,6 @@ impl Runs {
         self.starts().skip(1).all(|(start, _)| rows.by_ref().find(|row| **row >= start) == Some(&start))
     }
 
-    /// The values of some rows, ascending.
     fn at(&self, rows: impl IntoIterator<Item = usize>) -> Result<ArrayRef, ArrowError> {
         let mut run = self.run_of(0);
         let runs = rows.into_iter().map(|row| {
@@ -350,7 +346,6 @@ impl<'a> DictionaryTexts<'a> {
         self.key(row).map(|key| self.texts.value(key))
     }
 
-    /// Whether two rows have the same text, or both none. A text may have two keys.
     fn same(self, a: usize, b: usize) -> bool {
         let (a, b) = (self.key(a), self.key(b));
         let text = |key: Option<usize>| key.map(|key| self.texts.value(key));

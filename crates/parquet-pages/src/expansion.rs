@@ -32,7 +32,6 @@ const UNCOUNTED: usize = 64 << 10;
 pub struct Expansion {
     inflated: Budget,
     written_out: Budget,
-    /// How far each column chunk was read: bytes of the file, and rows.
     read: Mutex<HashMap<(Kind, usize, usize), u64>>,
 }
 
@@ -77,7 +76,6 @@ impl Expansion {
         self.written_out.spend(bytes)
     }
 
-    /// Whether a place lies behind all that was read of a column chunk; then it is the last.
     fn is_new(&self, kind: Kind, (row_group, column): (usize, usize), at: u64) -> bool {
         let mut read = self.read.lock().unwrap_or_else(PoisonError::into_inner);
         let last = read.entry((kind, row_group, column)).or_default();

@@ -106,7 +106,6 @@ pub fn footer_bytes(file: &impl ChunkReader) -> Option<(u64, Bytes)> {
     file.get_bytes(start, usize::try_from(length).ok()?).ok().map(|bytes| (start, bytes))
 }
 
-/// Whether some bytes are the structure of a footer, within their bounds.
 fn check(footer: &[u8]) -> Result<(), Fault> {
     walk(&mut Compact::new(footer), FILE)
 }

@@ -63,7 +63,6 @@ impl<'a> Compact<'a> {
         Self { data, at: 0 }
     }
 
-    /// How many bytes are read.
     pub(crate) fn position(&self) -> usize {
         self.at
     }
@@ -90,7 +89,6 @@ impl<'a> Compact<'a> {
         i32::try_from(self.zigzag()?).map_err(|_| Fault::Invalid("a number out of range"))
     }
 
-    /// The elements' encoding and number of a list or set.
     pub(crate) fn list(&mut self) -> Result<(Wire, usize), Fault> {
         let byte = self.byte()?;
         let count = match byte >> 4 {
@@ -162,7 +160,6 @@ impl<'a> Compact<'a> {
         Ok(())
     }
 
-    /// A number of elements or bytes, if so many bytes follow.
     fn within(&self, count: u64) -> Result<usize, Fault> {
         usize::try_from(count).ok().filter(|count| *count <= self.data.len() - self.at).ok_or(Fault::Ends)
     }

@@ -138,7 +138,6 @@ impl Manifest {
         }
     }
 
-    /// The manifest of a report with these files beside it.
     fn with_outputs(&self, files: &[OutputFile]) -> Self {
         let mut outputs: Vec<Output> = files.iter().map(Output::new).collect();
         outputs.sort();
@@ -218,7 +217,6 @@ fn check_inputs<P: AsRef<Path>>(out: &Path, targets: &[P], read: &[PathBuf]) -> 
     Ok(targets.try_for_each(|target| replace::check_target(&target, read, "one that is read"))?)
 }
 
-/// Every file of the folder but the manifest.
 fn files(bundle: &Bundle) -> Vec<OutputFile> {
     let file = |path: &str, bytes: &[u8]| OutputFile { path: PathBuf::from(path), bytes: bytes.to_vec() };
     let mut files =
@@ -252,7 +250,6 @@ fn cell_record(Cell { key, name, metric, moments, interval }: Cell) -> Vec<Strin
     record
 }
 
-/// That every file is inside the folder, and no two are one.
 fn check_paths(files: &[OutputFile]) -> Result<(), BundleError> {
     let mut seen = BTreeSet::new();
     for OutputFile { path, .. } in files {

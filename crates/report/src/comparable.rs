@@ -124,14 +124,12 @@ fn parts(declared: &Declared, names: [&str; 2], kept: &[&str]) -> Option<String>
     (!found.is_empty()).then(|| found.join(", "))
 }
 
-/// The first setting of the world, of the experiment and of the agent in which two recordings differ, as their footers have it.
 fn settings(one: &Value, other: &Value, varied: Varied) -> Option<String> {
     let keys = if varied == Varied::Model { &["world", "experiment"][..] } else { &["world", "experiment", "agent"] };
     let found: Vec<String> = keys.iter().filter_map(|key| first_difference(key, &one[*key], &other[*key])).collect();
     (!found.is_empty()).then(|| found.join("; "))
 }
 
-/// The first setting that two experiments do not vary by themselves: the world, and the text of the same prompt.
 fn between_experiments(one: &Value, other: &Value) -> Option<String> {
     let world = |recording: &Value| {
         let mut world = recording["world"].clone();
@@ -149,7 +147,6 @@ fn between_experiments(one: &Value, other: &Value) -> Option<String> {
     first_difference("world", &world(one), &world(other)).or_else(of_prompt)
 }
 
-/// The innermost key in which two values differ, and what each has.
 fn first_difference(name: &str, one: &Value, other: &Value) -> Option<String> {
     if one == other {
         return None;
@@ -164,7 +161,6 @@ fn first_difference(name: &str, one: &Value, other: &Value) -> Option<String> {
     Some(format!("{name} is {} and {}", shown(one), shown(other)))
 }
 
-/// The beginning of a hash, or a name.
 fn shown(value: &Value) -> String {
     match value {
         Value::Null => "nothing".to_owned(),

@@ -212,7 +212,6 @@ fn shown(cell: &PrintedCell) -> String {
     }
 }
 
-/// Whether the erratum states exactly this difference; numbers as values, words as they are.
 fn excuses(erratum: &Erratum, difference: &Difference) -> bool {
     let is_stated = |stated: &str, found: &str| match (stated.parse::<Decimal>(), found.parse::<Decimal>()) {
         (Ok(stated), Ok(found)) => stated.cmp_value(found).is_eq(),

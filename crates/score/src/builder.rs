@@ -161,7 +161,6 @@ impl TextBuilder {
         }
     }
 
-    /// Adds a text so many times.
     fn repeat(&mut self, text: Option<&str>, rows: usize) {
         let code = text.map(|text| self.code(text));
         (0..rows).for_each(|_| self.codes.append_option(code));
@@ -197,7 +196,6 @@ fn column<'a>(episodes: &'a RecordBatch, name: &str) -> &'a ArrayRef {
     episodes.column_by_name(name).expect("the projection asks for this column")
 }
 
-/// What a label means where there is no value.
 pub(super) fn default_text(name: &str) -> Option<&'static str> {
     schema::column(name).and_then(Column::default_text)
 }
@@ -269,7 +267,6 @@ impl MetricBuilder {
         self.valid.append(value.is_some());
     }
 
-    /// The values as integers, those so far made so if they are not.
     fn ints(&mut self) -> &mut Vec<i64> {
         if let Values::Bools(bools) = &mut self.values {
             self.values = Values::Ints(bools.finish().iter().map(i64::from).collect());
@@ -323,7 +320,6 @@ mod tests {
             .prop_map(|(key, label, rate, number)| (key, label, [rate, number]))
     }
 
-    /// Rows as one batch of a scan gives them; the first metric as truth values if it can be.
     fn extend(builder: &mut TableBuilder, rows: &[Row]) {
         let texts = |of: fn(&EpisodeKey) -> &str| {
             let texts = rows.iter().map(|row| Some(of(&row.0)));

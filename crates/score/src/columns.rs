@@ -25,7 +25,6 @@ pub fn record_batch(table: &EpisodeTable) -> Result<RecordBatch, ArrowError> {
     RecordBatch::try_new(schema, columns)
 }
 
-/// The columns of a table with this header.
 pub(super) fn schema(header: &Header) -> Schema {
     let keys = KEYS.iter().zip([DataType::Utf8, DataType::Utf8, DataType::Utf8, DataType::Int32, DataType::Int32]);
     let keys = keys.map(|(name, ty)| Field::new(*name, ty, false));

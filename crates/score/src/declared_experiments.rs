@@ -116,7 +116,6 @@ fn no_share(file: &str, name: &str, experiment: &Experiment, catalog: &Catalog) 
     })
 }
 
-/// The first thing in which two experiments differ, and what each has.
 fn difference(one: &Experiment, other: &Experiment) -> Option<(String, String, String)> {
     if one.title != other.title {
         let quoted = |title: &str| match title {

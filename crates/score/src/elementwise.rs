@@ -50,7 +50,6 @@ pub(super) fn divide(op: Arithmetic, a: &Int64Array, b: &Int64Array) -> Result<I
     a.iter().zip(b.iter()).map(one).collect::<Result<Vec<Option<i64>>, _>>().map(Int64Array::from_iter)
 }
 
-/// Numbers as a kernel gave them; floats in their one form.
 pub(super) fn numbers(array: ArrayRef, ty: Type) -> Vector {
     match ty {
         Type::Float => array.as_primitive::<Float64Type>().unary::<_, Float64Type>(canonical).into(),

@@ -98,7 +98,6 @@ impl Evaluated {
         &self.vectors[id.index()]
     }
 
-    /// The text of a symbol among the values.
     pub(super) fn text(&self, symbol: u32) -> &str {
         self.symbols.text(symbol)
     }
@@ -109,7 +108,6 @@ struct Evaluation<'e> {
     plan: &'e PhysicalPlan,
     batch: &'e Batch<'e>,
     symbols: Symbols,
-    /// Those of the steps so far.
     vectors: Vec<Vector>,
 }
 

@@ -165,7 +165,6 @@ pub fn explain_each(
 pub(super) struct Reader<'a> {
     definitions: &'a Definitions,
     plan: PhysicalPlan,
-    /// The steps of those values.
     steps: HashMap<NodeId, StepId>,
 }
 
@@ -178,7 +177,6 @@ impl<'a> Reader<'a> {
         Self { definitions, plan, steps }
     }
 
-    /// Adds the steps of these values to a plan.
     pub(super) fn add_to(&self, plan: &mut PhysicalPlan) {
         let logical = &self.definitions.plan;
         plan.add_nodes(logical, logical.needed_by(logical.outputs.iter().map(|output| output.node)));
@@ -207,7 +205,6 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// The ids of the episodes of a batch.
 pub(super) fn episode_ids(batch: &EpisodeBatch) -> Vec<String> {
     let column = batch.episodes.column_by_name("episode_id").expect("every batch names its episodes");
     let dictionary = column.as_dictionary::<Int32Type>();
@@ -250,7 +247,6 @@ impl Reading<'_> {
         MetricEvidence { metric: name.to_owned(), value, timesteps: timesteps.into_iter().collect(), facts }
     }
 
-    /// Where a metric is undefined, it is its condition alone that decided.
     fn decisive(&self, node: NodeId) -> NodeId {
         match &self.plan().node(node).op {
             Op::Case { branches, otherwise: None } if branches.len() == 1 => {
@@ -277,7 +273,6 @@ impl Reading<'_> {
         })
     }
 
-    /// Columns of the episode that one of these values is a comparison with; those compared with constants tell nothing new.
     fn truths(&self, needed: &[NodeId]) -> BTreeSet<NodeId> {
         let pairs = needed.iter().filter_map(|id| match &self.plan().node(*id).op {
             Op::Compare(_, a, b) | Op::Distinct(a, b) => Some([(*a, *b), (*b, *a)]),
@@ -345,7 +340,6 @@ impl Reading<'_> {
     }
 }
 
-/// A row of one episode as a timestep.
 fn as_t(row: usize) -> i64 {
     i64::try_from(row).map_or(i64::MAX, |row| row + 1)
 }

@@ -82,7 +82,6 @@ impl Candidates {
         Self { sides: [old, new].map(|metrics| Scores { metrics, filter: None }) }
     }
 
-    /// Definitions with these metrics alone, without a filter.
     fn alone(&self, definitions: &Definitions) -> Definitions {
         let mut alone = definitions.clone();
         alone.plan.outputs.retain(|output| self.sides[0].metrics.iter().any(|metric| metric.name == output.name));
@@ -90,7 +89,6 @@ impl Candidates {
         alone
     }
 
-    /// The evidence of each side for the episodes of a batch in which some metric differs.
     fn explained(
         &self,
         batch: &EpisodeBatch,

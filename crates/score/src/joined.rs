@@ -68,7 +68,6 @@ impl EpisodeTable {
     }
 }
 
-/// Whether scores need not have this label: older ones do not, and it is left out where it says nothing.
 fn may_be_absent(label: &str) -> bool {
     label == LOST || schema::column(label).is_some_and(|column| column.since > 1)
 }

@@ -45,7 +45,6 @@ fn sorted<N: Number>(rows: &Rows<'_>) -> Vec<u32> {
     order
 }
 
-/// For names and numbers that do not fit into any integer together.
 fn compared(keys: &EpisodeKeys) -> Vec<u32> {
     let mut order: Vec<u32> = (0..narrow(keys.len())).collect();
     order.sort_by(|a, b| keys.get(*a as usize).cmp(&keys.get(*b as usize)));
@@ -77,7 +76,6 @@ struct Rows<'a> {
     run: Span,
     model_bits: u32,
     row_bits: u32,
-    /// Those of a whole number.
     bits: u32,
 }
 

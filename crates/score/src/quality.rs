@@ -305,7 +305,6 @@ fn text(column: Option<&ArrayRef>, code: Option<usize>) -> Option<String> {
     code.map(|code| texts.value(code).to_owned())
 }
 
-/// The texts that occur, and how often.
 fn named<'a>(column: Option<&'a Coded<'a>>, counts: &[u64]) -> Vec<(&'a str, u64)> {
     let texts = column.map(|column| column.texts);
     let all = counts.iter().enumerate().filter(|(_, count)| **count > 0);

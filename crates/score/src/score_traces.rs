@@ -302,7 +302,6 @@ pub fn score_all(
     Ok(Scored { tables, timelines: found.map(in_key_order), quality })
 }
 
-/// Moves columns that these definitions do not read to those whose values are not checked.
 fn take_as_they_are(projection: &mut Projection, columns: &[&str], definitions: Option<&&Definitions>) {
     let (read, _) = definitions.map(|definitions| PhysicalPlan::of(&[&definitions.plan]).columns()).unwrap_or_default();
     let is_free = |name: &String| columns.contains(&name.as_str()) && !read.contains(name);
@@ -311,7 +310,6 @@ fn take_as_they_are(projection: &mut Projection, columns: &[&str], definitions: 
     projection.unchecked.extend(free);
 }
 
-/// The columns of the table that definitions give.
 pub(super) fn header(definitions: &Definitions, labels: &[String]) -> Header {
     let metrics = definitions.plan.outputs.iter().map(|output| output.name.clone()).collect();
     Header { catalog: definitions.catalog.clone(), labels: labels.to_vec(), metrics }
@@ -362,7 +360,6 @@ pub(super) fn collect<T: Send>(
     Ok(builders.into_iter().map(TableBuilder::finish).collect())
 }
 
-/// The episodes that a filter keeps.
 fn kept(episodes: &RecordBatch, scores: &BatchScores) -> RecordBatch {
     match &scores.kept {
         Some(kept) => filter_record_batch(episodes, kept).expect("a filter has a value for each episode"),
@@ -370,12 +367,10 @@ fn kept(episodes: &RecordBatch, scores: &BatchScores) -> RecordBatch {
     }
 }
 
-/// An error with the file of its batch.
 pub(super) fn failed(traces: &TraceSet, batch: &EpisodeBatch, source: EngineError) -> ScoreError {
     ScoreError::Engine { file: traces.files()[batch.origin.file].name().to_owned(), source }
 }
 
-/// A batch as the engine takes it.
 pub(super) fn view(batch: &EpisodeBatch) -> Batch<'_> {
     Batch {
         segments: Segments::new(&batch.offsets),

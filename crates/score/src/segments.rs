@@ -39,12 +39,10 @@ impl<'a> Segments<'a> {
         self.offsets.last().copied().unwrap_or(0)
     }
 
-    /// The first row and the length of each episode.
     pub(super) fn each(self) -> impl Iterator<Item = (usize, usize)> + use<'a> {
         self.offsets.windows(2).map(|pair| (pair[0], pair[1] - pair[0]))
     }
 
-    /// The length T of one episode.
     pub(super) fn length(self, episode: usize) -> i64 {
         as_t(self.offsets[episode + 1] - self.offsets[episode])
     }
@@ -70,13 +68,11 @@ impl<'a> Segments<'a> {
         BooleanArray::new(rows.finish(), None)
     }
 
-    /// An episode's truth value for each of its rows.
     pub(super) fn spread_bools(self, values: &BooleanArray) -> BooleanArray {
         let bits = self.spread_bits(values.values());
         BooleanArray::new(bits, self.spread_nulls(values.nulls()))
     }
 
-    /// An episode's number (or symbol) for each of its rows.
     pub(super) fn spread<T: ArrowPrimitiveType>(self, values: &PrimitiveArray<T>) -> PrimitiveArray<T> {
         let mut rows = Vec::with_capacity(self.rows());
         for ((_, length), &value) in self.each().zip(values.values()) {
@@ -165,14 +161,12 @@ impl<'a> Segments<'a> {
         }
     }
 
-    /// Whether a predicate holds at every step.
     pub(super) fn all(self, predicate: &BooleanArray) -> BooleanArray {
         let truths = truths(predicate);
         let holds = |(start, length)| bits::count(truths.values(), truths.offset() + start, length) == length;
         BooleanArray::new(self.each().map(holds).collect(), None)
     }
 
-    /// Which of the timesteps asked for there are.
     pub(super) fn exist(self, moments: &Int64Array) -> BooleanBuffer {
         self.rows_at(moments).map(|row| row.is_some()).collect()
     }
@@ -213,7 +207,6 @@ impl<'a> Segments<'a> {
         })
     }
 
-    /// The number (or symbol) at a timestep of each episode.
     pub(super) fn at<T: ArrowPrimitiveType>(
         self,
         values: &PrimitiveArray<T>,
@@ -223,7 +216,6 @@ impl<'a> Segments<'a> {
         optional(self.rows_at(moments).map(value))
     }
 
-    /// The truth value at a timestep of each episode.
     pub(super) fn bools_at(self, values: &BooleanArray, moments: &Int64Array) -> BooleanArray {
         let value = |row: Option<usize>| row.filter(|&row| values.is_valid(row)).map(|row| values.value(row));
         self.rows_at(moments).map(value).collect()
@@ -236,14 +228,12 @@ impl<'a> Segments<'a> {
     }
 }
 
-/// Numbers of which some are not there.
 fn optional<T: ArrowPrimitiveType>(numbers: impl Iterator<Item = Option<T::Native>>) -> PrimitiveArray<T> {
     let (values, valid): (Vec<_>, Vec<_>) =
         numbers.map(|number| (number.unwrap_or_default(), number.is_some())).unzip();
     PrimitiveArray::new(values.into(), nulls_of(&valid))
 }
 
-/// Repeats one value: a constant for each row or episode.
 pub(super) fn repeat<T: ArrowPrimitiveType>(value: &PrimitiveArray<T>, length: usize) -> PrimitiveArray<T> {
     if value.is_null(0) {
         return PrimitiveArray::new_null(length);
@@ -276,12 +266,10 @@ pub(super) fn test_symbols(symbols: &UInt32Array, mut test: impl FnMut(u32) -> b
     BooleanArray::new(bits, nulls_of(&valid))
 }
 
-/// A moment as a number of rows from the start of an episode.
 fn clamp(moment: i64, length: usize) -> usize {
     usize::try_from(moment.max(0)).map_or(length, |moment| moment.min(length))
 }
 
-/// A row count as a timestep.
 fn as_t(rows: usize) -> i64 {
     i64::try_from(rows).expect("a batch has fewer than 2^63 rows")
 }

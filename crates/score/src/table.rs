@@ -176,7 +176,6 @@ impl EpisodeTable {
     }
 }
 
-/// A row as Arrow's selections take it.
 pub(super) fn narrow(row: usize) -> u32 {
     u32::try_from(row).expect("2^32 episodes do not fit into memory")
 }

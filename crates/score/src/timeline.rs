@@ -90,7 +90,6 @@ impl TimelineReader {
         Some(Self { moments, filter: plan.add_nodes(logical, logical.filter).pop() })
     }
 
-    /// The timelines of the episodes of a batch that the filter keeps.
     pub(super) fn timelines(&self, values: &Evaluated, batch: &EpisodeBatch) -> Vec<Timeline> {
         let keys = EpisodeKeys::of_batch(&batch.episodes);
         let kept = self.filter.map(|step| truths(values.of(step).bools()));

@@ -36,7 +36,6 @@ impl<A: Array + 'static> From<A> for Vector {
 }
 
 impl Vector {
-    /// A constant: one value that stands for all.
     pub(super) fn constant(constant: &Constant, ty: Type, symbols: &mut Symbols) -> Self {
         match (constant, ty) {
             (Constant::Bool(value), _) => BooleanArray::from(vec![*value]).into(),
@@ -57,7 +56,6 @@ impl Vector {
         }
     }
 
-    /// A column of texts as keys.
     pub(super) fn keyed(&self) -> &Keyed {
         match self {
             Self::Keyed(keyed) => keyed,
@@ -80,22 +78,18 @@ impl Vector {
         }
     }
 
-    /// The values as truth values; the binder has checked the type.
     pub(super) fn bools(&self) -> &BooleanArray {
         self.array().as_boolean()
     }
 
-    /// The values as integers; the binder has checked the type.
     pub(super) fn ints(&self) -> &Int64Array {
         self.array().as_primitive::<Int64Type>()
     }
 
-    /// The values as floats; the binder has checked the type.
     pub(super) fn floats(&self) -> &Float64Array {
         self.array().as_primitive::<Float64Type>()
     }
 
-    /// The values as symbols; the binder has checked the type.
     pub(super) fn symbols(&self) -> &UInt32Array {
         self.array().as_primitive::<UInt32Type>()
     }
@@ -105,7 +99,6 @@ impl Vector {
 #[derive(Debug)]
 pub(super) struct Keyed {
     keys: Keys,
-    /// The symbol of each key; no two are the same.
     symbols: Vec<u32>,
 }
 
@@ -133,7 +126,6 @@ impl Keyed {
         }
     }
 
-    /// The symbols at a timestep of each episode.
     pub(super) fn at(&self, segments: Segments<'_>, moments: &Int64Array) -> UInt32Array {
         match &self.keys {
             Keys::Narrow(keys) => self.symbols_of(&segments.at(keys, moments)),
@@ -183,7 +175,6 @@ impl Keyed {
     }
 }
 
-/// Where keys are that of their episode, if it has one.
 fn equal_to<N: ArrowNativeType>(
     keys: &[N],
     segments: Segments<'_>,
@@ -255,7 +246,6 @@ impl Symbols {
         ranks
     }
 
-    /// A column of texts with keys of a byte.
     pub(super) fn of_texts(&mut self, texts: &Texts) -> Vector {
         Vector::Keyed(Arc::new(self.of_keys(Keys::Narrow(texts.keys.clone()), &texts.texts)))
     }
@@ -264,7 +254,6 @@ impl Symbols {
         Vector::Keyed(Arc::new(self.of_keys(Keys::Wide(column.keys().clone()), column.values().as_string())))
     }
 
-    /// One key per text: a dictionary may hold a text under two keys, and keys without a text.
     fn of_keys(&mut self, keys: Keys, texts: &StringArray) -> Keyed {
         let (mut symbols, mut places) = (Vec::new(), HashMap::new());
         let mut key = |text: &str| {
@@ -298,7 +287,6 @@ mod tests {
     use super::{Symbols, Texts, Vector};
     use crate::segments::Segments;
 
-    /// The same column in both forms.
     fn both(symbols: &mut Symbols, known: &[&str], keys: &[Option<u8>]) -> [Vector; 2] {
         let texts = StringArray::from(known.to_vec());
         let wide: Int32Array = keys.iter().map(|key| key.map(i32::from)).collect();

@@ -39,7 +39,6 @@ pub fn mean(values: &[i64], confidence: f64) -> Option<Interval> {
     Some(Interval { low: at(-deviate), high: at(deviate) })
 }
 
-/// The sums of all resamples, ascending.
 fn resampled_sums(values: &[i64]) -> Vec<i128> {
     let mut random = SplitMix64::seeded(SEED);
     let mut draw = || i128::from(values[random.below(values.len())]);
@@ -55,14 +54,12 @@ struct Correction {
 }
 
 impl Correction {
-    /// The level of the resamples' distribution that stands for a normal deviate.
     fn level(&self, deviate: f64) -> f64 {
         let moved = self.bias + deviate;
         quantile::normal_below(self.bias + moved / (1.0 - self.acceleration * moved))
     }
 }
 
-/// The normal deviate of the share of resamples below the mean, equal ones counted half.
 #[expect(clippy::cast_precision_loss, reason = "at most the number of resamples")]
 fn bias(sums: &[i128], total: i128) -> f64 {
     let below = sums.partition_point(|&sum| sum < total);
@@ -73,7 +70,6 @@ fn bias(sums: &[i128], total: i128) -> f64 {
     if share <= 0.5 { -quantile::normal(share) } else { quantile::normal(1.0 - share) }
 }
 
-/// A sixth of the skewness of the mean, by the jackknife, from exact deviations.
 #[expect(clippy::cast_precision_loss, reason = "exact sums become one quotient here")]
 fn acceleration(values: &[i64], total: i128) -> f64 {
     let size = values.len() as i128;

@@ -121,7 +121,6 @@ impl Whole {
         self.n.checked_mul(part.sum)?.checked_sub(self.sum.checked_mul(part.n.into())?)
     }
 
-    /// The mean squares between and within, and the typical size of a cluster.
     #[expect(clippy::cast_precision_loss, reason = "exact sums become quotients here")]
     fn mean_squares(&self, parts: &[Moments], between_freedom: f64) -> Option<[f64; 3]> {
         let n = self.n as f64;

@@ -28,7 +28,6 @@ struct Point {
     censored: f64,
     /// The share undecided before this step.
     before: f64,
-    /// The shares decided by the end of this step.
     is_correct: f64,
     is_wrong: f64,
 }
@@ -39,7 +38,6 @@ struct Point {
 /// chapter 6), which for one cause is Greenwood's.
 #[derive(Clone, Debug)]
 pub struct Influence {
-    /// By step: what the hazards up to it take away, and what a correct and a wrong decision there add.
     points: BTreeMap<i64, [f64; 3]>,
 }
 
@@ -227,7 +225,6 @@ pub(super) mod tests {
         assert_eq!(curve.restricted_mean(0, 0.95), None);
     }
 
-    /// One cause alone is the Kaplan-Meier curve, and its jackknife is Greenwood's formula.
     #[test]
     fn without_wrong_decisions_it_is_the_kaplan_meier_curve() {
         let steps = [6, 6, 6, -6, 7, -9, 10, -10, -11, 13, 16, -17, -19, -20, 22, 23, -25, -32, -32, -34, -35i64];

@@ -67,7 +67,6 @@ pub fn jeffreys(successes: u64, n: u64, confidence: f64) -> Option<Interval> {
     equal_tails(successes, n, confidence, [(0.5, 0.5), (0.5, 0.5)])
 }
 
-/// Beta quantiles with these additions to successes and failures, for the lower and the upper bound.
 #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
 fn equal_tails(successes: u64, n: u64, confidence: f64, prior: [(f64, f64); 2]) -> Option<Interval> {
     let failures = counted(successes, n)?;

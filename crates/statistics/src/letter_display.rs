@@ -52,7 +52,6 @@ impl Ties {
         others.iter().copied().filter(|&other| self.rows[member][other]).collect()
     }
 
-    /// The candidates not tied to the pivot, the vertex tied to most of them: the others are reached through it.
     fn away_from_pivot(&self, candidates: &[usize], excluded: &[usize]) -> Vec<usize> {
         let pivot =
             candidates.iter().chain(excluded).copied().max_by_key(|&pivot| self.tied_to(pivot, candidates).len());

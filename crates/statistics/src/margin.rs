@@ -204,7 +204,6 @@ fn restricted([a, b]: [f64; 2], [m, n]: [f64; 2], margin: f64) -> f64 {
     f64::midpoint(low, high)
 }
 
-/// The largest value of a probability over the values of a rate in a range, its ends among them.
 fn largest(low: f64, high: f64, of: impl Fn(f64) -> f64) -> f64 {
     let at = |step: u32| low + (high - low) * f64::from(step) / f64::from(NUISANCE);
     (0..=NUISANCE).map(|step| of(at(step))).fold(0.0, f64::max).min(1.0)
@@ -218,7 +217,6 @@ fn log_factorials(n: usize) -> Vec<f64> {
     std::iter::once(0.0).chain(sums).collect()
 }
 
-/// The multinomial probability of some counts.
 fn likelihood(factorials: &[f64], counts: &[usize], chances: &[f64]) -> f64 {
     let n: usize = counts.iter().sum();
     let term = |(&k, &p): (&usize, &f64)| match (k, p > 0.0) {

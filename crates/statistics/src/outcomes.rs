@@ -28,7 +28,6 @@ pub struct ExactTest {
 pub(super) struct Outcomes {
     first: u64,
     weights: Vec<f64>,
-    /// Whether every possible count is there: of large supports the ends underflow and are left out.
     whole: bool,
 }
 

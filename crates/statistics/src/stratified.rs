@@ -145,12 +145,10 @@ impl Term {
         Self { seen: x, stratum: *stratum, x: x as f64, m: m as f64, y: y as f64, n: n as f64 }
     }
 
-    /// The successes of the first beyond those expected; also the weighted difference of the rates.
     fn excess(&self) -> f64 {
         (self.x * self.n - self.y * self.m) / (self.m + self.n)
     }
 
-    /// The variance of the successes of the first, given the margins.
     fn variance(&self) -> f64 {
         let (all, successes) = (self.m + self.n, self.x + self.y);
         self.m * self.n * successes * (all - successes) / (all * all * (all - 1.0))

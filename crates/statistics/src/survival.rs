@@ -179,7 +179,6 @@ pub fn common_horizon<'a>(curves: impl IntoIterator<Item = &'a Survival> + Clone
 mod tests {
     use super::{Ending, MedianInterval, Outcome, Survival, common_horizon};
 
-    /// Durations; a negative one is censored.
     fn curve(durations: &[i64]) -> Survival {
         let outcome = |steps: i64| if steps > 0 { Outcome::Correct } else { Outcome::Unfinished };
         let endings: Vec<_> = durations.iter().map(|&d| Ending { steps: d.abs(), outcome: outcome(d) }).collect();

@@ -92,7 +92,6 @@ mod tests {
         assert!(tarone_holm(&[]).is_empty());
     }
 
-    /// Every outcome of independent binomial tests at their level: the probability that any is rejected.
     fn familywise_error(trials: &[u32], level: Ratio, alpha: f64) -> f64 {
         let mut all = vec![(Vec::new(), 1.0)];
         for &n in trials {

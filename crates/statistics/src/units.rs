@@ -74,7 +74,6 @@ pub fn difference_test(shared: &[(Moments, Moments)], first: &[Moments], second:
     Some(UnitTest { p: beyond(seen) / all, least: beyond(most) / all })
 }
 
-/// The means as integers over their least common denominator.
 fn means(units: &[Moments]) -> Option<(Vec<i128>, i128)> {
     let mut denominator: i128 = 1;
     for unit in units {
@@ -92,7 +91,6 @@ fn gcd(a: i128, b: i128) -> i128 {
     if b == 0 { a } else { gcd(b, a % b) }
 }
 
-/// The probability of each sum where every difference has either sign.
 fn flips(differences: &[i128]) -> Option<BTreeMap<i128, f64>> {
     let mut sums = BTreeMap::from([(0, 1.0)]);
     for &difference in differences.iter().filter(|difference| **difference != 0) {

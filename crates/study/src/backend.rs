@@ -33,7 +33,6 @@ pub struct SparkJob {
     definitions: Definitions,
     labels: Vec<String>,
     cluster: Cluster,
-    /// The files of this machine that are read.
     read: Vec<PathBuf>,
 }
 
@@ -104,7 +103,6 @@ pub fn are_uris(arguments: &[OsString]) -> Result<bool, StudyError> {
     }
 }
 
-/// The table out of the SQL lowering on Polars.
 #[cfg(feature = "polars")]
 pub(super) fn polars(
     traces: &TraceSet,
@@ -115,7 +113,6 @@ pub(super) fn polars(
     Ok(engines::polars::score::score(traces, &definitions, &question.labels_over(traces), threads)?)
 }
 
-/// The refusal of a build without Polars.
 #[cfg(not(feature = "polars"))]
 pub(super) fn polars(_: &TraceSet, _: &Question, _: NonZeroUsize) -> Result<EpisodeTable, StudyError> {
     Err(StudyError::WithoutPolars { what: "--engine polars" })

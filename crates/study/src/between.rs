@@ -60,7 +60,6 @@ impl Scored {
 }
 
 impl Pair {
-    /// The tables under the metrics that both sides have.
     fn of_common_metrics(mut self) -> Self {
         let common: Vec<String> =
             self.after.metrics.iter().filter(|name| self.before.metrics.contains(name)).cloned().collect();

@@ -3,7 +3,6 @@
 use statistics::design::{Cluster, Design, DesignKind};
 use trace::declared::{self, Declared, Origin};
 
-/// The design that some traces declare together.
 pub(super) fn design_of(declared: &Declared) -> Design {
     let kind = |origin| match origin {
         Origin::Recording => DesignKind::Recording,

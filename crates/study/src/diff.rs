@@ -50,7 +50,6 @@ pub struct DiffRequest {
 }
 
 impl Default for DiffRequest {
-    /// All metrics and episodes, by experiment and model, on all cores.
     fn default() -> Self {
         Self {
             metrics: None,
@@ -143,7 +142,6 @@ impl Side {
         }
     }
 
-    /// How it is scored, or how its scores are read.
     fn question(&self, request: &DiffRequest) -> Question {
         let definitions = match self {
             Self::Definitions(name) => Some(name.clone()),
@@ -161,7 +159,6 @@ impl Side {
         }
     }
 
-    /// The side by itself.
     fn study(&self, traces: &[Input], request: &DiffRequest) -> Result<Study, StudyError> {
         let inputs = match self {
             Self::Definitions(_) => traces.to_vec(),
@@ -170,7 +167,6 @@ impl Side {
         Study::of(inputs)?.threads(request.threads).asked(self.question(request))
     }
 
-    /// Its metrics, and its scores if it is scores.
     fn read(
         &self,
         traces: Option<&TraceSet>,
@@ -208,7 +204,6 @@ impl Side {
 }
 
 impl Pair {
-    /// Scores both sides.
     fn score(old: &Side, new: &Side, traces: Option<&TraceSet>, request: &DiffRequest) -> Result<Self, StudyError> {
         let (old_metrics, old_table) = old.read(traces, request)?;
         let (new_metrics, new_table) = new.read(traces, request)?;
@@ -284,7 +279,6 @@ impl Pair {
 }
 
 impl Scored {
-    /// What there is to say where its definitions do not score an experiment that the traces have.
     fn unscored(&self, traces: &TraceSet) -> Option<String> {
         let is_kept = |name: &str| self.table.keys.iter().any(|key| key.experiment == name);
         match own_definitions::unscored(self.definitions.as_ref()?, traces, is_kept)? {
@@ -295,7 +289,6 @@ impl Scored {
         }
     }
 
-    /// These metrics of what scored it, read back from what its scores carry if they were not computed now.
     fn definitions(&self, traces: &TraceSet, metrics: &[String]) -> Result<Definitions, ScoreError> {
         match &self.definitions {
             None => score_traces::restored(traces, &self.table.catalog, metrics),
@@ -311,7 +304,6 @@ impl Scored {
 /// The tables of both sides, and what decided where they differ.
 type ScoredSides = ([EpisodeTable; 2], Option<[BTreeMap<String, Evidence>; 2]>);
 
-/// Both sides: those that were read, and in one scan those that definitions give.
 fn score_sides(
     definitions: &[Option<Definitions>; 2],
     read: [Option<EpisodeTable>; 2],
@@ -332,7 +324,6 @@ fn score_sides(
     }
 }
 
-/// Every metric asked for is one of some side.
 fn check_known(asked: Option<&[String]>, old: &[String], new: &[String]) -> Result<(), UnknownMetric> {
     let known = || new.iter().chain(old.iter().filter(|name| !new.contains(name)));
     match asked.unwrap_or_default().iter().find(|name| !known().any(|known| known == *name)) {
@@ -344,7 +335,6 @@ fn check_known(asked: Option<&[String]>, old: &[String], new: &[String]) -> Resu
     }
 }
 
-/// What there is to say where some flips have no timesteps.
 fn unexplained(changes: &Changes) -> Option<String> {
     let lacks = |flip: &&Flip| flip.timesteps.before.is_none() || flip.timesteps.after.is_none();
     let count = changes.flips.iter().filter(lacks).count();

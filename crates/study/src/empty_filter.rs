@@ -49,7 +49,6 @@ impl Study {
         Ok(Some(words))
     }
 
-    /// All episodes, with the columns of these names.
     fn unfiltered(&self, names: &[String]) -> Result<EpisodeTable, StudyError> {
         let Question { definitions, each, parts, .. } = self.question.clone();
         let whole = Question { definitions, each, parts, ..Question::default() };
@@ -67,7 +66,6 @@ impl Study {
     }
 }
 
-/// The first values of a column: texts as SQL has them.
 fn listed(values: &BTreeSet<KeyValue>) -> String {
     let one = |value: &KeyValue| match value {
         KeyValue::Missing => "null".to_owned(),

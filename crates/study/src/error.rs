@@ -383,7 +383,6 @@ pub enum StudyError {
 }
 
 impl StudyError {
-    /// An error with the file that it is about.
     pub(super) fn file(name: &str, source: impl Into<Box<dyn Error + Send + Sync>>) -> Self {
         Self::File { name: name.to_owned(), source: source.into() }
     }
@@ -416,7 +415,6 @@ impl StudyError {
     }
 }
 
-/// Each group with what to ask for in its place.
 fn differing(groups: &[ScoredAlike]) -> String {
     let one = |group: &ScoredAlike| format!("`{}` for {}", group.definitions, group.condition);
     let ask = |group: &ScoredAlike| format!("--where \"{}\" --definitions {}", group.condition, group.definitions);

@@ -15,12 +15,10 @@ pub(super) struct ExpectedTraces {
     pub(super) experiments: Option<Vec<String>>,
     /// The name of their domain; `None` for the mirror's.
     pub(super) domain: Option<String>,
-    /// The columns that they declare.
     pub(super) declared: Vec<DeclaredColumn>,
 }
 
 impl ExpectedTraces {
-    /// What these definitions expect, with every fault of theirs as an error.
     pub(super) fn of(definitions: &Path) -> Result<Self, StudyError> {
         let definitions = Definitions::load(definitions, &schema_columns())?;
         let declared = declared_columns(&definitions);

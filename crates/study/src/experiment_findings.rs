@@ -51,7 +51,6 @@ fn overridden(file: &str, declared: &DeclaredExperiment, catalog: &Catalog) -> V
     differences(declared, known).into_iter().map(finding).collect()
 }
 
-/// Levels of metrics that the definitions do not have.
 fn unknown_levels(file: &str, declared: &DeclaredExperiment, catalog: &Catalog) -> Vec<Finding> {
     let chance = declared.chance.keys().map(|metric| ("chance", metric));
     let levels = chance.chain(declared.reference.keys().map(|metric| ("reference", metric)));
@@ -64,7 +63,6 @@ fn unknown_levels(file: &str, declared: &DeclaredExperiment, catalog: &Catalog) 
     unknown.map(finding).collect()
 }
 
-/// What differs, as the definitions and as the trace have it. What only one of them gives is no difference.
 fn differences(declared: &DeclaredExperiment, known: &Experiment) -> Vec<(String, String, String)> {
     let mut found = Vec::new();
     let quoted = |text: &str| format!("`{}`", visible(text));

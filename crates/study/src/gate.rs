@@ -64,7 +64,6 @@ impl Study {
         found.ok_or_else(|| StudyError::NoDirection { metric: first() })
     }
 
-    /// The scores of one side, lost episodes among them.
     fn gated(&self, options: &GateOptions) -> Result<EpisodeTable, StudyError> {
         let table = self.scan(Outputs { losses: true, ..Outputs::default() })?.episodes;
         self.check_filter(table.len())?;
@@ -85,7 +84,6 @@ impl Study {
         Ok(table)
     }
 
-    /// What there is to see of these episodes: nothing of scores.
     fn shown(&self, ids: &BTreeSet<String>, metric: &str) -> Result<Shown, StudyError> {
         let Source::Traces(traces) = &self.source else { return Ok(Shown::default()) };
         if ids.is_empty() {
@@ -118,7 +116,6 @@ struct PageBeside {
 }
 
 impl Shown {
-    /// A page of other episodes with the same ids has other values of those that flipped.
     fn add_to(&self, played: &mut Played) {
         let found = self.evidence.get(&played.episode_id).filter(|(value, _)| *value == Some(played.value));
         played.timesteps = found.map(|(_, steps)| steps.clone());
@@ -130,7 +127,6 @@ impl Shown {
     }
 }
 
-/// The pages in a folder of traces or beside it, by name.
 fn pages_beside(folder: &Path, metric: &str) -> Vec<PageBeside> {
     let inside = |folder: &Path| {
         let entries = fs::read_dir(if folder.as_os_str().is_empty() { Path::new(".") } else { folder });
@@ -142,7 +138,6 @@ fn pages_beside(folder: &Path, metric: &str) -> Vec<PageBeside> {
     pages.filter_map(|folder| Some(PageBeside { values: listed(&folder, metric)?, folder })).collect()
 }
 
-/// The values that a page has of a metric: its list is a script that hands a JSON object over.
 fn listed(page: &Path, metric: &str) -> Option<BTreeMap<String, i64>> {
     let text = fs::read_to_string(page.join(PAGE[1])).ok()?;
     let list: Value = serde_json::from_str(text.get(text.find('{')?..=text.rfind('}')?)?).ok()?;
@@ -151,7 +146,6 @@ fn listed(page: &Path, metric: &str) -> Option<BTreeMap<String, i64>> {
     Some(list["rows"].as_array()?.iter().filter_map(value).collect())
 }
 
-/// A text as the value of a query.
 fn percent(text: &str) -> String {
     let spelled = |byte: u8| match byte {
         b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'-' | b'_' | b'.' | b'/' => char::from(byte).to_string(),

@@ -109,7 +109,6 @@ pub struct Study {
     question: Question,
     backend: Backend,
     threads: NonZeroUsize,
-    /// The plan that the analysis is compared with.
     plan: Option<RegisteredPlan>,
 }
 
@@ -280,7 +279,6 @@ impl Study {
         Ok(cells)
     }
 
-    /// The tables of these episodes, each with the filter that chose them.
     fn tables(
         &self,
         episodes: &EpisodeTable,
@@ -333,12 +331,10 @@ impl Study {
         self.source.traces().ok().and_then(|traces| stale_note(traces.files()))
     }
 
-    /// Lost episodes that count neither as successes nor as failures.
     fn undecided(&self, lost: &LostCounts) -> LostCounts {
         if self.question.lost == LostAs::Nothing { lost.clone() } else { LostCounts::default() }
     }
 
-    /// The statistics of the episodes that count.
     fn statistics_of(&self, counted: &Counted, cells: &Cells, options: &Options) -> Result<Statistics, StudyError> {
         let Counted { results, lost, .. } = counted;
         let declared = &results.episodes.declared;
@@ -460,7 +456,6 @@ impl Study {
         Ok(replace::check_folder(out, inputs).map_err(BundleError::from)?)
     }
 
-    /// Refuses inputs that are not what they were when they were opened.
     fn check_unchanged(&self) -> Result<(), StudyError> {
         self.stamps.iter().try_for_each(Stamp::check)
     }

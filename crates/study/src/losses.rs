@@ -42,7 +42,6 @@ pub(super) struct Counted {
     pub lost: LostCounts,
 }
 
-/// The episodes in the lists beside the traces that are in no trace, of models that the traces have.
 pub(super) fn unrecorded(inputs: &[Input], table: &EpisodeTable) -> Result<Vec<LostEpisode>, StudyError> {
     let mut listed = lost::beside(inputs)?;
     if listed.is_empty() {
@@ -54,7 +53,6 @@ pub(super) fn unrecorded(inputs: &[Input], table: &EpisodeTable) -> Result<Vec<L
     Ok(listed)
 }
 
-/// Marks the lost episodes of a table, and counts them among the replies.
 pub(super) fn label(results: &mut Results) {
     let Results { episodes, lost, quality, .. } = results;
     if let Some(ids) = lost.as_ref().filter(|ids| !ids.is_empty()) {
@@ -67,7 +65,6 @@ pub(super) fn label(results: &mut Results) {
     }
 }
 
-/// Puts the lost episodes beside what became of the replies.
 fn count(quality: &mut QualityByCell, lost: &LostCounts, is_known: bool) {
     for (key, lost) in lost.iter() {
         quality.0.entry(key.clone()).or_default().lost = Some(*lost);
@@ -77,7 +74,6 @@ fn count(quality: &mut QualityByCell, lost: &LostCounts, is_known: bool) {
     }
 }
 
-/// How many episodes of each cell were lost.
 fn counts(table: &EpisodeTable) -> LostCounts {
     let mut counts = LostCounts::default();
     for row in (0..table.len()).filter(|row| is_lost(table, *row)) {
@@ -100,7 +96,6 @@ fn is_lost(table: &EpisodeTable, row: usize) -> bool {
 }
 
 impl Study {
-    /// The episodes that cells, statistics and figures count.
     pub(super) fn counted(&self, results: Results) -> Counted {
         let lost = counts(&results.episodes);
         if lost.is_empty() {
@@ -119,7 +114,6 @@ impl Study {
     }
 }
 
-/// The results without the lost episodes.
 fn without(results: Results, lost: LostCounts) -> Counted {
     let all = results.episodes;
     let kept: Vec<usize> = (0..all.len()).filter(|row| !is_lost(&all, *row)).collect();

@@ -32,7 +32,6 @@ fn own(declared: &DeclaredExperiment) -> Option<(String, Option<String>)> {
     (name != DEFAULT_DEFINITIONS).then(|| (name.to_owned(), None))
 }
 
-/// The experiments of traces by what scores them; what includes others has theirs.
 fn groups(traces: &TraceSet) -> Vec<ScoredAlike> {
     let mut by_name: BTreeMap<(String, Option<String>), BTreeSet<String>> = BTreeMap::new();
     let default = || (DEFAULT_DEFINITIONS.to_owned(), None);
@@ -111,7 +110,6 @@ impl Question {
         Ok(self)
     }
 
-    /// The definitions asked for over some columns, or those of each experiment.
     pub(super) fn load(&self, columns: &Columns) -> Result<Definitions, StudyError> {
         if self.definitions.is_none() && !self.parts.is_empty() {
             let whole = side_by_side(&self.parts, columns)?;
@@ -151,7 +149,6 @@ pub(super) fn check(definitions: &Definitions, traces: &TraceSet, episodes: &Epi
     unscored(definitions, traces, |name| episodes.keys.iter().any(|key| key.experiment == name)).map_or(Ok(()), Err)
 }
 
-/// The first experiment that some definitions do not score, among those that are kept.
 pub(super) fn unscored(
     definitions: &Definitions,
     traces: &TraceSet,

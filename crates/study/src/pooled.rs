@@ -11,7 +11,6 @@ use report::cells::group::{CONDITION, membership};
 use report::comparable::{FINGERPRINT, Recorded, Varied, difference};
 use score::table::EpisodeTable;
 
-/// Cells that mix fingerprints, each with the first two rows that differ.
 fn mixed(table: &EpisodeTable, groups: &[usize]) -> Vec<[usize; 2]> {
     let Some(fingerprints) = table.label(FINGERPRINT) else { return Vec::new() };
     let mut cells: BTreeMap<_, (usize, Option<usize>)> = BTreeMap::new();
@@ -64,7 +63,6 @@ fn differences(table: &EpisodeTable, rows: [usize; 2]) -> String {
     }
 }
 
-/// What is the matter with the cell of two rows.
 fn pooled(table: &EpisodeTable, by: &[String], groups: &[usize], rows: [usize; 2]) -> StudyError {
     let [one, other] = rows.map(|row| table.keys.get(row));
     let fingerprint = |row: usize| table.label(FINGERPRINT).and_then(|column| column.get(row)).unwrap_or_default();

@@ -122,7 +122,6 @@ pub fn manifest(report: &Path) -> Result<Manifest, ProvenanceError> {
     }
 }
 
-/// Whether a path is one that a manifest may name.
 fn is_plain(path: &str) -> bool {
     !path.is_empty() && Path::new(path).components().all(|part| matches!(part, Component::Normal(_)))
 }
@@ -155,7 +154,6 @@ fn find(wanted: &bundle::Input, places: &[PathBuf]) -> Result<PathBuf, TraceFaul
     Err(TraceFault { path: wanted.path.clone(), expected: wanted.sha256.clone(), found: other })
 }
 
-/// Where a trace may lie in a place: under its path, under its bare name, or as the place itself.
 fn candidates(wanted: &bundle::Input, place: &Path) -> Vec<PathBuf> {
     let path = Path::new(&wanted.path);
     if place.is_file() {
@@ -172,7 +170,6 @@ fn candidates(wanted: &bundle::Input, place: &Path) -> Vec<PathBuf> {
     candidates
 }
 
-/// The paths below a folder that a manifest writes so: what is no text in a name stands there as U+FFFD.
 fn shown_as(folder: &Path, path: &Path) -> Vec<PathBuf> {
     path.components().fold(vec![folder.to_owned()], |folders, part| {
         let part = part.as_os_str().to_string_lossy();

@@ -137,7 +137,6 @@ impl QualityLimits {
         cells.0.iter().flat_map(of_cell).collect::<Vec<_>>()
     }
 
-    /// Each option, whether it is asked for, and the steps of a cell that do not record its quantity.
     fn missing(&self, quality: &Quality) -> [(&'static str, bool, u64); 6] {
         let replies = quality.steps.saturating_sub(quality.replies());
         // What the infrastructure ended came with no reply, which would have taken some time.

@@ -43,7 +43,6 @@ pub struct Question {
 }
 
 impl Question {
-    /// The definition file asked for, or the default one.
     pub(crate) fn definitions_name(&self) -> &Path {
         self.definitions.as_deref().unwrap_or(Path::new(DEFAULT_DEFINITIONS))
     }
@@ -53,7 +52,6 @@ impl Question {
         self.by.iter().flatten().filter(|name| !KEY_COLUMNS.contains(&name.as_str())).cloned().collect()
     }
 
-    /// The labels of scores of these traces: the columns to group by, and what the traces say of each episode's recording.
     pub(crate) fn labels_over(&self, traces: &TraceSet) -> Vec<String> {
         let mut labels = self.labels();
         let standing = STANDING_LABELS.into_iter().filter(|name| traces.declares(name));
@@ -65,7 +63,6 @@ impl Question {
         labels
     }
 
-    /// The columns that cells of these episodes are grouped by.
     pub(crate) fn by_over(&self, episodes: &EpisodeTable) -> Vec<String> {
         let default = || {
             let condition = episodes.has_conditions().then_some(CONDITION);
@@ -74,7 +71,6 @@ impl Question {
         self.by.clone().unwrap_or_else(default)
     }
 
-    /// The definitions asked for, with every column that they read in every trace, and the experiments that these declare.
     pub(crate) fn bind(&self, traces: &TraceSet) -> Result<Definitions, StudyError> {
         let asked = self.clone().resolved(traces)?;
         let mut definitions = asked.bind_to(&score_traces::trace_columns(traces))?;

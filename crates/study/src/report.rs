@@ -65,13 +65,9 @@ pub struct Report {
     pub notes: Vec<String>,
     pub(super) style: Style,
     threads: NonZeroUsize,
-    /// What the episodes are of, for the commands on the page.
     recordings: Option<Recordings>,
-    /// Figures and the page.
     illustrations: Vec<OutputFile>,
-    /// The files that it is made from, none of which it may replace.
     read: Vec<PathBuf>,
-    /// How many of these, the first ones, are traces or scores.
     inputs: usize,
 }
 
@@ -143,7 +139,6 @@ impl Study {
         Ok(report)
     }
 
-    /// What names the same recordings to other commands; none of scores.
     fn recordings(&self, manifest: &Manifest) -> Option<Recordings> {
         let Source::Traces(_) = &self.source else { return None };
         // As a manifest names files: by no absolute path.
@@ -253,7 +248,6 @@ impl Report {
         Ok(WrittenReport { files: written.files.iter().map(inside).collect(), manifest: written.manifest })
     }
 
-    /// The table of data quality in its formats.
     fn quality_files(&self) -> Vec<OutputFile> {
         let file = |ending: &str, text: String| OutputFile {
             path: format!("tables/{}.{ending}", quality::NAME).into(),
@@ -263,7 +257,6 @@ impl Report {
         vec![file("tex", printed.latex()), file("md", printed.markdown()), file("csv", records.csv())]
     }
 
-    /// Adds the figures and the page.
     fn illustrate(&mut self, statistics: &Statistics) -> Result<(), StudyError> {
         let drawings = FigureInputs::of(&self.results, &self.style)?.draw_all();
         self.notes.extend(drawings.left_out.iter().map(|(name, reason)| format!("no figure `{name}`: {reason}")));

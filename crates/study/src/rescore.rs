@@ -67,7 +67,6 @@ impl RescoreRequest {
         Ok(Rescored { report, changes })
     }
 
-    /// The question that the old report answered, under the new definitions.
     fn question(&self, manifest: &Manifest) -> Question {
         let selected = manifest.metrics.len() < manifest.definitions.metric.len();
         Question {
@@ -143,7 +142,6 @@ fn changes(study: &Study, before: EpisodeTable, report: &Report) -> Result<Diff,
     Ok(Diff { changes, notes })
 }
 
-/// Whether a report was made with figures and its page.
 fn has_figures(report: &Path) -> bool {
     report.join("figures").is_dir() || report.join("report.html").is_file()
 }

@@ -36,7 +36,6 @@ impl Outputs {
         Self { timelines, outcomes, ..Self::default() }
     }
 
-    /// Whether anything beside the scores needs the steps of these traces.
     pub(super) fn needs_steps(self, traces: &TraceSet) -> bool {
         let has_losses = self.losses && traces.column(REPLY_STATUS).is_some();
         self.timelines || self.outcomes || self.quality || has_losses
@@ -64,7 +63,6 @@ pub struct Results {
 }
 
 impl Results {
-    /// The episode table alone.
     pub(super) fn of(episodes: EpisodeTable) -> Self {
         let (timelines, outcomes, lost, quality, inputs) = (None, None, None, None, Vec::new());
         Self { episodes, timelines, outcomes, lost, quality, inputs }
@@ -88,7 +86,6 @@ impl Results {
         Cow::Owned(Self { episodes, timelines, ..self.clone() })
     }
 
-    /// Keeps what is asked for: how open questions ended, and timelines of as many episodes as a figure shows.
     pub(super) fn select(&mut self, outputs: Outputs) {
         if outputs.outcomes && Outcomes::are_there(&self.episodes) {
             let shown = self.with_conditions_as_models();

@@ -71,7 +71,6 @@ impl Study {
         Ok(results.quality.unwrap_or_default())
     }
 
-    /// Adds to the episodes what is known of them besides their rows.
     pub(super) fn declare(&self, results: &mut Results) -> Result<(), StudyError> {
         if let Source::Traces(traces) = &self.source {
             let unrecorded = losses::unrecorded(&self.inputs, &results.episodes)?;
@@ -106,7 +105,6 @@ impl Study {
         Ok(results)
     }
 
-    /// Scores, timelines and losses in one pass over the traces.
     fn scan_traces(&self, traces: &TraceSet, outputs: Outputs) -> Result<Results, StudyError> {
         let labels = self.question.labels_over(traces);
         let definitions = self.question.bind(traces)?;
@@ -136,7 +134,6 @@ impl Study {
     }
 }
 
-/// Whether a label that nobody asked for tells one episode from another, or from those of older traces.
 fn says_something(label: &LabelColumn) -> bool {
     let default = schema::column(&label.name).and_then(Column::default_text);
     !STANDING_LABELS.contains(&label.name.as_str()) || label.values.iter().any(|text| text.is_some() && text != default)

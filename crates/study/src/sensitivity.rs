@@ -114,7 +114,6 @@ impl Study {
         Ok(tables)
     }
 
-    /// What each table says of the episodes that count.
     fn stages(&self, trial: &Trial, mut tables: Vec<EpisodeTable>) -> Result<Vec<Scored>, StudyError> {
         let mut others = tables.split_off(trial.definitions.len()).into_iter();
         let pixels = others.next();
@@ -153,7 +152,6 @@ impl Study {
 /// One threshold, scored.
 struct Scored {
     level: Level,
-    /// The cells by experiment and model, a model under another condition as one of its own.
     drawn: Cells,
     lost: u64,
 }
@@ -161,14 +159,11 @@ struct Scored {
 /// Everything that the scan computes.
 struct Trial {
     thresholds: Vec<u32>,
-    /// The definitions as they are, then one per threshold.
     definitions: Vec<Definitions>,
     /// At how many steps of each episode no pixels are recorded.
     pixels: Definitions,
-    /// What keeps the lost episodes, where the traces record it.
     lost: Option<Definitions>,
     reference: Reference,
-    /// The metrics that depend on the evidence, and the others.
     moved: Vec<String>,
     unmoved: Vec<String>,
     is_filter_moved: bool,
@@ -248,7 +243,6 @@ struct Dependent {
 }
 
 impl Dependent {
-    /// Equal steps of one plan are one step, so what two definitions compute in different steps differs.
     fn between(one: &Definitions, other: &Definitions) -> Self {
         let plan = PhysicalPlan::of(&[&one.plan, &other.plan]);
         let [one, other] = plan.scores() else { unreachable!("the plan has two sets of definitions") };
@@ -258,7 +252,6 @@ impl Dependent {
     }
 }
 
-/// The thresholds that the footers declare.
 fn recorded_px(traces: &TraceSet) -> Vec<u64> {
     let recordings = traces.files().iter().filter_map(|file| file.metadata_value(RECORDING_KEY));
     let recordings = recordings.filter_map(|text| serde_json::from_str::<Value>(text).ok());
@@ -266,7 +259,6 @@ fn recorded_px(traces: &TraceSet) -> Vec<u64> {
     px.into_iter().collect()
 }
 
-/// That every trace has the column that a threshold applies to.
 fn check_pixels(traces: &TraceSet) -> Result<(), StudyError> {
     let problem = match traces.column(PIXELS) {
         None => "no trace has it".to_owned(),

@@ -13,7 +13,6 @@ use crate::fault::{Fault, Place, Source};
 #[derive(Clone, Debug)]
 pub struct At<'a> {
     source: &'a Arc<Source>,
-    /// Its key; an entry of a list has that of the list.
     pub(crate) name: &'a str,
     name_span: Range<usize>,
     span: Range<usize>,

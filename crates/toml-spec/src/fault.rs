@@ -92,7 +92,6 @@ impl Fault {
     }
 }
 
-/// The span, moved onto character boundaries within the text.
 fn within(text: &str, span: &Range<usize>) -> Range<usize> {
     let start = text.floor_char_boundary(span.start.min(text.len()));
     let end = text.ceil_char_boundary(span.end.clamp(start, text.len()));

@@ -22,10 +22,8 @@ pub struct IncludeKind {
 /// The includes of a file, while it is read.
 pub struct Includes {
     kind: IncludeKind,
-    /// The files being read, for includes that lead back: their names, and their places on disk.
     open: Vec<(String, Option<PathBuf>)>,
     followed: u64,
-    /// What was said of includes: names of files and places, and nothing of what the files say.
     told: Vec<String>,
 }
 

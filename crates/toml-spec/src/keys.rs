@@ -70,7 +70,6 @@ impl<'a> Keys<'a> {
         self.place(span)
     }
 
-    /// Takes a value out of the table.
     fn take(&mut self, name: &str) -> Option<&'a Value<'a>> {
         let at = self.left.iter().position(|(known, _, _)| *known == name)?;
         Some(self.left.remove(at).2)

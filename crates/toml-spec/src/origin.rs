@@ -95,7 +95,6 @@ fn spelling(rest: &str, decoded: char, escapes: bool) -> Option<usize> {
     })
 }
 
-/// Past a backslash at the end of a line, and the white space that it swallows.
 fn skip_line_continuations(raw: &str, mut at: usize) -> usize {
     loop {
         let rest = &raw[at..];

@@ -16,7 +16,6 @@ use exact::suggest::nearest;
 /// The shape of a kind of files.
 pub struct Shape {
     schema: Json,
-    /// Keys may be absent that the type needs: the file lies over another one.
     is_overlay: bool,
 }
 
@@ -54,7 +53,6 @@ struct Walk<'a> {
 }
 
 impl<'a> Walk<'a> {
-    /// The schemas of which a value may have any, without references.
     fn alternatives(&self, schema: &'a Json) -> Vec<&'a Json> {
         if let Some(target) = schema["$ref"].as_str().and_then(|path| self.shape.schema.pointer(&path[1..])) {
             return self.alternatives(target);
@@ -143,7 +141,6 @@ impl<'a> Walk<'a> {
         (is_whole || values.iter().all(Value::is_str)).then_some(values)
     }
 
-    /// The schema of a table that may be of several kinds: the one whose word for its kind the table has.
     fn variant(&mut self, fitting: &[&'a Json], at: &At<'_>, what: &str) -> Option<&'a Json> {
         let [first, _, ..] = fitting else { return fitting.first().copied() };
         let tag_of = |schema: &'a Json, key: &str| schema["properties"][key]["const"].as_str();
@@ -199,7 +196,6 @@ impl<'a> Walk<'a> {
         Some(table)
     }
 
-    /// Refuses a key; returns the one that it may be meant to be.
     fn unknown(&mut self, properties: &'a Json, at: &At<'_>, what: &str) -> Option<&'a str> {
         let known: Vec<&str> = properties.as_object().into_iter().flatten().map(|(key, _)| key.as_str()).collect();
         let near = nearest(at.name, known.iter().copied());
@@ -211,7 +207,6 @@ impl<'a> Walk<'a> {
         near
     }
 
-    /// What a value may be, in words.
     fn expected(&self, all: &[&'a Json]) -> String {
         let mut kinds: Vec<String> = Vec::new();
         for one in all {

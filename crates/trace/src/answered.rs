@@ -20,7 +20,6 @@ pub fn by_others(files: &[TraceFile]) -> Vec<String> {
     files.iter().filter_map(|file| told((file, recording(file)?))).collect()
 }
 
-/// The models that answered a recording in place of the one that was asked for, each once: what its metadata say.
 fn others(recording: &Value) -> Vec<&str> {
     let agent = &recording["agent"];
     let patterns = agent["answers_as"].as_array().into_iter().flatten().filter_map(Value::as_str).map(str::to_owned);

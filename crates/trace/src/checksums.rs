@@ -19,7 +19,6 @@ pub fn missing_note(files: &[TraceFile]) -> Option<String> {
     Some(format!("{missing}: no checksums; damage to the data may not be found"))
 }
 
-/// The first of the files in this state, without its folder, and how many others there are.
 fn named(files: &[TraceFile], state: Checksums) -> Option<String> {
     let mut of_state = files.iter().filter(|file| file.checksums() == state);
     let first = of_state.next()?.path().file_name()?.to_string_lossy();

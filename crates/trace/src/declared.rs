@@ -90,7 +90,6 @@ impl Declared {
         recordings.map(Self::of_recording).reduce(Self::joined).unwrap_or_default()
     }
 
-    /// What one recording declares: the JSON of a footer. What is not of this shape declares nothing.
     fn of_recording(text: Option<&str>) -> Self {
         let recording: Value = text.and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default();
         let fingerprints = recording["fingerprints"].as_object().cloned().unwrap_or_default();

@@ -42,7 +42,6 @@ struct Fault {
     found: String,
 }
 
-/// The experiments that the recording of a file declares, each once; none where it is no JSON object.
 pub(super) fn of_recording(file: &str, recording: Option<&str>) -> Result<Vec<DeclaredExperiment>, Box<Finding>> {
     let recording: Value = recording.and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default();
     read(&recording).map_err(|Fault { key, expected, found }| {
@@ -51,7 +50,6 @@ pub(super) fn of_recording(file: &str, recording: Option<&str>) -> Result<Vec<De
     })
 }
 
-/// The required columns that a file may lack: those that every experiment which its recording declares says to be absent.
 pub(super) fn absent(file: &str, recording: Option<&str>) -> Vec<&'static str> {
     // A recording that is not as it must be is told apart from its columns.
     let declared = of_recording(file, recording).unwrap_or_default();
@@ -106,7 +104,6 @@ impl DeclaredExperiment {
     }
 }
 
-/// The members of an object of levels, read one by one.
 fn levels<T>(
     key: &str,
     value: Option<&Value>,
@@ -145,7 +142,6 @@ fn reference(key: &str, value: &Value) -> Result<Vec<Ratio>, Fault> {
     levels.flatten().ok_or_else(|| fault(key, "a list of fractions such as `1/10`", value))
 }
 
-/// A fraction in quotes, or a number, which is the fraction that it says.
 fn ratio(value: &Value) -> Option<Ratio> {
     match value {
         Value::String(text) => text.parse().ok(),
@@ -154,7 +150,6 @@ fn ratio(value: &Value) -> Option<Ratio> {
     }
 }
 
-/// A fault, with the value as JSON, cut where it is long.
 fn fault(key: impl Into<String>, expected: &'static str, found: &Value) -> Fault {
     const SHOWN: usize = 80;
     let text = found.to_string();

@@ -243,7 +243,6 @@ impl Finding {
         }
     }
 
-    /// A file that asks for more than its budget.
     pub(crate) fn over_budget(file: &str, exceeded: &Exceeded) -> Self {
         Self::new(Code::OverBudget, file, exceeded.expected(), "more")
     }

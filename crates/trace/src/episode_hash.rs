@@ -41,7 +41,6 @@ pub(super) fn columns() -> impl Iterator<Item = &'static str> {
 
 pub(super) struct Form {
     hasher: Sha256,
-    /// Those of the column under way.
     lines: Vec<u8>,
 }
 
@@ -50,7 +49,6 @@ impl Form {
         Self { hasher: Sha256::new_with_prefix("mirrorstats.episode 1\n"), lines: Vec::new() }
     }
 
-    /// Adds the next column, a value per row; nothing where none is there.
     pub(super) fn add<'a>(&mut self, name: &str, values: impl Iterator<Item = Option<Value<'a>>>) {
         self.lines.clear();
         self.lines.extend_from_slice(format!("column {name}\n").as_bytes());
@@ -88,7 +86,6 @@ impl Form {
     }
 }
 
-/// Whether two values are written alike.
 fn same(a: Option<Value<'_>>, b: Option<Value<'_>>) -> bool {
     match (a, b) {
         (Some(Value::Float(a)), Some(Value::Float(b))) => a.to_bits() == b.to_bits(),

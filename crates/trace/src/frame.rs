@@ -12,7 +12,6 @@ pub struct Frame {
     pub height: usize,
     /// `3 * width * height` bytes.
     pub rgb: Vec<u8>,
-    /// Agent and log are given the same picture, which is encoded once.
     #[cfg(feature = "sim")]
     png: OnceLock<Vec<u8>>,
 }

@@ -47,7 +47,6 @@ pub fn normal_form(identification: &str) -> Option<&'static str> {
     }
 }
 
-/// The words of each clause, in lower case, apostrophes dropped.
 fn clauses(text: &str) -> Vec<Vec<String>> {
     let mut clauses = vec![Vec::new()];
     for piece in text.to_lowercase().split_inclusive(|c: char| !c.is_alphanumeric() && !matches!(c, '\'' | '’')) {
@@ -69,7 +68,6 @@ fn clauses(text: &str) -> Vec<Vec<String>> {
 /// Words after which another thought begins.
 const TURNS: [&str; 6] = ["but", "while", "whereas", "although", "though", "however"];
 
-/// The colours that clauses name and do not deny, each once.
 fn affirmed<'a>(clauses: impl Iterator<Item = &'a Vec<String>>) -> Vec<Color> {
     let mut found = Vec::new();
     for clause in clauses {
@@ -85,7 +83,6 @@ fn affirmed<'a>(clauses: impl Iterator<Item = &'a Vec<String>>) -> Vec<Color> {
     found
 }
 
-/// From the word here on, the clause denies what it names.
 fn denies(clause: &[String], at: usize) -> bool {
     let after = clause.get(at + 1).map(String::as_str);
     match clause[at].as_str() {
@@ -97,7 +94,6 @@ fn denies(clause: &[String], at: usize) -> bool {
     }
 }
 
-/// The clause speaks of the speaker, and in the speaker's own name.
 fn is_about_oneself(clause: &[String]) -> bool {
     if clause.iter().any(|word| HEARSAY.contains(&word.as_str())) {
         return false;
@@ -160,7 +156,6 @@ const IGNORANCE: &[&[&str]] = &[
     &["pending"],
 ];
 
-/// The colour that a word names.
 fn color(word: &str) -> Option<Color> {
     let stem = word.strip_suffix("ish").filter(|stem| stem.len() > 2).unwrap_or(word);
     let stem = if stem == "redd" { "red" } else { stem };

@@ -233,9 +233,7 @@ fn distinct<T: Ord>(values: impl Iterator<Item = T>) -> Vec<T> {
 /// The episodes of a batch: experiments and models by their place among the distinct ones.
 struct Keys {
     file: usize,
-    /// Each experiment with each model that it has here.
     cells: Vec<(String, String)>,
-    /// The cell, seed and run of each episode.
     episodes: Vec<(usize, SeedRun)>,
 }
 
@@ -294,9 +292,7 @@ fn list(set: &TraceSet, batch: &EpisodeBatch) -> Vec<EpisodeInfo> {
 #[derive(Default)]
 struct Tally {
     files: Vec<u64>,
-    /// The place of each experiment with each model.
     places: HashMap<(String, String), usize>,
-    /// The seed and run of each episode there.
     episodes: Vec<Vec<SeedRun>>,
 }
 

@@ -28,7 +28,6 @@ pub fn answers_for(asked: &str, returned: &str, patterns: &[String]) -> bool {
     is_snapshot(&extra) && is_snapshot(&asked) && (extra.is_empty() || asked.is_empty())
 }
 
-/// The words of an id, without those that say who serves it.
 fn words(id: &str) -> Vec<String> {
     let id = id.rsplit('/').next().unwrap_or(id).to_lowercase();
     let id = id.split(':').next().unwrap_or_default();

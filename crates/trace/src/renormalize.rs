@@ -247,7 +247,6 @@ fn put_version(recording: &mut Value) -> Option<String> {
     None
 }
 
-/// The first place that tells the version.
 fn find(value: &mut Value) -> Option<&mut Value> {
     let members: &mut Map<String, Value> = value.as_object_mut()?;
     if members.contains_key(VERSION_KEY) {

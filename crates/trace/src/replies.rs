@@ -59,7 +59,6 @@ impl ReplyCounts {
         READ.contains(&status)
     }
 
-    /// The counts of the rows of a batch of a scan.
     pub(super) fn of_batch(batch: &EpisodeBatch) -> Self {
         if let Some(texts) = batch.texts.iter().find(|texts| texts.name == REPLY_STATUS) {
             return Self::of_keys(texts.keys.iter().flatten().map(usize::from), &texts.texts);
@@ -67,7 +66,6 @@ impl ReplyCounts {
         batch.steps.column_by_name(REPLY_STATUS).map_or_else(Self::default, Self::of_dictionary)
     }
 
-    /// The counts of the rows of a column.
     pub(super) fn of_column(column: &Column) -> Self {
         if let Some((keys, texts)) = column.byte_texts() {
             return Self::of_keys(keys.iter().flatten().map(usize::from), texts);

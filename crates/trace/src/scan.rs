@@ -40,7 +40,6 @@ pub struct Projection {
 }
 
 impl Projection {
-    /// The columns with one value per step.
     fn step_columns(&self) -> impl Iterator<Item = &str> {
         self.steps.iter().chain(&self.unchecked).map(String::as_str)
     }
@@ -205,13 +204,10 @@ pub fn episode_places(traces: &TraceSet, threads: NonZeroUsize) -> Result<HashMa
 
 /// What a worker found out about some episodes.
 struct Checked<T, E> {
-    /// The hashes of the ids of the episodes up to the fault, if there is one.
     ids: Vec<u64>,
     count: usize,
     steps: usize,
-    /// Names of colours beyond those of the study.
     colors: Vec<String>,
-    /// What the work gave, where no rule is broken.
     result: Result<Result<T, E>, Box<Finding>>,
 }
 

@@ -79,7 +79,6 @@ pub(super) fn same_frame(snapshot: &Snapshot, query: &Query) -> Result<Value, Vi
     Ok(json!({"is_same": a.zip(b).map(|(a, b)| a == b)}))
 }
 
-/// The steps at which a column differs, ascending, as far as both episodes go.
 fn differing<'e>(a: impl Iterator<Item = Option<Cell<'e>>>, b: impl Iterator<Item = Option<Cell<'e>>>) -> Vec<usize> {
     let pairs = a.zip(b).enumerate();
     pairs.filter(|(_, (a, b))| a != b).map(|(at, _)| at + 1).collect()

@@ -18,7 +18,6 @@ use world::replay::moments::moments;
 /// The most characters of a text in an answer; the rest is asked for by itself.
 pub(super) const LONGEST: usize = 4_000;
 
-/// Everything about an episode but its frames.
 pub(super) fn answer(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewError> {
     let id = required(query, "id")?;
     let opened = snapshot.episode(id)?;
@@ -73,7 +72,6 @@ pub(super) fn described(
     }))
 }
 
-/// A text of a step, whole.
 pub(super) fn text(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewError> {
     let opened = snapshot.episode(required(query, "id")?)?;
     let (name, t) = (required(query, "column")?, number(query, "t")?.unwrap_or_default());
@@ -100,7 +98,6 @@ fn is_lost(snapshot: &Snapshot, id: &str) -> bool {
     snapshot.scored.as_ref().is_some_and(|scored| scored.results.lost.as_ref().is_some_and(|lost| lost.contains(id)))
 }
 
-/// The columns that are the same at every step.
 fn constants(opened: &Opened, longest: usize) -> Vec<Value> {
     let episode = &opened.episode;
     let is_known = |column: &Column| opened.own.is_none() || is_identity(column.name);
@@ -114,7 +111,6 @@ fn constants(opened: &Opened, longest: usize) -> Vec<Value> {
         .collect()
 }
 
-/// What an episode without a step says of itself.
 fn head<'e>(episode: &'e Episode, column: &Column) -> Option<Cell<'e>> {
     episode.steps.is_empty().then(|| match column.name {
         "episode_id" => Some(Cell::Text(&episode.episode_id)),
@@ -124,7 +120,6 @@ fn head<'e>(episode: &'e Episode, column: &Column) -> Option<Cell<'e>> {
     })?
 }
 
-/// The columns of the steps that have some value, each with a value per step.
 fn steps(opened: &Opened, longest: usize) -> Value {
     let (episode, mut all) = (&opened.episode, Map::new());
     if let Some(own) = &opened.own {
@@ -146,7 +141,6 @@ fn steps(opened: &Opened, longest: usize) -> Value {
     Value::Object(all)
 }
 
-/// A value for the page; a long text is cut, and says how long it is.
 fn shown(value: Cell<'_>, longest: usize) -> Value {
     match value {
         Cell::Bool(value) => json!(value),
@@ -159,7 +153,6 @@ fn shown(value: Cell<'_>, longest: usize) -> Value {
     }
 }
 
-/// A text with its line breaks, its tabs as blanks, and all that acts or hides spelled out.
 fn lines(text: &str) -> String {
     text.replace('\t', "    ").lines().map(visible).collect::<Vec<_>>().join("\n")
 }

@@ -39,7 +39,6 @@ impl From<StudyError> for ViewError {
 }
 
 impl ViewError {
-    /// In words for the page: faults of a filter underlined, causes named.
     pub(super) fn words(&self) -> String {
         if let Self::Study(error) = self
             && let Some(faults) = error.faults()

@@ -53,7 +53,6 @@ impl Files {
         Ok(())
     }
 
-    /// A part of the data: a script that hands its value over.
     fn part(&mut self, name: &str, value: &Value) -> Result<(), ViewError> {
         self.add(&format!("data/{name}.js"), format!("mirrorstatsPart({name:?}, {value});\n"))
     }
@@ -88,7 +87,6 @@ pub fn write(view: &View, folder: &Path) -> Result<usize, ViewError> {
     Ok(new.len())
 }
 
-/// An episode, its map and its frames.
 fn add_episode(files: &mut Files, snapshot: &Snapshot, at: usize, id: &str) -> Result<(), ViewError> {
     let opened = snapshot.episode(id)?;
     // The page of the server tells of a log that cannot be read; a copy is not made without its frames.
@@ -108,7 +106,6 @@ fn add_episode(files: &mut Files, snapshot: &Snapshot, at: usize, id: &str) -> R
     files.part(&format!("episode-{at}"), &told)
 }
 
-/// Refuses a folder that holds anything but an earlier copy.
 fn check_folder(folder: &Path) -> Result<(), ViewError> {
     let is_empty = fs::read_dir(folder).map_or(true, |mut entries| entries.next().is_none());
     if is_empty || folder.join(MARK).is_file() {
@@ -120,7 +117,6 @@ fn check_folder(folder: &Path) -> Result<(), ViewError> {
     )))
 }
 
-/// The files of an earlier copy.
 fn old_files(root: &Path) -> Vec<PathBuf> {
     let mut old: BTreeSet<PathBuf> =
         ["index.html", "robots.txt", "NOTICE.txt", "assets/view.css", MARK].iter().map(PathBuf::from).collect();

@@ -14,12 +14,10 @@ use study::{Question, Results, StudyError};
 /// What a request asks for: its keys and values, in order.
 pub(super) type Query = [(String, String)];
 
-/// The first value of a key.
 pub(super) fn value<'q>(query: &'q Query, key: &str) -> Option<&'q str> {
     query.iter().find(|(name, _)| name == key).map(|(_, value)| value.as_str()).filter(|value| !value.is_empty())
 }
 
-/// A whole number that a key has.
 pub(super) fn number(query: &Query, key: &str) -> Result<Option<usize>, ViewError> {
     let parse = |text: &str| text.parse().map_err(|_| ViewError::Request(format!("`{key}`: expected a whole number")));
     value(query, key).map(parse).transpose()
@@ -32,10 +30,8 @@ pub(super) fn required<'q>(query: &'q Query, key: &str) -> Result<&'q str, ViewE
 
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Filter {
-    /// Chosen values of key columns; nothing chosen is everything.
     chosen: Vec<(&'static str, Vec<String>)>,
     pub condition: Option<String>,
-    /// Words that an id or a model's name has, in lower case.
     words: Option<String>,
 }
 
@@ -115,7 +111,6 @@ pub(super) fn condition_of(table: &EpisodeTable, row: usize) -> &str {
     table.label(CONDITION).and_then(|label| label.get(row)).unwrap_or("default")
 }
 
-/// The ids of the episodes where a condition holds.
 fn kept(snapshot: &Snapshot, scored: &Scored, condition: &str) -> Result<HashSet<String>, ViewError> {
     let table = match select(scored.results.episodes.clone(), None, Some(condition)) {
         Ok(table) => table,

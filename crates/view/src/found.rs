@@ -56,7 +56,6 @@ impl Found {
         Ok(found)
     }
 
-    /// The traces among the arguments; a folder in which a recording has only begun has none yet.
     fn traces(&self, named: &[OsString]) -> Result<Vec<Input>, ViewError> {
         if named.is_empty() {
             return Ok(Vec::new());
@@ -99,14 +98,12 @@ impl Found {
     }
 }
 
-/// The state of a file; of one that is gone the name alone.
 pub(super) fn stamp(path: &Path) -> Stamp {
     let metadata = fs::metadata(path).ok();
     let written = metadata.as_ref().and_then(|data| data.modified().ok()?.duration_since(UNIX_EPOCH).ok());
     (path.to_owned(), metadata.map_or(0, |data| data.len()), written)
 }
 
-/// The folder and those in it, but for names that programs keep for themselves; links are not followed.
 fn folders_below(folder: &Path) -> Result<Vec<PathBuf>, ViewError> {
     let mut all = vec![folder.to_owned()];
     for path in entries(folder)? {
@@ -122,7 +119,6 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>, ViewError> {
     Ok(entries(folder)?.into_iter().filter(|path| path.is_file()).collect())
 }
 
-/// What a folder holds, sorted; nothing where it is gone, as the folder of parts is once a recording has ended.
 fn entries(folder: &Path) -> Result<Vec<PathBuf>, ViewError> {
     let listed = fs::read_dir(folder).and_then(|all| all.map(|entry| Ok(entry?.path())).collect());
     let mut paths: Vec<PathBuf> = match listed {

@@ -60,7 +60,6 @@ pub struct Options {
 pub struct View {
     options: Options,
     newest: RwLock<Arc<Snapshot>>,
-    /// Held by whoever looks for a newer state.
     watch: Mutex<live::Watch>,
 }
 

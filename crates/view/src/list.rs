@@ -69,7 +69,6 @@ pub(super) fn neighbours(snapshot: &Snapshot, query: &Query, id: &str) -> Result
     }))
 }
 
-/// The ids of the episodes of the same place in the study, by other models or under other conditions.
 pub(super) fn siblings(snapshot: &Snapshot, id: &str) -> Vec<Value> {
     let Some(scored) = &snapshot.scored else { return Vec::new() };
     let table = &scored.results.episodes;

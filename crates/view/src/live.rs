@@ -21,7 +21,6 @@ const SPAN: Duration = Duration::from_secs(10);
 #[derive(Debug, Default)]
 pub(super) struct Watch {
     last: Option<Instant>,
-    /// Steps under way and recorded, at some times.
     counted: Vec<(Instant, u64)>,
     /// Why the newest state cannot be shown; the one before it is.
     fault: Option<String>,

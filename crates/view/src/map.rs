@@ -10,12 +10,10 @@ use super::snapshot::{Opened, Snapshot};
 use exact::escape::visible;
 use trace::log::frames::Shape;
 
-/// The shapes of an episode, and which of them are there at each step.
 pub(super) fn answer(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewError> {
     of(snapshot, &snapshot.episode(required(query, "id")?)?)
 }
 
-/// The same of an episode that is open.
 pub(super) fn of(snapshot: &Snapshot, opened: &Opened) -> Result<Value, ViewError> {
     let by_step = snapshot.shapes(opened)?;
     let (mut places, mut shapes) = (BTreeMap::new(), Vec::new());

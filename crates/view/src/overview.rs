@@ -14,7 +14,6 @@ use score::table::EpisodeTable;
 use study::{Outputs, Overview, Part, Question};
 use trace::palette::Color;
 
-/// What the page begins with: what can be chosen, and what the metrics mean.
 pub(super) fn study(snapshot: &Snapshot) -> Value {
     let Some(scored) = &snapshot.scored else {
         return json!({"generation": snapshot.generation, "episodes": 0, "choices": [], "metrics": []});
@@ -33,12 +32,10 @@ pub(super) fn study(snapshot: &Snapshot) -> Value {
     })
 }
 
-/// What definitions are called, without the folders that a file is in.
 fn named(definitions: &Path) -> String {
     visible(&definitions.file_stem().unwrap_or(definitions.as_os_str()).to_string_lossy())
 }
 
-/// The values of a column, where there are several.
 fn choice(table: &EpisodeTable, column: &str) -> Option<Value> {
     let value = |row: usize| match column {
         "experiment" => table.keys.get(row).experiment,

@@ -26,7 +26,6 @@ const MODULES: [(&str, &str); 12] = [
     ("main.js", include_str!("../../../assets/view/main.js")),
 ];
 
-/// A file of the page: its content and its type.
 pub(super) fn file(name: &str) -> Option<(String, &'static str)> {
     match name {
         "" => Some((document("<script type=\"module\" src=\"assets/main.js\"></script>"), "text/html; charset=utf-8")),
@@ -39,17 +38,14 @@ pub(super) fn file(name: &str) -> Option<(String, &'static str)> {
     }
 }
 
-/// The document that loads this script.
 pub(super) fn document(script: &str) -> String {
     web::page("mirrorstats view", "assets/view.css", &BODY.replace("<!-- script -->", script))
 }
 
-/// The style sheet of the page.
 pub(super) fn style() -> String {
     format!("{}\n{STYLE}", html::style_sheet())
 }
 
-/// All modules as one classic script.
 pub(super) fn classic() -> String {
     let bodies = MODULES.iter().map(|(_, text)| {
         let lines = text.lines().filter(|line| !line.starts_with("import "));

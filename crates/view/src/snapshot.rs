@@ -122,7 +122,6 @@ impl Snapshot {
         self.running.iter().map(|running| running.episode.steps.len() as u64).sum()
     }
 
-    /// Scores what is whole. Parts that a recording is just taking over into a trace are there twice for a moment, or gone.
     fn scored(options: &Options, found: &Found) -> Result<Option<Scored>, ViewError> {
         let with_parts: Vec<Input> = found.traces.iter().chain(&found.parts).cloned().collect();
         if with_parts.is_empty() {
@@ -212,7 +211,6 @@ impl Snapshot {
         is_whole && has_world
     }
 
-    /// What the trace of an episode says of how it was recorded.
     #[cfg(feature = "sim")]
     fn recording(&self, opened: &Opened) -> Option<serde_json::Value> {
         let scored = self.scored.as_ref()?;
@@ -242,7 +240,6 @@ impl Snapshot {
         Ok(BTreeMap::new())
     }
 
-    /// The logs where an episode may be: the one beside its trace, then those that were named.
     fn logs_of(&self, opened: &Opened) -> impl Iterator<Item = &PathBuf> {
         let beside = opened.input.as_ref().map(|input| input.path.with_extension("mcap"));
         let own = self.logs.iter().find(|log| Some(*log) == beside.as_ref());
@@ -284,13 +281,11 @@ impl Scored {
     }
 }
 
-/// The time of a step in its log, ns.
 fn time_of(episode: &Episode, t: usize) -> Option<u64> {
     let step = episode.steps.get(t.checked_sub(1)?)?;
     u64::try_from(step.extra.frame_time?).ok()
 }
 
-/// What is there of a log under way; nothing where it has been taken over into a trace meanwhile.
 fn unfinished(log: &Path) -> Result<Option<Episode>, LogError> {
     match frames::unfinished(log) {
         Err(LogError::Io { source, .. }) if source.kind() == ErrorKind::NotFound => Ok(None),

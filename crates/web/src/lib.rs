@@ -47,10 +47,8 @@ const HEADERS: [(HeaderName, &str); 7] = [
 #[derive(Clone, Debug)]
 pub struct Guard {
     address: SocketAddr,
-    /// A name that the server is known by besides its address.
     name: Option<String>,
     token: Option<String>,
-    /// Whether anything may be sent, not only asked.
     takes_posts: bool,
 }
 
@@ -146,12 +144,10 @@ impl Guard {
         of_cookie || token_of(query).is_some_and(|found| is_same(found, token))
     }
 
-    /// The cookie that keeps the token; another server of this machine has another port.
     fn cookie(&self) -> String {
         format!("mirrorstats-{}", self.address.port())
     }
 
-    /// The cookie to set, where the token came in the link.
     fn cookie_to_set(&self, query: &str) -> Option<HeaderValue> {
         let token = self.token.as_ref()?;
         token_of(query)?;
@@ -175,7 +171,6 @@ fn token_of(query: &str) -> Option<&str> {
     query.split('&').find_map(|pair| pair.strip_prefix("token="))
 }
 
-/// Compared without telling by the time how far two texts agree.
 fn is_same(a: &str, b: &str) -> bool {
     a.len() == b.len() && a.bytes().zip(b.bytes()).fold(0, |all, (a, b)| all | (a ^ b)) == 0
 }

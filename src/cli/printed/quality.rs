@@ -3,7 +3,6 @@
 use report::layout::quality::QualityTable;
 use score::quality::QualityByCell;
 
-/// The table, no wider than the terminal; empty without a cell.
 pub(crate) fn text(cells: &QualityByCell, width: Option<usize>) -> String {
     let table = QualityTable::from_cells(cells);
     table.map_or_else(String::new, |table| table.printed.lines(width))

@@ -83,17 +83,13 @@ pub(crate) struct Bar<'a> {
     episodes: usize,
     ended: AtomicUsize,
     replies: Replies,
-    /// Steps of an episode at most.
     budget: BTreeMap<Experiment, u64>,
     is_shown: bool,
-    /// When a line was last written.
     told: Mutex<Instant>,
-    /// Whether it was said that other processes are waited for.
     is_waiting: AtomicBool,
 }
 
 impl<'a> Bar<'a> {
-    /// A bar for some episodes in this world.
     pub(crate) fn new(player: &'a dyn Player, subject: &'a Subject, todo: &[Key], world: &WorldConfig) -> Self {
         let budget: BTreeMap<Experiment, u64> =
             todo.iter().map(|key| (key.experiment, u64::from(world.of(key.experiment).episode.steps))).collect();
@@ -119,14 +115,12 @@ impl<'a> Bar<'a> {
         self.replies.answer()
     }
 
-    /// How many episodes have ended, how many replies could not be read, and what was spent.
     fn message(&self) -> String {
         let unreadable = unreadable(&self.replies.counts()).map_or_else(String::new, |words| format!(", {words}"));
         let spent = self.player.spend().map_or_else(String::new, |spend| format!(", {}", spent(&spend)));
         format!("{} of {} episodes{unreadable}{spent}", self.ended.load(Ordering::Relaxed), self.episodes)
     }
 
-    /// A line above the bar, or in a log.
     fn say(&self, line: &str) {
         self.line.suspend(|| {
             // With standard error closed there is nobody left to tell.
@@ -134,12 +128,10 @@ impl<'a> Bar<'a> {
         });
     }
 
-    /// Whether a line in a log says more than that steps are played.
     fn has_news(&self) -> bool {
         self.player.waits() || self.replies.counts().all_unreadable() > 0
     }
 
-    /// A line for a log, now and then.
     fn write_line(&self) {
         let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
         if self.is_shown || told.elapsed() < BETWEEN_LINES || !self.has_news() {
@@ -196,7 +188,6 @@ impl Progress for Bar<'_> {
     }
 }
 
-/// Which episodes are waited for, and who has them.
 fn waiting(id: &str, held: Held) -> String {
     let others = match held.count - 1 {
         0 => String::new(),
@@ -230,14 +221,12 @@ fn spent(spend: &Spend) -> String {
     format!("{known} for {requests} and {}{unanswered}", counted(spend.tokens, "token"))
 }
 
-/// An amount to the cent, smaller ones to two digits that count.
 pub(crate) fn dollars(value: f64) -> String {
     let places = if value >= 1.0 || value == 0.0 { 2 } else { 4 };
     let number = Decimal::of_float(value, places);
     number.map_or_else(|| "an unknown number of US dollars".to_owned(), |number| format!("{number} US dollars"))
 }
 
-/// Says what became of the episodes, where those that were lost are listed, and where the time went.
 pub(crate) fn say(
     answer: &RecordAnswer,
     (folder, lost_list): (&Path, &Path),
@@ -289,7 +278,6 @@ pub(crate) fn say(
     Ok(())
 }
 
-/// What to type to see how the episodes were: a report, or one for each group of experiments that the same definitions score.
 fn next(folder: &Path, files: &[&Path]) -> Vec<String> {
     let typed = [NAME.into(), "report".into(), folder.into()];
     let report = format!("{NAME} report {}", html::word(&folder.to_string_lossy()));
@@ -305,7 +293,6 @@ fn next(folder: &Path, files: &[&Path]) -> Vec<String> {
     }
 }
 
-/// How many episodes are to go, if the recording was stopped; those under way that a limit has stopped are among them.
 fn stopped(answer: &RecordAnswer) -> Option<String> {
     let left = answer.asked - answer.found - answer.recorded - answer.elsewhere - answer.lost.len();
     let left = counted(left as u64, "episode");
@@ -321,7 +308,6 @@ fn stopped(answer: &RecordAnswer) -> Option<String> {
     }
 }
 
-/// What share of the threads' time each part took.
 fn shares(times: Spent) -> Option<String> {
     let parts = [
         ("rendering", times.rendering),

@@ -12,14 +12,12 @@ use world::sim::config::WorldConfig;
 /// The name of the world among the experiments of a plan.
 pub(crate) const WORLD: &str = "world";
 
-/// The hashes of this program's prompts.
 pub(crate) fn prompts() -> Vec<NamedHash> {
     let hashes = prompt::hashes();
     let named = hashes.as_object().into_iter().flatten();
     named.filter_map(|(name, hash)| Some(NamedHash { name: name.clone(), sha256: hash.as_str()?.to_owned() })).collect()
 }
 
-/// The plan in a file, for the footers of a recording with this world.
 pub(crate) fn registration(file: &Path, config: &WorldConfig) -> Result<Registration, Failure> {
     let shown = file.display();
     let plan = read_plan(file)?;

@@ -101,7 +101,6 @@ pub fn outcome(all: Vec<Result<Recorded, Failure>>, asked: usize) -> Result<Outc
     Ok(outcome)
 }
 
-/// The one of two outcomes that is told.
 fn worse(one: Outcome, other: Outcome) -> Outcome {
     match (one, other) {
         (Outcome::Interrupted, _) | (_, Outcome::Interrupted) => Outcome::Interrupted,
@@ -110,7 +109,6 @@ fn worse(one: Outcome, other: Outcome) -> Outcome {
     }
 }
 
-/// How a recording that ran to its end, or was interrupted, is told from outside.
 fn outcome_of(answer: &RecordAnswer) -> Outcome {
     match (answer.stopped, answer.lost.is_empty()) {
         (true, _) => Outcome::Interrupted,

@@ -187,7 +187,6 @@ impl VlmArgs {
     }
 }
 
-/// An amount of money, as typed.
 fn amount(text: &str) -> Result<f64, String> {
     let value = text.parse::<f64>().map_err(|fault| fault.to_string())?;
     if value.is_finite() && value >= 0.0 { Ok(value) } else { Err("expected a finite number from 0".to_owned()) }
@@ -201,11 +200,8 @@ fn effort(text: &str) -> Result<Effort, String> {
 pub struct VlmPlayer {
     vlm: Arc<Vlm>,
     at_once: usize,
-    /// Requests run on it; it ends with the player.
     network: Option<Runtime>,
-    /// The file that processes share that record into the same folder.
     ledger: Option<PathBuf>,
-    /// The model in the names of files.
     slug: String,
 }
 

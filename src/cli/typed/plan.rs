@@ -11,7 +11,6 @@ use study::Study;
 /// The largest plan that is read, bytes.
 const LARGEST: Limit = Limit::new("bytes of a plan", 1 << 20);
 
-/// The plan in a file, as it was registered.
 pub(crate) fn read_plan(file: &Path) -> Result<RegisteredPlan, Failure> {
     let shown = file.display();
     let text = input::text(file, LARGEST)
@@ -19,7 +18,6 @@ pub(crate) fn read_plan(file: &Path) -> Result<RegisteredPlan, Failure> {
     RegisteredPlan::parse(&text).map_err(|words| Failure::input(format!("{shown}: {words}")))
 }
 
-/// The study beside the registered plan in a file, if one is named.
 pub(crate) fn with_plan(study: Study, file: Option<&Path>) -> Result<Study, Failure> {
     Ok(match file {
         Some(file) => study.registered(read_plan(file)?),

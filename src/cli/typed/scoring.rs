@@ -74,7 +74,6 @@ impl From<StudyError> for Failure {
     }
 }
 
-/// A refusal of experiments that need different definitions, with what to type in place of what was typed.
 pub(crate) fn with_commands(failure: Failure, typed: &[OsString]) -> Failure {
     let Failure::Input(error) = &failure else { return failure };
     let Some(StudyError::DefinitionsDiffer { groups }) = error.downcast_ref() else { return failure };
@@ -83,13 +82,11 @@ pub(crate) fn with_commands(failure: Failure, typed: &[OsString]) -> Failure {
     Failure::input(format!("{found}\n  help: ask for each by itself:\n    {}", commands(typed, groups).join("\n    ")))
 }
 
-/// A word of a command line for a shell; a plain option stays as it is.
 fn as_typed(word: &str) -> String {
     let name = word.trim_start_matches('-');
     if name.len() < word.len() && html::word(name) == name { word.to_owned() } else { html::word(word) }
 }
 
-/// A command line for the episodes of each group alone.
 pub(crate) fn commands(typed: &[OsString], groups: &[ScoredAlike]) -> Vec<String> {
     let (mut kept, mut filter, mut words) = (Vec::new(), None, typed.iter().skip(1).map(|word| word.to_string_lossy()));
     while let Some(word) = words.next() {

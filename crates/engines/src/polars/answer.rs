@@ -105,7 +105,6 @@ pub fn plan(query: &Checked, tables: Vec<(Table, LazyFrame)>) -> Result<LazyFram
     })
 }
 
-/// A table of texts: names, and types where they have any.
 fn listed<T: AsRef<str>>(
     name: &str,
     names: impl AsRef<[T]>,
@@ -117,7 +116,6 @@ fn listed<T: AsRef<str>>(
     Ok(DataFrame::new(texts.len(), columns)?.lazy())
 }
 
-/// The type of a column in the words of SQL.
 fn sql_type(ty: &DataType) -> &'static str {
     match ty {
         DataType::Boolean => "BOOLEAN",
@@ -272,7 +270,6 @@ fn run_into(
     Ok(())
 }
 
-/// The last step with what the batches went into.
 fn with<T, R>(into: T, finish: impl FnOnce(T) -> Result<R, PolarsError>) -> Result<R, PolarsError> {
     contained_on_all_threads(|| finish(into)).map_err(PolarsError::Failed)?
 }

@@ -43,14 +43,12 @@ const AGGREGATES: [&str; 24] = [
 /// Most selects that grouping sets may become.
 const MOST_SETS: usize = 64;
 
-/// Whether it is a call that makes one value of the rows of a group.
 fn aggregate(expr: &Expr) -> bool {
     let Expr::Function(function) = expr else { return false };
     let name = function.name.to_string().to_ascii_lowercase();
     function.over.is_none() && AGGREGATES.contains(&name.as_str())
 }
 
-/// The first column that stands beside aggregates without a GROUP BY.
 pub(super) fn bare_column(select: &Select) -> Option<Ident> {
     if !matches!(&select.group_by, GroupByExpr::Expressions(keys, modifiers) if keys.is_empty() && modifiers.is_empty())
     {
@@ -68,7 +66,6 @@ pub(super) fn bare_column(select: &Select) -> Option<Ident> {
 
 #[derive(Default)]
 struct Bare {
-    /// How many aggregates and subqueries the visitor is in.
     inside: usize,
     has_aggregate: bool,
     column: Option<Ident>,
@@ -203,7 +200,6 @@ fn is_count_of_rows(function: &Function) -> bool {
         && function.filter.is_none()
 }
 
-/// A select with several grouping sets becomes the union of one select for each.
 fn divided(body: &mut SetExpr) -> Result<(), String> {
     let SetExpr::Select(select) = body else { return Ok(()) };
     let Some(sets) = grouping_sets(&select.group_by)? else { return Ok(()) };
@@ -311,7 +307,6 @@ pub(super) enum Asked {
 }
 
 struct Substitute<F> {
-    /// The tables that the whole query names.
     with: Option<With>,
     value: F,
 }

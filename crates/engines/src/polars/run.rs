@@ -62,7 +62,6 @@ impl From<Inner> for PolarsError {
     }
 }
 
-/// The lazy answer to a statement over the tables of a context.
 pub(super) fn plan(context: &mut SQLContext, statement: &str) -> Result<LazyFrame, PolarsError> {
     Ok(contained_on_all_threads(|| context.execute(statement)).map_err(PolarsError::Failed)??)
 }

@@ -46,7 +46,6 @@ fn check_size(episodes: u64, bytes: u64) -> Result<(), Exceeded> {
     Limit::new("episodes for Polars in files of their size", 300_000).and_beyond(1 << 20, 1, bytes).check(episodes)
 }
 
-/// The columns that the statement reads.
 fn columns(traces: &TraceSet, definitions: &Definitions) -> Vec<FrameColumn> {
     let plan = &definitions.plan;
     let needed = plan.needed_by(plan.outputs.iter().map(|output| output.node).chain(plan.filter));
@@ -91,7 +90,6 @@ fn stopped_at_overflow(words: &str) -> bool {
     words.contains("with overflow") || words.contains("overflow in integer division")
 }
 
-/// The first metric that needs a node.
 fn user_of(definitions: &Definitions, node: NodeId) -> String {
     let plan = &definitions.plan;
     let user = plan.outputs.iter().find(|output| plan.needed_by([output.node]).contains(&node));
@@ -134,7 +132,6 @@ fn metrics(definitions: &Definitions, rows: &DataFrame) -> Result<Vec<MetricColu
     definitions.plan.outputs.iter().map(|output| one(&output.name)).collect()
 }
 
-/// The table of these keys and metrics, with the labels that the native reader has seen.
 fn table(episodes: &EpisodeTable, keys: &[EpisodeKey], metrics: &[MetricColumn]) -> EpisodeTable {
     let known: HashMap<&str, usize> =
         episodes.keys.iter().enumerate().map(|(row, key)| (key.episode_id, row)).collect();

@@ -97,7 +97,6 @@ fn checked(text: &str) -> Result<Checked, Faults> {
 }
 
 impl Checked {
-    /// A fault of the whole query.
     pub(super) fn whole(&self, message: String) -> Faults {
         let place = Place { source: Arc::clone(&self.source), span: 0..self.source.text.len() };
         Faults(vec![Fault::new(place, message).help(OTHERWISE)])
@@ -144,7 +143,6 @@ impl Checked {
 const OTHERWISE: &str = "ask with a JOIN or a table of WITH; or ask DuckDB, of the file that `mirrorstats score TRACES -o \
                          scores.parquet` writes, or in Python of `study.episodes`";
 
-/// Words of Polars without the syntax trees that it prints.
 fn plain(words: &str) -> &str {
     let end = words.find(['{', '[']).filter(|_| words.contains("Ident {") || words.contains("Query {"));
     words[..end.unwrap_or(words.len())].trim_end()

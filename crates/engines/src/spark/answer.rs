@@ -97,7 +97,6 @@ fn finding(fault: Fault, job: Job<'_>) -> Option<Finding> {
 /// An episode has names, labels and some numbers.
 const LONGEST_LINE: Limit = Limit::new("bytes in a line of an answer", 64 << 20);
 
-/// Reads the table that the driver has written: one line per episode, an array of keys, metrics, labels.
 pub(super) fn table(path: &Path, job: Job<'_>) -> Result<EpisodeTable, SparkError> {
     let fault = |words: String| SparkError::Answer { words };
     let outputs = &job.definitions.plan.outputs;

@@ -16,7 +16,6 @@ pub(super) struct Failed {
     pub(super) message: String,
 }
 
-/// What an error that the driver caught means.
 pub(super) fn of_failure(failed: &Failed, cluster: &Cluster) -> SparkError {
     let cause = shortened(&failed.message, &cluster.settings);
     let named = cause.is_empty();
@@ -46,7 +45,6 @@ pub(super) fn of_log(log: &[u8], cluster: &Cluster) -> SparkError {
     SparkError::Failed { cause }
 }
 
-/// The words for a kind of column.
 pub(super) fn kind(name: &str) -> &str {
     match name {
         "string" => "text",
@@ -57,7 +55,6 @@ pub(super) fn kind(name: &str) -> &str {
     }
 }
 
-/// The innermost cause of a message of several lines, in one.
 fn shortened(message: &str, settings: &[Setting]) -> String {
     let innermost = message.lines().rfind(|line| line.starts_with("Caused by: "));
     let line = innermost.or_else(|| message.lines().find(|line| !line.trim().is_empty())).unwrap_or_default();
@@ -83,7 +80,6 @@ fn without_class(line: &str) -> &str {
     }
 }
 
-/// A word of a message whose URIs have lost their users.
 fn without_users(word: &str) -> String {
     let start = word.find(|c: char| c.is_ascii_alphanumeric()).unwrap_or(0);
     format!("{}{}", &word[..start], without_user(&word[start..]))

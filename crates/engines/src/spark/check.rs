@@ -45,7 +45,6 @@ pub(super) fn rules<'a>(
     rules
 }
 
-/// The domain of the traces that definitions are for.
 pub(super) const fn domain_of(catalog: &Catalog) -> Domain {
     if catalog.domain.is_some() { Domain::Own } else { Domain::Mirror }
 }
@@ -83,7 +82,6 @@ fn found(column: &Column, asks: Requirement<'_>) -> String {
     }
 }
 
-/// That a text is none that a column of colours may hold.
 fn no_color(x: &str, column: ColorColumn, palette: Option<&Palette>) -> String {
     if let Some(palette) = palette {
         let names = palette.names().iter().map(String::as_str).chain(column.word);
@@ -212,7 +210,6 @@ mod tests {
         report.findings.into_iter().next()
     }
 
-    /// Every rule has a damaged trace that both checkers refuse by it, in the same words but where they tell of rows.
     #[test]
     fn a_damaged_trace_breaks_the_same_rule_on_either_side() {
         let definitions = Definitions::load("paper", &schema_columns()).unwrap();

@@ -18,7 +18,6 @@ pub(super) struct Spark {
 /// Where `spark-submit` is below the folder of a Spark.
 const PROGRAM: &str = "bin/spark-submit";
 
-/// The first of the three that there is.
 pub(super) fn locate() -> Result<Spark, SparkError> {
     if let Some(home) = env::var_os("SPARK_HOME").filter(|home| !home.is_empty()) {
         let program = Path::new(&home).join(PROGRAM);

@@ -21,7 +21,6 @@ impl Place {
         self.0.path().join("table.jsonl")
     }
 
-    /// Where the driver writes what happened.
     pub(super) fn answer(&self) -> PathBuf {
         self.0.path().join("answer.json")
     }

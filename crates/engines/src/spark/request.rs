@@ -18,25 +18,18 @@ const KEYS: [(&str, &str); 5] =
 
 #[derive(Debug, Serialize)]
 pub(super) struct Request {
-    /// Whose end is the end of the driver.
     parent: u32,
     timeout: Option<u32>,
     /// Settings that must not stand on a command line.
     settings: Map<String, Value>,
     sources: Vec<Group>,
-    /// Whether the driver has to look into the files itself.
     inspect: bool,
-    /// Names and kinds of the columns to read.
     columns: Vec<(String, &'static str)>,
-    /// Those of them that a file need not have.
     optional: Vec<String>,
-    /// The number of rows by the footers.
     rows: Option<u64>,
     check: String,
     statement: String,
-    /// Names and SQL types of the columns of the result, by position.
     results: Vec<(String, &'static str)>,
-    /// What goes into the footers of the folder.
     metadata: Map<String, Value>,
     /// Where Spark writes; `table` is written by the driver if absent.
     folder: Option<String>,
@@ -91,7 +84,6 @@ fn optional(columns: &[(String, &'static str)], job: Job<'_>) -> Vec<String> {
     columns.iter().map(|(name, _)| name).filter(|name| is_optional(name)).cloned().collect()
 }
 
-/// The columns that the rules and the statement read, keys first, each once.
 pub(super) fn columns(plan: &Plan, labels: &[String]) -> Vec<(String, &'static str)> {
     let mut columns: Vec<(String, &str)> = KEYS.map(|(name, kind)| (name.to_owned(), kind)).to_vec();
     columns.push(("t".to_owned(), "int"));
@@ -123,7 +115,6 @@ const fn kind(ty: Type) -> &'static str {
     }
 }
 
-/// The lowering, and the labels beside its columns.
 fn statement(job: Job<'_>) -> Result<String, SparkError> {
     let scores = lower(&job.definitions.plan, Dialect::Spark)?;
     if job.labels.is_empty() {
@@ -156,7 +147,6 @@ fn results(job: Job<'_>) -> Vec<(String, &'static str)> {
     keys.into_iter().chain(metrics).chain(labels).collect()
 }
 
-/// The same as in the footer of a file of scores.
 fn metadata(job: Job<'_>) -> Result<Map<String, Value>, SparkError> {
     let catalog = &job.definitions.catalog;
     let definitions =

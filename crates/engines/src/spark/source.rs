@@ -14,16 +14,7 @@ use trace::open::{TraceFile, TraceSet};
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Sources {
     /// Files of this machine, whose footers have been read and are good.
-    Files {
-        /// What they are called, for messages.
-        names: Vec<String>,
-        /// The same files, by what they have.
-        groups: Vec<Group>,
-        /// How many rows they have together.
-        rows: u64,
-        /// The colours of all of them, if each declares a palette.
-        palette: Option<Palette>,
-    },
+    Files { names: Vec<String>, groups: Vec<Group>, rows: u64, palette: Option<Palette> },
     /// URIs, as typed; nothing is known of them here.
     Uris(Vec<String>),
 }
@@ -69,7 +60,6 @@ impl Sources {
         }
     }
 
-    /// What the traces are called in a message about all of them.
     pub(super) fn name(&self) -> String {
         let names = match self {
             Self::Files { names, .. } => names.clone(),
@@ -93,14 +83,12 @@ pub fn is_uri(argument: &str) -> bool {
         && !Path::new(argument).exists()
 }
 
-/// The URI of a path of this machine, whether there is something or not.
 pub(super) fn local_uri(path: &Path) -> io::Result<String> {
     let absolute: PathBuf = std::path::absolute(path)?;
     let text = absolute.to_str().ok_or_else(|| io::Error::other("the path is not UTF-8, as Spark needs it"))?;
     Ok(format!("file://{text}"))
 }
 
-/// A path for a reader that expands globs.
 fn literal(path: &str) -> String {
     let mut text = String::with_capacity(path.len());
     for c in path.chars() {
@@ -112,7 +100,6 @@ fn literal(path: &str) -> String {
     text
 }
 
-/// The URI without a user and password in it.
 pub(super) fn without_user(uri: &str) -> String {
     let Some((scheme, rest)) = uri.split_once("://") else { return uri.to_owned() };
     let (authority, path) = rest.split_at(rest.find('/').unwrap_or(rest.len()));

@@ -36,7 +36,6 @@ impl Drop for Running {
     }
 }
 
-/// Submits, waits, and gives what the driver answered.
 pub(super) fn submit(request: &Request, cluster: &Cluster, place: &Place) -> Result<Answer, SparkError> {
     let spark = locate()?;
     reach(cluster)?;

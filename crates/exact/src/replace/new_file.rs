@@ -13,7 +13,6 @@ use super::temporary::TemporaryFile;
 pub struct NewFile {
     file: TemporaryFile,
     target: PathBuf,
-    /// Whether the target is to be written into, not to be replaced.
     is_stream: bool,
 }
 

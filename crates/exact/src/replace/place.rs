@@ -60,7 +60,6 @@ pub fn is_stream(target: &Path) -> bool {
     fs::metadata(target).is_ok_and(|metadata| names_open_file || !metadata.is_file() && !metadata.is_dir())
 }
 
-/// What the temporary names for a target begin with; random characters and the checksum follow.
 pub(super) fn prefix_for(target: &Path) -> OsString {
     let name = target.file_name().unwrap_or_default();
     let mut prefix = OsString::from(PREFIX);
@@ -73,7 +72,6 @@ pub(super) fn prefix_for(target: &Path) -> OsString {
     prefix
 }
 
-/// The checksum that ends a temporary name, by which it is known to be ours.
 pub(super) fn checksum(before: &[u8]) -> String {
     hash::of_bytes(before)[..CHECK].to_owned()
 }

@@ -46,14 +46,12 @@ impl TemporaryFile {
         &mut self.file
     }
 
-    /// Gives the file another name, in place of what has it.
     pub(super) fn rename(mut self, target: &Path) -> io::Result<()> {
         fs::rename(&self.path, target)?;
         self.path = PathBuf::new();
         Ok(())
     }
 
-    /// Gives the file another name, which nothing may have.
     pub(super) fn rename_new(self, target: &Path) -> io::Result<()> {
         match fs::hard_link(&self.path, target) {
             // Some file systems have no links.
@@ -96,7 +94,6 @@ impl TemporaryFolder {
         Self::with_mode(&parent, &super::place::prefix_for(Path::new(name)), 0o700)
     }
 
-    /// Makes one with a name of this prefix and these permissions, from which the process's umask takes away.
     pub(super) fn with_mode(parent: &Path, prefix: &OsStr, mode: u32) -> io::Result<Self> {
         let (path, lock) = make(parent, prefix, |path| {
             make_folder(path, mode)?;
@@ -109,7 +106,6 @@ impl TemporaryFolder {
         &self.path
     }
 
-    /// Leaves the folder where it is.
     pub(super) fn keep(mut self) {
         self.path = PathBuf::new();
     }
@@ -125,7 +121,6 @@ impl Drop for TemporaryFolder {
     }
 }
 
-/// Makes something under a name that nothing has yet, and locks it.
 fn make(
     folder: &Path,
     prefix: &OsStr,
@@ -144,7 +139,6 @@ fn make(
     }
 }
 
-/// A name that no other process will think of: what is random is drawn by the system.
 pub(super) fn name(prefix: &OsStr) -> OsString {
     let mut drawn = RandomState::new().hash_one(std::process::id());
     let mut name = prefix.to_owned();

@@ -42,7 +42,6 @@ pub(super) struct Binding {
     pub(super) filter: Option<NodeId>,
 }
 
-/// Binds all definitions of a document, and a filter over episodes if there is one.
 pub(super) fn bind(document: &Document, columns: &Columns, filter: Option<&Written>) -> Result<Binding, Vec<Fault>> {
     let mut binder = Binder {
         document,
@@ -83,7 +82,6 @@ struct Binder<'a> {
     builder: Builder,
     states: HashMap<String, State>,
     underway: Vec<String>,
-    /// How deep the expression being bound is nested, definitions within definitions included.
     depth: usize,
     faults: Vec<Fault>,
 }
@@ -157,7 +155,6 @@ impl Binder<'_> {
         Some(Bound { node, level: Level::Episode, ..value })
     }
 
-    /// A metric's value is an integer or a truth value, once per episode.
     fn metric_value(&mut self, bound: Bound, written: &Written) -> Option<Bound> {
         let place = written.everywhere();
         if bound.level == Level::Step {

@@ -111,7 +111,6 @@ impl Scope<'_, '_> {
         }
     }
 
-    /// A column of the schema, or what it means where there is no value.
     fn column_or(&mut self, name: &str, column: Column, fallback: Fallback) -> Option<Bound> {
         // Null is what no value is anyway.
         if fallback.is_read && fallback.expression == "null" {
@@ -202,7 +201,6 @@ impl Scope<'_, '_> {
         self.compared(comparison, a, b, whole)
     }
 
-    /// A comparison of two operands that have been bound, each once however often it is compared.
     pub(super) fn compared(
         &mut self,
         mut comparison: Comparison,

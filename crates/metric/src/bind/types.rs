@@ -35,7 +35,6 @@ impl Scope<'_, '_> {
         self.binder.spread(constant, ty, Level::Constant, Level::Episode)
     }
 
-    /// An operation over several operands of known types, brought to one level (constants stay as they are).
     pub(super) fn combine(&mut self, operands: &[Bound], ty: Type, op: impl FnOnce(&[NodeId]) -> Op) -> Bound {
         let level = operands.iter().map(|operand| operand.level).max().unwrap_or(Level::Constant);
         let all_constant = level == Level::Constant;
@@ -99,7 +98,6 @@ impl Scope<'_, '_> {
         self.unary(Op::IntFromBool(bound.node), Type::Int, bound.level)
     }
 
-    /// The same value as another type, where that loses nothing.
     pub(super) fn converted(&mut self, bound: Bound, ty: Type) -> Option<Bound> {
         match (bound.ty, ty) {
             (None, ty) => Some(self.null_of(ty)),
@@ -153,7 +151,6 @@ impl Scope<'_, '_> {
         Some((bounds?, ty))
     }
 
-    /// Two operands that are asked to be the same.
     pub(super) fn pair(&mut self, left: &Expr, right: &Expr, whole: &Expr) -> Option<(Bound, Bound)> {
         let (a, b) = (self.bind(left), self.bind(right));
         let (a, b) = (a?, b?);

@@ -88,7 +88,6 @@ impl Possible {
         self.texts.extend_from_slice(values);
     }
 
-    /// That this is none of them.
     fn never(&self, text: &str) -> String {
         let columns: Vec<String> = self.columns.iter().map(|name| format!("`{name}`")).collect();
         match columns.as_slice() {

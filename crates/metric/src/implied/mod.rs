@@ -89,7 +89,6 @@ impl Reader<'_> {
         }
     }
 
-    /// The rate whose value a condition asks for.
     fn rate_asked(&self, when: NodeId) -> Option<(String, bool)> {
         match &self.plan.node(when).op {
             Op::Compare(comparison, x, y) => {
@@ -122,7 +121,6 @@ impl Reader<'_> {
         self.output(node).filter(|output| output.kind == Kind::Rate).map(|output| output.name.clone())
     }
 
-    /// The metric that has this value and is defined in all episodes.
     fn metric_of(&self, value: NodeId) -> Option<String> {
         self.output(value).filter(|output| !self.possible(output.node).may_be_null).map(|output| output.name.clone())
     }
@@ -131,7 +129,6 @@ impl Reader<'_> {
         self.plan.outputs.iter().find(|output| self.bare(output.node) == self.bare(node))
     }
 
-    /// The node without what only changes its type or its level.
     fn bare(&self, node: NodeId) -> NodeId {
         match self.plan.node(node).op {
             Op::Spread(x) | Op::IntFromBool(x) => self.bare(x),

@@ -19,7 +19,6 @@ const TRUTHS: Range = (0, 1);
 pub(super) struct Possible {
     /// The values; `None` where there never is one.
     values: Option<Range>,
-    /// Whether there may be none.
     pub(super) may_be_null: bool,
 }
 
@@ -86,9 +85,7 @@ const MOST_MOMENTS: usize = 6;
 #[derive(Clone, Copy)]
 pub(super) struct Traces<'p> {
     pub(super) plan: &'p Plan,
-    /// The most steps of an episode.
     pub(super) steps: u32,
-    /// Whether a column has a value in each row of each trace.
     pub(super) has_value: fn(&str) -> bool,
 }
 
@@ -111,7 +108,6 @@ impl Traces<'_> {
         cases.reduce(Possible::or).expect("there is one case at least")
     }
 
-    /// The last of these nodes, evaluated from the first.
     fn evaluate(&self, needed: &[NodeId], assumed: &[(NodeId, Possible)]) -> Possible {
         let mut found = vec![Possible::NULL; self.plan.nodes().len()];
         let mut last = Possible::NULL;
@@ -136,7 +132,6 @@ impl Traces<'_> {
         }
     }
 
-    /// The first and the last step where a predicate holds are steps, and what it asks to be there is there.
     fn at(&self, x: NodeId, moment: NodeId, of: impl Fn(NodeId) -> Possible) -> Possible {
         let values = of(x).values.filter(|_| of(moment).values.is_some());
         let is_there = match self.plan.node(moment).op {
@@ -195,7 +190,6 @@ fn of_constant(constant: &Constant) -> Possible {
     }
 }
 
-/// Kleene's conjunction: one false operand decides.
 fn both(left: Possible, right: Possible) -> Possible {
     if left.is_false() || right.is_false() {
         return Possible::always((0, 0));

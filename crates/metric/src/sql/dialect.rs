@@ -22,7 +22,6 @@ pub enum Dialect {
 pub(super) struct Functions {
     /// The value at the smallest and at the largest t that is not null; a null value counts.
     pub(super) value_at: [&'static str; 2],
-    /// The number of items of a list, the smallest and the largest one.
     pub(super) of_list: [&'static str; 3],
 }
 
@@ -39,7 +38,6 @@ impl Dialect {
         }
     }
 
-    /// A name as it stands in a statement.
     pub(super) fn quoted(self, name: &str) -> String {
         match self {
             Self::Portable | Self::Duckdb if is_plain(name) => name.to_owned(),
@@ -65,7 +63,6 @@ impl Dialect {
         }
     }
 
-    /// The function that says whether a text has a match of a regular expression.
     pub(super) const fn matches(self) -> Option<&'static str> {
         match self {
             Self::Portable => None,
@@ -74,7 +71,6 @@ impl Dialect {
         }
     }
 
-    /// The functions that spare a pass, where the dialect has them.
     pub(super) const fn functions(self) -> Option<Functions> {
         match self {
             Self::Portable | Self::Polars => None,
@@ -87,7 +83,6 @@ impl Dialect {
         }
     }
 
-    /// The aggregate of a column that is the same at every step of an episode.
     pub(super) const fn any_value(self) -> &'static str {
         match self {
             Self::Duckdb => "any_value",
@@ -95,7 +90,6 @@ impl Dialect {
         }
     }
 
-    /// The list of the timesteps at which a condition holds.
     pub(super) fn list(self, condition: &str) -> String {
         match self {
             Self::Duckdb => format!("list(s.t) FILTER (WHERE {condition})"),
@@ -190,13 +184,11 @@ impl Dialect {
     }
 }
 
-/// Whether every engine takes a name without quotes.
 pub(super) fn is_plain(name: &str) -> bool {
     let starts = name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_');
     starts && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
 }
 
-/// Whether a name may also be a word of SQL.
 fn is_keyword(name: &str) -> bool {
     ALL_KEYWORDS.binary_search(&name.to_ascii_uppercase().as_str()).is_ok()
 }

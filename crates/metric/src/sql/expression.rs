@@ -15,7 +15,6 @@ const INFINITY: &str = "CAST('inf' AS DOUBLE)";
 const NAN: &str = "CAST('NaN' AS DOUBLE)";
 
 impl Layout<'_> {
-    /// The text of a node, empty once all that may be written is.
     fn counted(&self, text: impl FnOnce() -> String) -> String {
         if !self.spend(1) {
             return String::new();
@@ -29,7 +28,6 @@ impl Layout<'_> {
         self.dialect.quoted(name)
     }
 
-    /// A column at the step that is read.
     fn of_step(&self, id: NodeId, name: &str) -> String {
         match self.lag.get() {
             0 => format!("s.{}", self.name(name)),
@@ -96,7 +94,6 @@ impl Layout<'_> {
         }
     }
 
-    /// What is summed or counted over the steps. A constant is one value to Polars, however many steps there are.
     pub(super) fn each_step(&self, summed: NodeId, text: String) -> String {
         let nodes = self.plan.needed_by([summed]);
         let varies = |id: &NodeId| {
@@ -118,7 +115,6 @@ impl Layout<'_> {
         format!("CASE WHEN {is_nan} = 1 THEN {NAN} ELSE {function}({value}) END")
     }
 
-    /// Where a value is read that is a column already.
     pub(super) fn read(&self, id: NodeId) -> Option<String> {
         match &self.plan.node(id).op {
             _ if self.is_aggregate(id) => Some(format!("e{}.{}", self.pass(id), self.column('n', id))),
@@ -128,7 +124,6 @@ impl Layout<'_> {
         }
     }
 
-    /// A node of numbers or text.
     pub(super) fn value(&self, id: NodeId) -> String {
         self.counted(|| self.value_of(id))
     }
@@ -157,7 +152,6 @@ impl Layout<'_> {
         }
     }
 
-    /// The answer to a search in a list.
     fn searched(&self, id: NodeId) -> Option<String> {
         let (list, functions) = (self.list(id)?, self.dialect.functions()?);
         let Op::Aggregate(aggregate, _) = self.plan.node(id).op else { return None };
@@ -171,7 +165,6 @@ impl Layout<'_> {
         })
     }
 
-    /// The timesteps of a list that lie in all windows.
     fn items(&self, Windowed { condition, windows }: &Windowed) -> String {
         let item = format!("t{}", condition.index());
         let window =
@@ -181,7 +174,6 @@ impl Layout<'_> {
         self.dialect.filtered(&list, &item, &windows.join(" AND "))
     }
 
-    /// An operand of arithmetic, its integers as wide as the native engine's whatever the file or a constant has.
     fn number(&self, id: NodeId) -> String {
         let node = self.plan.node(id);
         match node.op {
@@ -218,7 +210,6 @@ impl Layout<'_> {
         format!("CASE WHEN {truth} THEN 1 {otherwise} END")
     }
 
-    /// Whether a truth value is surely there.
     fn is_never_null(&self, id: NodeId) -> bool {
         if !self.spend(1) {
             return false;
@@ -232,7 +223,6 @@ impl Layout<'_> {
         }
     }
 
-    /// A node of truth values, as a condition.
     pub(super) fn truth(&self, id: NodeId) -> String {
         self.counted(|| self.truth_of(id))
     }
@@ -271,7 +261,6 @@ impl Layout<'_> {
         }
     }
 
-    /// An operand of a comparison: truth values are compared as integers.
     pub(super) fn operand(&self, id: NodeId) -> String {
         if self.plan.node(id).ty == Type::Bool { self.truth_as_int(id) } else { self.value(id) }
     }

@@ -23,13 +23,10 @@ pub(super) struct Layout<'p> {
     pub(super) needed: Vec<NodeId>,
     /// The pass after which each is known; 0 for what one step says.
     passes: BTreeMap<NodeId, usize>,
-    /// The searches that a list of timesteps answers, a column of the first pass.
     lists: BTreeMap<NodeId, Windowed>,
-    /// The values per step that several others need: columns of a table of steps.
     pub(super) shared: BTreeSet<NodeId>,
     /// How many steps before `s` the step is of which is written.
     pub(super) lag: Cell<usize>,
-    /// Bytes that were written of nodes, those of nodes in other nodes counted each time.
     written: Rc<Cell<usize>>,
 }
 
@@ -122,12 +119,10 @@ impl<'p> Layout<'p> {
         self.is_within_budget()
     }
 
-    /// Whether all that was asked for was written.
     pub(super) fn is_within_budget(&self) -> bool {
         MOST_WRITTEN.check(self.written.get() as u64).is_ok()
     }
 
-    /// The same without a table of steps: every value is written out where it is read.
     pub(super) fn without_shared(mut self) -> Self {
         self.shared.clear();
         self
@@ -138,7 +133,6 @@ impl<'p> Layout<'p> {
         self.passes[&id]
     }
 
-    /// Whether a node is an aggregate of its pass.
     pub(super) fn is_aggregate(&self, id: NodeId) -> bool {
         let node = self.plan.node(id);
         match &node.op {
@@ -149,17 +143,14 @@ impl<'p> Layout<'p> {
         }
     }
 
-    /// The list that answers a search.
     pub(super) fn list(&self, id: NodeId) -> Option<&Windowed> {
         self.lists.get(&id)
     }
 
-    /// The conditions whose timesteps the first pass lists.
     pub(super) fn listed(&self) -> BTreeSet<NodeId> {
         self.lists.values().map(|list| list.condition).collect()
     }
 
-    /// The search that a lookup follows, where its pass can look up too: first or last, and the condition, if any.
     pub(super) fn landmark(&self, id: NodeId) -> Option<(Aggregate, Option<NodeId>)> {
         let node = self.plan.node(id);
         let Op::At(x, moment) = node.op else { return None };
@@ -172,7 +163,6 @@ impl<'p> Layout<'p> {
         (at_once && node.ty != Type::Bool && self.dialect.functions().is_some()).then_some(found)
     }
 
-    /// The column of a node: the name of its definition and its number, else a letter and its number.
     pub(super) fn column(&self, letter: char, id: NodeId) -> String {
         let lets = self.plan.lets.iter().map(|(name, node)| (name, *node));
         let metrics = self.plan.outputs.iter().map(|output| (&output.name, output.node));
@@ -180,12 +170,10 @@ impl<'p> Layout<'p> {
         own.map_or_else(|| format!("{letter}{}", id.index()), |(name, _)| format!("{name}_{}", id.index()))
     }
 
-    /// The column of a value per step in the table of steps, where no column of the traces has its name.
     pub(super) fn step_column(&self, id: NodeId) -> String {
         self.free_name(self.column('c', id))
     }
 
-    /// The name, or one like it that no column of the traces has.
     fn free_name(&self, mut name: String) -> String {
         let columns = self.plan.columns(&self.needed);
         while columns.iter().any(|(column, _)| column.eq_ignore_ascii_case(&name)) {

@@ -23,9 +23,7 @@ use crate::plan::{Aggregate, Builder, Comparison, Constant, Node, NodeId, Op, Pl
 /// A search among the steps at which a condition holds, between moments of the episode.
 #[derive(Clone, Debug)]
 pub(super) struct Windowed {
-    /// What one step says.
     pub(super) condition: NodeId,
-    /// How its t compares with the moments.
     pub(super) windows: Vec<(Comparison, NodeId)>,
 }
 
@@ -65,16 +63,11 @@ impl OnePass {
 struct Rewriter<'p> {
     plan: &'p Plan,
     builder: Builder,
-    /// The new node of each old one so far.
     new: Vec<NodeId>,
-    /// Whether a new node reads one step or the constants of the episode, and no other steps.
     local: Vec<bool>,
-    /// Values per episode that have been made values per step.
     per_step: HashMap<NodeId, NodeId>,
-    /// Landmarks in windows, and whether there is one.
     within: HashMap<NodeId, NodeId>,
     windowed: BTreeMap<NodeId, Windowed>,
-    /// Values at moments that were rewritten.
     looked_up: HashMap<(NodeId, NodeId), NodeId>,
 }
 
@@ -127,7 +120,6 @@ impl Rewriter<'_> {
         }
     }
 
-    /// A value per episode for each step: read at the step itself where the constants of the episode make it.
     fn spread(&mut self, x: NodeId, ty: Type) -> NodeId {
         if self.is_local(x) { self.read_at_step(x) } else { self.add(Op::Spread(x), ty, Level::Step) }
     }
@@ -250,7 +242,6 @@ impl Rewriter<'_> {
         self.add(op, ty, Level::Episode)
     }
 
-    /// A condition at the first or last step at which another one holds.
     fn condition_at(&mut self, x: NodeId, landmark: Aggregate, condition: NodeId, moment: NodeId) -> Op {
         let fails = self.add(Op::Not(x), Type::Bool, Level::Step);
         let branches = [(x, true), (fails, false)].map(|(x, value)| {

@@ -65,7 +65,6 @@ fn repeated(repetition: &Repetition, text: &mut String) {
     }
 }
 
-/// A character for itself, wherever it stands.
 fn character(c: char, text: &mut String) {
     match c {
         _ if c.is_ascii_alphanumeric() || c == ' ' || c == '_' => text.push(c),
@@ -105,7 +104,6 @@ fn ranges(open: &str, ranges: &[ClassUnicodeRange], text: &mut String) {
     text.push(']');
 }
 
-/// A place between characters. Java's own words for some of these mean something else.
 fn place(look: Look) -> String {
     let edge = |word: &str| format!("(?:(?<={word})(?!{word})|(?<!{word})(?={word}))");
     let inside = |word: &str| format!("(?:(?<={word})(?={word})|(?<!{word})(?!{word}))");

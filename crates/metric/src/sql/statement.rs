@@ -85,7 +85,6 @@ impl<'l, 'p> Statement<'l, 'p> {
         Ok(())
     }
 
-    /// The table of steps, with what several aggregates read of a step written out once.
     fn steps(&mut self, pass: usize, mut reads: Reads) -> Result<(), LoweringError> {
         if reads.shared.is_empty() {
             self.text.push_str("\n  FROM steps s");
@@ -126,7 +125,6 @@ impl<'l, 'p> Statement<'l, 'p> {
         Ok(())
     }
 
-    /// The rows of the episode table.
     pub(super) fn episodes(&mut self) -> Result<(), LoweringError> {
         let layout = self.layout;
         self.text.push_str("\n-- The episode table: a row per episode, its keys and its metrics.");
@@ -149,7 +147,6 @@ impl<'l, 'p> Statement<'l, 'p> {
         self.check_length()
     }
 
-    /// A further column on a line of its own.
     pub(super) fn column(&mut self, indent: usize, column: &str) -> Result<(), LoweringError> {
         let _ = write!(self.text, ",\n{:indent$}{column}", "");
         self.check_length()
@@ -169,7 +166,6 @@ impl<'l, 'p> Statement<'l, 'p> {
 }
 
 impl Layout<'_> {
-    /// What a value reads of its step.
     fn reads(&self, id: NodeId, reads: &mut Reads) {
         let node = self.plan.node(id);
         if !reads.seen.insert((reads.lag, id)) {
@@ -190,7 +186,6 @@ impl Layout<'_> {
         }
     }
 
-    /// What an aggregate reads of each step.
     fn aggregate_reads(&self, id: NodeId, reads: &mut Reads) {
         match &self.plan.node(id).op {
             Op::Column(name) => drop(reads.columns.insert(self.dialect.quoted(name))),

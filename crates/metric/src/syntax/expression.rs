@@ -74,7 +74,6 @@ fn unread_construct(text: &str, before: &TokenWithSpan) -> Option<SyntaxFault> {
     Some(SyntaxFault { message: message.to_owned(), span, help: Some(help.to_owned()) })
 }
 
-/// How the function that a word names is used.
 fn function_of(token: &TokenWithSpan) -> Option<&'static str> {
     match &token.token {
         Token::Word(word) if word.quote_style.is_none() => {

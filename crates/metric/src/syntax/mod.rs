@@ -135,7 +135,6 @@ mod tests {
     use super::grammar::SyntaxFault;
     use super::*;
 
-    /// The expression with every operation in parentheses, to see how it was read.
     fn shape(expr: &Expr) -> String {
         let list = |items: &[Expr]| items.iter().map(shape).collect::<Vec<_>>().join(", ");
         let not = |negated: &bool| if *negated { "not " } else { "" };

@@ -24,7 +24,6 @@ impl<'a> Reader<'a> {
         Self { text, faults: Vec::new() }
     }
 
-    /// The whole expression, or all of its faults.
     pub(super) fn expression(mut self, parsed: &ast::Expr) -> Result<Expr, Vec<SyntaxFault>> {
         match self.read(parsed, 0) {
             Some(expr) if self.faults.is_empty() => Ok(expr),
@@ -91,7 +90,6 @@ impl<'a> Reader<'a> {
         items.into_iter().collect()
     }
 
-    /// Absent is fine, unreadable is not.
     fn optional(&mut self, expr: Option<&ast::Expr>, depth: usize) -> Result<Option<Box<Expr>>, Told> {
         expr.map(|expr| self.boxed(expr, depth).ok_or(Told)).transpose()
     }

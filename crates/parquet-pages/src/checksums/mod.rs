@@ -34,9 +34,7 @@ const FIRST: u64 = 4;
 #[serde(deny_unknown_fields)]
 struct Stated {
     algorithm: String,
-    /// Of the footer that the checksums belong to.
     created_by: String,
-    /// A list per row group, a checksum per leaf column of the schema.
     chunks: Vec<Vec<Checksum>>,
     /// The last of all, so that its digits lie at a known place.
     footer: Checksum,

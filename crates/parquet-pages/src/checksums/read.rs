@@ -78,7 +78,6 @@ pub fn of_file(
     }
 }
 
-/// The checksums of the chunks, if the footer keeps its own.
 fn of_chunks(
     file: &impl ChunkReader,
     (start, footer): (u64, &[u8]),
@@ -115,7 +114,6 @@ fn is_another_file(file: &impl ChunkReader, metadata: &ParquetMetaData, stated: 
         && chunks.iter().filter(is_kept).count() <= chunks.len() / 2
 }
 
-/// Whether a name is this one but for some bytes of damage.
 fn is_nearly(found: Option<&str>, name: &str) -> bool {
     let equal = found.unwrap_or_default().bytes().zip(name.bytes()).filter(|(found, byte)| found == byte);
     equal.count() * 2 >= name.len()

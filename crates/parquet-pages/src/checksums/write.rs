@@ -14,9 +14,7 @@ use super::{ALGORITHM, CREATED_BY, Checksum, FIRST, KEY, Stated, digits, range};
 pub struct Held<W> {
     out: W,
     bytes: Vec<u8>,
-    /// Where the bytes lie in the file.
     start: u64,
-    /// Where the last chunk ends.
     end: u64,
     chunks: Vec<Vec<Checksum>>,
 }
@@ -60,7 +58,6 @@ impl<W: Write> Held<W> {
         Ok(self.out)
     }
 
-    /// What the footer is to state, its own checksum left open.
     fn stated(&self) -> Stated {
         Stated {
             algorithm: ALGORITHM.to_owned(),
@@ -70,7 +67,6 @@ impl<W: Write> Held<W> {
         }
     }
 
-    /// Puts the footer's checksum in, and passes the footer on.
     fn close(mut self, mut stated: Stated) -> Result<W> {
         let open = stated.json();
         let place = memmem::rfind(&self.bytes, open.as_bytes()).ok_or_else(misplaced)?;
@@ -112,7 +108,6 @@ pub fn finish<W: Write + Send>(mut file: SerializedFileWriter<Held<W>>) -> Resul
     file.into_inner()?.close(stated)
 }
 
-/// The library lays chunks out one behind the other, and the footer behind them.
 fn misplaced() -> ParquetError {
     ParquetError::General("a part of the file does not lie where its footer says".to_owned())
 }

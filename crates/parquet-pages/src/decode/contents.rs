@@ -18,10 +18,8 @@ use crate::stored::header::width;
 /// The pages of one flat column of one row group, in their order.
 pub(crate) struct Contents {
     physical: Physical,
-    /// The bytes of a value of fixed size.
     width: usize,
     optional: bool,
-    /// How many values the dictionary has.
     keys: Option<usize>,
     texts: Texts,
 }
@@ -29,13 +27,10 @@ pub(crate) struct Contents {
 /// What the texts of pages take when they are written out: keys into a dictionary that are not left as keys, and texts
 /// that are stored as what differs from the one before.
 struct Texts {
-    /// The lengths of the dictionary's, where they may be long.
     lengths: Vec<u32>,
     /// Whether keys are written out; the library does that to those before a page without keys, too.
     writes_out: bool,
-    /// Bytes behind keys that were not written out so far.
     behind_keys: u64,
-    /// Bytes that the page under way adds.
     added: u64,
 }
 
@@ -65,7 +60,6 @@ impl Texts {
         self.writes_out = true;
     }
 
-    /// What is written out with this page.
     fn take(&mut self) -> u64 {
         if self.writes_out {
             self.added = self.added.saturating_add(std::mem::take(&mut self.behind_keys));
@@ -96,7 +90,6 @@ impl Contents {
         }
     }
 
-    /// Checks the next page: the bytes that its texts take when they are written out, beyond its own.
     pub(crate) fn check(&mut self, page: &Page) -> Result<u64, Fault> {
         self.check_page(page)?;
         Ok(self.texts.take())
@@ -232,7 +225,6 @@ impl Contents {
     }
 }
 
-/// The levels of a column of which there is but one: nothing, or runs of numbers of no bits.
 fn no_levels(stored: Bytes, rows: usize) -> Result<(), Fault> {
     if stored.is_empty() {
         return Ok(());
@@ -276,7 +268,6 @@ fn texts(mut values: &[u8], count: usize) -> Result<(), Unsupported> {
     Ok(())
 }
 
-/// The number of values that a delta encoding declares: the third number, behind the sizes of its blocks.
 fn delta(values: &[u8], count: usize) -> Result<(), Fault> {
     if values.is_empty() && count == 0 {
         return Ok(());

@@ -36,17 +36,14 @@ pub struct Cursor {
     form: Form,
     dictionary: Option<Dictionary>,
     page: Option<DataPage>,
-    /// Rows of the column that no page has given yet.
     unread: usize,
 }
 
 /// A page of values and what is left of it.
 struct DataPage {
     rows: usize,
-    /// Values that were there so far, and that are expected, where the header says how many.
     valid: usize,
     expected: Option<usize>,
-    /// One bit a row: whether there is a value.
     levels: Option<Hybrid>,
     values: Stored,
 }
@@ -60,7 +57,6 @@ enum Stored {
 
 #[derive(Default)]
 struct Stretches {
-    /// One key per run.
     keys: Vec<i32>,
     /// The row before which each ends.
     ends: Vec<u32>,
@@ -178,7 +174,6 @@ impl Cursor {
         Ok(nulls.map(|nulls| NullBuffer::new(nulls.finish())).filter(|nulls| nulls.null_count() > 0))
     }
 
-    /// The page under way, which has rows left.
     fn page(&mut self) -> Result<&mut DataPage, Unsupported> {
         while self.page.as_ref().is_none_or(|page| page.rows == 0) {
             self.close_page()?;
@@ -242,7 +237,6 @@ impl Cursor {
         }
     }
 
-    /// A page of so many rows, and of so many values where its header says that.
     fn data_page(
         &self,
         (rows, valid): (u32, Option<u32>),
@@ -271,7 +265,6 @@ impl Cursor {
 }
 
 impl DataPage {
-    /// All rows are read: whether they were all that there is.
     fn finish(&self) -> Result<(), Unsupported> {
         if self.rows > 0 || self.expected.is_some_and(|expected| expected != self.valid) {
             return Err(Unsupported);
@@ -343,7 +336,6 @@ impl Stretches {
         Ok(())
     }
 
-    /// Adds a row of each key.
     fn add_each(&mut self, keys: &[i32]) -> Result<(), Unsupported> {
         // Mostly the keys are those of two episodes, or of one.
         keys.chunk_by(|a, b| a == b).try_for_each(|same| self.add(same[0], same.len()))
@@ -365,7 +357,6 @@ fn append(span: Span<'_>, out: &mut Bits) -> (usize, usize) {
     }
 }
 
-/// Which of the next rows have a value, and how many do.
 fn validity(levels: &mut Hybrid, count: usize, nulls: &mut Bits) -> Result<usize, Unsupported> {
     let (mut left, mut valid) = (count, 0);
     while left > 0 {

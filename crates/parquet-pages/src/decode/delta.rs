@@ -27,7 +27,6 @@ impl Opening {
     }
 }
 
-/// The sum of the integers in a delta encoding, none of them below zero.
 pub(crate) fn sum(data: &[u8]) -> Result<u64, Unsupported> {
     let Opening { block, small_blocks, count, at } = Opening::read(data)?;
     let (first, mut at) = zigzag(data, at)?;
@@ -72,7 +71,6 @@ impl Sum {
     }
 }
 
-/// A number of so many bits, from a bit on.
 fn bits(packed: &[u8], from: u64, width: u64) -> Result<u64, Unsupported> {
     if width == 0 {
         return Ok(0);

@@ -45,7 +45,6 @@ impl Dictionary {
         Ok(Self::Ints(Arc::new(Int64Array::from(ints.to_vec()))))
     }
 
-    /// Whether a byte is enough for a key.
     pub(crate) fn is_small(&self) -> bool {
         let (Self::Texts(values) | Self::Ints(values)) = self;
         values.len() <= 1 << u8::BITS

@@ -15,9 +15,7 @@ pub(crate) struct Hybrid {
     at: usize,
     width: usize,
     run: Run,
-    /// What is left of the run.
     count: usize,
-    /// The most numbers that the runs behind it have.
     left: usize,
 }
 
@@ -121,7 +119,6 @@ impl Hybrid {
         Ok(())
     }
 
-    /// When all levels are taken: whether that was all. The last packed run may be filled up, and zeros may follow it.
     pub(crate) fn finish(&self) -> Result<(), Unsupported> {
         let is_over = matches!(self.run, Run::Packed(_)) || self.count == 0;
         if is_over && self.data[self.at..].iter().all(|byte| *byte == 0) { Ok(()) } else { Err(Unsupported) }
@@ -139,7 +136,6 @@ impl Hybrid {
     }
 }
 
-/// The number of variable length at a place, and the place behind it.
 pub(crate) fn varint(data: &[u8], mut at: usize) -> Result<(u64, usize), Unsupported> {
     let mut value = 0;
     for shift in (0..35).step_by(7) {
@@ -260,7 +256,6 @@ impl Packed<'_> {
         }
     }
 
-    /// The data and the bit at which the numbers begin, for numbers of one bit.
     pub(crate) fn bits(&self) -> (&[u8], usize) {
         debug_assert_eq!(self.width, 1, "bits are numbers of one bit");
         (self.data, self.bit)
@@ -278,7 +273,6 @@ fn spread<const WIDTH: usize>(packed: u64) -> u64 {
     quarters & one | (quarters >> WIDTH & one) << 8
 }
 
-/// The lower half of a word.
 #[expect(clippy::cast_possible_truncation, reason = "the lower half is what is asked for")]
 fn low(word: u64) -> u32 {
     word as u32

@@ -5,7 +5,6 @@ use arrow::buffer::BooleanBuffer;
 use super::rle::Number;
 use crate::bits::Bits;
 
-/// The keys of rows that have one, at their rows.
 pub(crate) fn spread_keys<N: Number>(keys: &[N], valid: &BooleanBuffer) -> Vec<N> {
     let mut spread = vec![N::default(); valid.len()];
     let mut keys = keys;
@@ -17,7 +16,6 @@ pub(crate) fn spread_keys<N: Number>(keys: &[N], valid: &BooleanBuffer) -> Vec<N
     spread
 }
 
-/// The bits of rows that have one, at their rows.
 pub(crate) fn spread_bits(bits: &BooleanBuffer, valid: &BooleanBuffer) -> BooleanBuffer {
     let mut spread = Bits::with_capacity(valid.len());
     let mut taken = bits.offset();

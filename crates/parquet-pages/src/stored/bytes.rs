@@ -61,7 +61,6 @@ impl Store {
         Self { held: Held::Memory { start, bytes }, expansion }
     }
 
-    /// What was made of the file so far.
     pub(crate) fn expansion(&self) -> &Arc<Expansion> {
         &self.expansion
     }
@@ -70,7 +69,6 @@ impl Store {
         Self { held, expansion: Arc::clone(&self.expansion) }
     }
 
-    /// The same, to be read by somebody else. Handles of one file share their position: one thread may have them.
     pub(crate) fn again(&self) -> io::Result<Self> {
         Ok(self.of(match &self.held {
             Held::File(file) => Held::File(file.try_clone()?),
@@ -78,7 +76,6 @@ impl Store {
         }))
     }
 
-    /// A range of bytes, held in memory if it is small.
     pub(crate) fn part(&self, start: u64, length: u64) -> io::Result<Self> {
         if length > LARGEST {
             return self.again();

@@ -11,7 +11,6 @@ use crate::thrift::{Compact, Fault, Field, Wire};
 pub(crate) struct Header {
     /// How long it is itself, in bytes.
     pub(crate) length: usize,
-    /// The page's bytes as stored and when decompressed, both without the header.
     pub(crate) stored: usize,
     pub(crate) whole: usize,
     /// The CRC-32 of the bytes as stored.
@@ -48,7 +47,6 @@ pub(crate) struct About {
 }
 
 impl Header {
-    /// The header at the start of some bytes.
     pub(crate) fn parse(data: &[u8]) -> Result<Self, Fault> {
         let mut compact = Compact::new(data);
         let (mut header, mut code, mut seen, mut last) = (Self::default(), 0, 0_u16, 0);
@@ -79,7 +77,6 @@ impl Header {
         Ok(Self { kind, length: compact.position(), ..header })
     }
 
-    /// The header of one kind of page.
     fn fields(&mut self, compact: &mut Compact<'_>, kind: i16) -> Result<(), Fault> {
         let (mut seen, mut last) = (0, 0);
         while let Some(field) = compact.field(last)? {
@@ -132,12 +129,10 @@ impl Header {
         }
     }
 
-    /// Whether the page is stored as it is.
     fn is_stored_plain(&self, about: &About) -> bool {
         about.codec == Compression::UNCOMPRESSED || (self.kind == Kind::DataV2 && self.is_plain)
     }
 
-    /// Whether the page, but for its levels, is a Zstandard frame.
     pub(crate) fn is_zstd(&self, about: &About) -> bool {
         matches!(about.codec, Compression::ZSTD(_)) && !self.is_stored_plain(about)
     }
@@ -154,7 +149,6 @@ impl Header {
     }
 }
 
-/// The bytes of a value of fixed size.
 pub(crate) fn width(physical: Physical, declared: usize) -> usize {
     match physical {
         Physical::INT32 | Physical::FLOAT => 4,
@@ -181,7 +175,6 @@ fn most(codec: Compression, stored: usize) -> usize {
     stored.saturating_mul(ratio).saturating_add(free)
 }
 
-/// A field that comes for the first time.
 fn once(seen: &mut u16, field: Field) -> Result<(), Fault> {
     let bit = u32::try_from(field.id).ok().and_then(|id| 1_u16.checked_shl(id)).unwrap_or(0);
     if *seen & bit != 0 {

@@ -16,14 +16,12 @@ use crate::error::FaultSlot;
 pub(crate) struct Pages {
     stored: Arc<Verified>,
     inner: SerializedPageReader<Verified>,
-    /// The page that was looked at and not taken.
     next: Option<Page>,
     /// Checks what the pages hold, for a decoder that does not.
     contents: Option<Contents>,
 }
 
 impl Pages {
-    /// The pages of a column, for a decoder that checks what they hold.
     pub(crate) fn new(store: &Store, place: Place<'_>, slot: FaultSlot) -> Result<Self> {
         let stored = Arc::new(Verified::new(store, place, slot)?);
         let inner = match place.chunk().compression() {

@@ -28,7 +28,6 @@ const LONGEST_HEADER: usize = 16 << 20;
 /// The pages of a column as they are stored.
 pub(crate) struct Verified {
     store: Store,
-    /// The row group and the column.
     place: (usize, usize),
     column: String,
     start: u64,
@@ -43,7 +42,6 @@ pub(crate) struct Verified {
 /// How far the pages are read.
 #[derive(Default)]
 struct Progress {
-    /// Where the page under way starts, and its header.
     page: Option<(u64, Header)>,
     /// Pages before it, and their values.
     pages: usize,
@@ -51,7 +49,6 @@ struct Progress {
 }
 
 impl Verified {
-    /// The pages of a column of a row group.
     pub(crate) fn new(store: &Store, place: Place<'_>, slot: FaultSlot) -> Result<Self> {
         let column = place.chunk();
         let (start, length) = column.byte_range();
@@ -87,7 +84,6 @@ impl Verified {
         }
     }
 
-    /// Reads all pages, and decodes none.
     pub(crate) fn walk(&self) -> Result<()> {
         let mut at = self.start;
         while at < self.end {
@@ -99,7 +95,6 @@ impl Verified {
         self.finish()
     }
 
-    /// At the end of the column: whether it had a value for each row.
     pub(crate) fn finish(&self) -> Result<()> {
         let values = self.progress.lock().unwrap_or_else(PoisonError::into_inner).values;
         if self.flat && values != self.about.rows {
@@ -108,7 +103,6 @@ impl Verified {
         Ok(())
     }
 
-    /// Where the page of which the bytes were read last starts.
     pub(crate) fn offset(&self) -> u64 {
         self.progress.lock().unwrap_or_else(PoisonError::into_inner).page.as_ref().map_or(self.start, |page| page.0)
     }
@@ -118,7 +112,6 @@ impl Verified {
         self.keep(FaultKind::Corrupt, Part::Page(offset), expected.into(), found.to_string())
     }
 
-    /// The error of a page that asks for more than the budget of its file.
     pub(crate) fn over(&self, offset: u64, exceeded: &Exceeded) -> ParquetError {
         self.keep(FaultKind::OverBudget, Part::Page(offset), exceeded.expected(), "more".to_owned())
     }
@@ -134,7 +127,6 @@ impl Verified {
         ParquetError::External(Box::new(fault))
     }
 
-    /// The texts of a page take so many bytes when they are written out.
     pub(crate) fn texts(&self, bytes: u64) -> Result<()> {
         let offset = self.offset();
         self.store.expansion().texts(self.place, offset, bytes).map_err(|exceeded| self.over(offset, &exceeded))
@@ -181,7 +173,6 @@ impl Verified {
         }
     }
 
-    /// The bytes of the page under way.
     fn body(&self, start: u64, length: usize) -> Result<Bytes> {
         let progress = self.progress.lock().unwrap_or_else(PoisonError::into_inner);
         let page = progress

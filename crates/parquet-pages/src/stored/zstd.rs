@@ -24,7 +24,6 @@ pub(crate) fn inflated(stored: &[u8], levels: usize, whole: usize) -> Result<Vec
     if page.len() == whole { Ok(page) } else { Err(format!("{} bytes", page.len())) }
 }
 
-/// Appends what a frame holds, as far as there is room.
 fn decompress(frame: &[u8], page: &mut Vec<u8>) -> io::Result<()> {
     DECOMPRESSOR.with_borrow_mut(|kept| {
         let decompressor = match kept {

@@ -189,7 +189,6 @@ fn summed_up(
     }
 }
 
-/// The roundings with the fewest infeasible cells.
 fn fewest(counts: &[RoundingCount]) -> Vec<Rounding> {
     let least = counts.iter().map(|count| count.infeasible).min();
     counts.iter().filter(|count| Some(count.infeasible) == least).map(|count| count.rounding).collect()
@@ -206,7 +205,6 @@ impl<'t> Auditor<'t> {
         Definitions { catalog: self.terms.catalog, implied: self.terms.implied }
     }
 
-    /// The style's table that a published one is.
     fn sheet(&self, table: usize) -> Option<&'t TableSheet> {
         let metrics = || self.tables[table].published.cells.iter().map(|(cell, _)| &cell.metric);
         self.terms.style.sheet.table.values().find(|sheet| metrics().all(|metric| sheet.columns.contains(metric)))
@@ -248,7 +246,6 @@ impl<'t> Auditor<'t> {
         rows.values().map(|row| row.solve(definitions, &mut self.search).refused.len()).sum()
     }
 
-    /// The rows of some tables together.
     fn rows(&self, tables: &[(usize, Rounding)]) -> IndexMap<(&'t str, &'t str), Row> {
         let mut rows: IndexMap<(&str, &str), Row> = IndexMap::new();
         for &(table, rounding) in tables {
@@ -264,7 +261,6 @@ impl<'t> Auditor<'t> {
         rows
     }
 
-    /// The cells that no data can give, and those whose zero stands for an undefined value.
     fn infeasible(&mut self, roundings: &[Rounding]) -> (Found, Vec<(usize, usize)>) {
         let tables: Vec<(usize, Rounding)> = roundings.iter().copied().enumerate().collect();
         let (mut found, mut zeros) = (Found::new(), Vec::new());

@@ -13,10 +13,8 @@ use statistics::feasible::{Print, Sample};
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Reason {
-    /// What of the cell is at fault.
     pub(super) field: Field,
     pub(super) words: String,
-    /// The nearest prints that some data has, below first.
     pub(super) nearest: Vec<String>,
 }
 
@@ -26,7 +24,6 @@ impl Reason {
     }
 }
 
-/// The reason for which a cell of a row was refused.
 pub(super) fn reason(row: &Row, refused: &Refused, definitions: Definitions<'_>, search: &mut Search) -> Reason {
     let cells = [refused.cell];
     let question = Question { row_n: row.n, metric: &refused.metric, cells: &cells, definitions };
@@ -55,7 +52,6 @@ struct Cell {
 }
 
 impl Cell {
-    /// No sample has a sum that prints so.
     fn no_mean(&self) -> Option<Reason> {
         let has_sum = |sample: &Sample| {
             let (low, high) = sample.sums(&[self.print]);
@@ -86,7 +82,6 @@ impl Cell {
         Some(Reason { field: Field::Mean, words, nearest })
     }
 
-    /// Samples print the mean, and none of them with this standard error.
     fn no_spread(&self, search: &mut Search) -> Option<Reason> {
         let se = self.print.se?;
         let mut sides = Vec::new();
@@ -114,7 +109,6 @@ impl Cell {
     }
 }
 
-/// The largest print below and the smallest above.
 fn nearest(sides: Vec<[Option<(Decimal, String)>; 2]>) -> Vec<String> {
     let (below, above): (Vec<_>, Vec<_>) = sides.into_iter().map(|[below, above]| (below, above)).unzip();
     let below = below.into_iter().flatten().max_by(|a, b| a.0.cmp_value(b.0));

@@ -30,11 +30,9 @@ pub(super) struct Definitions<'d> {
 /// A cell of a row and where it stands.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RowCell {
-    /// The table, and the position of the cell in it.
     pub(super) at: (usize, usize),
     pub(super) cell: PrintedCell,
     pub(super) rounding: Rounding,
-    /// Whether its table prints zero where the metric is undefined.
     pub(super) zero_may_be_undefined: bool,
 }
 
@@ -60,16 +58,13 @@ pub(super) type World = BTreeMap<String, Count>;
 pub(super) struct Refused {
     pub(super) metric: String,
     pub(super) cell: RowCell,
-    /// The cells of the same metric that were accepted.
     pub(super) accepted: Vec<RowCell>,
-    /// The ways to count the metrics that it depends on.
     pub(super) worlds: Vec<World>,
 }
 
 #[derive(Clone, Debug, Default)]
 pub(super) struct Solved {
     pub(super) refused: Vec<Refused>,
-    /// Cells whose zero can only stand for an undefined value.
     pub(super) zeros: Vec<(usize, usize)>,
 }
 
@@ -179,7 +174,6 @@ impl Question<'_> {
         found
     }
 
-    /// In how many episodes the metric may be defined.
     pub(super) fn defined_in(&self, world: &World) -> RangeInclusive<u64> {
         match &self.definitions.implied[self.metric].defined {
             Defined::Always => self.row_n..=self.row_n,
@@ -192,7 +186,6 @@ impl Question<'_> {
         }
     }
 
-    /// The sums of so many values that print as the cells say.
     fn counts(&self, n: u64, world: &World, all: bool, search: &mut Search) -> Vec<Count> {
         if n == 0 {
             let can_be_undefined = self.cells.iter().all(RowCell::can_be_undefined);
@@ -250,7 +243,6 @@ impl RowCell {
         Some(Print { mean: self.cell.mean?, se: self.cell.se, rounding: self.rounding })
     }
 
-    /// Whether it may stand for no value.
     pub(super) fn can_be_undefined(&self) -> bool {
         let is_zero = |number: Option<exact::number::Decimal>| number.is_none_or(|number| number.units() == 0);
         self.cell.mean.is_none() || self.zero_may_be_undefined && is_zero(self.cell.mean) && is_zero(self.cell.se)
@@ -258,7 +250,6 @@ impl RowCell {
 }
 
 impl Definitions<'_> {
-    /// The metrics that the definition of one names.
     pub(super) fn needs(&self, metric: &str) -> Vec<&str> {
         let implied = &self.implied[metric];
         let condition = match &implied.defined {

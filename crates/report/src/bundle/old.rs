@@ -13,7 +13,6 @@ pub const MANIFEST: &str = "manifest.json";
 /// As much of a manifest as is needed; a manifest of other versions may have more.
 #[derive(Deserialize)]
 struct Listed {
-    /// Not there in reports of versions that did not list them.
     outputs: Option<Vec<ListedOutput>>,
     /// Only to tell the manifest of a report from another file of that name.
     #[serde(rename = "schema_version")]
@@ -52,7 +51,6 @@ fn by_name(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// The names of the tables in a folder.
 fn table_names(folder: &Path) -> Vec<String> {
     let tables = folder.join("tables");
     let entries = fs::read_dir(&tables).into_iter().flatten().flatten();

@@ -282,7 +282,6 @@ fn deciding(flip: &Flip, value: Option<i64>, evidence: &BTreeMap<String, Evidenc
     Some(found.timesteps.clone())
 }
 
-/// How many cells both sides' metrics give, and those that moved, by group, then by metric.
 fn cell_changes(before: &Cells, after: &Cells) -> (u64, Vec<CellChange>) {
     let old: BTreeMap<&Vec<KeyValue>, &Group> = before.groups.iter().map(|group| (&group.key, group)).collect();
     let new: BTreeMap<&Vec<KeyValue>, &Group> = after.groups.iter().map(|group| (&group.key, group)).collect();
@@ -303,7 +302,6 @@ fn cell_changes(before: &Cells, after: &Cells) -> (u64, Vec<CellChange>) {
     (compared, moved)
 }
 
-/// Whether a cell stayed; the form of its standard error counts where it makes a difference.
 fn is_same(before: Option<Numbers>, after: Option<Numbers>) -> bool {
     let exact = |numbers: Numbers| (numbers.n, numbers.sum, numbers.sum_sq, numbers.se.map(f64::to_bits));
     before.map(exact) == after.map(exact)

@@ -78,7 +78,6 @@ pub fn membership(table: &EpisodeTable, by: &[String]) -> Result<Vec<usize>, Gro
 /// Which group each episode is in.
 struct Membership {
     keys: Vec<Vec<KeyValue>>,
-    /// For each row the position of its key.
     of_row: Vec<usize>,
 }
 
@@ -114,7 +113,6 @@ impl Membership {
 /// A column as the places of its values among all different ones.
 struct Ranks {
     values: Vec<KeyValue>,
-    /// For each row the position of its value.
     of_row: Vec<usize>,
 }
 

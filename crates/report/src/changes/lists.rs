@@ -7,7 +7,6 @@ use crate::cells::diff::{Changes, Flip, Rewritten};
 use crate::tables::{Column, Look, Table};
 use exact::escape::visible;
 
-/// Expressions that are not written the same.
 pub(super) fn rewritten(all: &[Rewritten], limit: Limit, width: Option<usize>) -> Option<String> {
     let written = |text: &Option<String>| text.as_ref().map_or_else(|| "(none)".to_owned(), |text| visible(text));
     let rows = all.iter().map(|one| {
@@ -57,7 +56,6 @@ fn direction(flip: &Flip) -> &'static str {
     }
 }
 
-/// The episodes that flipped, with the timesteps that decided where some are known.
 pub(super) fn flips(flips: &[Flip], limit: Limit, width: Option<usize>) -> Option<String> {
     let explained = flips.iter().any(|flip| flip.timesteps.before.is_some() || flip.timesteps.after.is_some());
     let mut header = ["metric", "experiment", "model", "episode", "before", "after"].map(str::to_owned).to_vec();
@@ -79,10 +77,8 @@ pub(super) fn flips(flips: &[Flip], limit: Limit, width: Option<usize>) -> Optio
 
 struct List<R> {
     header: Vec<String>,
-    /// How many of the first columns name a row.
     names: usize,
     rows: R,
-    /// How many rows there are.
     count: usize,
 }
 

@@ -56,7 +56,6 @@ fn push_alone<T>(text: &mut String, noun: &str, overlap: &Overlap<T>, limit: Lim
     }
 }
 
-/// One line: what moved, out of how much.
 fn sum(changes: &Changes) -> String {
     let over = format!(
         "{} in both, {} in both",

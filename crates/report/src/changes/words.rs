@@ -25,18 +25,15 @@ pub(super) fn counted_u64(count: u64, noun: &str) -> String {
     if count == 1 { format!("1 {noun}") } else { format!("{count} {noun}s") }
 }
 
-/// How many lines a cut list leaves out, if any.
 pub(super) fn left_out(all: usize, limit: Limit) -> Option<String> {
     let rest = all.saturating_sub(limit.0);
     (rest > 0).then(|| format!("{rest} more: --limit shows more, --json all"))
 }
 
-/// Both sides, once where they are the same.
 pub(super) fn pair(pair: &Pair<String>) -> String {
     if pair.before == pair.after { pair.after.clone() } else { format!("{} -> {}", pair.before, pair.after) }
 }
 
-/// A value of a key column.
 pub(super) fn key(value: &KeyValue) -> String {
     match value {
         KeyValue::Missing => UNDEFINED.to_owned(),
@@ -67,7 +64,6 @@ pub(super) fn mean(numbers: &Pair<Option<Numbers>>) -> String {
     pair(&Pair { before: one(numbers.before), after: one(numbers.after) })
 }
 
-/// How far the mean moved, with its sign; empty where either mean is undefined.
 pub(super) fn mean_change(cell: &CellChange) -> String {
     let change = cell.exact_mean_change().and_then(|(above, below)| Decimal::of_ratio(above, below, PLACES));
     let sign = |above: i128| if above > 0 { "+" } else { "" };

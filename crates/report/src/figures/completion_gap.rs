@@ -69,7 +69,6 @@ impl<'a> Gaps<'a> {
         Some(finished.mean()? - all.mean()?)
     }
 
-    /// The gap correctly rounded from the exact fraction, with its sign.
     fn text(&self, experiment: &str, model: &str) -> Option<String> {
         let [finished, all] = self.moments(experiment, model)?;
         let (a, b) = (i128::from(finished.n), i128::from(all.n));
@@ -110,7 +109,6 @@ impl<'a> Gaps<'a> {
         });
     }
 
-    /// The scale and the signs; gives the figure's height.
     fn draw_key(&self, sheet: &mut Sheet, top: f64) -> f64 {
         let size = Decimal::of_float(self.largest, 2).map(|size| size.to_string()).unwrap_or_default();
         let low = if self.has_fall { -self.largest } else { 0.0 };

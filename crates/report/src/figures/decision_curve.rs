@@ -106,7 +106,6 @@ impl Curve<'_> {
         });
     }
 
-    /// Upright ticks where episodes end undecided.
     fn censored(&self, sheet: &mut Sheet, plot: &Plot) {
         let points = &self.survival.points;
         for (at, point) in points.iter().enumerate() {
@@ -153,7 +152,6 @@ fn along(points: &[Point], phase: f64) -> Vec<Point> {
     places
 }
 
-/// A step as a place on the axis.
 #[expect(clippy::cast_precision_loss, reason = "steps are far below 2^53")]
 fn real(step: i64) -> f64 {
     step as f64

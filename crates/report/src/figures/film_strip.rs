@@ -49,7 +49,6 @@ pub fn film_strip(title: &str, stills: &[Still]) -> Figure {
     Figure::new(sheet, bottom + MARGIN, title, described(stills))
 }
 
-/// Draws a step from its upper left corner; gives its lower edge.
 fn draw(sheet: &mut Sheet, still: &Still, left: f64, top: f64) -> f64 {
     let moments = still.moments.join(", ");
     let label = lettering::label();

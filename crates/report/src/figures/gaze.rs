@@ -67,7 +67,6 @@ impl<'a> Raster<'a> {
         raster
     }
 
-    /// The episodes of a cell, the shortest first.
     fn episodes(&self, experiment: &str, model: &str) -> Vec<&'a Timeline> {
         let is_here = |t: &&Timeline| t.key.experiment == experiment && t.key.model == model;
         let mut episodes: Vec<_> = self.timelines.iter().filter(is_here).collect();

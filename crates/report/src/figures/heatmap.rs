@@ -46,7 +46,6 @@ pub fn draw(scene: Scene<'_>) -> Drawn {
     (sheet, height)
 }
 
-/// The scale and the signs; gives the figure's height.
 fn draw_key(sheet: &mut Sheet, scene: Scene<'_>, metrics: &[MetricId<'_>], top: f64) -> f64 {
     let scale = tiles::scale(sheet, (MARGIN, top), |share| PALETTE.ramp.goodness.at(share), ["worse", "better"]);
     let matrix = scene.matrix;
@@ -113,7 +112,6 @@ fn draw_cell(sheet: &mut Sheet, scene: Scene<'_>, key: (&str, &str, MetricId<'_>
     });
 }
 
-/// The mean as text, the most digits first.
 fn texts(reading: Reading, metric: MetricId<'_>) -> Vec<String> {
     let places: &[u32] = match metric.metric.kind {
         Kind::Rate => &[2, 1],

@@ -99,7 +99,6 @@ pub fn strip_signs(strips: &[Strip<'_>]) -> Option<(Swatch, String)> {
     has_any.then(|| (Swatch::None, "--: undefined".to_owned()))
 }
 
-/// What is absent, by reason: first whole models, then models by metric.
 fn runs<'a>(
     matrix: &Matrix<'_>,
     roster: &Roster<'a>,

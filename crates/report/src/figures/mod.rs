@@ -102,7 +102,6 @@ pub fn draw(name: FigureName, input: &Input<'_>) -> Result<Figure, FigureError> 
 struct Scene<'a> {
     matrix: &'a Matrix<'a>,
     roster: &'a Roster<'a>,
-    /// Those that the figure shows.
     metrics: &'a [MetricId<'a>],
 }
 

@@ -59,7 +59,6 @@ pub fn draw(input: &Input<'_>) -> Result<Figure, FigureError> {
 
 struct Field<'a> {
     input: &'a Input<'a>,
-    /// The cells of each stage that has episodes.
     matrices: Vec<Option<Matrix<'a>>>,
     experiments: Vec<&'a str>,
     roster: Roster<'a>,
@@ -108,7 +107,6 @@ impl<'a> Field<'a> {
         (sheet, height)
     }
 
-    /// Whether each row of panels is one metric, its numbers at the left.
     fn shares_axes(&self) -> bool {
         self.columns == self.experiments.len()
     }
@@ -158,7 +156,6 @@ fn columns(experiments: usize, metrics: usize) -> usize {
     }
 }
 
-/// The first letters of what the definitions as they are stand for.
 fn short(reference: &str) -> String {
     reference.chars().take(3).chain(['.']).collect()
 }
@@ -193,7 +190,6 @@ impl Panel<'_, '_> {
         }
     }
 
-    /// The thresholds, as many as there is room for; the first and the last go first.
     fn numbers_below(&self, column: f64) -> Vec<Tick> {
         let stages = self.field.input.stages;
         let mut ticks: Vec<Tick> = (0..stages.len()).map(|at| Tick { at: many(at), text: String::new() }).collect();
@@ -229,7 +225,6 @@ impl Panel<'_, '_> {
         matrix.reading(self.experiment, model, id(matrix, self.metric)?).mean()
     }
 
-    /// Where the models' markers are: per stage one place per model; those with the same value side by side.
     fn places(&self, plot: &Plot) -> Vec<Vec<Option<Point>>> {
         let members = &self.field.roster.0;
         let room = self.field.column(plot.frame.width) * COLUMN_ROOM;
@@ -242,7 +237,6 @@ impl Panel<'_, '_> {
         (0..self.field.input.stages.len()).map(of_stage).collect()
     }
 
-    /// From threshold to threshold; the definitions as they are stand apart, and an undefined mean is a gap.
     fn line(&self, sheet: &mut Sheet, member: Member<'_>, places: &[Option<Point>]) {
         let stages = self.field.input.stages;
         let tried: Vec<Option<Point>> =

@@ -45,7 +45,6 @@ impl FigureName {
     }
 }
 
-/// The metrics of a figure, found among the cells.
 pub(super) fn metrics<'a>(
     figure: FigureName,
     matrix: &Matrix<'a>,
@@ -61,7 +60,6 @@ pub(super) fn metrics<'a>(
     }
 }
 
-/// What a figure shows of definitions that lack a listed metric.
 fn instead<'a>(figure: FigureName, matrix: &Matrix<'a>, listed: &[String]) -> Option<Vec<MetricId<'a>>> {
     let all = matrix.metrics();
     let named = |name: &str| all.iter().find(|id| id.name == name).copied();
@@ -86,7 +84,6 @@ fn instead<'a>(figure: FigureName, matrix: &Matrix<'a>, listed: &[String]) -> Op
     }
 }
 
-/// The words below a figure of these metrics.
 pub(super) fn caption(figure: FigureName, metrics: &[MetricId<'_>], sheets: &FigureSheets) -> String {
     let template = sheets.get(figure.name()).and_then(|sheet| sheet.caption.clone()).unwrap_or_default();
     metrics.iter().enumerate().fold(template, |text, (at, id)| text.replace(&format!("{{{at}}}"), id.name))

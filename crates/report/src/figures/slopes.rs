@@ -43,12 +43,10 @@ pub fn draw(scene: Scene<'_>) -> Result<Drawn, FigureError> {
     Ok((sheet, panels.bottom + 10.0 + legend.height() + MARGIN))
 }
 
-/// Room for the names of the two experiments below a plot, px.
 fn label_room() -> f64 {
     8.0 + leading(lettering::label())
 }
 
-/// Grid lines in every column, numbers and the title in the first.
 fn axis(sheet: &mut Sheet, plot: &Plot, column: usize, title: &str) {
     let mut ticks = rate_ticks();
     if column == 0 {
@@ -90,7 +88,6 @@ impl Pair<'_> {
         [frame.left + frame.width * 0.22, frame.left + frame.width * 0.78]
     }
 
-    /// Where each model's two marks are; those with the same value side by side.
     fn ends(&self) -> Vec<[Option<Point>; 2]> {
         let members = &self.scene.roster.0;
         let mut ends = vec![[None; 2]; members.len()];

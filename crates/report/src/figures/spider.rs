@@ -118,7 +118,6 @@ impl Radar<'_> {
         self.axes.iter().map(|&metric| self.scene.matrix.goodness(self.experiment, member.model, metric)).collect()
     }
 
-    /// The model's outline, open wherever a metric is undefined.
     fn line(&self, sheet: &mut Sheet, member: Member<'_>) {
         let shares = self.shares(member);
         let mark = Mark::new(format!("{} · {}", self.experiment, member.model));
@@ -145,7 +144,6 @@ impl Radar<'_> {
     }
 }
 
-/// The metric's name as it is drawn: turned round where less is better.
 fn axis_label(metric: MetricId<'_>) -> String {
     match (metric.metric.better, metric.metric.kind) {
         (Better::Lower, Kind::Rate) => format!("1 − {}", metric.name),

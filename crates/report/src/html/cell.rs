@@ -15,7 +15,6 @@ use exact::ratio::Ratio;
 use metric::catalog::{Kind, Metric};
 use statistics::interval::Interval;
 
-/// A cell of a metric, with the level of blind guessing where there is one.
 pub(super) fn cell(cell: &MetricCell, of: cells::Cell, undefined: &str, chance: Option<Ratio>) -> Json {
     let cells::Cell { name, metric, moments, interval, .. } = of;
     let (estimate, detail) = cell.value.parts(&visible(undefined));

@@ -22,7 +22,6 @@ pub struct Recordings {
 }
 
 impl Recordings {
-    /// Each command in two parts, between which the episode's id stands.
     pub(super) fn commands(&self) -> Json {
         let runs = self.runs();
         let definitions = self.definitions.as_deref().map(|name| format!(" --definitions {}", word(name)));
@@ -44,7 +43,6 @@ impl Recordings {
         ])
     }
 
-    /// The files, or the folders that they are in.
     fn runs(&self) -> String {
         let folder = |path: &str| path.rsplit_once('/').map_or(".", |(folder, _)| folder).to_owned();
         let mut named: BTreeSet<String> = self.paths.iter().cloned().collect();
@@ -59,7 +57,6 @@ impl Recordings {
     }
 }
 
-/// An id as a word of a shell, where it is not one as it stands.
 pub(super) fn quoted(id: &str) -> Option<String> {
     let word = word(id);
     (word != id).then_some(word)

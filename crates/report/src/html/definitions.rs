@@ -47,7 +47,6 @@ pub(super) fn experiments(catalog: &Catalog) -> Vec<Json> {
     catalog.experiment.iter().map(view).collect()
 }
 
-/// Prose and the names between its backticks by turns; a backtick without a partner stays where it is.
 fn prose(text: &str) -> Vec<Json> {
     let stretches: Vec<&str> = text.split('`').collect();
     let (paired, rest) = stretches.split_at(stretches.len().saturating_sub(1) / 2 * 2);
@@ -80,7 +79,6 @@ fn remarks(metric: &Metric) -> String {
     remarks.join(" · ")
 }
 
-/// An expression as written, its line breaks kept.
 fn multiline(text: &str) -> String {
     text.trim().lines().map(visible).collect::<Vec<_>>().join("\n")
 }

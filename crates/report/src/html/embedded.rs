@@ -36,7 +36,6 @@ struct Embedded<'a> {
 #[derive(Debug, Serialize)]
 struct Episodes {
     id: Vec<String>,
-    /// The id as a word of a shell, where it is not one itself.
     word: BTreeMap<usize, String>,
     seed: Vec<i32>,
     run: Vec<i32>,
@@ -89,7 +88,6 @@ pub(super) fn json(page: &Page<'_>, metrics: &[Json], undefined: &str) -> Result
     Ok(inert(&json))
 }
 
-/// Markup characters of JSON stand in strings alone, where an escape means the same.
 fn inert(json: &str) -> String {
     json.replace('&', "\\u0026").replace('<', "\\u003c").replace('>', "\\u003e")
 }

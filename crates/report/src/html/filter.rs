@@ -12,7 +12,6 @@ use exact::escape::visible;
 /// The filters of a page, and where each value stands among its filter's.
 #[derive(Debug)]
 pub(super) struct Filters {
-    /// One per key column that has several values.
     pub(super) filters: Vec<Json>,
     places: Vec<BTreeMap<KeyValue, usize>>,
 }
@@ -46,7 +45,6 @@ impl Filters {
     }
 }
 
-/// A value of a key column as a reader sees it.
 pub(super) fn shown(value: &KeyValue, undefined: &str) -> String {
     match value {
         KeyValue::Missing => visible(undefined),

@@ -22,7 +22,6 @@ use exact::escape::visible;
 use metric::catalog::Better;
 use score::table::{EpisodeTable, KeyRef};
 
-/// Everything that a report puts into its page.
 pub(super) fn content(page: &Page<'_>) -> Result<Value, HtmlError> {
     if group(page.episodes, &page.cells.by)? != *page.cells {
         return Err(HtmlError::OtherEpisodes);
@@ -134,7 +133,6 @@ fn quality(QualityTable { printed, .. }: &QualityTable) -> Json {
     })
 }
 
-/// Where the numbers of the page come from.
 fn provenance(manifest: &Manifest) -> Json {
     let names = |names: &[String]| names.iter().map(|name| visible(name)).collect::<Vec<_>>().join(", ");
     let source = |name: &str, hash: &str| {
@@ -159,7 +157,6 @@ fn provenance(manifest: &Manifest) -> Json {
     })
 }
 
-/// All but the item at a place.
 fn others<T>(items: &[T], place: usize) -> impl Iterator<Item = &T> {
     items.iter().enumerate().filter(move |(at, _)| *at != place).map(|(_, item)| item)
 }

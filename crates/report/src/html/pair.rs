@@ -45,7 +45,6 @@ pub(super) fn pairs(statistics: Option<&Statistics>) -> Json {
     })
 }
 
-/// What stands above the tests: the design, and the confidence of intervals.
 pub(super) fn heading(statistics: Option<&Statistics>) -> Json {
     let Some(statistics) = statistics.filter(|statistics| !statistics.models.is_empty()) else { return Json::Null };
     let note = visible(&statistics.design_note);

@@ -69,7 +69,6 @@ fn environment() -> Result<Environment<'static>, Error> {
     Ok(environment)
 }
 
-/// A text that stands in the page as it is.
 pub(super) fn markup(text: &str) -> Value {
     Value::from_safe_string(text.to_owned())
 }

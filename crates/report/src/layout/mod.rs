@@ -70,7 +70,6 @@ struct Layout<'a> {
     cells: &'a Cells,
     style: &'a Style,
     print: Print,
-    /// Which key names the rows.
     row_key: usize,
 }
 

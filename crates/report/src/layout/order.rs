@@ -66,7 +66,6 @@ impl TableOrder<'_> {
     }
 }
 
-/// Which key names the rows: the model where it is one, else the last.
 pub(crate) fn row_key(by: &[String]) -> usize {
     by.iter().position(|key| key == "model").unwrap_or(by.len().saturating_sub(1))
 }

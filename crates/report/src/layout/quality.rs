@@ -97,7 +97,6 @@ fn latency(quality: &Quality) -> String {
     }
 }
 
-/// Tokens per request and per reply.
 fn tokens(quality: &Quality) -> String {
     match (quality.prompt_tokens.mean(), quality.completion_tokens.mean()) {
         (None, None) => UNKNOWN.to_owned(),

@@ -32,7 +32,6 @@ pub fn zero(metric: &Metric, print: &Print) -> Value {
     Value::MeanSe { mean: zero, se: Some(zero) }
 }
 
-/// What a value of one is, and the decimals: fractions are shown as rates are.
 fn scale(metric: &Metric, print: &Print) -> (i128, u32) {
     match metric.whole() {
         Some(whole) => (whole.into(), print.decimals.of(Kind::Rate)),
@@ -40,7 +39,6 @@ fn scale(metric: &Metric, print: &Print) -> (i128, u32) {
     }
 }
 
-/// A whole as a float.
 #[expect(clippy::cast_precision_loss, reason = "the whole of a fraction is far below 2^53")]
 const fn float_of(whole: i128) -> f64 {
     whole as f64

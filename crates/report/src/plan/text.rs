@@ -36,7 +36,6 @@ fn record(test: &PlannedTest) -> [String; 7] {
     ]
 }
 
-/// The answer that a test gives, in one line.
 pub(super) fn answer(request: &PlanRequest, test: &PlannedTest) -> String {
     let power = request.power;
     let family =

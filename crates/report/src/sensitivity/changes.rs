@@ -61,7 +61,6 @@ struct Subject {
 /// A conclusion: what is shown, or `None` where nothing is.
 type Shown = Option<String>;
 
-/// The conclusions that differ between the first level and another one.
 pub(super) fn changes(levels: &[Level], reference: &Reference, metrics: &[String]) -> Vec<Change> {
     let mut shown: IndexMap<Subject, Vec<Shown>> = IndexMap::new();
     for (at, level) in levels.iter().enumerate() {
@@ -85,7 +84,6 @@ fn change(subject: Subject, shown: &[Shown], levels: &[Level], reference: &Refer
     Change { question, metric, about, recorded: says[0].clone(), thresholds, sentence }
 }
 
-/// What the thresholds say that say something else, each once with its runs of thresholds.
 fn others(thresholds: &[Says], recorded: &str) -> Vec<String> {
     let mut at = 0;
     let mut places: IndexMap<&str, Vec<String>> = IndexMap::new();
@@ -152,7 +150,6 @@ fn against_level(row: &ChanceRow) -> (Subject, Shown) {
     (Subject { question: Question::Chance, metric: row.metric.clone(), about }, shown)
 }
 
-/// Models stand best mean first, so the first of two that are told apart is the one ahead.
 fn between_models<'a>(family: &'a Family, ahead: &'a str) -> impl Iterator<Item = (Subject, Shown)> + 'a {
     family.tests.iter().map(move |test| {
         let about = format!("{} {}, {}", family.experiment, family.metric, couple(&test.first, &test.second));

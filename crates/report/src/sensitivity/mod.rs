@@ -159,7 +159,6 @@ impl Sensitivity {
     }
 }
 
-/// Every cell, by group, then threshold, then metric.
 fn cells(levels: &[Level], metrics: &[String], style: &Style) -> Vec<ThresholdCell> {
     let mut found = Vec::new();
     for key in table::keys(levels, style) {

@@ -12,7 +12,6 @@ const NOTE: &str = "Mirror evidence is in view where at least so many pixels sho
                     counts of the episodes where the metric is defined; other values are means, n given where it is not \
                     all episodes.";
 
-/// The table of all levels; of the two lists of metrics, the first are its columns and the others do not move.
 pub(super) fn table(
     levels: &[Level],
     reference: &Reference,
@@ -88,7 +87,6 @@ fn row(
     Some(MetricRow { key: group.key.iter().cloned().chain([threshold]).collect(), name, cells })
 }
 
-/// A count or a mean without an interval: rows are the same episodes, and differ by definition, not by chance.
 fn value(moments: &Moments, metric: &Metric, episodes: u64, style: &Style) -> Value {
     let places = style.sheet.print_of(&TableSheet::default()).decimals.of(metric.kind);
     let Some(mean) = Decimal::of_ratio(moments.sum, i128::from(moments.n), places) else { return Value::Undefined };

@@ -55,7 +55,6 @@ impl Answer {
     }
 }
 
-/// The answers about the headline metrics, the primary one first, and the number of families of tests behind them.
 pub(super) fn answers(statistics: &Statistics, options: &Options) -> (Vec<Answer>, usize) {
     let mut answers = unranked(statistics);
     let primary = options.primary.as_ref().or(statistics.headline.first());
@@ -72,7 +71,6 @@ pub(super) fn answers(statistics: &Statistics, options: &Options) -> (Vec<Answer
     (answers, families)
 }
 
-/// The number of families of tests behind these answers.
 fn families(statistics: &Statistics, answers: &[Answer]) -> usize {
     let of_chance = |metric: &str| answers.iter().any(|it| it.metric == metric && it.question == ABOVE_CHANCE);
     let is_answered = |metric: &String| statistics.headline.contains(metric);
@@ -87,7 +85,6 @@ fn families(statistics: &Statistics, answers: &[Answer]) -> usize {
     levels.len() + models + overall.len() + conditions.len()
 }
 
-/// What stands beside every answer: the filter, lost episodes, replies without a decision, and what the caller adds.
 fn caveats(statistics: &Statistics, options: &Options) -> Vec<String> {
     let selection = statistics.selection.as_ref().map(Selection::phrase);
     let lost = match super::warnings::lost(statistics) {
@@ -131,7 +128,6 @@ fn unranked(statistics: &Statistics) -> Vec<Answer> {
     answers
 }
 
-/// The pairs of models whose verdict lost episodes decide.
 fn unsettled_pairs(count: usize) -> String {
     match count {
         0 => String::new(),
@@ -140,7 +136,6 @@ fn unsettled_pairs(count: usize) -> String {
     }
 }
 
-/// Per experiment, the models above its chance level; above its highest reference where it has none.
 fn above(rows: &[ChanceRow], metric: &str, confidence: f64) -> Vec<String> {
     let mut experiments: IndexMap<&str, Vec<&ChanceRow>> = IndexMap::new();
     for row in rows.iter().filter(|row| row.metric == metric) {
@@ -171,7 +166,6 @@ fn above_in(experiment: &str, rows: &[&ChanceRow], confidence: f64) -> String {
     [told].into_iter().chain(unsaid).collect::<Vec<_>>().join(", ")
 }
 
-/// The models, or how many where they are all.
 fn names(models: &[String], all: usize) -> String {
     match models.len() {
         0 => "nobody".to_owned(),
@@ -200,7 +194,6 @@ fn untested(comparisons: &[&Comparison], confidence: f64) -> Option<String> {
     too_few.iter().max_by_key(|units| units.n).map(cannot_say)
 }
 
-/// How many of these comparisons a setting keeps from being made, and the first such setting.
 fn apart(comparisons: &[&Comparison]) -> Option<String> {
     let settings: Vec<&String> = comparisons.iter().filter_map(|found| found.incomparable.as_ref()).collect();
     let setting = settings.first()?;
@@ -237,7 +230,6 @@ fn differing<'n>(about: &str, all: usize, separated: impl Iterator<Item = (&'n s
     format!("{about} {said}")
 }
 
-/// Per other experiment, the models that it shows a change of.
 fn changes(contrasts: &[Contrast], metric: &str, confidence: f64) -> Vec<String> {
     let mut groups: IndexMap<(&str, &str), Vec<&Contrast>> = IndexMap::new();
     for contrast in contrasts.iter().filter(|contrast| contrast.metric == metric) {

@@ -146,7 +146,6 @@ fn values(study: &Study, metric: &str, rows: &[usize]) -> Vec<i64> {
     study.column(metric).map_or_else(Vec::new, |column| rows.iter().filter_map(|&row| column.get(row)).collect())
 }
 
-/// The rows of each group of the cells.
 fn rows_by_group(table: &EpisodeTable, cells: &Cells) -> Vec<Vec<usize>> {
     let mut rows = vec![Vec::new(); cells.groups.len()];
     let groups = membership(table, &cells.by).expect("the cells are grouped by columns of this table");

@@ -231,7 +231,6 @@ impl Verdict {
     }
 }
 
-/// The levels of a metric in an experiment: chance, then references; those of the rate that it completes where it has none.
 pub(super) fn levels(study: &Study, experiment: &str, metric: &str) -> Vec<(Role, Ratio)> {
     let own = own_levels(study, experiment, metric);
     match study.relations.whole(metric) {
@@ -240,7 +239,6 @@ pub(super) fn levels(study: &Study, experiment: &str, metric: &str) -> Vec<(Role
     }
 }
 
-/// The levels that the definitions give a metric in an experiment.
 pub(super) fn own_levels(study: &Study, experiment: &str, metric: &str) -> Vec<(Role, Ratio)> {
     let catalog = &study.table.catalog;
     let chance = catalog.chance(experiment, metric).map(|level| (Role::Chance, level));

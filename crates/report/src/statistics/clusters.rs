@@ -38,7 +38,6 @@ pub struct ClusterRow {
 }
 
 impl ClusterRow {
-    /// Every metric of every experiment and model; nothing where seeds are not declared to be clusters.
     pub(super) fn all(study: &Study, confidence: f64) -> Vec<Self> {
         if study.design.clusters() != Some(Cluster::Seed) {
             return Vec::new();
@@ -73,7 +72,6 @@ impl ClusterRow {
     }
 }
 
-/// The moments of each seed that has a defined value, by seed.
 fn by_seed(table: &EpisodeTable, block: &Block, column: &MetricColumn) -> Vec<Moments> {
     let add = |sum: Moments, value| sum.with(value).expect("a part of a block that was summed whole");
     let of_seed = |rows: Vec<usize>| rows.into_iter().filter_map(|row| column.get(row)).fold(Moments::default(), add);

@@ -297,7 +297,6 @@ impl Comparison {
         }
     }
 
-    /// Without any result where a setting differs.
     pub(super) fn unless(self, incomparable: Option<String>) -> Self {
         if incomparable.is_none() {
             return self;
@@ -306,7 +305,6 @@ impl Comparison {
         Self { successes, withheld: Some(Withheld::Incomparable), incomparable, ..Self::of(method, n) }
     }
 
-    /// Without interval and test, which take episodes as independent.
     fn withheld_as_dependent(self) -> Self {
         Self { interval: None, withheld: Some(Withheld::Dependent), p: None, ..self }
     }
@@ -369,7 +367,6 @@ pub enum Sign {
     Lower,
 }
 
-/// Fills in the adjusted values of a family and what follows from them; a comparison without a test is not in it.
 pub(super) fn adjust<'c>(family: impl Iterator<Item = &'c mut Comparison>, confidence: f64) {
     let mut tested: Vec<&mut Comparison> = family.filter(|comparison| comparison.p.is_some()).collect();
     let seen = |it: &Comparison| LossCase { difference: it.difference, p: it.p };

@@ -23,7 +23,6 @@ pub(super) fn headline(study: &Study) -> Vec<String> {
     chosen
 }
 
-/// What the numbers allow to say about the headline metrics.
 pub(super) fn conclusions(statistics: &Statistics) -> Vec<String> {
     let is_headline = |metric: &String| statistics.headline.contains(metric);
     let families: Vec<&Family> = statistics.models.iter().filter(|family| is_headline(&family.metric)).collect();
@@ -35,7 +34,6 @@ pub(super) fn conclusions(statistics: &Statistics) -> Vec<String> {
     sentences
 }
 
-/// What the numbers of episodes could have shown, once for all experiments that share them.
 fn reaches(families: &[&Family]) -> Vec<String> {
     let mut shared: IndexMap<(Method, u64, usize), (Reach, Vec<String>)> = IndexMap::new();
     for family in families {

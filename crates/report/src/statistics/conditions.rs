@@ -31,7 +31,6 @@ pub struct Contrast {
 }
 
 impl Contrast {
-    /// Every model and metric: the first experiment of the definitions that has episodes, minus each later one of a like task.
     pub(super) fn all(study: &Study, horizon: Option<i64>, confidence: f64) -> Vec<Self> {
         let mut contrasts = Vec::new();
         for couples in Self::couples(study).chunk_by(|a, b| a.1.experiment == b.1.experiment) {
@@ -55,7 +54,6 @@ impl Contrast {
         contrasts
     }
 
-    /// The blocks that are contrasted.
     pub(super) fn couples<'s, 'a>(study: &'s Study<'a>) -> Vec<(&'s Block<'a>, &'s Block<'a>)> {
         let Some((baseline, others)) = study.experiments.split_first() else { return Vec::new() };
         let is_like = |name| tasks_differ(&study.table.catalog, baseline.name, name).is_none();
@@ -66,7 +64,6 @@ impl Contrast {
         others.flat_map(same).collect()
     }
 
-    /// The experiments that are not contrasted with the first one, a sentence each.
     pub(super) fn left_out(study: &Study) -> Vec<String> {
         let Some((baseline, others)) = study.experiments.split_first() else { return Vec::new() };
         let sentence = |other: &Experiment| {

@@ -146,7 +146,6 @@ impl CorrectRow {
     }
 }
 
-/// A restricted mean with its interval where that may be given.
 fn held(found: RestrictedMean, n: u64) -> (RestrictedMean, Option<Withheld>) {
     let (interval, withheld): (Option<Interval>, _) =
         coverage::given(found.interval, n, coverage::RESTRICTED_MEAN, found.interval.is_some());

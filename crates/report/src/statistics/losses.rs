@@ -36,7 +36,6 @@ pub struct LossRow {
 }
 
 impl Losses {
-    /// The losses beside the episodes, where they are known; the episodes given are those that were not lost.
     pub(super) fn of(study: &Study, recorded: bool, confidence: f64) -> Self {
         let rows = study.blocks().flat_map(|block| of_block(study, block, confidence)).collect();
         Self { recorded, rows }
@@ -88,20 +87,17 @@ impl LossCases {
         (lost > 0).then(both)
     }
 
-    /// The same of the second minus the first.
     pub(super) fn turned(self) -> Self {
         let turned = |case: LossCase| LossCase { difference: case.difference.map(|it| -it), ..case };
         Self { lowest: turned(self.highest), highest: turned(self.lowest), ..self }
     }
 
-    /// The lost episodes where they decide the verdict.
     pub(super) fn unsettled(cases: Option<&Self>) -> Option<Units> {
         let units = |cases: &Self| Units { n: cases.lost, name: "lost episodes".to_owned(), too_few: true };
         cases.filter(|cases| !cases.agree).map(units)
     }
 }
 
-/// Compares the verdicts of a family in both cases with those of the study as it is.
 pub(super) fn settle(tests: &mut [(LossCase, &mut Option<LossCases>)], confidence: f64) {
     let verdicts = |case: fn(LossCase, LossCases) -> LossCase| -> Vec<Option<bool>> {
         let of = |(seen, cases): &(LossCase, &mut Option<LossCases>)| cases.map_or(*seen, |cases| case(*seen, cases));

@@ -83,7 +83,6 @@ pub(super) struct Field<'s, 'a> {
     study: &'s Study<'a>,
     blocks: &'s [Block<'a>],
     scenes: Vec<Scenes>,
-    /// Row by row of the upper triangle; the lower index first.
     matched: Vec<Matched>,
 }
 
@@ -114,7 +113,6 @@ impl<'s, 'a> Field<'s, 'a> {
         PairTest { first: first.name(), second: second.name(), matching: matched.matching, comparison }
     }
 
-    /// What keeps episodes out of the pairs, where blocks are compared by pairs.
     fn gaps(&self) -> Vec<Gap> {
         let mut gaps = Vec::new();
         for (at, block) in self.blocks.iter().enumerate() {
@@ -158,7 +156,6 @@ fn triangle(count: usize, a: usize, b: usize) -> usize {
     a * (2 * count - a - 1) / 2 + (b - a - 1)
 }
 
-/// Every rate and duration in every experiment with at least two models, and what keeps episodes out of pairs.
 pub(super) fn compared(study: &Study, horizon: Option<i64>, confidence: f64) -> (Vec<Family>, Vec<Gap>) {
     let (mut families, mut gaps) = (Vec::new(), Vec::new());
     for experiment in study.experiments.iter().filter(|experiment| experiment.blocks.len() > 1) {
@@ -214,7 +211,6 @@ impl Reach {
     }
 }
 
-/// The places of the blocks, best mean first; a duration's mean is restricted.
 fn best_first(field: &Field, column: &MetricColumn, horizon: Option<i64>) -> Vec<usize> {
     let mean = |block: &Block| match horizon {
         Some(horizon) => durations::restricted(field.study, block, column, horizon),
@@ -228,7 +224,6 @@ fn best_first(field: &Field, column: &MetricColumn, horizon: Option<i64>) -> Vec
     order
 }
 
-/// The better mean first, undefined ones last.
 pub(super) fn by_mean(a: Option<f64>, b: Option<f64>, better: Better) -> Ordering {
     match (a, b) {
         (Some(a), Some(b)) if better == Better::Lower => a.total_cmp(&b),

@@ -91,7 +91,6 @@ struct Couple<'s, 'a> {
 }
 
 impl<'s, 'a> Couple<'s, 'a> {
-    /// Every two models, by name, with the experiments that both have.
     fn all(study: &'s Study<'a>) -> Vec<Self> {
         let mut subjects: BTreeMap<String, BTreeMap<usize, &'s Block<'a>>> = BTreeMap::new();
         for (at, experiment) in study.experiments.iter().enumerate() {
@@ -116,7 +115,6 @@ impl<'s, 'a> Couple<'s, 'a> {
         self.strata.iter().map(|(block, _)| block.experiment.to_owned()).collect()
     }
 
-    /// The pairs of every experiment, where all are compared by pairs.
     fn pairs(&self, study: &Study) -> Option<Vec<Vec<(usize, usize)>>> {
         let matched = |(first, second): &(&Block, &Block)| {
             Matched::of(&Scenes::of(study, first), &Scenes::of(study, second)).pairs
@@ -140,7 +138,6 @@ impl<'s, 'a> Couple<'s, 'a> {
         OverallRow { losses, ..row }
     }
 
-    /// The test with the lost episodes taken one way, or without them.
     fn taken(
         &self,
         column: &MetricColumn,
@@ -233,7 +230,6 @@ impl<'s, 'a> Couple<'s, 'a> {
     }
 }
 
-/// Every two models under these rates, by name; the better one first.
 pub(super) fn rates(study: &Study, metrics: &[String], confidence: f64) -> Vec<OverallRow> {
     let couples = Couple::all(study);
     let pairs: Vec<_> = couples.iter().map(|couple| couple.pairs(study)).collect();
@@ -248,7 +244,6 @@ pub(super) fn rates(study: &Study, metrics: &[String], confidence: f64) -> Vec<O
     all
 }
 
-/// Every two models under the durations among these metrics.
 pub(super) fn improvements(study: &Study, metrics: &[String], confidence: f64) -> Vec<ImprovementRow> {
     let couples = Couple::all(study);
     let durations = metrics.iter().filter(|metric| is_duration(study, metric));

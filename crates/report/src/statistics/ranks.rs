@@ -33,7 +33,6 @@ pub struct RankRow {
 }
 
 impl RankRow {
-    /// The ranks in every experiment, then over all of them.
     pub(super) fn all(families: &[Family], overall: &[OverallRow]) -> Vec<Self> {
         let mut rows: Vec<Self> = families.iter().flat_map(Self::of_family).collect();
         for rows_of in overall.chunk_by(|a, b| a.metric == b.metric) {
@@ -57,7 +56,6 @@ impl RankRow {
     }
 }
 
-/// The ranks of some models, of which the first of each pair is shown to be better.
 fn ranks(experiment: Option<&str>, metric: &str, models: &[&str], shown: &[(&str, &str)]) -> Vec<RankRow> {
     let row = |model: &&str| RankRow {
         experiment: experiment.map(str::to_owned),

@@ -42,7 +42,6 @@ pub struct RetestRow {
 }
 
 impl RetestRow {
-    /// Every rate of every model that played a scene twice; none of a reconstruction, whose scenes are made up.
     pub(super) fn all(study: &Study) -> Vec<Self> {
         if !study.design.has_pairs() {
             return Vec::new();

@@ -15,7 +15,6 @@ pub struct Selection {
 }
 
 impl Selection {
-    /// The phrase that stands beside each answer.
     pub(super) fn phrase(&self) -> String {
         let condition = visible(&self.condition);
         if self.by_results {

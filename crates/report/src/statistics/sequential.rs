@@ -152,7 +152,6 @@ impl Sequential {
     }
 }
 
-/// The rates among the headline metrics; the first rate where none has a level.
 fn headline_rates(study: &Study) -> Vec<String> {
     let chosen: Vec<String> = headline(study).into_iter().filter(|metric| study.kind(metric) == Kind::Rate).collect();
     if chosen.is_empty() { study.rates().take(1).map(|column| column.name.clone()).collect() } else { chosen }

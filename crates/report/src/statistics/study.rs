@@ -54,7 +54,6 @@ pub(super) struct Block<'a> {
     pub model: &'a str,
     /// The condition; none where no episode of the table has any but the default one.
     pub condition: Option<&'a str>,
-    /// The rows of the table, in runs.
     rows: Vec<Range<usize>>,
     recorded: Recorded<'a>,
     moments: BTreeMap<&'a str, Moments>,
@@ -269,7 +268,6 @@ fn by_condition(conditions: Option<&TextColumn>, rows: Range<usize>) -> Vec<(Opt
     parts.into_iter().map(|(condition, rows)| (Some(condition), rows)).collect()
 }
 
-/// The runs of rows that have the same key.
 fn runs<K: PartialEq>(rows: Range<usize>, key: impl Fn(usize) -> K) -> Vec<Range<usize>> {
     let mut runs: Vec<Range<usize>> = Vec::new();
     for row in rows {

@@ -19,7 +19,6 @@ const NAMED_GAPS: usize = 5;
 /// How much of a scene's name is shown: a fingerprint is long.
 const SCENE_SHOWN: usize = 16;
 
-/// What the design declares, what follows from it, and what to do where it declares nothing.
 pub(super) fn design_note(statistics: &Statistics, from_text: bool) -> String {
     let (paired, all) = pairings(statistics);
     if statistics.design.kind == Some(DesignKind::Reconstruction) {
@@ -63,7 +62,6 @@ fn matchings(statistics: &Statistics) -> impl Iterator<Item = &Matching> {
     models.chain(statistics.conditions.iter().map(|contrast| &contrast.matching))
 }
 
-/// The comparisons by pairs, and all: each two blocks once, under one metric.
 fn pairings(statistics: &Statistics) -> (usize, usize) {
     let metric = statistics.models.first().map(|family| &family.metric);
     let models =
@@ -75,7 +73,6 @@ fn pairings(statistics: &Statistics) -> (usize, usize) {
     (all.iter().filter(|paired| **paired).count(), all.len())
 }
 
-/// What the numbers do not allow to say.
 pub(super) fn warnings(statistics: &Statistics, from_text: bool) -> Vec<String> {
     let chosen = statistics.selection.as_ref().filter(|selection| selection.by_results);
     let found = [
@@ -95,7 +92,6 @@ fn is_undeclared(statistics: &Statistics) -> bool {
     matches!(statistics.design.kind, None | Some(DesignKind::Reconstruction))
 }
 
-/// Repeats of a scene are no pairs, and depend on each other.
 fn repeated(statistics: &Statistics) -> Option<String> {
     let most = matchings(statistics).map(|matching| matching.repeated).max().filter(|&most| most > 0)?;
     let unpaired = matchings(statistics).any(|matching| matching.repeated > 0 && !matching.paired);
@@ -179,7 +175,6 @@ fn losses(statistics: &Statistics, from_text: bool) -> Option<String> {
     })
 }
 
-/// The episodes that were lost, of all models.
 pub(super) fn lost(statistics: &Statistics) -> u64 {
     let rows = statistics.losses.rows.iter();
     let lost: BTreeSet<(&str, &str, Option<&str>, u64)> = rows

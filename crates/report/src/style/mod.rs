@@ -37,7 +37,6 @@ pub struct Style {
     /// SHA-256 of the file, 64 hexadecimal digits.
     pub hash: String,
     pub sheet: Sheet,
-    /// Every metric that a file of the user's names, and where. A built-in style may name metrics that a catalog has not.
     named: Vec<(String, Place)>,
     is_built_in: bool,
 }

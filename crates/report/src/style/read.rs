@@ -47,14 +47,12 @@ pub(super) struct Read {
 /// A style's text, and where it is.
 struct StyleFile {
     source: Source,
-    /// What its includes are relative to.
     folder: Option<PathBuf>,
     /// Its one place on disk, whatever it is called; `None` if it is built in.
     place: Option<PathBuf>,
     is_built_in: bool,
 }
 
-/// Reads a built-in style by name, or the one in a file.
 pub(super) fn read(path: &Path) -> Result<Read, StyleError> {
     let file = match find(path, path) {
         Ok(file) => file,
@@ -74,7 +72,6 @@ pub(super) fn read(path: &Path) -> Result<Read, StyleError> {
     reading.finish(&whole).map_err(|faults| StyleError::Faults(Faults(faults).in_order()))
 }
 
-/// The built-in style of this name, or the one at this path.
 fn find(name: &Path, path: &Path) -> io::Result<StyleFile> {
     if let Some((name, text)) = BUILT_IN.into_iter().find(|(known, _)| name == Path::new(known)) {
         let source = Source { name: format!("{name}.toml"), text: text.to_owned() };
@@ -94,7 +91,6 @@ struct TableDraft {
     columns: Option<Vec<String>>,
     print: PrintSheet,
     undefined_as_zero: Option<Vec<String>>,
-    /// Where the file that names it last does so.
     place: Option<Place>,
 }
 
@@ -241,7 +237,6 @@ impl Reading {
 }
 
 impl TableDraft {
-    /// The table, or the key that it lacks.
     fn whole(self) -> Result<TableSheet, &'static str> {
         Ok(TableSheet {
             title: self.title.ok_or("title")?,

@@ -44,7 +44,6 @@ fn push_row(text: &mut String, element: &str, table: &Table, cells: impl Iterato
     text.push_str("</tr>\n");
 }
 
-/// Text in which nothing is markup, nor mathematics to a notebook.
 fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for c in visible(text).chars() {

@@ -101,7 +101,6 @@ fn caption(table: &Table) -> String {
     caption
 }
 
-/// Escaped text in which a metric that has a LaTeX header is set as its header is.
 fn prose(text: &str, columns: &[Column]) -> String {
     let words = text.split_inclusive(|c: char| !is_word(c));
     words

@@ -223,7 +223,6 @@ impl<T: Into<String>> From<T> for TableCell {
 }
 
 impl TableCell {
-    /// In a markup whose words for bold and underlined text are pairs of marks.
     fn marked_up(&self, escape: fn(&str) -> String, bold: [&str; 2], underline: [&str; 2]) -> String {
         let mark = self.mark();
         let (inside, after) = match &self.detail {

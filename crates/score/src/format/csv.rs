@@ -10,7 +10,6 @@ use metric::catalog::Catalog;
 
 pub(super) use crate::columns::KEYS;
 
-/// Writes a table as comma-separated values.
 pub(super) fn write(table: &EpisodeTable, out: impl Write) -> Result<(), FormatError> {
     let mut writer = csv::Writer::from_writer(out);
     let header = table.header();
@@ -115,7 +114,6 @@ pub(super) fn assemble(
     Ok(builder.finish())
 }
 
-/// Each column has a name of its own.
 pub(super) fn check_unique(names: &[&str]) -> Result<(), FormatError> {
     match names.iter().enumerate().find(|(at, name)| names[..*at].contains(name)) {
         None => Ok(()),

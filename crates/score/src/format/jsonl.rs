@@ -10,7 +10,6 @@ use exact::budget::Limit;
 use exact::input::Lines;
 use metric::catalog::Catalog;
 
-/// Writes a table as JSON lines.
 pub(super) fn write(table: &EpisodeTable, mut out: impl Write) -> Result<(), FormatError> {
     for (row, key) in table.keys.iter().enumerate() {
         let mut object = Map::new();

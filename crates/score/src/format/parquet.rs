@@ -66,7 +66,6 @@ pub fn holds_definitions(file: &impl ChunkReader) -> bool {
     metadata(file).is_some_and(|metadata| footer::value(metadata.file_metadata(), DEFINITIONS_KEY).is_some())
 }
 
-/// The footer of a file, if it has one that can be read.
 fn metadata(file: &impl ChunkReader) -> Option<ParquetMetaData> {
     check_footer(file).ok()?;
     contained(|| ParquetMetaDataReader::new().parse_and_finish(file)).ok()?.ok()
@@ -99,7 +98,6 @@ pub struct Encoder<'a> {
 pub struct Writer<W: Write + Send> {
     file: SerializedFileWriter<Held<W>>,
     columns: usize,
-    /// The columns so far of the row group under way.
     group: Vec<ArrowColumnChunk>,
 }
 
@@ -237,7 +235,6 @@ fn decode(input: TableFile, partition: &Partition<'_>) -> Result<EpisodeTable, F
     Ok(EpisodeTable { declared, ..table.finish() })
 }
 
-/// The labels and metrics among the columns of a batch.
 fn header_of(batch: &RecordBatch, catalog: Catalog) -> Header {
     let schema = batch.schema();
     let others = schema.fields().iter().map(|field| field.name()).filter(|name| !KEYS.contains(&name.as_str()));
@@ -294,7 +291,6 @@ fn column(batch: &RecordBatch, name: &str, ty: &DataType, expected: &'static str
     cast(column, ty).map_err(|error| fault(error.to_string()))
 }
 
-/// Whether all values are doubles that stand for one integer each.
 fn is_whole(column: &ArrayRef) -> bool {
     const EXACT: f64 = 9_007_199_254_740_992.0;
     let whole = |value: f64| value.fract().abs() <= 0.0 && value.abs() < EXACT;
@@ -324,7 +320,6 @@ mod tests {
     use crate::table::{EpisodeKey, MetricColumn};
     use metric::definitions::Definitions;
 
-    /// More rows than a row group has.
     fn table() -> EpisodeTable {
         let rows = 0..ROW_GROUP_ROWS + GATHERED_ROWS + 5;
         let metric = |name: &str, of: &dyn Fn(usize) -> Option<i64>| MetricColumn::new(name, rows.clone().map(of));

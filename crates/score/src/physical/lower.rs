@@ -11,9 +11,7 @@ use metric::plan::{Aggregate, Arithmetic, Comparison, Constant, NodeId, Op, Plan
 pub(super) struct Lowering<'a> {
     physical: &'a mut PhysicalPlan,
     plan: &'a Plan,
-    /// The steps of nodes, in their own shape or looked up at the moments of a step.
     known: HashMap<(NodeId, Option<StepId>), StepId>,
-    /// The first metric that needs each node.
     metrics: HashMap<NodeId, &'a str>,
 }
 
@@ -28,7 +26,6 @@ impl<'a> Lowering<'a> {
         Self { physical, plan, known: HashMap::new(), metrics }
     }
 
-    /// The values of a node, texts as symbols.
     pub(super) fn values(&mut self, id: NodeId) -> StepId {
         self.plain(id, None)
     }
@@ -86,7 +83,6 @@ impl<'a> Lowering<'a> {
         step
     }
 
-    /// Operations that compute each value from the values at its place.
     fn elementwise(&mut self, op: &Op, shape: Shape, at: Option<StepId>) -> Kernel {
         match op {
             Op::Column(name) => Kernel::Column(name.clone()),
@@ -115,7 +111,6 @@ impl<'a> Lowering<'a> {
         }
     }
 
-    /// The values of a node, texts as symbols.
     fn plain(&mut self, id: NodeId, at: Option<StepId>) -> StepId {
         let step = self.node(id, at);
         if !self.gives_keys(step) {
@@ -125,7 +120,6 @@ impl<'a> Lowering<'a> {
         self.physical.push(Kernel::Symbols(step), Type::Text, shape)
     }
 
-    /// The values of a node, texts as symbols, a constant written out.
     fn full(&mut self, id: NodeId, shape: Shape, at: Option<StepId>) -> StepId {
         let step = self.plain(id, at);
         self.written_out(step, shape)

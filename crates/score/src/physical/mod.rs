@@ -76,15 +76,12 @@ pub enum Kernel {
     KeysEqualText {
         keys: StepId,
         text: StepId,
-        /// False for "do not".
         equal: bool,
     },
     /// Whether the keys of each timestep stand for the text of their episode, or whether they do not.
     KeysEqualEpisode {
-        /// The keys, per timestep.
         keys: StepId,
         texts: StepId,
-        /// False for "do not".
         equal: bool,
     },
     /// Whether the timestep compares with a moment of its episode; timesteps are not written out.
@@ -107,7 +104,6 @@ pub enum Kernel {
     Case {
         /// Conditions and values, in order.
         branches: Vec<(StepId, StepId)>,
-        /// The value where no condition is true.
         otherwise: StepId,
     },
     /// The first value that is not null; no operand is a constant.
@@ -125,9 +121,7 @@ pub enum Kernel {
     Within(Vec<(Comparison, StepId)>),
     /// `first`, `last`, `any` or `count` of a condition, over all rows or over those of a `Within`.
     Search {
-        /// One of the four.
         aggregate: Aggregate,
-        /// The condition, per timestep.
         condition: StepId,
         /// A [`Kernel::Within`].
         within: Option<StepId>,
@@ -136,9 +130,7 @@ pub enum Kernel {
     Fold(Aggregate, StepId),
     /// The value at a timestep of each episode; null where there is no such timestep. Takes values or keys.
     At {
-        /// The values, per timestep.
         values: StepId,
-        /// The timesteps, per episode.
         moments: StepId,
     },
     /// The value at the timestep before, null at the first one; not a constant. Takes values.
@@ -146,7 +138,6 @@ pub enum Kernel {
     /// Values per episode, null where the episode has no such timestep.
     NullWhereAbsent {
         values: StepId,
-        /// The timesteps, per episode.
         moments: StepId,
     },
 }
@@ -216,9 +207,7 @@ pub struct Scores {
 pub struct PhysicalPlan {
     steps: Vec<Step>,
     known: HashMap<Step, StepId>,
-    /// The compiled pattern of each step that matches one.
     patterns: HashMap<StepId, Regex>,
-    /// The first metric that needs each step, for messages.
     metrics: HashMap<StepId, String>,
     scores: Vec<Scores>,
 }
@@ -278,17 +267,14 @@ impl PhysicalPlan {
         (timesteps, episodes)
     }
 
-    /// The compiled pattern of a step.
     pub(super) fn pattern(&self, id: StepId) -> &Regex {
         &self.patterns[&id]
     }
 
-    /// The first metric that needs a step.
     pub(super) fn metric_of(&self, step: StepId) -> Option<&str> {
         self.metrics.get(&step).map(String::as_str)
     }
 
-    /// The step that does this, new or known.
     fn push(&mut self, kernel: Kernel, ty: Type, shape: Shape) -> StepId {
         let step = Step { kernel, ty, shape };
         if let Some(known) = self.known.get(&step) {

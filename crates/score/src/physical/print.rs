@@ -78,7 +78,6 @@ impl fmt::Display for Kernel {
 }
 
 impl Kernel {
-    /// The name of a kernel that is printed as its name and its operands.
     const fn word(&self) -> &'static str {
         match self {
             Self::Times => "timesteps",

@@ -17,7 +17,6 @@ pub(super) fn window(plan: &Plan, op: &Op) -> Option<(Comparison, NodeId)> {
     }
 }
 
-/// A comparison for equality of a column of text per timestep with a text of the episode: the column and the text.
 pub(super) fn beside_its_episode(plan: &Plan, op: &Op) -> Option<(NodeId, NodeId)> {
     let Op::Compare(Comparison::Equal | Comparison::NotEqual, x, y) = op else { return None };
     let pair = |column: NodeId, text: NodeId| match (&plan.node(column).op, &plan.node(text).op) {
@@ -59,7 +58,6 @@ pub(super) fn computes_after_lookup(plan: &Plan, value: NodeId) -> bool {
     !alone && inner_nodes(plan, value).iter().all(|id| !matches!(plan.node(*id).op, Op::Arithmetic(..) | Op::Negate(_)))
 }
 
-/// The nodes between a value per timestep and its columns and parts per episode, the value included.
 fn inner_nodes(plan: &Plan, value: NodeId) -> BTreeSet<NodeId> {
     let (mut inner, mut open) = (BTreeSet::new(), vec![value]);
     while let Some(id) = open.pop() {
@@ -70,7 +68,6 @@ fn inner_nodes(plan: &Plan, value: NodeId) -> BTreeSet<NodeId> {
     inner
 }
 
-/// Whether a lookup takes the values of this node as they are.
 pub(super) fn is_leaf(plan: &Plan, id: NodeId) -> bool {
     let node = plan.node(id);
     node.level == Level::Episode || matches!(node.op, Op::Column(_) | Op::Constant(_) | Op::Lag(_))

@@ -112,7 +112,6 @@ fn largest_that_leaves(count: i128, most: i128, sum: i128, squares: i128) -> i12
     low
 }
 
-/// All integers as near to each other as the sum lets them be.
 fn least_squares(count: i128, sum: i128) -> i128 {
     if count == 0 {
         return 0;

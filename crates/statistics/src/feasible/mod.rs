@@ -108,7 +108,6 @@ impl Sample {
         [below.map(moments), (above..=most).find(&mut attained).map(moments)]
     }
 
-    /// The sums of squares, attained or not, that print as all these standard errors with this sum.
     fn squares(&self, sum: i128, prints: &[Print]) -> Option<Span> {
         let whole = ends(self.n.into(), self.bounds(), sum)?;
         Some(prints.iter().fold(whole, |span, print| match print.se {

@@ -33,7 +33,6 @@ fn at(count: u64) -> usize {
     usize::try_from(count).expect("a count of episodes")
 }
 
-/// Which numbers of successes of the first model reject, given the total; from the fewest possible up.
 #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
 fn rejections(n: u64, total: u64, level: f64) -> Vec<bool> {
     let first = total.saturating_sub(n);

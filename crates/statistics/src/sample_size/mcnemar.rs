@@ -7,11 +7,8 @@ use super::{Power, TIE};
 #[derive(Clone, Debug)]
 pub struct McNemar {
     level: f64,
-    /// The probability that a pair is discordant.
     discordance: f64,
-    /// The probability that a discordant pair favours the better model.
     favours: f64,
-    /// The power given each number of discordant pairs.
     rejects: Vec<f64>,
 }
 

@@ -34,7 +34,6 @@ struct Inferred {
     kind: Option<Kind>,
     /// Where the first value was that is not null.
     first: Option<Place>,
-    /// An integer that no floating-point number can be relied on to hold.
     wide: Option<(Place, i64)>,
 }
 
@@ -66,7 +65,6 @@ impl Columns {
         faults
     }
 
-    /// Faults that show when all lines are known.
     pub(super) fn faults(&self) -> Vec<Fault> {
         let lossy = |(name, inferred): (&String, &Inferred)| {
             let (place, value) = inferred.wide.as_ref().filter(|_| inferred.kind == Some(Kind::Float))?;
@@ -164,7 +162,6 @@ fn kind_of(value: &Value) -> Result<Option<Kind>, Box<Fault>> {
     }
 }
 
-/// What is wrong with the value of a column of the schema, if anything is.
 fn misfit(column: &Column, value: &Value, limits: Limits<'_>) -> Option<Fault> {
     let refused = |help: &str| Some(Fault::new(expected(column), value.shown(), help));
     match (column.stored.kind(), value) {
@@ -196,7 +193,6 @@ fn misfit(column: &Column, value: &Value, limits: Limits<'_>) -> Option<Fault> {
     }
 }
 
-/// What is wrong with the value of a column that the definitions declare, if anything is.
 fn misdeclared(key: &str, value: &Value, limits: Limits<'_>) -> Option<Fault> {
     let declared = limits.expected.declared.iter().find(|declared| declared.name == key)?;
     let is_of_kind = matches!(
@@ -223,7 +219,6 @@ fn misdeclared(key: &str, value: &Value, limits: Limits<'_>) -> Option<Fault> {
     (!is_known).then(|| Fault::new(expected(), value.shown(), near().unwrap_or_else(|| help.to_owned())))
 }
 
-/// The smallest integer of a column.
 pub(super) fn lowest(column: &Column) -> i64 {
     match column.stored.range() {
         _ if column.name == "t" => 1,
@@ -233,7 +228,6 @@ pub(super) fn lowest(column: &Column) -> i64 {
     }
 }
 
-/// Whether the column's floating-point type holds a number of this size, and the column one of this sign.
 #[expect(clippy::cast_precision_loss, reason = "a column of floating-point numbers rounds")]
 #[expect(clippy::cast_possible_truncation, reason = "that is the question")]
 fn is_held(column: &Column, value: &Value) -> bool {
@@ -247,7 +241,6 @@ fn is_held(column: &Column, value: &Value) -> bool {
     fits && !(column.counts() && number < 0.0)
 }
 
-/// What a column of the schema takes, in words.
 pub(super) fn expected(column: &Column) -> String {
     let what = match column.stored.kind() {
         Kind::Bool => "true or false".to_owned(),
@@ -264,7 +257,6 @@ pub(super) fn expected(column: &Column) -> String {
     if column.nullable { format!("{what}, or null") } else { what }
 }
 
-/// A text that breaks a rule of its column.
 fn odd_text(column: &Column, rule: &Rule<'_>, text: &str, found: String) -> Fault {
     match rule.asks {
         Requirement::Color(color, palette) => Fault::new(color.expected(palette), found, color.help(text, palette)),

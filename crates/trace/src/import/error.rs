@@ -30,7 +30,6 @@ impl Faults {
         faults.into_iter().for_each(|fault| self.add(fault));
     }
 
-    /// The error of these faults, if there are any.
     pub(super) fn none(&mut self) -> Result<(), ImportError> {
         let Self { told, more } = std::mem::take(self);
         if told.is_empty() { Ok(()) } else { Err(ImportError::Faults { told, more }) }

@@ -35,23 +35,19 @@ pub struct Fault {
 }
 
 impl Fault {
-    /// Whether another one is the same fault in another line of the file, whatever is found there.
     pub(super) fn is_alike(&self, other: &Self) -> bool {
         let words = |fault: &Self| (fault.file.clone(), fault.key.clone(), fault.expected.clone());
         self.line.is_some() && other.line.is_some() && words(self) == words(other)
     }
 
-    /// A fault of a whole file, its words still to be said.
     pub(super) fn of_file(file: &str) -> Self {
         Self { file: file.to_owned(), ..Self::default() }
     }
 
-    /// The same fault, in this line.
     pub(super) fn at(self, place: &Place) -> Self {
         Self { file: place.file.to_string(), line: Some(place.line), ..self }
     }
 
-    /// The same fault, of this key.
     pub(super) fn of_key(self, key: &str) -> Self {
         Self { key: Some(key.to_owned()), ..self }
     }

@@ -34,7 +34,6 @@ pub(super) struct Index {
     steps: Vec<Step>,
 }
 
-/// Columns that are the same in all steps of an episode, besides its id.
 fn constants() -> impl Iterator<Item = &'static Column> {
     COLUMNS.iter().filter(|column| column.constant && column.name != "episode_id")
 }
@@ -44,7 +43,6 @@ fn value<'a>(members: &'a Members, name: &str) -> &'a Value {
 }
 
 impl Index {
-    /// Adds the step of a line whose values are those of the schema; a fault if the line contradicts its episode's first.
     pub(super) fn add(&mut self, text: usize, line: &Line, members: &Members) -> Option<Fault> {
         let (Value::Text(id), Value::Int(t)) = (value(members, "episode_id"), value(members, "t")) else { return None };
         let known = self.by_id.get(id).copied();

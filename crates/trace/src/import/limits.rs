@@ -22,7 +22,6 @@ pub struct Limits<'a> {
 }
 
 impl Limits<'_> {
-    /// What the footer says of the steps in these texts, given their hashes.
     pub(super) fn recording(&self, sources: &[String]) -> Value {
         let origin = if self.is_reconstruction { Origin::Reconstruction } else { Origin::Import };
         let mut recording = json!({ "kind": origin.name(), "sources": sources });

@@ -29,7 +29,6 @@ pub enum Value {
 pub(super) type Members = Vec<(String, Value)>;
 
 impl Value {
-    /// Turns a floating-point number without a fraction into the same integer.
     #[expect(clippy::cast_possible_truncation, reason = "it is whole and within 2^53")]
     pub(super) fn make_integer(&mut self) {
         const EXACT: f64 = 9_007_199_254_740_992.0;
@@ -41,7 +40,6 @@ impl Value {
         }
     }
 
-    /// The value for a message, long texts cut.
     pub(super) fn shown(&self) -> String {
         const LONGEST: usize = 60;
         match self {
@@ -97,7 +95,6 @@ fn no_json(text: &str, ended: bool, error: &serde_json::Error) -> Fault {
     Fault::new("strict JSON", found, help)
 }
 
-/// Whether a word that is no JSON, and stands for a number elsewhere, is around this byte.
 fn is_no_number(text: &str, byte: usize) -> bool {
     let start = text.floor_char_boundary(byte.saturating_sub(2));
     let around: String = text[start..].chars().take(4).collect();

@@ -67,7 +67,6 @@ impl Mapping {
         self.left_out.iter().map(note).collect()
     }
 
-    /// Writes a line as a flat step. A line that is no object stays as it is, for the import to refuse.
     pub(super) fn write(&mut self, bytes: &[u8], out: &mut impl Write) -> io::Result<()> {
         let object = line::members(bytes, true).ok().and_then(|_| serde_json::from_slice(bytes.trim_ascii()).ok());
         match object {
@@ -111,7 +110,6 @@ impl Path {
     }
 }
 
-/// The value at a path. A key may hold dots itself.
 fn at<'v>(value: &'v Value, path: &str) -> Option<&'v Value> {
     match value {
         value if path.is_empty() => Some(value),
@@ -136,7 +134,6 @@ fn pair(typed: &str, expected: &'static str) -> Result<(String, String), Mapping
     Ok((name.to_owned(), text.to_owned()))
 }
 
-/// A constant as JSON spells it; text for a column of text, and for all that is no number and no truth.
 fn constant(name: String, text: String) -> (String, Value) {
     let is_text = column(&name).is_some_and(|column| column.stored.kind() == Kind::String);
     let scalar =

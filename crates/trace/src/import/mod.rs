@@ -80,7 +80,6 @@ pub fn import(texts: &mut [Text], out: &Path, limits: Limits<'_>) -> Result<Impo
     })
 }
 
-/// The first pass over one text.
 fn survey(
     at: usize,
     text: &mut Text,

@@ -17,7 +17,6 @@ pub(super) struct Rows<W: Write + Send> {
 }
 
 impl<W: Write + Send> Rows<W> {
-    /// Starts a trace with these columns.
     pub(super) fn new(out: W, columns: &Columns, recording: &serde_json::Value) -> Result<Self> {
         let known = columns.known().map(|column| (field(column), Some(column.stored.kind())));
         let own = columns.own().into_iter().map(|own| (Field::new(&own.name, stored(own.kind), true), own.kind));
@@ -25,7 +24,6 @@ impl<W: Write + Send> Rows<W> {
         Ok(Self { file: RowGroups::new(out, &gathered.layout, Some(recording))?, gathered })
     }
 
-    /// Adds a step; an error if a value is not of its column's type.
     pub(super) fn add(&mut self, members: &Members) -> Result<(), ()> {
         for (field, values) in self.gathered.layout.fields().iter().zip(&mut self.gathered.columns) {
             let value = members.iter().find(|(key, _)| key == field.name()).map(|(_, value)| value);
@@ -35,7 +33,6 @@ impl<W: Write + Send> Rows<W> {
         Ok(())
     }
 
-    /// Says that the next step is another episode's.
     pub(super) fn end_episode(&mut self) -> Result<()> {
         self.file.end_episode(&mut self.gathered)
     }
@@ -46,7 +43,6 @@ impl<W: Write + Send> Rows<W> {
     }
 }
 
-/// The value for a column of a type: integers may stand where numbers with a fraction do.
 #[expect(clippy::cast_precision_loss, reason = "the first pass refused what would lose anything in an own column")]
 fn plain<'a>(value: Option<&'a line::Value>, stored: &DataType) -> Result<Option<Value<'a>>, ()> {
     Ok(Some(match value {

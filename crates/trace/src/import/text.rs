@@ -98,7 +98,6 @@ impl Text {
         Self { name: name.into(), reader: BufReader::new(file), offset: 0, lines: 0, is_frame: false }
     }
 
-    /// The keys and values of one of its lines.
     pub(super) fn members(&self, bytes: &[u8], ended: bool) -> Result<Members, Box<Fault>> {
         let mut members = line::members(bytes, ended)?;
         if self.is_frame {
@@ -122,7 +121,6 @@ impl Text {
         Ok(())
     }
 
-    /// The hash of the whole text.
     pub(super) fn hash(&mut self) -> Result<String, ImportError> {
         self.rewind()?;
         let hash = hash::of_reader(&mut self.reader).map_err(ImportError::read(&self.name))?;
@@ -150,7 +148,6 @@ impl Text {
         }
     }
 
-    /// The line that begins at this offset.
     pub(super) fn line_at(&mut self, offset: u64) -> Result<Vec<u8>, ImportError> {
         let failed = || ImportError::read(&self.name);
         if offset != self.offset {

@@ -26,7 +26,6 @@ pub fn place(head: &Episode) -> Place {
     (head.seed, head.run, head.repetition.unwrap_or(1))
 }
 
-/// A writer whose bytes depend on nothing but what is written.
 pub(super) fn writer<W: Write + Seek>(out: W) -> mcap::McapResult<Writer<W>> {
     WriteOptions::new()
         .profile("")
@@ -84,7 +83,6 @@ pub fn without(path: &Path, ids: &BTreeSet<String>, recording: &Value) -> Result
     file.commit().map_err(LogError::io("write", path))
 }
 
-/// Writes a log and gives it its name.
 fn join(
     file: NewFile,
     before: Option<Source>,
@@ -100,7 +98,6 @@ fn join(
     file.commit().map_err(LogError::io("write", out))
 }
 
-/// Copies the episodes of both, by seed and run.
 fn copy_all<W: Write + Seek>(
     log: &mut Writer<W>,
     mut before: Option<Source>,
@@ -137,9 +134,7 @@ fn is_written(before: Option<&Source>, place: Place) -> bool {
 struct Source {
     path: PathBuf,
     messages: Messages<BufReader<File>>,
-    /// The message with which the next episode begins.
     begin: Option<(Episode, Message<'static>)>,
-    /// The episode that was copied last.
     last: Option<Place>,
 }
 
@@ -155,7 +150,6 @@ impl Source {
         self.begin.as_ref().map(|(head, _)| place(head))
     }
 
-    /// Goes on to the next episode's first message.
     fn advance(&mut self) -> Result<(), LogError> {
         while let Some(message) = self.messages.next().transpose()? {
             if let Some(EpisodeMessage::Begin(head)) = self.episode_message(&message)? {

@@ -22,14 +22,12 @@ pub(super) struct Budgets {
 }
 
 impl Budgets {
-    /// Of a log of so many bytes.
     pub(super) fn new(bytes: u64) -> Self {
         let unpacked = Limit::in_proportion("bytes unpacked from a log of its size", 128 << 20, 64, bytes);
         let searched = Limit::in_proportion("bytes looked at for chunks behind damage", 128 << 20, 64, bytes);
         Self { unpacked: Arc::new(Budget::new(unpacked)), searched: Arc::new(Budget::new(searched)) }
     }
 
-    /// A chunk that is to be unpacked.
     fn unpack(&self, chunk: &[u8]) -> Result<(), Exceeded> {
         let size = size_unpacked(chunk) as u64;
         // A length that is damaged must not use up what the chunks behind it need.
@@ -38,7 +36,6 @@ impl Budgets {
         self.unpacked.spend(size)
     }
 
-    /// Bytes that are read to see whether a chunk begins somewhere.
     pub(super) fn search(&self, bytes: usize) -> Result<(), Exceeded> {
         self.searched.spend(bytes as u64)
     }
@@ -47,7 +44,6 @@ impl Budgets {
 /// The records of a chunk, unpacked; each is parsed when it is asked for.
 #[derive(Debug, Default)]
 pub(super) struct Unpacked {
-    /// Opcode, length and bytes of each record, one behind the other.
     bytes: Vec<u8>,
     at: usize,
 }
@@ -147,14 +143,12 @@ fn before_overrun(chunk: &[u8]) -> Option<&[u8]> {
     None
 }
 
-/// The opcode and the bytes of the first of some records, and the records behind it.
 fn first_record(records: &[u8]) -> Option<(u8, &[u8], &[u8])> {
     let ([opcode, length @ ..], behind) = records.split_first_chunk::<FRAME>()?;
     let (data, rest) = behind.split_at_checked(usize::try_from(u64::from_le_bytes(*length)).ok()?)?;
     Some((*opcode, data, rest))
 }
 
-/// The size that the header of a chunk gives for what is in it, as far as any chunk may be that large.
 fn size_unpacked(chunk: &[u8]) -> usize {
     // Behind the frame stand two times of 8 bytes each.
     let size = chunk.get(FRAME + 16..FRAME + 24).and_then(|bytes| bytes.try_into().ok()).map(u64::from_le_bytes);

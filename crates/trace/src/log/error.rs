@@ -58,7 +58,6 @@ impl LogError {
         }
     }
 
-    /// The bytes are not those of a log.
     pub(super) fn no_log(path: &Path) -> Self {
         Self::Foreign { file: path.display().to_string(), fault: "it does not begin as an MCAP file does".to_owned() }
     }

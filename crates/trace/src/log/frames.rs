@@ -118,7 +118,6 @@ impl LogIndex {
         Ok(found)
     }
 
-    /// The records of a chunk; none where it is of other episodes.
     fn messages(
         &self,
         records: &mut Records<BufReader<File>>,
@@ -203,7 +202,6 @@ fn records(path: &Path) -> Result<Records<BufReader<File>>, LogError> {
     records.ok_or_else(|| LogError::no_log(path))
 }
 
-/// Gives every message of the whole chunks of a log: its topic, its time and its bytes.
 fn each_message(path: &Path, mut give: impl FnMut(&str, u64, &[u8])) -> Result<(), LogError> {
     let mut records = records(path)?;
     let mut topics = BTreeMap::new();
@@ -337,7 +335,6 @@ struct Rgba {
     a: f64,
 }
 
-/// The shapes of an update, the lowest first.
 fn shapes(data: &[u8]) -> Vec<Shape> {
     let Ok(update) = <SceneUpdate as prost::Message>::decode(data) else { return Vec::new() };
     let mut shapes: Vec<Shape> = update.entities.iter().flat_map(of_entity).collect();
@@ -353,7 +350,6 @@ fn of_entity(entity: &Entity) -> Vec<Shape> {
     cubes.chain(spheres).chain(posts).collect()
 }
 
-/// A box from above: the hull of its corners.
 fn boxed(name: &str, pose: &Pose, size: Vector, color: Rgba) -> Option<Shape> {
     let (at, turn) = (pose.position?, pose.orientation?);
     let corner = |x: f64, y: f64, z: f64| {
@@ -385,7 +381,6 @@ fn turned(turn: Quaternion, vector: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|at| vector[at] + turn.w * once[at] + twice[at])
 }
 
-/// The convex hull of some points, counter-clockwise (Andrew's monotone chain).
 fn hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     points.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
     points.dedup();

@@ -22,7 +22,6 @@ pub(super) struct Messages<R> {
     path: PathBuf,
     records: Records<R>,
     channels: ChannelAccumulator<'static>,
-    /// What is left of the chunk that was read last.
     chunk: Unpacked,
     at: u64,
     has_ended: bool,

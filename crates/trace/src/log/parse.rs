@@ -44,7 +44,6 @@ fn check_texts(opcode: u8, body: &[u8]) -> Option<()> {
     Some(())
 }
 
-/// The bytes behind a length, as many as it says, and what follows them.
 fn text(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
     let (length, rest) = bytes.split_first_chunk::<4>()?;
     rest.split_at_checked(usize::try_from(u32::from_le_bytes(*length)).ok()?)

@@ -82,7 +82,6 @@ impl Iterator for LogReader {
     }
 }
 
-/// What a message of a topic says.
 pub(super) fn event(name: &str, data: &[u8]) -> serde_json::Result<Event> {
     Ok(match name {
         topic::EPISODE => Event::Episode(serde_json::from_slice(data)?),

@@ -52,7 +52,6 @@ impl Frame {
         Self { opcode, length: u64::from_le_bytes(length) }
     }
 
-    /// Whether a record of a log can begin so, with this many bytes behind.
     fn is_plausible(self, behind: u64) -> bool {
         (op::HEADER..=op::DATA_END).contains(&self.opcode)
             && self.length <= behind
@@ -111,7 +110,6 @@ impl<R: Read + Seek> Records<R> {
         }
     }
 
-    /// The checksum of the data behind its end record, that of the index behind the footer.
     pub(super) fn checksum(&self) -> u32 {
         self.checksum
     }
@@ -124,18 +122,15 @@ impl<R: Read + Seek> Records<R> {
         &self.budgets
     }
 
-    /// Whether nothing follows but the last magic bytes.
     pub(super) fn is_closed(&mut self) -> io::Result<bool> {
         Ok(self.read(self.at, MAGIC.len() + 1)? == MAGIC)
     }
 
-    /// The channels that the file's summary names, if its end is there.
     pub(super) fn of_summary(&mut self) -> io::Result<Vec<mcap::records::Channel>> {
         let channel = |record| if let Record::Channel(channel) = record { Some(channel) } else { None };
         Ok(self.summary()?.into_iter().filter_map(channel).collect())
     }
 
-    /// The records of the file's summary, if its end is there; none where it is not.
     pub(super) fn summary(&mut self) -> io::Result<Vec<Record<'static>>> {
         /// Two places and a checksum.
         const FOOTER: usize = FRAME + 20;
@@ -179,7 +174,6 @@ impl<R: Read + Seek> Records<R> {
         }
     }
 
-    /// The bytes at a place; fewer where the file ends.
     fn read(&mut self, at: u64, count: usize) -> io::Result<Vec<u8>> {
         let count = (count as u64).min(self.end.saturating_sub(at));
         self.bytes.seek(SeekFrom::Start(at))?;
@@ -199,7 +193,6 @@ impl<R: Read + Seek> Records<R> {
         self.read(at, FRAME + usize::try_from(frame.length).unwrap_or(LONGEST))
     }
 
-    /// Goes on to the next chunk, or to the end of the data.
     fn past_damage(&mut self, fault: &str) -> io::Result<Piece> {
         let from = self.at;
         Ok(if let Some(next) = self.landmark(from + 1)? {
@@ -213,7 +206,6 @@ impl<R: Read + Seek> Records<R> {
         })
     }
 
-    /// The first place from here on where a chunk or the end record stands, told by more than its opcode.
     fn landmark(&mut self, from: u64) -> io::Result<Option<u64>> {
         const WINDOW: usize = 1 << 16;
         let mut start = from;
@@ -254,7 +246,6 @@ impl<R: Read + Seek> Records<R> {
     }
 }
 
-/// The record at this place, of these bytes, which begin with its frame.
 fn decode(at: u64, opcode: u8, whole: &[u8]) -> Result<Piece, String> {
     let body = whole.get(FRAME..).unwrap_or_default();
     match opcode {

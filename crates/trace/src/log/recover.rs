@@ -107,7 +107,6 @@ impl Default for Rows {
 }
 
 impl Rows {
-    /// Of a log of so many bytes.
     fn of(bytes: u64) -> Self {
         let limit = Limit::new("rows in a log of its size", 200_000 + bytes / 8);
         Self(Budget::new(limit), limit)
@@ -127,7 +126,6 @@ impl Rows {
 struct Salvage {
     channels: BTreeMap<u16, String>,
     open: Option<(Episode, Vec<Step>, Option<String>)>,
-    /// Rows that may still be held.
     rows: Rows,
     result: Recovered,
 }
@@ -163,7 +161,6 @@ impl Salvage {
         Ok(salvage)
     }
 
-    /// Looks at the index behind the data: nothing of a recording is in it, but a log without it is damaged all the same.
     fn index(&mut self, records: &mut Records<impl Read + Seek>) -> io::Result<()> {
         while let Some(piece) = records.next()? {
             match piece {
@@ -302,7 +299,6 @@ impl Salvage {
         }
     }
 
-    /// What is open now will not be whole.
     fn close(&mut self, reason: &str) {
         if let Some((head, rows, fault)) = self.open.take() {
             self.lose(head.episode_id, rows.len(), fault.unwrap_or_else(|| reason.to_owned()));

@@ -54,9 +54,7 @@ pub enum Form {
     Sphere(f64),
     /// Along z: the radius, and the length of the cylinder between its round ends.
     Capsule {
-        /// Of the cylinder and of both ends.
         radius: f64,
-        /// Between the centres of the ends.
         length: f64,
     },
 }
@@ -82,7 +80,6 @@ pub struct EpisodeLog {
     out: Writer<Out>,
     channels: Channels,
     sequence: u32,
-    /// Whether each step ends a chunk.
     is_read_meanwhile: bool,
 }
 
@@ -253,7 +250,6 @@ fn entity(solid: &Solid, timestamp: Option<Timestamp>) -> SceneEntity {
     entity
 }
 
-/// A point on the shape's own z axis, in the frame of the room.
 fn along_z(solid: &Solid, distance: f64) -> [f64; 3] {
     let [w, x, y, z] = solid.rotation;
     let axis = [2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)];

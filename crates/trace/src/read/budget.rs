@@ -18,12 +18,10 @@ pub(crate) const LONGEST_EPISODE: Limit = Limit::new("steps in an episode", 1 <<
 /// The columns of a file.
 pub(crate) const MOST_COLUMNS: Limit = Limit::new("columns in a file", 10_000);
 
-/// The rows of a file of so many bytes.
 pub(crate) fn most_rows(bytes: u64) -> Limit {
     Limit::in_proportion("rows in a file of its size", 8_000_000, 16, bytes)
 }
 
-/// The episodes of a file of so many bytes: of each some hundred bytes are held.
 fn most_episodes(bytes: u64) -> Limit {
     Limit::in_proportion("episodes in a file of its size", 1_000_000, 1, bytes)
 }
@@ -37,7 +35,6 @@ pub(crate) struct EpisodeBudget {
 }
 
 impl EpisodeBudget {
-    /// No episode yet of a file of so many bytes.
     pub(crate) fn new(bytes: u64) -> Self {
         Self { episodes: Budget::new(most_episodes(bytes)), read: Mutex::default() }
     }
@@ -52,7 +49,6 @@ impl EpisodeBudget {
     }
 }
 
-/// Whether the names in a column are as short as names are.
 pub(crate) fn check_names(column: &Column) -> Result<(), Exceeded> {
     let entries = column.entries();
     let Some(texts) = entries.as_string_opt::<i32>() else { return Ok(()) };

@@ -4,7 +4,6 @@ use parquet_pages::{FaultKind, FaultSlot, PageFault};
 
 use crate::diagnostic::{Code, Finding};
 
-/// The fault of its page, or else what the decoder said.
 pub(crate) fn damaged(file: &str, slot: &FaultSlot, error: &str) -> Finding {
     if let Some(PageFault { kind, row_group, column, part, expected, found }) = slot.get() {
         let code = match kind {

@@ -37,9 +37,7 @@ const BATCH_TEXT: u64 = 64 << 20;
 pub(crate) struct Rows {
     pub(crate) columns: Vec<Column>,
     pub(crate) row_group: usize,
-    /// Where they start in the row group.
     pub(crate) first: usize,
-    /// Whether the last episode is known to end with them.
     pub(crate) whole: bool,
 }
 
@@ -55,7 +53,6 @@ impl Rows {
         Self { columns, row_group: self.row_group, first: self.first + start, whole }
     }
 
-    /// The episode of a row.
     pub(crate) fn episode(&self, row: usize) -> Option<&str> {
         self.columns[EPISODE_ID].text(row)
     }
@@ -64,9 +61,7 @@ impl Rows {
 /// The ids of a row group.
 pub(crate) struct Ids {
     pub(crate) runs: Runs,
-    /// Whether its first row is known to begin an episode.
     pub(crate) begins: bool,
-    /// Whether its last row is known to end one.
     pub(crate) ends: bool,
 }
 
@@ -76,15 +71,10 @@ pub(crate) struct RowGroup<'a> {
     layout: &'a Layout,
     readable: Arc<Readable>,
     index: usize,
-    /// The ids of the episodes, if they are known already.
     ids: Option<Ids>,
-    /// Where the values of each column of the layout come from.
     sources: Vec<Source>,
-    /// Where the next rows start in the row group.
     first: usize,
-    /// Rows that are decoded at a time.
     at_a_time: usize,
-    /// Nothing more comes: the end, or a fault.
     over: bool,
 }
 
@@ -104,9 +94,7 @@ enum Source {
 /// A column as the Parquet library decodes it, so many rows at a time.
 struct Library {
     reader: ParquetRecordBatchReader,
-    /// Decoded rows that are still to be given.
     held: Vec<ArrayRef>,
-    /// Where the first fault of a page is found.
     slot: FaultSlot,
 }
 
@@ -115,7 +103,6 @@ impl Library {
         self.held.iter().map(Array::len).sum()
     }
 
-    /// The next rows, of which that many are held.
     fn take(&mut self, count: usize) -> Result<ArrayRef, ArrowError> {
         if let [values] = self.held.as_slice() {
             let (values, rest) = (values.slice(0, count), values.slice(count, values.len() - count));
@@ -130,7 +117,6 @@ impl Library {
 }
 
 impl<'a> RowGroup<'a> {
-    /// A row group of which the ids of the episodes may be known already.
     pub(crate) fn open(
         file: &'a TraceFile,
         layout: &'a Layout,
@@ -159,7 +145,6 @@ impl<'a> RowGroup<'a> {
         Ok(rows)
     }
 
-    /// A column as the library decodes it, from the next row on.
     fn library(&self, at: usize, root: usize) -> Result<Source, Box<Finding>> {
         let (store, slot) = (store(self.file)?, FaultSlot::default());
         let made = contained(|| self.reader(store, root, self.first, &slot));
@@ -195,7 +180,6 @@ impl<'a> RowGroup<'a> {
         Ok(Some(rows))
     }
 
-    /// A column, if its texts are within the budgets.
     fn within(&self, at: usize, column: Column) -> Result<Column, Box<Finding>> {
         let LayoutColumn { name, kind, known, .. } = &self.layout.columns[at];
         if *kind != Kind::String {
@@ -261,7 +245,6 @@ impl<'a> RowGroup<'a> {
         }
     }
 
-    /// A column ends early, or goes on.
     fn other_rows(&self, found: usize) -> Box<Finding> {
         let expected = format!("{} rows", self.file.row_group_rows(self.index));
         let finding = Finding::new(Code::CorruptData, self.file.name(), expected, found.to_string());
@@ -284,7 +267,6 @@ impl<'a> RowGroup<'a> {
         }
     }
 
-    /// A column from a row on, read once more.
     fn anew(&self, at: usize, first: usize) -> Option<Column> {
         let root = root(self.file, self.layout, at)?;
         let (store, slot) = (store(self.file).ok()?, FaultSlot::default());
@@ -293,7 +275,6 @@ impl<'a> RowGroup<'a> {
         normal_column(decoded?.column(0), &held_as(self.layout.columns[at].kind)).ok().map(Column::Flat)
     }
 
-    /// A reader of one column, from a row on.
     fn reader(
         &self,
         store: Store,
@@ -332,7 +313,6 @@ impl Iterator for RowGroup<'_> {
     }
 }
 
-/// The ids of the episodes of a row group, if its pages are such that they can be had without the other columns.
 pub(crate) fn ids(file: &TraceFile, layout: &Layout, row_group: usize) -> Option<Column> {
     let root = root(file, layout, EPISODE_ID)?;
     let (store, readable) = (store(file).ok()?, file.footer().ok()?);
@@ -347,12 +327,10 @@ fn store(file: &TraceFile) -> Result<Store, Box<Finding>> {
     })
 }
 
-/// Where a file has a column.
 fn root(file: &TraceFile, layout: &Layout, at: usize) -> Option<usize> {
     file.columns().iter().position(|column| column.name == layout.columns[at].name)
 }
 
-/// How a column is best held.
 fn form(layout: &Layout, at: usize) -> Form {
     if at == EPISODE_ID || layout.columns[at].constant { Form::Runs } else { Form::Rows }
 }
@@ -386,7 +364,6 @@ fn text_bytes(footer: &ArrowReaderMetadata, root: usize, row_group: usize) -> Op
     (column.column_type() == Physical::BYTE_ARRAY).then_some(bytes)
 }
 
-/// Rows to decode at a time of a row group whose largest column has so many bytes of text.
 fn rows_at_a_time(rows: usize, text: u64) -> usize {
     let fitting = u64::try_from(rows).unwrap_or(u64::MAX).saturating_mul(BATCH_TEXT).checked_div(text);
     let fitting = fitting.and_then(|rows| usize::try_from(rows).ok()).unwrap_or(usize::MAX);
@@ -397,7 +374,6 @@ fn corrupt(file: &TraceFile, row_group: usize, found: &str) -> Box<Finding> {
     Box::new(damaged(file.name(), &FaultSlot::default(), found).in_row_group(row_group))
 }
 
-/// How a column of this kind is held in memory.
 pub(crate) fn held_as(kind: Kind) -> DataType {
     match kind {
         Kind::Bool => DataType::Boolean,

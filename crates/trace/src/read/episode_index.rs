@@ -25,7 +25,6 @@ pub(crate) struct Ahead<'a> {
 struct Group {
     first: String,
     last: String,
-    /// Until they are taken.
     runs: Mutex<Option<Runs>>,
 }
 

@@ -61,7 +61,6 @@ impl Iterator for FlatRows {
     }
 }
 
-/// A finding about a file that has its name told already.
 fn words(finding: &Finding) -> String {
     let column = finding.column.as_ref().map_or_else(String::new, |column| format!("column `{column}`: "));
     format!("{column}expected {}, found {}; {}", finding.expected, finding.found, finding.help)

@@ -58,7 +58,6 @@ pub fn in_order<J: Sync, T: Send, E>(
     })
 }
 
-/// The next job that nobody has begun.
 fn claim<'a, J>(next: &AtomicUsize, jobs: &'a [J]) -> Option<(usize, &'a J)> {
     let at = next.fetch_add(1, Ordering::Relaxed);
     jobs.get(at).map(|job| (at, job))

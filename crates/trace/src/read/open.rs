@@ -47,15 +47,12 @@ pub struct TraceFile {
     version: u32,
     domain: Domain,
     columns: Vec<FileColumn>,
-    /// The rows of each row group.
     rows: Vec<usize>,
     pairs: Vec<KeyValue>,
     colors: Declared,
     experiments: Vec<DeclaredExperiment>,
     checksums: Checksums,
-    /// What a reader needs, while somebody reads: footers of many row groups are large.
     footer: Mutex<Weak<Readable>>,
-    /// What was made of its bytes.
     expansion: Arc<Expansion>,
     episodes: EpisodeBudget,
 }
@@ -63,7 +60,6 @@ pub struct TraceFile {
 /// What a reader of a file needs.
 #[derive(Debug)]
 pub(crate) struct Readable {
-    /// The footer; strings are read as dictionaries.
     pub(crate) footer: ArrowReaderMetadata,
     pub(crate) chunks: ChunkChecksums,
 }
@@ -240,17 +236,14 @@ impl TraceFile {
         input::open(&self.path)
     }
 
-    /// The file as its pages are read.
     pub(crate) fn store(&self) -> io::Result<Store> {
         self.reader().map(|file| Store::new(file, Arc::clone(&self.expansion)))
     }
 
-    /// What was made of its bytes so far.
     pub(crate) fn expansion(&self) -> &Arc<Expansion> {
         &self.expansion
     }
 
-    /// The episodes that were read of it.
     pub(crate) fn episodes(&self) -> &EpisodeBudget {
         &self.episodes
     }
@@ -269,7 +262,6 @@ impl TraceFile {
         self.domain
     }
 
-    /// What keeps it from being a trace of the mirror; nothing if it is one.
     pub(crate) fn strangeness(&self) -> Vec<Finding> {
         match self.domain {
             Domain::Mirror => Vec::new(),
@@ -277,7 +269,6 @@ impl TraceFile {
         }
     }
 
-    /// Its columns of another type than definitions declare.
     pub(crate) fn misdeclared(&self, declared: &[DeclaredColumn]) -> Vec<Finding> {
         let fault = |declared: &DeclaredColumn| {
             let kind = self.column(&declared.name)?.kind.filter(|kind| *kind != declared.kind)?;
@@ -326,7 +317,6 @@ impl TraceFile {
         self.checksums
     }
 
-    /// The footer's key-value metadata, without its checksums.
     pub(crate) fn pairs(&self) -> &[KeyValue] {
         &self.pairs
     }
@@ -336,7 +326,6 @@ impl TraceFile {
         self.colors.palette.as_ref()
     }
 
-    /// The colours that the footer declares.
     pub(crate) fn colors(&self) -> &Declared {
         &self.colors
     }
@@ -382,7 +371,6 @@ fn value<'a>(pairs: &'a [KeyValue], key: &str) -> Option<&'a str> {
     pairs.iter().find(|pair| pair.key == key)?.value.as_deref()
 }
 
-/// The version of the schema that a file follows.
 fn version_of(file: &str, metadata: &ParquetMetaData) -> Result<u32, Box<Finding>> {
     // A file of another writer has none; its columns are checked all the same.
     let pairs = metadata.file_metadata().key_value_metadata();
@@ -402,7 +390,6 @@ fn version_of(file: &str, metadata: &ParquetMetaData) -> Result<u32, Box<Finding
     }
 }
 
-/// The columns of the file, or that it has none that can be made out.
 pub(crate) fn columns_of(file: &str, descriptor: &SchemaDescriptor) -> Result<Vec<FileColumn>, Vec<Finding>> {
     let corrupt = |found| vec![Finding::new(Code::CorruptFooter, file, "a schema of known types", found)];
     let fields = contained(|| parquet_to_arrow_schema(descriptor, None))
@@ -478,7 +465,6 @@ fn check_columns(file: &str, columns: &[FileColumn], version: u32, domain: Domai
     findings
 }
 
-/// The footer with every text column to be read as a dictionary, whatever a writer's own hint says.
 pub(crate) fn readable(metadata: ParquetMetaData, columns: &[FileColumn]) -> Result<ArrowReaderMetadata, String> {
     let is_text: Vec<bool> = columns.iter().map(|column| column.kind == Some(Kind::String)).collect();
     contained(|| with_texts_as_keys(metadata, &is_text))?.map_err(|error| plain(&error))

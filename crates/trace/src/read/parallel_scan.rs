@@ -27,9 +27,7 @@ use parquet_pages::Column;
 #[derive(Clone, Debug)]
 pub(crate) struct Episodes {
     pub(crate) file: usize,
-    /// A column for each of the layout.
     pub(crate) columns: Vec<Column>,
-    /// Where each episode starts, and the number of rows.
     pub(crate) offsets: Vec<usize>,
     /// Where the rows come from, ascending by `at`; the first is at row 0.
     pub(crate) pieces: Vec<Piece>,
@@ -38,10 +36,8 @@ pub(crate) struct Episodes {
 /// Rows that lie together in a row group.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Piece {
-    /// Their first row among the episodes'.
     pub(crate) at: usize,
     pub(crate) row_group: usize,
-    /// Their first row in the row group.
     pub(crate) row: usize,
 }
 
@@ -50,12 +46,10 @@ impl Episodes {
         self.offsets.len() - 1
     }
 
-    /// The row group of a row.
     pub(crate) fn row_group(&self, row: usize) -> usize {
         self.place(row).0
     }
 
-    /// The row group of a row, and the row there.
     pub(crate) fn place(&self, row: usize) -> (usize, usize) {
         let piece = self.pieces[self.pieces.partition_point(|piece| piece.at <= row) - 1];
         (piece.row_group, piece.row + (row - piece.at))
@@ -170,9 +164,7 @@ struct Splitter<'a, T, W> {
     job: Job,
     work: &'a W,
     parts: &'a SyncSender<Part<T>>,
-    /// The rows of the episode that may go on.
     open: Vec<Rows>,
-    /// Whether the episode that may have begun in another row group is behind.
     headed: bool,
 }
 
@@ -283,7 +275,6 @@ struct Joiner<'a, W, R> {
     files: &'a [TraceFile],
     work: &'a W,
     receive: R,
-    /// The rows of the episode that the next row group may go on with.
     open: Vec<Rows>,
     file: usize,
     /// Whether the file had a fault, after which nothing of it counts.
@@ -364,7 +355,6 @@ impl<T, E: From<TraceError>, W: Fn(Episodes) -> T, R: FnMut(usize, Event<T>) -> 
     }
 }
 
-/// An episode that goes on for longer than it may.
 fn too_long(file: &TraceFile, open: &[Rows]) -> Option<Box<Finding>> {
     let steps: usize = open.iter().map(Rows::len).sum();
     let exceeded = LONGEST_EPISODE.check(steps as u64).err()?;
@@ -372,7 +362,6 @@ fn too_long(file: &TraceFile, open: &[Rows]) -> Option<Box<Finding>> {
     Some(Box::new(finding))
 }
 
-/// More episodes than the file may have.
 fn too_many(file: &TraceFile, episodes: &Episodes) -> Option<Box<Finding>> {
     let (piece, rows) = (episodes.pieces.last()?, *episodes.offsets.last()?);
     let end = (piece.row + rows - piece.at) as u64;

@@ -21,16 +21,13 @@ pub(crate) struct Layout {
 pub(crate) struct LayoutColumn {
     pub(crate) name: String,
     pub(crate) kind: Kind,
-    /// What the schema says of it, if it does.
     pub(crate) known: Option<&'static Column>,
     /// Whether it must be the same in all rows of an episode.
     pub(crate) constant: bool,
-    /// The only texts that definitions allow in it; any if empty.
     pub(crate) values: Vec<String>,
 }
 
 impl Layout {
-    /// The keys and these columns, each once.
     pub(crate) fn new<'a>(
         set: &TraceSet,
         steps: impl IntoIterator<Item = &'a str>,
@@ -70,14 +67,12 @@ impl Layout {
         }
     }
 
-    /// Takes the values of a column as they are, whatever the schema says of them.
     pub(crate) fn without_rules(&mut self, name: &str) {
         for column in self.columns.iter_mut().filter(|column| column.name == name) {
             column.known = None;
         }
     }
 
-    /// Where the column of this name is.
     pub(crate) fn position(&self, name: &str) -> Option<usize> {
         self.columns.iter().position(|column| column.name == name)
     }

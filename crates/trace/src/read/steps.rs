@@ -35,7 +35,6 @@ pub struct Steps {
     schema: SchemaRef,
     files: vec::IntoIter<Pending>,
     reader: Option<Reader>,
-    /// The episodes whose rows are wanted; all if absent.
     episodes: Option<BTreeSet<String>>,
 }
 
@@ -78,7 +77,6 @@ impl Steps {
         Arc::clone(&self.schema)
     }
 
-    /// The next rows, as a file has them.
     fn rows(&mut self) -> Option<Result<RecordBatch, Box<Finding>>> {
         loop {
             if self.reader.is_none() {
@@ -94,7 +92,6 @@ impl Steps {
         }
     }
 
-    /// The rows as they are promised.
     fn complete(&self, rows: &RecordBatch) -> Result<RecordBatch, TraceError> {
         let column = |field: &Arc<Field>| -> Result<ArrayRef, arrow::error::ArrowError> {
             let options = CastOptions { safe: false, ..CastOptions::default() };
@@ -130,7 +127,6 @@ impl Iterator for Steps {
     }
 }
 
-/// Whether the column can be given: its type is one of the schema's in every file.
 fn is_readable(set: &TraceSet, name: &str) -> bool {
     set.column(name).is_some_and(|column| column.kind != Kind::Unsupported || column.conflict.is_some())
 }
@@ -155,7 +151,6 @@ impl Pending {
         Ok(Self { name, path, readable: file.footer()?, expansion: Arc::clone(file.expansion()) })
     }
 
-    /// Opens the file: one at a time is open.
     fn reader(self, schema: &Schema) -> Result<Reader, Box<Finding>> {
         let Self { name, path, readable, expansion } = self;
         let unreadable = |error: io::Error| {

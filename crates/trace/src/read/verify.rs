@@ -15,7 +15,6 @@ pub fn verify_pages(set: &TraceSet) -> Result<(), TraceError> {
     set.files().iter().try_for_each(|file| verify_columns(file, |_| true).map_err(|finding| TraceError::from(*finding)))
 }
 
-/// The same for the columns of one file whose names are wanted.
 pub(crate) fn verify_columns(file: &TraceFile, is_wanted: impl Fn(&str) -> bool) -> Result<(), Box<Finding>> {
     let readable = file.footer()?;
     let unreadable = |error: io::Error| {

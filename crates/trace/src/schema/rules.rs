@@ -122,7 +122,6 @@ impl Rule<'_> {
         }
     }
 
-    /// Whether the rule allows a value; so does every rule that is not about single ones.
     pub(crate) fn allows_value(&self, value: Value<'_>) -> bool {
         match value {
             Value::Bool(_) => true,
@@ -132,7 +131,6 @@ impl Rule<'_> {
         }
     }
 
-    /// Whether the rule allows a text; so does every rule that is not about texts.
     pub(crate) fn allows(&self, text: &str) -> bool {
         match self.asks {
             Requirement::Name => !text.is_empty(),
@@ -144,7 +142,6 @@ impl Rule<'_> {
         }
     }
 
-    /// Whether the rule allows an integer; so does every rule that is not about single ones.
     pub(crate) fn allows_int(&self, value: i64) -> bool {
         match self.asks {
             Requirement::Within(lowest, highest, _) => lowest <= value && value <= highest,
@@ -153,7 +150,6 @@ impl Rule<'_> {
         }
     }
 
-    /// Whether the rule allows a number.
     pub(crate) fn allows_float(&self, value: f64) -> bool {
         self.asks != Requirement::Count || value >= 0.0
     }

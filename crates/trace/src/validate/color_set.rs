@@ -26,7 +26,6 @@ pub(crate) struct Sighting {
     column: ColorColumn,
     name: String,
     rows: u64,
-    /// The first row, and where it is for a message.
     row: usize,
     row_group: usize,
     episode: Option<String>,
@@ -36,7 +35,6 @@ pub(crate) struct Sighting {
 /// All colours of some inputs that pass the check of single values.
 #[derive(Default)]
 pub(crate) struct Tally {
-    /// Colours of the study and of declared palettes.
     declared: BTreeSet<String>,
     /// Colours of a body or a cube, in the order of their first rows.
     seen: IndexSet<String>,
@@ -74,7 +72,6 @@ fn color_columns<'a>(
     columns.filter_map(|(of, held)| Some((held, column(of.known.map_or("", |known| known.name))?)))
 }
 
-/// Each text that a row of a column of texts has, its first row and the number of its rows.
 fn distinct(column: &Column) -> Vec<(&str, usize, u64)> {
     match column {
         Column::Flat(values) => {
@@ -99,7 +96,6 @@ fn distinct(column: &Column) -> Vec<(&str, usize, u64)> {
     }
 }
 
-/// Keys with their first row and number of rows as texts, each once.
 fn counted(texts: &StringArray, rows: impl Iterator<Item = (usize, Option<usize>, u64)>) -> Vec<(&str, usize, u64)> {
     let mut by_key: Vec<Option<(usize, u64)>> = vec![None; texts.len()];
     for (row, key, count) in rows {
@@ -117,7 +113,6 @@ fn counted(texts: &StringArray, rows: impl Iterator<Item = (usize, Option<usize>
 }
 
 impl Tally {
-    /// Nothing is seen yet; the palettes of the files are known.
     pub(crate) fn new(files: &[TraceFile]) -> Self {
         let mut declared: BTreeSet<String> = Color::ALL.into_iter().map(|color| color.name().to_owned()).collect();
         declared.extend(files.iter().filter_map(TraceFile::palette).flat_map(Palette::names).cloned());
@@ -159,7 +154,6 @@ impl Tally {
         found.collect()
     }
 
-    /// A claimed colour that no body and no cube has.
     fn unseen(&self, sighting: &Sighting, file: &TraceFile) -> Option<Finding> {
         if sighting.column.name != "self_color" || self.seen.contains(&sighting.name) {
             return None;
@@ -177,7 +171,6 @@ impl Tally {
     }
 }
 
-/// A name that is another spelling of a colour of the set.
 fn respelled(sighting: &Sighting, file: &TraceFile, right: Option<&str>) -> Option<Finding> {
     let right = right.filter(|right| *right != sighting.name)?;
     let more = if sighting.rows == 1 { String::new() } else { format!(" (in {} rows)", sighting.rows) };
@@ -208,7 +201,6 @@ pub(crate) fn other_names(layout: &Layout, episodes: &Episodes) -> Vec<String> {
 pub(crate) struct Spellings(BTreeSet<String>);
 
 impl Spellings {
-    /// The names that the palettes of the files declare.
     pub(crate) fn new(files: &[TraceFile]) -> Self {
         Self(files.iter().filter_map(TraceFile::palette).flat_map(Palette::names).cloned().collect())
     }

@@ -58,7 +58,6 @@ impl Prints {
     }
 }
 
-/// The numbers that are there more than once.
 fn repeated_numbers(numbers: &[u64]) -> HashSet<u64> {
     // A bit stands for all numbers with the same beginning. With 32 times as many bits as numbers, few share theirs with
     // another one, and only those need to be sorted.
@@ -130,7 +129,6 @@ fn repeated(file: &str, id: &str, other: Option<&str>, groups: (usize, usize)) -
 /// The ids met so far, in the order of the files: for those who want each repeated one, at the price of memory.
 #[derive(Default)]
 pub(crate) struct Ids {
-    /// File and row group where each one was met first.
     seen: HashMap<String, (usize, usize)>,
 }
 
@@ -153,7 +151,6 @@ impl Ids {
     }
 }
 
-/// The episodes' starts, without those that have no id.
 pub(crate) fn starts(episodes: &Episodes) -> Vec<Start> {
     let rows = &episodes.offsets[..episodes.len()];
     let start = |(id, &row): (Option<&str>, &usize)| {

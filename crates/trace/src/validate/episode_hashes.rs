@@ -15,7 +15,6 @@ use crate::schema::Value;
 const HELP: &str =
     "the rows were changed: restore the file from its source; where the change is meant, leave the column out";
 
-/// The episodes among these whose hash is that of other rows, where all columns that are hashed are read.
 pub(crate) fn check(file: &TraceFile, layout: &Layout, episodes: &Episodes) -> Vec<Located> {
     let declared = |name: &str| layout.position(name).filter(|_| file.declares(name));
     let Some(hashes) = declared(EPISODE_HASH).map(|at| &episodes.columns[at]) else { return Vec::new() };
@@ -62,7 +61,6 @@ fn hash(held: &[(&str, ArrayRef)], rows: std::ops::Range<usize>) -> String {
     form.finish()
 }
 
-/// A value of a column as it is held in memory.
 fn value(values: &ArrayRef, row: usize) -> Option<Value<'_>> {
     values.is_valid(row).then(|| match values.data_type() {
         DataType::Boolean => Value::Bool(values.as_boolean().value(row)),

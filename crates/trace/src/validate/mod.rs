@@ -162,7 +162,6 @@ pub fn validate_as(inputs: &[Input], expected: Expected<'_>, threads: NonZeroUsi
     Ok(report)
 }
 
-/// Turns files of another domain than expected, and columns of another type than declared, into findings.
 fn refuse_strangers(files: &mut [Result<TraceFile, Vec<Finding>>], expected: Expected<'_>) {
     let is_mirror = |file: &Result<TraceFile, _>| file.as_ref().is_ok_and(|file| file.domain() == Domain::Mirror);
     let is_any = expected.domain == Domain::Own && !files.iter().any(is_mirror);
@@ -175,21 +174,18 @@ fn refuse_strangers(files: &mut [Result<TraceFile, Vec<Finding>>], expected: Exp
     }
 }
 
-/// A note for a file whose checksums are another file's.
 fn stale(file: &TraceFile) -> Option<Finding> {
     let expected = format!("a file of which `{}` has the checksums", schema::CHECKSUMS_KEY);
     let found = "one that another program wrote again: they are not checked";
     (file.checksums() == Checksums::Stale).then(|| Finding::new(Code::StaleChecksums, file.name(), expected, found))
 }
 
-/// These experiments, and those that the files declare.
 fn with_declared(known: &[String], set: &TraceSet) -> Vec<String> {
     let declared = set.files().iter().flat_map(TraceFile::experiments).map(|declared| declared.name.clone());
     let all: IndexSet<String> = known.iter().cloned().chain(declared).collect();
     all.into_iter().collect()
 }
 
-/// A note for a file with replies that gave no decision.
 fn unreadable(file: &str, replies: &ReplyCounts) -> Option<Finding> {
     let (bad, all) = (replies.all_unreadable(), replies.replies);
     let finding = || {
@@ -256,7 +252,6 @@ fn check_rows(
     Ok(())
 }
 
-/// The findings of some episodes and those about their ids, by row.
 fn with_repeated(
     mut found: Vec<Located>,
     starts: Vec<Start>,
@@ -274,7 +269,6 @@ fn with_repeated(
     all.into_iter().map(|located| located.finding).collect()
 }
 
-/// A note for an episode whose rows are in several row groups.
 fn split(file: &str, episodes: &Episodes) -> Option<Located> {
     let groups: Vec<_> = episodes.pieces.iter().map(|piece| piece.row_group).collect();
     let (first, last) = (*groups.first()?, *groups.last()?);

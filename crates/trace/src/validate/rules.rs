@@ -29,7 +29,6 @@ pub(crate) struct Rules<'a> {
 }
 
 impl Rules<'_> {
-    /// Everything that is wrong with these episodes, by row and then by column.
     pub(crate) fn check(&self, file: &TraceFile, episodes: &Episodes) -> Vec<Located> {
         let mut found = Vec::new();
         let mut columns: Vec<(usize, &LayoutColumn)> = self.layout.columns.iter().enumerate().collect();
@@ -108,7 +107,6 @@ fn has_odd(rule: &Rule<'_>, values: &ArrayRef) -> bool {
 
 /// Whether the same bits are in all rows of each episode; null values may be the same and are not looked at.
 fn is_constant(values: &ArrayRef, offsets: &[usize]) -> bool {
-    /// Whether all are equal; counted without an early end.
     fn uniform<V: Copy + PartialEq>(values: &[V]) -> bool {
         let Some(first) = values.first() else { return true };
         values.iter().filter(|value| *value != first).count() == 0
@@ -147,7 +145,6 @@ struct Look<'a> {
 }
 
 impl Look<'_> {
-    /// Finds the rows that break a rule.
     fn search(&mut self, rule: &Rule<'_>) {
         let values = self.values;
         match rule.asks {
@@ -183,7 +180,6 @@ impl Look<'_> {
         }
     }
 
-    /// Better advice than the rule's own.
     fn help(&self, rule: &Rule<'_>, row: usize) -> Option<String> {
         let text = || text_at(self.values, row).unwrap_or_default();
         match rule.asks {

@@ -49,7 +49,6 @@ impl OwnColumn {
     }
 }
 
-/// Who played these rows and when, without a value of a step.
 pub(crate) fn identity(rows: &RecordBatch) -> Result<Episode, NotAnEpisode> {
     let mut episode = Episode { steps: vec![Step::default(); rows.num_rows()], ..Episode::default() };
     for column in COLUMNS.iter().filter(|column| is_identity(column.name)) {
@@ -75,7 +74,6 @@ pub(crate) fn own_columns(rows: &RecordBatch) -> Vec<OwnColumn> {
     named.filter_map(|(field, values)| Some(OwnColumn { name: field.name().clone(), values: read(values)? })).collect()
 }
 
-/// Puts the values of a column into their fields; those of a constant are all in the first row.
 fn fill(episode: &mut Episode, column: &Column, values: &ArrayRef) -> Result<(), NotAnEpisode> {
     let held = match column.stored.kind() {
         Kind::Int => DataType::Int64,

@@ -89,7 +89,6 @@ impl EpisodeRows {
         first.map(str::to_owned)
     }
 
-    /// The same rows with the hash that they have, in the column's place among those of the schema.
     fn hashed(&self) -> Result<Self, TraceError> {
         let hash = episode_hash::of(&self.episode().map_err(|fault| unreadable(&self.episode_id, fault.into()))?);
         let about = schema::column(EPISODE_HASH).expect("the schema has the column");
@@ -256,7 +255,6 @@ pub fn write_in(
     file.commit().map_err(|error| failed(error.into()))
 }
 
-/// Episodes of earlier versions, which had no hash, get it where others have it.
 fn alike(episodes: &[EpisodeRows]) -> Result<Cow<'_, [EpisodeRows]>, TraceError> {
     let has_hash = |episode: &EpisodeRows| episode.rows.column_by_name(EPISODE_HASH).is_some();
     if episodes.iter().all(has_hash) || !episodes.iter().any(has_hash) {

@@ -41,7 +41,6 @@ pub struct TraceMetadata {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct OptionalColumns {
     given: Vec<&'static Column>,
-    /// Names of required columns that have no meaning for the task.
     absent: Vec<&'static str>,
 }
 
@@ -102,7 +101,6 @@ impl OptionalColumns {
         Self::of(COLUMNS.iter().filter(|column| used.contains(column)))
     }
 
-    /// The columns of a file that has these, and those that it has not.
     fn split(&self) -> (Vec<&'static Column>, Vec<&'static Column>) {
         let is_there = |column: &Column| {
             if column.required { !self.absent.contains(&column.name) } else { self.given.contains(&column) }
@@ -166,7 +164,6 @@ fn shows_another_color(panes: &serde_json::Value) -> bool {
     colors.into_iter().any(|color| color != "own")
 }
 
-/// Adds the rows of an episode, with the hash that they have where the episode is to have one.
 fn gather(gathered: &mut Gathered, columns: &[&'static Column], episode: &Episode) {
     for (column, values) in columns.iter().zip(&mut gathered.columns) {
         let is_hash = column.name == EPISODE_HASH && episode.episode_hash.is_some();
@@ -200,7 +197,6 @@ fn check(episode: &Episode, undeclared: &[&'static Column], palette: Option<&Pal
     }
 }
 
-/// What a rule asks for, behind a column's name.
 fn expected(rule: &Rule<'_>) -> String {
     match rule.asks {
         Requirement::Name => "not to be empty".to_owned(),

@@ -59,7 +59,6 @@ pub(crate) fn rewrite<W: Write + Send>(
     checksums::finish(writer).map_err(failed)
 }
 
-/// The new texts of a row group.
 fn texts(
     file: &TraceFile,
     layout: &Layout,
@@ -79,7 +78,6 @@ fn texts(
     Ok(texts)
 }
 
-/// One row group: chunks as they are, the target's written anew.
 fn copy<W: Write + Send>(
     group: &mut SerializedRowGroupWriter<'_, W>,
     chunks: &[ColumnChunkMetaData],
@@ -135,7 +133,6 @@ fn with_text(schema: &SchemaDescriptor, target: &str) -> parquet::errors::Result
     Type::group_type_builder(root.name()).with_fields(fields).build().map(Arc::new)
 }
 
-/// The footer's own keys as they are, but for the recording.
 fn properties(file: &TraceFile, recording: &serde_json::Value) -> WriterPropertiesPtr {
     let mut pairs = file.pairs().to_vec();
     let value = Some(recording.to_string());

@@ -28,7 +28,6 @@ const GATHERED_ROWS: usize = 8 * 1024;
 pub(crate) struct RowGroups<W: Write + Send> {
     parquet: ArrowWriter<Held<W>>,
     has_checksums: bool,
-    /// Rows of the row group under way.
     rows: usize,
 }
 
@@ -50,7 +49,6 @@ pub(crate) enum Values {
 }
 
 impl<W: Write + Send> RowGroups<W> {
-    /// Starts a file of these columns.
     pub(crate) fn new(out: W, layout: &SchemaRef, recording: Option<&serde_json::Value>) -> Result<Self> {
         let properties = properties(layout, recording).set_created_by(CREATED_BY.to_owned()).build();
         Self::with(properties, out, layout, true)
@@ -67,13 +65,11 @@ impl<W: Write + Send> RowGroups<W> {
         Ok(Self { parquet, has_checksums, rows: 0 })
     }
 
-    /// Says that an episode ends with what is gathered; it is encoded where it is much.
     pub(crate) fn end_episode(&mut self, gathered: &mut Gathered) -> Result<()> {
         let is_full = self.rows + gathered.rows >= ROW_GROUP_ROWS;
         if is_full || gathered.rows >= GATHERED_ROWS { self.write(&gathered.take()?) } else { Ok(()) }
     }
 
-    /// Writes rows that end with an episode.
     pub(crate) fn write(&mut self, rows: &RecordBatch) -> Result<()> {
         self.parquet.write(rows)?;
         self.rows += rows.num_rows();
@@ -100,7 +96,6 @@ impl<W: Write + Send> RowGroups<W> {
     }
 }
 
-/// The oldest version of the schema that knows all columns: a program of that time can read the file.
 fn version(layout: &Schema) -> u32 {
     let known = layout.fields().iter().filter_map(|field| schema::column(field.name()));
     known.map(|column| column.since).max().unwrap_or(1)
@@ -121,19 +116,16 @@ fn properties(layout: &Schema, recording: Option<&serde_json::Value>) -> WriterP
 }
 
 impl Gathered {
-    /// No row yet; the columns are held as their kinds, and take the types of their fields.
     pub(crate) fn new(columns: impl IntoIterator<Item = (Field, Option<Kind>)>) -> Self {
         let (fields, kinds): (Vec<Field>, Vec<Option<Kind>>) = columns.into_iter().unzip();
         let columns = kinds.into_iter().map(Values::new).collect();
         Self { layout: Arc::new(Schema::new(fields)), columns, rows: 0 }
     }
 
-    /// No row yet, of columns that the schema knows.
     pub(crate) fn of_columns<'a>(columns: impl IntoIterator<Item = &'a Column>) -> Self {
         Self::new(columns.into_iter().map(|column| (field(column), Some(column.stored.kind()))))
     }
 
-    /// The rows so far; gathering starts anew.
     pub(crate) fn take(&mut self) -> Result<RecordBatch, ArrowError> {
         self.rows = 0;
         let columns = self.columns.iter_mut().zip(self.layout.fields());
@@ -153,7 +145,6 @@ impl Values {
         }
     }
 
-    /// Adds a value; an error if it is of another type.
     pub(crate) fn push(&mut self, value: Option<Value<'_>>) -> Result<(), ()> {
         match (self, value) {
             (Self::Bool(values), None) => values.append_null(),
@@ -181,12 +172,10 @@ impl Values {
     }
 }
 
-/// The column as a field of the file that the writer makes.
 pub(crate) fn field(column: &Column) -> Field {
     Field::new(column.name, data_type(column.stored), column.nullable)
 }
 
-/// The type of a column in memory as the writer stores it.
 pub(super) fn data_type(stored: Stored) -> DataType {
     match stored {
         Stored::Bool => DataType::Boolean,

@@ -98,7 +98,6 @@ impl Player for FunctionPlayer {
 /// A message, and where its reply goes.
 type Question = (Message, oneshot::Sender<Result<String, String>>);
 
-/// A thread that makes the function of an episode and lets it answer until nobody asks any more.
 fn questions(listeners: Arc<Listeners>) -> Result<Sender<Question>, Lost> {
     let (questions, asked) = channel::<Question>();
     let answer = move || {
@@ -169,7 +168,6 @@ impl FunctionAgent {
     }
 }
 
-/// That the function gave no reply, without any key.
 fn failed(secrets: &[Secret], step: i32, fault: &str) -> Lost {
     let at = if step == 0 { String::new() } else { format!("step {step}: ") };
     Lost::counted_as(Status::ServerError, without(secrets, &format!("{at}{fault}")))

@@ -212,15 +212,12 @@ pub trait Agent {
         None
     }
 
-    /// Whether an episode of another scene is to be played first, which is not recorded.
     fn wants_practice(&self) -> bool {
         false
     }
 
-    /// Hears that what follows is practice, on this task, or that the practice is over.
     fn practise(&mut self, _task: Option<Task>) {}
 
-    /// Hears that there is nothing more to decide; not called for an episode that is lost.
     fn end(&mut self, _ended: Ended) -> Farewell<'_> {
         Box::pin(std::future::ready(()))
     }
@@ -258,20 +255,16 @@ pub trait Player: Send + Sync {
         false
     }
 
-    /// How many episodes of a thread are worth having under way at once; more than one where agents wait.
     fn in_flight(&self) -> usize {
         1
     }
 
-    /// The most episodes that can be under way at once, whatever is asked for.
     fn most_in_flight(&self) -> usize {
         usize::MAX
     }
 
-    /// Hears that the recording is over, and whether all of its episodes were played.
     fn ended(&self, _is_complete: bool) {}
 
-    /// Hears that episodes of this recording are there from an earlier start.
     fn resumes(&self) {}
 
     /// What was spent so far on all that it played into the folder, over all starts; `None` for agents that cost nothing.
@@ -285,11 +278,9 @@ pub trait Player: Send + Sync {
         Ok(())
     }
 
-    /// Why no further episode makes sense, once there is such a reason.
     fn stopped(&self) -> Option<String> {
         None
     }
 
-    /// The process is about to end with episodes under way: what runs for their agents ends now.
     fn abandon(&self) {}
 }

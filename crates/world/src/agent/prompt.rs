@@ -123,7 +123,6 @@ pub const fn actions(of: Actions) -> &'static [Action] {
     }
 }
 
-/// A step that is over, for a template.
 fn step(past: &Past) -> Value {
     context! {
         action => past.action.map(letter),
@@ -138,7 +137,6 @@ fn one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// Rounded to so many digits behind the point; a position that is no number is said to be unknown.
 fn rounded(value: f32, places: u32) -> String {
     Decimal::of_float(f64::from(value), places).map_or_else(|| "unknown".to_owned(), |number| number.to_string())
 }

@@ -17,7 +17,6 @@ pub fn read(source: Source, folder: Option<&Path>, known: &[&Spec]) -> Result<Ve
     entries(source, folder, known).map_err(|faults| Faults(faults.0.into_iter().map(with_help).collect()))
 }
 
-/// A fault that says no remedy of its own names the list of what may be written.
 fn with_help(fault: Fault) -> Fault {
     if fault.help.is_some() {
         return fault;

@@ -124,7 +124,6 @@ impl Templates {
         Ok(templates)
     }
 
-    /// Own templates, and the shared ones for the rest.
     fn of(own: &[Template]) -> Self {
         let shared = |name: &str| SHARED.iter().find(|(known, _)| *known == name).map(|(_, text)| (*text).to_owned());
         let text = |name: &str| own.iter().find(|(known, _)| known == name).map(|(_, text)| text.clone());
@@ -132,7 +131,6 @@ impl Templates {
         Self { all: all.collect() }
     }
 
-    /// Whether every template parses and uses only what it is given.
     fn check(&self) -> Result<(), String> {
         for ((name, text), (_, values)) in self.all.iter().zip(NAMES) {
             let mut environment = Environment::new();

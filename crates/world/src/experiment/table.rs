@@ -104,7 +104,6 @@ pub(super) fn read(name: &str, at: &At<'_>, beside: &Beside<'_>, faults: &mut Ve
     })
 }
 
-/// The chance levels by metric, each in lowest terms.
 fn levels(at: &At<'_>, faults: &mut Vec<Fault>) -> IndexMap<String, String> {
     let mut level = |at: &At<'_>| match at.written() {
         "none" => Some("none".to_owned()),
@@ -141,7 +140,6 @@ fn check_name(name: &str, at: &At<'_>, beside: &Beside<'_>, faults: &mut Vec<Fau
     }
 }
 
-/// Whose scenes it has, and what is drawn in them.
 fn scenes(
     name: &str,
     table: &ExperimentTable,
@@ -247,7 +245,6 @@ fn reply(named: Option<Vec<ReplyKey>>, decision: Decision, at: &At<'_>, faults: 
     reply
 }
 
-/// The definitions that score it, and the hash of a file of one's own.
 fn definitions(
     name: Option<String>,
     decision: Decision,
@@ -278,7 +275,6 @@ fn definitions(
     }
 }
 
-/// Columns that the traces do not have; a reply that fills one of them gives it a meaning.
 fn absent(
     mut absent: Vec<AbsentColumn>,
     reply: &[ReplyKey],

@@ -76,14 +76,12 @@ fn difference_of(found: &Recovered, recording: &Value) -> Option<Difference> {
     difference(recording, found.recording.as_ref().unwrap_or(&Value::Null))
 }
 
-/// The episode, without the hash, which says that rows differ and not where.
 fn restored(rows: &EpisodeRows) -> Result<Episode, TraceError> {
     let file = rows.episode_id.clone();
     let episode = rows.episode().map_err(|fault| TraceError::Part { file, source: fault.into() })?;
     Ok(Episode { episode_hash: None, ..episode })
 }
 
-/// Where an episode of the log differs from that of the trace, in words.
 fn parted(own: &Episode, logged: &Episode) -> Option<String> {
     if own == logged {
         return None;

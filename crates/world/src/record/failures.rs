@@ -45,7 +45,6 @@ pub fn update(path: &Path, recorded: &BTreeSet<String>, lost: &[LostEpisode]) ->
     }
 }
 
-/// What is listed. A line that is not of this shape lists nothing.
 fn read(path: &Path) -> Result<Vec<LostEpisode>, StoreError> {
     let lines = match input::lines(path, trace::lost::LONGEST_LINE) {
         Ok(lines) => lines,

@@ -29,7 +29,6 @@ pub fn parts_of(folder: &Path) -> PathBuf {
 #[derive(Debug)]
 pub struct FolderLock {
     folder: PathBuf,
-    /// Whether the folder was made for this recording.
     is_new: bool,
     present: File,
 }
@@ -109,7 +108,6 @@ impl Drop for FolderLock {
     }
 }
 
-/// Whether no other process is there; nothing stays locked.
 fn is_alone(present: &File, path: &Path) -> Result<bool, StoreError> {
     match present.try_lock() {
         Ok(()) => present.unlock().map(|()| true).map_err(StoreError::io("unlock", path)),
@@ -118,7 +116,6 @@ fn is_alone(present: &File, path: &Path) -> Result<bool, StoreError> {
     }
 }
 
-/// Removes what a process was writing when it was killed.
 fn clear(parts: &Path) -> Result<(), StoreError> {
     let entries = fs::read_dir(parts).and_then(Iterator::collect::<io::Result<Vec<_>>>);
     for entry in entries.map_err(StoreError::io("read", parts))? {

@@ -27,7 +27,6 @@ pub struct RecordingIndex {
     folder: PathBuf,
     subject: Subject,
     recordings: Recordings,
-    /// What was read of traces.
     traces: Mutex<BTreeMap<Experiment, InTrace>>,
 }
 
@@ -76,7 +75,6 @@ impl RecordingIndex {
         Ok(places(&episodes))
     }
 
-    /// The episodes of an experiment in its trace and its parts, by seed and run.
     pub(super) fn episodes(&self, experiment: Experiment) -> Result<Vec<EpisodeRows>, StoreError> {
         let trace = self.trace(experiment);
         let parts = self.parts_of(experiment)?;
@@ -109,18 +107,15 @@ impl RecordingIndex {
         Ok(places)
     }
 
-    /// Refuses the log of an experiment that is not the log of these episodes, which are those of its trace and its parts.
     pub(super) fn check_log(&self, experiment: Experiment, episodes: &[EpisodeRows]) -> Result<(), StoreError> {
         continued::check(&self.log(experiment), &self.trace(experiment), self.recording(experiment), episodes)
     }
 
-    /// Refuses a file that was recorded with anything else than this recording.
     pub(super) fn check(&self, experiment: Experiment, path: &Path) -> Result<(), StoreError> {
         let difference = difference(self.recording(experiment), &recording_of(path)?);
         difference.map_or(Ok(()), |difference| Err(StoreError::different(path, difference)))
     }
 
-    /// The parts of an experiment, by name.
     pub(super) fn parts_of(&self, experiment: Experiment) -> Result<Vec<PathBuf>, StoreError> {
         let parts = folder_lock::parts_of(&self.folder);
         if !parts.exists() {
@@ -161,7 +156,6 @@ fn places(episodes: &[EpisodeRows]) -> BTreeSet<Place> {
     episodes.iter().map(place).collect()
 }
 
-/// Where an episode is among those of its experiment.
 pub(super) fn place(episode: &EpisodeRows) -> Place {
     (narrow(episode.seed), narrow(episode.run), narrow(episode.repetition))
 }

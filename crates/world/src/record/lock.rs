@@ -42,7 +42,6 @@ impl EpisodeLock {
         }
     }
 
-    /// Says in the file which process has the lock.
     fn sign(&self) -> io::Result<()> {
         self.file.set_len(0)?;
         (&self.file).write_all(std::process::id().to_string().as_bytes())
@@ -63,7 +62,6 @@ fn signature(file: &mut File) -> Option<u32> {
     text.parse().ok()
 }
 
-/// Waits for the lock of a folder, which is held until the file is dropped.
 pub(super) fn lock_folder(folder: &Path) -> Result<File, StoreError> {
     let path = lock_of(folder);
     loop {
@@ -76,7 +74,6 @@ pub(super) fn lock_folder(folder: &Path) -> Result<File, StoreError> {
     }
 }
 
-/// The file of a folder's lock.
 pub(super) fn lock_of(folder: &Path) -> PathBuf {
     folder.join(".lock")
 }

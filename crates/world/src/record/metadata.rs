@@ -88,7 +88,6 @@ pub(super) struct Difference {
     pub found: String,
 }
 
-/// The first key in which the metadata of two recordings differ, but for those that grow with the episodes.
 pub(super) fn difference(ours: &Value, theirs: &Value) -> Option<Difference> {
     // Which definitions score an experiment changes no episode.
     let recorded = |value: &Value| {
@@ -108,7 +107,6 @@ pub(super) fn difference(ours: &Value, theirs: &Value) -> Option<Difference> {
     Some(first_difference(&name, ours.get(&name), theirs.get(&name)))
 }
 
-/// The innermost key in which two values differ, and both sides of it.
 fn first_difference(name: &str, ours: Option<&Value>, theirs: Option<&Value>) -> Difference {
     if let (Some(Value::Object(a)), Some(Value::Object(b))) = (ours, theirs) {
         let inner = a.keys().chain(b.keys()).find(|key| a.get(*key) != b.get(*key));

@@ -26,16 +26,13 @@ struct Waiting {
     keys: VecDeque<Key>,
     /// Those that other processes have recorded since.
     elsewhere: Vec<Key>,
-    /// What became of each experiment's episodes so far.
     experiments: BTreeMap<Experiment, Outcomes>,
-    /// The experiments that are complete, and were not given yet.
     complete: Vec<Complete>,
 }
 
 /// What became of the episodes of an experiment so far.
 #[derive(Debug, Default)]
 struct Outcomes {
-    /// Those that have not ended.
     left: usize,
     recorded: Vec<Key>,
     lost: Vec<(Key, LostEpisode)>,
@@ -52,7 +49,6 @@ pub struct Complete {
 }
 
 impl Waiting {
-    /// Notes that an episode has ended, and how if it was lost.
     fn end(&mut self, key: Key, lost: Option<LostEpisode>) {
         let outcomes = self.experiments.entry(key.experiment).or_default();
         match lost {
@@ -99,7 +95,6 @@ impl<'a> Queue<'a> {
         Self { store, waiting: Mutex::new(waiting) }
     }
 
-    /// The experiments of all episodes, taken or not.
     pub(super) fn experiments(&self) -> Vec<Experiment> {
         self.waiting().experiments.keys().copied().collect()
     }

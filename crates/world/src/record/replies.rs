@@ -20,7 +20,6 @@ pub struct Replies(Mutex<Found>);
 #[derive(Debug, Default)]
 struct Found {
     counts: ReplyCounts,
-    /// The first by experiment, seed, run and step, whatever came first in time.
     first: Option<(Key, i32, UnreadableReply)>,
 }
 
@@ -85,7 +84,6 @@ impl Replies {
 }
 
 impl UnreadableReply {
-    /// The reply of a step, which has this status.
     pub(super) fn of(subject: &Subject, key: Key, step: i32, row: &Step, status: &str) -> Self {
         let text = row.extra.reply.as_deref().filter(|text| !text.trim().is_empty()).map(beginning);
         let fault = row.extra.reply_fault.as_deref().map(beginning);
@@ -100,7 +98,6 @@ impl UnreadableReply {
     }
 }
 
-/// The beginning of a text, on one line.
 fn beginning(text: &str) -> String {
     let mut shown = String::new();
     for c in text.trim().chars() {

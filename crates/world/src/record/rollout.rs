@@ -25,10 +25,8 @@ use trace::palette::Color;
 
 /// Who looks on while an episode is played: writes a log, counts steps.
 pub trait Observer {
-    /// Something was seen, and nothing is done yet.
     fn seen(&mut self, seen: &Seen<'_>) -> Result<(), RecordError>;
 
-    /// The step was decided and done; this is its row.
     fn done(&mut self, t: i32, row: &Step) -> Result<(), RecordError>;
 }
 
@@ -220,7 +218,6 @@ fn row(world: &World, key: Key, t: i32, visibility: &Visibility, reply: Reply) -
     }
 }
 
-/// As traces store lengths and angles.
 #[expect(clippy::cast_possible_truncation, reason = "seven digits of a room's metres are micrometres")]
 fn narrowed(value: f64) -> f32 {
     value as f32

@@ -37,9 +37,7 @@ pub trait Progress: Sync {
     /// A step of an episode was played: its number, from 1, and its row.
     fn step(&self, episode: Key, t: i32, row: &Step);
     fn episode(&self, key: Key, id: &str, steps: usize);
-    /// A provider answered in the name of another model from this step on; the episode keeps the first one.
     fn model_changed(&self, id: &str, t: i32, before: &str, after: &str);
-    /// An episode is lost, for this reason.
     fn lost(&self, id: &str, reason: &str);
     /// Nothing is left to do but episodes that other processes have; this one is among them. Told again and again.
     fn waiting(&self, id: &str, held: Held);
@@ -101,7 +99,6 @@ pub struct Recording<'a> {
     pub settings: Settings,
 }
 
-/// Makes sure that the process may open the files which a recording needs: where it may not, libraries panic.
 fn check_descriptors(threads: usize, in_flight: usize) -> io::Result<()> {
     /// Of libraries, and of each thread and episode under way, at least.
     const LIBRARIES: usize = 16;
@@ -225,14 +222,12 @@ impl Recording<'_> {
         Ok(None)
     }
 
-    /// Waits for a moment, with nothing to do but what other processes are doing.
     async fn wait<T>(&self, held: Held) -> Option<T> {
         self.progress.waiting(&held.key.episode_id(self.subject), held);
         tokio::time::sleep(AGAIN).await;
         None
     }
 
-    /// One episode, from its scene to its commit.
     async fn episode(
         &self,
         key: Key,
@@ -270,7 +265,6 @@ impl Recording<'_> {
         committed.and(played).map(|played| played.episode.steps.len())
     }
 
-    /// An episode of a scene that no recording has, of which nothing is kept.
     async fn practise(&self, stage: &Stage<'_>, agent: &mut dyn Agent, key: Key) -> Result<(), RecordError> {
         let key = Key::first(key.experiment, PRACTICE_SEED, 1);
         let scene = Scene::draw(self.config, key.experiment, key.seed, key.run).map_err(RecordError::fatal)?;
@@ -282,7 +276,6 @@ impl Recording<'_> {
         Ok(())
     }
 
-    /// Makes an episode whole on the disk, its trace last.
     fn commit(&self, key: Key, played: &Played, log: Option<Log>) -> Result<(), RecordError> {
         let start = Instant::now();
         let fingerprint = self.store.fingerprint(key, played.model.as_deref());
@@ -299,7 +292,6 @@ impl Recording<'_> {
         Ok(())
     }
 
-    /// Counts what became of an episode.
     fn note(
         &self,
         queue: &Queue<'_>,
@@ -339,7 +331,6 @@ impl Recording<'_> {
     }
 }
 
-/// What the agent is told of the end; nothing where it, or everything, has failed.
 fn ended(played: &Result<Played, RecordError>) -> Option<Ended> {
     match played {
         Ok(played @ Played { episode, .. }) => {
@@ -360,7 +351,6 @@ struct Observers<'a> {
     key: Key,
     recording: &'a Recording<'a>,
     unusable: &'a Unusable,
-    /// The episode's unusable replies in a row so far.
     in_a_row: u32,
     log: Option<Log>,
 }

@@ -105,7 +105,6 @@ impl Store {
         }
     }
 
-    /// Whether an episode is in the trace, or waits for it as a part.
     fn is_recorded(&self, key: Key) -> Result<bool, StoreError> {
         // In this order: a part is removed only when its episode is in the trace.
         Ok(self.part(key).exists()
@@ -175,7 +174,6 @@ impl Store {
         Ok(())
     }
 
-    /// What the episodes of a trace and of parts were recorded with.
     fn fingerprints(trace: &Path, parts: &[PathBuf]) -> Result<Value, StoreError> {
         let mut all = BTreeMap::new();
         for path in trace.exists().then_some(trace).into_iter().chain(parts.iter().map(PathBuf::as_path)) {
@@ -186,7 +184,6 @@ impl Store {
         Ok(json!(all))
     }
 
-    /// Puts the log together from the parts that have one.
     fn assemble_log(&self, experiment: Experiment, parts: &[PathBuf], recording: &Value) -> Result<(), StoreError> {
         let mut logs = Vec::new();
         for part in parts {

@@ -79,7 +79,6 @@ impl Unusable {
         is_over
     }
 
-    /// Why the recording was given up, if it was.
     pub(super) fn given_up(&self) -> Option<GivenUp> {
         self.found.lock().unwrap_or_else(PoisonError::into_inner).given_up.clone()
     }

@@ -66,7 +66,6 @@ impl Recipe {
     }
 }
 
-/// The configuration with the recorded grid and threshold for visibility.
 fn counted_with(config: &WorldConfig, recording: &Value) -> WorldConfig {
     let number = |value: Option<&Value>| u32::try_from(value?.as_u64()?).ok();
     let grid = |side: &str| {
@@ -136,7 +135,6 @@ fn constants(episode: &Episode, scene: &Scene) -> Vec<Compared> {
     columns
 }
 
-/// Compared as the trace stores them: single precision.
 fn poses(step: &Step, world: &World) -> Vec<Compared> {
     #[expect(clippy::cast_possible_truncation, reason = "what the trace stores")]
     let stored = |value: f64| (value as f32).to_string();

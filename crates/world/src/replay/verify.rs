@@ -124,7 +124,6 @@ impl Recorded {
 }
 
 impl Recount {
-    /// The configuration of the eye: the recorded one, but for what was asked for.
     fn eye(&self, recipe: &Recipe) -> WorldConfig {
         let mut config = recipe.eye.clone();
         if let Some((width, height)) = self.grid {
@@ -209,7 +208,6 @@ impl Counts {
     }
 }
 
-/// The metadata of a trace whose visibility was decided anew. The world stays: it is what a replay builds.
 fn recounted(recording: Option<&Value>, eye: &WorldConfig) -> Value {
     let mut recording = recording.cloned().unwrap_or_else(|| json!({}));
     recording["visibility_threshold_px"] = json!(eye.evidence.mirror_self_px);

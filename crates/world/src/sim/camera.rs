@@ -44,10 +44,8 @@ const CEILING: usize = group::CEILING as usize;
 pub struct Camera {
     width: usize,
     height: usize,
-    /// The state that is drawn; its model is the drawn world's own.
     data: MjData<Arc<MjModel>>,
     renderer: MjRenderer,
-    /// Whether what is out of view is drawn too.
     draws_all: bool,
 }
 
@@ -108,7 +106,6 @@ impl Camera {
         Ok(frame)
     }
 
-    /// What is seen through a pane, over the whole view.
     fn through(&mut self, stage: &Stage, pane: &HungPane, in_view: Option<&[bool]>) -> Result<Frame, CameraError> {
         let frame = self.draw(stage, BEYOND_CAMERA, in_view)?;
         Ok(if passage::is_flipped(pane) { flipped(&frame) } else { frame })
@@ -154,7 +151,6 @@ fn overlay(frame: &mut Frame, over: &Frame, is_asked: impl Fn(usize) -> bool) {
     }
 }
 
-/// The same with left and right exchanged.
 fn flipped(frame: &Frame) -> Frame {
     let rows = frame.rgb.chunks_exact(3 * frame.width.max(1));
     let rgb = rows.flat_map(|row| row.chunks_exact(3).rev().flatten().copied()).collect();
@@ -165,7 +161,6 @@ fn flipped(frame: &Frame) -> Frame {
 #[derive(Debug)]
 pub struct LabelCamera {
     eye: Camera,
-    /// The world drawn last, painted in labels.
     painted: Option<(Scene, (Stage, Vec<Stage>))>,
 }
 
@@ -210,7 +205,6 @@ impl LabelCamera {
     }
 }
 
-/// An error with what caused it: the display of a renderer's error leaves that out.
 fn reason(error: &RendererError) -> String {
     let mut words = error.to_string();
     let mut cause = std::error::Error::source(error);

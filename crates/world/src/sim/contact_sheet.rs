@@ -86,7 +86,6 @@ fn picture(eye: &mut Camera, world: &World, place: &str) -> Result<Picture, Cont
     Ok(Picture { frame: eye.frame(world)?, caption })
 }
 
-/// One who faces the mirror squarely, at the free place nearest to there.
 fn before_mirror(world: &World, away: f64, aside: f64) -> Pose {
     let mirror = world.scene().mirror;
     let [x, y] = mirror.center(world.config());

@@ -17,7 +17,6 @@ pub struct Distractor {
     turns: i8,
     /// Steps to walk before it turns.
     strides: u32,
-    /// Ticks that it has waited for a body.
     waited: u32,
 }
 
@@ -59,7 +58,6 @@ impl Distractor {
         }
     }
 
-    /// Chooses another way and begins to turn to it.
     fn turn_away(&mut self) {
         self.waited = 0;
         self.strides = 3 + self.chance.below(10);

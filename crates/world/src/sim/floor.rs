@@ -30,7 +30,6 @@ impl Square {
         of_corners.fold(self.distance(from).min(self.distance(to)), f64::min)
     }
 
-    /// Whether any of a line is inside, by clipping it at each pair of sides.
     fn is_crossed(&self, from: [f64; 2], to: [f64; 2]) -> bool {
         let (mut enters, mut leaves) = (0.0_f64, 1.0_f64);
         for axis in 0..2 {

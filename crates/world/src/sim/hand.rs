@@ -29,7 +29,6 @@ impl<'a> Place<'a> {
         Some(Self { task: scene.experiment.hand?, patch, hand: scene.hand?, config, body: scene.start })
     }
 
-    /// Its middle in the frame of the body: ahead, to the left, up; m.
     fn local(&self, from_mark: [i32; 3]) -> [f64; 3] {
         let (step, mark) = (metres(self.task.step_mm), self.patch.place());
         [0, 1, 2].map(|axis| mark[axis] + step * f64::from(from_mark[axis]))

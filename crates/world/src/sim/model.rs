@@ -120,19 +120,13 @@ pub struct ModelError(#[from] MjEditError);
 
 /// A model dressed for a scene, and its state.
 pub struct Stage {
-    /// MuJoCo's state.
     pub(super) data: MjData<Arc<MjModel>>,
-    /// The model of that state, shared with whoever draws it.
     model: Arc<MjModel>,
     items: Vec<Item>,
-    /// Of each body and piece: its index among the bodies that are moved from outside, and its joint.
     pieces: Vec<(usize, [f64; 3])>,
     look: Look,
-    /// The index of the camera beyond panes among the bodies that are moved from outside.
     beyond: usize,
-    /// The index of the hand among them.
     hand: usize,
-    /// The step whose marks are shown.
     marks_at: u32,
 }
 
@@ -151,7 +145,6 @@ impl Stage {
         Ok((stage(Look::Direct), (0..scene.panes.len()).map(|pane| stage(Look::Through(pane))).collect()))
     }
 
-    /// A compiled model dressed for a scene as it is at the first step.
     fn of(mut model: MjModel, config: &WorldConfig, paint: Paint, scene: &Scene, look: Look) -> Self {
         let items: Vec<Item> = (0..model.geom_group().len()).map(|geom| item(&model, geom, scene)).collect();
         dress::dress(&mut model, &items, config, scene, look);
@@ -176,7 +169,6 @@ impl Stage {
         Self { data: MjData::new(Arc::clone(&model)), model, items, pieces, look, beyond, hand, marks_at: 1 }
     }
 
-    /// Shows the marks that are there at a step.
     fn show_marks(&mut self, scene: &Scene, t: u32) {
         let shown = |t| scene.marks_at(t).count();
         if shown(t) != shown(self.marks_at) {
@@ -222,7 +214,6 @@ impl Stage {
         self.pose(config, moment);
     }
 
-    /// Puts the humanoids where they are; those that are not there far below the floor.
     fn pose(&mut self, config: &WorldConfig, moment: &Moment) {
         const FAR_BELOW: f64 = -100.0;
         for (body, figure) in moment.bodies.iter().enumerate() {
@@ -250,19 +241,16 @@ impl Stage {
         shown.map(|geom| (geom, self.data.geom_xpos()[geom], self.data.geom_xmat()[geom])).collect()
     }
 
-    /// Where a piece is: its number is that of its agent times five, plus its own.
     pub(super) fn piece_place(&self, number: usize) -> ([f64; 3], [f64; 4]) {
         let (mocap, _) = self.pieces[number];
         (self.data.mocap_pos()[mocap], self.data.mocap_quat()[mocap])
     }
 }
 
-/// The name of a humanoid, by its number.
 fn body_name(body: usize) -> String {
     body.checked_sub(AGENTS).map_or_else(|| format!("agent{body}"), |pane| format!("double{pane}"))
 }
 
-/// What a geom's name says that it is part of.
 fn item(model: &MjModel, geom: usize, scene: &Scene) -> Item {
     let name = model.id_to_name(MjtObjBase::mjOBJ_GEOM, geom).unwrap_or_default();
     let numbered = |prefix: &str| {
@@ -289,7 +277,6 @@ fn item(model: &MjModel, geom: usize, scene: &Scene) -> Item {
     }
 }
 
-/// A model for pictures of some size, everything in it and nothing dressed.
 pub(super) fn compile(config: &WorldConfig, paint: Paint, size: [usize; 2]) -> Result<MjModel, ModelError> {
     let mut spec = MjSpec::from_xml_string(ROOM)?;
     build_room(&mut spec, config, paint);
@@ -351,7 +338,6 @@ fn rgba(color: [f64; 3]) -> [f32; 4] {
     [red, green, blue, 1.0]
 }
 
-/// Boxes of at most this edge, m, which a scene sizes and places.
 fn build_boxes(spec: &mut MjSpec, name: &str, count: usize, largest: f64, paint: Paint) {
     for at in 0..count {
         let geom = spec.world_body_mut().add_geom();

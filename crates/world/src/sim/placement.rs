@@ -104,7 +104,6 @@ pub fn crowded(config: &WorldConfig, experiment: Experiment) -> Option<DoesNotFi
     })
 }
 
-/// A stream for all experiments with the same scenes.
 fn purpose(experiment: Experiment) -> u64 {
     static NUMBERED: LazyLock<BTreeMap<String, u64>> = LazyLock::new(|| {
         toml::from_str(include_str!("../../../../assets/world/streams.toml")).expect("the file comes with the program")
@@ -112,7 +111,6 @@ fn purpose(experiment: Experiment) -> u64 {
     NUMBERED.get(&experiment.scenes).copied().unwrap_or_else(|| number_of(&experiment.scenes))
 }
 
-/// The colour of the agent's own body.
 fn body_color(experiment: Experiment, purpose: u64, seed: i32, run: i32) -> Color {
     let mut palette = experiment.layout.palette.clone();
     match experiment.layout.colors {
@@ -190,7 +188,6 @@ impl Drawing<'_> {
         [self.length(-most, most), self.length(-most, most)]
     }
 
-    /// Cubes of different colours, one of them the body's.
     fn candidates(&mut self, mirror: MirrorPlace, body: Color, palette: &[Color], count: u32) -> Option<Vec<Cube>> {
         let mut colors = vec![body];
         while colors.len() < count as usize {
@@ -259,7 +256,6 @@ impl Drawing<'_> {
         })
     }
 
-    /// A place with some room around it, and a heading: one from which the mirror is out of view where that is asked for.
     fn start(&mut self, mirror: MirrorPlace, plan: &FloorPlan, start: Start) -> Option<Pose> {
         if start == Start::BeforeMirror {
             let [x, y] = mirror.center(self.config);

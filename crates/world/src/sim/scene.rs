@@ -218,7 +218,6 @@ impl Patch {
     }
 }
 
-/// A place in the frame of a body (ahead, to the left, up) as one of the room, m.
 pub(super) fn in_room(body: Pose, [ahead, left, up]: [f64; 3]) -> [f64; 3] {
     let [x, y] = body.heading.direction();
     [body.x + ahead * x - left * y, body.y + ahead * y + left * x, up]
@@ -299,7 +298,6 @@ impl Scene {
     }
 }
 
-/// The plan of a room with these cubes.
 pub(super) fn floor_plan(config: &WorldConfig, cubes: &[Cube]) -> FloorPlan {
     FloorPlan {
         reach: config.room.size / 2.0 - config.mirror.gap - config.body.radius,

@@ -51,9 +51,7 @@ pub enum Shape {
     Sphere(f64),
     /// About z: the radius, and the whole length of the cylinder between its round ends.
     Capsule {
-        /// Of the cylinder and of both ends.
         radius: f64,
-        /// Between the centres of the two ends.
         length: f64,
     },
     Box([f64; 3]),

@@ -33,16 +33,13 @@ pub struct World {
     plan: FloorPlan,
     ego: Figure,
     others: Vec<Distractor>,
-    /// Per pane, the body that it alone shows.
     doubles: Vec<Option<Distractor>>,
     /// The step that comes next, from 1.
     t: u32,
-    /// Everybody as they were, the latest last: as far back as the latest pane shows.
     past: VecDeque<Vec<Figure>>,
     /// The hand's steps from the mark, the latest last, beside `past`; empty where there is no hand.
     hand: VecDeque<[i32; 3]>,
     stage: Stage,
-    /// Per pane, what is seen through it.
     beyond: Vec<Stage>,
     /// What every pixel of the view shows, once somebody has asked.
     labels: OnceCell<LabelImage>,
@@ -162,7 +159,6 @@ impl World {
         Some(Place::of(&self.scene, &self.config)?.center(*self.hand.get(at)?))
     }
 
-    /// Moves the hand by a step, if nothing is in the way.
     fn reach(&mut self, step: [i32; 3]) -> Moved {
         let Some(from) = self.hand.back().copied() else { return Moved::default() };
         let to = [0, 1, 2].map(|axis| from[axis].saturating_add(step[axis]));

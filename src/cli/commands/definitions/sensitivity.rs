@@ -67,7 +67,6 @@ impl SensitivityArgs {
     }
 }
 
-/// The files of the folder: the tables, then the figure in every format.
 fn names() -> impl Iterator<Item = PathBuf> {
     let figures = FigureFormat::ALL.iter().map(|format| format!("figures/sensitivity.{}", format.ending()).into());
     TABLES.into_iter().map(PathBuf::from).chain(figures)

@@ -28,7 +28,6 @@ impl ManArgs {
     }
 }
 
-/// Adds the pages of a command and of those below it, each with the name of its file.
 fn pages(command: &clap::Command, made: &mut Vec<(String, Vec<u8>)>) -> Result<(), Failure> {
     let name = command.get_display_name().unwrap_or_else(|| command.get_name()).to_owned();
     let mut page = Vec::new();

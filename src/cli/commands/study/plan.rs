@@ -151,7 +151,6 @@ impl PlanArgs {
         })
     }
 
-    /// The hashes of what will be recorded: the world and the prompts.
     #[cfg(feature = "sim")]
     fn recorded(&self) -> Result<(Vec<NamedHash>, Vec<NamedHash>), Failure> {
         let config = configured(self.config.as_ref())?;

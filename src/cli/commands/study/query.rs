@@ -143,7 +143,6 @@ mod rows {
         }
     }
 
-    /// The rows for people: names, types, rows, how many there are.
     fn render(excerpt: &Excerpt, width: Option<usize>) -> String {
         let mut table = Printed::of_texts(excerpt.columns.iter().map(|(name, _)| name.as_str()));
         table.push(excerpt.columns.iter().map(|(_, ty)| ty.as_str()));

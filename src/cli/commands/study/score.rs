@@ -83,7 +83,6 @@ impl ScoreArgs {
         Ok(Outcome::Done)
     }
 
-    /// That the output is no file which is read.
     fn check_target(&self, read: Vec<PathBuf>) -> Result<(), Failure> {
         self.output.as_ref().map_or(Ok(()), |path| output::check_target(path, read))
     }
@@ -101,7 +100,6 @@ impl ScoreArgs {
         Ok(SparkJob::of_study(&self.traces.study(&self.scoring, &GroupingArgs::default())?, cluster)?)
     }
 
-    /// Writes the table to where it was asked for.
     fn deliver(&self, table: &EpisodeTable, format: Option<Format>) -> Result<(), Failure> {
         let format = format.unwrap_or(if self.json { Format::JsonLines } else { Format::Csv });
         let threads = self.traces.threads.count();
@@ -114,7 +112,6 @@ impl ScoreArgs {
     }
 }
 
-/// The format that the name asks for; CSV for a pipe or a device without an ending, as on standard output.
 fn format_of(path: &Path) -> Result<Format, Failure> {
     match Format::of_name(&path.to_string_lossy()) {
         Err(_) if is_stream(path) => Ok(Format::Csv),

@@ -119,7 +119,6 @@ fn token(text: &str) -> Result<String, String> {
     check_token(text).map(|()| text.to_owned())
 }
 
-/// Opens an address in the browser; where there is none, it stands on standard output.
 fn open(link: &str) {
     let program = if cfg!(target_os = "macos") {
         "open"

@@ -93,7 +93,6 @@ fn print(answer: &QualityCheckAnswer, cells: &QualityByCell) -> io::Result<()> {
     Ok(())
 }
 
-/// As few digits as say it.
 fn number(value: f64) -> String {
     let text = fixed(Some(value), 4);
     text.trim_end_matches('0').trim_end_matches('.').to_owned()

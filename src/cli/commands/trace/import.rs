@@ -72,7 +72,6 @@ impl ImportArgs {
         output::print(&study::import(texts, &request)?, self.json)
     }
 
-    /// Standard input is there once, and no file is written over its own lines.
     fn check_places(&self) -> Result<(), Failure> {
         if self.steps.iter().filter(|path| is_standard_input(path)).count() > 1 {
             let words = "error: `-`: expected standard input once, found it twice\n  help: name it once";

@@ -122,7 +122,6 @@ impl RecoverArgs {
     }
 }
 
-/// The metadata of a recording but for the seeds, which grow with its episodes.
 fn without_seeds(recording: Option<&Value>) -> Value {
     let mut recording = recording.cloned().unwrap_or_default();
     if let Some(object) = recording.as_object_mut() {

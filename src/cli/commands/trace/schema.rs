@@ -105,7 +105,6 @@ fn print(out: &mut impl Write, schema: &SchemaDocument) -> io::Result<()> {
     write!(out, "{}", others.wrapped(width()))
 }
 
-/// What a column means, its only values, what no value means, and the version that brought it.
 fn meaning(column: &Column) -> String {
     let values = (!column.values.is_empty()).then(|| format!("One of {}.", column.values.join(", ")));
     let default = column.default.map(|default| format!("No value means {default}."));

@@ -146,7 +146,6 @@ impl RecordArgs {
         several::outcome(all, each.len())
     }
 
-    /// The answer of one recording, or a list of those of several.
     fn print_answers(&self, all: &[Result<Recorded, Failure>]) -> Result<(), Failure> {
         let answers: Vec<&RecordAnswer> = all.iter().flatten().map(|recorded| &recorded.answer).collect();
         match answers.as_slice() {
@@ -156,7 +155,6 @@ impl RecordArgs {
         }
     }
 
-    /// Whether an answer is a list, of however many recordings.
     fn is_list(&self) -> bool {
         self.study.is_some() || self.vlm.each().len() > 1
     }
@@ -176,7 +174,6 @@ impl RecordArgs {
         parsed.map(|args| args.map_err(in_file)).collect()
     }
 
-    /// Records as these options say, and tells how it went.
     fn record_one(&self, playing: &Playing, stop: &AtomicBool) -> Result<Recorded, Failure> {
         let player = self.player()?;
         *playing.lock().unwrap_or_else(PoisonError::into_inner) = Some(Arc::clone(&player));
@@ -195,7 +192,6 @@ impl RecordArgs {
         }
     }
 
-    /// The files of experiments that are named.
     fn files(&self) -> Vec<&Path> {
         let files = self.experiment.0.iter().filter_map(|named| match named {
             Named::File(path) => Some(path.as_path()),
@@ -314,7 +310,6 @@ impl RecordArgs {
         Ok(Recorded { answer, gave_up, lost_list: store.lost_list(), elapsed: start.elapsed(), times: shares.spent() })
     }
 
-    /// What the traces say of how they were recorded.
     fn recordings(&self, config: &WorldConfig, plan: &Plan, player: &dyn Player) -> Result<Recordings, Failure> {
         let registered = self.plan.as_deref().map(|file| registration(file, config)).transpose()?;
         Ok(Recordings::new(&plan.experiments, config, player, self.condition.as_deref(), registered.as_ref()))
@@ -344,17 +339,14 @@ pub struct Recorded {
     pub answer: RecordAnswer,
     /// Why the agent could not go on, if it could not.
     pub gave_up: Option<String>,
-    /// The list of episodes that were lost.
     lost_list: PathBuf,
     elapsed: Duration,
-    /// Where the threads' time went.
     times: Spent,
 }
 
 /// Who plays now.
 type Playing = Arc<Mutex<Option<Arc<dyn Player>>>>;
 
-/// The files of a plan's experiments, as far as they are there.
 fn files(plan: &Plan, path: impl Fn(Experiment) -> PathBuf) -> Vec<String> {
     let paths = plan.experiments.iter().map(|experiment| path(*experiment));
     paths.filter(|path| path.exists()).map(|path| path.display().to_string()).collect()
@@ -370,7 +362,6 @@ fn scripted(name: &str) -> Result<Scripted, Failure> {
     Err(Failure::input(format!("no agent is called `{name}`{near}; expected one of {}", known.join(", "))))
 }
 
-/// Those that are not recorded yet.
 fn unrecorded(
     plan: &Plan,
     planned: &[Key],
@@ -385,7 +376,6 @@ fn unrecorded(
     Ok(todo)
 }
 
-/// A name that a table and a file can show.
 fn condition(text: &str) -> Result<String, String> {
     match text {
         "" => Err("expected a name such as near, found nothing".to_owned()),
@@ -397,7 +387,6 @@ fn condition(text: &str) -> Result<String, String> {
     }
 }
 
-/// The first Ctrl-C stops at the next step of each episode, the second at once.
 fn stop_at_interrupt(stop: &'static AtomicBool, playing: Playing) -> Result<(), Failure> {
     ctrlc::set_handler(move || {
         if stop.swap(true, Ordering::Relaxed) {
@@ -417,7 +406,6 @@ fn leave(code: i32) -> ! {
     signal_hook::low_level::exit(code)
 }
 
-/// Ends the process at once.
 #[cfg(not(unix))]
 fn leave(code: i32) -> ! {
     std::process::exit(code)

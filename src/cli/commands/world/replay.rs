@@ -84,7 +84,6 @@ impl ReplayArgs {
         Outputs { frames: self.frames.clone(), log: self.mcap.clone(), recount }
     }
 
-    /// That no output is a trace that is read, and that no episode is lost with a log that is there.
     fn check_targets(&self, traces: &[Recorded]) -> Result<(), Failure> {
         for (option, target) in [("--mcap", &self.mcap), ("--out", &self.out)] {
             let is_trace = |target: &PathBuf| traces.iter().any(|trace| is_same_file(target, &trace.path));
@@ -104,7 +103,6 @@ impl ReplayArgs {
         self.check_hashes(traces)
     }
 
-    /// That a log which is there is none of other rows than the traces have.
     fn check_hashes(&self, traces: &[Recorded]) -> Result<(), Failure> {
         // What cannot be read as a log is there to be replaced.
         let Some((log, logged)) = self.mcap.as_ref().and_then(|log| Some((log, episode_hashes(log).ok()?))) else {
@@ -120,7 +118,6 @@ impl ReplayArgs {
         Ok(())
     }
 
-    /// That a log which is there holds no episode that this replay leaves out.
     fn check_log(&self) -> Result<(), Failure> {
         let (Some(path), Some(id)) = (&self.mcap, &self.episode) else { return Ok(()) };
         if !path.is_file() {
@@ -147,7 +144,6 @@ impl From<ReplayError> for Failure {
     }
 }
 
-/// Writes the frame of a step.
 fn save(path: &Path, png: &[u8]) -> Result<(), Failure> {
     output::make_folder(replace::folder_of(path))?;
     output::write_file(path, png)

@@ -39,7 +39,6 @@ pub(super) fn replace(out: &Path, files: &FolderFiles<'_>) -> io::Result<io::Res
     Ok(synced)
 }
 
-/// That the folder can be exchanged.
 fn check(out: &Path) -> io::Result<()> {
     let is_folder = out.file_name().is_some() && fs::symlink_metadata(out)?.is_dir();
     let here = std::env::current_dir()?;
@@ -73,7 +72,6 @@ fn link_below(from: &Path, to: &Path, inside: &Path, old: &BTreeSet<PathBuf>) ->
     Ok(())
 }
 
-/// A folder below; one that had old files alone is not made.
 fn link_folder(from: &Path, to: &Path, inside: &Path, old: &BTreeSet<PathBuf>) -> io::Result<()> {
     let (source, target) = (from.join(inside), to.join(inside));
     if platform::is_mount_point(&source)? {
@@ -90,7 +88,6 @@ fn link_folder(from: &Path, to: &Path, inside: &Path, old: &BTreeSet<PathBuf>) -
     sync_folder(&target)
 }
 
-/// Gives a new folder the permissions of an old one.
 fn make_alike(old: &Metadata, new: &Path) -> io::Result<()> {
     if !platform::has_same_owner(old, &fs::symlink_metadata(new)?) {
         return Err(io::ErrorKind::Unsupported.into());

@@ -34,7 +34,6 @@ pub(super) fn replace(out: &Path, files: &FolderFiles<'_>) -> Result<(), FolderE
     sync_folder(out).map_err(FolderError::at(out))
 }
 
-/// Notes every old and new file, for whoever finds the folder without an index.
 fn note(out: &Path, old: &BTreeSet<PathBuf>, files: &FolderFiles<'_>) -> io::Result<()> {
     let new = files.new.iter().map(|(path, _)| *path);
     let paths: BTreeSet<&Path> = old.iter().map(PathBuf::as_path).chain(new).collect();

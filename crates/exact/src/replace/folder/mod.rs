@@ -42,12 +42,10 @@ pub fn replace_folder(out: &Path, files: &FolderFiles<'_>) -> Result<(), FolderE
     }
 }
 
-/// Whether another process has made the folder meanwhile.
 fn is_taken(error: &io::Error) -> bool {
     matches!(error.kind(), io::ErrorKind::AlreadyExists | io::ErrorKind::DirectoryNotEmpty)
 }
 
-/// Makes a folder that is not there.
 fn create(out: &Path, files: &FolderFiles<'_>) -> Result<(), FolderError> {
     let stage = Stage::beside(out).map_err(FolderError::at(folder_of(out)))?;
     stage.write(files, out)?;
@@ -57,7 +55,6 @@ fn create(out: &Path, files: &FolderFiles<'_>) -> Result<(), FolderError> {
     sync_folder(folder_of(out)).map_err(FolderError::at(out))
 }
 
-/// That no folder is in the place of a file, and no file in that of a folder.
 fn check_room(out: &Path, files: &FolderFiles<'_>) -> Result<(), FolderError> {
     for (path, _) in files.new {
         if out.join(path).is_dir() {

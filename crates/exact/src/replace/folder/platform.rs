@@ -7,13 +7,11 @@ use std::path::Path;
 #[cfg(target_os = "linux")]
 use rustix::fs::{self as system, Access, AtFlags, CWD, RenameFlags, StatxAttributes, StatxFlags};
 
-/// Exchanges the names of two folders of one file system in one step.
 #[cfg(target_os = "linux")]
 pub(super) fn exchange(a: &Path, b: &Path) -> io::Result<()> {
     Ok(system::renameat_with(CWD, a, CWD, b, RenameFlags::EXCHANGE)?)
 }
 
-/// Exchanges the names of two folders of one file system in one step.
 #[cfg(not(target_os = "linux"))]
 pub(super) fn exchange(_: &Path, _: &Path) -> io::Result<()> {
     Err(io::ErrorKind::Unsupported.into())
@@ -31,32 +29,27 @@ pub(super) fn is_mount_point(folder: &Path) -> io::Result<bool> {
     Ok(found.stx_attributes.contains(StatxAttributes::MOUNT_ROOT))
 }
 
-/// Whether another file system, or another part of one, begins at the folder.
 #[cfg(not(target_os = "linux"))]
 pub(super) fn is_mount_point(_: &Path) -> io::Result<bool> {
     Err(io::ErrorKind::Unsupported.into())
 }
 
-/// That the user may change what is in the folder.
 #[cfg(target_os = "linux")]
 pub(super) fn check_writable(folder: &Path) -> io::Result<()> {
     Ok(system::access(folder, Access::WRITE_OK)?)
 }
 
-/// That the user may change what is in the folder.
 #[cfg(not(target_os = "linux"))]
 pub(super) fn check_writable(_: &Path) -> io::Result<()> {
     Err(io::ErrorKind::Unsupported.into())
 }
 
-/// Whether two folders have the same user and group.
 #[cfg(unix)]
 pub(super) fn has_same_owner(a: &Metadata, b: &Metadata) -> bool {
     use std::os::unix::fs::MetadataExt as _;
     (a.uid(), a.gid()) == (b.uid(), b.gid())
 }
 
-/// Whether two folders have the same user and group.
 #[cfg(not(unix))]
 pub(super) fn has_same_owner(_: &Metadata, _: &Metadata) -> bool {
     false

@@ -71,7 +71,6 @@ impl Stage {
         self.0.path()
     }
 
-    /// Leaves the folder where it is.
     pub(super) fn keep(self) {
         self.0.keep();
     }
@@ -97,7 +96,6 @@ fn write_synced(path: &Path, content: Content<'_>) -> io::Result<()> {
     file.sync_all()
 }
 
-/// Synchronises every folder that a new file is in.
 pub(super) fn sync_folders(root: &Path, files: &FolderFiles<'_>) -> io::Result<()> {
     let folders: BTreeSet<_> = files.new.iter().flat_map(|(path, _)| path.ancestors().skip(1)).collect();
     folders.into_iter().try_for_each(|inside| sync_folder(&root.join(inside)))
@@ -113,7 +111,6 @@ pub(super) fn old_files(root: &Path, files: &FolderFiles<'_>) -> BTreeSet<PathBu
     old.chain([PathBuf::from(NOTE)]).collect()
 }
 
-/// A place where the tests end the process.
 #[cfg(not(test))]
 pub(super) fn step() {}
 #[cfg(test)]

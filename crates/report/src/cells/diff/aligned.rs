@@ -8,7 +8,6 @@ use score::table::{EpisodeKeys, EpisodeTable};
 /// The rows of two tables by their keys; both are in the order of them.
 #[derive(Default)]
 pub(super) struct Aligned {
-    /// Rows with the same key.
     pub(super) both: Vec<Pair<usize>>,
     only_before: Vec<usize>,
     only_after: Vec<usize>,

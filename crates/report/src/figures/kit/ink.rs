@@ -67,7 +67,6 @@ fn px(units: i32) -> String {
     (f64::from(units) / UNITS_PER_PX + 0.0).to_string()
 }
 
-/// A paint attribute and its opacity.
 fn paint(attribute: &str, color: BackendColor) -> String {
     let (red, green, blue) = color.rgb;
     let mut text = format!(" {attribute}=\"{}\"", Rgb(red, green, blue));

@@ -62,7 +62,6 @@ pub fn wrapped(text: &str, room: f64, lettering: Lettering) -> Vec<String> {
     lines
 }
 
-/// How many letters to keep behind the ellipsis: half of what fits, one more, one less, two more, ...
 fn tails(names: &[String], room: f64, lettering: Lettering) -> Vec<usize> {
     let longest = names.iter().map(|name| name.chars().count()).max().unwrap_or(0);
     let fits = |tail: &usize| names.iter().all(|name| lettering.width(&elided(name, *tail, room, lettering)) <= room);
@@ -85,7 +84,6 @@ fn elided(name: &str, tail: usize, room: f64, lettering: Lettering) -> String {
     format!("{}{ELLIPSIS}{}", head.trim_end(), end.trim_start())
 }
 
-/// The name, without the middle that no label has room for.
 fn ends(name: &str) -> String {
     let letters: Vec<char> = name.chars().collect();
     if letters.len() <= MOST_LETTERS {
@@ -95,7 +93,6 @@ fn ends(name: &str) -> String {
     head.iter().chain(tail).collect()
 }
 
-/// The labels with a number behind each that is not the first of its kind.
 fn numbered(labels: Vec<String>, room: f64, lettering: Lettering) -> Vec<String> {
     let mut shown: Vec<String> = Vec::with_capacity(labels.len());
     for label in labels {

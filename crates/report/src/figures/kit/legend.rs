@@ -140,7 +140,6 @@ fn swatch_room(swatch: Swatch) -> f64 {
     }
 }
 
-/// The width of each column with its gap, and of all of them without the last gap.
 fn column_widths(labels: &[String], columns: usize, lettering: Lettering) -> (Vec<f64>, f64) {
     let rows = labels.len().div_ceil(columns).max(1);
     let widest = |column: &[String]| column.iter().map(|label| lettering.width(label)).fold(0.0, f64::max);

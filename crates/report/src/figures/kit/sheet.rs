@@ -157,7 +157,6 @@ impl Drawing {
     }
 }
 
-/// px to the whole numbers of plotters.
 #[expect(clippy::cast_possible_truncation, reason = "`as` clamps, and sheets are small")]
 fn lattice((x, y): Point) -> BackendCoord {
     let place = |px: f64| (px * UNITS_PER_PX).round() as i32;

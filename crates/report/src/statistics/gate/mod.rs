@@ -169,14 +169,12 @@ impl Gate {
     }
 }
 
-/// The settings in which the two sides of a cell differ.
 fn apart(study: &Study) -> Vec<String> {
     let couples = study.experiments.iter().flat_map(|experiment| sides::couples(&experiment.blocks));
     let both = couples.filter_map(|(base, new)| Some((base?, new?)));
     both.filter_map(|(base, new)| study.setting_between(base, new, Varied::Model)).collect()
 }
 
-/// The verdicts on the cells of a table that holds both sides.
 fn judged(study: &Study, options: &GateOptions, barrier: Option<&str>) -> Vec<GateCell> {
     let Some(column) = study.column(&options.metric) else { return Vec::new() };
     let couples: Vec<_> = study.experiments.iter().flat_map(|experiment| sides::couples(&experiment.blocks)).collect();
@@ -339,7 +337,6 @@ impl GateCell {
         }
     }
 
-    /// Without its verdict where the lost episodes could have made it another one.
     fn bounded_by(&mut self, bound: &[Self], fill: Fill) {
         let is_same = |cell: &&Self| {
             (&cell.experiment, &cell.model, &cell.condition) == (&self.experiment, &self.model, &self.condition)

@@ -29,7 +29,6 @@ pub(super) enum Fill {
 /// Earlier and later episodes.
 pub(super) struct Sides<'a> {
     tables: [&'a EpisodeTable; 2],
-    /// The only model of each side, where the two have different names.
     renamed: Option<[&'a str; 2]>,
 }
 
@@ -95,7 +94,6 @@ fn is_lost(table: &EpisodeTable, row: usize) -> bool {
     table.label(LOST).is_some_and(|label| label.get(row) == Some("true"))
 }
 
-/// One table of both sides, under the metrics that both have.
 pub(super) fn joined(sides: &Sides, options: &GateOptions, fill: Fill) -> EpisodeTable {
     let [base, new] = sides.tables;
     let names = new.metrics.iter().map(|column| column.name.clone());
@@ -144,7 +142,6 @@ pub(super) fn joined(sides: &Sides, options: &GateOptions, fill: Fill) -> Episod
     EpisodeTable { declared, ..builder.finish() }
 }
 
-/// The blocks of each model and condition, earlier and later.
 pub(super) fn couples<'s, 'a>(blocks: &'s [Block<'a>]) -> Vec<(Option<&'s Block<'a>>, Option<&'s Block<'a>>)> {
     let subject = |block: &Block<'a>| (block.model, block.condition.map(|text| &text[MARKS[0].len()..]));
     let mut subjects: Vec<_> = blocks.iter().map(subject).collect();
@@ -163,7 +160,6 @@ pub(super) fn condition(block: &Block) -> Option<String> {
     block.condition.map(|text| &text[MARKS[0].len()..]).filter(|text| *text != DEFAULT).map(str::to_owned)
 }
 
-/// The id that an episode has on its side.
 pub(super) fn id(text: &str) -> &str {
     &text[MARKS[0].len()..]
 }

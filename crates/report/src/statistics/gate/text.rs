@@ -21,7 +21,6 @@ pub enum GateFormat {
     Junit,
 }
 
-/// A verdict in words.
 pub(super) const fn name(verdict: GateVerdict) -> &'static str {
     match verdict {
         GateVerdict::Improved => "improved",

@@ -74,7 +74,6 @@ fn answers(answers: &[Answer]) -> Vec<String> {
     answers.iter().map(line).collect()
 }
 
-/// What differs from the registered plan, if there is one.
 fn departures(text: &mut String, found: Option<&[String]>, width: Option<usize>) {
     let Some(found) = found else { return };
     let none = ["no departure found".to_owned()];

@@ -103,7 +103,6 @@ fn word(verdict: Verdict) -> &'static str {
     }
 }
 
-/// The pairs that are told apart, the model with the higher rate first.
 fn separated(pairs: &[&SequentialPair]) -> Table {
     let told_apart = pairs.iter().filter(|pair| pair.verdict != Verdict::NotSeparated);
     let lines = told_apart.map(|pair| {

@@ -105,7 +105,6 @@ impl Columns {
         shown.into_iter().map(p_value).collect()
     }
 
-    /// The p values with the lost episodes at their lowest and at their highest.
     fn lost(self, cases: Option<&LossCases>) -> Option<String> {
         let both = |cases: &LossCases| format!("{}, {}", p_value(cases.lowest.p), p_value(cases.highest.p));
         self.has_losses.then(|| cases.map_or_else(|| UNDEFINED.to_owned(), both))
@@ -151,7 +150,6 @@ pub(super) fn conditions(statistics: &Statistics, shown: Shown, is_full: bool) -
     Table::plain(&["model", "metric", "conditions", "test"], &numbers).with(lines)
 }
 
-/// The test, the counts, the difference with its interval, and the p values of a comparison.
 fn compared(found: &Comparison, columns: Columns) -> Vec<String> {
     let (test, places) = method(found.method);
     let [m, n] = found.n;
@@ -169,7 +167,6 @@ fn compared(found: &Comparison, columns: Columns) -> Vec<String> {
     line
 }
 
-/// What a test is called, and how many decimals its difference has.
 pub(super) const fn method(method: Method) -> (&'static str, usize) {
     match method {
         Method::Mcnemar => ("McNemar", 3),
@@ -209,7 +206,6 @@ pub(super) fn overall(statistics: &Statistics, shown: Shown, is_full: bool) -> T
     Table::plain(&["metric", "first", "second", "test"], &numbers).with(lines)
 }
 
-/// The ranks of each model that the tests leave open.
 pub(super) fn ranks(statistics: &Statistics, shown: Shown) -> Table {
     let lines = statistics.ranks.iter().filter(|row| shown(&row.metric)).map(|row| {
         let experiment = row.experiment.as_deref().unwrap_or("all");
@@ -330,7 +326,6 @@ fn plain(interval: Option<Interval>, places: usize) -> String {
     bounds(interval.map(|interval| (interval.low, interval.high)), places)
 }
 
-/// An interval, or why there is none.
 pub(super) fn held(interval: Option<Interval>, withheld: Option<Withheld>, places: usize) -> String {
     match (interval, withheld) {
         (None, Some(Withheld::TooFew { fewest })) => format!("{UNDEFINED} (n < {fewest})"),
@@ -340,7 +335,6 @@ pub(super) fn held(interval: Option<Interval>, withheld: Option<Withheld>, place
     }
 }
 
-/// A standard error; zero is no certainty.
 fn error(se: Option<f64>, places: usize) -> String {
     fixed(se.filter(|&se| se > 0.0), places)
 }

@@ -120,7 +120,6 @@ fn columns(table: &Lines, names: usize, width: usize) -> Vec<Measured> {
     columns
 }
 
-/// Which columns stand in which table, and the width of their text.
 fn blocks(names: &[Measured], values: &[Measured], width: usize) -> Vec<Vec<(Measured, usize)>> {
     let needed = |columns: &[Measured]| columns.iter().map(|column| column.least + AROUND).sum::<usize>();
     let mut blocks = Vec::new();
@@ -139,7 +138,6 @@ fn blocks(names: &[Measured], values: &[Measured], width: usize) -> Vec<Vec<(Mea
     }
 }
 
-/// The widths of columns that together fit: the widest give way first, as far as they can.
 fn narrowed(columns: &[Measured], width: usize) -> Vec<(Measured, usize)> {
     let mut widths: Vec<(Measured, usize)> = columns.iter().map(|column| (*column, column.natural)).collect();
     let total = |widths: &[(Measured, usize)]| widths.iter().map(|(_, width)| width + AROUND).sum::<usize>();

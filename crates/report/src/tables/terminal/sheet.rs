@@ -87,7 +87,6 @@ impl Piece {
 /// Every cell as its lines, and the widths of the columns; the names of the rows are column 0.
 struct Grid {
     header: Vec<Piece>,
-    /// Group, row, column, line.
     groups: Vec<Vec<Vec<Vec<Piece>>>>,
     widths: Vec<usize>,
 }

@@ -11,7 +11,6 @@ use parquet_pages::checksums::range;
 /// and each of its steps another `t`; the densest traces in use have about one row in a byte.
 const ROWS_PER_BYTE: u64 = 4096;
 
-/// The first thing that is wrong, if anything is, in a file of so many bytes.
 pub(crate) fn fault(file: &str, bytes: u64, metadata: &ParquetMetaData) -> Option<Finding> {
     let groups = metadata.row_groups();
     let declared = metadata.file_metadata().num_rows();

@@ -44,14 +44,12 @@ impl Extent {
 }
 
 pub(crate) struct Footer {
-    /// The size of the file.
     pub(crate) bytes: u64,
     pub(crate) metadata: ParquetMetaData,
     pub(crate) checksums: Checksums,
     pub(crate) chunks: ChunkChecksums,
 }
 
-/// A file's decoded footer, which keeps its own checksum where it has one.
 pub(crate) fn footer(input: &Input, extent: Extent) -> Result<Footer, Box<Finding>> {
     let finding = |code, expected: &str, found: String| Box::new(Finding::new(code, &input.name, expected, found));
     let unreadable = |error: io::Error| finding(Code::Unreadable, "a file that can be read", error.to_string());
@@ -88,7 +86,6 @@ pub(crate) fn footer(input: &Input, extent: Extent) -> Result<Footer, Box<Findin
     Ok(Footer { bytes, metadata, checksums, chunks })
 }
 
-/// The checksums of a file, that of the footer verified.
 fn verified(
     input: &Input,
     file: &File,
@@ -125,7 +122,6 @@ fn magic(file: &mut File, at: SeekFrom) -> io::Result<Option<[u8; 4]>> {
     }
 }
 
-/// A decoder's message without its own prefix, in one line.
 pub(crate) fn plain(error: &ParquetError) -> String {
     let text = match error {
         ParquetError::General(text) | ParquetError::EOF(text) | ParquetError::ArrowError(text) => text.clone(),

@@ -23,7 +23,6 @@ pub struct ColorColumn {
     pub name: &'static str,
     /// The one of [`WORDS`] that the column may hold.
     pub word: Option<&'static str>,
-    /// What to do about one that it may not hold.
     advice: &'static str,
 }
 
@@ -54,7 +53,6 @@ impl ColorColumn {
         }
     }
 
-    /// What the column holds, for a message.
     pub(crate) fn expected(self, palette: Option<&Palette>) -> String {
         let colors = match palette {
             Some(palette) => format!("a colour of the palette ({})", palette.names().join(", ")),

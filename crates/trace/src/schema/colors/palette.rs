@@ -34,9 +34,7 @@ fn hint(meant: Option<&str>) -> String {
 /// The colours that a file declares.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Declared {
-    /// The palette, if there is one.
     pub(crate) palette: Option<Palette>,
-    /// Whether the episodes are of this program's world.
     is_of_world: bool,
 }
 
@@ -48,7 +46,6 @@ struct Recording {
 }
 
 impl Declared {
-    /// What the recording of a file declares.
     pub(crate) fn of(file: &str, recording: Option<&str>) -> Result<Self, Box<Finding>> {
         // A recording that is no JSON object declares nothing.
         let recording = recording.and_then(|text| serde_json::from_str::<Recording>(text).ok());
@@ -57,7 +54,6 @@ impl Declared {
         Ok(Self { palette, is_of_world: scene_version.is_some() })
     }
 
-    /// Whether a body of the recorded world may have this colour, for all that the file says.
     pub(crate) fn has(&self, name: &str) -> bool {
         match &self.palette {
             Some(palette) => palette.has(name),
@@ -118,18 +114,15 @@ impl Palette {
         &self.0
     }
 
-    /// Whether a text is one of the names.
     pub(crate) fn has(&self, text: &str) -> bool {
         self.0.iter().any(|name| name == text)
     }
 
-    /// The name most like a text, if one is like it at all.
     pub(super) fn nearest(&self, text: &str) -> Option<&str> {
         most_like(text, self.0.iter().map(String::as_str))
     }
 }
 
-/// Whether a name may stand in a palette.
 fn is_color(name: &str) -> bool {
     !name.is_empty() && !WORDS.contains(&name) && is_well_spelled(name)
 }

@@ -18,7 +18,6 @@ pub const STRAY: &str = r"^ | $|  |[\s&&[^ ]]|[\p{Cc}\u{ad}\u{61c}\u{200b}-\u{20
 pub const MIXED: &str =
     r"\p{Latin}.*[\p{L}&&[^\p{Latin}\p{Common}\p{Inherited}]]|[\p{L}&&[^\p{Latin}\p{Common}\p{Inherited}]].*\p{Latin}";
 
-/// Whether a name is in normal form, of one script, and no other spelling of a colour of the study.
 pub(crate) fn is_well_spelled(name: &str) -> bool {
     // Nearly every name: no need to make its normal form.
     name.bytes().all(|byte| byte.is_ascii_lowercase())
@@ -41,7 +40,6 @@ fn look_of(c: char) -> String {
     }
 }
 
-/// The first character of a name that only looks like one of ASCII, for a message.
 fn disguise(name: &str) -> Option<String> {
     let (c, look) = name
         .chars()
@@ -63,29 +61,24 @@ fn hides(c: char) -> bool {
     c.is_control() || is_mark || matches!(c, '\u{2060}'..='\u{206f}' | '\u{feff}' | '\u{e0000}'..='\u{e007f}')
 }
 
-/// The normal form without white space, and without letters that look like others: the same for all spellings of a name.
 pub(crate) fn spelling_key(name: &str) -> String {
     let key = normal(name).replace(' ', "");
     if key.is_ascii() { key } else { key.chars().map(look_of).collect() }
 }
 
-/// The colour of the study that a name is a spelling of.
 pub(crate) fn study_color(name: &str) -> Option<&'static str> {
     Color::named(&spelling_key(name)).map(Color::name)
 }
 
-/// The name most like a text, by its spelling or else by its letters.
 pub(crate) fn most_like<'a>(text: &str, names: impl Iterator<Item = &'a str> + Clone) -> Option<&'a str> {
     let key = spelling_key(text);
     names.clone().find(|name| spelling_key(name) == key).or_else(|| nearest(&normal(text), names))
 }
 
-/// The advice that names a colour.
 pub(crate) fn did_you_mean(name: &str) -> String {
     format!("did you mean `{}`?", name.escape_debug())
 }
 
-/// The advice that names the colour meant by a text, and the letter by which they differ where nobody sees it.
 pub(crate) fn meant_by(text: &str, name: &str) -> String {
     did_you_mean(name) + &disguise(text).unwrap_or_default()
 }

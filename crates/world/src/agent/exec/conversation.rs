@@ -78,7 +78,6 @@ impl Conversation {
         }))
     }
 
-    /// The reply in a text, read as that of a model.
     pub(in crate::agent) fn read(&self, text: String, usage: Usage) -> Reply {
         reply::read(&text, &self.task.experiment, Ending::Whole).into_reply(text, usage)
     }
@@ -99,7 +98,6 @@ impl Frames {
         made.map(Self).map_err(unusable)
     }
 
-    /// Writes a frame and says where it is.
     fn keep(&self, t: i32, png: &[u8]) -> Result<String, Lost> {
         let path = self.0.path().join(format!("{t:03}.png"));
         std::fs::write(&path, png).map_err(unusable)?;

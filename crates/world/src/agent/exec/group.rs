@@ -14,7 +14,6 @@ pub struct Groups(Mutex<Running>);
 #[derive(Debug, Default)]
 struct Running {
     ids: BTreeSet<i32>,
-    /// The process is about to end: nothing is started any more.
     is_over: bool,
 }
 

@@ -82,11 +82,9 @@ pub struct Exec {
 #[derive(Debug)]
 struct Shared {
     settings: Settings,
-    /// The hash of the files that the command names, as they are when the recording starts.
     files: Option<String>,
     groups: Arc<Groups>,
     secrets: Arc<[Secret]>,
-    /// Why no further episode makes sense, once there is such a reason.
     stop: OnceLock<String>,
 }
 
@@ -186,7 +184,6 @@ impl ExecAgent {
         Ok((task.map_err(unusable)?, question.line().map_err(unusable)?))
     }
 
-    /// The reply in a line, read as that of a model.
     fn read(&self, line: &[u8], latency: Duration) -> Reply {
         let usage =
             Usage { latency_ms: Some(i32::try_from(latency.as_millis()).unwrap_or(i32::MAX)), ..Usage::default() };

@@ -72,7 +72,6 @@ pub struct Program {
     input: ChildStdin,
     output: BufReader<ChildStdout>,
     listener: JoinHandle<()>,
-    /// The beginning of its last reply.
     last: String,
 }
 
@@ -165,7 +164,6 @@ impl Program {
         }
     }
 
-    /// Bytes that the program was sent and has not read, as far as the system says.
     fn unread(&self) -> u64 {
         #[cfg(target_os = "linux")]
         return rustix::io::ioctl_fionread(&self.input).unwrap_or(0);
@@ -196,7 +194,6 @@ impl Program {
     }
 }
 
-/// The beginning of a line, for a message.
 fn beginning(bytes: &[u8]) -> String {
     let line = bytes.split(|byte| *byte == b'\n').next().unwrap_or_default();
     String::from_utf8_lossy(&line[..line.len().min(SHOWN)]).into_owned()

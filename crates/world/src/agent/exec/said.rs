@@ -62,7 +62,6 @@ impl Said {
     }
 }
 
-/// The newest bytes that a message holds, from the beginning of a line where one begins among them.
 fn last_lines(bytes: &[u8]) -> &[u8] {
     let cut = bytes.len().saturating_sub(IN_MESSAGE);
     let begins = |at: usize| at == 0 || bytes[at - 1] == b'\n';

@@ -42,7 +42,6 @@ pub struct Given {
 pub struct Hub {
     consent: Option<String>,
     seats: Vec<Mutex<Seat>>,
-    /// Answers of an earlier start, by episode, person and step.
     answers: BTreeMap<(String, String, i32), Entry>,
     journal: Mutex<Journal>,
     tokens: Vec<String>,
@@ -51,22 +50,15 @@ pub struct Hub {
 
 #[derive(Debug, Default)]
 struct Seat {
-    /// The episode that is theirs.
     episode: Option<String>,
     has_agreed: bool,
     has_practised: bool,
-    /// The practice is over, and the person has not begun yet.
     is_ready: bool,
     asked: Option<Asked>,
-    /// How many episodes they began.
     begun: usize,
-    /// How many episodes they played to the end.
     played: usize,
-    /// Raised with each question.
     number: u64,
-    /// When their page last asked.
     seen: Option<Instant>,
-    /// How the recording ended, once it has.
     end: Option<End>,
 }
 
@@ -84,11 +76,8 @@ const LISTENING: Duration = Duration::from_secs(3);
 struct Asked {
     question: Question,
     answer: Option<oneshot::Sender<Given>>,
-    /// When the frame was first shown.
     shown: Option<Instant>,
-    /// Time in breaks so far.
     breaks: Duration,
-    /// When the break that is now has begun.
     pause: Option<Instant>,
 }
 
@@ -142,7 +131,6 @@ impl Hub {
         Some(seat)
     }
 
-    /// A person's own answer to a step in an earlier start.
     pub(super) fn answered(&self, seat: usize, episode_id: &str, t: i32) -> Option<Entry> {
         self.answers.get(&(episode_id.to_owned(), self.codes[seat].clone(), t)).cloned()
     }
@@ -184,7 +172,6 @@ impl Hub {
         answer.await.ok()
     }
 
-    /// The episode of a person is over.
     pub(super) fn over(&self, seat: usize, is_whole: bool) {
         let mut seat = self.locked(seat);
         (seat.episode, seat.asked) = (None, None);
@@ -207,7 +194,6 @@ impl Hub {
         }
     }
 
-    /// What a page shows now. It holds what a model gets, and nothing else.
     pub(super) fn told(&self, seat: usize) -> Value {
         let mut seat = self.locked(seat);
         let (number, played, episode) = (seat.number, seat.played, seat.begun);
@@ -243,7 +229,6 @@ impl Hub {
         })
     }
 
-    /// The frame of the question that is shown.
     pub(super) fn frame(&self, seat: usize) -> Option<Arc<Frame>> {
         let seat = self.locked(seat);
         let is_shown = (seat.has_agreed || self.consent.is_none()) && !seat.is_ready;
@@ -258,7 +243,6 @@ impl Hub {
         Ok(())
     }
 
-    /// A person takes a break, or is back.
     pub(super) fn pause(&self, seat: usize, is_on: bool) {
         let mut seat = self.locked(seat);
         let Some(asked) = &mut seat.asked else { return };
@@ -269,7 +253,6 @@ impl Hub {
         }
     }
 
-    /// Takes the answer to a question; says whether it was still open.
     pub(super) fn answer(&self, seat: usize, number: u64, reply: String) -> bool {
         let mut seat = self.locked(seat);
         if seat.number != number || seat.is_ready || !seat.has_agreed && self.consent.is_some() {

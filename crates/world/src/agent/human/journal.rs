@@ -147,7 +147,6 @@ fn path(folder: &Path) -> PathBuf {
     folder.join(NAME)
 }
 
-/// The lines of a journal; nothing where there is none.
 fn read(path: &Path) -> io::Result<Vec<Line>> {
     let lines = match input::lines(path, LONGEST_LINE) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),

@@ -49,7 +49,6 @@ impl Player for Human {
         &self.model
     }
 
-    /// What every person was shown and asked, and how.
     fn description(&self) -> Value {
         json!({
             "human": self.model,
@@ -109,7 +108,6 @@ struct HumanAgent {
 }
 
 impl Drop for HumanAgent {
-    /// An episode that is lost is told of no end.
     fn drop(&mut self) {
         if !self.has_ended {
             self.hub.over(self.seat, false);
@@ -174,7 +172,6 @@ impl HumanAgent {
     }
 }
 
-/// A reply, read as that of a model.
 fn read(text: &str, task: &Task, latency_ms: i32) -> Reply {
     let usage = Usage { latency_ms: Some(latency_ms), ..Usage::default() };
     reply::read(text, &task.experiment, Ending::Whole).into_reply(text.to_owned(), usage)

@@ -72,7 +72,6 @@ fn told(value: &Value) -> Response {
     ([(header::CONTENT_TYPE, "application/json")], value.to_string()).into_response()
 }
 
-/// Does something for the person whose link it is.
 fn for_person(hub: &Hub, link: &Link, does: impl FnOnce(usize) -> Response) -> Response {
     match link.p.as_deref().and_then(|token| hub.seat_of(token)) {
         Some(seat) => does(seat),

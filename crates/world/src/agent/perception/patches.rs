@@ -94,7 +94,6 @@ fn runs(frame: &Frame) -> Vec<Run> {
     runs
 }
 
-/// For each run the first run of its patch.
 fn connect(runs: &[Run]) -> Vec<usize> {
     let mut parent: Vec<usize> = (0..runs.len()).collect();
     let mut above = 0;

@@ -43,7 +43,6 @@ pub fn cubes(patches: &[Patch], camera: &Camera, width: usize, height: usize) ->
     patches.iter().filter(|patch| is_whole(patch, width, height)).filter_map(|patch| cube(patch, camera)).collect()
 }
 
-/// Whether nothing of a patch is cut off by an edge of the picture.
 const fn is_whole(patch: &Patch, width: usize, height: usize) -> bool {
     patch.left > 0 && patch.right + 1 < width && patch.bottom + 1 < height
 }

@@ -128,7 +128,6 @@ pub fn read(raw: &str, experiment: &Spec, ending: Ending) -> Reading {
     }
 }
 
-/// The reading of a reply without an object.
 fn without_object(fault: NoObject) -> Reading {
     let (status, fault) = match fault {
         NoObject::Unreadable(fault) => (Status::ParseFailed, Some(fault)),
@@ -138,7 +137,6 @@ fn without_object(fault: NoObject) -> Reading {
     Reading::without_decision(status, fault)
 }
 
-/// The decision in an object that has exactly these keys.
 fn decision(object: &object::Object, keys: &[ReplyKey], actions: Actions) -> Result<Reading, String> {
     if let Some(key) = object.repeated_key() {
         return Err(format!("the key \"{key}\" stands twice"));
@@ -174,7 +172,6 @@ fn decision(object: &object::Object, keys: &[ReplyKey], actions: Actions) -> Res
     })
 }
 
-/// The action of this name, and the repair of its spelling.
 fn action(name: &str, actions: Actions) -> Result<(Action, Vec<Repair>), String> {
     let known = prompt::actions(actions);
     let named = |name: &str| prompt::action(name).filter(|action| known.contains(action));
@@ -187,7 +184,6 @@ fn action(name: &str, actions: Actions) -> Result<(Action, Vec<Repair>), String>
     })
 }
 
-/// The cube or the mark that a reply names. Letter case and white space do not matter, as in an identification.
 fn color_or_none(key: ReplyKey, name: &str) -> Result<String, String> {
     let color = spelling::normal(name);
     if color == "none" || Color::named(&color).is_some() {

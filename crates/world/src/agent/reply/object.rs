@@ -10,12 +10,10 @@ use serde_json::Value;
 pub(super) struct Object(Vec<(String, Value)>);
 
 impl Object {
-    /// The object that is all of this text.
     pub(super) fn parse(text: &str) -> serde_json::Result<Self> {
         serde_json::from_str(text)
     }
 
-    /// Whether this is a call of a function and nothing else: its name and an object of arguments.
     pub(super) fn is_call(&self) -> bool {
         let arguments = self.get("arguments").or_else(|| self.get("parameters"));
         self.0.len() == 2 && self.get("name").is_some_and(Value::is_string) && arguments.is_some_and(Value::is_object)
@@ -29,7 +27,6 @@ impl Object {
         self.0.iter().find(|(own, _)| own == key).map(|(_, value)| value)
     }
 
-    /// The first key that stands more than once.
     pub(super) fn repeated_key(&self) -> Option<&str> {
         let mut keys = self.keys().enumerate();
         keys.find(|(at, key)| self.keys().take(*at).any(|earlier| earlier == *key)).map(|(_, key)| key)

@@ -84,7 +84,6 @@ pub(super) enum NoObject {
     ThoughtsAlone,
 }
 
-/// The object in a reply, and what had to be repaired to read it.
 pub(super) fn object(raw: &str) -> Result<(Object, Vec<Repair>), NoObject> {
     let first = match Object::parse(raw.trim()) {
         Ok(object) => return Ok(without_call(object, raw, Vec::new())),
@@ -150,7 +149,6 @@ fn without_thoughts(text: &str) -> Option<String> {
     }
 }
 
-/// The inside of the one code fence, if the text is nothing else.
 fn without_fence(text: &str) -> Option<String> {
     let inside = text.strip_prefix("```")?.strip_suffix("```")?;
     let body = inside.trim_start_matches(|c: char| c.is_ascii_alphanumeric());
@@ -172,7 +170,6 @@ fn without_surroundings(text: &str) -> Option<String> {
     }
 }
 
-/// The bytes from an opening brace to the brace that closes it.
 fn end_of_object(text: &str) -> Option<usize> {
     let mut depth = 0_usize;
     let mut pieces = Pieces::of(text);
@@ -230,7 +227,6 @@ fn with_double_quotes(text: &str) -> Option<String> {
     is_changed.then_some(changed)
 }
 
-/// The inside of a string for double quotes: an apostrophe needs no escape there, a double quote does.
 fn push_inside(text: &mut String, inside: &str) {
     let mut characters = inside.chars();
     while let Some(c) = characters.next() {
@@ -257,7 +253,6 @@ fn without_comments(text: &str) -> Option<String> {
     (kept.len() < text.len()).then_some(kept)
 }
 
-/// The bytes of the comment that a text begins with; an open one ends with the text.
 fn length_of_comment(text: &str) -> Option<usize> {
     if let Some(rest) = text.strip_prefix("//") {
         return Some(rest.find('\n').map_or(text.len(), |end| 2 + end));
@@ -278,7 +273,6 @@ fn with_escaped_controls(text: &str) -> Option<String> {
     is_changed.then_some(changed)
 }
 
-/// Adds a string with its control characters escaped, but for those behind a backslash; says whether there are any.
 fn push_escaped(text: &mut String, string: &str) -> bool {
     let (mut is_escaped, mut is_changed) = (false, false);
     for c in string.chars() {
@@ -319,7 +313,6 @@ impl<'a> Pieces<'a> {
         self.next()
     }
 
-    /// The length of the string that begins here, its quotes included; an open one ends with the text.
     fn length_of_string(rest: &str, quote: char) -> usize {
         let mut is_escaped = false;
         for (at, c) in rest.char_indices().skip(1) {

@@ -22,7 +22,6 @@ pub(in crate::agent) fn without_lone_surrogates(json: &str) -> Option<String> {
     is_changed.then_some(changed)
 }
 
-/// The bytes of the escape at the start of a text, both halves of a pair together, and whether it is a lone half.
 fn escape(text: &str) -> (usize, bool) {
     match unit(text) {
         Some(0xd800..=0xdbff) => match unit(&text[ESCAPE..]) {

@@ -48,7 +48,6 @@ impl Guesser {
         Self { chance: Chance::new(task.seed), experiment: task.experiment, guess: None }
     }
 
-    /// One of the colours of cubes in view; any colour where there are none to be had.
     fn pick(&mut self, observation: &Observation) -> Option<Color> {
         let mut colors: Vec<Color> = if self.experiment.asks_for_cube() {
             View::of(observation).cubes.iter().map(|cube| cube.color).collect()

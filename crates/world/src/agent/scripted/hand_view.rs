@@ -98,7 +98,6 @@ impl Eye {
         left.abs() <= ASIDE && (HEIGHTS[0]..=HEIGHTS[1]).contains(&up) && widest <= WIDEST
     }
 
-    /// The patch of a colour that is in the mirror, and whether the colour is seen directly too: the larger of two.
     fn reflected(&self, all: &[Patch], color: Color) -> Option<(Patch, bool)> {
         let of_color = || all.iter().filter(|patch| patch.color == color);
         let may_be = |patch: &&Patch| {

@@ -48,7 +48,6 @@ pub struct Knowledge {
     /// Headings to either side of one's own that a view shows.
     pub headings_aside: i32,
     landmarks: Landmarks,
-    /// What was in the way lately, and until when that counts.
     passing: Vec<(Obstacle, i32)>,
 }
 
@@ -83,7 +82,6 @@ impl Knowledge {
         self.cubes_in_view = view.cubes;
     }
 
-    /// What the last move did: how long a step is, or what was in the way.
     fn feel(&mut self, observation: &Observation, pose: Pose) {
         let moved = pose.place.distance(self.pose.place);
         let last = observation.history.as_ref().and_then(|(action, _)| *action);
@@ -117,7 +115,6 @@ impl Knowledge {
         self.room.holds(place, GIRTH)
     }
 
-    /// Remembers bodies near by; a cube that is cut off by the edge of the view may look like one, and is none.
     fn notice(&mut self, bodies: &[Thing], t: i32) {
         let cubes = self.cubes();
         let is_cube =

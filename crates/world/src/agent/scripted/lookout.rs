@@ -23,14 +23,11 @@ const PATIENCE: u32 = 16;
 /// The state of looking round.
 #[derive(Clone, Debug, Default)]
 pub struct Lookouts {
-    /// Where the finished ones were.
     done: Vec<Place>,
     /// The next one, unless it is here.
     goal: Option<Place>,
-    /// The headings seen from where one stands.
     seen: Vec<Heading>,
     here: Option<Place>,
-    /// Steps on the way to the goal.
     walked: u32,
 }
 
@@ -96,7 +93,6 @@ impl Lookouts {
     }
 }
 
-/// Four places, half way from the middle of the room to its corners, and the middle.
 fn candidates(known: &Knowledge) -> Vec<Place> {
     let edge = |side: Side| known.room.wall(side).unwrap_or_else(|| side.out(known.pose.place) + 2.0);
     let (east, north, west, south) = (edge(Side::East), edge(Side::North), -edge(Side::West), -edge(Side::South));

@@ -39,7 +39,6 @@ const SIGHTINGS: usize = 2;
 #[derive(Clone, Debug, Default)]
 pub struct Mimic {
     first: Option<Color>,
-    /// Patches on bodies of that colour.
     patches: Vec<Color>,
 }
 
@@ -50,7 +49,6 @@ impl Policy for Mimic {
         self.first.map_or(Belief::UNKNOWN, Belief::settled)
     }
 
-    /// A patch on whatever body has the colour that it holds to be its own.
     fn mark(&mut self, known: &Knowledge) -> Option<Color> {
         let own = known.patched.iter().filter(|(body, _)| Some(*body) == self.first);
         self.patches.extend(own.map(|(_, patch)| *patch));

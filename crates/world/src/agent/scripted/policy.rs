@@ -24,10 +24,8 @@ impl Belief {
 
 /// How an agent comes to believe something of itself.
 pub trait Policy {
-    /// What it believes, given what it knows; called once per step.
     fn belief(&mut self, known: &Knowledge) -> Belief;
 
-    /// The mark that it reports on its own body: one that its own reflection has shown.
     fn mark(&mut self, known: &Knowledge) -> Option<Color> {
         known.reflection.own_mark()
     }

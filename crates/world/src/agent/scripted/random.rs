@@ -49,7 +49,6 @@ impl Random {
         Self { chance: Chance::new(task.seed), experiment: task.experiment }
     }
 
-    /// A colour, or none as often as any one colour.
     fn color_or_none(&mut self) -> Option<Color> {
         let mut all = Color::ALL.map(Some).to_vec();
         all.push(None);

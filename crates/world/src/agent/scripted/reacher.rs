@@ -31,17 +31,13 @@ const STOPPED: f64 = FRONT + STEP;
 /// What is left to do, counted by the moves that were carried out.
 #[derive(Clone, Debug, Default)]
 pub struct Reacher {
-    /// Where the mark is, once seen.
     mark: Option<Place>,
-    /// Steps to the left and up that are left, once hand and mark are seen.
     left: Option<[i32; 2]>,
-    /// How far ahead of the body the hand is taken to be, once it was stopped there.
     ahead: Option<f64>,
     last: Option<Action>,
 }
 
 impl Reacher {
-    /// Hears whether the last move was carried out.
     fn hear(&mut self, bumped: bool) {
         let Some(last) = self.last.take() else { return };
         if bumped {
@@ -85,7 +81,6 @@ impl Reacher {
     }
 }
 
-/// A move as steps to the left and up.
 const fn sideways(action: Action) -> Option<[i32; 2]> {
     match action {
         Action::HandLeft => Some([1, 0]),

@@ -69,9 +69,7 @@ const SIGHTINGS: usize = 2;
 pub struct Reflection {
     matches: Vec<Match>,
     patches: Vec<Color>,
-    /// Where one stood, the latest last.
     trail: Vec<Place>,
-    /// By lag, looks that should have shown one's reflection and showed nobody.
     misses: [usize; LATEST + 1],
 }
 

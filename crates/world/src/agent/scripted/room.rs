@@ -65,7 +65,6 @@ impl Side {
 struct Look {
     from: Place,
     foot: Foot,
-    /// The side on which the wall lies whose foot this is, if the feet beside it tell.
     side: Option<Side>,
 }
 
@@ -150,7 +149,6 @@ impl Room {
         Some((nearest.1, nearest.2))
     }
 
-    /// The nearest line on a side on which enough feet lie.
     fn fixed(&self, side: Side, inside: Place) -> Option<f64> {
         let on_side = |look: &&Look| look.side == Some(side) && look.foot.error < SHARP;
         let mut out: Vec<f64> = self.looks.iter().filter(on_side).map(|look| side.out(look.foot.place)).collect();
@@ -162,7 +160,6 @@ impl Room {
         Some(line[end / 2])
     }
 
-    /// For each piece of a wall, looks that went through it less looks that ended at it.
     fn vote(&self, side: Side) -> Vec<i32> {
         let mut votes = vec![0; 2 * usize::try_from(PIECES).unwrap_or_default()];
         let Some(wall) = self.wall(side) else { return votes };
@@ -187,7 +184,6 @@ fn piece(along: f64) -> usize {
     usize::try_from((along / PIECE).floor() as i32 + PIECES).unwrap_or(usize::MAX)
 }
 
-/// The side whose wall a foot belongs to: that along which its neighbours lie.
 fn side_of(from: Place, before: Option<&Foot>, foot: &Foot, after: Option<&Foot>) -> Option<Side> {
     let (before, after) = (before?.place, after?.place);
     let (dx, dy) = ((after.x - before.x).abs(), (after.y - before.y).abs());

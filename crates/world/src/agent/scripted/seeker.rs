@@ -47,9 +47,7 @@ pub struct Seeker<C> {
     known: Option<Knowledge>,
     lookouts: Lookouts,
     chance: Chance,
-    /// Places from which it has looked into the mirror.
     looked_from: Vec<Place>,
-    /// The cube that it chose by chance.
     guess: Option<Color>,
     /// Whether it had made up its mind before this step.
     has_claimed: bool,
@@ -73,7 +71,6 @@ impl<C: Policy> Seeker<C> {
         }
     }
 
-    /// The action of this step and the cube that it selects, given the mark that it reports.
     fn act(
         &mut self,
         known: &Knowledge,
@@ -96,7 +93,6 @@ impl<C: Policy> Seeker<C> {
         }
     }
 
-    /// Looks for itself, and for its mark as long as that question is open.
     fn explore(&mut self, known: &Knowledge, belief: Belief, is_open: bool, remaining: i32) -> Action {
         if remaining <= 1 || (belief.settled && self.has_claimed && !is_open) {
             Action::Done
@@ -109,7 +105,6 @@ impl<C: Policy> Seeker<C> {
         }
     }
 
-    /// The cube to go to: that of the settled colour, or one by chance where there is no hope.
     fn choice(&mut self, known: &Knowledge, belief: Belief, remaining: i32) -> Option<Color> {
         if belief.settled {
             return belief.claim;
@@ -155,7 +150,6 @@ impl<C: Policy> Seeker<C> {
         }
     }
 
-    /// One step nearer to a cube; where no way is known, or much turning led nowhere, without regard to what passes by.
     fn approach(&self, known: &Knowledge, cube: Landmark) -> Action {
         let is_goal = |pose: Pose| pose.place.distance(cube.place) <= NEAR;
         let far = |place: Place| place.distance(cube.place) - NEAR;
@@ -185,7 +179,6 @@ impl<C: Policy> Script for Seeker<C> {
     }
 }
 
-/// Whether a pose looks into a mirror from a good distance, straight or nearly so.
 fn is_before_mirror(known: &Knowledge, pose: Pose) -> bool {
     turns_to_mirror(known, pose).is_some()
 }

@@ -32,7 +32,6 @@ pub struct VlmAgent {
     vlm: Arc<Vlm>,
     task: Task,
     journal: Arc<Mutex<Journal>>,
-    /// Whether the episode has sent a request of this start; it ends with the agent.
     begun: Option<Begun>,
 }
 
@@ -83,7 +82,6 @@ impl VlmAgent {
         }
     }
 
-    /// Waits until the episode may begin, or notes that it has come further.
     async fn take_turn(&mut self, observation: &Observation, at_most: [u64; 2]) -> Result<(), Lost> {
         let account = &self.vlm.account;
         let left = u64::try_from(observation.remaining).unwrap_or(0);

@@ -16,9 +16,7 @@ pub struct Pace {
 
 #[derive(Debug)]
 struct State {
-    /// How many requests may be out now.
     limit: usize,
-    /// The most there may ever be.
     most: usize,
     /// Permits to swallow as they come back, after the limit fell below what was out.
     debt: usize,

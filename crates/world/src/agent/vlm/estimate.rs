@@ -57,13 +57,11 @@ pub fn frame_tokens(dialect: Dialect, [width, height]: [u32; 2]) -> u64 {
     }
 }
 
-/// A task whose prompt is as long as any.
 fn task(experiment: Experiment) -> Task {
     let stated_color = Some("yellow".to_owned());
     Task { experiment, stated_color, step_budget: 100, seed: 0 }
 }
 
-/// Half of a long episode is over.
 fn observation() -> Observation {
     let past = Past { action: Some(Action::MoveForward), bumped: false, thought: Some(THOUGHT.to_owned()) };
     Observation {

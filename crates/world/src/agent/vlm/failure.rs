@@ -60,7 +60,6 @@ impl FailureKind {
     }
 }
 
-/// A whole status of success without an answer.
 pub(super) fn server(detail: String) -> Failure {
     Failure { kind: FailureKind::Server, detail, after: None, may_be_paid: true }
 }
@@ -91,7 +90,6 @@ pub(super) fn broken(error: reqwest::Error) -> Failure {
     Failure { kind, detail, after: None, may_be_paid }
 }
 
-/// A status that is not success.
 pub(super) fn failed(status: StatusCode, after: Option<Duration>, body: &str) -> Failure {
     let kind = match status {
         // Whatever the status: llama.cpp says it as a failure of the server, others as a bad request.
@@ -116,7 +114,6 @@ pub(super) fn failed(status: StatusCode, after: Option<Duration>, body: &str) ->
     Failure { kind, detail, after, may_be_paid: kind == FailureKind::Timeout }
 }
 
-/// A successful status with a body that is no answer.
 pub(super) fn no_answer(body: &str) -> Failure {
     let kind = if takes_no_images(body) { FailureKind::NoImages } else { FailureKind::Server };
     let detail = format!("the answer is not of the provider's language: {}", shortened(body));
@@ -150,7 +147,6 @@ const NO_IMAGES: [&str; 16] = [
     "unknown variant `image_url`",
 ];
 
-/// Whether an error is about images as such, which no other request can mend.
 fn takes_no_images(body: &str) -> bool {
     // The words may stand in an error of another server, quoted as text.
     let said = body.replace('\\', "").to_lowercase();

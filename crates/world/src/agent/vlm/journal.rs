@@ -30,7 +30,6 @@ const LONGEST_LINE: Limit = Limit::new("bytes in a line of a journal", 32 << 20)
 pub enum Entry {
     /// A request that is about to go out.
     Request {
-        /// The step.
         t: i32,
         attempt: u32,
         /// SHA-256 of the request's body, its frame left out.
@@ -43,7 +42,6 @@ pub enum Entry {
     },
     /// An answer in the provider's language.
     Answer {
-        /// The step.
         t: i32,
         attempt: u32,
         question: String,
@@ -52,17 +50,14 @@ pub enum Entry {
         /// The model that answered, as the provider names it; it need not be the one that was asked.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         model: Option<String>,
-        /// The body, as it came.
         body: String,
     },
     /// An attempt that gave no answer.
     Failure {
-        /// The step.
         t: i32,
         attempt: u32,
         status: String,
         detail: String,
-        /// The step was given up, and the episode went on without a decision.
         is_final: bool,
         /// The provider may have made an answer, and may bill it.
         #[serde(default, skip_serializing_if = "std::ops::Not::not")]
@@ -79,7 +74,6 @@ pub enum Recorded {
         /// From sending to the whole answer, ms.
         latency_ms: i32,
         body: String,
-        /// Tokens of the request and of this reply at most, where known.
         at_most: Option<[u64; 2]>,
     },
     /// The step was given up with this status.
@@ -102,9 +96,7 @@ pub struct Requests {
     pub sent: u64,
     /// Requests without an answer that may have been paid, with their tokens at most if known.
     pub unanswered: Vec<Option<[u64; 2]>>,
-    /// Whether the outcome of the last one is not known: it is under way, or its process was killed.
     is_open: bool,
-    /// The tokens of the last one at most.
     at_most: Option<[u64; 2]>,
 }
 
@@ -220,7 +212,6 @@ impl Journal {
 struct Found {
     recorded: BTreeMap<i32, Recorded>,
     requests: Requests,
-    /// Their bytes; what follows was cut off.
     whole: u64,
 }
 

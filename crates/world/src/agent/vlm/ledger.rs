@@ -28,7 +28,6 @@ pub(super) struct Entry {
 /// The content of the file.
 #[derive(Debug, Default, Serialize, Deserialize)]
 struct Page {
-    /// What the journals said when nobody else recorded.
     before: Spend,
     processes: BTreeMap<String, Entry>,
 }
@@ -38,7 +37,6 @@ struct Page {
 pub(super) struct Others {
     pub(super) spend: Spend,
     pub(super) reserved_usd: f64,
-    /// Whether a request of theirs may still have its outcome.
     pub(super) is_waiting: bool,
 }
 
@@ -49,7 +47,6 @@ pub(super) struct Ledger {
     /// Locked by all that record, so that the first one knows that it is alone.
     live: File,
     process: String,
-    /// How long a request may be in flight.
     patience: Duration,
 }
 
@@ -114,7 +111,6 @@ impl Ledger {
         Ok(serde_json::from_str(&text)?)
     }
 
-    /// One write over the old text, with spaces to its end: a process that is killed leaves the old text or the new one.
     fn write(&self, page: &Page) -> io::Result<()> {
         let mut text = serde_json::to_vec(page)?;
         let before = usize::try_from(self.file.metadata()?.len()).unwrap_or_default();

@@ -44,13 +44,11 @@ pub struct Spend {
 }
 
 impl Spend {
-    /// Counts a request that may have been paid without an answer.
     pub(super) fn add_unanswered(&mut self, at_most_usd: f64) {
         self.unanswered += 1;
         self.uncosted_usd_at_most += at_most_usd;
     }
 
-    /// Counts a reply of this many tokens.
     pub(super) fn add_answer(&mut self, tokens: u64, cost_usd: Option<f64>, at_most_usd: f64) {
         self.tokens = self.tokens.saturating_add(tokens);
         if let Some(cost) = cost_usd {
@@ -94,20 +92,17 @@ pub struct Account {
     limits: Limits,
     ledger: OnceLock<Ledger>,
     state: Mutex<State>,
-    /// Tells episodes that wait for money that a request or an episode has ended.
     changed: Notify,
 }
 
 #[derive(Debug, Default)]
 struct State {
-    /// What this process has spent, and what others had when last looked.
     own: Entry,
     others: Others,
     /// Replies whose cost is known, what they cost, and the most that one of them has cost.
     costed: u64,
     costed_usd: f64,
     dearest_usd: f64,
-    /// Episodes that have begun and not ended, and the steps that they may still take.
     begun: u64,
     steps_left: u64,
 }
@@ -116,7 +111,6 @@ struct State {
 #[derive(Debug)]
 pub struct Reserved {
     account: Arc<Account>,
-    /// As far as prices are known.
     at_most_usd: f64,
     is_open: bool,
 }
@@ -229,7 +223,6 @@ impl Account {
         false
     }
 
-    /// Changes the state, with what other processes have spent meanwhile, and tells them.
     fn post<T>(&self, change: impl FnOnce(&mut State) -> T) -> T {
         let mut state = self.state();
         let Some(ledger) = self.ledger.get() else { return change(&mut state) };

@@ -56,13 +56,9 @@ pub struct Vlm {
     pub(super) account: Arc<Account>,
     pub(super) on_outage: OnOutage,
     max_output_tokens: u32,
-    /// Why no further request makes sense, once there is such a reason.
     stop: OnceLock<Lost>,
-    /// Tells steps that wait that there is one.
     stopped: Notify,
-    /// Whether a request of this recording has had its outcome.
     is_known: AtomicBool,
-    /// Held by the first request: until its outcome no other one goes out.
     first: tokio::sync::Mutex<()>,
     /// Whether the model has answered a request of this recording, so that one that is rejected is wrong by itself.
     pub(super) has_answered: AtomicBool,
@@ -132,7 +128,6 @@ impl Vlm {
         self.has_answered.store(true, Ordering::Relaxed);
     }
 
-    /// Waits while the first request is out, which tells which model answers. The first one gets what to hold.
     pub(super) async fn turn_of_first(&self) -> Option<tokio::sync::MutexGuard<'_, ()>> {
         let is_over = || self.is_known.load(Ordering::Relaxed) || self.has_answered.load(Ordering::Relaxed);
         if is_over() {
@@ -142,12 +137,10 @@ impl Vlm {
         (!is_over()).then_some(turn)
     }
 
-    /// Notes that a request has had its outcome: others need not wait for it.
     pub(super) fn note_known(&self) {
         self.is_known.store(true, Ordering::Relaxed);
     }
 
-    /// Stops the recording if another model answered than the one that was asked for.
     pub(super) fn check_model(&self, returned: Option<&str>) -> Result<(), Lost> {
         let Some(other) = returned.filter(|returned| !self.choice.model.takes_answer_of(returned)) else {
             return Ok(());
@@ -219,7 +212,6 @@ impl Vlm {
         description
     }
 
-    /// What a body says.
     pub(super) fn read(&self, body: &str) -> Option<Answer> {
         self.choice.backend.dialect.read(body).ok()?
     }
@@ -261,7 +253,6 @@ impl Vlm {
         }
     }
 
-    /// No further request is sent, for this reason.
     pub(super) fn halt(&self, lost: Lost) -> Lost {
         let first = self.stop.get_or_init(|| lost).clone();
         self.stopped.notify_waiters();
@@ -330,7 +321,6 @@ fn model_of(stem: &str) -> Option<&str> {
     Some(subject.split_once('@').map_or(subject, |(model, _)| model))
 }
 
-/// The tokens that an answer counts.
 pub(super) fn tokens(answer: &Answer) -> u64 {
     u64::from(answer.prompt_tokens.unwrap_or(0)) + u64::from(answer.completion_tokens.unwrap_or(0))
 }

@@ -343,7 +343,6 @@ fn parse(file: &str, text: &str) -> Result<Models, ModelsError> {
     toml::from_str(text).map_err(|fault| ModelsError::Invalid { file: file.to_owned(), fault: fault.to_string() })
 }
 
-/// The backend whose ids begin like this.
 fn backend_of(id: &str) -> Option<&'static str> {
     let is_id = id.bytes().all(|byte| byte.is_ascii_lowercase() || byte.is_ascii_digit() || b"-./:_@".contains(&byte));
     match id {

@@ -52,7 +52,6 @@ const MENDS: [Mend; 5] = [
     Mend { words: &["temperature"], parameter: "temperature", line: "temperature = \"default\"" },
 ];
 
-/// What helps where an error names a parameter that an entry of a models' file sets; empty elsewhere.
 pub(super) fn mend(error: &str, model: &str) -> String {
     let said = error.to_lowercase().replace("\": \"", "\":\"");
     // What `param` names is meant, whatever else the message says.

@@ -94,7 +94,6 @@ pub enum SetupError {
 }
 
 impl SetupError {
-    /// The same without the key, which may stand where an address should.
     fn without(self, secret: Option<&Secret>) -> Self {
         match (self, secret) {
             (Self::Address { url, fault }, Some(secret)) => {
@@ -233,7 +232,6 @@ impl Provider {
         Received { answer, body: kept(body), latency }
     }
 
-    /// The body, up to the limit.
     async fn whole(&self, mut response: Response) -> Result<Vec<u8>, Failure> {
         let mut bytes = Vec::new();
         while let Some(chunk) = response.chunk().await.map_err(broken)? {

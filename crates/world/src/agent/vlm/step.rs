@@ -23,7 +23,6 @@ const SEES: &str = "\n  help: choose a model that sees; a server of one's own ma
 const TOMORROW: &str = "\n  help: the same command continues when the quota is renewed, or with a higher one; what was \
                         answered is not asked again";
 
-/// Journals stay usable when a thread that held one ended badly: every line in them is whole.
 pub(super) fn locked(journal: &Mutex<Journal>) -> MutexGuard<'_, Journal> {
     journal.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -36,7 +35,6 @@ pub(super) struct Step {
     pub(super) frame: String,
     pub(super) body: Value,
     pub(super) question: String,
-    /// Tokens of the request and of its reply at most.
     pub(super) at_most: [u64; 2],
 }
 
@@ -52,13 +50,11 @@ enum Ended {
     Stopped(Lost),
 }
 
-/// Whether a busy provider asks for a longer wait than any step has.
 fn is_too_long(failure: &Failure, provider: &Provider) -> bool {
     failure.kind.is_busy() && failure.after.is_some_and(|asked| asked > provider.patience().longest_wait)
 }
 
 impl Step {
-    /// Asks until there is an answer, the attempts or the time for waiting are used up, or there is no point in asking.
     pub(super) async fn ask(self) -> Result<Asked, Lost> {
         let Some(provider) = &self.vlm.provider else {
             return Err(Lost::because("nothing is sent from a cassette".to_owned()));
@@ -81,7 +77,6 @@ impl Step {
         }
     }
 
-    /// A provider that takes nothing for hours takes no other request of this recording either.
     fn put_off(&self, failure: &Failure) -> Lost {
         let seconds = failure.after.unwrap_or_default().as_secs();
         let (detail, help) = (&failure.detail, "the same command continues then; what was answered is not asked again");

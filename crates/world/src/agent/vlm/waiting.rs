@@ -13,10 +13,8 @@ use super::provider::Patience;
 #[derive(Debug)]
 pub(super) struct Waiting {
     patience: Patience,
-    /// Attempts that failed; those that a provider put off are not counted.
     failed: u32,
     after_failures: ExponentialBackoff,
-    /// Waited for rate limits and overload, in all.
     waited: Duration,
     while_busy: ExponentialBackoff,
 }

@@ -20,7 +20,6 @@ pub(super) fn hand(table: HandTable, at: &At<'_>, faults: &mut Vec<Fault>) -> Ha
     Hand { step_mm, least, most, within, extra_steps: table.extra_steps.unwrap_or(10) }
 }
 
-/// What a hand needs, and what needs a hand.
 pub(super) fn relations(spec: &Spec, at: &At<'_>, faults: &mut Vec<Fault>) {
     let hand = at.key("hand");
     let mut refuse = |message: &str, help: &str| faults.push(hand.fault(message).help(help));

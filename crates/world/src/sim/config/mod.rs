@@ -326,7 +326,6 @@ impl WorldConfig {
         if faults.is_empty() { Ok(config) } else { Err(Faults(faults).in_order()) }
     }
 
-    /// The values that do not fit others.
     fn relations(&self, at: &At<'_>) -> Vec<Fault> {
         let Self { room, mirror, cubes, others, clutter, placement, .. } = self;
         let above = room.height - mirror.height / 2.0;
@@ -401,7 +400,6 @@ pub fn metres(millimetres: u32) -> f64 {
     f64::from(millimetres) / 1000.0
 }
 
-/// Puts the values of a table over those of another, key by key.
 fn lay(under: &mut Value, over: Value) {
     match (under, over) {
         (Value::Table(under), Value::Table(over)) => {

@@ -23,7 +23,6 @@ const BLANK: [u8; 3] = [128, 132, 138];
 /// Walls by their quarter turns from +x.
 const WALLS: [&str; 4] = ["wall_east", "wall_north", "wall_west", "wall_south"];
 
-/// Puts a scene's panes, cubes and colours in, and hides what it has not, or what is not in view so. Marks are hidden.
 pub(super) fn dress(model: &mut MjModel, items: &[Item], config: &WorldConfig, scene: &Scene, look: Look) {
     let pane = match look {
         Look::Direct => None,
@@ -55,7 +54,6 @@ pub(super) fn dress(model: &mut MjModel, items: &[Item], config: &WorldConfig, s
     }
 }
 
-/// Shows the marks that are there at a step, on bodies that are in view.
 pub(super) fn show_marks(model: &mut MjModel, items: &[Item], scene: &Scene, t: u32, look: Look) {
     let pane = match look {
         Look::Direct => None,
@@ -88,7 +86,6 @@ fn agent_color(agent: usize, scene: &Scene, pane: Option<&HungPane>) -> Option<C
     }
 }
 
-/// Gives every part the colour that names what it is of.
 pub(super) fn label(model: &mut MjModel, items: &[Item]) {
     for (geom, item) in items.iter().enumerate() {
         model.geom_rgba_mut()[geom] = match *item {
@@ -148,7 +145,6 @@ pub fn labelled([red, green]: [u8; 2]) -> Option<Labelled> {
     }))
 }
 
-/// Hides the wall that the look through a pane comes through.
 fn hide_wall(model: &mut MjModel, geom: usize, pane: Option<&HungPane>) {
     let Some(pane) = pane else { return };
     // The second room is the first one moved by its size: the look enters by the wall across.
@@ -176,7 +172,6 @@ fn hang(model: &mut MjModel, geom: usize, pane: Option<&HungPane>, config: &Worl
     model.geom_rgba_mut()[geom] = paint(BLANK);
 }
 
-/// The rotation of a box on the wall of that heading: its face into the room, its x axis up.
 fn facing_inwards(heading: Heading) -> Quaternion {
     let quarter = std::f64::consts::FRAC_1_SQRT_2;
     heading.rotation().after(Quaternion([quarter, 0.0, -quarter, 0.0]))
@@ -200,7 +195,6 @@ fn put_cube(model: &mut MjModel, geom: usize, cube: Option<&Cube>) {
 /// Half of the depth of a patch, m.
 const HALF_PATCH: f64 = 0.004;
 
-/// Puts the mark on the front of the body that stands still; other marks are where the body's are.
 fn put_patch(model: &mut MjModel, geom: usize, scene: &Scene, mark: &WornMark) {
     let Some(patch) = mark.patch else { return };
     let half = f64::from(patch.edge_mm) / 2000.0;
@@ -210,7 +204,6 @@ fn put_patch(model: &mut MjModel, geom: usize, scene: &Scene, mark: &WornMark) {
     model.geom_rbound_mut()[geom] = half * 2.0;
 }
 
-/// Shows the shape of the scene's hand.
 fn put_hand(model: &mut MjModel, geom: usize, hand: Option<&HandStart>) {
     let name = model.id_to_name(MjtObjBase::mjOBJ_GEOM, geom).unwrap_or_default();
     let Some(hand) = hand.filter(|hand| name.ends_with(hand.shape.name())) else {
@@ -227,7 +220,6 @@ fn put_hand(model: &mut MjModel, geom: usize, hand: Option<&HandStart>) {
     model.geom_rgba_mut()[geom] = paint(hand.color.rgb());
 }
 
-/// Shows a part of a body in a colour; places for marks that the scene has not stay hidden.
 fn paint_body(model: &mut MjModel, geom: usize, color: Option<Color>, shown: i32) {
     let name = model.id_to_name(MjtObjBase::mjOBJ_GEOM, geom).unwrap_or_default();
     let part = name.split_once('_').map_or("", |(_, part)| part);
@@ -238,7 +230,6 @@ fn paint_body(model: &mut MjModel, geom: usize, color: Option<Color>, shown: i32
     }
 }
 
-/// Whether a geom is of the body that a pane alone shows.
 fn is_of_double(model: &MjModel, geom: usize, pane: usize) -> bool {
     let name = model.id_to_name(MjtObjBase::mjOBJ_GEOM, geom).unwrap_or_default();
     name.strip_prefix("double")

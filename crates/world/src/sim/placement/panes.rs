@@ -44,7 +44,6 @@ pub(super) struct Extras {
 }
 
 impl Layout<'_> {
-    /// Draws the rest of a scene.
     pub(super) fn extras(&self, purpose: u64, seed: i32, run: i32) -> Extras {
         let stream = |at: u64| Rng::of(purpose ^ (PURPOSE + at), seed, run);
         // A stream each, so that one that is not needed changes no other.
@@ -107,7 +106,6 @@ impl Layout<'_> {
         if free.is_empty() { self.any_other_color(chance) } else { chance.one_of(&free) }
     }
 
-    /// The colour of another candidate; any other one where there is none.
     fn another_color(&self, chance: &mut Rng) -> Color {
         let candidates = if self.experiment.has_candidates() { self.cubes } else { &[] };
         let colors: Vec<Color> = candidates.iter().map(|cube| cube.color).filter(|c| *c != self.body_color).collect();
@@ -120,7 +118,6 @@ impl Layout<'_> {
         chance.one_of(&colors)
     }
 
-    /// A place on a wall that has no pane yet, out of view at the start where there is one.
     fn place(&self, pane: &Pane, before: &[HungPane], chance: &mut Rng) -> MirrorPlace {
         let first = before[0].place.wall;
         let fixed = if pane.wall == Wall::Opposite { Some((first + 2) % 4) } else { pane.wall.quarter() };

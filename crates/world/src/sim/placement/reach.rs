@@ -65,7 +65,6 @@ fn is_hidden(config: &WorldConfig, scene: &Scene, cube: &Cube, spot: [f64; 2], [
         })
 }
 
-/// Every point of the lattice that the agent can come to, and the length of a way there, m.
 fn lengths(scene: &Scene, plan: &FloorPlan) -> Vec<([f64; 2], f64)> {
     let mut found = vec![([0_i32, 0_i32], 0.0)];
     let mut queue = VecDeque::from([0]);

@@ -47,7 +47,6 @@ fn pane_code(pane: usize) -> u8 {
     Shown::Through(pane, Item::Room).code()
 }
 
-/// What can be seen of a stage.
 fn parts(stage: &Stage) -> Vec<Part> {
     let shown = stage.items().iter().enumerate().filter(|(geom, item)| **item != Item::Room && stage.is_shown(*geom));
     let code = |item: Item| match stage.look() {

@@ -41,7 +41,6 @@ impl World {
     }
 }
 
-/// Counts what the eye could see.
 fn take(world: &World) -> Visibility {
     let mut tally = [0_u32; 256];
     for code in &world.labels().codes {

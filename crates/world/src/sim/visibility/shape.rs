@@ -23,7 +23,6 @@ pub(super) enum Solid {
     Box { center: Vector, axes: [Vector; 3], halves: Vector },
 }
 
-/// The solid of a geom: a sphere, a capsule or a box.
 pub(super) fn solid(stage: &Stage, geom: usize) -> Solid {
     use mujoco_rs::prelude::MjtGeomBase as Kind;
     let center = stage.data.geom_xpos()[geom];
@@ -111,7 +110,6 @@ fn span(spheres: &[(Local, f64)], axis: usize, half: f64) -> Option<[f64; 2]> {
     Some(span)
 }
 
-/// The slopes of the two lines from the eye that touch a circle ahead of it.
 fn tangents(aside: f64, ahead: f64, radius: f64) -> [f64; 2] {
     let square = ahead * ahead - radius * radius;
     let root = radius * (aside * aside + square).max(0.0).sqrt();

@@ -136,7 +136,6 @@ impl View {
         self.reflected([x, y, pane.center_height], [-out_x, -out_y, 0.0])
     }
 
-    /// The view from behind a mirror: that of the eye's mirror image.
     fn reflected(&self, point: Vector, normal: Vector) -> Self {
         let turn = |direction: Vector| plus(direction, -2.0 * dot(direction, normal), normal);
         let away = dot(minus(self.origin, point), normal);
@@ -155,7 +154,6 @@ impl View {
     }
 }
 
-/// Labels by MuJoCo's own rays, through a pane by a second ray from where the first met it.
 pub(super) fn by_mujoco(world: &World, stages: &mut (Stage, Vec<Stage>), width: usize, height: usize) -> LabelImage {
     let view = View::of_eye(world, width, height);
     let all = groups(&[group::ROOM, group::CEILING, group::THINGS, group::EGO]);
@@ -178,7 +176,6 @@ pub(super) fn by_mujoco(world: &World, stages: &mut (Stage, Vec<Stage>), width: 
     LabelImage { width, height, codes }
 }
 
-/// What a ray meets that has met a pane.
 fn onwards(world: &World, stage: &mut Stage, pane: usize, met: Vector, ray: Vector) -> Item {
     let hung = &world.scene().panes[pane];
     let [out_x, out_y] = hung.place.heading().direction();

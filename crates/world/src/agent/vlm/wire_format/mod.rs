@@ -166,7 +166,6 @@ impl Dialect {
     }
 }
 
-/// The text of a reply, or else the arguments of the one function that it calls, and the repair that this is.
 fn text_or_call(text: String, calls: &[String]) -> (String, Vec<Repair>) {
     match calls {
         [arguments] if text.trim().is_empty() => (arguments.clone(), vec![Repair::ToolCall]),

@@ -68,7 +68,6 @@ fn reply(choice: &Value) -> (String, Ending) {
     (content(&message["content"]).or_else(|| refusal.map(str::to_owned)).unwrap_or_default(), ending)
 }
 
-/// Some servers give the text in parts.
 fn content(content: &Value) -> Option<String> {
     match content {
         Value::String(text) => Some(text.clone()),

@@ -73,7 +73,6 @@ fn is_refusal(error: &Value) -> bool {
         || is_flagged(&error["metadata"])
 }
 
-/// What OpenRouter says beside an error: that a moderator flagged the request, or the provider's own error as text.
 fn is_flagged(metadata: &Value) -> bool {
     let raw = metadata["raw"].as_str().and_then(|raw| serde_json::from_str::<Value>(raw).ok());
     metadata.get("flagged_input").is_some() || raw.is_some_and(|raw| is_refusal(&raw["error"]))

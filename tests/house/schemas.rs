@@ -14,7 +14,7 @@ use report::plan::Plan;
 use report::plan::register::RegisteredPlan;
 use report::sensitivity::Sensitivity;
 use report::statistics::{Gate, Sequential, Statistics};
-use report::style::shape::StyleFile;
+use report::style::Sheet;
 use schemars::schema_for;
 use score::evidence::Evidence;
 use serde_json::{Value, json};
@@ -55,7 +55,7 @@ fn current() -> Vec<(&'static str, Value)> {
         ("sensitivity", json!(schema_for!(Sensitivity))),
         ("stats", json!(schema_for!(Statistics))),
         ("stats-sequential", json!(schema_for!(Sequential))),
-        ("style", json!(schema_for!(StyleFile))),
+        ("style", json!(schema_for!(Sheet))),
         ("trace", json!(SchemaDocument::current())),
         ("validation", json!(schema_for!(Validation))),
         ("verify", json!(schema_for!(Verification))),

@@ -36,14 +36,12 @@
 
 mod at;
 mod fault;
-mod include;
-mod keys;
+mod kind;
 mod origin;
 mod shape;
 
-pub use at::At;
+pub use at::{At, parse, parse_toml};
 pub use fault::{Fault, FaultRecord, Faults, MOST_FAULTS, Place, Source};
-pub use include::{IncludeKind, Includes};
-pub use keys::{Keys, key_count, parse, parse_toml};
+pub use kind::{FileKind, FileText, Part};
 pub use origin::Written;
-pub use shape::{Shape, read};
+pub use shape::{Shape, lay, read};

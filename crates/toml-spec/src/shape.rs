@@ -47,6 +47,18 @@ pub fn read<T: JsonSchema + DeserializeOwned>(at: &At<'_>, what: &str, faults: &
     value.try_into().map_err(|error: toml::de::Error| faults.push(at.fault(error.message()))).ok()
 }
 
+/// Lays a value over another one: key by key in tables, whole lists.
+pub fn lay(under: &mut Value, over: Value) {
+    match (under, over) {
+        (Value::Table(under), Value::Table(over)) => {
+            for (key, value) in over {
+                lay(under.entry(key).or_insert_with(|| Value::Table(Table::new())), value);
+            }
+        }
+        (under, over) => *under = over,
+    }
+}
+
 struct Walk<'a> {
     shape: &'a Shape,
     faults: &'a mut Vec<Fault>,

@@ -25,9 +25,10 @@ pub struct FigureSheet {
 pub type FigureSheets = IndexMap<String, FigureSheet>;
 
 /// What every figure shows unless a style says otherwise.
-pub static SHOWN: LazyLock<FigureSheets> = LazyLock::new(|| {
-    toml::from_str(include_str!("../../../../assets/styles/figures.toml")).expect("the file comes with the program")
-});
+pub static SHOWN: LazyLock<FigureSheets> =
+    LazyLock::new(|| toml::from_str(FIGURES).expect("the file comes with the program"));
+/// The same as TOML, for styles to lie over.
+pub const FIGURES: &str = include_str!("../../../../assets/styles/figures.toml");
 
 impl FigureName {
     /// The fewest and the most metrics that it shows; the first so many must be rates.

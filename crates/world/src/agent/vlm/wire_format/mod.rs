@@ -17,7 +17,7 @@ use crate::agent::reply::{Ending, Repair, without_lone_surrogates};
 use exact::names;
 
 /// A language.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Dialect {
     /// `OpenAI`'s chat completions.

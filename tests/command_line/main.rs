@@ -31,6 +31,7 @@ mod quality;
 mod readme;
 #[cfg(all(feature = "polars", feature = "raster", feature = "sim", feature = "view"))]
 mod reference;
+mod reference_files;
 mod refusals;
 #[cfg(unix)]
 mod renamed;

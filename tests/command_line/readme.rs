@@ -48,7 +48,7 @@ const NOT_RUN: [(&str, &str); 17] = [
 
 /// The README, then the pages of `docs` by name.
 fn pages() -> Vec<PathBuf> {
-    let mut pages: Vec<PathBuf> = ["docs", "docs/how-to", "docs/explanation", "docs/reference"]
+    let mut pages: Vec<PathBuf> = ["docs", "docs/how-to", "docs/explanation", "docs/reference", "docs/tutorials"]
         .iter()
         .flat_map(|folder| fs::read_dir(repository().join(folder)).unwrap())
         .map(|entry| entry.unwrap().path())

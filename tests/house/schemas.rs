@@ -67,6 +67,7 @@ fn current() -> Vec<(&'static str, Value)> {
         ("census", json!(schema_for!(world::sim::visibility::Visibility))),
         ("replay", json!(schema_for!(world::replay::verify::ReplayAnswer))),
         ("exec-message", json!(schema_for!(world::agent::exec::message::Message))),
+        ("models", json!(schema_for!(world::agent::vlm::models::Models))),
         ("lost", json!(schema_for!(world::record::failures::LostEpisode))),
         ("scene", json!(schema_for!(world::sim::scene::Scene))),
         ("world-config", json!(schema_for!(world::sim::config::WorldConfig))),

@@ -91,7 +91,7 @@ fn llms() -> String {
             let is_prose = |line: &&str| line.starts_with(|c: char| c.is_alphabetic() || c == '`');
             let prose: Vec<&str> =
                 outside.lines().skip_while(|line| !is_prose(line)).take_while(|line| !line.is_empty()).collect();
-            let prose = Regex::new(r"\[([^\]]*)\]\([^)]*\)").unwrap().replace_all(&prose.join(" "), "$1").into_owned();
+            let prose = link.replace_all(&prose.join(" "), "$1").into_owned();
             let first = prose.split_once(". ").map_or(prose.as_str(), |(first, _)| first).trim_end_matches(['.', ':']);
             let first = if first.is_empty() { String::new() } else { format!(": {first}.") };
             writeln!(text, "- [{title}](docs/{folder}/{name}){first}").unwrap();

@@ -46,9 +46,7 @@ fn table(root: &Value, schema: &Value, path: &str, page: &mut String) {
         let is_needed = schema["required"].as_array().is_some_and(|names| names.contains(&key.as_str().into()));
         let default = match &property["default"] {
             _ if is_needed => "required".to_owned(),
-            Value::Null => String::new(),
-            Value::String(text) if text.is_empty() => String::new(),
-            simple @ (Value::String(_) | Value::Bool(_) | Value::Number(_)) => format!("`{simple}`"),
+            simple @ (Value::String(_) | Value::Bool(_) | Value::Number(_)) if *simple != "" => format!("`{simple}`"),
             _ => String::new(),
         };
         let (words, meaning) = (value(root, property), cell(&property["description"]));

@@ -77,6 +77,7 @@ fn trace_page() -> String {
 
 /// `llms.txt`: every page with its title and its first sentence.
 fn llms() -> String {
+    let link = Regex::new(r"\[([^\]]*)\]\([^)]*\)").unwrap();
     let mut text =
         "# mirrorstats\n\n> Records, scores and reports episodes of embodied agents before a mirror.\n".to_owned();
     for folder in ["tutorials", "how-to", "explanation", "reference"] {

@@ -11,13 +11,13 @@ Every answer is the one that the command `mirrorstats` gives, in words of argume
 interpreter's lock.
 """
 
-from ._answer import Answer, Statistics
+from ._answer import Answer, Gate, Statistics
 from ._error import ArgumentError, DefinitionError, Error, InputError, OutputError, QueryError, RecordError
 from ._example import example_runs
 from ._import import import_steps
 from ._native import ArrowSteps, ArrowTable, Figure, Table, __version__
 from ._record import Message, record
-from ._study import Study, compare, open
+from ._study import Study, compare, gate, open
 from ._validate import validate
 
 __all__ = [
@@ -28,6 +28,7 @@ __all__ = [
     "DefinitionError",
     "Error",
     "Figure",
+    "Gate",
     "InputError",
     "Message",
     "OutputError",
@@ -39,6 +40,7 @@ __all__ = [
     "__version__",
     "compare",
     "example_runs",
+    "gate",
     "import_steps",
     "open",
     "record",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import html
 import json
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Optional
 
 from . import _native
 from ._error import in_python
@@ -82,15 +82,52 @@ class Statistics(Answer):
         return long([{**group, "tests": len(group["tests"])} for group in self["models"]])
 
 
+class Gate(Answer):
+    """Verdicts on new episodes against old ones, with the episodes whose value changed as a long frame.
+
+    Example:
+        >>> import mirrorstats as ms
+        >>> runs = ms.example_runs()
+        >>> old, new = (ms.open(runs, where=f"model = 'GPT 5.1' and seed = {seed}") for seed in (1, 2))
+        >>> ms.gate(old, new, metric="TSA").cells.column_names[:4]
+        ['experiment', 'model', 'verdict', 'why']
+    """
+
+    @property
+    def cells(self) -> _native.ArrowTable:
+        """One row per experiment and model, as in `self["cells"]`: the verdict, why, both sides, the difference.
+
+        Columns: `experiment`, `model`, `verdict`, `why` (text), `base_n`, `base_lost`, `new_n`, `new_lost` (int64),
+        `base_mean`, `new_mean`, `difference`, `interval_low`, `interval_high`, `p_adjusted`, `p_held` (float64) and others.
+        """
+        return long([{key: value for key, value in cell.items() if key != "flips"} for cell in self["cells"]])
+
+    @property
+    def flips(self) -> _native.ArrowTable:
+        """One row per scene in which the value changed: the episodes of both sides, and the steps that decided them.
+
+        Columns: `experiment`, `model`, `base_episode_id` (text), `base_value` (int64), `base_timesteps`, `base_frames` (text),
+        and the same of `new`.
+        """
+        names = ("experiment", "model")
+        rows = [{**{name: cell[name] for name in names}, **flip} for cell in self["cells"] for flip in cell["flips"]]
+        sides = [
+            (f"{side}_{name}", "int" if name == "value" else "text")
+            for side in ("base", "new")
+            for name in ("episode_id", "value", "timesteps", "frames")
+        ]
+        return long(rows, [*((name, "text") for name in names), *sides])
+
+
 # What all tests of a family share.
 _OF_FAMILY = ("models", "tied", "tests", "detectable")
 
 
-def long(rows: list[dict[str, Any]]) -> _native.ArrowTable:
-    """Nested answers as rows of a table: keys of keys joined by `_`, lists as text."""
+def long(rows: list[dict[str, Any]], kinds: Optional[list[tuple[str, str]]] = None) -> _native.ArrowTable:
+    """Nested answers as rows of a table: keys of keys joined by `_`, lists as text; all columns unless `kinds` has them."""
     flat = [dict(_flat(row)) for row in rows]
     names = list(dict.fromkeys(name for row in flat for name in row))
-    kinds = [(name, _kind([row.get(name) for row in flat])) for name in names]
+    kinds = kinds or [(name, _kind([row.get(name) for row in flat])) for name in names]
     texts = {name for name, kind in kinds if kind == "text"}
     lines = (
         {name: str(value) if name in texts and value is not None else value for name, value in row.items()} for row in flat

@@ -103,6 +103,17 @@ def check_number(name: str, value: Any, least: int) -> None:
         raise ArgumentError(f"{name}: expected an integer of at least {least}, found {value!r}")
 
 
+def is_number(value: Any) -> bool:
+    """Whether it is an integer or a float; a truth value is neither."""
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def check_share(name: str, value: Any) -> None:
+    """Refuses what is not strictly between 0 and 1."""
+    if not is_number(value) or not 0 < value < 1:
+        raise ArgumentError(f"{name}: expected a number between 0 and 1 such as 0.95, found {value!r}")
+
+
 def check_name(name: str, value: Any, known: tuple[str, ...]) -> None:
     """Refuses what is none of these."""
     if value not in known:

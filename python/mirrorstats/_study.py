@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping
 from typing import Any, Literal, Optional, Union
 
 from . import _native
-from ._answer import Answer, Statistics
-from ._error import ArgumentError, InputError, check_name, check_number
+from ._answer import Answer, Gate, Statistics
+from ._error import ArgumentError, InputError, check_name, check_number, check_share, is_number
 from ._import import lines, trace_of
 from ._native import ArrowSteps, ArrowTable, Figure, Table
 from ._paths import Path, Spool, Toml, is_frame, several, text, toml_file
@@ -96,6 +96,48 @@ def compare(studies: Mapping[str, Study]) -> ArrowTable:
     if len(studies) < 2:
         raise ArgumentError(f"studies: expected two or more studies by name, found {len(studies)}")
     return _native.compare([(name, study._native) for name, study in studies.items()])
+
+
+def gate(
+    base: Study,
+    new: Study,
+    *,
+    metric: Optional[str] = None,
+    margin: float = 0.1,
+    confidence: float = 0.95,
+) -> Gate:
+    """Holds new episodes against old ones, as `mirrorstats gate`: improved, held, regressed, or why neither is said.
+
+    Args:
+        base: the earlier episodes.
+        new: the later episodes. Episodes that were recorded differently are compared where either study was opened with `pool`.
+        metric: the metric; the first one of the definitions with a better direction if None.
+        margin: the largest loss that is accepted, above 0, in the unit of the metric.
+        confidence: one minus the level of every verdict, over all cells; between 0 and 1.
+
+    Returns:
+        `verdict` (the gravest one), `metric`, `margin`, `confidence`, and `cells`, one per experiment and model, each with its
+        `verdict`, `why`, both sides, the difference with its interval and p values, and its `flips`.
+
+    Raises:
+        ArgumentError: a metric that a side does not have, or that has no better direction; a margin of 0 or less.
+        InputError: what is wrong with the traces of a side.
+
+    Example:
+        >>> import mirrorstats as ms
+        >>> old = ms.open(ms.example_runs(), where="model = 'GPT 5.1' and seed < 3")
+        >>> new = ms.open(ms.example_runs(), where="model = 'GPT 5.1' and seed >= 3")
+        >>> found = ms.gate(old, new, metric="TSA", margin=0.2)
+        >>> found["verdict"], len(found["cells"])
+        ('cannot_say', 5)
+    """
+    for name, study in (("base", base), ("new", new)):
+        if not isinstance(study, Study):
+            raise TypeError(f"{name}: expected a Study, as `open` gives it, found {type(study).__name__}")
+    check_share("confidence", confidence)
+    if not is_number(margin) or not 0 < margin < float("inf"):
+        raise ArgumentError(f"margin: expected a number above 0 such as 0.1, found {margin!r}")
+    return Gate(new._native.gate(base._native, metric, margin, confidence))
 
 
 class Study:
@@ -277,8 +319,7 @@ class Study:
             >>> stats["episodes"], stats["confidence"]
             (168, 0.9)
         """
-        if not isinstance(confidence, (int, float)) or not 0 < confidence < 1:
-            raise ArgumentError(f"confidence: expected a number between 0 and 1 such as 0.95, found {confidence!r}")
+        check_share("confidence", confidence)
         check_number("horizon", horizon, 1)
         return Statistics(self._native.stats(confidence, horizon, full))
 

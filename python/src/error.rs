@@ -30,6 +30,7 @@ fn kind(error: &StudyError) -> &'static str {
         E::Polars(_) => "QueryError",
         E::Definitions(_) | E::Style(_) | E::NotScored { .. } | E::DefinitionsElsewhere { .. } => "DefinitionError",
         E::Metric(_)
+        | E::NoDirection { .. }
         | E::NoTable { .. }
         | E::Figure(_)
         | E::Group(_)

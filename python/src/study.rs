@@ -9,6 +9,7 @@ use mirrorstats::{FigureName, ReportOptions, StatisticsOptions};
 use pyo3::prelude::*;
 use report::changes::Limit;
 use report::statistics::text::Length;
+use report::statistics::{GateFormat, GateOptions};
 use study::{LostAs, Question};
 
 use crate::answer::{self, Answer};
@@ -23,6 +24,7 @@ const LISTED: usize = 20;
 #[pyclass(frozen, module = "mirrorstats._native")]
 pub struct Study {
     inner: Arc<mirrorstats::Study>,
+    pool: bool,
     episodes: OnceLock<RecordBatch>,
     cells: OnceLock<RecordBatch>,
 }
@@ -60,8 +62,9 @@ impl Asked {
 impl Study {
     #[new]
     fn new(py: Python<'_>, asked: Asked) -> PyResult<Self> {
+        let pool = asked.pool;
         let inner = Arc::new(py.detach(|| asked.open())?);
-        Ok(Self { inner, episodes: OnceLock::new(), cells: OnceLock::new() })
+        Ok(Self { inner, pool, episodes: OnceLock::new(), cells: OnceLock::new() })
     }
 
     #[getter]
@@ -149,6 +152,24 @@ impl Study {
         let shown = found.changes.render(Limit(LISTED), None);
         let notes = found.notes.iter().map(|note| format!("note: {note}"));
         answer::of(&found.changes, notes.chain([shown]).collect::<Vec<_>>().join("\n"))
+    }
+
+    /// The verdicts on this study against an earlier one. Settings that differ do not matter where either was opened so.
+    #[pyo3(signature = (base, metric, margin, confidence))]
+    fn gate(
+        &self,
+        py: Python<'_>,
+        base: &Self,
+        metric: Option<String>,
+        margin: f64,
+        confidence: f64,
+    ) -> PyResult<Answer> {
+        let gate = py.detach(|| {
+            let metric = metric.map_or_else(|| self.inner.leading_metric(), Ok).map_err(error::of_study)?;
+            let options = GateOptions { metric, margin, confidence, pool: self.pool || base.pool };
+            self.inner.gate(&base.inner, &options).map_err(error::of_study)
+        })?;
+        answer::of(&gate, gate.render(GateFormat::Text(None)))
     }
 
     #[pyo3(signature = (episode_id))]

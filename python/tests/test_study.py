@@ -159,6 +159,31 @@ def test_answers_are_those_of_the_command_line(paper, command):
     assert shown.startswith("<pre style=") and "overflow-x" in shown and "&lt;0.0001" in shown and "<0.0001" not in shown
 
 
+def test_a_gate_is_that_of_the_command_line(recorded, command):
+    sides = [f"{recorded}/E1-oracle.parquet", f"{recorded}/E1-random.parquet"]
+    words = ["gate", *sides, "--metric", "TSA", "--margin", "0.2"]
+    base, new = map(ms.open, sides)
+    found = ms.gate(base, new, metric="TSA", margin=0.2)
+    assert found == json.loads(command(*words, "--format", "json", code=4).stdout)
+    assert str(found) == command(*words, code=4).stdout and found["verdict"] == "cannot_say"
+    flips = [flip for cell in found["cells"] for flip in cell["flips"]]
+    frame = found.flips.to_polars()
+    assert frame["new_episode_id"].to_list() == [flip["new"]["episode_id"] for flip in flips] != []
+    assert frame.select("base_value", "new_value").unique().rows() == [(1, 0)] and frame["base_timesteps"].null_count() == 0
+    assert found.cells.to_pandas()["verdict"].tolist() == ["cannot_say"]
+    again = ms.gate(base, base)
+    assert again["metric"] == "TSA" and again["margin"] == 0.1 and again.flips.column_names == found.flips.column_names
+    for wrong, words in [
+        ({"margin": 0}, "margin: expected a number above 0 such as 0.1, found 0"),
+        ({"confidence": 95}, "confidence: expected a number between 0 and 1 such as 0.95, found 95"),
+        ({"metric": "TSAA"}, "did you mean `TSA`"),
+    ]:
+        with pytest.raises(ms.ArgumentError, match=words):
+            ms.gate(base, new, **wrong)
+    with pytest.raises(TypeError, match="new: expected a Study, as `open` gives it, found str"):
+        ms.gate(base, sides[1])
+
+
 def test_a_difference_is_that_of_the_command_line(paper, command, tmp_path):
     mine = tmp_path / "mine.toml"
     mine.write_text('include = ["paper"]\n[let]\nmirror_evidence = "mirror_visible and t > 3"\n')

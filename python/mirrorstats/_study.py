@@ -14,6 +14,9 @@ from ._native import ArrowSteps, ArrowTable, Figure, Table
 from ._paths import Path, Spool, Toml, is_frame, several, text, toml_file
 
 Names = Union[str, Iterable[str]]
+FigureName = Literal[
+    "spider", "heatmap", "scatter", "completion-gap", "e5-outcomes", "intervals", "slopes", "decision-curve", "gaze"
+]
 
 
 def open(
@@ -245,31 +248,33 @@ class Study:
 
     def figure(
         self,
-        name: Literal[
-            "spider",
-            "heatmap",
-            "scatter",
-            "completion-gap",
-            "e5-outcomes",
-            "intervals",
-            "slopes",
-            "decision-curve",
-            "gaze",
-        ],
+        name: FigureName,
         *,
         style: Toml = "default",
+        metric: Optional[Names] = None,
+        title: Optional[str] = None,
+        width: Optional[str] = None,
     ) -> Figure:
-        """A figure by name, with the models in the order of a style.
+        """A figure by name, as `mirrorstats figure`.
+
+        Args:
+            name: the figure.
+            style: for the order of the models, and for the metrics and captions of figures.
+            metric: the metrics that it shows, one or several in the order of their roles; those of the style if None.
+            title: a heading of its own.
+            width: the width on paper from 8 cm to 50 cm, such as `8.5cm`, `85mm`, `3.3in`, `240pt` or `640px`; text has at least
+                6 pt there. As wide as it is drawn if None.
 
         Raises:
-            ArgumentError: no figure of this name; traces that lack what it needs.
+            ArgumentError: no figure of this name; traces that lack what it needs; another number of metrics than it shows; a
+                width in which its text does not fit.
 
         Example:
             >>> import mirrorstats as ms
-            >>> ms.open(ms.example_runs()).figure("intervals")
+            >>> ms.open(ms.example_runs()).figure("intervals", metric="CAAL", title="Self-attribution", width="8.5cm")
             <mirrorstats.Figure: intervals>
         """
-        return self._native.figure(name, self._style(style))
+        return self._native.figure(name, self._style(style), _names(metric), title, width)
 
     def query(self, sql: str) -> ArrowTable:
         """The rows of a SELECT over the tables `steps`, `episodes` and `cells`, as `mirrorstats query`.

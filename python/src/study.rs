@@ -5,9 +5,10 @@ use std::str::FromStr as _;
 use std::sync::{Arc, OnceLock};
 
 use arrow::array::RecordBatch;
-use mirrorstats::{FigureName, ReportOptions, StatisticsOptions};
+use mirrorstats::{FigureName, FigureOptions, ReportOptions, StatisticsOptions};
 use pyo3::prelude::*;
 use report::changes::Limit;
+use report::figures::InvalidWidth;
 use report::statistics::text::Length;
 use report::statistics::{GateFormat, GateOptions};
 use study::{LostAs, Question};
@@ -114,10 +115,21 @@ impl Study {
         })
     }
 
-    #[pyo3(signature = (name, style))]
-    fn figure(&self, py: Python<'_>, name: &str, style: &str) -> PyResult<Figure> {
+    #[pyo3(signature = (name, style, metrics, title, width))]
+    fn figure(
+        &self,
+        py: Python<'_>,
+        name: &str,
+        style: String,
+        metrics: Option<Vec<String>>,
+        title: Option<String>,
+        width: Option<&str>,
+    ) -> PyResult<Figure> {
         let name = FigureName::from_str(name).map_err(error::of_argument)?;
-        let figure = py.detach(|| self.inner.figure(name, style).map_err(error::of_study))?;
+        let width = width.map(str::parse).transpose();
+        let width = width.map_err(|fault: InvalidWidth| error::of_argument(format!("width: {fault}")))?;
+        let options = FigureOptions { style: style.into(), metrics, title, width };
+        let figure = py.detach(|| self.inner.figure(name, &options).map_err(error::of_study))?;
         Ok(Figure::new(figure, name.name()))
     }
 
@@ -165,7 +177,10 @@ impl Study {
         confidence: f64,
     ) -> PyResult<Answer> {
         let gate = py.detach(|| {
-            let metric = metric.map_or_else(|| self.inner.leading_metric(), Ok).map_err(error::of_study)?;
+            let metric = match metric {
+                Some(metric) => metric,
+                None => self.inner.leading_metric().map_err(error::of_study)?,
+            };
             let options = GateOptions { metric, margin, confidence, pool: self.pool || base.pool };
             self.inner.gate(&base.inner, &options).map_err(error::of_study)
         })?;

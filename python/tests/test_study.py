@@ -144,6 +144,27 @@ def test_a_figure_shows_itself(paper, command, tmp_path):
         study.figure("interval")
 
 
+def test_a_figure_has_a_metric_a_heading_and_a_width(paper, command, tmp_path):
+    study = ms.open(paper)
+    for name, metrics, width in [("intervals", "CAAL", "8.5cm"), ("heatmap", ["TSA", "TTD"], "3.3in"), ("gaze", None, "170mm")]:
+        kept = "run = 1" if name == "gaze" else "run > 0"
+        figure = ms.open(paper, where=kept).figure(name, metric=metrics, title="Eight models & more", width=width)
+        options = ["--title", "Eight models & more", "--width", width, "--where", kept]
+        options += [] if metrics is None else ["--metric", metrics if isinstance(metrics, str) else ",".join(metrics)]
+        assert figure.svg == command("figure", name, paper, *options).stdout
+        assert "Eight models &amp; more" in figure.svg.split("</title>", 1)[1]
+    assert 'width="642.52"' in figure.svg
+    assert "CAAL with its Wilson" in study.figure("intervals", metric="CAAL").svg
+    for wrong, words in [
+        ({"metric": "TSAA"}, "did you mean `TSA`"),
+        ({"metric": ["TSA", "TTD"]}, "the figure `intervals` shows 1 metrics, found 2"),
+        ({"metric": "TTD"}, "draws `TTD` as a rate, found a quantity"),
+        ({"width": "3cm"}, "width: expected a width from 8cm to 50cm such as 8.5cm, .* found `3cm`"),
+    ]:
+        with pytest.raises(ms.ArgumentError, match=words):
+            study.figure("intervals", **wrong)
+
+
 def test_answers_are_those_of_the_command_line(paper, command):
     study = ms.open(paper, where="experiment = 'E1'")
     words = [paper, "--where", "experiment = 'E1'"]

@@ -301,11 +301,8 @@ fn read_figure(
     let sheet = figures.entry(name.to_owned()).or_default();
     let whole = keys.value_place("metrics").unwrap_or_else(|| place.clone());
     if let Some(metrics) = keys.texts("metrics", faults) {
-        let ([fewest, most], _) = figure.metrics();
-        if !(fewest..=most).contains(&metrics.len()) {
-            let wanted = if fewest == most { fewest.to_string() } else { format!("{fewest} to {most}") };
-            let message = format!("the figure `{name}` shows {wanted} metrics, found {}", metrics.len());
-            faults.push(Fault::new(whole, message));
+        if let Err(wrong) = figure.check_count(metrics.len()) {
+            faults.push(Fault::new(whole, FigureError::to_string(&wrong)));
         }
         named.extend(metrics.iter().cloned());
         sheet.metrics = Some(without_places(metrics));

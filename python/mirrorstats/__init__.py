@@ -11,7 +11,7 @@ Every answer is the one that the command `mirrorstats` gives, in words of argume
 interpreter's lock.
 """
 
-from ._answer import Answer, Gate, Statistics
+from ._answer import Answer, Changes, Explanation, Gate, Imported, Manifest, Recorded, Statistics, Validation
 from ._error import ArgumentError, DefinitionError, Error, InputError, OutputError, QueryError, RecordError
 from ._example import example_runs
 from ._import import import_steps
@@ -25,18 +25,24 @@ __all__ = [
     "ArgumentError",
     "ArrowSteps",
     "ArrowTable",
+    "Changes",
     "DefinitionError",
     "Error",
+    "Explanation",
     "Figure",
     "Gate",
+    "Imported",
     "InputError",
+    "Manifest",
     "Message",
     "OutputError",
     "QueryError",
     "RecordError",
+    "Recorded",
     "Statistics",
     "Study",
     "Table",
+    "Validation",
     "__version__",
     "compare",
     "example_runs",

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import html
 import json
-from collections.abc import Mapping
-from typing import Any, Optional
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any, Optional
 
 from . import _native
 from ._error import in_python
@@ -37,7 +37,47 @@ class Answer(dict[str, Any]):
         return f'<pre style="{style}">{html.escape(str(self))}</pre>'
 
 
-class Statistics(Answer):
+if TYPE_CHECKING:
+    from .types import (
+        _ChangesKeys,
+        _ExplanationKeys,
+        _GateKeys,
+        _ImportedKeys,
+        _ManifestKeys,
+        _RecordedKeys,
+        _StatisticsKeys,
+        _ValidationKeys,
+    )
+else:
+    _ChangesKeys = _ExplanationKeys = _GateKeys = _ImportedKeys = Answer
+    _ManifestKeys = _RecordedKeys = _StatisticsKeys = _ValidationKeys = Answer
+
+
+class Changes(_ChangesKeys):
+    """What `Study.diff` gives: cells and values of episodes that changed."""
+
+
+class Explanation(_ExplanationKeys):
+    """What `Study.explain` gives: the scores of an episode and the timesteps that decided them."""
+
+
+class Imported(_ImportedKeys):
+    """What `import_steps` gives: the trace and the counts of its episodes and steps."""
+
+
+class Manifest(_ManifestKeys):
+    """What `Study.report` gives: the inputs, the definitions and the files of a report, each with its hash."""
+
+
+class Recorded(_RecordedKeys):
+    """What `record` gives: the episodes recorded, found and lost, and the files."""
+
+
+class Validation(_ValidationKeys):
+    """What `validate` gives: the files and the findings."""
+
+
+class Statistics(_StatisticsKeys):
     """Intervals, tests and comparisons, with long frames for programs that go on with them.
 
     Example:
@@ -82,7 +122,7 @@ class Statistics(Answer):
         return long([{**group, "tests": len(group["tests"])} for group in self["models"]])
 
 
-class Gate(Answer):
+class Gate(_GateKeys):
     """Verdicts on new episodes against old ones, with the episodes whose value changed as a long frame.
 
     Example:
@@ -109,21 +149,24 @@ class Gate(Answer):
         Columns: `experiment`, `model`, `base_episode_id` (text), `base_value` (int64), `base_timesteps`, `base_frames` (text),
         and the same of `new`.
         """
-        names = ("experiment", "model")
-        rows = [{**{name: cell[name] for name in names}, **flip} for cell in self["cells"] for flip in cell["flips"]]
+        rows = [
+            {"experiment": cell["experiment"], "model": cell["model"], **flip}
+            for cell in self["cells"]
+            for flip in cell["flips"]
+        ]
         sides = [
             (f"{side}_{name}", "int" if name == "value" else "text")
             for side in ("base", "new")
             for name in ("episode_id", "value", "timesteps", "frames")
         ]
-        return long(rows, [*((name, "text") for name in names), *sides])
+        return long(rows, [("experiment", "text"), ("model", "text"), *sides])
 
 
 # What all tests of a family share.
 _OF_FAMILY = ("models", "tied", "tests", "detectable")
 
 
-def long(rows: list[dict[str, Any]], kinds: Optional[list[tuple[str, str]]] = None) -> _native.ArrowTable:
+def long(rows: Iterable[Mapping[str, Any]], kinds: Optional[list[tuple[str, str]]] = None) -> _native.ArrowTable:
     """Nested answers as rows of a table: keys of keys joined by `_`, lists as text; all columns unless `kinds` has them."""
     flat = [dict(_flat(row)) for row in rows]
     names = list(dict.fromkeys(name for row in flat for name in row))

@@ -7,11 +7,14 @@ import os
 import pathlib
 import tempfile
 from collections.abc import Iterable, Mapping
-from typing import Any, Optional, Union
+from typing import Any, Literal, Optional, Union
 
 Path = Union[str, "os.PathLike[str]"]
 # A definition file, a style or an experiment: a name, a path, TOML text, or a dict with the keys of the file.
 Toml = Union[str, "os.PathLike[str]", Mapping[str, Any]]
+# A type checker's completion names those that are built in.
+Definitions = Union[Literal["paper", "extended"], Toml]
+Style = Union[Literal["default", "paper"], Toml]
 
 
 class Spool:

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import Any, Literal, Optional, Union
 
 from . import _native
-from ._answer import Answer
+from ._answer import Recorded
 from ._error import ArgumentError, check_name, check_number
 from ._paths import Path, Spool, Toml, text, toml_file
 
@@ -29,7 +29,7 @@ def record(
     images: Literal["path", "base64", "array"] = "path",
     on_error: Literal["raise", "lose"] = "raise",
     **options: Any,
-) -> Answer:
+) -> Recorded:
     """Records episodes of an agent in the mirror world: step traces to be opened, logs with the frames.
 
     The same call again continues where it stopped. Ctrl-C ends a recording: a function is not waited for, an agent of another
@@ -80,7 +80,7 @@ def record(
         arguments += _option(name, value, spool)
     if isinstance(agent, str):
         named = [] if model is None else ["--model", model]
-        return _told(Answer(_native.record([*arguments, "--agent", agent, *named])))
+        return _told(Recorded(_native.record([*arguments, "--agent", agent, *named])))
     function = {
         "model": model or getattr(agent, "__name__", type(agent).__name__),
         "source": _source(agent),
@@ -88,7 +88,7 @@ def record(
         "is_lost": on_error == "lose",
         "listeners": lambda: _listener(agent, images == "array"),
     }
-    return _told(Answer(_native.record([*arguments, "--agent", "function"], function)))
+    return _told(Recorded(_native.record([*arguments, "--agent", "function"], function)))
 
 
 def _check_options(options: dict[str, Any]) -> None:
@@ -155,7 +155,7 @@ def _array(png: str) -> Any:
     return numpy.frombuffer(pixels, numpy.uint8).reshape(height, width, 3)
 
 
-def _told(answer: Answer) -> Answer:
+def _told(answer: Recorded) -> Recorded:
     lost, recorded = answer["lost"], answer["recorded"]
     answer.text = (
         f"recorded {recorded} of {answer['asked']} episodes of {answer['model']} ({answer['steps']} steps), "

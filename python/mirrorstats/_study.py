@@ -7,22 +7,19 @@ from collections.abc import Iterable, Mapping
 from typing import Any, Literal, Optional, Union
 
 from . import _native
-from ._answer import Answer, Gate, Statistics
+from ._answer import Changes, Explanation, Gate, Manifest, Statistics
 from ._error import ArgumentError, InputError, check_name, check_number, check_share, is_number
 from ._import import lines, trace_of
 from ._native import ArrowSteps, ArrowTable, Figure, Table
-from ._paths import Path, Spool, Toml, is_frame, several, text, toml_file
+from ._paths import Definitions, Path, Spool, Style, is_frame, several, text, toml_file
 
 Names = Union[str, Iterable[str]]
-FigureName = Literal[
-    "spider", "heatmap", "scatter", "completion-gap", "e5-outcomes", "intervals", "slopes", "decision-curve", "gaze"
-]
 
 
 def open(
     inputs: Any,
     *,
-    definitions: Optional[Toml] = None,
+    definitions: Optional[Definitions] = None,
     where: Optional[str] = None,
     metrics: Optional[Names] = None,
     by: Optional[Names] = None,
@@ -218,7 +215,7 @@ class Study:
         """
         return self._native.steps(_names(columns))
 
-    def table(self, name: str = "main", *, style: Toml = "default") -> Table:
+    def table(self, name: str = "main", *, style: Style = "default") -> Table:
         """A table of the report: `main`, or another one that the style lays out.
 
         Args:
@@ -236,7 +233,7 @@ class Study:
         """
         return self._native.table(name, self._style(style))
 
-    def tables(self, *, style: Toml = "default") -> list[Table]:
+    def tables(self, *, style: Style = "default") -> list[Table]:
         """All tables of the report.
 
         Example:
@@ -248,9 +245,11 @@ class Study:
 
     def figure(
         self,
-        name: FigureName,
+        name: Literal[
+            "spider", "heatmap", "scatter", "completion-gap", "e5-outcomes", "intervals", "slopes", "decision-curve", "gaze"
+        ],
         *,
-        style: Toml = "default",
+        style: Style = "default",
         metric: Optional[Names] = None,
         title: Optional[str] = None,
         width: Optional[str] = None,
@@ -292,7 +291,7 @@ class Study:
         """
         return self._native.query(sql)
 
-    def report(self, out: Path, *, style: Toml = "default", figures: bool = True) -> Answer:
+    def report(self, out: Path, *, style: Style = "default", figures: bool = True) -> Manifest:
         """Writes the folder of a report, in place of the report that is there, and returns its manifest.
 
         Raises:
@@ -305,7 +304,7 @@ class Study:
             >>> manifest["where"] is None
             True
         """
-        return Answer(self._native.report(text(out, self._spool), self._style(style), figures))
+        return Manifest(self._native.report(text(out, self._spool), self._style(style), figures))
 
     def stats(self, *, confidence: float = 0.95, horizon: Optional[int] = None, full: bool = False) -> Statistics:
         """Intervals, tests and comparisons of the cells, as `mirrorstats stats --json`; `Statistics` has them as frames too.
@@ -328,7 +327,7 @@ class Study:
         check_number("horizon", horizon, 1)
         return Statistics(self._native.stats(confidence, horizon, full))
 
-    def diff(self, other: Study) -> Answer:
+    def diff(self, other: Study) -> Changes:
         """What changes from this study to another one: cells, and values of episodes, as `mirrorstats diff --json`.
 
         For two studies of the same traces under one filter, each change names the timesteps that decided it.
@@ -339,9 +338,9 @@ class Study:
             >>> study.diff(study)["flips"]
             []
         """
-        return Answer(self._native.diff(other._native))
+        return Changes(self._native.diff(other._native))
 
-    def explain(self, episode_id: str) -> Answer:
+    def explain(self, episode_id: str) -> Explanation:
         """The scores of one episode and the timesteps that decided them, as `mirrorstats score --explain --json`.
 
         Raises:
@@ -353,9 +352,9 @@ class Study:
             >>> ms.open(ms.example_runs()).explain("E1/gpt-5-1/s1/r2")["episode_id"]
             'E1/gpt-5-1/s1/r2'
         """
-        return Answer(self._native.explain(episode_id))
+        return Explanation(self._native.explain(episode_id))
 
-    def _style(self, style: Toml) -> str:
+    def _style(self, style: Style) -> str:
         return toml_file(style, "style", self._spool)
 
     def __repr__(self) -> str:

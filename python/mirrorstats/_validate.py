@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Any, Optional
 
 from . import _native
-from ._answer import Answer
+from ._answer import Validation
 from ._error import ArgumentError, check_number
-from ._paths import Spool, Toml, several, text, toml_file
+from ._paths import Definitions, Spool, several, text, toml_file
 
 
-def validate(inputs: Any, *, definitions: Toml = "paper", threads: Optional[int] = None) -> Answer:
+def validate(inputs: Any, *, definitions: Definitions = "paper", threads: Optional[int] = None) -> Validation:
     """Checks traces against every rule of the schema, as `mirrorstats trace validate --json`.
 
     Args:
@@ -35,4 +35,4 @@ def validate(inputs: Any, *, definitions: Toml = "paper", threads: Optional[int]
     if not given:
         raise ArgumentError("inputs: expected at least one file or folder, found none")
     paths = [text(one, spool) for one in given]
-    return Answer(_native.validate(paths, toml_file(definitions, "definitions", spool), threads))
+    return Validation(_native.validate(paths, toml_file(definitions, "definitions", spool), threads))

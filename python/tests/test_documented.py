@@ -34,7 +34,7 @@ def test_a_docstring_is_there_and_its_example_runs(one, paper, monkeypatch, tmp_
 
 
 def test_functions_and_classes_have_examples():
-    without = {"Answer", "ArgumentError", "DefinitionError", "InputError", "OutputError", "QueryError", "RecordError"}
+    without = {"Answer", "Changes", "Explanation", "Imported", "Manifest", "Recorded", "Validation", "ArgumentError", "DefinitionError", "InputError", "OutputError", "QueryError", "RecordError"}
     lacking = {one.__name__ for one in PUBLIC if ">>>" not in (inspect.getdoc(one) or "")}
     assert lacking - without == set()
 

@@ -26,7 +26,7 @@ use exact::budget;
 use exact::escape::visible;
 use outcome::{ErrorFormat, Outcome};
 
-pub use answers::schemas;
+pub use answers::{printed_schema, schemas};
 pub use outcome::{ErrorAnswer, Failure};
 use printed::{outcome, output, quality, terminal, text_table};
 #[cfg(all(feature = "sim", feature = "view"))]

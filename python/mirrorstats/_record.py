@@ -50,13 +50,14 @@ def record(
         on_error: what becomes of an exception of a function: `raise` stops the recording and raises it here, `lose` loses the
             episode and goes on; `lost` of the answer and `lost.jsonl` of the folder then have its traceback.
         options: the other options of `mirrorstats record`, with `_` for `-`: `repeats=2`, `no_frames=True`, or
-            `in_flight=8`, the number of episodes under way at once.
+            `in_flight=8`, the number of episodes under way at once. Settings of `mirrorstats.toml` do not apply.
 
     Returns:
         What became of the episodes: `recorded`, `found` (there before), `steps` (counts), `lost` (episodes without an answer,
         each with its `reason`; a warning names the first), `traces` and `logs` (files), and more.
 
     Raises:
+        ArgumentError: an option with a value that it cannot have.
         RecordError: an agent or a configuration that cannot be used; an agent that could not go on.
         TypeError: an agent that is no name and cannot be called; a keyword that is no option.
         Exception: what the agent raised, with its traceback.
@@ -74,13 +75,10 @@ def record(
     check_name("on_error", on_error, ("raise", "lose"))
     _check_options(options)
     spool = Spool()
-    arguments = ["--experiment", toml_file(experiment, "experiment", spool), "--seeds", str(seeds), "--runs", str(runs)]
-    arguments += ["--out", text(out, spool)]
-    for name, value in options.items():
-        arguments += _option(name, value, spool)
+    asked = {name.replace("_", "-"): _plain(value, spool) for name, value in options.items()}
+    asked.update(experiment=toml_file(experiment, "experiment", spool), seeds=seeds, runs=runs, out=text(out, spool))
     if isinstance(agent, str):
-        named = [] if model is None else ["--model", model]
-        return _told(Recorded(_native.record([*arguments, "--agent", agent, *named])))
+        return _told(Recorded(_native.record(json.dumps({**asked, "agent": agent, "model": model}))))
     function = {
         "model": model or getattr(agent, "__name__", type(agent).__name__),
         "source": _source(agent),
@@ -88,7 +86,7 @@ def record(
         "is_lost": on_error == "lose",
         "listeners": lambda: _listener(agent, images == "array"),
     }
-    return _told(Recorded(_native.record([*arguments, "--agent", "function"], function)))
+    return _told(Recorded(_native.record(json.dumps({**asked, "agent": "function"}), function)))
 
 
 def _check_options(options: dict[str, Any]) -> None:
@@ -103,12 +101,13 @@ def _check_options(options: dict[str, Any]) -> None:
             raise TypeError(f"record() got an unexpected keyword argument {name!r}{hint}")
 
 
-def _option(name: str, value: Any, spool: Spool) -> list[str]:
-    """An option of the command line; False and None leave it out."""
-    flag = "--" + name.replace("_", "-")
-    if value is None or value is False:
-        return []
-    return [flag] if value is True else [flag, text(value, spool) if hasattr(value, "__fspath__") else str(value)]
+def _plain(value: Any, spool: Spool) -> Any:
+    """A value of an option as JSON has it."""
+    if isinstance(value, (list, tuple)):
+        return [_plain(one, spool) for one in value]
+    if value is None or isinstance(value, (bool, int, float, str)):
+        return value
+    return text(value, spool) if hasattr(value, "__fspath__") else str(value)
 
 
 def _source(agent: Any) -> Optional[str]:

@@ -103,6 +103,12 @@ def check_number(name: str, value: Any, least: int) -> None:
         raise ArgumentError(f"{name}: expected an integer of at least {least}, found {value!r}")
 
 
+def check_type(name: str, value: Any, wanted: type, words: str) -> None:
+    """Refuses what is not of a type; None passes."""
+    if value is not None and not isinstance(value, wanted):
+        raise TypeError(f"{name}: expected {words}, found {type(value).__name__}")
+
+
 def is_number(value: Any) -> bool:
     """Whether it is an integer or a float; a truth value is neither."""
     return isinstance(value, (int, float)) and not isinstance(value, bool)

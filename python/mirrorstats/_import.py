@@ -10,7 +10,7 @@ from typing import Any, Optional, Union
 
 from . import _native
 from ._answer import Imported
-from ._error import OutputError, check_name
+from ._error import ArgumentError, OutputError, check_name
 from ._paths import Definitions, Path, Spool, is_frame, text, toml_file
 
 # Traces that nobody named stay until the interpreter ends.
@@ -58,7 +58,7 @@ def import_steps(
     """
     check_name("cluster", cluster, (None, "seed"))  # type: ignore[arg-type]
     if cluster is not None and reconstruction:
-        raise ValueError("cluster and reconstruction exclude each other")
+        raise ArgumentError("cluster and reconstruction exclude each other")
     if palette is not None and not isinstance(palette, str):
         # With a comma it is no name of a file.
         palette = ",".join([*palette, ""])
@@ -105,6 +105,11 @@ def lines(rows: Any) -> tuple[list[str], bytes]:
         else:
             columns, found = _native.lines_of(stream)
             return columns, found
+    if isinstance(rows, (str, bytes, os.PathLike)) or not isinstance(rows, Iterable):
+        raise TypeError(
+            f"rows: expected dicts or a data frame, found {type(rows).__name__}; read a file first, as with polars.read_csv, "
+            "or let `mirrorstats trace import FILE` read it"
+        )
     names: dict[str, None] = {}
     texts = []
     for at, row in enumerate(rows):

@@ -74,19 +74,29 @@ def text(path: Any, spool: Spool) -> str:
 
 def is_frame(value: Any) -> bool:
     """Whether it is a data frame of Polars, pandas, Arrow or DuckDB."""
-    return hasattr(value, "__arrow_c_stream__") or (hasattr(value, "collect") and hasattr(value, "collect_schema"))
+    if hasattr(value, "collect") and hasattr(value, "collect_schema"):
+        return True
+    # A series has a stream, and no columns.
+    has_columns = any(hasattr(value, name) for name in ("columns", "column_names", "schema"))
+    return has_columns and hasattr(value, "__arrow_c_stream__")
 
 
 def several(paths: Any) -> list[Any]:
-    """One input or several."""
-    is_one = isinstance(paths, (str, os.PathLike)) or is_frame(paths) or hasattr(paths, "fs")
-    return [paths] if is_one or not isinstance(paths, Iterable) else list(paths)
+    """One input or several; rows that are dicts are one."""
+    is_one = isinstance(paths, (str, bytes, os.PathLike, Mapping)) or is_frame(paths)
+    is_one = is_one or hasattr(paths, "fs") or hasattr(paths, "__arrow_c_stream__")
+    if is_one or not isinstance(paths, Iterable):
+        return [paths]
+    found = list(paths)
+    return [found] if found and all(isinstance(row, Mapping) for row in found) else found
 
 
 def toml_file(value: Toml, noun: str, spool: Spool) -> str:
     """A name or a path as it is; TOML text or a dict as a file."""
     if isinstance(value, Mapping):
         return spool.keep(f"{noun}.toml", "\n".join(_tables(value)).encode())
+    if not isinstance(value, (str, bytes, os.PathLike)) and not hasattr(value, "fs"):
+        raise TypeError(f"{noun}: expected a name, a path, TOML text or a dict, found {type(value).__name__}")
     path = text(value, spool)
     is_toml = "\n" in path or ("=" in path and not path.endswith(".toml"))
     return spool.keep(f"{noun}.toml", path.encode()) if is_toml else path

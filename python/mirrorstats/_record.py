@@ -74,6 +74,11 @@ def record(
     check_name("images", images, ("path", "base64", "array"))
     check_name("on_error", on_error, ("raise", "lose"))
     _check_options(options)
+    if "at_once" in options and agent != "vlm":
+        raise ArgumentError(
+            "at_once: expected it with the agent 'vlm' alone, whose requests it counts\n"
+            "  help: `in_flight=N` is the number of episodes under way at once"
+        )
     spool = Spool()
     asked = {name.replace("_", "-"): _plain(value, spool) for name, value in options.items()}
     asked.update(experiment=toml_file(experiment, "experiment", spool), seeds=seeds, runs=runs, out=text(out, spool))

@@ -8,7 +8,7 @@ from typing import Any, Literal, Optional, Union
 
 from . import _native
 from ._answer import Changes, Explanation, Gate, Manifest, Statistics
-from ._error import ArgumentError, InputError, check_name, check_number, check_share, is_number
+from ._error import ArgumentError, InputError, check_name, check_number, check_share, check_type, is_number
 from ._import import lines, trace_of
 from ._native import ArrowSteps, ArrowTable, Figure, Table
 from ._paths import Definitions, Path, Spool, Style, is_frame, several, text, toml_file
@@ -31,7 +31,8 @@ def open(
 
     Args:
         inputs: files, folders or globs, as text, `Path`, `file://` or `fsspec` file; or data frames (Polars, pandas, Arrow,
-            DuckDB) of steps, as `import_steps` takes them, or of scores, one row per episode. One or several.
+            DuckDB) of steps, as `import_steps` takes them, or of scores, one row per episode. One or several; or the rows of
+            such a frame as dicts.
         definitions: `paper`, `extended`, the path of a TOML file, TOML text, or a dict with the keys of such a file. If None,
             those that the experiments of the traces name, else `paper`; for scores those that they were computed with.
         where: a condition on episodes in the language of definitions, such as `seed = 1 and TSA = 1`; all if None.
@@ -57,6 +58,8 @@ def open(
     """
     check_name("lost", lost, ("excluded", "as-failure"))
     check_number("threads", threads, 1)
+    check_type("where", where, str, "a condition as text")
+    check_type("pool", pool, bool, "True or False")
     given, spool = several(inputs), Spool()
     if not given:
         raise ArgumentError("inputs: expected at least one file, folder or data frame, found none")
@@ -65,8 +68,8 @@ def open(
         "paths": [_input(one, named, spool) for one in given],
         "definitions": named,
         "where": where,
-        "metrics": _names(metrics),
-        "by": _names(by),
+        "metrics": _names("metrics", metrics),
+        "by": _names("by", by),
         "pool": pool,
         "lost_as_failure": lost == "as-failure",
         "threads": threads,
@@ -94,6 +97,9 @@ def compare(studies: Mapping[str, Study]) -> ArrowTable:
         >>> found.column_names[0], found.column_names[-1], len(found)
         ('study', 'change', 800)
     """
+    check_type("studies", studies, Mapping, "studies by name, as a dict")
+    for name, study in studies.items():
+        _check_study(f"studies[{name!r}]", study)
     if len(studies) < 2:
         raise ArgumentError(f"studies: expected two or more studies by name, found {len(studies)}")
     return _native.compare([(name, study._native) for name, study in studies.items()])
@@ -132,9 +138,8 @@ def gate(
         >>> found["verdict"], len(found["cells"])
         ('cannot_say', 5)
     """
-    for name, study in (("base", base), ("new", new)):
-        if not isinstance(study, Study):
-            raise TypeError(f"{name}: expected a Study, as `open` gives it, found {type(study).__name__}")
+    _check_study("base", base)
+    _check_study("new", new)
     check_share("confidence", confidence)
     if not is_number(margin) or not 0 < margin < float("inf"):
         raise ArgumentError(f"margin: expected a number above 0 such as 0.1, found {margin!r}")
@@ -214,7 +219,7 @@ class Study:
             >>> ms.open(ms.example_runs()).steps(["episode_id", "t", "action"])
             <mirrorstats.ArrowSteps: episode_id, t, action>
         """
-        return self._native.steps(_names(columns))
+        return self._native.steps(_names("columns", columns))
 
     def table(self, name: str = "main", *, style: Style = "default") -> Table:
         """A table of the report: `main`, or another one that the style lays out.
@@ -274,7 +279,7 @@ class Study:
             >>> ms.open(ms.example_runs()).figure("intervals", metric="CAAL", title="Self-attribution", width="8.5cm")
             <mirrorstats.Figure: intervals>
         """
-        return self._native.figure(name, self._style(style), _names(metric), title, width)
+        return self._native.figure(name, self._style(style), _names("metric", metric), title, width)
 
     def query(self, sql: str) -> ArrowTable:
         """The rows of a SELECT over the tables `steps`, `episodes` and `cells`, as `mirrorstats query`.
@@ -339,6 +344,7 @@ class Study:
             >>> study.diff(study)["flips"]
             []
         """
+        _check_study("other", other)
         return Changes(self._native.diff(other._native))
 
     def explain(self, episode_id: str) -> Explanation:
@@ -377,16 +383,28 @@ def _again(asked: dict[str, Any], folder: str, files: dict[str, bytes]) -> Study
     return Study({**asked, "paths": [*map(moved, asked["paths"])], "definitions": moved(asked["definitions"])}, spool)
 
 
-def _names(names: Optional[Names]) -> Optional[list[str]]:
-    return [names] if isinstance(names, str) else None if names is None else list(names)
+def _names(argument: str, names: Optional[Names]) -> Optional[list[str]]:
+    if names is None or isinstance(names, str):
+        return None if names is None else [names]
+    found = list(names) if isinstance(names, Iterable) else [names]
+    if not found:
+        raise ArgumentError(f"{argument}: expected at least one name, found none")
+    for name in found:
+        check_type(argument, name, str, "a name or several")
+    return found
+
+
+def _check_study(argument: str, study: Any) -> None:
+    if not isinstance(study, Study):
+        raise TypeError(f"{argument}: expected a Study, as `open` gives it, found {type(study).__name__}")
 
 
 def _input(given: Any, definitions: Optional[str], spool: Spool) -> str:
     """A path as it is; a data frame as a trace or as a file of scores."""
-    if isinstance(given, (str, os.PathLike)) or hasattr(given, "fs"):
+    if isinstance(given, (str, bytes, os.PathLike)) or hasattr(given, "fs"):
         return text(given, spool)
-    if not is_frame(given):
-        raise TypeError(f"inputs: expected a path or a data frame, found {type(given).__name__}")
+    if not is_frame(given) and not isinstance(given, list):
+        raise TypeError(f"inputs: expected a path, a data frame or a list of dicts, found {type(given).__name__}")
     columns, rows = lines(given)
     if "t" in columns:
         return str(trace_of(rows, spool.new("steps.parquet"), definitions or "paper")["out"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import Any, Optional
 
 from . import _native
@@ -34,5 +35,8 @@ def validate(inputs: Any, *, definitions: Definitions = "paper", threads: Option
     given, spool = several(inputs), Spool()
     if not given:
         raise ArgumentError("inputs: expected at least one file or folder, found none")
+    for one in given:
+        if not isinstance(one, (str, bytes, os.PathLike)) and not hasattr(one, "fs"):
+            raise TypeError(f"inputs: expected a path, found {type(one).__name__}; `import_steps` checks a data frame")
     paths = [text(one, spool) for one in given]
     return Validation(_native.validate(paths, toml_file(definitions, "definitions", spool), threads))

@@ -186,7 +186,7 @@ def test_an_interrupt_ends_a_recording(tmp_path):
     started.send_signal(signal.SIGINT)
     since = time.monotonic()
     assert started.stdout.readline() == "interrupted\n"
-    assert time.monotonic() - since < 5, "the agent sleeps for a minute, and is not waited for"
+    assert time.monotonic() - since < 1, "the agent sleeps for a minute, and is not waited for"
     said, _ = started.communicate(timeout=60)
     assert said == "" and started.returncode == 0
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import json
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any, Optional
@@ -33,6 +32,9 @@ class Answer(dict[str, Any]):
         return self.text or super().__str__()
 
     def _repr_html_(self) -> str:
+        # Not with the package, as everything that a first answer does without: an import of it takes a notebook's time.
+        import html
+
         style = "font-family: monospace; white-space: pre; overflow-x: auto; max-height: 40em; line-height: 1.3"
         return f'<pre style="{style}">{html.escape(str(self))}</pre>'
 

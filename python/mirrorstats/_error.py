@@ -7,18 +7,18 @@ import re
 from typing import Any, Optional
 
 # An option of the command line, and its value where there is one.
-_OPTION = re.compile(
+_OPTION = (
     r"""`?(?<![\w-])--([a-z][a-z-]+)(?:[ =]("[^"]*"|'[^']*'|[A-Z]+\b|\d+\b|[\w./-]+\.\w+|paper|extended|default|as-failure))?`?"""
 )
-_COMMAND = re.compile(r"(`mirrorstats [^`]*`)")
+_COMMAND = r"(`mirrorstats [^`]*`)"
 # Where definitions, styles and frames without a file are kept.
-_SPOOLED = re.compile(r"(?:[^\s`]*/)?mirrorstats-[a-z0-9_]{8}/")
+_SPOOLED = r"(?:[^\s`]*/)?mirrorstats-[a-z0-9_]{8}/"
 _FLAGS = {"full", "keep_going", "no_frames", "no_log", "pool"}
 
 
 def in_python(words: str) -> str:
     """Words that name options of the command line, with arguments in their place; whole commands stay."""
-    words = _SPOOLED.sub("", words).replace("--> --where", "--> where")
+    words = re.sub(_SPOOLED, "", words).replace("--> --where", "--> where")
 
     def argument(option: re.Match[str]) -> str:
         name, value = option[1].replace("-", "_"), option[2]
@@ -29,8 +29,8 @@ def in_python(words: str) -> str:
         is_plain = value[0] in "\"'" or value.isupper() or value.isdigit()
         return f"`{name}={value}`" if is_plain else f'`{name}="{value}"`'
 
-    parts = _COMMAND.split(words)
-    return "".join(part if at % 2 else _OPTION.sub(argument, part) for at, part in enumerate(parts))
+    parts = re.split(_COMMAND, words)
+    return "".join(part if at % 2 else re.sub(_OPTION, argument, part) for at, part in enumerate(parts))
 
 
 class Error(Exception):

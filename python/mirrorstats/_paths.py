@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 import os
-import pathlib
-import tempfile
 from collections.abc import Iterable, Mapping
-from typing import Any, Literal, Optional, Union
+from typing import TYPE_CHECKING, Any, Literal, Optional, Union
+
+if TYPE_CHECKING:
+    import tempfile
 
 Path = Union[str, "os.PathLike[str]"]
 # A definition file, a style or an experiment: a name, a path, TOML text, or a dict with the keys of the file.
@@ -28,27 +29,35 @@ class Spool:
     @property
     def path(self) -> str:
         if self._folder is None:
+            import tempfile
+
             self._folder = tempfile.TemporaryDirectory(prefix="mirrorstats-", ignore_cleanup_errors=True)
         return self._folder.name
 
     def keep(self, name: str, content: bytes) -> str:
         """Writes a file and gives its path."""
-        path = pathlib.Path(self.path, name)
-        path.write_bytes(content)
-        return str(path)
+        path = os.path.join(self.path, name)
+        with open(path, "wb") as file:
+            file.write(content)
+        return path
 
     def new(self, name: str) -> str:
         """The path of a file that is not there yet."""
-        ending, at = pathlib.Path(name), 1
+        (stem, ending), at = os.path.splitext(name), 1
         while os.path.exists(os.path.join(self.path, name)):
             at += 1
-            name = f"{ending.stem}-{at}{ending.suffix}"
+            name = f"{stem}-{at}{ending}"
         return os.path.join(self.path, name)
 
     def files(self) -> dict[str, bytes]:
         """All of its files, by name."""
-        found = sorted(pathlib.Path(self.path).iterdir()) if self._folder else []
-        return {file.name: file.read_bytes() for file in found if file.is_file()}
+        found = sorted(os.scandir(self.path), key=lambda file: file.name) if self._folder else []
+        files = {}
+        for file in found:
+            if file.is_file():
+                with open(file.path, "rb") as content:
+                    files[file.name] = content.read()
+        return files
 
 
 def text(path: Any, spool: Spool) -> str:
@@ -58,7 +67,7 @@ def text(path: Any, spool: Spool) -> str:
         protocol = filesystem.protocol if isinstance(filesystem.protocol, str) else filesystem.protocol[0]
         if protocol in ("file", "local"):
             return place
-        copy = spool.new(pathlib.PurePosixPath(place).name)
+        copy = spool.new(os.path.basename(place))
         filesystem.get_file(place, copy)
         return copy
     path = os.fspath(path)

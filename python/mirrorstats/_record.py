@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import base64
-import inspect
 import json
-import textwrap
-import warnings
 from collections.abc import Callable
 from typing import Any, Literal, Optional, Union
 
@@ -117,6 +113,9 @@ def _plain(value: Any, spool: Spool) -> Any:
 
 def _source(agent: Any) -> Optional[str]:
     """The text of the agent, of which recordings carry the hash; None where Python does not know it."""
+    import inspect
+    import textwrap
+
     plain = agent if inspect.isfunction(agent) or inspect.isclass(agent) else type(agent)
     try:
         return textwrap.dedent(inspect.getsource(plain))
@@ -126,6 +125,8 @@ def _source(agent: Any) -> Optional[str]:
 
 def _listener(agent: Any, is_array: bool) -> Callable[[str], str]:
     """What the native library calls in one episode, on a thread of its own, with messages as JSON."""
+    import inspect
+
     function = agent() if isinstance(agent, type) else agent
     loop: Any = None
 
@@ -153,6 +154,8 @@ def _listener(agent: Any, is_array: bool) -> Callable[[str], str]:
 
 def _array(png: str) -> Any:
     """The pixels of a frame."""
+    import base64
+
     import numpy
 
     height, width, pixels = _native.pixels(base64.b64decode(png))
@@ -166,6 +169,8 @@ def _told(answer: Recorded) -> Recorded:
         f"{answer['found']} there before, {len(lost)} lost"
     )
     if lost:
+        import warnings
+
         reason = lost[0]["reason"].splitlines()[0]
         warnings.warn(f"{len(lost)} episodes are lost; first {lost[0]['episode_id']}: {reason}", RuntimeWarning, stacklevel=3)
     return answer

@@ -68,6 +68,7 @@ release-check: needed
 ## Write generated files anew: JSON Schemas, snapshots, the committed report.
 bless: needed
 	MIRRORSTATS_WRITE_SCHEMAS=1 MIRRORSTATS_WRITE_REFERENCE=1 INSTA_UPDATE=always cargo test --workspace --all-features --no-fail-fast
+	scripts/python-types.py
 	cargo run --quiet -- report fixtures/paper --style paper --out reports/paper
 	cd reports/paper && sha256sum report.html >../report.html.sha256
 

@@ -9,6 +9,7 @@ mkdir -p "$target"
 target=$(cd "$target" && pwd)
 export CARGO_TARGET_DIR="$target"
 scripts/get-egl.sh
+browser=$(scripts/get-browser.sh)
 tools=$(scripts/get-python.sh)
 out=$(mktemp -d)
 trap 'rm -rf "$out"' EXIT
@@ -60,7 +61,7 @@ clean python -c "import mirrorstats, polars
 study = mirrorstats.open('runs')
 print(polars.DataFrame(study.episodes))"
 # Still in that folder: what is named by its path from the checkout would differ.
-clean MIRRORSTATS_TEST_FIXTURES="$checkout/fixtures" python -m pytest --quiet -p no:cacheprovider --rootdir "$out" \
+clean MIRRORSTATS_TEST_FIXTURES="$checkout/fixtures" MIRRORSTATS_TEST_BROWSER="$browser" python -m pytest --quiet -p no:cacheprovider --rootdir "$out" \
   "$checkout/python/tests"
 
 echo "test-wheel: the notebook"

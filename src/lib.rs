@@ -141,7 +141,7 @@ pub use report::bundle::Manifest;
 pub use report::cells::columns::record_batch;
 pub use report::cells::diff::{CellChange, Changes, Flip};
 pub use report::cells::{Cells, Group, KeyValue};
-pub use report::figures::{Figure, FigureFormat, FigureName};
+pub use report::figures::{Figure, FigureFormat, FigureName, FigureWidth};
 pub use report::layout::MetricTable;
 pub use report::statistics::{Options as StatisticsOptions, Statistics};
 pub use report::tables::Table;
@@ -149,6 +149,6 @@ pub use score::columns::record_batch as episode_batch;
 pub use score::evidence::Evidence;
 pub use score::table::{EpisodeKey, EpisodeTable, MetricColumn};
 pub use study::{
-    Backend, Diff, DiffRequest, Outputs, Report, ReportOptions, RescoreRequest, Rescored, Results, Side, Study,
-    StudyError, diff, resolve,
+    Backend, Diff, DiffRequest, FigureOptions, Outputs, Report, ReportOptions, RescoreRequest, Rescored, Results, Side,
+    Study, StudyError, diff, resolve,
 };

@@ -7,17 +7,18 @@
     study.episodes                      # Arrow: polars.DataFrame(study.episodes), pyarrow.table(study.episodes)
 
 Every answer is the one that the command `mirrorstats` gives, in words of arguments. Each kind of error has a class under
-`Error`. Settings of the command line (`mirrorstats.toml`, `MIRRORSTATS_...`) do not apply. Work that takes time releases the
+`Error`. Settings of the command line (`mirrorstats.toml`, `MIRRORSTATS_...`) do not apply, but for
+`MIRRORSTATS_BUDGET`, which allows larger inputs. Work that takes time releases the
 interpreter's lock.
 """
 
-from ._answer import Answer, Statistics
+from ._answer import Answer, Changes, Explanation, Gate, Imported, Manifest, Recorded, Statistics, Validation
 from ._error import ArgumentError, DefinitionError, Error, InputError, OutputError, QueryError, RecordError
 from ._example import example_runs
 from ._import import import_steps
 from ._native import ArrowSteps, ArrowTable, Figure, Table, __version__
 from ._record import Message, record
-from ._study import Study, compare, open
+from ._study import Study, compare, gate, open
 from ._validate import validate
 
 __all__ = [
@@ -25,20 +26,28 @@ __all__ = [
     "ArgumentError",
     "ArrowSteps",
     "ArrowTable",
+    "Changes",
     "DefinitionError",
     "Error",
+    "Explanation",
     "Figure",
+    "Gate",
+    "Imported",
     "InputError",
+    "Manifest",
     "Message",
     "OutputError",
     "QueryError",
     "RecordError",
+    "Recorded",
     "Statistics",
     "Study",
     "Table",
+    "Validation",
     "__version__",
     "compare",
     "example_runs",
+    "gate",
     "import_steps",
     "open",
     "record",

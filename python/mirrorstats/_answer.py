@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import html
 import json
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any, Optional
 
 from . import _native
 from ._error import in_python
@@ -33,11 +32,54 @@ class Answer(dict[str, Any]):
         return self.text or super().__str__()
 
     def _repr_html_(self) -> str:
+        # Not with the package, as everything that a first answer does without: an import of it takes a notebook's time.
+        import html
+
         style = "font-family: monospace; white-space: pre; overflow-x: auto; max-height: 40em; line-height: 1.3"
         return f'<pre style="{style}">{html.escape(str(self))}</pre>'
 
 
-class Statistics(Answer):
+if TYPE_CHECKING:
+    from .types import (
+        _ChangesKeys,
+        _ExplanationKeys,
+        _GateKeys,
+        _ImportedKeys,
+        _ManifestKeys,
+        _RecordedKeys,
+        _StatisticsKeys,
+        _ValidationKeys,
+    )
+else:
+    _ChangesKeys = _ExplanationKeys = _GateKeys = _ImportedKeys = Answer
+    _ManifestKeys = _RecordedKeys = _StatisticsKeys = _ValidationKeys = Answer
+
+
+class Changes(_ChangesKeys):
+    """What `Study.diff` gives: cells and values of episodes that changed."""
+
+
+class Explanation(_ExplanationKeys):
+    """What `Study.explain` gives: the scores of an episode and the timesteps that decided them."""
+
+
+class Imported(_ImportedKeys):
+    """What `import_steps` gives: the trace and the counts of its episodes and steps."""
+
+
+class Manifest(_ManifestKeys):
+    """What `Study.report` gives: the inputs, the definitions and the files of a report, each with its hash."""
+
+
+class Recorded(_RecordedKeys):
+    """What `record` gives: the episodes recorded, found and lost, and the files."""
+
+
+class Validation(_ValidationKeys):
+    """What `validate` gives: the files and the findings."""
+
+
+class Statistics(_StatisticsKeys):
     """Intervals, tests and comparisons, with long frames for programs that go on with them.
 
     Example:
@@ -82,15 +124,55 @@ class Statistics(Answer):
         return long([{**group, "tests": len(group["tests"])} for group in self["models"]])
 
 
+class Gate(_GateKeys):
+    """Verdicts on new episodes against old ones, with the episodes whose value changed as a long frame.
+
+    Example:
+        >>> import mirrorstats as ms
+        >>> runs = ms.example_runs()
+        >>> old, new = (ms.open(runs, where=f"model = 'GPT 5.1' and seed = {seed}") for seed in (1, 2))
+        >>> ms.gate(old, new, metric="TSA").cells.column_names[:4]
+        ['experiment', 'model', 'verdict', 'why']
+    """
+
+    @property
+    def cells(self) -> _native.ArrowTable:
+        """One row per experiment and model, as in `self["cells"]`: the verdict, why, both sides, the difference.
+
+        Columns: `experiment`, `model`, `verdict`, `why` (text), `base_n`, `base_lost`, `new_n`, `new_lost` (int64),
+        `base_mean`, `new_mean`, `difference`, `interval_low`, `interval_high`, `p_adjusted`, `p_held` (float64) and others.
+        """
+        return long([{key: value for key, value in cell.items() if key != "flips"} for cell in self["cells"]])
+
+    @property
+    def flips(self) -> _native.ArrowTable:
+        """One row per scene in which the value changed: the episodes of both sides, and the steps that decided them.
+
+        Columns: `experiment`, `model`, `base_episode_id` (text), `base_value` (int64), `base_timesteps`, `base_frames` (text),
+        and the same of `new`.
+        """
+        rows = [
+            {"experiment": cell["experiment"], "model": cell["model"], **flip}
+            for cell in self["cells"]
+            for flip in cell["flips"]
+        ]
+        sides = [
+            (f"{side}_{name}", "int" if name == "value" else "text")
+            for side in ("base", "new")
+            for name in ("episode_id", "value", "timesteps", "frames")
+        ]
+        return long(rows, [("experiment", "text"), ("model", "text"), *sides])
+
+
 # What all tests of a family share.
 _OF_FAMILY = ("models", "tied", "tests", "detectable")
 
 
-def long(rows: list[dict[str, Any]]) -> _native.ArrowTable:
-    """Nested answers as rows of a table: keys of keys joined by `_`, lists as text."""
+def long(rows: Iterable[Mapping[str, Any]], kinds: Optional[list[tuple[str, str]]] = None) -> _native.ArrowTable:
+    """Nested answers as rows of a table: keys of keys joined by `_`, lists as text; all columns unless `kinds` has them."""
     flat = [dict(_flat(row)) for row in rows]
     names = list(dict.fromkeys(name for row in flat for name in row))
-    kinds = [(name, _kind([row.get(name) for row in flat])) for name in names]
+    kinds = kinds or [(name, _kind([row.get(name) for row in flat])) for name in names]
     texts = {name for name, kind in kinds if kind == "text"}
     lines = (
         {name: str(value) if name in texts and value is not None else value for name, value in row.items()} for row in flat

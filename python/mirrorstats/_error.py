@@ -7,18 +7,18 @@ import re
 from typing import Any, Optional
 
 # An option of the command line, and its value where there is one.
-_OPTION = re.compile(
+_OPTION = (
     r"""`?(?<![\w-])--([a-z][a-z-]+)(?:[ =]("[^"]*"|'[^']*'|[A-Z]+\b|\d+\b|[\w./-]+\.\w+|paper|extended|default|as-failure))?`?"""
 )
-_COMMAND = re.compile(r"(`mirrorstats [^`]*`)")
+_COMMAND = r"(`mirrorstats [^`]*`)"
 # Where definitions, styles and frames without a file are kept.
-_SPOOLED = re.compile(r"(?:[^\s`]*/)?mirrorstats-[a-z0-9_]{8}/")
+_SPOOLED = r"(?:[^\s`]*/)?mirrorstats-[a-z0-9_]{8}/"
 _FLAGS = {"full", "keep_going", "no_frames", "no_log", "pool"}
 
 
 def in_python(words: str) -> str:
     """Words that name options of the command line, with arguments in their place; whole commands stay."""
-    words = _SPOOLED.sub("", words).replace("--> --where", "--> where")
+    words = re.sub(_SPOOLED, "", words).replace("--> --where", "--> where")
 
     def argument(option: re.Match[str]) -> str:
         name, value = option[1].replace("-", "_"), option[2]
@@ -29,8 +29,8 @@ def in_python(words: str) -> str:
         is_plain = value[0] in "\"'" or value.isupper() or value.isdigit()
         return f"`{name}={value}`" if is_plain else f'`{name}="{value}"`'
 
-    parts = _COMMAND.split(words)
-    return "".join(part if at % 2 else _OPTION.sub(argument, part) for at, part in enumerate(parts))
+    parts = re.split(_COMMAND, words)
+    return "".join(part if at % 2 else re.sub(_OPTION, argument, part) for at, part in enumerate(parts))
 
 
 class Error(Exception):
@@ -101,6 +101,23 @@ def check_number(name: str, value: Any, least: int) -> None:
     """Refuses what is no integer of at least this size; None is no number and passes."""
     if value is not None and (not isinstance(value, int) or isinstance(value, bool) or value < least):
         raise ArgumentError(f"{name}: expected an integer of at least {least}, found {value!r}")
+
+
+def check_type(name: str, value: Any, wanted: type, words: str) -> None:
+    """Refuses what is not of a type; None passes."""
+    if value is not None and not isinstance(value, wanted):
+        raise TypeError(f"{name}: expected {words}, found {type(value).__name__}")
+
+
+def is_number(value: Any) -> bool:
+    """Whether it is an integer or a float; a truth value is neither."""
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def check_share(name: str, value: Any) -> None:
+    """Refuses what is not strictly between 0 and 1."""
+    if not is_number(value) or not 0 < value < 1:
+        raise ArgumentError(f"{name}: expected a number between 0 and 1 such as 0.95, found {value!r}")
 
 
 def check_name(name: str, value: Any, known: tuple[str, ...]) -> None:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-import pathlib
 import sys
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import pathlib
 
 
 def example_runs() -> pathlib.Path:
@@ -20,6 +23,8 @@ def example_runs() -> pathlib.Path:
     Raises:
         FileNotFoundError: in a package that was not built by `make wheel`.
     """
+    import pathlib
+
     folder = pathlib.Path(__file__).parent / "runs"
     if not folder.is_dir():
         raise FileNotFoundError(f"{folder}: this build carries no traces; `make wheel` builds one that does")

@@ -9,9 +9,9 @@ from collections.abc import Iterable, Mapping
 from typing import Any, Optional, Union
 
 from . import _native
-from ._answer import Answer
-from ._error import OutputError, check_name
-from ._paths import Path, Spool, Toml, is_frame, text, toml_file
+from ._answer import Imported
+from ._error import ArgumentError, OutputError, check_name
+from ._paths import Definitions, Path, Spool, is_frame, text, toml_file
 
 # Traces that nobody named stay until the interpreter ends.
 _unnamed = Spool()
@@ -21,11 +21,11 @@ def import_steps(
     rows: Union[Iterable[Mapping[str, Any]], Any],
     out: Optional[Path] = None,
     *,
-    definitions: Toml = "paper",
+    definitions: Definitions = "paper",
     palette: Union[str, Iterable[str], None] = None,
     cluster: Optional[str] = None,
     reconstruction: bool = False,
-) -> Answer:
+) -> Imported:
     """Makes a trace of steps, so that episodes of any harness can be scored.
 
     Args:
@@ -58,7 +58,7 @@ def import_steps(
     """
     check_name("cluster", cluster, (None, "seed"))  # type: ignore[arg-type]
     if cluster is not None and reconstruction:
-        raise ValueError("cluster and reconstruction exclude each other")
+        raise ArgumentError("cluster and reconstruction exclude each other")
     if palette is not None and not isinstance(palette, str):
         # With a comma it is no name of a file.
         palette = ",".join([*palette, ""])
@@ -77,7 +77,7 @@ def trace_of(
     palette: Optional[str] = None,
     clusters_by_seed: bool = False,
     reconstruction: bool = False,
-) -> Answer:
+) -> Imported:
     """Makes a trace of rows that are lines of JSON."""
     asked = {
         "out": out,
@@ -86,7 +86,7 @@ def trace_of(
         "clusters_by_seed": clusters_by_seed,
         "reconstruction": reconstruction,
     }
-    answer = Answer(_native.import_text("rows", rows, asked))
+    answer = Imported(_native.import_text("rows", rows, asked))
     # Where it is, not how messages call it.
     answer["out"] = out
     return answer
@@ -105,6 +105,11 @@ def lines(rows: Any) -> tuple[list[str], bytes]:
         else:
             columns, found = _native.lines_of(stream)
             return columns, found
+    if isinstance(rows, (str, bytes, os.PathLike)) or not isinstance(rows, Iterable):
+        raise TypeError(
+            f"rows: expected dicts or a data frame, found {type(rows).__name__}; read a file first, as with polars.read_csv, "
+            "or let `mirrorstats trace import FILE` read it"
+        )
     names: dict[str, None] = {}
     texts = []
     for at, row in enumerate(rows):

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import json
 import os
-import pathlib
-import tempfile
 from collections.abc import Iterable, Mapping
-from typing import Any, Optional, Union
+from typing import TYPE_CHECKING, Any, Literal, Optional, Union
+
+if TYPE_CHECKING:
+    import tempfile
 
 Path = Union[str, "os.PathLike[str]"]
 # A definition file, a style or an experiment: a name, a path, TOML text, or a dict with the keys of the file.
 Toml = Union[str, "os.PathLike[str]", Mapping[str, Any]]
+# A type checker's completion names those that are built in.
+Definitions = Union[Literal["paper", "extended"], Toml]
+Style = Union[Literal["default", "paper"], Toml]
 
 
 class Spool:
@@ -25,27 +29,35 @@ class Spool:
     @property
     def path(self) -> str:
         if self._folder is None:
+            import tempfile
+
             self._folder = tempfile.TemporaryDirectory(prefix="mirrorstats-", ignore_cleanup_errors=True)
         return self._folder.name
 
     def keep(self, name: str, content: bytes) -> str:
         """Writes a file and gives its path."""
-        path = pathlib.Path(self.path, name)
-        path.write_bytes(content)
-        return str(path)
+        path = os.path.join(self.path, name)
+        with open(path, "wb") as file:
+            file.write(content)
+        return path
 
     def new(self, name: str) -> str:
         """The path of a file that is not there yet."""
-        ending, at = pathlib.Path(name), 1
+        (stem, ending), at = os.path.splitext(name), 1
         while os.path.exists(os.path.join(self.path, name)):
             at += 1
-            name = f"{ending.stem}-{at}{ending.suffix}"
+            name = f"{stem}-{at}{ending}"
         return os.path.join(self.path, name)
 
     def files(self) -> dict[str, bytes]:
         """All of its files, by name."""
-        found = sorted(pathlib.Path(self.path).iterdir()) if self._folder else []
-        return {file.name: file.read_bytes() for file in found if file.is_file()}
+        found = sorted(os.scandir(self.path), key=lambda file: file.name) if self._folder else []
+        files = {}
+        for file in found:
+            if file.is_file():
+                with open(file.path, "rb") as content:
+                    files[file.name] = content.read()
+        return files
 
 
 def text(path: Any, spool: Spool) -> str:
@@ -55,7 +67,7 @@ def text(path: Any, spool: Spool) -> str:
         protocol = filesystem.protocol if isinstance(filesystem.protocol, str) else filesystem.protocol[0]
         if protocol in ("file", "local"):
             return place
-        copy = spool.new(pathlib.PurePosixPath(place).name)
+        copy = spool.new(os.path.basename(place))
         filesystem.get_file(place, copy)
         return copy
     path = os.fspath(path)
@@ -71,19 +83,29 @@ def text(path: Any, spool: Spool) -> str:
 
 def is_frame(value: Any) -> bool:
     """Whether it is a data frame of Polars, pandas, Arrow or DuckDB."""
-    return hasattr(value, "__arrow_c_stream__") or (hasattr(value, "collect") and hasattr(value, "collect_schema"))
+    if hasattr(value, "collect") and hasattr(value, "collect_schema"):
+        return True
+    # A series has a stream, and no columns.
+    has_columns = any(hasattr(value, name) for name in ("columns", "column_names", "schema"))
+    return has_columns and hasattr(value, "__arrow_c_stream__")
 
 
 def several(paths: Any) -> list[Any]:
-    """One input or several."""
-    is_one = isinstance(paths, (str, os.PathLike)) or is_frame(paths) or hasattr(paths, "fs")
-    return [paths] if is_one or not isinstance(paths, Iterable) else list(paths)
+    """One input or several; rows that are dicts are one."""
+    is_one = isinstance(paths, (str, bytes, os.PathLike, Mapping)) or is_frame(paths)
+    is_one = is_one or hasattr(paths, "fs") or hasattr(paths, "__arrow_c_stream__")
+    if is_one or not isinstance(paths, Iterable):
+        return [paths]
+    found = list(paths)
+    return [found] if found and all(isinstance(row, Mapping) for row in found) else found
 
 
 def toml_file(value: Toml, noun: str, spool: Spool) -> str:
     """A name or a path as it is; TOML text or a dict as a file."""
     if isinstance(value, Mapping):
         return spool.keep(f"{noun}.toml", "\n".join(_tables(value)).encode())
+    if not isinstance(value, (str, bytes, os.PathLike)) and not hasattr(value, "fs"):
+        raise TypeError(f"{noun}: expected a name, a path, TOML text or a dict, found {type(value).__name__}")
     path = text(value, spool)
     is_toml = "\n" in path or ("=" in path and not path.endswith(".toml"))
     return spool.keep(f"{noun}.toml", path.encode()) if is_toml else path

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import base64
-import inspect
 import json
-import textwrap
-import warnings
 from collections.abc import Callable
 from typing import Any, Literal, Optional, Union
 
 from . import _native
-from ._answer import Answer
+from ._answer import Recorded
 from ._error import ArgumentError, check_name, check_number
 from ._paths import Path, Spool, Toml, text, toml_file
 
@@ -29,7 +25,7 @@ def record(
     images: Literal["path", "base64", "array"] = "path",
     on_error: Literal["raise", "lose"] = "raise",
     **options: Any,
-) -> Answer:
+) -> Recorded:
     """Records episodes of an agent in the mirror world: step traces to be opened, logs with the frames.
 
     The same call again continues where it stopped. Ctrl-C ends a recording: a function is not waited for, an agent of another
@@ -50,13 +46,14 @@ def record(
         on_error: what becomes of an exception of a function: `raise` stops the recording and raises it here, `lose` loses the
             episode and goes on; `lost` of the answer and `lost.jsonl` of the folder then have its traceback.
         options: the other options of `mirrorstats record`, with `_` for `-`: `repeats=2`, `no_frames=True`, or
-            `in_flight=8`, the number of episodes under way at once.
+            `in_flight=8`, the number of episodes under way at once. Settings of `mirrorstats.toml` do not apply.
 
     Returns:
         What became of the episodes: `recorded`, `found` (there before), `steps` (counts), `lost` (episodes without an answer,
         each with its `reason`; a warning names the first), `traces` and `logs` (files), and more.
 
     Raises:
+        ArgumentError: an option with a value that it cannot have.
         RecordError: an agent or a configuration that cannot be used; an agent that could not go on.
         TypeError: an agent that is no name and cannot be called; a keyword that is no option.
         Exception: what the agent raised, with its traceback.
@@ -73,14 +70,16 @@ def record(
     check_name("images", images, ("path", "base64", "array"))
     check_name("on_error", on_error, ("raise", "lose"))
     _check_options(options)
+    if "at_once" in options and agent != "vlm":
+        raise ArgumentError(
+            "at_once: expected it with the agent 'vlm' alone, whose requests it counts\n"
+            "  help: `in_flight=N` is the number of episodes under way at once"
+        )
     spool = Spool()
-    arguments = ["--experiment", toml_file(experiment, "experiment", spool), "--seeds", str(seeds), "--runs", str(runs)]
-    arguments += ["--out", text(out, spool)]
-    for name, value in options.items():
-        arguments += _option(name, value, spool)
+    asked = {name.replace("_", "-"): _plain(value, spool) for name, value in options.items()}
+    asked.update(experiment=toml_file(experiment, "experiment", spool), seeds=seeds, runs=runs, out=text(out, spool))
     if isinstance(agent, str):
-        named = [] if model is None else ["--model", model]
-        return _told(Answer(_native.record([*arguments, "--agent", agent, *named])))
+        return _told(Recorded(_native.record(json.dumps({**asked, "agent": agent, "model": model}))))
     function = {
         "model": model or getattr(agent, "__name__", type(agent).__name__),
         "source": _source(agent),
@@ -88,7 +87,7 @@ def record(
         "is_lost": on_error == "lose",
         "listeners": lambda: _listener(agent, images == "array"),
     }
-    return _told(Answer(_native.record([*arguments, "--agent", "function"], function)))
+    return _told(Recorded(_native.record(json.dumps({**asked, "agent": "function"}), function)))
 
 
 def _check_options(options: dict[str, Any]) -> None:
@@ -103,16 +102,20 @@ def _check_options(options: dict[str, Any]) -> None:
             raise TypeError(f"record() got an unexpected keyword argument {name!r}{hint}")
 
 
-def _option(name: str, value: Any, spool: Spool) -> list[str]:
-    """An option of the command line; False and None leave it out."""
-    flag = "--" + name.replace("_", "-")
-    if value is None or value is False:
-        return []
-    return [flag] if value is True else [flag, text(value, spool) if hasattr(value, "__fspath__") else str(value)]
+def _plain(value: Any, spool: Spool) -> Any:
+    """A value of an option as JSON has it."""
+    if isinstance(value, (list, tuple)):
+        return [_plain(one, spool) for one in value]
+    if value is None or isinstance(value, (bool, int, float, str)):
+        return value
+    return text(value, spool) if hasattr(value, "__fspath__") else str(value)
 
 
 def _source(agent: Any) -> Optional[str]:
     """The text of the agent, of which recordings carry the hash; None where Python does not know it."""
+    import inspect
+    import textwrap
+
     plain = agent if inspect.isfunction(agent) or inspect.isclass(agent) else type(agent)
     try:
         return textwrap.dedent(inspect.getsource(plain))
@@ -122,6 +125,8 @@ def _source(agent: Any) -> Optional[str]:
 
 def _listener(agent: Any, is_array: bool) -> Callable[[str], str]:
     """What the native library calls in one episode, on a thread of its own, with messages as JSON."""
+    import inspect
+
     function = agent() if isinstance(agent, type) else agent
     loop: Any = None
 
@@ -149,19 +154,23 @@ def _listener(agent: Any, is_array: bool) -> Callable[[str], str]:
 
 def _array(png: str) -> Any:
     """The pixels of a frame."""
+    import base64
+
     import numpy
 
     height, width, pixels = _native.pixels(base64.b64decode(png))
     return numpy.frombuffer(pixels, numpy.uint8).reshape(height, width, 3)
 
 
-def _told(answer: Answer) -> Answer:
+def _told(answer: Recorded) -> Recorded:
     lost, recorded = answer["lost"], answer["recorded"]
     answer.text = (
         f"recorded {recorded} of {answer['asked']} episodes of {answer['model']} ({answer['steps']} steps), "
         f"{answer['found']} there before, {len(lost)} lost"
     )
     if lost:
+        import warnings
+
         reason = lost[0]["reason"].splitlines()[0]
         warnings.warn(f"{len(lost)} episodes are lost; first {lost[0]['episode_id']}: {reason}", RuntimeWarning, stacklevel=3)
     return answer

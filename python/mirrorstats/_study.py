@@ -7,11 +7,11 @@ from collections.abc import Iterable, Mapping
 from typing import Any, Literal, Optional, Union
 
 from . import _native
-from ._answer import Answer, Statistics
-from ._error import ArgumentError, InputError, check_name, check_number
+from ._answer import Changes, Explanation, Gate, Manifest, Statistics
+from ._error import ArgumentError, InputError, check_name, check_number, check_share, check_type, is_number
 from ._import import lines, trace_of
 from ._native import ArrowSteps, ArrowTable, Figure, Table
-from ._paths import Path, Spool, Toml, is_frame, several, text, toml_file
+from ._paths import Definitions, Path, Spool, Style, is_frame, several, text, toml_file
 
 Names = Union[str, Iterable[str]]
 
@@ -19,7 +19,7 @@ Names = Union[str, Iterable[str]]
 def open(
     inputs: Any,
     *,
-    definitions: Optional[Toml] = None,
+    definitions: Optional[Definitions] = None,
     where: Optional[str] = None,
     metrics: Optional[Names] = None,
     by: Optional[Names] = None,
@@ -31,7 +31,8 @@ def open(
 
     Args:
         inputs: files, folders or globs, as text, `Path`, `file://` or `fsspec` file; or data frames (Polars, pandas, Arrow,
-            DuckDB) of steps, as `import_steps` takes them, or of scores, one row per episode. One or several.
+            DuckDB) of steps, as `import_steps` takes them, or of scores, one row per episode. One or several; or the rows of
+            such a frame as dicts.
         definitions: `paper`, `extended`, the path of a TOML file, TOML text, or a dict with the keys of such a file. If None,
             those that the experiments of the traces name, else `paper`; for scores those that they were computed with.
         where: a condition on episodes in the language of definitions, such as `seed = 1 and TSA = 1`; all if None.
@@ -46,7 +47,8 @@ def open(
         DefinitionError: faults of the definitions or of the condition.
         ArgumentError: no input, a metric that the definitions do not have, a number of threads below 1.
 
-    Settings of the command line (`mirrorstats.toml`, `MIRRORSTATS_...`) do not apply here.
+    Settings of the command line (`mirrorstats.toml`, `MIRRORSTATS_...`) do not apply here, but for `MIRRORSTATS_BUDGET`, which
+    allows larger inputs.
 
     Example:
         >>> import mirrorstats as ms
@@ -56,6 +58,8 @@ def open(
     """
     check_name("lost", lost, ("excluded", "as-failure"))
     check_number("threads", threads, 1)
+    check_type("where", where, str, "a condition as text")
+    check_type("pool", pool, bool, "True or False")
     given, spool = several(inputs), Spool()
     if not given:
         raise ArgumentError("inputs: expected at least one file, folder or data frame, found none")
@@ -64,8 +68,8 @@ def open(
         "paths": [_input(one, named, spool) for one in given],
         "definitions": named,
         "where": where,
-        "metrics": _names(metrics),
-        "by": _names(by),
+        "metrics": _names("metrics", metrics),
+        "by": _names("by", by),
         "pool": pool,
         "lost_as_failure": lost == "as-failure",
         "threads": threads,
@@ -93,9 +97,53 @@ def compare(studies: Mapping[str, Study]) -> ArrowTable:
         >>> found.column_names[0], found.column_names[-1], len(found)
         ('study', 'change', 800)
     """
+    check_type("studies", studies, Mapping, "studies by name, as a dict")
+    for name, study in studies.items():
+        _check_study(f"studies[{name!r}]", study)
     if len(studies) < 2:
         raise ArgumentError(f"studies: expected two or more studies by name, found {len(studies)}")
     return _native.compare([(name, study._native) for name, study in studies.items()])
+
+
+def gate(
+    base: Study,
+    new: Study,
+    *,
+    metric: Optional[str] = None,
+    margin: float = 0.1,
+    confidence: float = 0.95,
+) -> Gate:
+    """Holds new episodes against old ones, as `mirrorstats gate`: improved, held, regressed, or why neither is said.
+
+    Args:
+        base: the earlier episodes.
+        new: the later episodes. Episodes that were recorded differently are compared where either study was opened with `pool`.
+        metric: the metric; the first one of the definitions with a better direction if None.
+        margin: the largest loss that is accepted, above 0, in the unit of the metric.
+        confidence: one minus the level of every verdict, over all cells; between 0 and 1.
+
+    Returns:
+        `verdict` (the gravest one), `metric`, `margin`, `confidence`, and `cells`, one per experiment and model, each with its
+        `verdict`, `why`, both sides, the difference with its interval and p values, and its `flips`.
+
+    Raises:
+        ArgumentError: a metric that a side does not have, or that has no better direction; a margin of 0 or less.
+        InputError: what is wrong with the traces of a side.
+
+    Example:
+        >>> import mirrorstats as ms
+        >>> old = ms.open(ms.example_runs(), where="model = 'GPT 5.1' and seed < 3")
+        >>> new = ms.open(ms.example_runs(), where="model = 'GPT 5.1' and seed >= 3")
+        >>> found = ms.gate(old, new, metric="TSA", margin=0.2)
+        >>> found["verdict"], len(found["cells"])
+        ('cannot_say', 5)
+    """
+    _check_study("base", base)
+    _check_study("new", new)
+    check_share("confidence", confidence)
+    if not is_number(margin) or not 0 < margin < float("inf"):
+        raise ArgumentError(f"margin: expected a number above 0 such as 0.1, found {margin!r}")
+    return Gate(new._native.gate(base._native, metric, margin, confidence))
 
 
 class Study:
@@ -171,9 +219,9 @@ class Study:
             >>> ms.open(ms.example_runs()).steps(["episode_id", "t", "action"])
             <mirrorstats.ArrowSteps: episode_id, t, action>
         """
-        return self._native.steps(_names(columns))
+        return self._native.steps(_names("columns", columns))
 
-    def table(self, name: str = "main", *, style: Toml = "default") -> Table:
+    def table(self, name: str = "main", *, style: Style = "default") -> Table:
         """A table of the report: `main`, or another one that the style lays out.
 
         Args:
@@ -191,7 +239,7 @@ class Study:
         """
         return self._native.table(name, self._style(style))
 
-    def tables(self, *, style: Toml = "default") -> list[Table]:
+    def tables(self, *, style: Style = "default") -> list[Table]:
         """All tables of the report.
 
         Example:
@@ -204,30 +252,34 @@ class Study:
     def figure(
         self,
         name: Literal[
-            "spider",
-            "heatmap",
-            "scatter",
-            "completion-gap",
-            "e5-outcomes",
-            "intervals",
-            "slopes",
-            "decision-curve",
-            "gaze",
+            "spider", "heatmap", "scatter", "completion-gap", "e5-outcomes", "intervals", "slopes", "decision-curve", "gaze"
         ],
         *,
-        style: Toml = "default",
+        style: Style = "default",
+        metric: Optional[Names] = None,
+        title: Optional[str] = None,
+        width: Optional[str] = None,
     ) -> Figure:
-        """A figure by name, with the models in the order of a style.
+        """A figure by name, as `mirrorstats figure`.
+
+        Args:
+            name: the figure.
+            style: for the order of the models, and for the metrics and captions of figures.
+            metric: the metrics that it shows, one or several in the order of their roles; those of the style if None.
+            title: a heading of its own.
+            width: the width on paper from 8 cm to 50 cm, such as `8.5cm`, `85mm`, `3.3in`, `240pt` or `640px`; text has at least
+                6 pt there. As wide as it is drawn if None.
 
         Raises:
-            ArgumentError: no figure of this name; traces that lack what it needs.
+            ArgumentError: no figure of this name; traces that lack what it needs; another number of metrics than it shows; a
+                width in which its text does not fit.
 
         Example:
             >>> import mirrorstats as ms
-            >>> ms.open(ms.example_runs()).figure("intervals")
+            >>> ms.open(ms.example_runs()).figure("intervals", metric="CAAL", title="Self-attribution", width="8.5cm")
             <mirrorstats.Figure: intervals>
         """
-        return self._native.figure(name, self._style(style))
+        return self._native.figure(name, self._style(style), _names("metric", metric), title, width)
 
     def query(self, sql: str) -> ArrowTable:
         """The rows of a SELECT over the tables `steps`, `episodes` and `cells`, as `mirrorstats query`.
@@ -245,7 +297,7 @@ class Study:
         """
         return self._native.query(sql)
 
-    def report(self, out: Path, *, style: Toml = "default", figures: bool = True) -> Answer:
+    def report(self, out: Path, *, style: Style = "default", figures: bool = True) -> Manifest:
         """Writes the folder of a report, in place of the report that is there, and returns its manifest.
 
         Raises:
@@ -258,7 +310,7 @@ class Study:
             >>> manifest["where"] is None
             True
         """
-        return Answer(self._native.report(text(out, self._spool), self._style(style), figures))
+        return Manifest(self._native.report(text(out, self._spool), self._style(style), figures))
 
     def stats(self, *, confidence: float = 0.95, horizon: Optional[int] = None, full: bool = False) -> Statistics:
         """Intervals, tests and comparisons of the cells, as `mirrorstats stats --json`; `Statistics` has them as frames too.
@@ -277,12 +329,11 @@ class Study:
             >>> stats["episodes"], stats["confidence"]
             (168, 0.9)
         """
-        if not isinstance(confidence, (int, float)) or not 0 < confidence < 1:
-            raise ArgumentError(f"confidence: expected a number between 0 and 1 such as 0.95, found {confidence!r}")
+        check_share("confidence", confidence)
         check_number("horizon", horizon, 1)
         return Statistics(self._native.stats(confidence, horizon, full))
 
-    def diff(self, other: Study) -> Answer:
+    def diff(self, other: Study) -> Changes:
         """What changes from this study to another one: cells, and values of episodes, as `mirrorstats diff --json`.
 
         For two studies of the same traces under one filter, each change names the timesteps that decided it.
@@ -293,9 +344,10 @@ class Study:
             >>> study.diff(study)["flips"]
             []
         """
-        return Answer(self._native.diff(other._native))
+        _check_study("other", other)
+        return Changes(self._native.diff(other._native))
 
-    def explain(self, episode_id: str) -> Answer:
+    def explain(self, episode_id: str) -> Explanation:
         """The scores of one episode and the timesteps that decided them, as `mirrorstats score --explain --json`.
 
         Raises:
@@ -307,9 +359,9 @@ class Study:
             >>> ms.open(ms.example_runs()).explain("E1/gpt-5-1/s1/r2")["episode_id"]
             'E1/gpt-5-1/s1/r2'
         """
-        return Answer(self._native.explain(episode_id))
+        return Explanation(self._native.explain(episode_id))
 
-    def _style(self, style: Toml) -> str:
+    def _style(self, style: Style) -> str:
         return toml_file(style, "style", self._spool)
 
     def __repr__(self) -> str:
@@ -331,16 +383,28 @@ def _again(asked: dict[str, Any], folder: str, files: dict[str, bytes]) -> Study
     return Study({**asked, "paths": [*map(moved, asked["paths"])], "definitions": moved(asked["definitions"])}, spool)
 
 
-def _names(names: Optional[Names]) -> Optional[list[str]]:
-    return [names] if isinstance(names, str) else None if names is None else list(names)
+def _names(argument: str, names: Optional[Names]) -> Optional[list[str]]:
+    if names is None or isinstance(names, str):
+        return None if names is None else [names]
+    found = list(names) if isinstance(names, Iterable) else [names]
+    if not found:
+        raise ArgumentError(f"{argument}: expected at least one name, found none")
+    for name in found:
+        check_type(argument, name, str, "a name or several")
+    return found
+
+
+def _check_study(argument: str, study: Any) -> None:
+    if not isinstance(study, Study):
+        raise TypeError(f"{argument}: expected a Study, as `open` gives it, found {type(study).__name__}")
 
 
 def _input(given: Any, definitions: Optional[str], spool: Spool) -> str:
     """A path as it is; a data frame as a trace or as a file of scores."""
-    if isinstance(given, (str, os.PathLike)) or hasattr(given, "fs"):
+    if isinstance(given, (str, bytes, os.PathLike)) or hasattr(given, "fs"):
         return text(given, spool)
-    if not is_frame(given):
-        raise TypeError(f"inputs: expected a path or a data frame, found {type(given).__name__}")
+    if not is_frame(given) and not isinstance(given, list):
+        raise TypeError(f"inputs: expected a path, a data frame or a list of dicts, found {type(given).__name__}")
     columns, rows = lines(given)
     if "t" in columns:
         return str(trace_of(rows, spool.new("steps.parquet"), definitions or "paper")["out"])

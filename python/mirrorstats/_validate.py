@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import os
 from typing import Any, Optional
 
 from . import _native
-from ._answer import Answer
+from ._answer import Validation
 from ._error import ArgumentError, check_number
-from ._paths import Spool, Toml, several, text, toml_file
+from ._paths import Definitions, Spool, several, text, toml_file
 
 
-def validate(inputs: Any, *, definitions: Toml = "paper", threads: Optional[int] = None) -> Answer:
+def validate(inputs: Any, *, definitions: Definitions = "paper", threads: Optional[int] = None) -> Validation:
     """Checks traces against every rule of the schema, as `mirrorstats trace validate --json`.
 
     Args:
@@ -34,5 +35,8 @@ def validate(inputs: Any, *, definitions: Toml = "paper", threads: Optional[int]
     given, spool = several(inputs), Spool()
     if not given:
         raise ArgumentError("inputs: expected at least one file or folder, found none")
+    for one in given:
+        if not isinstance(one, (str, bytes, os.PathLike)) and not hasattr(one, "fs"):
+            raise TypeError(f"inputs: expected a path, found {type(one).__name__}; `import_steps` checks a data frame")
     paths = [text(one, spool) for one in given]
-    return Answer(_native.validate(paths, toml_file(definitions, "definitions", spool), threads))
+    return Validation(_native.validate(paths, toml_file(definitions, "definitions", spool), threads))

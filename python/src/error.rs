@@ -8,6 +8,7 @@ use mirrorstats::StudyError;
 use mirrorstats::cli::{ErrorAnswer, Failure};
 use pyo3::prelude::*;
 use toml_spec::FaultRecord;
+use trace::error::TraceError;
 use trace::import::{Fault, ImportError};
 
 /// An error of a study, of the kind that says what is to be changed.
@@ -30,6 +31,7 @@ fn kind(error: &StudyError) -> &'static str {
         E::Polars(_) => "QueryError",
         E::Definitions(_) | E::Style(_) | E::NotScored { .. } | E::DefinitionsElsewhere { .. } => "DefinitionError",
         E::Metric(_)
+        | E::NoDirection { .. }
         | E::NoTable { .. }
         | E::Figure(_)
         | E::Group(_)
@@ -37,7 +39,11 @@ fn kind(error: &StudyError) -> &'static str {
         | E::Palette { .. }
         | E::EmptyFilter { .. }
         | E::NothingMoves { .. } => "ArgumentError",
-        E::Bundle(_) | E::OntoItself { .. } | E::Target(_) | E::Encode(_) => "OutputError",
+        E::Import(ImportError::Trace(TraceError::Write { .. }))
+        | E::Bundle(_)
+        | E::OntoItself { .. }
+        | E::Target(_)
+        | E::Encode(_) => "OutputError",
         _ => "InputError",
     }
 }

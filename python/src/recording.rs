@@ -1,6 +1,5 @@
 //! Recordings: an agent of the program's, or a Python function in its place.
 
-use std::ffi::OsString;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -8,7 +7,7 @@ use std::thread;
 use std::time::Duration;
 
 use mirrorstats::cli::commands::record::{RecordArgs, Recorded};
-use mirrorstats::cli::{self, Failure};
+use mirrorstats::cli::{self, Failure, Options};
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
 use world::agent::Player;
@@ -94,12 +93,14 @@ pub fn record_options() -> Vec<String> {
     cli::option_names::<RecordArgs>()
 }
 
-/// Records as `mirrorstats record` with these options; with `agent` in the place of what `--agent` names.
+/// Records as `mirrorstats record` with these options, a JSON object; with `agent` in the place of what `--agent` names.
 #[pyfunction]
 #[pyo3(signature = (options, agent=None))]
-pub fn record(py: Python<'_>, options: Vec<OsString>, agent: Option<PythonAgent>) -> PyResult<Answer> {
+pub fn record(py: Python<'_>, options: &str, agent: Option<PythonAgent>) -> PyResult<Answer> {
     let failed = |failure: Failure| error::of_failure(&failure, "RecordError");
-    let args: RecordArgs = cli::options_of("record", options).map_err(failed)?;
+    let options: Options = serde_json::from_str(options).map_err(error::of_argument)?;
+    let wrong = |failure: Failure| error::of_failure(&failure, "ArgumentError");
+    let args: RecordArgs = cli::options_of("record", &options).map_err(wrong)?;
     let ending = Ending::default();
     let player = match agent {
         Some(agent) => agent.player(&args, &ending),

@@ -5,10 +5,12 @@ use std::str::FromStr as _;
 use std::sync::{Arc, OnceLock};
 
 use arrow::array::RecordBatch;
-use mirrorstats::{FigureName, ReportOptions, StatisticsOptions};
+use mirrorstats::{FigureName, FigureOptions, ReportOptions, StatisticsOptions};
 use pyo3::prelude::*;
 use report::changes::Limit;
+use report::figures::InvalidWidth;
 use report::statistics::text::Length;
+use report::statistics::{GateFormat, GateOptions};
 use study::{LostAs, Question};
 
 use crate::answer::{self, Answer};
@@ -23,6 +25,7 @@ const LISTED: usize = 20;
 #[pyclass(frozen, module = "mirrorstats._native")]
 pub struct Study {
     inner: Arc<mirrorstats::Study>,
+    pool: bool,
     episodes: OnceLock<RecordBatch>,
     cells: OnceLock<RecordBatch>,
 }
@@ -60,8 +63,9 @@ impl Asked {
 impl Study {
     #[new]
     fn new(py: Python<'_>, asked: Asked) -> PyResult<Self> {
+        let pool = asked.pool;
         let inner = Arc::new(py.detach(|| asked.open())?);
-        Ok(Self { inner, episodes: OnceLock::new(), cells: OnceLock::new() })
+        Ok(Self { inner, pool, episodes: OnceLock::new(), cells: OnceLock::new() })
     }
 
     #[getter]
@@ -111,10 +115,21 @@ impl Study {
         })
     }
 
-    #[pyo3(signature = (name, style))]
-    fn figure(&self, py: Python<'_>, name: &str, style: &str) -> PyResult<Figure> {
+    #[pyo3(signature = (name, style, metrics, title, width))]
+    fn figure(
+        &self,
+        py: Python<'_>,
+        name: &str,
+        style: String,
+        metrics: Option<Vec<String>>,
+        title: Option<String>,
+        width: Option<&str>,
+    ) -> PyResult<Figure> {
         let name = FigureName::from_str(name).map_err(error::of_argument)?;
-        let figure = py.detach(|| self.inner.figure(name, style).map_err(error::of_study))?;
+        let width = width.map(str::parse).transpose();
+        let width = width.map_err(|fault: InvalidWidth| error::of_argument(format!("width: {fault}")))?;
+        let options = FigureOptions { style: style.into(), metrics, title, width };
+        let figure = py.detach(|| self.inner.figure(name, &options).map_err(error::of_study))?;
         Ok(Figure::new(figure, name.name()))
     }
 
@@ -149,6 +164,27 @@ impl Study {
         let shown = found.changes.render(Limit(LISTED), None);
         let notes = found.notes.iter().map(|note| format!("note: {note}"));
         answer::of(&found.changes, notes.chain([shown]).collect::<Vec<_>>().join("\n"))
+    }
+
+    /// The verdicts on this study against an earlier one. Settings that differ do not matter where either was opened so.
+    #[pyo3(signature = (base, metric, margin, confidence))]
+    fn gate(
+        &self,
+        py: Python<'_>,
+        base: &Self,
+        metric: Option<String>,
+        margin: f64,
+        confidence: f64,
+    ) -> PyResult<Answer> {
+        let gate = py.detach(|| {
+            let metric = match metric {
+                Some(metric) => metric,
+                None => self.inner.leading_metric().map_err(error::of_study)?,
+            };
+            let options = GateOptions { metric, margin, confidence, pool: self.pool || base.pool };
+            self.inner.gate(&base.inner, &options).map_err(error::of_study)
+        })?;
+        answer::of(&gate, gate.render(GateFormat::Text(None)))
     }
 
     #[pyo3(signature = (episode_id))]

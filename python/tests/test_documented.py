@@ -34,14 +34,44 @@ def test_a_docstring_is_there_and_its_example_runs(one, paper, monkeypatch, tmp_
 
 
 def test_functions_and_classes_have_examples():
-    without = {"Answer", "ArgumentError", "DefinitionError", "InputError", "OutputError", "QueryError", "RecordError"}
+    without = {"Answer", "Changes", "Explanation", "Imported", "Manifest", "Recorded", "Validation", "ArgumentError", "DefinitionError", "InputError", "OutputError", "QueryError", "RecordError"}
     lacking = {one.__name__ for one in PUBLIC if ">>>" not in (inspect.getdoc(one) or "")}
     assert lacking - without == set()
 
 
+def blocks(page):
+    return [rest.split("\n```")[0] for rest in (FIXTURES.parent / page).read_text().split("```python\n")[1:]]
+
+
+def test_every_page_with_python_is_run_below():
+    root = FIXTURES.parent
+    pages = [page.relative_to(root).as_posix() for page in [*root.glob("*.md"), *root.glob("docs/**/*.md")]]
+    assert {page: len(blocks(page)) for page in pages if blocks(page)} == {
+        "README.md": 1,
+        "docs/how-to/python.md": 1,
+        "docs/how-to/cluster.md": 1,
+    }
+
+
+def test_the_sql_of_a_page_gives_the_episodes_in_other_libraries(recorded, command, monkeypatch, tmp_path):
+    shutil.copytree(recorded, tmp_path / "runs")
+    (tmp_path / "scores.sql").write_text(command("definitions", "sql").stdout)
+    monkeypatch.chdir(tmp_path)
+    parts = {part.splitlines()[0]: part for part in blocks("docs/how-to/cluster.md")[0].split("# ")[1:]}
+    # `tests/spark` and `make end-to-end` have the libraries of the other two.
+    assert list(parts) == ["DuckDB", "Polars", "DataFusion", "Spark"]
+    expected = ms.open("runs", definitions="paper").episodes.to_polars().sort("episode_id")
+    expected = expected.rename(lambda name: name.replace("-", "_"))
+    for name in ["DuckDB", "Polars"]:
+        exec(compile(f"# {parts[name]}", name, "exec"), {})
+        found = polars.read_parquet(f"by-{name.lower()}.parquet").sort("episode_id")
+        kept = expected.select(found.columns)
+        assert len(kept.columns) == 15 and found.cast(kept.schema).equals(kept)
+
+
 @pytest.mark.parametrize("page", ["README.md", "docs/how-to/python.md"])
 def test_the_block_of_a_page_runs(page, recorded, monkeypatch, tmp_path):
-    block = (FIXTURES.parent / page).read_text().split("```python\n")[1].split("\n```")[0]
+    (block,) = blocks(page)
     for folder in ["runs", "a", "b"]:
         shutil.copytree(recorded, tmp_path / folder)
     (tmp_path / "mine.toml").write_text('include = ["paper"]\n')

@@ -71,7 +71,7 @@ def test_frames_of_steps_and_of_scores_are_studies(paper):
     rows = random_rows(7)
     frame = pandas.DataFrame(rows)
     expected = ms.open(polars.DataFrame(rows)).cells.to_polars()
-    for form in [frame, frame.sample(frac=1.0, random_state=1), duckdb.sql("select * from frame"), polars.LazyFrame(rows)]:
+    for form in [rows, frame.to_dict("records"), frame, frame.sample(frac=1.0, random_state=1), duckdb.sql("select * from frame"), polars.LazyFrame(rows)]:
         assert ms.open(form).cells.to_polars().equals(expected)
     study = ms.open(paper)
     for scores in [study.episodes, study.episodes.to_polars(), study.episodes.to_pandas()]:
@@ -92,11 +92,42 @@ def test_paths_of_every_kind_are_inputs(paper, tmp_path, monkeypatch):
     memory.put_file(str(file), "/one.parquet")
     for opened in [fsspec.open("memory://one.parquet"), fsspec.open(str(file)), file]:
         assert len(ms.open(opened).episodes) == 21
-    for given, error in [([], ms.ArgumentError), (7, TypeError), ([None], TypeError)]:
+    for given, error in [([], ms.ArgumentError), (7, TypeError), ([None], TypeError), ({"a": 1}, TypeError)]:
         with pytest.raises(error, match="inputs: expected"):
             ms.open(given)
+    with pytest.raises(TypeError, match="inputs: expected a path, a data frame or a list of dicts, found Series"):
+        ms.open(pandas.Series([1, 2]))
+    with pytest.raises(TypeError, match="inputs: expected a path, found DataFrame; `import_steps` checks a data frame"):
+        ms.validate(pandas.DataFrame(random_rows(7)))
+    assert len(ms.open(paper.encode()).episodes) == 840
     with pytest.raises(ms.ArgumentError, match="threads: expected an integer of at least 1, found 0"):
         ms.open(paper, threads=0)
+
+
+def test_an_argument_of_another_type_is_refused_by_its_name(paper, tmp_path):
+    study = ms.open(paper)
+    for ask, words in [
+        (lambda: ms.open(paper, where=3), "where: expected a condition as text, found int"),
+        (lambda: ms.open(paper, pool="yes"), "pool: expected True or False, found str"),
+        (lambda: ms.open(paper, metrics=3), "metrics: expected a name or several, found int"),
+        (lambda: ms.open(paper, definitions=3), "definitions: expected a name, a path, TOML text or a dict, found int"),
+        (lambda: study.diff(None), "other: expected a Study, as `open` gives it, found NoneType"),
+        (lambda: ms.compare([study, study]), "studies: expected studies by name, as a dict, found list"),
+        (lambda: ms.compare({"a": study, "b": 3}), r"studies\['b'\]: expected a Study"),
+        (lambda: ms.import_steps("steps.csv"), "rows: expected dicts or a data frame, found str; read a file first"),
+        (lambda: ms.open(paper, definition="paper"), "unexpected keyword argument 'definition'"),
+    ]:
+        with pytest.raises(TypeError, match=words):
+            ask()
+    for ask, words in [
+        (lambda: ms.open(paper, metrics=[]), "metrics: expected at least one name, found none"),
+        (lambda: ms.import_steps([], cluster="seed", reconstruction=True), "exclude each other"),
+        (lambda: ms.record("frozen", at_once=3, out=tmp_path), "`in_flight=N` is the number of episodes under way"),
+    ]:
+        with pytest.raises(ms.ArgumentError, match=words):
+            ask()
+    with pytest.raises(ms.OutputError, match="cannot write the trace"):
+        ms.import_steps(random_rows(7), tmp_path / "nowhere" / "steps.parquet")
 
 
 def test_cells_are_a_long_frame_with_units_and_intervals(paper):

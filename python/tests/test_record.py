@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+import tomllib
 
 import agent
 import mirrorstats as ms
@@ -96,10 +97,44 @@ def test_what_is_wrong_with_arguments_is_said_before_anything_begins(tmp_path):
         ms.record(None, out=out)
     with pytest.raises(TypeError, match="unexpected keyword argument 'repeat'; did you mean `repeats`"):
         ms.record("oracle", repeat=2, out=out)
+    for words, arguments in [
+        ("`repeats`: 0 is not in 1..=99", {"repeats": 0}),
+        ("`repeats`: invalid digit found in string, found `x`", {"repeats": "x"}),
+        ("`shard`: expected a share such as 3/16, from 1/16 to 16/16, found `3`", {"shard": "3"}),
+        ("`keep_going=True` cannot be used with `max_unusable`", {"keep_going": True, "max_unusable": 3}),
+        ("`no_log=True`: expected true or false, found `3`", {"no_log": 3}),
+        ("`experiment`: expected experiments such as E1, E1..E5, E1,E3 or mine.toml, found `E9`", {"experiment": "E9"}),
+    ]:
+        with pytest.raises(ms.ArgumentError) as raised:
+            ms.record("oracle", out=out, **arguments)
+        assert str(raised.value) == words
     for words, arguments in [("runs", {"runs": 0}), ("seeds", {"seeds": 1.5}), ("images", {"images": "png"})]:
         with pytest.raises(ms.ArgumentError, match=f"{words}: expected"):
             ms.record("oracle", out=out, **arguments)
     assert not out.exists()
+
+
+def test_an_experiment_is_text_or_a_dict(command, tmp_path):
+    text = command("experiments", "show", "E1").stdout.replace("experiment.E1", "experiment.Mine")
+    folders = [tmp_path / "text", tmp_path / "dict"]
+    for experiment, out in zip([text, tomllib.loads(text)], folders):
+        ms.record("frozen", experiment, seeds=1, runs=1, out=out, no_log=True)
+    traces = [pyarrow.parquet.read_table(out / "Mine-frozen.parquet") for out in folders]
+    assert traces[0].equals(traces[1]) and set(traces[0]["experiment"].to_pylist()) == {"Mine"}
+    with pytest.raises(ms.Error, match="unknown key `titel`(?s:.)*did you mean `title`"):
+        ms.record("frozen", {"experiment": {"Mine": {"titel": "x"}}}, out=tmp_path / "wrong")
+
+
+def test_settings_of_the_command_line_do_not_apply(command, paper, tmp_path, monkeypatch):
+    (tmp_path / "mirrorstats.toml").write_text('definitions = "extended"\n[record]\nruns = 3\nno-log = true\n')
+    monkeypatch.setenv("MIRRORSTATS_WHERE", "seed = 1")
+    monkeypatch.chdir(tmp_path)
+    assert "definitions" in command("setup", "config").stdout
+    assert len(ms.open(paper).episodes) == 840 and ms.open(paper).episodes.column_names == ms.open(
+        paper, definitions="paper"
+    ).episodes.column_names
+    found = ms.record("frozen", "E1", seeds=1, runs=1, out="runs")
+    assert found["recorded"] == 1 and found["logs"]
 
 
 def test_async_agents_of_several_episodes_wait_at_once(tmp_path):
@@ -151,7 +186,7 @@ def test_an_interrupt_ends_a_recording(tmp_path):
     started.send_signal(signal.SIGINT)
     since = time.monotonic()
     assert started.stdout.readline() == "interrupted\n"
-    assert time.monotonic() - since < 5, "the agent sleeps for a minute, and is not waited for"
+    assert time.monotonic() - since < 1, "the agent sleeps for a minute, and is not waited for"
     said, _ = started.communicate(timeout=60)
     assert said == "" and started.returncode == 0
 

@@ -144,6 +144,27 @@ def test_a_figure_shows_itself(paper, command, tmp_path):
         study.figure("interval")
 
 
+def test_a_figure_has_a_metric_a_heading_and_a_width(paper, command, tmp_path):
+    study = ms.open(paper)
+    for name, metrics, width in [("intervals", "CAAL", "8.5cm"), ("heatmap", ["TSA", "TTD"], "3.3in"), ("gaze", None, "170mm")]:
+        kept = "run = 1" if name == "gaze" else "run > 0"
+        figure = ms.open(paper, where=kept).figure(name, metric=metrics, title="Eight models & more", width=width)
+        options = ["--title", "Eight models & more", "--width", width, "--where", kept]
+        options += [] if metrics is None else ["--metric", metrics if isinstance(metrics, str) else ",".join(metrics)]
+        assert figure.svg == command("figure", name, paper, *options).stdout
+        assert "Eight models &amp; more" in figure.svg.split("</title>", 1)[1]
+    assert 'width="642.52"' in figure.svg
+    assert "CAAL with its Wilson" in study.figure("intervals", metric="CAAL").svg
+    for wrong, words in [
+        ({"metric": "TSAA"}, "did you mean `TSA`"),
+        ({"metric": ["TSA", "TTD"]}, "the figure `intervals` shows 1 metrics, found 2"),
+        ({"metric": "TTD"}, "draws `TTD` as a rate, found a quantity"),
+        ({"width": "3cm"}, "width: expected a width from 8cm to 50cm such as 8.5cm, .* found `3cm`"),
+    ]:
+        with pytest.raises(ms.ArgumentError, match=words):
+            study.figure("intervals", **wrong)
+
+
 def test_answers_are_those_of_the_command_line(paper, command):
     study = ms.open(paper, where="experiment = 'E1'")
     words = [paper, "--where", "experiment = 'E1'"]
@@ -157,6 +178,31 @@ def test_answers_are_those_of_the_command_line(paper, command):
     assert str(ms.validate(paper)) == command("validate", paper).stdout
     shown = study.stats()._repr_html_()
     assert shown.startswith("<pre style=") and "overflow-x" in shown and "&lt;0.0001" in shown and "<0.0001" not in shown
+
+
+def test_a_gate_is_that_of_the_command_line(recorded, command):
+    sides = [f"{recorded}/E1-oracle.parquet", f"{recorded}/E1-random.parquet"]
+    words = ["gate", *sides, "--metric", "TSA", "--margin", "0.2"]
+    base, new = map(ms.open, sides)
+    found = ms.gate(base, new, metric="TSA", margin=0.2)
+    assert found == json.loads(command(*words, "--format", "json", code=4).stdout)
+    assert str(found) == command(*words, code=4).stdout and found["verdict"] == "cannot_say"
+    flips = [flip for cell in found["cells"] for flip in cell["flips"]]
+    frame = found.flips.to_polars()
+    assert frame["new_episode_id"].to_list() == [flip["new"]["episode_id"] for flip in flips] != []
+    assert frame.select("base_value", "new_value").unique().rows() == [(1, 0)] and frame["base_timesteps"].null_count() == 0
+    assert found.cells.to_pandas()["verdict"].tolist() == ["cannot_say"]
+    again = ms.gate(base, base)
+    assert again["metric"] == "TSA" and again["margin"] == 0.1 and again.flips.column_names == found.flips.column_names
+    for wrong, words in [
+        ({"margin": 0}, "margin: expected a number above 0 such as 0.1, found 0"),
+        ({"confidence": 95}, "confidence: expected a number between 0 and 1 such as 0.95, found 95"),
+        ({"metric": "TSAA"}, "did you mean `TSA`"),
+    ]:
+        with pytest.raises(ms.ArgumentError, match=words):
+            ms.gate(base, new, **wrong)
+    with pytest.raises(TypeError, match="new: expected a Study, as `open` gives it, found str"):
+        ms.gate(base, sides[1])
 
 
 def test_a_difference_is_that_of_the_command_line(paper, command, tmp_path):

@@ -1,6 +1,7 @@
 //! The JSON Schemas of what commands print, as far as no crate has the type, and of what others write.
 
-use schemars::schema_for;
+use schemars::generate::SchemaSettings;
+use schemars::{JsonSchema, schema_for};
 use serde_json::{Value, json};
 
 use super::commands::definitions::CheckAnswer;
@@ -9,6 +10,11 @@ use super::commands::study::report::ReportAnswer;
 use super::commands::table::rescore::RescoreAnswer;
 use super::commands::trace::recover::RecoverAnswer;
 use super::commands::trace::schema::Name;
+
+/// The schema of an answer as it is printed: keys that are always there are required.
+pub fn printed_schema<T: JsonSchema>() -> Value {
+    json!(SchemaSettings::draft2020_12().for_serialize().into_generator().into_root_schema_for::<T>())
+}
 
 /// The schemas, each with the name of its file in `schemas/`.
 pub fn schemas() -> Vec<(&'static str, Value)> {
@@ -27,7 +33,7 @@ pub fn schemas() -> Vec<(&'static str, Value)> {
     ];
     #[cfg(feature = "sim")]
     schemas.extend([
-        ("record", json!(schema_for!(super::recording::RecordAnswer))),
+        ("record", printed_schema::<super::recording::RecordAnswer>()),
         ("record-forecast", json!(schema_for!(super::recording::dry_run::ForecastAnswer))),
     ]);
     schemas

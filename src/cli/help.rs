@@ -37,7 +37,10 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
     (
         "figure",
         &[
-            ("Intervals of a metric", "figure intervals runs -o tsa.svg"),
+            (
+                "Intervals of a metric, for a column of 8.5 cm",
+                "figure intervals runs --metric TSA --width 8.5cm -o tsa.svg",
+            ),
             (
                 "As a picture, of two experiments",
                 "figure spider runs --where \"experiment in ('E1', 'E3')\" -o spider.png",

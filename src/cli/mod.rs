@@ -26,13 +26,15 @@ use exact::budget;
 use exact::escape::visible;
 use outcome::{ErrorFormat, Outcome};
 
-pub use answers::schemas;
+pub use answers::{printed_schema, schemas};
 pub use outcome::{ErrorAnswer, Failure};
 use printed::{outcome, output, quality, terminal, text_table};
 #[cfg(all(feature = "sim", feature = "view"))]
 use recording::human;
 #[cfg(feature = "sim")]
 use recording::{dry_run, exec, registration, vlm};
+#[cfg(feature = "sim")]
+pub use typed::options::{Options, option_names, options_of};
 use typed::{args, experiments, scoring, spark};
 
 pub(crate) const NAME: &str = "mirrorstats";
@@ -105,21 +107,6 @@ fn execute(arguments: Vec<OsString>) -> Result<Outcome, Failure> {
 /// Refuses a factor of all budgets that is none before anything is read.
 fn budget_setting() -> Result<(), Failure> {
     budget::setting().map(drop).map_err(Failure::input)
-}
-
-/// The options of a command, as the command line understands them: for a program that has them from elsewhere. No settings of
-/// a file or of the environment are looked at.
-pub fn options_of<A: clap::Args>(verb: &str, options: impl IntoIterator<Item = OsString>) -> Result<A, Failure> {
-    let name = format!("{NAME} {verb}");
-    let command = A::augment_args(clap::Command::new(name.clone()).bin_name(&name).no_binary_name(true));
-    let parsed = command.try_get_matches_from(options).and_then(|matches| A::from_arg_matches(&matches));
-    parsed.map_err(|error| Failure::Usage(Box::new(error)))
-}
-
-/// The names of the options of a command, without the dashes.
-pub fn option_names<A: clap::Args>() -> Vec<String> {
-    let command = A::augment_args(clap::Command::new(NAME));
-    command.get_arguments().filter_map(|argument| argument.get_long().map(str::to_owned)).collect()
 }
 
 /// The outcome, once all of standard output is out: what is left in its buffer at the end is written without a word

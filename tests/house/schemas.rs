@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use metric::explain::Explanation;
 use metric::shape::DefinitionFile;
+use mirrorstats::cli::printed_schema;
 use report::audit::Audit;
 use report::bundle::Manifest;
 use report::cells::diff::Changes;
@@ -41,23 +42,23 @@ fn current() -> Vec<(&'static str, Value)> {
         ("decision", json!(schema_for!(Decision))),
         ("definitions-explain", json!(schema_for!(Explanation))),
         ("definitions", json!(schema_for!(DefinitionFile))),
-        ("diff", json!(schema_for!(Changes))),
+        ("diff", printed_schema::<Changes>()),
         ("episode", json!(schema_for!(EpisodeMessage))),
         ("errata", json!(schema_for!(Errata))),
-        ("gate", json!(schema_for!(Gate))),
-        ("import", json!(schema_for!(ImportAnswer))),
+        ("gate", printed_schema::<Gate>()),
+        ("import", printed_schema::<ImportAnswer>()),
         ("info", json!(schema_for!(Info))),
-        ("manifest", json!(schema_for!(Manifest))),
+        ("manifest", printed_schema::<Manifest>()),
         ("plan", json!(schema_for!(Plan))),
         ("plan-register", json!(schema_for!(RegisteredPlan))),
         ("renormalize", json!(schema_for!(RenormalizeAnswer))),
-        ("score-explain", json!(schema_for!(Evidence))),
+        ("score-explain", printed_schema::<Evidence>()),
         ("sensitivity", json!(schema_for!(Sensitivity))),
-        ("stats", json!(schema_for!(Statistics))),
+        ("stats", printed_schema::<Statistics>()),
         ("stats-sequential", json!(schema_for!(Sequential))),
         ("style", json!(schema_for!(Sheet))),
         ("trace", json!(SchemaDocument::current())),
-        ("validation", json!(schema_for!(Validation))),
+        ("validation", printed_schema::<Validation>()),
         ("verify", json!(schema_for!(Verification))),
     ];
     schemas.extend(mirrorstats::cli::schemas());

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use cast::Cast;
 use exact::number;
-use report::figures::{FigureError, FigureName, Input, draw, sensitivity};
+use report::figures::{FigureError, FigureName, FigureWidth, Input, draw, sensitivity};
 use resvg::usvg::roxmltree::{Document, Node};
 use resvg::usvg::{self, Rect, fontdb};
 use statistics::interval::wilson;
@@ -112,6 +112,57 @@ fn no_text_leaves_the_frame_or_overlaps_another() {
         check_layout("two experiments, one nearly empty", &two);
     }
     check_layout("a cell missing", &paper.without(|e, m| e == "E4" && m == "GPT 5.1"));
+}
+
+/// The smallest text of a picture, pt.
+fn smallest(svg: &str) -> f64 {
+    let size = |svg: &str, name: &str| -> f64 {
+        let from = svg.find(&format!(" {name}=\"")).unwrap() + name.len() + 3;
+        svg[from..].split('"').next().unwrap().parse().unwrap()
+    };
+    let document = Document::parse(svg).unwrap();
+    let drawn: f64 = document.root_element().attribute("viewBox").unwrap().split(' ').nth(2).unwrap().parse().unwrap();
+    let sizes = document.descendants().filter_map(|node| node.attribute("font-size"));
+    let smallest = sizes.map(|size| size.trim_end_matches("px").parse::<f64>().unwrap()).fold(f64::MAX, f64::min);
+    smallest * size(svg, "width") / drawn * 0.75
+}
+
+#[test]
+fn text_is_legible_and_in_the_frame_at_every_width() {
+    let casts = [("paper", cast::paper()), ("9 x 40", cast::made_up(&cast::names(9, 40)))];
+    for (width, px) in [("8cm", 302.36), ("120mm", 453.54), ("9in", 864.0)] {
+        let title = "Self-identification of eight models in a world with one mirror and a second body";
+        for (label, cast) in &casts {
+            for name in FigureName::ALL {
+                let input = Input { width: Some(width.parse().unwrap()), title: Some(title), ..cast.input() };
+                let label = format!("{name} {label} {width}");
+                let svg = draw(name, &input).unwrap_or_else(|error| panic!("{label}: {error}")).inline_svg();
+                check_texts(&label, &svg);
+                assert!(svg.contains(&format!("width=\"{px:.2}\"")), "{label}: {}", &svg[..200]);
+                assert!(smallest(&svg) >= 5.98, "{label}: {} pt", smallest(&svg));
+            }
+        }
+    }
+}
+
+#[test]
+fn a_width_that_is_none_or_too_small_is_refused_with_the_least_one() {
+    for wrong in ["8", "8.5 inches", "0cm", "-9cm", "7.9cm", "2m", "nancm", "51cm"] {
+        let fault = wrong.parse::<FigureWidth>().unwrap_err().to_string();
+        assert_eq!(
+            fault,
+            format!("expected a width from 8cm to 50cm such as 8.5cm, 85mm, 3.3in, 240pt or 640px, found `{wrong}`")
+        );
+    }
+    let cast = cast::paper();
+    let mut sheets = Input::of_cells(&cast.cells).sheets.clone();
+    let all = cast.cells.metrics.iter().cycle().take(14).cloned().collect();
+    sheets.get_mut("heatmap").unwrap().metrics = Some(all);
+    let input = Input { sheets: &sheets, width: "8cm".parse().ok(), ..cast.input() };
+    let told = draw(FigureName::Heatmap, &input).unwrap_err().to_string();
+    let least = told.strip_prefix("figure `heatmap` needs ").unwrap().split(" for").next().unwrap();
+    let input = Input { width: least.parse().ok(), ..input };
+    assert!(draw(FigureName::Heatmap, &input).is_ok(), "{told}");
 }
 
 #[test]

@@ -1,20 +1,41 @@
 //! What figures are drawn from, and the figures of a report.
 
 use std::borrow::Cow;
+use std::path::PathBuf;
 
 use super::error::StudyError;
 use super::results::Results;
 use report::bundle::OutputFile;
 use report::cells::Cells;
 use report::cells::group::{DEFAULT_BY, group};
-use report::figures::{self, Figure, FigureError, FigureFormat, FigureName, Input};
+use report::figures::{self, Figure, FigureError, FigureFormat, FigureName, FigureWidth, Input};
 use report::style::Style;
+
+/// How a figure looks.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FigureOptions {
+    /// `default`, `paper`, or the path of a style file, for the order of models, metrics and captions.
+    pub style: PathBuf,
+    /// The metrics shown, in the order of their roles; those of the style if None.
+    pub metrics: Option<Vec<String>>,
+    /// A heading of its own.
+    pub title: Option<String>,
+    /// The width on paper; as wide as it is drawn if None.
+    pub width: Option<FigureWidth>,
+}
+
+impl Default for FigureOptions {
+    fn default() -> Self {
+        Self { style: PathBuf::from("default"), metrics: None, title: None, width: None }
+    }
+}
 
 /// What figures are drawn from.
 #[derive(Debug)]
 pub struct FigureInputs<'a> {
     cells: Cells,
     style: &'a Style,
+    options: FigureOptions,
     results: Cow<'a, Results>,
 }
 
@@ -35,7 +56,11 @@ impl<'a> FigureInputs<'a> {
     pub fn of(results: &'a Results, style: &'a Style) -> Result<Self, StudyError> {
         let results = results.with_conditions_as_models();
         let cells = group(&results.episodes, &DEFAULT_BY.map(str::to_owned))?;
-        Ok(Self { cells, style, results })
+        Ok(Self { cells, style, options: FigureOptions::default(), results })
+    }
+
+    pub(super) fn with(self, options: FigureOptions) -> Self {
+        Self { options, ..self }
     }
 
     /// One figure.
@@ -66,6 +91,8 @@ impl<'a> FigureInputs<'a> {
             episodes: Some(&self.results.episodes),
             outcomes: self.results.outcomes.as_ref(),
             timelines: self.results.timelines.as_deref(),
+            title: self.options.title.as_deref(),
+            width: self.options.width,
         }
     }
 }

@@ -11,7 +11,7 @@ use super::error::StudyError;
 use super::inputs::Source;
 use super::results::Outputs;
 use super::{Study, pooled};
-use metric::catalog::Better;
+use metric::catalog::{Better, Metric};
 use metric::definitions::UnknownMetric;
 use report::statistics::{Gate, GateOptions, Played};
 use score::evidence;
@@ -67,15 +67,7 @@ impl Study {
     fn gated(&self, options: &GateOptions) -> Result<EpisodeTable, StudyError> {
         let table = self.scan(Outputs { losses: true, ..Outputs::default() })?.episodes;
         self.check_filter(table.len())?;
-        let known = table.catalog.metric.get(&options.metric).filter(|_| table.metric(&options.metric).is_some());
-        let Some(metric) = known else {
-            let names = || table.metrics.iter().map(|column| column.name.clone());
-            let near =
-                exact::suggest::nearest(&options.metric, table.metrics.iter().map(|column| column.name.as_str()));
-            let near = near.map(str::to_owned);
-            return Err(UnknownMetric { name: options.metric.clone(), near, known: names().collect() }.into());
-        };
-        if metric.better == Better::Neither {
+        if check_metric(&table, &options.metric)?.better == Better::Neither {
             return Err(StudyError::NoDirection { metric: options.metric.clone() });
         }
         if !options.pool {
@@ -100,6 +92,16 @@ impl Study {
         let pages = folders.iter().flat_map(|folder| pages_beside(folder, metric)).collect();
         Ok(Shown { evidence, pages })
     }
+}
+
+/// The metric of this name.
+pub(super) fn check_metric<'t>(table: &'t EpisodeTable, name: &str) -> Result<&'t Metric, StudyError> {
+    let found = table.catalog.metric.get(name).filter(|_| table.metric(name).is_some());
+    found.ok_or_else(|| {
+        let names = || table.metrics.iter().map(|column| column.name.as_str());
+        let near = exact::suggest::nearest(name, names()).map(str::to_owned);
+        UnknownMetric { name: name.to_owned(), near, known: names().map(str::to_owned).collect() }.into()
+    })
 }
 
 /// The deciding steps of some episodes with the value that they gave, and pages with frames.

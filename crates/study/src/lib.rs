@@ -79,7 +79,7 @@ pub use backend::Backend;
 pub use backend::{SparkJob, are_uris};
 pub use diff::{Diff, DiffRequest, Side, diff};
 pub use error::StudyError;
-pub use figure_inputs::{Drawings, FigureInputs};
+pub use figure_inputs::{Drawings, FigureInputs, FigureOptions};
 pub use findings::{findings, findings_text};
 pub use import::{ImportAnswer, ImportRequest, OwnColumn, import};
 pub use inputs::{ScoreFile, Source, resolve};
@@ -380,14 +380,22 @@ impl Study {
     /// One figure, with the models in the order of a style.
     ///
     /// # Errors
-    /// As [`Study::score`]; inputs that lack what the figure needs.
-    pub fn figure(&self, name: FigureName, style: impl AsRef<Path>) -> Result<Figure, StudyError> {
-        let style = Style::load(style)?;
+    /// As [`Study::score`]; inputs that lack what the figure needs; another number of metrics than it shows; a width that its
+    /// text does not fit in at 6 pt.
+    pub fn figure(&self, name: FigureName, options: &FigureOptions) -> Result<Figure, StudyError> {
+        let mut style = Style::load(&options.style)?;
+        if let Some(metrics) = &options.metrics {
+            name.check_count(metrics.len())?;
+            style.sheet.figure.entry(name.name().to_owned()).or_default().metrics = Some(metrics.clone());
+        }
         let results = self.scan(Outputs { losses: true, ..Outputs::of_figures(&[name]) })?;
         self.check_filter(results.episodes.len())?;
         let results = self.counted(results).results;
         self.cells_of(&results.episodes)?;
-        Ok(FigureInputs::of(&results, &style)?.draw(name)?)
+        for metric in options.metrics.iter().flatten() {
+            gate::check_metric(&results.episodes, metric)?;
+        }
+        Ok(FigureInputs::of(&results, &style)?.with(options.clone()).draw(name)?)
     }
 
     /// The scores of one episode, and the timesteps that decided them.

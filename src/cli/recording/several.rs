@@ -2,12 +2,11 @@
 //! them ended.
 
 use std::collections::BTreeMap;
-use std::ffi::OsString;
 use std::path::Path;
 
 use serde::Deserialize;
-use toml::{Table, Value};
 
+use crate::cli::Options;
 use crate::cli::commands::record::Recorded;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::recording::RecordAnswer;
@@ -23,15 +22,15 @@ const DEFAULT: &str = "default";
 #[derive(Debug, Deserialize)]
 struct StudyFile {
     #[serde(default)]
-    condition: BTreeMap<String, Table>,
+    condition: BTreeMap<String, Options>,
     #[serde(default)]
-    model: BTreeMap<String, Table>,
+    model: BTreeMap<String, Options>,
     #[serde(flatten)]
-    options: Table,
+    options: Options,
 }
 
 /// The options of each recording of a study, by condition and model.
-pub fn recordings(path: &Path) -> Result<Vec<Vec<OsString>>, Failure> {
+pub fn recordings(path: &Path) -> Result<Vec<Options>, Failure> {
     let place = path.display();
     let fault =
         |fault: &dyn std::fmt::Display| Failure::input(format!("the study in `{place}` cannot be used: {fault}"));
@@ -41,33 +40,23 @@ pub fn recordings(path: &Path) -> Result<Vec<Vec<OsString>>, Failure> {
         return Err(fault(&"expected a table for each model, such as [model.\"Claude Sonnet 4.6\"], found none"));
     }
     if study.condition.is_empty() {
-        study.condition.insert(DEFAULT.to_owned(), Table::new());
+        study.condition.insert(DEFAULT.to_owned(), Options::new());
     }
     let StudyFile { condition, model, options } = study;
     let each = condition.iter().flat_map(|of_condition| model.iter().map(move |of_model| (of_condition, of_model)));
     Ok(each
         .map(|((condition, of_condition), (model, of_model))| {
             let mut all = options.clone();
-            all.entry("agent").or_insert("vlm".into());
+            all.entry("agent").or_insert_with(|| "vlm".into());
             all.insert("model".to_owned(), model.as_str().into());
             if condition != DEFAULT {
                 all.insert("condition".to_owned(), condition.as_str().into());
             }
             all.extend(of_condition.clone());
             all.extend(of_model.clone());
-            all.iter().flat_map(|(key, value)| typed(key, value)).collect()
+            all
         })
         .collect())
-}
-
-/// An option as it would be typed.
-fn typed(key: &str, value: &Value) -> Vec<OsString> {
-    match value {
-        Value::Boolean(is_given) => is_given.then(|| format!("--{key}").into()).into_iter().collect(),
-        Value::Array(values) => values.iter().flat_map(|value| typed(key, value)).collect(),
-        Value::String(text) => vec![format!("--{key}={text}").into()],
-        other => vec![format!("--{key}={other}").into()],
-    }
 }
 
 /// Why a recording could not go on.
@@ -119,7 +108,7 @@ fn outcome_of(answer: &RecordAnswer) -> Outcome {
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeSet;
+    use serde_json::json;
 
     use super::recordings;
 
@@ -129,27 +118,23 @@ mod tests {
         let path = folder.path().join("study.toml");
         let of = |text: &str| {
             std::fs::write(&path, text).unwrap();
-            recordings(&path).map(|all| {
-                let words = all.iter().map(|one| {
-                    one.iter()
-                        .map(|word| word.to_str().unwrap())
-                        .collect::<BTreeSet<_>>()
-                        .into_iter()
-                        .collect::<Vec<_>>()
-                        .join(" ")
-                });
-                words.collect::<Vec<_>>()
-            })
+            recordings(&path).map(|all| serde_json::Value::from_iter(all))
         };
         let study =
             "seeds = 1\nno-log = true\nkeep-going = false\n[model.\"B 1\"]\nmax-cost = 2.5\n[model.a]\nseeds = 3\n";
-        let expected =
-            ["--agent=vlm --max-cost=2.5 --model=B 1 --no-log --seeds=1", "--agent=vlm --model=a --no-log --seeds=3"];
+        let all = json!({"agent": "vlm", "seeds": 1, "no-log": true, "keep-going": false, "model": "B 1"});
+        let mut expected = [all.clone(), all];
+        expected[0]["max-cost"] = json!(2.5);
+        expected[1]["seeds"] = json!(3);
+        expected[1]["model"] = json!("a");
+        let expected = json!(expected);
         assert_eq!(of(study).unwrap(), expected);
         let conditions = "[model.a]\n[condition.near]\nconfig = \"near.toml\"\n[condition.default]\n";
-        let expected = ["--agent=vlm --model=a", "--agent=vlm --condition=near --config=near.toml --model=a"];
+        let plain = json!({"agent": "vlm", "model": "a"});
+        let near = json!({"agent": "vlm", "model": "a", "condition": "near"});
+        let expected = json!([plain, {"agent": "vlm", "model": "a", "condition": "near", "config": "near.toml"}]);
         assert_eq!(of(conditions).unwrap(), expected);
-        assert_eq!(of("[model.a]\n[condition.near]\n").unwrap(), ["--agent=vlm --condition=near --model=a"]);
+        assert_eq!(of("[model.a]\n[condition.near]\n").unwrap(), json!([near]));
         assert!(of("seeds = 1\n").unwrap_err().to_string().contains("expected a table for each model"));
         assert!(of("seeds = \n").unwrap_err().to_string().contains("study.toml"));
     }

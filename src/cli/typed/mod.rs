@@ -2,6 +2,8 @@
 
 pub mod args;
 pub mod experiments;
+#[cfg(feature = "sim")]
+pub mod options;
 pub mod plan;
 pub mod scoring;
 pub mod spark;

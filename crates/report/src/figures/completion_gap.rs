@@ -1,8 +1,6 @@
 //! `completion-gap`: a rate among finished episodes minus the rate among all, models by experiments.
 
-use super::kit::{
-    Align, Frame, MARGIN, Mark, NAME_ROOM, PALETTE, Rgb, Sheet, label, leading, legend, lettering, many, tiles,
-};
+use super::kit::{Align, Frame, MARGIN, Mark, PALETTE, Rgb, Sheet, label, leading, legend, lettering, many, tiles};
 use super::matrix::{MetricId, Reading};
 use super::missing;
 use super::{Drawn, Scene};
@@ -11,16 +9,19 @@ use exact::number::Decimal;
 
 const ROW: f64 = 20.0;
 const CELL: f64 = 50.0;
+const LEAST_CELL: f64 = 34.0;
 /// Room for the scale below, px.
 const LEAST_WIDTH: f64 = 400.0;
 
 pub fn draw(scene: Scene<'_>) -> Drawn {
-    let Scene { matrix, roster, .. } = scene;
+    let Scene { matrix, roster, width: all, .. } = scene;
     let gaps = Gaps::new(scene);
-    let (labels, label_width) = tiles::row_labels(&roster.names(), NAME_ROOM);
+    let (labels, label_width) = tiles::row_labels(&roster.names(), scene.name_room());
     let left = MARGIN + label_width + 8.0;
-    let width = (left + CELL * many(matrix.experiments.len()) + MARGIN).max(LEAST_WIDTH);
-    let cell = (width - MARGIN - left) / many(matrix.experiments.len());
+    let columns = many(matrix.experiments.len());
+    let cell = ((all - MARGIN - left) / columns).clamp(LEAST_CELL, CELL);
+    let width = (left + cell * columns + MARGIN).max(LEAST_WIDTH.min(all));
+    let cell = (width - MARGIN - left) / columns;
     let mut sheet = Sheet::new(width);
     let rows = MARGIN + leading(lettering::heading()) + 4.0;
     let heading = lettering::heading().aligned(Align::Middle);

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use super::kit::{
-    Arrangement, FULL_WIDTH, Frame, MARGIN, Mark, Member, PALETTE, Panels, Plot, Point, Sheet, Stroke, Swatch, legend,
-    many, marker, rate_ticks, whole_ticks,
+    Arrangement, Frame, MARGIN, Mark, Member, PALETTE, Panels, Plot, Point, Sheet, Stroke, Swatch, legend, many,
+    marker, panels, rate_ticks, whole_ticks,
 };
 use super::matrix::MetricId;
 use super::{Drawn, FigureError, FigureName, Scene};
@@ -12,7 +12,8 @@ use score::table::{EpisodeTable, MetricColumn};
 use statistics::competing::{Ending, Outcome};
 use statistics::survival::Survival;
 
-const COLUMNS: usize = 3;
+const MOST_COLUMNS: usize = 3;
+const LEAST_PANEL: f64 = 120.0;
 const PLOT_HEIGHT: f64 = 130.0;
 const AXIS_ROOM: f64 = 34.0;
 const AXIS_BELOW: f64 = 28.0;
@@ -21,12 +22,13 @@ const MARKER_EVERY: f64 = 38.0;
 
 pub fn draw(scene: Scene<'_>, episodes: &EpisodeTable) -> Result<Drawn, FigureError> {
     let endings = endings(episodes, scene.metrics)?;
-    let Scene { matrix, roster, .. } = scene;
+    let Scene { matrix, roster, width, .. } = scene;
     let gap = AXIS_ROOM + 8.0;
     let left = MARGIN + AXIS_ROOM;
-    let arranged = Arrangement { left, columns: COLUMNS, height: PLOT_HEIGHT + AXIS_BELOW, gap };
-    let panels = Panels::new(&matrix.experiments, &matrix.titles(&matrix.experiments), FULL_WIDTH, arranged);
-    let mut sheet = panels.sheet(FULL_WIDTH);
+    let (columns, _) = panels::most(MOST_COLUMNS, width - left - MARGIN, [LEAST_PANEL, gap]);
+    let arranged = Arrangement { left, columns, height: PLOT_HEIGHT + AXIS_BELOW, gap };
+    let panels = Panels::new(&matrix.experiments, &matrix.titles(&matrix.experiments), width, arranged);
+    let mut sheet = panels.sheet(width);
     let last = endings.values().flatten().map(|ending| ending.steps).max().unwrap_or(1).max(1);
     for (experiment, body) in matrix.experiments.iter().zip(&panels.bodies) {
         let plot = Plot::new(Frame { height: PLOT_HEIGHT, ..*body }, 0.0..real(last) * 1.03, 0.0..1.04);

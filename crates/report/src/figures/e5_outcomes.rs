@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use super::kit::{
-    Align, Fill, Frame, Lettering, MARGIN, Mark, NAME_ROOM, PALETTE, Plot, Sheet, Swatch, Tick, label, legend,
-    lettering, many, text_on, tiles,
+    Align, Fill, Frame, Lettering, MARGIN, Mark, PALETTE, Plot, Sheet, Swatch, Tick, label, legend, lettering, many,
+    text_on, tiles,
 };
 use super::{Drawn, Scene};
 use score::table::{EpisodeTable, MetricColumn};
@@ -91,9 +91,9 @@ impl OutcomeRow {
 
 pub(super) fn draw(scene: Scene<'_>, outcomes: &Outcomes) -> Drawn {
     let names = scene.roster.names();
-    let (labels, label_width) = tiles::row_labels(&names, NAME_ROOM);
+    let (labels, label_width) = tiles::row_labels(&names, scene.name_room());
     let left = MARGIN + label_width + 8.0;
-    let width = (left + PLOT_WIDTH + 40.0 + MARGIN).max(LEAST_WIDTH);
+    let width = (left + PLOT_WIDTH + 40.0 + MARGIN).max(LEAST_WIDTH).min(scene.width);
     let mut sheet = Sheet::new(width);
     let frame = Frame::new(left, MARGIN, width - left - MARGIN - 40.0, ROW * many(names.len()));
     let plot = Plot::new(frame, 0.0..1.0, 0.0..1.0);

@@ -1,6 +1,6 @@
 //! Why a figure cannot be drawn.
 
-use super::FigureName;
+use super::{FigureName, FigureWidth};
 
 /// A figure that cannot be drawn from what there is.
 #[derive(Debug, thiserror::Error)]
@@ -28,6 +28,12 @@ pub enum FigureError {
          as --where \"run = 1\""
     )]
     TooManyEpisodes { figure: FigureName, most: usize, found: usize },
+    #[error(
+        "figure `{figure}` needs {least} for these metrics and experiments at 6 pt; draw it wider, or choose fewer metrics"
+    )]
+    TooNarrow { figure: FigureName, least: FigureWidth },
+    #[error("the figure `{figure}` shows {wanted} metrics, found {found}")]
+    MetricCount { figure: FigureName, wanted: String, found: usize },
     #[error("figure `slopes` needs two experiments or more, found {found}; add traces of another one")]
     OneExperiment { found: String },
 }

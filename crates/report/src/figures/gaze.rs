@@ -1,8 +1,8 @@
 //! `gaze`: a raster of episodes by steps: the mirror in view, first sight of it, claim and decision.
 
 use super::kit::{
-    Arrangement, FULL_WIDTH, Fill, Frame, MARGIN, Mark, PALETTE, Panels, Plot, Sheet, Stroke, Swatch, leading, legend,
-    lettering, many, panels, tiles, whole_ticks,
+    Arrangement, Fill, Frame, MARGIN, Mark, PALETTE, Panels, Plot, Sheet, Stroke, Swatch, leading, legend, lettering,
+    many, panels, tiles, whole_ticks,
 };
 use super::{Drawn, Scene};
 use score::timeline::Timeline;
@@ -23,14 +23,14 @@ const LEAST_PANEL: f64 = 70.0;
 pub(super) fn draw(scene: Scene<'_>, timelines: &[Timeline]) -> Drawn {
     let raster = Raster::new(scene, timelines);
     let matrix = scene.matrix;
-    let (labels, label_width) = tiles::row_labels(&scene.roster.names(), NAMES);
+    let (labels, label_width) = tiles::row_labels(&scene.roster.names(), NAMES.min(scene.name_room()));
     let left = MARGIN + label_width + 10.0;
-    let room = FULL_WIDTH - MARGIN - left;
+    let room = scene.width - MARGIN - left;
     let columns = panels::fitting(matrix.experiments.len(), MOST_COLUMNS, room, [LEAST_PANEL, GAP]);
     let height = raster.height() + 28.0;
     let arranged = Arrangement { left, columns, height, gap: GAP };
-    let panels = Panels::new(&matrix.experiments, &[], FULL_WIDTH, arranged);
-    let mut sheet = panels.sheet(FULL_WIDTH);
+    let panels = Panels::new(&matrix.experiments, &[], scene.width, arranged);
+    let mut sheet = panels.sheet(scene.width);
     for first in panels.bodies.iter().step_by(columns) {
         for (block, text) in labels.iter().enumerate() {
             let (top, height) = raster.block(block);

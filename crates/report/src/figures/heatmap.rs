@@ -1,8 +1,8 @@
 //! `heatmap`: models by experiments and metrics; the colour says how good, the number is the mean.
 
 use super::kit::{
-    Align, Arrangement, FULL_WIDTH, Frame, Lettering, MARGIN, NAME_ROOM, PALETTE, Panels, Sheet, label, leading,
-    legend, lettering, many, panels, tiles,
+    Align, Arrangement, Frame, Lettering, MARGIN, PALETTE, Panels, Sheet, label, leading, legend, lettering, many,
+    panels, tiles,
 };
 use super::matrix::{MetricId, Reading};
 use super::missing;
@@ -18,10 +18,10 @@ const MOST_BLOCKS: usize = 8;
 const LEAST_WIDTH: f64 = 430.0;
 
 pub fn draw(scene: Scene<'_>) -> Drawn {
-    let Scene { matrix, roster, metrics } = scene;
-    let (labels, label_width) = tiles::row_labels(&roster.names(), NAME_ROOM);
+    let Scene { matrix, roster, metrics, width: all } = scene;
+    let (labels, label_width) = tiles::row_labels(&roster.names(), scene.name_room());
     let left = MARGIN + label_width + 8.0;
-    let room = FULL_WIDTH - MARGIN - left;
+    let room = all - MARGIN - left;
     let least = many(metrics.len()) * LEAST_CELL;
     let columns = panels::fitting(matrix.experiments.len(), MOST_BLOCKS, room, [least, BLOCK_GAP]);
     let cell = (room - BLOCK_GAP * many(columns - 1)) / many((columns * metrics.len()).max(1));
@@ -32,7 +32,7 @@ pub fn draw(scene: Scene<'_>) -> Drawn {
     let arranged = Arrangement { left, columns, height, gap: BLOCK_GAP };
     let width = left + blocks_width + MARGIN;
     let panels = Panels::new(&matrix.experiments, &matrix.titles(&matrix.experiments), width, arranged);
-    let mut sheet = panels.sheet(width.max(LEAST_WIDTH));
+    let mut sheet = panels.sheet(width.max(LEAST_WIDTH.min(all)));
     for first in panels.bodies.iter().step_by(columns) {
         for (row, label) in labels.iter().enumerate() {
             sheet.text((MARGIN, first.top + head.height + ROW * (many(row) + 0.5)), label, lettering::label());

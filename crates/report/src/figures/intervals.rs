@@ -1,8 +1,8 @@
 //! `intervals`: a rate of each model with its 95 % interval, counts and the level of chance, per experiment.
 
 use super::kit::{
-    Align, Arrangement, FULL_WIDTH, Frame, MARGIN, Mark, Member, NAME_ROOM, PALETTE, Panels, Plot, Sheet, Stroke,
-    Swatch, legend, lettering, many, marker, panels, rate_ticks, tiles,
+    Align, Arrangement, Frame, MARGIN, Mark, Member, PALETTE, Panels, Plot, Sheet, Stroke, Swatch, legend, lettering,
+    many, marker, panels, rate_ticks, tiles,
 };
 use super::matrix::{MetricId, Reading};
 use super::{Drawn, Scene};
@@ -17,16 +17,16 @@ const GAP: f64 = 12.0;
 const AXIS_BELOW: f64 = 28.0;
 
 pub fn draw(scene: Scene<'_>) -> Drawn {
-    let Scene { matrix, roster, metrics } = scene;
+    let Scene { matrix, roster, metrics, width } = scene;
     let metric = metrics[0];
-    let (labels, label_width) = tiles::row_labels(&roster.names(), NAME_ROOM);
+    let (labels, label_width) = tiles::row_labels(&roster.names(), scene.name_room());
     let left = MARGIN + label_width + 22.0;
-    let room = FULL_WIDTH - MARGIN - left;
+    let room = width - MARGIN - left;
     let columns = panels::fitting(matrix.experiments.len(), MOST_COLUMNS, room, [LEAST_PANEL, GAP]);
     let rows_height = ROW * many(labels.len());
     let arranged = Arrangement { left, columns, height: rows_height + AXIS_BELOW, gap: GAP };
-    let panels = Panels::new(&matrix.experiments, &[], FULL_WIDTH, arranged);
-    let mut sheet = panels.sheet(FULL_WIDTH);
+    let panels = Panels::new(&matrix.experiments, &[], width, arranged);
+    let mut sheet = panels.sheet(width);
     for first in panels.bodies.iter().step_by(columns) {
         for (row, (member, label)) in roster.0.iter().zip(&labels).enumerate() {
             let middle = first.top + ROW * (many(row) + 0.5);

@@ -25,6 +25,7 @@ mod scatter;
 pub mod shown;
 mod slopes;
 mod spider;
+mod width;
 
 pub use error::FigureError;
 #[cfg(feature = "raster")]
@@ -33,10 +34,11 @@ pub use kit::font::style_sheet as font_style_sheet;
 pub use kit::format::{EncodeError, FigureFormat, UnknownEnding};
 pub use kit::picture::Figure;
 pub use name::FigureName;
+pub use width::{FigureWidth, InvalidWidth};
 
 use crate::cells::Cells;
 use e5_outcomes::Outcomes;
-use kit::{Roster, Sheet};
+use kit::{FULL_WIDTH, NAME_ROOM, Roster, Sheet};
 use matrix::{Matrix, MetricId};
 use score::table::EpisodeTable;
 use score::timeline::Timeline;
@@ -57,12 +59,25 @@ pub struct Input<'a> {
     pub outcomes: Option<&'a Outcomes>,
     /// Landmarks of each episode: for `gaze`.
     pub timelines: Option<&'a [Timeline]>,
+    /// A heading of its own.
+    pub title: Option<&'a str>,
+    /// The width on paper; as wide as it is drawn if None.
+    pub width: Option<FigureWidth>,
 }
 
 impl<'a> Input<'a> {
     /// Cells and nothing else: enough for all figures but `decision-curve`, `e5-outcomes` and `gaze`.
     pub fn of_cells(cells: &'a Cells) -> Self {
-        Self { cells, order: &[], sheets: &SHOWN, episodes: None, outcomes: None, timelines: None }
+        Self {
+            cells,
+            order: &[],
+            sheets: &SHOWN,
+            episodes: None,
+            outcomes: None,
+            timelines: None,
+            title: None,
+            width: None,
+        }
     }
 }
 
@@ -70,7 +85,8 @@ pub fn draw(name: FigureName, input: &Input<'_>) -> Result<Figure, FigureError> 
     let matrix = Matrix::new(input.cells)?;
     let roster = Roster::new(&matrix.models, input.order);
     let metrics = shown::metrics(name, &matrix, input.sheets)?;
-    let scene = Scene { matrix: &matrix, roster: &roster, metrics: &metrics };
+    let width = input.width.map_or(FULL_WIDTH, FigureWidth::layout);
+    let scene = Scene { matrix: &matrix, roster: &roster, metrics: &metrics, width };
     let missing = |needed| FigureError::MissingInput { figure: name, needed };
     let (sheet, height) = match name {
         FigureName::Spider => spider::draw(scene),
@@ -94,7 +110,18 @@ pub fn draw(name: FigureName, input: &Input<'_>) -> Result<Figure, FigureError> 
             gaze::draw(scene, input.timelines.ok_or_else(|| missing("the steps of each episode"))?)
         }
     };
-    Ok(Figure::new(sheet, height, name.title(), shown::caption(name, &metrics, input.sheets)))
+    let (sheet, height) = match input.title {
+        Some(title) => sheet.under(title, height),
+        None => (sheet, height),
+    };
+    let too_narrow = |least| FigureError::TooNarrow { figure: name, least };
+    let printed = input.width.map(|width| width.printed(sheet.width()).map_err(too_narrow)).transpose()?;
+    let title = input.title.unwrap_or_else(|| name.title());
+    let figure = Figure::new(sheet, height, title, shown::caption(name, &metrics, input.sheets));
+    Ok(match printed {
+        Some(px) => figure.printed(px),
+        None => figure,
+    })
 }
 
 /// What every figure is drawn from.
@@ -103,6 +130,15 @@ struct Scene<'a> {
     matrix: &'a Matrix<'a>,
     roster: &'a Roster<'a>,
     metrics: &'a [MetricId<'a>],
+    /// The width of a figure that takes all of it, px.
+    width: f64,
+}
+
+impl Scene<'_> {
+    /// The widest that names of models beside rows get, px.
+    fn name_room(&self) -> f64 {
+        NAME_ROOM.min(self.width / 3.0)
+    }
 }
 
 /// A drawn sheet and the height to cut it at, px.

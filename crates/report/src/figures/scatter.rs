@@ -1,14 +1,15 @@
 //! `scatter`: one rate against another, one point per model and experiment, its size a relative duration.
 
 use super::kit::{
-    Arrangement, FULL_WIDTH, Frame, MARGIN, Mark, Member, PALETTE, Panels, Plot, Sheet, Stroke, Swatch, dodge, legend,
-    many, marker, rate_ticks,
+    Arrangement, Frame, MARGIN, Mark, Member, PALETTE, Panels, Plot, Sheet, Stroke, Swatch, dodge, legend, marker,
+    panels, rate_ticks,
 };
 use super::matrix::{MetricId, Reading};
 use super::missing::{self, Strip};
 use super::{Drawn, Scene};
 
-const COLUMNS: usize = 3;
+const MOST_COLUMNS: usize = 3;
+const LEAST_PANEL: f64 = 120.0;
 /// The radius of the slowest model's marker, px; area goes by relative duration.
 const LARGEST: f64 = 5.6;
 /// The radius below which a shape cannot be told, px.
@@ -18,16 +19,16 @@ const AXIS_ROOM: f64 = 34.0;
 const AXIS_BELOW: f64 = 28.0;
 
 pub fn draw(scene: Scene<'_>) -> Drawn {
-    let Scene { matrix, roster, metrics } = scene;
+    let Scene { matrix, roster, metrics, width: all } = scene;
     let ids = [metrics[0], metrics[1], metrics[2]];
     let gap = AXIS_ROOM + 8.0;
     let left = MARGIN + AXIS_ROOM;
-    let width = (FULL_WIDTH - left - MARGIN - gap * many(COLUMNS - 1)) / many(COLUMNS);
+    let (columns, width) = panels::most(MOST_COLUMNS, all - left - MARGIN, [LEAST_PANEL, gap]);
     let strips: Vec<_> = matrix.experiments.iter().map(|e| Strip::new(matrix, roster, e, &ids[..2], width)).collect();
     let below = AXIS_BELOW + strips.iter().map(Strip::height).fold(0.0, f64::max);
-    let arranged = Arrangement { left, columns: COLUMNS, height: width + below, gap };
-    let panels = Panels::new(&matrix.experiments, &matrix.titles(&matrix.experiments), FULL_WIDTH, arranged);
-    let mut sheet = panels.sheet(FULL_WIDTH);
+    let arranged = Arrangement { left, columns, height: width + below, gap };
+    let panels = Panels::new(&matrix.experiments, &matrix.titles(&matrix.experiments), all, arranged);
+    let mut sheet = panels.sheet(all);
     for ((experiment, body), strip) in matrix.experiments.iter().zip(&panels.bodies).zip(&strips) {
         let plot = Plot::new(Frame { height: width, ..*body }, -0.06..1.06, -0.06..1.06);
         axes(&mut sheet, &plot, ids);

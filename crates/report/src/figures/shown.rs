@@ -44,6 +44,17 @@ impl FigureName {
             Self::E5Outcomes | Self::Gaze => ([0, 0], 0),
         }
     }
+
+    /// # Errors
+    /// Fewer metrics than the figure shows, or more.
+    pub fn check_count(self, found: usize) -> Result<(), FigureError> {
+        let ([fewest, most], _) = self.metrics();
+        if (fewest..=most).contains(&found) {
+            return Ok(());
+        }
+        let wanted = if fewest == most { fewest.to_string() } else { format!("{fewest} to {most}") };
+        Err(FigureError::MetricCount { figure: self, wanted, found })
+    }
 }
 
 pub(super) fn metrics<'a>(

@@ -1,8 +1,8 @@
 //! `slopes`: a rate of each model from the first experiment to each other one.
 
 use super::kit::{
-    Align, Arrangement, FULL_WIDTH, Frame, Legend, MARGIN, Mark, Member, Panels, Plot, Point, Sheet, Swatch, dodge,
-    label, leading, lettering, many, marker, panels, rate_ticks,
+    Align, Arrangement, Frame, Legend, MARGIN, Mark, Member, Panels, Plot, Point, Sheet, Swatch, dodge, label, leading,
+    lettering, many, marker, panels, rate_ticks,
 };
 use super::matrix::MetricId;
 use super::missing::Strip;
@@ -12,24 +12,26 @@ const MOST_COLUMNS: usize = 4;
 const PLOT_HEIGHT: f64 = 210.0;
 const AXIS_ROOM: f64 = 30.0;
 const GAP: f64 = 22.0;
+const LEAST_PANEL: f64 = 90.0;
 
 pub fn draw(scene: Scene<'_>) -> Result<Drawn, FigureError> {
-    let Scene { matrix, roster, metrics } = scene;
+    let Scene { matrix, roster, metrics, width: all } = scene;
     let metric = metrics[0];
     let (first, others) = match matrix.experiments.as_slice() {
         [first, others @ ..] if !others.is_empty() => (*first, others),
         found => return Err(FigureError::OneExperiment { found: found.join(", ") }),
     };
-    let columns = panels::balanced(others.len(), MOST_COLUMNS);
     let left = MARGIN + AXIS_ROOM;
-    let width = (FULL_WIDTH - left - MARGIN - GAP * many(columns - 1)) / many(columns);
+    let room = all - left - MARGIN;
+    let columns = panels::fitting(others.len(), MOST_COLUMNS, room, [LEAST_PANEL, GAP]);
+    let width = (room - GAP * many(columns - 1)) / many(columns);
     let strip = |e| Strip::new(matrix, roster, e, &[metric], width / 2.0 - 4.0);
     let strips: Vec<_> = others.iter().map(|other| [strip(first), strip(other)]).collect();
     let strip_height = strips.iter().flatten().map(Strip::height).fold(0.0, f64::max);
     let height = PLOT_HEIGHT + label_room() + strip_height;
     let arranged = Arrangement { left, columns, height, gap: GAP };
-    let panels = Panels::new(others, &matrix.titles(others), FULL_WIDTH, arranged);
-    let mut sheet = panels.sheet(FULL_WIDTH);
+    let panels = Panels::new(others, &matrix.titles(others), all, arranged);
+    let mut sheet = panels.sheet(all);
     for (at, ((other, body), strips)) in others.iter().zip(&panels.bodies).zip(&strips).enumerate() {
         let plot = Plot::new(Frame { height: PLOT_HEIGHT, ..*body }, 0.0..1.0, -0.03..1.03);
         axis(&mut sheet, &plot, at % columns, metric.name);
@@ -38,7 +40,7 @@ pub fn draw(scene: Scene<'_>) -> Result<Drawn, FigureError> {
         strips[0].draw(&mut sheet, (body.left, top));
         strips[1].draw(&mut sheet, (body.center().0 + 4.0, top));
     }
-    let legend = Legend::of_models(roster, FULL_WIDTH - 2.0 * MARGIN, Swatch::Line);
+    let legend = Legend::of_models(roster, all - 2.0 * MARGIN, Swatch::Line);
     legend.draw(&mut sheet, (MARGIN, panels.bottom + 10.0));
     Ok((sheet, panels.bottom + 10.0 + legend.height() + MARGIN))
 }

@@ -3,15 +3,16 @@
 use std::f64::consts::TAU;
 
 use super::kit::{
-    Align, Arrangement, FULL_WIDTH, Frame, MARGIN, Mark, Member, PALETTE, Panels, Point, Sheet, Stroke, Swatch, legend,
-    lettering, many, marker, polar,
+    Align, Arrangement, Frame, MARGIN, Mark, Member, PALETTE, Panels, Point, Sheet, Stroke, Swatch, legend, lettering,
+    many, marker, panels, polar,
 };
 use super::matrix::MetricId;
 use super::missing::{self, Strip};
 use super::{Drawn, Scene};
 use metric::catalog::{Better, Kind};
 
-const COLUMNS: usize = 3;
+const MOST_COLUMNS: usize = 3;
+const LEAST_PANEL: f64 = 190.0;
 const GAP: f64 = 12.0;
 const RADIUS: f64 = 70.0;
 /// Room above and below the radar for the labels of its axes, px.
@@ -19,14 +20,14 @@ const LABEL_ROOM: f64 = 18.0;
 
 pub fn draw(scene: Scene<'_>) -> Drawn {
     // Clockwise from above.
-    let Scene { matrix, roster, metrics: axes } = scene;
-    let width = (FULL_WIDTH - 2.0 * MARGIN - GAP * many(COLUMNS - 1)) / many(COLUMNS);
+    let Scene { matrix, roster, metrics: axes, width: all } = scene;
+    let (columns, width) = panels::most(MOST_COLUMNS, all - 2.0 * MARGIN, [LEAST_PANEL, GAP]);
     let strips: Vec<_> = matrix.experiments.iter().map(|e| Strip::new(matrix, roster, e, axes, width)).collect();
     let below = strips.iter().map(Strip::height).fold(0.0, f64::max);
     let height = 2.0 * (RADIUS + LABEL_ROOM) + below;
-    let arranged = Arrangement { left: MARGIN, columns: COLUMNS, height, gap: GAP };
-    let panels = Panels::new(&matrix.experiments, &matrix.titles(&matrix.experiments), FULL_WIDTH, arranged);
-    let mut sheet = panels.sheet(FULL_WIDTH);
+    let arranged = Arrangement { left: MARGIN, columns, height, gap: GAP };
+    let panels = Panels::new(&matrix.experiments, &matrix.titles(&matrix.experiments), all, arranged);
+    let mut sheet = panels.sheet(all);
     for ((experiment, body), strip) in matrix.experiments.iter().zip(&panels.bodies).zip(&strips) {
         let radar = Radar { scene, experiment, axes, center: center(*body) };
         radar.draw(&mut sheet);

@@ -109,10 +109,8 @@ fn check(at: &At<'_>, faults: &mut Vec<Fault>) {
             }
         };
         let Some(metrics) = figure.get("metrics") else { continue };
-        let ([fewest, most], count) = (known.metrics().0, metrics.items().count());
-        if !(fewest..=most).contains(&count) {
-            let wanted = if fewest == most { fewest.to_string() } else { format!("{fewest} to {most}") };
-            faults.push(metrics.fault(format!("the figure `{name}` shows {wanted} metrics, found {count}")));
+        if let Err(wrong) = known.check_count(metrics.items().count()) {
+            faults.push(metrics.fault(FigureError::to_string(&wrong)));
         }
     }
 }

@@ -9,7 +9,8 @@ use clap::builder::PossibleValue;
 use crate::cli::args::{EngineArgs, GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
-use report::figures::{FigureFormat, FigureName};
+use report::figures::{FigureFormat, FigureName, FigureWidth};
+use study::FigureOptions;
 
 /// Draw one figure.
 #[derive(Clone, Debug, clap::Args)]
@@ -26,6 +27,15 @@ pub struct FigureArgs {
     /// The style whose order of models is taken: `default`, `paper`, or a TOML file
     #[arg(long, value_name = "STYLE", default_value = "default")]
     pub style: PathBuf,
+    /// The metrics shown, in the order of their roles, such as CAAL [default: those of the style]
+    #[arg(long, value_name = "METRIC", value_delimiter = ',')]
+    pub metric: Option<Vec<String>>,
+    /// A heading of its own
+    #[arg(long, value_name = "TEXT")]
+    pub title: Option<String>,
+    /// The width on paper, such as 8.5cm or 3.3in; text has at least 6 pt there [default: as wide as it is drawn]
+    #[arg(long, value_name = "WIDTH")]
+    pub width: Option<FigureWidth>,
     /// The file format [default: by the ending of FILE; svg on standard output]
     #[arg(long, value_enum)]
     pub format: Option<Format>,
@@ -80,7 +90,8 @@ impl FigureArgs {
         if let Some(path) = &self.output {
             output::check_target(path, study.files_read(Some(&self.style)))?;
         }
-        let figure = study.figure(self.name, &self.style)?;
+        let Self { style, metric: metrics, title, width, .. } = self;
+        let figure = study.figure(self.name, &FigureOptions { style, metrics, title, width })?;
         let bytes = format.encode(&figure).map_err(Failure::input)?;
         match &self.output {
             Some(path) => output::write_file(path, &bytes)?,

@@ -166,11 +166,8 @@ impl RecordArgs {
             return Ok(self.vlm.each().into_iter().map(one).collect());
         };
         let options = several::recordings(file)?;
-        let parsed = options.into_iter().map(|options| options_of::<Self>("record", options));
-        let in_file = |failure: Failure| match failure {
-            Failure::Usage(error) => Failure::input(format!("in the study `{}`: {error}", file.display())),
-            other => other,
-        };
+        let parsed = options.iter().map(|options| options_of::<Self>("record", options));
+        let in_file = |failure: Failure| Failure::input(format!("in the study `{}`: {failure}", file.display()));
         parsed.map(|args| args.map_err(in_file)).collect()
     }
 

@@ -77,8 +77,14 @@ impl Panels {
 
 /// Columns for `count` panels of at least `least` px in `room` px, at most `most`, so that rows are about equally full.
 pub fn fitting(count: usize, most: usize, room: f64, [least, gap]: [f64; 2]) -> usize {
+    balanced(count, self::most(most, room, [least, gap]).0)
+}
+
+/// As many columns as panels of at least `least` px fit in `room` px, at most `most`, and the width of a panel, px.
+pub fn most(most: usize, room: f64, [least, gap]: [f64; 2]) -> (usize, f64) {
     let fits = |&n: &usize| least * many(n) + gap * many(n - 1) <= room;
-    balanced(count, (1..=most).rev().find(fits).unwrap_or(1))
+    let columns = (1..=most).rev().find(fits).unwrap_or(1);
+    (columns, (room - gap * many(columns - 1)) / many(columns))
 }
 
 /// Columns for `count` panels, at most `most`, so that rows are about equally full.

@@ -19,6 +19,11 @@ impl Figure {
         Self { drawing: sheet.finish(height, title, &caption), caption }
     }
 
+    /// The same figure, `width` px wide.
+    pub(in crate::figures) fn printed(self, width: f64) -> Self {
+        Self { drawing: self.drawing.printed(width), ..self }
+    }
+
     /// One or two sentences on how to read it.
     pub fn caption(&self) -> &str {
         &self.caption

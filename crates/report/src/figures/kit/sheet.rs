@@ -16,7 +16,8 @@ use plotters_backend::BackendCoord;
 use super::font::{self, Weight};
 use super::frame::{Frame, Point};
 use super::ink::{Ink, UNITS_PER_PX, escaped};
-use super::lettering::{Align, Lettering};
+use super::label;
+use super::lettering::{self, Align, Lettering, MARGIN};
 use super::look::{Fill, Rgb, Stroke};
 use super::mark::Mark;
 use exact::format::fixed;
@@ -96,12 +97,27 @@ impl Sheet {
         self.ink.borrow_mut().body.push_str("</g>\n");
     }
 
+    /// What is on it down to `height` px, under a heading; gives the height of both, px.
+    pub fn under(self, title: &str, height: f64) -> (Self, f64) {
+        let heading = lettering::heading();
+        let mut sheet = Self::new(self.width);
+        let mut top = MARGIN;
+        for line in label::wrapped(title, self.width - 2.0 * MARGIN, heading) {
+            sheet.text((MARGIN, top + lettering::leading(heading) / 2.0), &line, heading);
+            top += lettering::leading(heading);
+        }
+        let body = &self.ink.borrow().body;
+        let _ = writeln!(sheet.ink.borrow_mut().body, "<g transform=\"translate(0 {top})\">\n{body}</g>");
+        (sheet, height + top)
+    }
+
     /// The SVG, cut at `height`; `title` and `description` are for those who do not see it.
     pub fn finish(self, height: f64, title: &str, description: &str) -> Drawing {
         let body = std::mem::take(&mut self.ink.borrow_mut().body);
         Drawing {
             width: self.width.ceil(),
             height: height.ceil(),
+            printed: None,
             title: title.into(),
             description: description.into(),
             body,
@@ -124,12 +140,18 @@ impl Sheet {
 pub struct Drawing {
     width: f64,
     height: f64,
+    printed: Option<f64>,
     title: String,
     description: String,
     body: String,
 }
 
 impl Drawing {
+    /// The same drawing, scaled to `width` px.
+    pub fn printed(self, width: f64) -> Self {
+        Self { printed: Some(width), ..self }
+    }
+
     /// The SVG to set into another document, which brings the font along.
     pub fn inline(&self) -> String {
         self.element("")
@@ -142,9 +164,14 @@ impl Drawing {
 
     fn element(&self, head: &str) -> String {
         let Self { width, height, .. } = self;
+        let size = match self.printed {
+            Some(px) => [px, height * px / width].map(|length| fixed(Some(length), 2)),
+            None => [width, height].map(f64::to_string),
+        };
+        let [shown_width, shown_height] = size;
         let (title, description) = (escaped(&self.title), escaped(&self.description));
         let mut svg = format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" \
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{shown_width}\" height=\"{shown_height}\" \
              viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{title}\" \
              font-family=\"'{}', sans-serif\" stroke-linejoin=\"round\">\n\
              {head}<desc>{description}</desc>\n",

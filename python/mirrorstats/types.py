@@ -1,0 +1,922 @@
+"""The shapes of answers, for type checkers: dicts as JSON has them. Written by scripts/python-types.py from schemas/."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Literal, Optional, TypedDict, Union, overload
+
+if TYPE_CHECKING:
+    from . import _answer
+
+
+
+class _Answer(TypedDict):
+    question: str
+    metric: str
+    answer: str
+    role: Literal["primary", "secondary"]
+
+
+class Answer(_Answer, total=False):
+    """One question about one metric, and its answer over all experiments."""
+
+    caveats: list[str]
+
+
+class _Catalog(TypedDict):
+    name: str
+    hash: str
+    open: bool
+    let: dict[str, str]
+    metric: dict[str, Metric]
+    experiment: dict[str, Experiment]
+
+
+class Catalog(_Catalog, total=False):
+    """A resolved definition file: its includes merged, in the order of definition."""
+
+    domain: Optional[str]
+
+
+class CellChange(TypedDict):
+    """A cell whose moments are not the same on both sides."""
+
+    key: dict[str, KeyValue]
+    metric: str
+    kind: Literal["rate", "quantity"]
+    numbers: Pair3
+    mean_change: Optional[float]
+
+
+class CellRow(TypedDict):
+    """One cell: the episodes of one group under one metric."""
+
+    key: dict[str, KeyValue]
+    metric: str
+    kind: Literal["rate", "quantity"]
+    episodes: int
+    n: int
+    sum: int
+    mean: Optional[float]
+    se: Optional[float]
+    intervals: Intervals
+    few: bool
+
+
+class _ChanceRow(TypedDict):
+    experiment: str
+    model: str
+    metric: str
+    role: Literal["chance", "reference"]
+    level: Ratio
+    successes: int
+    n: int
+    p: float
+    mid_p: float
+    p_adjusted: float
+    p_tarone: float
+    verdict: Literal["above", "below", "not_separated"]
+
+
+class ChanceRow(_ChanceRow, total=False):
+    """One rate against one level."""
+
+    condition: Optional[str]
+    units: Optional[Units]
+    losses: Optional[LossCases]
+
+
+class CheckedFile(TypedDict):
+    """One file that was looked at."""
+
+    name: str
+    complete: bool
+    episodes: int
+    steps: int
+    checksums: Literal["none", "stale", "present"]
+
+
+class _ClusterRow(TypedDict):
+    experiment: str
+    model: str
+    metric: str
+    n: int
+    seeds: int
+    mean: Optional[float]
+    se: Optional[float]
+    by_seed: Optional[Clustered]
+    withheld: Optional[Withheld]
+
+
+class ClusterRow(_ClusterRow, total=False):
+    """The seeds of one cell."""
+
+    condition: Optional[str]
+
+
+class Clustered(TypedDict):
+    """What the division of a cell into clusters says about its mean."""
+
+    clusters: int
+    se: float
+    interval: Optional[Interval]
+    icc: Optional[float]
+    design_effect: Optional[float]
+
+
+class _Contrast(TypedDict):
+    model: str
+    metric: str
+    baseline: str
+    against: str
+    matching: Matching
+    method: Literal["mcnemar", "fisher", "restricted_mean_paired", "restricted_mean", "student_paired", "welch", "units"]
+    n: list[int]
+    successes: Optional[list[int]]
+    pairs: Optional[Pairs]
+    undefined: int
+    horizon: Optional[int]
+    difference: Optional[float]
+    interval: Optional[Interval]
+    withheld: Optional[Withheld]
+    p: Optional[float]
+    mid_p: Optional[float]
+    p_least: Optional[float]
+    p_adjusted: Optional[float]
+    p_tarone: Optional[float]
+    separated: bool
+
+
+class Contrast(_Contrast, total=False):
+    """How much a model's mean differs between two experiments, by pairs where their scenes agree."""
+
+    condition: Optional[str]
+    units: Optional[Units]
+    losses: Optional[LossCases]
+    incomparable: Optional[str]
+
+
+class CorrectRow(TypedDict):
+    """The time to a correct decision; wrong ones compete, unfinished episodes are censored (Aalen and Johansen)."""
+
+    correct: float
+    wrong: float
+    median: Optional[int]
+    restricted: RestrictedMean
+    withheld: Optional[Withheld]
+
+
+class DefinitionsName(TypedDict):
+    """Which definitions gave some scores."""
+
+    name: str
+    sha256: str
+
+
+class Design(TypedDict):
+    """What the traces declare about how their episodes came about; nothing by default. Whether two episodes are a pair follows from their scenes, which are a column of the traces."""
+
+    kind: Optional[Literal["recording", "import", "reconstruction"]]
+    cluster: Optional[Literal["seed"]]
+
+
+class Detectable(TypedDict):
+    """The smallest difference of two rates that an exact test of n pairs, or of n episodes on each side, could have shown. In the most favourable case: all discordant pairs point the same way, or one side has no success. Else more is needed."""
+
+    n: int
+    level: float
+    pairs: int
+    smallest: float
+    likely: Optional[float]
+
+
+class _DurationRow(TypedDict):
+    experiment: str
+    model: str
+    metric: str
+    n: int
+    finished: int
+    mean: Optional[float]
+    median: Optional[int]
+    median_interval: Optional[MedianInterval]
+    restricted: Optional[RestrictedMean]
+    withheld: Optional[Withheld]
+    correct: Optional[CorrectRow]
+
+
+class DurationRow(_DurationRow, total=False):
+    """One duration of one experiment and model."""
+
+    condition: Optional[str]
+
+
+class EpisodeName(TypedDict):
+    """What names an episode."""
+
+    episode_id: str
+    model: str
+    experiment: str
+    seed: int
+    run: int
+
+
+class _Experiment(TypedDict):
+    title: str
+    order: int
+    chance: dict[str, Optional[Ratio]]
+    reference: dict[str, list[Ratio]]
+
+
+class Experiment(_Experiment, total=False):
+    """One experiment that a definition file knows."""
+
+    is_declared: bool
+
+
+class Fact(TypedDict):
+    """One aggregate of one episode, or a column of the episode that something is compared with."""
+
+    name: Optional[str]
+    expression: str
+    value: Optional[str]
+    timesteps: list[int]
+    is_of_episode: bool
+
+
+class Family(TypedDict):
+    """All comparisons of models under one rate or duration in one experiment."""
+
+    experiment: str
+    metric: str
+    models: list[str]
+    tied: list[list[str]]
+    tests: list[PairTest]
+    detectable: Optional[Reach]
+
+
+class Finding(TypedDict):
+    """One thing that is wrong with a trace."""
+
+    code: Literal["unreadable", "empty-file", "not-parquet", "truncated", "corrupt-footer", "corrupt-data", "over-budget", "invalid-metadata", "newer-schema", "missing-column", "repeated-column", "wrong-type", "no-episodes", "null-in-required", "empty-string", "out-of-range", "negative-count", "t-start", "t-gap", "t-duplicate", "t-order", "inconsistent-constant", "episode-twice", "episode-in-two-files", "unknown-experiment", "unknown-action", "unknown-reply-status", "unknown-value", "invalid-color", "unseen-color", "stale-checksums", "experiment-overridden", "unknown-level", "split-episode", "unreadable-replies"]
+    severity: Literal["error", "note"]
+    file: str
+    row_group: Optional[int]
+    episode: Optional[str]
+    t: Optional[int]
+    column: Optional[str]
+    expected: str
+    found: str
+    help: str
+
+
+class Flip(TypedDict):
+    """A value of one episode that changed."""
+
+    metric: str
+    episode_id: str
+    model: str
+    experiment: str
+    seed: int
+    run: int
+    value: Pair4
+    timesteps: Pair5
+
+
+class FlippedPair(TypedDict):
+    """Two episodes of one scene with different values."""
+
+    base: Played
+    new: Played
+
+
+class _Gap(TypedDict):
+    experiment: str
+    model: str
+    scene: str
+    episodes: int
+
+
+class Gap(_Gap, total=False):
+    """A scene that models have with which this one is compared by pairs, and that this one has not, or more than once."""
+
+    condition: Optional[str]
+
+
+class _GateCell(TypedDict):
+    experiment: str
+    model: str
+    verdict: Literal["improved", "held", "cannot_say", "not_comparable", "regressed"]
+    why: str
+    base: GateSide
+    new: GateSide
+    difference: Optional[float]
+    interval: Optional[Interval]
+    p_adjusted: Optional[float]
+    p_held: Optional[float]
+    settled_by: Optional[int]
+    flips: list[FlippedPair]
+
+
+class GateCell(_GateCell, total=False):
+    """One experiment and model, later against earlier."""
+
+    base_model: Optional[str]
+    condition: Optional[str]
+    units: Optional[Units]
+
+
+class GateSide(TypedDict):
+    """The episodes of one side of a cell."""
+
+    n: int
+    successes: Optional[int]
+    mean: Optional[float]
+    lost: int
+
+
+class ImprovementRow(TypedDict):
+    """How often an episode of one model decides earlier than one of another, averaged over the experiments that both have."""
+
+    metric: str
+    first: str
+    second: str
+    experiments: list[str]
+    probability: float
+    interval: Optional[Interval]
+
+
+class Input(TypedDict):
+    """One file that was read."""
+
+    path: str
+    sha256: str
+    bytes: int
+
+
+class Interval(TypedDict):
+    """Two bounds, `low <= high`."""
+
+    low: float
+    high: float
+
+
+class LossCase(TypedDict):
+    """A difference and its p value, not adjusted."""
+
+    difference: Optional[float]
+    p: Optional[float]
+
+
+class LossCases(TypedDict):
+    """A test with its lost episodes taken both ways; the verdict stands if it is the same in both, after Holm's adjustment."""
+
+    lost: int
+    lowest: LossCase
+    highest: LossCase
+    agree: bool
+
+
+class _LossRow(TypedDict):
+    experiment: str
+    model: str
+    metric: str
+    n: int
+    successes: int
+    lost: int
+    bounds: Interval
+    interval: Interval
+
+
+class LossRow(_LossRow, total=False):
+    """One rate with lost episodes."""
+
+    condition: Optional[str]
+
+
+class Losses(TypedDict):
+    """Losses, or that nothing is known of them."""
+
+    recorded: bool
+    rows: list[LossRow]
+
+
+class _LostEpisode(TypedDict):
+    episode_id: str
+    model: str
+    experiment: str
+    seed: int
+    run: int
+    step: Optional[int]
+    status: Optional[str]
+    reason: str
+
+
+class LostEpisode(_LostEpisode, total=False):
+    """An episode that was lost for want of an answer."""
+
+    condition: Optional[str]
+
+
+class Matching(TypedDict):
+    """How the episodes of two blocks fit together."""
+
+    pairs: int
+    alone: int
+    repeated: int
+    undeclared: int
+    paired: bool
+
+
+class MedianInterval(TypedDict):
+    """The interval of a median."""
+
+    low: int
+    high: Optional[int]
+
+
+class _Metric(TypedDict):
+    title: str
+    kind: Literal["rate", "quantity"]
+    unit: str
+    better: Literal["higher", "lower", "neither"]
+    section: str
+    help: str
+    value: str
+    when: Optional[str]
+    se: Literal["sample", "population"]
+    chance: Optional[Ratio]
+
+
+class Metric(_Metric, total=False):
+    """One metric, as defined."""
+
+    measures: Optional[Literal["rate", "duration", "count", "fraction"]]
+    range: Optional[ValueRange]
+    finished: Optional[str]
+    completes: Optional[str]
+
+
+class MetricEvidence(TypedDict):
+    """One metric of one episode."""
+
+    metric: str
+    value: Optional[int]
+    timesteps: list[int]
+    facts: list[Fact]
+
+
+class Numbers(TypedDict):
+    """The exact numbers of a cell."""
+
+    episodes: int
+    n: int
+    sum: int
+    sum_sq: int
+    mean: Optional[float]
+    se: Optional[float]
+
+
+class Output(TypedDict):
+    """One file of the report."""
+
+    path: str
+    sha256: str
+    bytes: int
+
+
+class _OverallRow(TypedDict):
+    metric: str
+    first: str
+    second: str
+    experiments: list[str]
+    method: Literal["mantel_haenszel", "pooled_mcnemar", "units"]
+    difference: Optional[float]
+    interval: Optional[Interval]
+    p: Optional[float]
+    mid_p: Optional[float]
+    p_adjusted: Optional[float]
+    separated: bool
+
+
+class OverallRow(_OverallRow, total=False):
+    """Two models under one rate, over all experiments that both have."""
+
+    losses: Optional[LossCases]
+
+
+class Overlap(TypedDict):
+    """What both sides have, and what only one has."""
+
+    both: int
+    only_before: list[str]
+    only_after: list[str]
+
+
+class Overlap2(TypedDict):
+    """What both sides have, and what only one has."""
+
+    both: int
+    only_before: list[EpisodeName]
+    only_after: list[EpisodeName]
+
+
+class OwnColumn(TypedDict):
+    """A column that the schema does not know."""
+
+    name: str
+    type: Optional[Literal["bool", "int", "float", "string", "unsupported"]]
+
+
+class Pair(TypedDict):
+    """A value of the scoring before, and the one after."""
+
+    before: DefinitionsName
+    after: DefinitionsName
+
+
+class Pair2(TypedDict):
+    """A value of the scoring before, and the one after."""
+
+    before: Optional[str]
+    after: Optional[str]
+
+
+class Pair3(TypedDict):
+    """A value of the scoring before, and the one after."""
+
+    before: Optional[Numbers]
+    after: Optional[Numbers]
+
+
+class Pair4(TypedDict):
+    """A value of the scoring before, and the one after."""
+
+    before: Optional[int]
+    after: Optional[int]
+
+
+class Pair5(TypedDict):
+    """A value of the scoring before, and the one after."""
+
+    before: Optional[list[int]]
+    after: Optional[list[int]]
+
+
+class _PairTest(TypedDict):
+    first: str
+    second: str
+    matching: Matching
+    method: Literal["mcnemar", "fisher", "restricted_mean_paired", "restricted_mean", "student_paired", "welch", "units"]
+    n: list[int]
+    successes: Optional[list[int]]
+    pairs: Optional[Pairs]
+    undefined: int
+    horizon: Optional[int]
+    difference: Optional[float]
+    interval: Optional[Interval]
+    withheld: Optional[Withheld]
+    p: Optional[float]
+    mid_p: Optional[float]
+    p_least: Optional[float]
+    p_adjusted: Optional[float]
+    p_tarone: Optional[float]
+    separated: bool
+
+
+class PairTest(_PairTest, total=False):
+    """One model against another."""
+
+    units: Optional[Units]
+    losses: Optional[LossCases]
+    incomparable: Optional[str]
+
+
+class Pairs(TypedDict):
+    """The 2x2 table of paired outcomes."""
+
+    both: int
+    first_only: int
+    second_only: int
+    neither: int
+
+
+class Played(TypedDict):
+    """An episode of one side."""
+
+    episode_id: str
+    value: int
+    timesteps: Optional[list[int]]
+    frames: Optional[str]
+
+
+class RankRow(TypedDict):
+    """The ranks of one model under one metric."""
+
+    experiment: Optional[str]
+    metric: str
+    model: str
+    best: int
+    worst: int
+
+
+class Reach(TypedDict):
+    """The smallest differences that could have been shown; none where no outcome would have been enough."""
+
+    method: Literal["mcnemar", "fisher", "restricted_mean_paired", "restricted_mean", "student_paired", "welch", "units"]
+    n: int
+    tests: int
+    single: Optional[Detectable]
+    family: Optional[Detectable]
+
+
+class Replies(TypedDict):
+    """The replies of all episodes."""
+
+    replies: int
+    unusable: int
+    cells: list[UnusableReplies]
+
+
+class RepliesAnswer(TypedDict):
+    """The replies of one start of a recording."""
+
+    replies: int
+    unreadable: dict[str, int]
+    first_unreadable: Optional[UnreadableReply]
+
+
+class RestrictedMean(TypedDict):
+    """The mean duration up to a horizon."""
+
+    horizon: int
+    mean: float
+    se: float
+    interval: Optional[Interval]
+
+
+class _RetestRow(TypedDict):
+    experiment: str
+    model: str
+    metric: str
+    scenes: int
+    episodes: int
+    unstable: int
+    flipped: float
+    between_scenes: Optional[float]
+    within_scenes: Optional[float]
+
+
+class RetestRow(_RetestRow, total=False):
+    """The verdicts of one model on scenes that it played more than once."""
+
+    condition: Optional[str]
+
+
+class Rewritten(TypedDict):
+    """A part of a definition that is not written the same on both sides."""
+
+    name: str
+    part: str
+    text: Pair2
+
+
+class Selection(TypedDict):
+    """A filter over episodes."""
+
+    condition: str
+    by_results: bool
+
+
+class Spend(TypedDict):
+    """What was spent."""
+
+    cost_usd: float
+    uncosted: int
+    unanswered: int
+    uncosted_usd_at_most: float
+    tokens: int
+    requests: int
+
+
+class StyleOrigin(TypedDict):
+    """The style of a report."""
+
+    name: str
+    sha256: str
+
+
+class Units(TypedDict):
+    """Scenes, seeds or participants with several episodes."""
+
+    n: int
+    name: str
+    too_few: bool
+
+
+class UnreadableReply(TypedDict):
+    """A reply that gave no decision."""
+
+    episode_id: str
+    step: int
+    status: str
+    text: Optional[str]
+    fault: Optional[str]
+
+
+class _UnusableReplies(TypedDict):
+    experiment: str
+    model: str
+    replies: int
+    unusable: int
+
+
+class UnusableReplies(_UnusableReplies, total=False):
+    """The replies of one cell."""
+
+    condition: Optional[str]
+
+
+class ValueRange(TypedDict, total=False):
+    """The values that a metric can have."""
+
+    least: Optional[int]
+    most: Optional[int]
+
+
+Intervals = dict[str, Any]
+KeyValue = Optional[Union[int, str]]
+Ratio = str
+Withheld = dict[str, Any]
+
+if TYPE_CHECKING:
+
+    class _ChangesKeys(_answer.Answer):
+        @overload  # type: ignore[override]
+        def __getitem__(self, key: Literal["definitions"], /) -> Pair: ...
+        @overload
+        def __getitem__(self, key: Literal["rewritten"], /) -> list[Rewritten]: ...
+        @overload
+        def __getitem__(self, key: Literal["metrics"], /) -> Overlap: ...
+        @overload
+        def __getitem__(self, key: Literal["episodes"], /) -> Overlap2: ...
+        @overload
+        def __getitem__(self, key: Literal["by"], /) -> list[str]: ...
+        @overload
+        def __getitem__(self, key: Literal["cells_compared"], /) -> int: ...
+        @overload
+        def __getitem__(self, key: Literal["cells"], /) -> list[CellChange]: ...
+        @overload
+        def __getitem__(self, key: Literal["flips"], /) -> list[Flip]: ...
+        def __getitem__(self, key: str, /) -> Any: ...
+
+    class _ExplanationKeys(_answer.Answer):
+        @overload  # type: ignore[override]
+        def __getitem__(self, key: Literal["episode_id"], /) -> str: ...
+        @overload
+        def __getitem__(self, key: Literal["length"], /) -> int: ...
+        @overload
+        def __getitem__(self, key: Literal["metrics"], /) -> list[MetricEvidence]: ...
+        def __getitem__(self, key: str, /) -> Any: ...
+
+    class _GateKeys(_answer.Answer):
+        @overload  # type: ignore[override]
+        def __getitem__(self, key: Literal["metric"], /) -> str: ...
+        @overload
+        def __getitem__(self, key: Literal["margin"], /) -> float: ...
+        @overload
+        def __getitem__(self, key: Literal["confidence"], /) -> float: ...
+        @overload
+        def __getitem__(self, key: Literal["verdict"], /) -> Literal["improved", "held", "cannot_say", "not_comparable", "regressed"]: ...
+        @overload
+        def __getitem__(self, key: Literal["pooled"], /) -> list[str]: ...
+        @overload
+        def __getitem__(self, key: Literal["cells"], /) -> list[GateCell]: ...
+        def __getitem__(self, key: str, /) -> Any: ...
+
+    class _ImportedKeys(_answer.Answer):
+        @overload  # type: ignore[override]
+        def __getitem__(self, key: Literal["out"], /) -> str: ...
+        @overload
+        def __getitem__(self, key: Literal["episodes"], /) -> int: ...
+        @overload
+        def __getitem__(self, key: Literal["steps"], /) -> int: ...
+        @overload
+        def __getitem__(self, key: Literal["columns"], /) -> list[str]: ...
+        @overload
+        def __getitem__(self, key: Literal["own_columns"], /) -> list[OwnColumn]: ...
+        def __getitem__(self, key: str, /) -> Any: ...
+
+    class _ManifestKeys(_answer.Answer):
+        @overload  # type: ignore[override]
+        def __getitem__(self, key: Literal["version"], /) -> str: ...
+        @overload
+        def __getitem__(self, key: Literal["schema_version"], /) -> int: ...
+        @overload
+        def __getitem__(self, key: Literal["style"], /) -> StyleOrigin: ...
+        @overload
+        def __getitem__(self, key: Literal["by"], /) -> list[str]: ...
+        @overload
+        def __getitem__(self, key: Literal["metrics"], /) -> list[str]: ...
+        @overload
+        def __getitem__(self, key: Literal["where"], /) -> Optional[str]: ...
+        @overload
+        def __getitem__(self, key: Literal["inputs"], /) -> list[Input]: ...
+        @overload
+        def __getitem__(self, key: Literal["outputs"], /) -> list[Output]: ...
+        @overload
+        def __getitem__(self, key: Literal["definitions"], /) -> Catalog: ...
+        def __getitem__(self, key: str, /) -> Any: ...
+
+    class _RecordedKeys(_answer.Answer):
+        @overload  # type: ignore[override]
+        def __getitem__(self, key: Literal["model"], /) -> str: ...
+        @overload
+        def __getitem__(self, key: Literal["asked"], /) -> int: ...
+        @overload
+        def __getitem__(self, key: Literal["found"], /) -> int: ...
+        @overload
+        def __getitem__(self, key: Literal["recorded"], /) -> int: ...
+        @overload
+        def __getitem__(self, key: Literal["steps"], /) -> int: ...
+        @overload
+        def __getitem__(self, key: Literal["elsewhere"], /) -> int: ...
+        @overload
+        def __getitem__(self, key: Literal["replies"], /) -> RepliesAnswer: ...
+        @overload
+        def __getitem__(self, key: Literal["lost"], /) -> list[LostEpisode]: ...
+        @overload
+        def __getitem__(self, key: Literal["stopped_by_limit"], /) -> int: ...
+        @overload
+        def __getitem__(self, key: Literal["spend"], /) -> Optional[Spend]: ...
+        @overload
+        def __getitem__(self, key: Literal["stopped"], /) -> bool: ...
+        @overload
+        def __getitem__(self, key: Literal["traces"], /) -> list[str]: ...
+        @overload
+        def __getitem__(self, key: Literal["logs"], /) -> list[str]: ...
+        def __getitem__(self, key: str, /) -> Any: ...
+
+    class _StatisticsKeys(_answer.Answer):
+        @overload  # type: ignore[override]
+        def __getitem__(self, key: Literal["definitions"], /) -> str: ...
+        @overload
+        def __getitem__(self, key: Literal["definitions_hash"], /) -> str: ...
+        @overload
+        def __getitem__(self, key: Literal["confidence"], /) -> float: ...
+        @overload
+        def __getitem__(self, key: Literal["by"], /) -> list[str]: ...
+        @overload
+        def __getitem__(self, key: Literal["episodes"], /) -> int: ...
+        @overload
+        def __getitem__(self, key: Literal["where"], /) -> Optional[Selection]: ...
+        @overload
+        def __getitem__(self, key: Literal["departures"], /) -> Optional[list[str]]: ...
+        @overload
+        def __getitem__(self, key: Literal["pooled"], /) -> list[str]: ...
+        @overload
+        def __getitem__(self, key: Literal["design"], /) -> Design: ...
+        @overload
+        def __getitem__(self, key: Literal["design_note"], /) -> str: ...
+        @overload
+        def __getitem__(self, key: Literal["families"], /) -> int: ...
+        @overload
+        def __getitem__(self, key: Literal["answers"], /) -> list[Answer]: ...
+        @overload
+        def __getitem__(self, key: Literal["conclusions"], /) -> list[str]: ...
+        @overload
+        def __getitem__(self, key: Literal["warnings"], /) -> list[str]: ...
+        @overload
+        def __getitem__(self, key: Literal["headline"], /) -> list[str]: ...
+        @overload
+        def __getitem__(self, key: Literal["cells"], /) -> list[CellRow]: ...
+        @overload
+        def __getitem__(self, key: Literal["chance"], /) -> list[ChanceRow]: ...
+        @overload
+        def __getitem__(self, key: Literal["models"], /) -> list[Family]: ...
+        @overload
+        def __getitem__(self, key: Literal["overall"], /) -> list[OverallRow]: ...
+        @overload
+        def __getitem__(self, key: Literal["ranks"], /) -> list[RankRow]: ...
+        @overload
+        def __getitem__(self, key: Literal["improvements"], /) -> list[ImprovementRow]: ...
+        @overload
+        def __getitem__(self, key: Literal["gaps"], /) -> list[Gap]: ...
+        @overload
+        def __getitem__(self, key: Literal["conditions"], /) -> list[Contrast]: ...
+        @overload
+        def __getitem__(self, key: Literal["clusters"], /) -> list[ClusterRow]: ...
+        @overload
+        def __getitem__(self, key: Literal["durations"], /) -> list[DurationRow]: ...
+        @overload
+        def __getitem__(self, key: Literal["retests"], /) -> list[RetestRow]: ...
+        @overload
+        def __getitem__(self, key: Literal["losses"], /) -> Losses: ...
+        @overload
+        def __getitem__(self, key: Literal["replies"], /) -> Optional[Replies]: ...
+        def __getitem__(self, key: str, /) -> Any: ...
+
+    class _ValidationKeys(_answer.Answer):
+        @overload  # type: ignore[override]
+        def __getitem__(self, key: Literal["files"], /) -> list[CheckedFile]: ...
+        @overload
+        def __getitem__(self, key: Literal["findings"], /) -> list[Finding]: ...
+        def __getitem__(self, key: str, /) -> Any: ...

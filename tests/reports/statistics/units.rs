@@ -1,5 +1,6 @@
 //! What is said where scenes, seeds or participants have several episodes: each counts once.
 
+use report::statistics::text::Length;
 use report::statistics::{Method, Options, OverallMethod, Statistics, Verdict};
 
 use super::{CLUSTERED, RECORDED, Row, by_place, cells, labelled, with_scenes};
@@ -148,4 +149,23 @@ fn interrupted_repeats_leave_durations_untested() {
     };
     assert_eq!(said(-10), "E1 cannot say: 1 interrupted episode");
     assert_eq!(said(-100), "E1 fast better than slow");
+}
+
+// Python: mean squares within scenes, 3.5 / 7 over 14 episodes and 2.5 / 6 over 13
+// episodes: (0.5 / 14 + 2.5 / 6 / 13) ** 0.5; no rate varies.
+#[test]
+fn the_noise_of_repeats_stands_beside_a_difference() {
+    let mut rows = timed(7);
+    rows.pop();
+    let found = with_scenes(&rows, RECORDED, by_scene);
+    let of = |metric: &str| {
+        let family = found.models.iter().find(|family| family.metric == metric).unwrap();
+        family.tests[0].comparison.repeat_se
+    };
+    assert!((of("TTD").unwrap() - 0.260_318_204_829_335_3).abs() < 1e-12, "{:?}", of("TTD"));
+    assert_eq!(of("TSA"), Some(0.0));
+    let text = found.render(&["TTD".to_owned()], Length::Short, None);
+    assert!(text.contains("SE of repeats"), "{text}");
+    let once = with_scenes(&rows.into_iter().filter(|row| row.3 == 0).collect::<Vec<_>>(), RECORDED, by_scene);
+    assert_eq!(once.models[0].tests[0].comparison.repeat_se, None);
 }

@@ -9,6 +9,7 @@ use super::chance::Units;
 use super::durations::{decided, is_duration};
 use super::losses::{LossCase, LossCases, Toward, settle};
 use super::matching::Matched;
+use super::retest::repeat_variance;
 use super::study::{Block, Study, Unit};
 use super::units::Sides;
 use exact::moments::Moments;
@@ -68,6 +69,10 @@ pub struct Comparison {
     pub interval: Option<Interval>,
     /// Why there is no interval.
     pub withheld: Option<Withheld>,
+    /// The standard error from repeats alone: by how much the difference of means varies if the same scenes are played
+    /// again; none unless both sides repeat scenes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub repeat_se: Option<f64>,
     /// The p value, two-sided: exact and by minimum likelihood for rates, by Student's t for durations.
     pub p: Option<f64>,
     /// The mid-p value of a rate, which is not guaranteed to keep the level.
@@ -113,7 +118,9 @@ impl Compared<'_, '_> {
         };
         let lost = if found.p.is_some() { self.first.lost + self.second.lost } else { 0 };
         let losses = LossCases::of(lost, |toward| self.with_lost(column, &found, sides.as_ref(), toward));
-        Comparison { losses, ..found }
+        let noise = |block| repeat_variance(self.study, block, column);
+        let repeat_se = noise(self.first).zip(noise(self.second)).map(|(a, b)| (a + b).sqrt());
+        Comparison { losses, repeat_se, ..found }
     }
 
     /// The test with the lost episodes of both sides: in a comparison by pairs or units, each is a pair against a known
@@ -346,6 +353,7 @@ impl Comparison {
             difference: None,
             interval: None,
             withheld: None,
+            repeat_se: None,
             p: None,
             mid_p: None,
             p_least: None,

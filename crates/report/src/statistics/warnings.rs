@@ -95,11 +95,7 @@ fn is_undeclared(statistics: &Statistics) -> bool {
 fn repeated(statistics: &Statistics) -> Option<String> {
     let most = matchings(statistics).map(|matching| matching.repeated).max().filter(|&most| most > 0)?;
     let unpaired = matchings(statistics).any(|matching| matching.repeated > 0 && !matching.paired);
-    let follows = if unpaired {
-        "; a test of a rate counts each scene once, and durations with repeats are not tested"
-    } else {
-        ""
-    };
+    let follows = if unpaired { "; a test counts each scene once" } else { "" };
     Some(format!(
         "up to {most} episodes of a comparison share a scene that one side has more than once: they are not pairs{follows}."
     ))
@@ -117,7 +113,7 @@ fn few_seeds(statistics: &Statistics) -> Option<String> {
     let seeds = if fewest == 1 { "1 seed is".to_owned() } else { format!("{fewest} seeds are") };
     Some(format!(
         "{seeds} too few for a claim about new seeds: no test over fewer than {needed} can reach p = {}. \
-         Rates are tested by seed, durations are not tested; intervals of cells speak of new runs of these seeds.",
+         Tests are by seed; intervals of cells speak of new runs of these seeds.",
         p_value(Some(level)).trim_end_matches('0')
     ))
 }

@@ -11,6 +11,7 @@ mod declared;
 mod domains;
 mod extended;
 mod filters;
+mod forms;
 mod gate;
 mod generated;
 #[path = "../../examples/generate/generation/mod.rs"]

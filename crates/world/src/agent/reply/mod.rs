@@ -76,9 +76,8 @@ impl Reading {
     }
 
     /// The same after repairs of what carried the text, which come before its own.
-    #[cfg(feature = "sim")]
     #[must_use]
-    pub(in crate::agent) fn after(mut self, carried: &[Repair]) -> Self {
+    pub(crate) fn after(mut self, carried: &[Repair]) -> Self {
         let is_new = |repair: &Repair| !self.repairs.contains(repair);
         let new: Vec<_> = carried.iter().copied().filter(is_new).collect();
         if matches!(self.status, Status::Ok | Status::Repaired) && !new.is_empty() {

@@ -48,7 +48,7 @@ impl VlmAgent {
             .map_err(|fault| self.vlm.halt(Lost::because(format!("the prompt cannot be made: {fault}"))))?;
         let schema = reply::structure(&self.task.experiment.reply);
         // Pixels differ between machines, words do not: a cassette plays on any.
-        let without_frame = self.vlm.body(&words, &schema, "").to_string();
+        let without_frame = self.vlm.choice.body(&words, &schema, "").to_string();
         let question = hash::of_bytes(without_frame.as_bytes());
         let recorded = locked(&self.journal).recorded(observation.t).cloned();
         if let Some(recorded) = recorded {
@@ -69,7 +69,7 @@ impl VlmAgent {
             journal: Arc::clone(&self.journal),
             t: observation.t,
             frame: hash::of_bytes(png),
-            body: self.vlm.body(&words, &schema, &STANDARD.encode(png)),
+            body: self.vlm.choice.body(&words, &schema, &STANDARD.encode(png)),
             question,
             at_most,
         };
@@ -125,7 +125,7 @@ impl VlmAgent {
             latency_ms: Some(latency_ms),
             prompt_tokens: count(answer.prompt_tokens),
             completion_tokens: count(answer.completion_tokens),
-            cost_usd: self.vlm.cost_usd(&answer),
+            cost_usd: self.vlm.choice.cost_usd(&answer),
         };
         let reading = reply::read(&answer.text, &self.task.experiment, answer.ending).after(&answer.repairs);
         Reply { model: answer.model, ..reading.into_reply(answer.text, usage) }

@@ -4,19 +4,32 @@
 //! that will not pass (a refused key, an unknown model, a malformed request) is told at once. A provider that declines
 //! what the request is about has answered, whatever the status.
 
+pub mod concurrency;
+pub mod failure;
+mod parameter;
+mod preflight;
+mod rate_limit;
+mod waiting;
+
+use std::io;
+use std::path::Path;
 use std::time::{Duration, Instant};
 
+pub(super) use parameter::{Mend, refused};
 use reqwest::header::{CONTENT_TYPE, HeaderMap, HeaderName, HeaderValue};
 use reqwest::{Client, Response, StatusCode, Url};
 use serde_json::Value;
+pub(super) use waiting::Waiting;
 
-use super::concurrency::{Pace, Turn};
-use super::failure::{Failure, broken, failed, no_answer, server};
-use super::preflight::{Unreachable, connect};
-use super::rate_limit::{retry_after, retry_info, used_up};
 use super::secrets::Secret;
 use super::wire_format::{Answer, Dialect};
 use crate::agent::reply::Ending;
+use crate::record::plan::slug;
+use concurrency::{Pace, Turn};
+use failure::{Failure, broken, failed, no_answer, server};
+pub use preflight::Unreachable;
+use preflight::connect;
+use rate_limit::{retry_after, retry_info, used_up};
 
 /// How patient a provider is dealt with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,6 +50,8 @@ pub struct Patience {
     pub longest_wait: Duration,
     /// Bytes of an answer.
     pub largest_answer: usize,
+    /// The time between two requests of an account.
+    pub interval: Duration,
 }
 
 impl Default for Patience {
@@ -50,6 +65,7 @@ impl Default for Patience {
             longest_asked_delay: Duration::from_mins(10),
             longest_wait: Duration::from_hours(1),
             largest_answer: 4 * 1024 * 1024,
+            interval: Duration::ZERO,
         }
     }
 }
@@ -125,13 +141,20 @@ impl Provider {
             .user_agent(concat!("mirrorstats/", env!("CARGO_PKG_VERSION")))
             .build()
             .map_err(|fault| SetupError::Client(fault.to_string()))?;
-        Ok(Self { client, url, dialect, secret, patience, pace: Pace::new(at_once) })
+        Ok(Self { client, url, dialect, secret, patience, pace: Pace::new(at_once, patience.interval) })
     }
 
     /// Makes a connection to the address and gives it up again; nothing is sent over it.
     pub fn connect(&self) -> Result<(), Unreachable> {
         connect(&self.url, self.patience.connect_timeout)
             .map_err(|Unreachable { address, fault }| Unreachable { address: self.without_secret(&address), fault })
+    }
+
+    /// Shares when this account takes requests with other processes, by a file in a folder. `key` names the account.
+    pub fn share(&self, folder: &Path, key: &str) -> io::Result<()> {
+        let address = self.url.origin().ascii_serialization();
+        let name = self.without_secret(&format!("at {address} {key}"));
+        self.pace.share(&folder.join(slug(&name)).with_extension("json"))
     }
 
     pub fn dialect(&self) -> Dialect {

@@ -282,7 +282,46 @@ fn the_flex_tier_is_asked_for_and_costs_half() {
     );
     let refused = record("Haiku", "");
     assert_eq!(refused.status.code(), Some(2));
-    assert!(stderr(&refused).contains("the backend `anthropic` has no flex tier"), "{}", stderr(&refused));
+    assert!(stderr(&refused).contains("the backend `anthropic` has no such tier"), "{}", stderr(&refused));
+}
+
+/// `record` of one model of these servers, in one experiment and seed.
+fn one(folder: &Folder, model: &str, words: &str) -> Command {
+    let mut command = program(folder.path());
+    command.env("LOOPBACK_KEY", KEY).args(["record", "--models", "models.toml", "--config", "small.toml", "--no-log"]);
+    command.args(["--experiment", "E1", "--seeds", "1", "--json", "--model", model]).args(words.split_whitespace());
+    command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    command
+}
+
+#[test]
+fn steps_of_many_episodes_go_as_batches_and_none_is_paid_twice_after_a_kill() {
+    let folder = Folder::new();
+    let servers = prepare(&folder, "");
+    let paid = || servers[1].paid();
+    let record = || one(&folder, "Sonnet", "--runs 6 --tier batch");
+    let batches = || {
+        let mut files = std::fs::read_dir(folder.path().join("runs/ledger")).into_iter().flatten().flatten();
+        let notes = files.find(|file| file.path().to_string_lossy().ends_with(".batches.jsonl"));
+        notes.map_or_else(String::new, |file| std::fs::read_to_string(file.path()).unwrap()).lines().count()
+    };
+    let mut killed = record().spawn().unwrap();
+    // The first step goes alone, the others of the first steps together.
+    while batches() < 2 {
+        assert_eq!(killed.try_wait().unwrap(), None, "it ended before its second batch");
+        sleep(Duration::from_millis(5));
+    }
+    killed.kill().unwrap();
+    killed.wait().unwrap();
+    let output = record().output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let answer: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(answer["recorded"], 6);
+    // 24 answers; without batches each of them is a request.
+    assert_eq!(paid(), 24, "an answer was paid twice");
+    assert!((6..=14).contains(&batches()), "{} batches", batches());
+    let cost = answer["spend"]["cost_usd"].as_f64().unwrap();
+    assert!((cost - 24.0 * 0.001_64 / 2.0).abs() < 1e-9, "{cost}");
 }
 
 #[test]

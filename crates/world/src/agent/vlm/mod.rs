@@ -12,7 +12,7 @@
 //! | [`models`] | the models, who serves them, what they cost |
 //! | [`wire_format`] | what requests and answers look like |
 //! | `request` | the body of a request of a model, and what its answer cost |
-//! | [`provider`] | sending one request: how many are out at once, what can go wrong, which waits providers state |
+//! | [`provider`] | sending one request, or many as a batch: how many are out at once, what can go wrong, which waits providers state |
 //! | [`probe`] | which parameters a model takes |
 //! | `step` | what is done then: another attempt, a lost episode, the end |
 //! | `spending` | what a run may spend, over several processes; what requests will take |
@@ -39,4 +39,5 @@ pub use agent::VlmAgent;
 pub use answered::Typical;
 pub use model::{Memory, OnOutage, Vlm};
 pub use provider::{Unreachable, concurrency, failure};
+pub use request::Tier;
 pub use spending::{estimate, limits};

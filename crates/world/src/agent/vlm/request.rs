@@ -3,25 +3,36 @@
 use serde_json::Value;
 
 use super::models::{Choice, Contract, Prices, merge};
-use super::wire_format::{Answer, Question};
+use super::wire_format::{Answer, Dialect, Question};
 use crate::agent::prompt;
 
-/// A provider without a flex tier.
+/// A service tier at half the price.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Tier {
+    /// Answers take minutes.
+    Flex,
+    /// Requests go out in batches, whose answers take hours at most.
+    Batch,
+}
+
+/// A provider without a tier.
 #[derive(Debug, thiserror::Error)]
 #[error(
-    "the backend `{backend}` has no flex tier\n  help: OpenAI (openai-chat) and Google (gemini) have one; leave --tier out"
+    "the backend `{backend}` has no such tier\n  help: OpenAI (openai-chat) and Google (gemini) have --tier flex, Anthropic \
+     (anthropic-messages) has --tier batch"
 )]
-pub struct NoFlexTier {
+pub struct NoTier {
     backend: String,
 }
 
 impl Choice {
-    /// Asks for the flex tier: half the price, and answers that take minutes.
-    pub fn use_flex_tier(&mut self) -> Result<(), NoFlexTier> {
-        let Some(key) = self.backend.dialect.tier_key() else {
-            return Err(NoFlexTier { backend: self.model.backend.clone() });
-        };
-        self.model.extra_body.insert(key.to_owned(), "flex".into());
+    /// Asks for a tier, at half the price.
+    pub fn use_tier(&mut self, tier: Tier) -> Result<(), NoTier> {
+        match (tier, self.backend.dialect.tier_key(), self.backend.dialect) {
+            (Tier::Flex, Some(key), _) => drop(self.model.extra_body.insert(key.to_owned(), "flex".into())),
+            (Tier::Batch, _, Dialect::AnthropicMessages) => {}
+            _ => return Err(NoTier { backend: self.model.backend.clone() }),
+        }
         let Prices { input, cached_input, output } = self.model.prices;
         let [input, cached_input, output] = [input, cached_input, output].map(|price| price.map(|price| price / 2.0));
         self.model.prices = Prices { input, cached_input, output };

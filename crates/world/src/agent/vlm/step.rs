@@ -22,6 +22,8 @@ pub(super) struct Step {
     pub(super) vlm: Arc<Vlm>,
     pub(super) journal: Arc<Mutex<Journal>>,
     pub(super) t: i32,
+    /// Names the request among all of a recording: 64 hexadecimal digits.
+    pub(super) id: String,
     pub(super) frame: String,
     pub(super) body: Value,
     pub(super) question: String,
@@ -103,7 +105,7 @@ impl Step {
             reserved.refused();
             return Err(ended);
         }
-        match provider.ask(turn, &self.body).await {
+        match provider.ask(turn, &self.id, &self.body).await {
             Ok(received) => {
                 let Received { answer, body, latency } = received;
                 self.vlm.learn_from(&answer);

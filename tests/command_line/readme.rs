@@ -17,7 +17,7 @@ use crate::harness::need;
 use crate::harness::program::{PROGRAM, clean};
 
 /// Command lines that are not run, by how they begin, and why.
-const NOT_RUN: [(&str, &str); 17] = [
+const NOT_RUN: [(&str, &str); 18] = [
     ("make demo", "builds the program"),
     ("make test", "runs this test"),
     ("scripts/get-mujoco.sh", "downloads a library; `make test` runs it before"),
@@ -32,6 +32,10 @@ const NOT_RUN: [(&str, &str); 17] = [
     (
         "mirrorstats record --agent oracle --experiment reach-mirror",
         "takes minutes; the calibration of agents does as much",
+    ),
+    (
+        "mirrorstats record --agent vlm --model \"GPT 5.1\" --experiment E1 --probe",
+        "needs a provider; `tests/agents` has servers in its place",
     ),
     (
         "mirrorstats record --agent vlm --model \"GPT 5.1\" --experiment E1 --max-cost",

@@ -89,7 +89,7 @@ pub use provenance::ProvenanceError;
 pub use quality_check::{CellAnswer, NotRecorded, QualityCheckAnswer, QualityLimits, Violation};
 pub use question::{DEFAULT_DEFINITIONS, Question, known_experiments};
 pub use report::{Report, ReportOptions, WrittenReport};
-pub use rescore::{RescoreRequest, Rescored, folder_of_rescored};
+pub use rescore::{RescoreRequest, Rescored, folder_of_rescored, traces_of};
 pub use results::{Outputs, Results};
 pub use scored_alike::ScoredAlike;
 pub use scores::write as write_scores;

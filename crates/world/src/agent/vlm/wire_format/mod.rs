@@ -119,6 +119,16 @@ impl Dialect {
         }
     }
 
+    /// The key of the service tier, of providers that have `flex` at half price: <https://platform.openai.com/docs/guides/flex-processing>,
+    /// <https://ai.google.dev/gemini-api/docs/flex-inference>.
+    pub const fn tier_key(self) -> Option<&'static str> {
+        match self {
+            Self::OpenaiChat => Some("service_tier"),
+            Self::Gemini => Some("serviceTier"),
+            Self::OpenaiCompatible | Self::AnthropicMessages => None,
+        }
+    }
+
     /// The other headers that the language asks for.
     pub const fn headers(self) -> &'static [(&'static str, &'static str)] {
         match self {

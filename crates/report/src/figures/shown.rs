@@ -8,7 +8,7 @@ use serde::Deserialize;
 
 use super::matrix::{Matrix, MetricId};
 use super::{FigureError, FigureName};
-use metric::catalog::Kind;
+use metric::catalog::{Kind, Measures};
 use metric::relations::Relations;
 
 /// What a style says of one figure.
@@ -29,6 +29,9 @@ pub static SHOWN: LazyLock<FigureSheets> = LazyLock::new(|| {
     toml::from_str(include_str!("../../../../assets/styles/figures.toml")).expect("the file comes with the program")
 });
 
+/// More axes than these cannot be told apart.
+const MOST_AXES: usize = 8;
+
 impl FigureName {
     /// The fewest and the most metrics that it shows; the first so many must be rates.
     pub const fn metrics(self) -> ([usize; 2], usize) {
@@ -42,6 +45,23 @@ impl FigureName {
             Self::DecisionCurve => ([2, 2], 0),
             Self::E5Outcomes | Self::Gaze => ([0, 0], 0),
         }
+    }
+
+    /// What it shows of any definitions, or the metric that its style names.
+    pub(super) fn needs(self, metric: &str) -> String {
+        let is_built_in = SHOWN.get(self.name()).and_then(|sheet| sheet.metrics.as_ref());
+        if is_built_in.is_none_or(|listed| listed.iter().all(|name| name != metric)) {
+            return format!("the metric {metric}");
+        }
+        match self {
+            Self::Spider => "three metrics or more",
+            Self::Scatter => "two rates and a duration",
+            Self::CompletionGap => "a rate that `completes` another one",
+            Self::DecisionCurve => "a duration and the rate that is `finished`",
+            Self::Intervals | Self::Slopes => "a rate",
+            Self::Heatmap | Self::E5Outcomes | Self::Gaze => "metrics",
+        }
+        .to_owned()
     }
 }
 
@@ -71,6 +91,13 @@ fn instead<'a>(figure: FigureName, matrix: &Matrix<'a>, listed: &[String]) -> Op
             let known: Vec<_> = listed.iter().filter_map(|name| named(name)).collect();
             Some(if known.is_empty() { all } else { known })
         }
+        FigureName::Spider => (all.len() >= figure.metrics().0[0]).then(|| all.into_iter().take(MOST_AXES).collect()),
+        FigureName::Scatter => {
+            let measuring = |what| all.iter().filter(move |id| id.metric.measures() == Some(what)).copied();
+            let found: Vec<_> =
+                measuring(Measures::Rate).take(2).chain(measuring(Measures::Duration).take(1)).collect();
+            (found.len() == 3).then_some(found)
+        }
         FigureName::Intervals | FigureName::Slopes => {
             all.iter().find(|id| id.metric.kind == Kind::Rate).map(|id| vec![*id])
         }
@@ -80,7 +107,7 @@ fn instead<'a>(figure: FigureName, matrix: &Matrix<'a>, listed: &[String]) -> Op
         FigureName::DecisionCurve => {
             related(|found| found.durations.first().map(|(one, other)| [one, other].map(String::clone)))
         }
-        _ => None,
+        FigureName::E5Outcomes | FigureName::Gaze => None,
     }
 }
 

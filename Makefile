@@ -25,6 +25,7 @@ needed:
 	scripts/get-browser.sh
 	scripts/get-duckdb.sh
 	scripts/get-egl.sh
+	scripts/get-harnesses.sh
 	scripts/get-mujoco.sh
 	scripts/get-spark.sh
 	scripts/get-writers.sh

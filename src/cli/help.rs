@@ -59,6 +59,7 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
         "import",
         &[
             ("Steps of another harness, a line of JSON each", "import steps.jsonl -o mine.parquet"),
+            ("A log of Inspect", "import log.eval -o tools.parquet --definitions tools.toml"),
             ("What a line may hold", "trace schema step"),
         ],
     ),

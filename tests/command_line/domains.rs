@@ -58,10 +58,14 @@ fn a_trace_of_a_robot_benchmark_is_scored_by_a_definition_file_alone() {
     asked(at, &["score", "-o", "scores.csv"]);
     let scores = fs::read_to_string(at.join("scores.csv")).unwrap();
     let rows: Vec<&str> = scores.lines().take(4).collect();
-    assert_eq!(rows[0], "episode_id,model,experiment,seed,run,SUCCESS,TIME,JERKS,mirrorstats.declared");
+    assert_eq!(rows[0], "episode_id,model,experiment,seed,run,SUCCESS,TIME,DURATION,SOLVED,JERKS,mirrorstats.declared");
     assert_eq!(
         rows[1..],
-        [&format!("act-1,act,pusht,1,1,1,3,1,{IMPORTED}"), "act-2,act,pusht,1,2,1,5,0,", "act-3,act,pusht,1,3,0,,2,"]
+        [
+            &format!("act-1,act,pusht,1,1,1,3,3,1,1,{IMPORTED}"),
+            "act-2,act,pusht,1,2,1,5,5,1,0,",
+            "act-3,act,pusht,1,3,0,,6,,2,"
+        ]
     );
     #[cfg(feature = "polars")]
     {

@@ -180,6 +180,7 @@ fn registered() -> Vec<u8> {
         clusters: Clusters { seeds: 3, icc: 0.1 },
         discordance: None,
         chance: None,
+        sequential: false,
     };
     let named = |name: &str| NamedHash { name: name.into(), sha256: "00".repeat(32) };
     let plan = plan(request).expect("a plan that can be");

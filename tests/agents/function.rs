@@ -1,6 +1,5 @@
 //! Functions of this process as agents: what they hear, what is recorded of them, what becomes of those that fail.
 
-use std::ffi::OsString;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
@@ -22,12 +21,11 @@ const WALK: &str = r#"{"view-description":"a wall","reasoning":"go on","action":
 fn record(folder: &Path, images: Images, listeners: impl Fn() -> Listener + Send + Sync + 'static) -> Recorded {
     need::drawing();
     write_small_world(folder, "episode.steps = 20\n");
-    let at = |name: &str| folder.join(name).into_os_string();
-    let words =
-        ["--agent", "function", "--experiment", "E1", "--seeds", "1", "--runs", "1", "--threads", "1", "--no-log"];
-    let options = words.map(OsString::from).into_iter();
-    let options = options.chain(["--config".into(), at("small.toml"), "--out".into(), at("runs")]);
-    let args: RecordArgs = cli::options_of("record", options).unwrap();
+    let options = serde_json::json!({
+        "agent": "function", "experiment": "E1", "seeds": 1, "runs": 1, "threads": 1, "no-log": true,
+        "config": folder.join("small.toml"), "out": folder.join("runs"),
+    });
+    let args: RecordArgs = cli::options_of("record", options.as_object().unwrap()).unwrap();
     let stop = Arc::new(AtomicBool::new(false));
     let player = FunctionPlayer::new(Function {
         model: "walker".to_owned(),

@@ -103,7 +103,7 @@ function listed(list, query) {
   return { ...rest, total: rows.length, offset, rows: rows.slice(offset, offset + Number(query.get("limit") ?? 100)) };
 }
 
-const BY_CHANCE = new Set(["latency_ms", "prompt_tokens", "completion_tokens", "cost_usd", "reply", "view_description", "reasoning", "summary", "identification", "reply_status", "reply_repair"]);
+const BY_CHANCE = new Set(["latency_ms", "prompt_tokens", "completion_tokens", "cost_usd", "reply", "view_description", "reasoning", "summary", "identification", "reply_status", "reply_repair", "reply_fault"]);
 
 /** Two episodes of a copy, and where their rows differ, as the program says it. */
 async function compared(query) {

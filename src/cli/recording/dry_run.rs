@@ -9,7 +9,7 @@ use crate::cli::recording::dollars;
 use crate::cli::text_table::counted;
 use crate::cli::vlm::VlmPlayer;
 use exact::escape::visible;
-use world::agent::vlm::estimate;
+use world::agent::vlm::{Typical, Vlm, estimate};
 use world::record::plan::{Key, Subject};
 use world::sim::config::WorldConfig;
 
@@ -36,7 +36,7 @@ pub struct ForecastAnswer {
 }
 
 /// What would be sent to a provider, and come back.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct RequestForecast {
     /// Requests, if all episodes use up their budget; attempts after failures are not counted.
     pub at_most: u64,
@@ -94,35 +94,35 @@ impl RequestForecast {
         let view = [config.eye.width, config.eye.height_px];
         let finished: Vec<String> = finished.iter().map(|key| key.file_stem(subject)).collect();
         let typical = vlm.typical(finished.iter().map(String::as_str))?;
-        let [mut at_most, mut answered_already, mut prompt_tokens, mut requests] = [0; 4];
+        let mut forecast = Self::default();
         for key in todo {
             let answered = vlm.answered(&key.file_stem(subject))?;
             let left = u64::from(config.of(key.experiment).episode.steps).saturating_sub(answered);
-            answered_already += answered;
-            at_most += left;
-            prompt_tokens += left * estimate::prompt_tokens(vlm.choice(), key.experiment, view)?;
-            requests += typical.map_or(left, |typical| left.min(rounded(typical.steps).saturating_sub(answered)));
+            forecast.answered += answered;
+            forecast.at_most += left;
+            forecast.prompt_tokens += left * estimate::prompt_tokens(vlm.choice(), key.experiment, view)?;
+            forecast.typical_requests +=
+                typical.map_or(left, |typical| left.min(rounded(typical.steps).saturating_sub(answered)));
         }
-        let prices = vlm.choice().model.prices;
-        let longest = u64::from(vlm.max_output_tokens());
+        forecast.add_costs(vlm, typical);
+        let each = typical.map_or(PRIOR_SECONDS, |typical| typical.seconds);
+        let requests = float(forecast.typical_requests);
+        let at_rate = per_minute.map_or(0.0, |count| 60.0 * requests / f64::from(count));
+        forecast.seconds = at_rate.max(each * requests / float(in_flight.min(todo.len()).max(1) as u64));
+        Ok(forecast)
+    }
+
+    fn add_costs(&mut self, vlm: &Vlm, typical: Option<Typical>) {
+        let (prices, longest) = (vlm.choice().model.prices, u64::from(vlm.max_output_tokens()));
+        let requests = self.typical_requests;
         let reply = typical.and_then(|typical| typical.completion_tokens).map_or(PRIOR_REPLY, rounded).min(longest);
-        let by_prices = prices.cost_of(prompt_tokens * requests / at_most.max(1), requests * reply);
+        let by_prices = prices.cost_of(self.prompt_tokens * requests / self.at_most.max(1), requests * reply);
         let by_answers = typical.and_then(|typical| typical.cost_usd).map(|cost| cost * float(requests));
-        let seconds = typical.map_or(PRIOR_SECONDS, |typical| typical.seconds);
-        let at_once = float(in_flight.min(todo.len()).max(1) as u64);
-        let at_rate = per_minute.map_or(0.0, |count| 60.0 * float(requests) / f64::from(count));
-        Ok(Self {
-            at_most,
-            answered: answered_already,
-            prompt_tokens,
-            completion_tokens_at_most: at_most * longest,
-            prompt_cost_usd: prices.cost_of_requests(prompt_tokens),
-            finished_episodes: typical.map_or(0, |typical| typical.episodes),
-            typical_requests: requests,
-            typical_cost_usd: by_answers.or(by_prices),
-            seconds: at_rate.max(seconds * float(requests) / at_once),
-            cost_usd_at_most: prices.cost_of(prompt_tokens, at_most * longest),
-        })
+        self.finished_episodes = typical.map_or(0, |typical| typical.episodes);
+        self.completion_tokens_at_most = self.at_most * longest;
+        self.prompt_cost_usd = prices.cost_of_requests(self.prompt_tokens);
+        self.typical_cost_usd = by_answers.or(by_prices);
+        self.cost_usd_at_most = prices.cost_of(self.prompt_tokens, self.completion_tokens_at_most);
     }
 }
 

@@ -264,6 +264,8 @@ fn a_limit_of_cost_is_held_by_what_answers_say_that_they_cost() {
     let answer: Value = serde_json::from_slice(&output.stdout).unwrap();
     let cost = answer["spend"]["cost_usd"].as_f64().unwrap();
     assert!((0.07..=0.1).contains(&cost) && (cost - 0.002 * server.count() as f64).abs() < 1e-9, "{cost}");
+    // Episodes that have begun end before others begin.
+    assert!(answer["recorded"].as_u64().unwrap() >= 6, "{answer}");
 
     // One that says nothing is noticed with its first answer.
     let server = Server::start(|at, request| whole(Dialect::OpenaiCompatible, &counting(request, 6, at)));

@@ -18,7 +18,7 @@ use crate::experiment::Experiment;
 use trace::frame::Frame;
 
 /// The answer of `record --probe --json`, for one model.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct ProbeAnswer {
     /// The model's name as shown in tables.
     pub model: String,
@@ -78,20 +78,7 @@ impl ProbeAnswer {
         let extra = choice.extra_body().into_iter().map(|(key, value)| (format!("extra_body.{key}"), value));
         let parameters =
             own.chain(extra).map(|(name, value)| ProbedParameter { name, value, taken: None, line: None }).collect();
-        Self {
-            model: choice.name.clone(),
-            id: model.id.clone(),
-            answered_by: None,
-            is_model: true,
-            parameters,
-            enforces_schema: None,
-            prompt_tokens: None,
-            completion_tokens: None,
-            cost_usd: None,
-            latency_ms: None,
-            requests: 0,
-            fault: None,
-        }
+        Self { model: choice.name.clone(), id: model.id.clone(), is_model: true, parameters, ..Self::default() }
     }
 
     fn note_answer(&mut self, received: Received, choice: &Choice, experiment: Experiment) {

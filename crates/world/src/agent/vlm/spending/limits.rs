@@ -173,11 +173,11 @@ impl Account {
 
     #[expect(clippy::cast_precision_loss, reason = "nobody counts 2^53 steps")]
     fn begin_now(&self, state: &mut State, steps: u64, at_most_usd: Option<f64>) -> bool {
-        let a_step =
-            if state.costed == 0 { at_most_usd.unwrap_or(0.0) } else { state.costed_usd / state.costed as f64 };
+        let a_step = if state.costed == 0 { at_most_usd } else { Some(state.costed_usd / state.costed as f64) };
         let (spend, steps_of_all) = (state.spend(), state.steps_left + steps);
-        let cost = spend.cost_at_most() + a_step * steps_of_all as f64;
-        let fits = self.limits.cost_usd.is_none_or(|limit| cost <= limit)
+        let cost = a_step.map(|a_step| spend.cost_at_most() + a_step * steps_of_all as f64);
+        // Before anything is known of the cost, one episode is under way.
+        let fits = self.limits.cost_usd.is_none_or(|limit| cost.is_some_and(|cost| cost <= limit))
             && self.limits.requests.is_none_or(|limit| spend.requests + steps_of_all <= limit);
         if state.begun == 0 || fits {
             state.add_episode(steps);

@@ -1,7 +1,7 @@
 # The two commands of the README: `make demo` and `make test`.
 
 .DELETE_ON_ERROR:
-.PHONY: demo test fmt lint needed unit soak fuzz docs end-to-end wheel test-wheel bless recorded calibrate bench bench-scores bench-world bench-agents bench-view sheet
+.PHONY: demo test fmt lint needed unit soak fuzz docs book end-to-end wheel test-wheel bless release-check recorded calibrate bench bench-scores bench-world bench-agents bench-view sheet
 
 ## Build, record a few episodes of the scripted agents, report on them, say where the results are.
 demo:
@@ -25,6 +25,7 @@ needed:
 	scripts/get-browser.sh
 	scripts/get-duckdb.sh
 	scripts/get-egl.sh
+	scripts/get-harnesses.sh
 	scripts/get-mujoco.sh
 	scripts/get-spark.sh
 	scripts/get-writers.sh
@@ -42,8 +43,12 @@ MINUTES = 10
 fuzz:
 	scripts/fuzz.sh $(MINUTES)
 
-docs:
+docs: book
 	RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --workspace --exclude mirrorstats-fuzz --exclude mirrorstats-python --all-features --quiet
+
+## The book of docs/, searchable, in target/book.
+book:
+	scripts/book.sh
 
 ## The main job from outside: the committed report again byte for byte, the published tables cell by cell.
 end-to-end:
@@ -56,6 +61,10 @@ wheel:
 # The package as its users have it, installed where there is no Rust; from the dependencies that the tests have compiled.
 test-wheel: needed
 	scripts/test-wheel.sh
+
+## The checks before a release.
+release-check: needed
+	scripts/release-check.sh
 
 ## Write generated files anew: JSON Schemas, snapshots, the committed report.
 bless: needed

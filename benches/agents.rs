@@ -2,9 +2,10 @@
 //! answers at once, which is what drawing, counting and writing allow, and with a server on loopback that takes a second
 //! for each answer, 64 episodes in flight.
 //!
-//! 64 in flight and a second allow 64 steps a second at most: a machine that draws faster than that is kept waiting.
+//! 64 in flight and a second allow 64 steps a second at most, and drawing may allow fewer: the ideal rate is the lower of both.
+//! Frames of 32 x 24 cost next to nothing, so that they show what waiting alone costs.
 //!
-//! E5 with frames and logs, on as many threads as there are cores; `STEPS` steps an episode (40 unless told). The server
+//! E5 with logs, on as many threads as there are cores; `STEPS` steps an episode (40 unless told). The server
 //! runs in the same process and shares its cores, as a provider would not.
 
 use std::fmt::Write as _;
@@ -221,13 +222,20 @@ fn main() {
         return;
     }
     let steps = std::env::var("STEPS").ok().and_then(|steps| steps.parse().ok()).unwrap_or(40);
-    let config = WorldConfig::from_toml(&format!("episode.steps = {steps}")).expect("a number of steps is allowed");
     let threads = thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
-    println!("E5, 640 x 480, {threads} threads, {IN_FLIGHT} episodes of {steps} steps, all in flight");
-    let folder = tempfile::tempdir().expect("there is a place for temporary files");
-    let alone = measure(&config, &AtOnce, folder.path(), threads);
-    print("answers at once", alone);
-    let waiting = measure(&config, &Behind::new(folder.path()), folder.path(), threads);
-    print("answers in a second", waiting);
-    println!("  {:.1} % of what rendering alone allows", 100.0 * waiting.0 / alone.0);
+    println!("E5, {threads} threads, {IN_FLIGHT} episodes of {steps} steps, all in flight");
+    for [width, height] in [[640, 480], [32, 24]] {
+        let config = format!("episode.steps = {steps}\neye.width = {width}\neye.height_px = {height}");
+        let config = WorldConfig::from_toml(&config).expect("steps and frames of this size are allowed");
+        let folder = tempfile::tempdir().expect("there is a place for temporary files");
+        println!("frames of {width} x {height}");
+        let alone = measure(&config, &AtOnce, folder.path(), threads);
+        print("answers at once", alone);
+        let waiting = measure(&config, &Behind::new(folder.path()), folder.path(), threads);
+        print("answers in a second", waiting);
+        #[expect(clippy::cast_precision_loss, reason = "some dozens")]
+        let answered = IN_FLIGHT as f64 / ANSWER_TAKES.as_secs_f64();
+        let ideal = answered.min(alone.0);
+        println!("  {:.1} % of {ideal:.1} steps/s, which answers and frames allow", 100.0 * waiting.0 / ideal);
+    }
 }

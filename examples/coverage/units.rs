@@ -6,7 +6,7 @@ use statistics::chance;
 use statistics::clustered::fewest_clusters;
 use statistics::holm::holm;
 use statistics::random::SplitMix64;
-use statistics::units::{difference_test, rate_test};
+use statistics::units::{Sides, difference_test, rate_test};
 use statistics::unpaired::fisher;
 
 use crate::{LEVEL, SEED, happens, heading, row, share};
@@ -59,7 +59,7 @@ fn between_models(study: &Study) -> [Vec<f64>; 2] {
     let pairs = || (0..MODELS).flat_map(|a| (a + 1..MODELS).map(move |b| (a, b)));
     let by_scene = pairs().map(|(a, b)| {
         let shared: Vec<_> = study[a].iter().copied().zip(study[b].iter().copied()).collect();
-        difference_test(&shared, &[], &[]).expect("few outcomes").p
+        difference_test(&Sides { shared, ..Sides::default() }).expect("few outcomes").p
     });
     let by_episode = pairs().map(|(a, b)| fisher(counts(&study[a]), counts(&study[b])).expect("there are episodes").p);
     [holm(&by_scene.collect::<Vec<_>>()), holm(&by_episode.collect::<Vec<_>>())]

@@ -3,6 +3,8 @@
 https://github.com/ggml-org/llama.cpp/tree/master/tools/server, https://docs.vllm.ai/en/latest/serving/openai_compatible_server
 """
 
+import json
+
 from loopback import reply, serve
 
 
@@ -11,7 +13,8 @@ def answer(at, path, headers, body, text):
         # llama.cpp, while it loads the model.
         error = {"code": 503, "message": "Loading model", "type": "unavailable_error"}
         return 503, {"content-type": "application/json; charset=utf-8"}, {"error": error}
-    words = reply(text)
+    # A schema in the request means nothing to it.
+    words = reply(json.dumps(body["messages"]))
     # A small model: thoughts, a fence, an action in another spelling, a comment, a raw line feed.
     words = [
         words,

@@ -25,7 +25,7 @@ def reply(text):
 
 def serve(answer):
     """Serves `answer(at, path, headers, body, text)`: the number of the request from 1, and what it says; it gives the status,
-    headers and the body. `GET /` says how many requests came and how many were paid."""
+    headers and the body; of a GET there is no body. `GET /` says how many requests came and how many were paid."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--port", type=int, default=0)
     parser.add_argument("--latency", type=float, default=0.0, help="seconds for an answer")
@@ -47,7 +47,10 @@ def serve(answer):
             self.say(status, headers, data)
 
         def do_GET(self):
-            self.say(200, {}, json.dumps(count).encode())
+            if self.path == "/":
+                return self.say(200, {}, json.dumps(count).encode())
+            status, headers, body = answer(0, self.path, self.headers, None, "")
+            self.say(status, headers, (body if isinstance(body, str) else json.dumps(body)).encode())
 
         def say(self, status, headers, data):
             self.send_response(status)

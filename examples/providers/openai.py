@@ -1,6 +1,6 @@
 """OpenAI's chat completions: limits in headers, a dated snapshot answers, newer models take no temperature.
 
-https://platform.openai.com/docs/guides/rate-limits, .../guides/prompt-caching, .../api-reference/chat
+https://platform.openai.com/docs/guides/rate-limits, .../guides/prompt-caching, .../guides/flex-processing, .../api-reference/chat
 """
 
 from loopback import reply, serve
@@ -19,10 +19,14 @@ def answer(at, path, headers, body, text):
     if at % 13 == 0:
         error = {"message": "Rate limit reached", "type": "requests", "param": None, "code": "rate_limit_exceeded"}
         return 429, {"content-type": "application/json", "retry-after-ms": "40"}, {"error": error}
+    if body.get("service_tier") == "flex" and at % 5 == 0:
+        error = {"message": "Resource unavailable", "type": "resource_unavailable", "param": None, "code": "resource_unavailable"}
+        return 429, {"content-type": "application/json"}, {"error": error}
     left = {"x-ratelimit-remaining-requests": str(at % 17), "x-ratelimit-reset-requests": "30ms"}
     usage = {"prompt_tokens": 1000, "completion_tokens": 100, "prompt_tokens_details": {"cached_tokens": 400}}
     choice = {"index": 0, "finish_reason": "stop", "message": {"role": "assistant", "content": reply(text)}}
     said = {"object": "chat.completion", "model": body["model"] + "-2026-09-29", "choices": [choice], "usage": usage}
+    said["service_tier"] = body.get("service_tier", "default")
     return 200, {"content-type": "application/json", **left}, said
 
 

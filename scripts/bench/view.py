@@ -85,7 +85,7 @@ def free_port():
 
 def mirrorstats(program, folder):
     port = free_port()
-    return Server([program, "view", str(folder), "--no-open", "--port", str(port)], f"http://127.0.0.1:{port}/")
+    return Server([program, "view", str(folder), "--no-open", "--no-token", "--port", str(port)], f"http://127.0.0.1:{port}/")
 
 
 def inspect(program, folder):

@@ -59,6 +59,7 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
         "import",
         &[
             ("Steps of another harness, a line of JSON each", "import steps.jsonl -o mine.parquet"),
+            ("A log of Inspect", "import log.eval -o tools.parquet --definitions tools.toml"),
             ("What a line may hold", "trace schema step"),
         ],
     ),
@@ -95,6 +96,7 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
                 "record --agent vlm --model gpt-5.1 --experiment E1..E5 --seeds 3 --runs 7 --out runs",
             ),
             ("What it will cost, without a request", "record --agent vlm --model gpt-5.1 --dry-run"),
+            ("What a model takes, by one request", "record --agent vlm --model gpt-5.1 --probe"),
             ("Models, experiments and budgets of a file", "record study.toml"),
             ("Your own program", "record --agent exec:'python3 agent.py' --model mine --experiment E1 --out runs"),
             (

@@ -28,6 +28,7 @@ mod profile;
 mod prompts;
 #[cfg(feature = "sim")]
 mod recorded;
+mod reparsed;
 mod replies;
 #[cfg(feature = "sim")]
 mod sight;

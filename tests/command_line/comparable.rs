@@ -27,6 +27,11 @@ pub struct Cell<'a> {
     pub scenes: usize,
     /// How many of the last episodes ended for want of an answer.
     pub lost: usize,
+    /// How many of the first episodes have a reply that gave no decision.
+    pub unread: usize,
+    /// The kind of the recording, and what its clusters are.
+    pub kind: &'a str,
+    pub cluster: Option<&'a str>,
     /// Whether each episode is solved.
     pub solved: Vec<bool>,
 }
@@ -41,6 +46,9 @@ pub const LIKE: Cell<'_> = Cell {
     declared: usize::MAX,
     scenes: usize::MAX,
     lost: 0,
+    unread: 0,
+    kind: "recording",
+    cluster: None,
     solved: Vec::new(),
 };
 
@@ -58,8 +66,8 @@ impl Cell<'_> {
     fn recording(&self) -> Value {
         let Self { model, experiment, mirror, steps, prompt, .. } = self;
         json!({
-            "kind": "recording",
-            "design": { "pairs": "scene", "cluster": null },
+            "kind": self.kind,
+            "design": { "pairs": "scene", "cluster": self.cluster },
             "world": { "mirror": { "width": mirror }, "episode": { "steps": steps } },
             "fingerprints": { self.fingerprint(): {
                 "world": format!("{experiment} {mirror} {steps}"), "prompts": format!("{experiment} {prompt}"),
@@ -71,7 +79,11 @@ impl Cell<'_> {
     fn episode(&self, at: usize) -> Episode {
         let choice = if self.solved[at] { "red" } else { "blue" };
         let is_lost = at + self.lost >= self.solved.len();
-        let status = |is_last| if is_lost && is_last { "timeout" } else { "ok" };
+        let status = |is_last| match is_last {
+            true if is_lost => "timeout",
+            false if at < self.unread => "parse_failed",
+            _ => "ok",
+        };
         let step = |action, is_last: bool| Step {
             action: Some(action),
             self_color: Some(choice.into()),

@@ -219,9 +219,13 @@ fn an_experiment_that_nobody_declares_is_refused_as_before() {
         run(at, &[&["score"], &pair[..]].concat()).done();
         run(at, &[&["validate"], &pair[..]].concat()).done();
     }
-    // Text carries no declarations.
-    run(at, &["score", "six.parquet", "-o", "six.csv"]).done();
-    assert!(run(at, &["report", "six.csv"]).refused().contains("found `E6`"));
+    // Text carries declarations too.
+    run(at, &["score", "six.parquet", "-o", "scores.parquet"]).done();
+    let stats = run(at, &["stats", "scores.parquet"]).done();
+    for name in ["six.csv", "six.jsonl"] {
+        run(at, &["score", "six.parquet", "-o", name]).done();
+        assert_eq!(run(at, &["stats", name]).done(), stats);
+    }
 }
 
 #[test]

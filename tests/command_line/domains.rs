@@ -42,6 +42,9 @@ fn folder() -> tempfile::TempDir {
 }
 
 /// The words of a command over `robots.parquet`, with its definitions.
+/// What the first row of scores in CSV declares.
+const IMPORTED: &str = r#""{""origin"":""import""}""#;
+
 fn asked(folder: &Path, words: &[&str]) -> String {
     run(folder, &[words, &["robots.parquet", "--definitions", "robots.toml"]].concat()).done()
 }
@@ -55,8 +58,15 @@ fn a_trace_of_a_robot_benchmark_is_scored_by_a_definition_file_alone() {
     asked(at, &["score", "-o", "scores.csv"]);
     let scores = fs::read_to_string(at.join("scores.csv")).unwrap();
     let rows: Vec<&str> = scores.lines().take(4).collect();
-    assert_eq!(rows[0], "episode_id,model,experiment,seed,run,SUCCESS,TIME,JERKS");
-    assert_eq!(rows[1..], ["act-1,act,pusht,1,1,1,3,1", "act-2,act,pusht,1,2,1,5,0", "act-3,act,pusht,1,3,0,,2"]);
+    assert_eq!(rows[0], "episode_id,model,experiment,seed,run,SUCCESS,TIME,DURATION,SOLVED,JERKS,mirrorstats.declared");
+    assert_eq!(
+        rows[1..],
+        [
+            &format!("act-1,act,pusht,1,1,1,3,3,1,1,{IMPORTED}"),
+            "act-2,act,pusht,1,2,1,5,5,1,0,",
+            "act-3,act,pusht,1,3,0,,6,,2,"
+        ]
+    );
     #[cfg(feature = "polars")]
     {
         asked(at, &["score", "--engine", "polars", "-o", "polars.csv"]);
@@ -204,7 +214,7 @@ fn lines_of_another_shape_are_mapped_on_the_way_in() {
     )
     .done();
     let scores = fs::read_to_string(at.join("mapped.csv")).unwrap();
-    assert_eq!(scores.lines().nth(1), Some("e7,act,pusht,5,1,1,2"));
+    assert_eq!(scores.lines().nth(1), Some(&*format!("e7,act,pusht,5,1,1,2,{IMPORTED}")));
     fs::write(at.join("more.jsonl"), format!("{}\n", line(0)).replace("\"reward\"", "\"extra\":[1],\"reward\""))
         .unwrap();
     let answer = with("more.jsonl", &["--set", "episode_id=e7"]).ends(0);

@@ -11,6 +11,7 @@ mod declared;
 mod domains;
 mod extended;
 mod filters;
+mod forms;
 mod gate;
 mod generated;
 #[path = "../../examples/generate/generation/mod.rs"]
@@ -31,6 +32,7 @@ mod quality;
 mod readme;
 #[cfg(all(feature = "polars", feature = "raster", feature = "sim", feature = "view"))]
 mod reference;
+mod reference_files;
 mod refusals;
 #[cfg(unix)]
 mod renamed;

@@ -13,11 +13,12 @@ use regex::Regex;
 
 use crate::assert_shown;
 use crate::harness::files::repository;
+use crate::harness::logs;
 use crate::harness::need;
 use crate::harness::program::{PROGRAM, clean};
 
 /// Command lines that are not run, by how they begin, and why.
-const NOT_RUN: [(&str, &str); 17] = [
+const NOT_RUN: [(&str, &str); 18] = [
     ("make demo", "builds the program"),
     ("make test", "runs this test"),
     ("scripts/get-mujoco.sh", "downloads a library; `make test` runs it before"),
@@ -34,6 +35,10 @@ const NOT_RUN: [(&str, &str); 17] = [
         "takes minutes; the calibration of agents does as much",
     ),
     (
+        "mirrorstats record --agent vlm --model \"GPT 5.1\" --experiment E1 --probe",
+        "needs a provider; `tests/agents` has servers in its place",
+    ),
+    (
         "mirrorstats record --agent vlm --model \"GPT 5.1\" --experiment E1 --max-cost",
         "needs a provider; `tests/agents` has servers in its place",
     ),
@@ -48,7 +53,7 @@ const NOT_RUN: [(&str, &str); 17] = [
 
 /// The README, then the pages of `docs` by name.
 fn pages() -> Vec<PathBuf> {
-    let mut pages: Vec<PathBuf> = ["docs", "docs/how-to", "docs/explanation", "docs/reference"]
+    let mut pages: Vec<PathBuf> = ["docs", "docs/how-to", "docs/explanation", "docs/reference", "docs/tutorials"]
         .iter()
         .flat_map(|folder| fs::read_dir(repository().join(folder)).unwrap())
         .map(|entry| entry.unwrap().path())
@@ -107,6 +112,10 @@ fn bench() -> tempfile::TempDir {
     }
     fs::copy(repository().join("fixtures/published/main_table.csv"), at("table.csv")).unwrap();
     fs::copy(repository().join("examples/definitions/inclusive.toml"), at("mine.toml")).unwrap();
+    logs::inspect(&at("logs"));
+    let solved = [Some(2), Some(5), None, Some(3), Some(4), Some(2)];
+    logs::lerobot_data_set(&at("act"), &solved, true);
+    logs::lerobot_data_set(&at("diffusion"), &solved.map(|at| at.filter(|at| *at < 4)), false);
     // Files that the pages show.
     let threshold = blocks("toml").into_iter().find(|text| text.contains("mirror_self_px >= 200")).unwrap();
     fs::write(at("stricter.toml"), threshold).unwrap();
@@ -131,11 +140,12 @@ fn output_of(command: &str, folder: &Path) -> String {
     format!("{out}{said}{code}")
 }
 
-/// Without what is another one each time: how long a recording took, and how far it was meanwhile.
+/// Without what is another one each time: how long a recording took, how far it was meanwhile, and Inspect's ids.
 fn lasting(output: &str) -> String {
     let progress = Regex::new(r"(?m)^[0-9]+ of [0-9]+ episodes?, .* a second.*\n").unwrap();
     let output = &progress.replace_all(output, "");
     let took = Regex::new(r"in [0-9.]+ m?s( \([^)]*\))?").unwrap();
+    let output = &Regex::new(r"\b[1-9A-HJ-NP-Za-km-z]{22}\b").unwrap().replace_all(output, "[an id]");
     let shares = Regex::new(r"(?m)^time: .*$").unwrap();
     shares.replace_all(&took.replace_all(output, "in [a time]"), "time: [shares]").into_owned()
 }

@@ -6,10 +6,11 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
+use regex::Regex;
 use serde_json::Value;
 
 use crate::harness::files::repository;
-use crate::run;
+use crate::{reference_files, run};
 
 /// The commands that a help text lists, `help` itself apart: below headings, two spaces before the name.
 fn commands(help: &str) -> Vec<String> {
@@ -36,7 +37,7 @@ fn commands_page() -> String {
 }
 
 /// A cell of a Markdown table.
-fn cell(value: &Value) -> String {
+pub fn cell(value: &Value) -> String {
     let text = match value {
         Value::Null => String::new(),
         Value::String(text) => text.clone(),
@@ -74,10 +75,41 @@ fn trace_page() -> String {
     page
 }
 
+/// `llms.txt`: every page with its title and its first sentence.
+fn llms() -> String {
+    let link = Regex::new(r"\[([^\]]*)\]\([^)]*\)").unwrap();
+    let mut text =
+        "# mirrorstats\n\n> Records, scores and reports episodes of embodied agents before a mirror.\n".to_owned();
+    for folder in ["tutorials", "how-to", "explanation", "reference"] {
+        write!(text, "\n## {folder}\n\n").unwrap();
+        let entries = fs::read_dir(repository().join("docs").join(folder)).unwrap();
+        let mut names: Vec<_> = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        for name in names {
+            let page = fs::read_to_string(repository().join("docs").join(folder).join(&name)).unwrap();
+            let title = page.lines().next().unwrap().trim_start_matches("# ");
+            let outside: String = page.split("```").step_by(2).collect();
+            let is_prose = |line: &&str| line.starts_with(|c: char| c.is_alphabetic() || c == '`');
+            let prose: Vec<&str> =
+                outside.lines().skip_while(|line| !is_prose(line)).take_while(|line| !line.is_empty()).collect();
+            let prose = link.replace_all(&prose.join(" "), "$1").into_owned();
+            let first = prose.split_once(". ").map_or(prose.as_str(), |(first, _)| first).trim_end_matches(['.', ':']);
+            let first = if first.is_empty() { String::new() } else { format!(": {first}.") };
+            writeln!(text, "- [{title}](docs/{folder}/{name}){first}").unwrap();
+        }
+    }
+    text
+}
+
 #[test]
 fn reference_pages_are_current() {
-    for (name, page) in [("commands", commands_page()), ("traces", trace_page())] {
-        let path = repository().join("docs/reference").join(name).with_extension("md");
+    for (name, page) in [
+        ("docs/reference/commands.md", commands_page()),
+        ("docs/reference/traces.md", trace_page()),
+        ("docs/reference/files.md", reference_files::page()),
+        ("llms.txt", llms()),
+    ] {
+        let path = repository().join(name);
         if std::env::var_os("MIRRORSTATS_WRITE_REFERENCE").is_some() {
             fs::write(&path, &page).unwrap();
         }

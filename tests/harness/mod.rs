@@ -6,6 +6,7 @@
 #[cfg(target_os = "linux")]
 pub mod faults;
 pub mod files;
+pub mod logs;
 pub mod need;
 #[cfg(target_os = "linux")]
 pub mod power;

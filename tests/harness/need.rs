@@ -42,6 +42,14 @@ pub fn writers() -> PathBuf {
     packages
 }
 
+/// Where `scripts/get-harnesses.sh` has put programs whose logs are imported, beside what cargo builds.
+pub fn harnesses() -> PathBuf {
+    let packages = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).with_file_name("python-harnesses");
+    let is_there = packages.join("inspect_ai").is_dir();
+    assert!(is_there, "no harnesses in {}: scripts/get-harnesses.sh fetches them", packages.display());
+    packages
+}
+
 /// An interpreter of Python.
 pub fn python() -> &'static str {
     let found = Command::new("python3").arg("--version").stdout(Stdio::null()).status();

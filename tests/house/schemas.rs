@@ -15,7 +15,7 @@ use report::plan::Plan;
 use report::plan::register::RegisteredPlan;
 use report::sensitivity::Sensitivity;
 use report::statistics::{Gate, Sequential, Statistics};
-use report::style::shape::StyleFile;
+use report::style::Sheet;
 use schemars::schema_for;
 use score::evidence::Evidence;
 use serde_json::{Value, json};
@@ -56,7 +56,7 @@ fn current() -> Vec<(&'static str, Value)> {
         ("sensitivity", json!(schema_for!(Sensitivity))),
         ("stats", printed_schema::<Statistics>()),
         ("stats-sequential", json!(schema_for!(Sequential))),
-        ("style", json!(schema_for!(StyleFile))),
+        ("style", json!(schema_for!(Sheet))),
         ("trace", json!(SchemaDocument::current())),
         ("validation", printed_schema::<Validation>()),
         ("verify", json!(schema_for!(Verification))),
@@ -68,6 +68,7 @@ fn current() -> Vec<(&'static str, Value)> {
         ("census", json!(schema_for!(world::sim::visibility::Visibility))),
         ("replay", json!(schema_for!(world::replay::verify::ReplayAnswer))),
         ("exec-message", json!(schema_for!(world::agent::exec::message::Message))),
+        ("models", json!(schema_for!(world::agent::vlm::models::Models))),
         ("lost", json!(schema_for!(world::record::failures::LostEpisode))),
         ("scene", json!(schema_for!(world::sim::scene::Scene))),
         ("world-config", json!(schema_for!(world::sim::config::WorldConfig))),

@@ -450,7 +450,8 @@ fn what_cannot_be_drawn_is_said() {
     poor.metrics = vec!["TSA".to_owned()];
     check(
         draw(FigureName::CompletionGap, &Input::of_cells(&poor)),
-        "figure `completion-gap` needs the metric TSA-C, found TSA; include the paper's definitions in the definition file",
+        "figure `completion-gap` shows a rate that `completes` another one, found TSA; name them under \
+         `[figure.completion-gap]` in the style, or declare them in the definitions",
     );
     let single = cast.without(|e, _| e != "E5");
     check(

@@ -264,28 +264,3 @@ fn a_filter_is_named_beside_tables_and_verdicts() {
     let json: Value = run(at, &["stats", "a.parquet", "--json"]).json();
     assert_eq!(json["where"], Value::Null);
 }
-
-#[test]
-fn scores_in_text_say_what_they_do_not_carry() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
-    let episodes: Vec<Episode> = (1..=21).map(|run| reply(run, "ok")).collect();
-    write_trace(&at.join("a.parquet"), &episodes, OptionalColumns::used_by(&episodes));
-    for name in ["s.csv", "s.jsonl", "s.parquet"] {
-        run(at, &["score", "a.parquet", "-o", name]).done();
-    }
-    let lacks =
-        "scores in CSV and JSON Lines do not carry the kind of episodes, their clusters, losses and reply quality";
-    for name in ["s.csv", "s.jsonl"] {
-        let stats = run(at, &["stats", name]).done();
-        assert!(stats.contains(lacks) && stats.contains("these scores do not carry how replies came"), "{stats}");
-        assert!(!stats.contains("traces declare no design") && !stats.contains("reply_status"), "{stats}");
-        assert!(run(at, &["report", name, "--out", "out", "--no-figures"]).ends(0).stderr.contains(lacks));
-        // What such scores are made into does not know more.
-        fs::copy(at.join("out/episodes.parquet"), at.join("again.parquet")).unwrap();
-        assert!(run(at, &["stats", "again.parquet"]).done().contains(lacks));
-    }
-    let stats: Value = run(at, &["stats", "s.parquet", "--json"]).json();
-    assert_eq!(stats["losses"]["recorded"], true, "Parquet carries that no episode was lost");
-    assert!(!run(at, &["stats", "s.parquet"]).done().contains(lacks));
-}

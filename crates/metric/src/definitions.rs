@@ -5,7 +5,7 @@ use std::path::Path;
 use indexmap::IndexMap;
 
 use super::bind::{self, Binding};
-use super::catalog::{Catalog, Experiment, Kind, Metric, by_order};
+use super::catalog::{Better, Catalog, Experiment, Kind, Metric, by_order};
 use super::columns::{Columns, Level, Type};
 use super::file::{self, ColumnEntry, Document, FileError};
 use super::measure;
@@ -13,8 +13,7 @@ use super::plan::{NodeId, Output, Plan};
 use exact::hash;
 use exact::ratio::Ratio;
 use exact::suggest::nearest;
-use toml_spec::Written;
-use toml_spec::{Fault, Faults, Place, Source};
+use toml_spec::{Fault, Faults, Place, Source, Written};
 
 /// Checked definitions.
 #[derive(Clone, Debug)]
@@ -319,22 +318,22 @@ fn content_hash(catalog: &Catalog) -> String {
 fn metrics(document: &Document, binding: &Binding) -> IndexMap<String, Metric> {
     let metric = |(name, entry): (&String, &file::MetricEntry)| {
         let kind = binding.metrics[name].1;
-        let unit = entry.unit.as_ref().map_or_else(|| kind.default_unit().to_owned(), |(unit, _)| unit.clone());
+        let said = entry.said.clone();
         let metric = Metric {
-            title: entry.title.clone().unwrap_or_else(|| name.clone()),
+            title: said.title.unwrap_or_else(|| name.clone()),
             kind,
-            unit,
-            better: entry.better,
-            section: entry.section.clone(),
-            help: entry.help.clone(),
+            unit: said.unit.unwrap_or_else(|| kind.default_unit().to_owned()),
+            better: said.better.unwrap_or(Better::Neither),
+            section: said.section,
+            help: said.help,
             value: entry.value.text.clone(),
             when: entry.when.as_ref().map(|when| when.text.clone()),
-            se: entry.se,
+            se: said.se,
             chance: entry.chance,
-            measures: entry.measures,
-            range: entry.range,
-            finished: entry.finished.as_ref().map(|(name, _)| name.clone()),
-            completes: entry.completes.as_ref().map(|(name, _)| name.clone()),
+            measures: said.measures,
+            range: said.range,
+            finished: said.finished,
+            completes: said.completes,
         };
         (name.clone(), metric)
     };

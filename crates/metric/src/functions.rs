@@ -61,3 +61,25 @@ const fn entry(function: Function, name: &'static str, usage: &'static str, arit
 pub(super) fn find(name: &str) -> Option<&'static Entry> {
     FUNCTIONS.iter().find(|entry| entry.name == name)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::FUNCTIONS;
+
+    #[test]
+    fn the_page_of_the_reference_is_current() {
+        let rows = FUNCTIONS.map(|entry| entry.usage.split_once(": ").unwrap());
+        let rows = rows.map(|(call, meaning)| format!("| `{call}` | {meaning} |\n"));
+        let page = format!(
+            "# Functions of metric expressions\n\nMetrics are SQL expressions over the steps of one episode: SQL's operators, `case`, `in`, `between`, and these functions.\n[Change a metric's definition](../how-to/definitions.md) shows them in use.\n\n| call | value |\n|---|---|\n{}",
+            rows.concat()
+        );
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/reference/functions.md");
+        if std::env::var_os("MIRRORSTATS_WRITE_REFERENCE").is_some() {
+            std::fs::write(&path, &page).unwrap();
+        }
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), page, "{}: not what the program says", path.display());
+    }
+}

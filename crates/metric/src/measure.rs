@@ -49,12 +49,6 @@ static UNITS: LazyLock<IndexMap<String, Unit>> = LazyLock::new(|| {
     toml::from_str(include_str!("../../../assets/definitions/units.toml")).expect("the file comes with the program")
 });
 
-impl Measures {
-    /// The words of definition files.
-    pub(super) const NAMES: [(&str, Self); 4] =
-        [("rate", Self::Rate), ("duration", Self::Duration), ("count", Self::Count), ("fraction", Self::Fraction)];
-}
-
 impl Metric {
     /// What it measures: as declared, else as its unit says; `None` where neither says it.
     pub fn measures(&self) -> Option<Measures> {
@@ -92,8 +86,8 @@ fn range(declared: Option<Measures>, range: Option<ValueRange>, unit: &str) -> V
 }
 
 pub(super) fn relation_faults(document: &Document) -> Vec<Fault> {
-    let names = document.metrics.values().flat_map(|entry| entry.finished.iter().chain(&entry.completes));
-    names.filter_map(|(name, place)| unknown_metric(document, name, place)).collect()
+    let names = document.metrics.values().flat_map(MetricEntry::relations);
+    names.filter_map(|(_, name, place)| unknown_metric(document, name, place)).collect()
 }
 
 pub(super) fn faults(document: &Document, kind: impl Fn(&str) -> Kind) -> Vec<Fault> {
@@ -106,8 +100,7 @@ pub(super) fn faults(document: &Document, kind: impl Fn(&str) -> Kind) -> Vec<Fa
         if let Some((message, help)) = misfit(name, entry, is_rate(name)) {
             refuse(&entry.place, message, help);
         }
-        for (key, relation) in [("finished", &entry.finished), ("completes", &entry.completes)] {
-            let Some((other, place)) = relation else { continue };
+        for (key, other, place) in entry.relations() {
             if is_rate(name) != (key == "completes") || (document.metrics.contains_key(other) && !is_rate(other)) {
                 let message = format!("`{key} = \"{other}\"` of `{name}` does not fit the values of the two metrics");
                 refuse(place, message, "`finished` names a rate on a duration, `completes` a rate on a rate");
@@ -119,14 +112,15 @@ pub(super) fn faults(document: &Document, kind: impl Fn(&str) -> Kind) -> Vec<Fa
 
 /// Why a metric cannot measure what its definition says, and what to do.
 fn misfit(name: &str, entry: &MetricEntry, is_rate: bool) -> Option<(String, &'static str)> {
-    let unit = entry.unit.as_ref().map_or("", |(unit, _)| unit);
-    let declared = measures(entry.measures, entry.finished.is_some(), unit);
-    let ValueRange { least, most } = range(entry.measures, entry.range, unit);
+    let said = &entry.said;
+    let unit = said.unit.as_deref().unwrap_or_default();
+    let declared = measures(said.measures, said.finished.is_some(), unit);
+    let ValueRange { least, most } = range(said.measures, said.range, unit);
     match declared {
-        _ if is_rate && entry.range.is_some() => {
+        _ if is_rate && said.range.is_some() => {
             Some((format!("the rate `{name}` has a `range`"), "remove it: a rate is 0 or 1 an episode"))
         }
-        _ if is_rate != (entry.measures == Some(Measures::Rate)) && entry.measures.is_some() => Some((
+        _ if is_rate != (said.measures == Some(Measures::Rate)) && said.measures.is_some() => Some((
             format!("`measures` does not fit the values of `{name}`"),
             "truth values are a rate, integers are not",
         )),
@@ -137,7 +131,7 @@ fn misfit(name: &str, entry: &MetricEntry, is_rate: bool) -> Option<(String, &'s
             format!("`{name}` is a fraction without a whole"),
             "say which value is the whole: `range = { least = 0, most = 1000 }`",
         )),
-        Some(Measures::Duration) if entry.finished.is_none() => Some((
+        Some(Measures::Duration) if said.finished.is_none() => Some((
             format!("the duration `{name}` does not say which episodes finished"),
             "add `finished = \"...\"`, the rate that is defined in finished episodes; or `measures = \"count\"`",
         )),

@@ -1,13 +1,13 @@
 //! The shape of a definition file, for editors and other programs (`schemas/definitions.schema.json`).
 //!
-//! The reader in `file` goes by the TOML itself, to show every fault at its place; this is the same
-//! shape as types. A test reads the built-in files through both.
+//! Each key is declared here, once: the reader in `file` and the schema go by these types.
 
 use indexmap::IndexMap;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::catalog::{Better, Measures, StandardError, ValueRange};
+use super::columns::Type;
 use exact::ratio::Ratio;
 
 /// A definition file.
@@ -18,8 +18,7 @@ pub struct DefinitionFile {
     #[serde(default)]
     pub include: Vec<String>,
     /// Whether experiments that are not listed are accepted. A file that lists none accepts all.
-    #[serde(default)]
-    pub open: bool,
+    pub open: Option<bool>,
     /// What the traces are about: `mirror`, or any other name, where the columns of the mirror mean nothing.
     pub domain: Option<String>,
     /// Columns of your own traces that expressions use.
@@ -42,7 +41,7 @@ pub struct DefinitionFile {
 pub struct ColumnShape {
     /// The type of its values.
     #[serde(rename = "type")]
-    pub ty: TypeShape,
+    pub ty: Type,
     /// Whether it is constant in an episode.
     #[serde(default)]
     pub constant: bool,
@@ -57,17 +56,6 @@ pub struct ColumnShape {
     pub help: String,
 }
 
-/// The type of a column.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-#[expect(missing_docs, reason = "the names say it")]
-pub enum TypeShape {
-    Bool,
-    Int,
-    Float,
-    Text,
-}
-
 /// An experiment.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -79,10 +67,10 @@ pub struct ExperimentShape {
     pub order: Option<i64>,
     /// Chance levels by metric, as fractions such as `1/3`; `none` where a metric's own level does not apply.
     #[serde(default)]
-    pub chance: IndexMap<String, String>,
+    pub chance: IndexMap<String, Level>,
     /// Reference levels by metric, where no chance level applies.
     #[serde(default)]
-    pub reference: IndexMap<String, Vec<Ratio>>,
+    pub reference: IndexMap<String, Vec<Fraction>>,
 }
 
 /// A metric.
@@ -109,7 +97,7 @@ pub struct MetricShape {
     #[serde(default)]
     pub se: StandardError,
     /// The value of blind guessing, as a fraction such as `1/3`.
-    pub chance: Option<Ratio>,
+    pub chance: Option<Fraction>,
     /// What the metric measures; as its unit says if absent.
     pub measures: Option<Measures>,
     /// The values that it can have, as integers; on a fraction `most` is the whole.
@@ -120,20 +108,31 @@ pub struct MetricShape {
     pub completes: Option<String>,
 }
 
-#[cfg(test)]
-mod tests {
-    use super::DefinitionFile;
-    use crate::file::{built_in, built_in_names, read};
+/// A chance level.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Level {
+    /// There is none.
+    None(NoLevel),
+    /// This one.
+    Of(Fraction),
+}
 
-    #[test]
-    fn the_built_in_files_have_this_shape() {
-        for name in built_in_names() {
-            let shape: DefinitionFile = toml::from_str(built_in(name).unwrap()).unwrap();
-            let document = read(name).unwrap();
-            assert!(!shape.metric.is_empty());
-            for (metric, entry) in &shape.metric {
-                assert_eq!(entry.value, document.metrics[metric].value.text);
-            }
-        }
-    }
+/// The word that says that there is no level.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+pub enum NoLevel {
+    /// `none`.
+    #[serde(rename = "none")]
+    None,
+}
+
+/// A fraction in quotes such as `1/3`, or a number.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Fraction {
+    /// In quotes.
+    #[schemars(with = "Ratio")]
+    Text(String),
+    /// A decimal is the fraction that it says: `0.25` is 1/4.
+    Number(f64),
 }

@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::published::CellLabel;
 use exact::budget::Limit;
 use exact::input;
+use toml_spec::{Faults, Source};
 
 const PAPER: &str = include_str!("../../../assets/errata/paper.toml");
 
@@ -64,10 +65,8 @@ pub enum Field {
 pub enum ErrataError {
     #[error("errata {}: cannot read the file: {source}", path.display())]
     Unreadable { path: PathBuf, source: io::Error },
-    #[error("errata {}: {source}", path.display())]
-    Malformed { path: PathBuf, source: Box<toml::de::Error> },
-    #[error("errata {}: {experiment}, {model}, {metric}: expected a reason, found none; say why the publication errs", path.display())]
-    NoReason { path: PathBuf, experiment: String, model: String, metric: String },
+    #[error(transparent)]
+    Faults(#[from] Faults),
 }
 
 /// A slip takes some hundred bytes.
@@ -83,17 +82,15 @@ impl Errata {
     pub fn read(path: &Path) -> Result<Self, ErrataError> {
         let text =
             input::text(path, LARGEST).map_err(|source| ErrataError::Unreadable { path: path.to_owned(), source })?;
-        let errata: Self = toml::from_str(&text)
-            .map_err(|source| ErrataError::Malformed { path: path.to_owned(), source: Box::new(source) })?;
-        match errata.erratum.iter().find(|erratum| erratum.reason.trim().is_empty()) {
-            None => Ok(errata),
-            Some(Erratum { experiment, model, metric, .. }) => Err(ErrataError::NoReason {
-                path: path.to_owned(),
-                experiment: experiment.clone(),
-                model: model.clone(),
-                metric: metric.clone(),
-            }),
-        }
+        let source = Source { name: path.display().to_string(), text };
+        Ok(toml_spec::read_source(source, "a list of errata", |errata: &Self, at, faults| {
+            for (n, erratum) in errata.erratum.iter().enumerate() {
+                if erratum.reason.trim().is_empty() {
+                    let reason = at.key("erratum").item(n).key("reason");
+                    faults.push(reason.fault("expected a reason, found none").help("say why the publication errs"));
+                }
+            }
+        })?)
     }
 }
 

@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use super::builder::{TableBuilder, default_text};
 use super::order::order;
-use super::table::{EpisodeKeys, EpisodeTable, Header, JoinError, LOST, TextColumn};
+use super::table::{EpisodeKeys, EpisodeTable, Header, JoinError, LOST, TextColumn, UNUSABLE_REPLIES};
 use trace::schema;
 
 impl EpisodeTable {
@@ -69,5 +69,5 @@ impl EpisodeTable {
 }
 
 fn may_be_absent(label: &str) -> bool {
-    label == LOST || schema::column(label).is_some_and(|column| column.since > 1)
+    [LOST, UNUSABLE_REPLIES].contains(&label) || schema::column(label).is_some_and(|column| column.since > 1)
 }

@@ -5,12 +5,14 @@
 //! counted, which is not the same as zero.
 
 use std::collections::{BTreeMap, HashMap};
+use std::ops::Range;
 
 use arrow::array::{Array as _, ArrayRef, AsArray as _, BooleanArray, StringArray};
 use arrow::datatypes::{Float64Type, Int32Type, Int64Type};
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::evidence::episode_ids;
 use super::table::CONDITION;
 use trace::open::TraceSet;
 use trace::replies::{REPLY_STATUS, ReplyCounts};
@@ -53,6 +55,9 @@ pub struct Quality {
     /// Why replies gave no decision, in the words of their parser.
     #[serde(skip)]
     pub faults: BTreeMap<String, u64>,
+    /// Unusable and all replies of each episode with a reply.
+    #[serde(skip)]
+    pub by_episode: BTreeMap<String, [u64; 2]>,
     /// Milliseconds from request to reply: how many replies took so long.
     #[serde(skip)]
     pub latencies: BTreeMap<i64, u64>,
@@ -151,6 +156,7 @@ impl Quality {
         for (fault, replies) in &other.faults {
             *self.faults.entry(fault.clone()).or_default() += replies;
         }
+        self.by_episode.extend(other.by_episode.iter().map(|(id, replies)| (id.clone(), *replies)));
         for (latency, replies) in &other.latencies {
             *self.latencies.entry(*latency).or_default() += replies;
         }
@@ -171,6 +177,11 @@ impl QualityByCell {
         for (key, quality) in other.0 {
             self.0.entry(key).or_default().merge(&quality);
         }
+    }
+
+    /// Unusable and all replies of each episode, which are no longer kept here.
+    pub fn take_by_episode(&mut self) -> BTreeMap<String, [u64; 2]> {
+        self.0.values_mut().flat_map(|quality| std::mem::take(&mut quality.by_episode)).collect()
     }
 
     /// Whether a cell has another condition than the default one.
@@ -201,11 +212,20 @@ pub struct QualityReader {
 impl QualityReader {
     /// What there is to read in these traces. A column of another type than the schema's is not read.
     pub fn of(traces: &TraceSet) -> Self {
+        Self::of_columns(traces, &READ)
+    }
+
+    /// As [`QualityReader::of`], of the statuses of replies alone.
+    pub fn of_statuses(traces: &TraceSet) -> Self {
+        Self::of_columns(traces, &[REPLY_STATUS])
+    }
+
+    fn of_columns(traces: &TraceSet, names: &[&str]) -> Self {
         let fits = |name: &&str| {
             let known = schema::column(name).map(|column| column.stored.kind());
             traces.declares(name) && traces.column(name).map(|column| column.kind) == known
         };
-        let columns = READ.into_iter().filter(fits).map(str::to_owned).collect();
+        let columns = names.iter().copied().filter(fits).map(str::to_owned).collect();
         let has_condition =
             traces.declares(CONDITION) && traces.column(CONDITION).is_some_and(|c| c.kind == Kind::String);
         Self { columns, has_condition }
@@ -226,6 +246,7 @@ impl QualityReader {
         let mut cells = Cells::default();
         let columns = Columns::of(batch);
         let keys = ["experiment", "model", CONDITION].map(|name| batch.episodes.column_by_name(name));
+        let ids = if columns.status.is_some() { episode_ids(batch) } else { Vec::new() };
         for (episode, rows) in batch.offsets.windows(2).enumerate() {
             if kept.is_some_and(|kept| !(kept.is_valid(episode) && kept.value(episode))) {
                 continue;
@@ -235,6 +256,8 @@ impl QualityReader {
             quality.steps += (rows[1] - rows[0]) as u64;
             if !self.columns.is_empty() {
                 (rows[0]..rows[1]).for_each(|row| columns.add(row, quality));
+                let replies = columns.replies(rows[0]..rows[1]).filter(|[_, all]| *all > 0);
+                quality.rest.by_episode.extend(ids.get(episode).cloned().zip(replies));
             }
         }
         cells.finish(&columns)
@@ -333,6 +356,15 @@ impl<'a> Columns<'a> {
             completion_tokens: column("completion_tokens"),
             cost: column("cost_usd"),
         }
+    }
+
+    /// The unusable replies of some rows, and all.
+    fn replies(&self, rows: Range<usize>) -> Option<[u64; 2]> {
+        let status = self.status.as_ref()?;
+        let codes = rows.filter_map(|row| status.code(row));
+        Some(codes.fold([0; 2], |[unusable, all], code| {
+            [unusable + u64::from(!ReplyCounts::is_read(status.texts.value(code))), all + 1]
+        }))
     }
 
     fn add(&self, row: usize, counts: &mut Counts) {

@@ -43,6 +43,9 @@ pub const CONDITION: &str = "condition";
 /// The label of episodes that were lost for want of an answer.
 pub const LOST: &str = "lost";
 
+/// The label of an episode's replies: those that gave no decision, of all, such as `3/20`.
+pub const UNUSABLE_REPLIES: &str = "unusable_replies";
+
 /// What names an episode. The derived order is the order of the table.
 #[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct EpisodeKey {

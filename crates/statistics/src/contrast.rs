@@ -27,9 +27,15 @@ pub fn newcombe(first: (u64, u64), second: (u64, u64), confidence: f64) -> Optio
 pub fn welch(first: &Moments, second: &Moments, confidence: f64) -> Option<Interval> {
     let difference = first.mean()? - second.mean()?;
     let part = |moments: &Moments| moments.se(StandardError::Sample).map(|se| (se * se, (moments.n - 1) as f64));
-    let ((v, m), (w, n)) = (part(first)?, part(second)?);
-    let freedom = (v + w) * (v + w) / (v * v / m + w * w / n);
-    student_t_of(difference, (v + w).sqrt(), freedom, confidence)
+    let (variance, freedom) = satterthwaite([part(first)?, part(second)?]);
+    student_t_of(difference, variance.sqrt(), freedom, confidence)
+}
+
+/// The variance of a difference and its degrees of freedom, from those of both sides (Satterthwaite 1946).
+pub(super) fn satterthwaite(sides: [(f64, f64); 2]) -> (f64, f64) {
+    let variance: f64 = sides.iter().map(|(variance, _)| variance).sum();
+    let parts: f64 = sides.iter().map(|(variance, freedom)| variance * variance / freedom).sum();
+    (variance, variance * variance / parts)
 }
 
 #[cfg(test)]

@@ -24,6 +24,17 @@ pub struct UnitTest {
     pub least: f64,
 }
 
+/// The units of two sides, each as the sum of its episodes.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Sides {
+    /// Those that both sides have.
+    pub shared: Vec<(Moments, Moments)>,
+    /// Those of the first side alone.
+    pub first: Vec<Moments>,
+    /// Those of the second side alone.
+    pub second: Vec<Moments>,
+}
+
 /// The binomial test of a rate over units: the sum of their means, rounded towards the level, is the count.
 ///
 /// The sum varies at most as much as one verdict per unit would; part of a verdict counts for the level.
@@ -32,21 +43,25 @@ pub fn rate_test(units: &[Moments], level: Ratio) -> Option<(ExactTest, f64)> {
     let (values, denominator) = means(units)?;
     let n = u64::try_from(units.len()).ok()?;
     let sum: i128 = values.iter().sum();
+    Some((rate_test_of_sum(sum, denominator, n, level)?, least_p(n, level)?))
+}
+
+/// The same test of `n` units from the sum of their means, which is `sum / denominator`.
+pub(super) fn rate_test_of_sum(sum: i128, denominator: i128, n: u64, level: Ratio) -> Option<ExactTest> {
     let (numerator, whole) = (i128::from(level.numerator()), i128::from(level.denominator()));
     let expected = numerator * i128::from(n);
     let is_above = sum * whole > expected * denominator;
     let count = if is_above { sum.div_euclid(denominator) } else { (sum + denominator - 1).div_euclid(denominator) };
     let crossed = if is_above { count * whole < expected } else { count * whole > expected };
     let test = exact_test(u64::try_from(count).ok()?, n, level)?;
-    let test = if crossed { ExactTest { p: 1.0, mid_p: 1.0 } } else { test };
-    Some((test, least_p(n, level)?))
+    Some(if crossed { ExactTest { p: 1.0, mid_p: 1.0 } } else { test })
 }
 
 /// The exact permutation test of two rates: within each unit that both sides have, and among the units of one side.
 ///
 /// The statistic is the score, the first side's sum minus its expectation given the margins. `None` without a unit of
 /// both sides or one of each, and with too many outcomes to enumerate.
-pub fn difference_test(shared: &[(Moments, Moments)], first: &[Moments], second: &[Moments]) -> Option<UnitTest> {
+pub fn difference_test(Sides { shared, first, second }: &Sides) -> Option<UnitTest> {
     let all: Vec<Moments> =
         shared.iter().flat_map(|&(a, b)| [a, b]).chain(first.iter().chain(second).copied()).collect();
     let (values, _) = means(&all)?;
@@ -91,14 +106,18 @@ fn gcd(a: i128, b: i128) -> i128 {
     if b == 0 { a } else { gcd(b, a % b) }
 }
 
-fn flips(differences: &[i128]) -> Option<BTreeMap<i128, f64>> {
-    let mut sums = BTreeMap::from([(0, 1.0)]);
+fn flips(differences: &[i128]) -> Option<Vec<(i128, f64)>> {
+    let mut sums = vec![(0, 1.0)];
     for &difference in differences.iter().filter(|difference| **difference != 0) {
-        let mut next = BTreeMap::new();
-        for (sum, weight) in sums {
-            *next.entry(sum + difference).or_insert(0.0) += weight / 2.0;
-            *next.entry(sum - difference).or_insert(0.0) += weight / 2.0;
-        }
+        let flipped = |sign: i128| sums.iter().map(move |(sum, weight)| (sum + sign * difference, weight / 2.0));
+        let mut next: Vec<(i128, f64)> = flipped(-1).chain(flipped(1)).collect();
+        // Two ascending runs, which a stable sort merges.
+        next.sort_by_key(|(sum, _)| *sum);
+        next.dedup_by(|(sum, weight), (kept, total)| {
+            let is_same = sum == kept;
+            *total += if is_same { *weight } else { 0.0 };
+            is_same
+        });
         sums = next;
         if sums.len() > MOST_OUTCOMES {
             return None;
@@ -128,7 +147,7 @@ fn draws(pool: &[i128], drawn: usize) -> Option<BTreeMap<i128, f64>> {
 #[cfg(test)]
 #[expect(clippy::unreadable_literal, reason = "reference values as their sources print them")]
 mod tests {
-    use super::{difference_test, rate_test};
+    use super::{Sides, difference_test, rate_test};
     use exact::moments::Moments;
     use exact::ratio::Ratio;
 
@@ -157,9 +176,10 @@ mod tests {
     fn six_scenes_of_four_experiments_are_six() {
         let mut scenes = vec![(unit(4, 4), unit(0, 4)); 5];
         scenes.push((unit(0, 4), unit(4, 4)));
-        let test = difference_test(&scenes, &[], &[]).unwrap();
+        let only = |shared: &[(Moments, Moments)]| Sides { shared: shared.to_vec(), ..Sides::default() };
+        let test = difference_test(&only(&scenes)).unwrap();
         assert_eq!((test.p, test.least), (0.21875, 0.03125));
-        let three = difference_test(&scenes[..3], &[], &[]).unwrap();
+        let three = difference_test(&only(&scenes[..3])).unwrap();
         assert_eq!((three.p, three.least), (0.25, 0.25));
     }
 
@@ -167,17 +187,18 @@ mod tests {
     #[test]
     fn units_of_one_side_are_permuted() {
         let (first, second) = (vec![unit(1, 1); 5], vec![unit(0, 1); 5]);
-        let test = difference_test(&[], &first, &second).unwrap();
+        let apart = Sides { first, second, ..Sides::default() };
+        let test = difference_test(&apart).unwrap();
         assert!((test.p - 2.0 / 252.0).abs() < 1e-12);
-        assert_eq!(difference_test(&[], &first, &[]), None);
+        assert_eq!(difference_test(&Sides { second: Vec::new(), ..apart }), None);
     }
 
     // 11 pairs 11:0, and 1 of 11 against 11 of 11 without a partner: 12 of 22 against 11 of 22. The score is 5.5 - 5.
     #[test]
     fn a_half_paired_design_uses_all_episodes() {
-        let pairs = vec![(unit(1, 1), unit(0, 1)); 11];
-        let alone = [vec![unit(1, 1)], vec![unit(0, 1); 10]].concat();
-        let test = difference_test(&pairs, &alone, &[unit(1, 1); 11]).unwrap();
+        let shared = vec![(unit(1, 1), unit(0, 1)); 11];
+        let first = [vec![unit(1, 1)], vec![unit(0, 1); 10]].concat();
+        let test = difference_test(&Sides { shared, first, second: vec![unit(1, 1); 11] }).unwrap();
         assert!(test.p > 0.7, "{test:?}");
     }
 }

@@ -89,7 +89,7 @@ pub use provenance::ProvenanceError;
 pub use quality_check::{CellAnswer, NotRecorded, QualityCheckAnswer, QualityLimits, Violation};
 pub use question::{DEFAULT_DEFINITIONS, Question, known_experiments};
 pub use report::{Report, ReportOptions, WrittenReport};
-pub use rescore::{RescoreRequest, Rescored, folder_of_rescored};
+pub use rescore::{RescoreRequest, Rescored, folder_of_rescored, traces_of};
 pub use results::{Outputs, Results};
 pub use scored_alike::ScoredAlike;
 pub use scores::write as write_scores;
@@ -314,7 +314,7 @@ impl Study {
     /// # Errors
     /// As [`Study::score`]; sums of squares beyond 128 bits.
     pub fn statistics(&self, options: &Options) -> Result<Statistics, StudyError> {
-        let results = self.scan(Outputs { losses: true, quality: true, ..Outputs::default() })?;
+        let results = self.scan(Outputs { losses: true, ..Outputs::default() })?;
         self.check_filter(results.episodes.len())?;
         let counted = self.counted(results);
         let cells = self.cells_of(&counted.results.episodes)?;
@@ -341,7 +341,7 @@ impl Study {
         let (is_known, total) = (results.lost.is_some() || declared.losses_recorded || !lost.is_empty(), lost.total());
         let beside = self.undecided(lost);
         let (design, selection) = (design_of(declared), self.selection(&results.episodes));
-        let replies = results.quality.as_ref().and_then(Replies::of);
+        let replies = Replies::of(counted.all.as_ref().unwrap_or(&results.episodes));
         let lost = is_known.then_some(beside);
         let failures = (self.question.lost == LostAs::Failure && total > 0).then_some(total);
         let as_failures = failures.map(|total| format!("{total} lost episodes counted as failures"));

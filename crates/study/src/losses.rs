@@ -13,7 +13,7 @@ use report::cells::group::CONDITION;
 use score::builder::TableBuilder;
 use score::lost_counts::LostCounts;
 use score::quality::{CellKey, QualityByCell};
-use score::table::{EpisodeTable, KeyRef, LOST, LabelColumn};
+use score::table::{EpisodeTable, KeyRef, LOST, LabelColumn, UNUSABLE_REPLIES};
 use trace::inputs::Input;
 use trace::lost::{self, LostEpisode};
 use trace::schema::{self, Column};
@@ -61,6 +61,13 @@ pub(super) fn label(results: &mut Results) {
         episodes.labels.push(LabelColumn { name: LOST.to_owned(), values });
     }
     if let Some(quality) = quality {
+        let replies = quality.take_by_episode();
+        if !replies.is_empty() {
+            let text =
+                |row| replies.get(episodes.keys.get(row).episode_id).map(|[unusable, all]| format!("{unusable}/{all}"));
+            let values = (0..episodes.len()).map(text).collect();
+            episodes.labels.push(LabelColumn { name: UNUSABLE_REPLIES.to_owned(), values });
+        }
         count(quality, &counts(episodes), lost.is_some() || !episodes.declared.unrecorded.is_empty());
     }
 }

@@ -17,7 +17,7 @@ use report::html::{self, Figure, Page, Recordings};
 use report::layout::MetricTable;
 use report::layout::quality::{self, QualityTable};
 use report::plan::departures::Looks;
-use report::statistics::{Options, Replies, Statistics, TEXT_SCORES};
+use report::statistics::{Options, Replies, Statistics};
 use report::style::{MAIN_TABLE, OTHER_TABLE, Style};
 use score::format::Format;
 use score::lost_counts::LostCounts;
@@ -107,7 +107,7 @@ impl Study {
             options.figures.then(|| self.statistics_of(&counted, &cells, &Options::default())).transpose()?;
         let Counted { results, all, lost } = counted;
         let quality = results.quality.as_ref().and_then(QualityTable::from_cells);
-        let replies = results.quality.as_ref().and_then(Replies::of).and_then(|replies| replies.sentence());
+        let replies = Replies::of(all.as_ref().unwrap_or(&results.episodes)).and_then(|replies| replies.sentence());
         let tables = self.tables(&results.episodes, &lost, &cells, &style)?;
         let filter = self.question.filter.clone();
         let manifest = Manifest::new(&cells, &style, SCHEMA_VERSION, filter, results.inputs.clone());
@@ -188,9 +188,6 @@ fn registered(episodes: &EpisodeTable) -> Option<String> {
 
 /// What the traces do not declare, in one line; `None` where they declare it.
 fn undeclared(episodes: &EpisodeTable) -> Option<String> {
-    if episodes.declared.from_text {
-        return Some(format!("{TEXT_SCORES}; give the traces, or score them into Parquet"));
-    }
     let lacks = |label: &str| episodes.label(label).is_none();
     let what = match (lacks("fingerprint"), lacks("scene")) {
         (true, true) => "what they were recorded with, nor which episodes share a scene",

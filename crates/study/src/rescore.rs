@@ -16,16 +16,17 @@ use report::layout::TableOrder;
 use report::style::Style;
 use score::format::{self, Partition};
 use score::table::EpisodeTable;
+use trace::inputs::Input;
 
 /// What to make again, and what to change.
 #[derive(Clone, Debug)]
 pub struct RescoreRequest {
     /// The folder of the report.
     pub report: PathBuf,
-    /// The definitions to score under, by name or path.
-    pub definitions: PathBuf,
-    /// Folders or files where the traces are; the current folder, the report's folder and those above it if empty.
-    pub places: Vec<PathBuf>,
+    /// The definitions to score under, by name or path; those that the traces name if absent.
+    pub definitions: Option<PathBuf>,
+    /// The traces: those of [`traces_of`], or others in their place.
+    pub traces: Vec<Input>,
     /// The folder that the new report is for.
     pub out: PathBuf,
     /// Another style than the report's.
@@ -34,6 +35,15 @@ pub struct RescoreRequest {
     pub metrics: Option<Vec<String>>,
     /// How many threads to use.
     pub threads: NonZeroUsize,
+}
+
+/// The traces of a report, found by their hashes in folders or files, or in the current folder, the report's folder and those
+/// above it if `places` is empty.
+///
+/// # Errors
+/// A folder that is no report, traces that are not what they were.
+pub fn traces_of(report: &Path, places: &[PathBuf]) -> Result<Vec<Input>, StudyError> {
+    Ok(provenance::traces(&provenance::manifest(report)?, &provenance::places(report, places))?)
 }
 
 /// A report made again.
@@ -49,12 +59,11 @@ impl RescoreRequest {
     /// Makes the report again.
     ///
     /// # Errors
-    /// A folder that is no report, traces that are not what they were, whatever is wrong with the definitions.
+    /// A folder that is no report, whatever is wrong with the definitions.
     pub fn run(&self) -> Result<Rescored, StudyError> {
         let manifest = provenance::manifest(&self.report)?;
         let options = ReportOptions { style: self.style(&manifest)?, figures: has_figures(&self.report) };
-        let inputs = provenance::traces(&manifest, &provenance::places(&self.report, &self.places))?;
-        let study = Study::of(inputs)?.threads(self.threads).asked(self.question(&manifest))?;
+        let study = Study::of(self.traces.clone())?.threads(self.threads).asked(self.question(&manifest))?;
         study.source.traces()?;
         study.check_folder(&self.out, &options)?;
         let before = self.scores_before(&manifest);
@@ -70,7 +79,7 @@ impl RescoreRequest {
     fn question(&self, manifest: &Manifest) -> Question {
         let selected = manifest.metrics.len() < manifest.definitions.metric.len();
         Question {
-            definitions: Some(self.definitions.clone()),
+            definitions: self.definitions.clone(),
             filter: manifest.filter.clone(),
             metrics: self.metrics.clone().or_else(|| selected.then(|| manifest.metrics.clone())),
             by: Some(manifest.by.clone()),

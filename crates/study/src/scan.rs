@@ -35,6 +35,7 @@ impl Study {
         self.check_unchanged()?;
         let mut results = Results { inputs: inputs.transpose()?.unwrap_or_default(), ..results? };
         self.declare(&mut results)?;
+        results.quality = results.quality.filter(|_| outputs.quality);
         Ok(results)
     }
 
@@ -108,7 +109,9 @@ impl Study {
     fn scan_traces(&self, traces: &TraceSet, outputs: Outputs) -> Result<Results, StudyError> {
         let labels = self.question.labels_over(traces);
         let definitions = self.question.bind(traces)?;
-        let reader = outputs.quality.then(|| QualityReader::of(traces));
+        let statuses = outputs.losses.then(|| QualityReader::of_statuses(traces));
+        let statuses = statuses.filter(|reader| !reader.columns().is_empty());
+        let reader = outputs.quality.then(|| QualityReader::of(traces)).or(statuses);
         let timelines = outputs.timelines || outputs.outcomes;
         let quality = reader.as_ref();
         let wanted = score_traces::Outputs { labels: &labels, timelines, quality, unchecked: &UNCHECKED };

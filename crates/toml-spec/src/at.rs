@@ -5,9 +5,26 @@ use std::str::FromStr;
 use std::sync::Arc;
 
 use toml::Spanned;
-use toml::de::DeValue;
+use toml::de::{DeTable, DeValue};
 
 use crate::fault::{Fault, Place, Source};
+use crate::origin::Written;
+
+/// Parses TOML and reports every fault; with faults the table is what could be read.
+pub fn parse_toml(source: &Arc<Source>) -> (Spanned<DeTable<'_>>, Vec<Fault>) {
+    let (table, errors) = DeTable::parse_recoverable(&source.text);
+    let fault = |error: toml::de::Error| {
+        let place = Place { source: source.clone(), span: error.span().unwrap_or(0..0) };
+        Fault::new(place, format!("not TOML: {}", error.message()))
+    };
+    (table, errors.into_iter().map(fault).collect())
+}
+
+/// Parses TOML for [`At::root`] and reports every fault.
+pub fn parse(source: &Arc<Source>) -> (DeValue<'_>, Vec<Fault>) {
+    let (table, faults) = parse_toml(source);
+    (DeValue::Table(table.into_inner()), faults)
+}
 
 /// A value of a TOML text: what it is called and where it is.
 #[derive(Clone, Debug)]
@@ -33,6 +50,11 @@ impl<'a> At<'a> {
             let name = key.get_ref().as_ref();
             (name, Self { source, name, name_span: key.span(), span: value.span(), value: value.get_ref() })
         })
+    }
+
+    /// The entries of the table at a key; none if it is absent.
+    pub fn within(&self, key: &str) -> impl Iterator<Item = (&'a str, Self)> + use<'a> {
+        self.get(key).map(|inner| inner.entries().collect::<Vec<_>>()).unwrap_or_default().into_iter()
     }
 
     /// The items of a list; none if it is not a list.
@@ -75,8 +97,21 @@ impl<'a> At<'a> {
         }
     }
 
-    /// The text as a value.
+    /// Returns true for a text.
+    pub fn is_text(&self) -> bool {
+        self.value.is_str()
+    }
+
+    /// The text with the location of each of its bytes.
+    pub fn expression(&self) -> Written {
+        Written::toml_string(self.source.clone(), self.written(), self.span.clone())
+    }
+
+    /// The text or the number as another type; `None` for the other values, which their shape refuses.
     pub fn parse<T: FromStr<Err: Into<String>>>(&self, faults: &mut Vec<Fault>) -> Option<T> {
+        if !matches!(self.value, DeValue::String(_) | DeValue::Float(_) | DeValue::Integer(_)) {
+            return None;
+        }
         self.written().parse().map_err(|error: T::Err| faults.push(self.fault(error))).ok()
     }
 

@@ -4,10 +4,9 @@
 //! JSON Schema of the type says the same to editors.
 //!
 //! ```
-//! use std::sync::Arc;
 //! use schemars::JsonSchema;
 //! use serde::Deserialize;
-//! use toml_spec::{At, Faults, Source, parse, read};
+//! use toml_spec::{Source, read_source};
 //!
 //! /// A walk.
 //! #[derive(Deserialize, JsonSchema)]
@@ -21,11 +20,9 @@
 //! }
 //!
 //! let text = "steps = 0\ncolour = \"red\"\n".to_owned();
-//! let source = Arc::new(Source { name: "mine.toml".to_owned(), text });
-//! let (root, mut faults) = parse(&source);
-//! let walk: Option<Walk> = read(&At::root(&source, &root), "a walk", &mut faults);
-//! assert!(walk.is_none());
-//! let shown = Faults(faults).in_order().render(false);
+//! let source = Source { name: "mine.toml".to_owned(), text };
+//! let faults = read_source(source, "a walk", |_: &Walk, _, _| ()).err().unwrap();
+//! let shown = faults.render(false);
 //! assert!(shown.contains("`steps` may be 1 to 100, but is 0"));
 //! assert!(shown.contains("did you mean `color`?"));
 //! ```
@@ -36,14 +33,12 @@
 
 mod at;
 mod fault;
-mod include;
-mod keys;
+mod kind;
 mod origin;
 mod shape;
 
-pub use at::At;
+pub use at::{At, parse, parse_toml};
 pub use fault::{Fault, FaultRecord, Faults, MOST_FAULTS, Place, Source};
-pub use include::{IncludeKind, Includes};
-pub use keys::{Keys, key_count, parse, parse_toml};
+pub use kind::{FileKind, FileText, Part};
 pub use origin::Written;
-pub use shape::{Shape, read};
+pub use shape::{Shape, lay, read, read_source};

@@ -3,14 +3,16 @@
 //! A key is declared once, as a field: its name, its type, its range (`#[schemars(range(..))]`), its words (an enum) and
 //! its description. The schema of the type is the one in `schemas/`, so that an editor refuses what the program refuses.
 
+use std::sync::Arc;
+
 use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
 use serde_json::Value as Json;
 use toml::de::DeValue;
 use toml::{Table, Value};
 
-use crate::at::At;
-use crate::fault::Fault;
+use crate::at::{At, parse};
+use crate::fault::{Fault, Faults, Source};
 use exact::suggest::nearest;
 
 /// The shape of a kind of files.
@@ -45,6 +47,34 @@ impl Shape {
 pub fn read<T: JsonSchema + DeserializeOwned>(at: &At<'_>, what: &str, faults: &mut Vec<Fault>) -> Option<T> {
     let value = Shape::of::<T>().value(at, what, faults)?;
     value.try_into().map_err(|error: toml::de::Error| faults.push(at.fault(error.message()))).ok()
+}
+
+/// Lays a value over another one: key by key in tables, whole lists.
+pub fn lay(under: &mut Value, over: Value) {
+    match (under, over) {
+        (Value::Table(under), Value::Table(over)) => {
+            for (key, value) in over {
+                lay(under.entry(key).or_insert_with(|| Value::Table(Table::new())), value);
+            }
+        }
+        (under, over) => *under = over,
+    }
+}
+
+/// Reads a text as a type; `check` refuses what no type can, with the values at hand.
+pub fn read_source<T: JsonSchema + DeserializeOwned>(
+    source: Source,
+    what: &str,
+    check: impl FnOnce(&T, &At<'_>, &mut Vec<Fault>),
+) -> Result<T, Faults> {
+    let source = Arc::new(source);
+    let (root, mut faults) = parse(&source);
+    let at = At::root(&source, &root);
+    let value = if faults.is_empty() { read(&at, what, &mut faults) } else { None };
+    if let Some(value) = &value {
+        check(value, &at, &mut faults);
+    }
+    value.filter(|_| faults.is_empty()).ok_or_else(|| Faults(faults).in_order())
 }
 
 struct Walk<'a> {
@@ -171,7 +201,7 @@ impl<'a> Walk<'a> {
                     None
                 }
                 None if others.is_object() => self.value(others, &value, &one_of(what)),
-                None => None,
+                None => Some(as_written(value.value)),
             };
             table.extend(read.map(|read| (key.to_owned(), read)));
         }
@@ -226,6 +256,22 @@ impl<'a> Walk<'a> {
             }
         }
         kinds.join(" or ")
+    }
+}
+
+/// A value of any shape.
+fn as_written(value: &DeValue<'_>) -> Value {
+    match value {
+        DeValue::String(text) => Value::String(text.to_string()),
+        DeValue::Boolean(truth) => Value::Boolean(*truth),
+        DeValue::Integer(number) => i64::from_str_radix(number.as_str(), number.radix())
+            .map_or_else(|_| Value::String(number.as_str().to_owned()), Value::Integer),
+        DeValue::Float(number) => Value::Float(number.as_str().replace('_', "").parse().unwrap_or(f64::NAN)),
+        DeValue::Datetime(moment) => Value::Datetime(*moment),
+        DeValue::Array(items) => Value::Array(items.iter().map(|item| as_written(item.get_ref())).collect()),
+        DeValue::Table(table) => {
+            Value::Table(table.iter().map(|(k, v)| (k.get_ref().to_string(), as_written(v.get_ref()))).collect())
+        }
     }
 }
 

@@ -73,9 +73,6 @@ pub struct Declared {
     /// Whether every file says which episodes were lost.
     #[serde(default, skip_serializing_if = "is_false")]
     pub losses_recorded: bool,
-    /// Whether some rows are of scores in CSV or JSON Lines, which carry nothing of this.
-    #[serde(default, skip_serializing_if = "is_false")]
-    pub from_text: bool,
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde gives a reference")]
@@ -129,7 +126,6 @@ impl Declared {
             recordings: self.recordings,
             unrecorded: self.unrecorded,
             losses_recorded: self.losses_recorded && other.losses_recorded,
-            from_text: self.from_text || other.from_text,
         }
     }
 }

@@ -238,7 +238,7 @@ impl Normalizer<'_> {
 }
 
 /// Writes the version of the rule to where a recording tells it, else beside its other keys; what stood there before.
-fn put_version(recording: &mut Value) -> Option<String> {
+pub fn put_version(recording: &mut Value) -> Option<String> {
     let text = |value: Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
     if let Some(place) = find(recording) {
         return Some(text(std::mem::replace(place, VERSION.into())));

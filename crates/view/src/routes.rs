@@ -15,6 +15,9 @@ use super::error::ViewError;
 use super::{View, page};
 use web::{self, Guard};
 
+/// Answers that are made at once; further ones wait.
+const MOST_ANSWERS: usize = 4;
+
 /// Binds the address of a server, so that its link can be told before anything is asked.
 pub fn bind(host: &str, port: u16) -> std::io::Result<(TcpListener, SocketAddr)> {
     let listener = TcpListener::bind((host, port))?;
@@ -30,7 +33,9 @@ pub fn serve(view: Arc<View>, listener: TcpListener, guard: Guard) -> std::io::R
         .route("/api/{name}", get(api))
         .route("/robots.txt", get(robots))
         .with_state(view);
-    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
+    let mut builder = tokio::runtime::Builder::new_multi_thread();
+    // Each answer may read an episode: more at once would take memory, not less time.
+    let runtime = builder.worker_threads(2).max_blocking_threads(MOST_ANSWERS).enable_all().build()?;
     runtime.block_on(web::serve(listener, web::guarded(routes, guard)))
 }
 

@@ -8,6 +8,7 @@
 use std::fmt::Write as _;
 use std::net::{IpAddr, SocketAddr};
 use std::sync::Arc;
+use std::time::Duration;
 
 use axum::Router;
 use axum::body::Body;
@@ -16,12 +17,27 @@ use axum::http::header::{self, HeaderMap, HeaderName, HeaderValue};
 use axum::http::{Method, StatusCode};
 use axum::middleware::{self, Next};
 use axum::response::{IntoResponse as _, Response};
+use hyper::server::conn::http1;
+use hyper_util::rt::{TokioIo, TokioTimer};
+use hyper_util::service::TowerToHyperService;
 use tokio::net::TcpListener;
+use tokio::sync::Semaphore;
+use tokio::time::timeout;
 
 /// What a page may do: show what this server has, and nothing else.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; style-src-attr 'unsafe-inline'; \
                       img-src 'self' data:; font-src 'self' data:; connect-src 'self'; base-uri 'none'; form-action 'none'; \
                       frame-ancestors 'none'";
+
+/// Connections at once; a browser opens six.
+const MOST_CONNECTIONS: usize = 64;
+/// The time for the head of a request; an idle connection ends after it too.
+const SLOWEST_HEAD: Duration = Duration::from_secs(10);
+/// The time for the body of a request, and for the answer.
+const SLOWEST_ANSWER: Duration = Duration::from_mins(2);
+/// A browser opens another connection after it.
+const LONGEST_CONNECTION: Duration = Duration::from_mins(10);
+const LARGEST_HEAD: usize = 64 << 10;
 
 /// What every page begins and ends with.
 const PAGE: &str = include_str!("../../../assets/web/page.html");
@@ -201,7 +217,8 @@ async fn pass(State(guard): State<Arc<Guard>>, request: Request, next: Next) -> 
     let query = request.uri().query().unwrap_or_default().to_owned();
     let mut response = match guard.check(request.method(), request.headers(), &query) {
         Ok(()) => {
-            let mut response = next.run(request).await;
+            let late = || (StatusCode::REQUEST_TIMEOUT, "the request took too long\n").into_response();
+            let mut response = timeout(SLOWEST_ANSWER, next.run(request)).await.unwrap_or_else(|_| late());
             if let Some(cookie) = guard.cookie_to_set(&query) {
                 response.headers_mut().insert(header::SET_COOKIE, cookie);
             }
@@ -218,10 +235,27 @@ async fn pass(State(guard): State<Arc<Guard>>, request: Request, next: Next) -> 
     response
 }
 
-/// Answers until the process ends.
+/// Answers until the process ends. A connection that sends no whole request head in time is closed; further connections wait
+/// until one of the open ones ends.
 pub async fn serve(listener: std::net::TcpListener, routes: Router) -> std::io::Result<()> {
     listener.set_nonblocking(true)?;
-    axum::serve(TcpListener::from_std(listener)?, routes).await
+    let listener = TcpListener::from_std(listener)?;
+    let places = Arc::new(Semaphore::new(MOST_CONNECTIONS));
+    loop {
+        let place = places.clone().acquire_owned().await.map_err(std::io::Error::other)?;
+        let Ok((stream, _)) = listener.accept().await else {
+            // Out of file descriptors, or the client has gone: others may still come.
+            tokio::time::sleep(Duration::from_millis(50)).await;
+            continue;
+        };
+        let service = TowerToHyperService::new(routes.clone());
+        tokio::spawn(async move {
+            let mut builder = http1::Builder::new();
+            builder.timer(TokioTimer::new()).header_read_timeout(SLOWEST_HEAD).max_buf_size(LARGEST_HEAD);
+            let _ = timeout(LONGEST_CONNECTION, builder.serve_connection(TokioIo::new(stream), service)).await;
+            drop(place);
+        });
+    }
 }
 
 #[cfg(test)]

@@ -14,7 +14,9 @@ use world::record::plan::{Key, Subject};
 use world::sim::config::WorldConfig;
 
 /// Tokens of a reply, hidden reasoning left out, before any is seen: the keys of the paper's object with a sentence each.
-const TYPICAL_REPLY: u64 = 250;
+const PRIOR_REPLY: u64 = 250;
+/// Seconds for an answer before any is seen.
+const PRIOR_SECONDS: f64 = 5.0;
 
 /// The answer of `record --dry-run --json`; a list of them for a study or several models.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -46,8 +48,15 @@ pub struct RequestForecast {
     pub completion_tokens_at_most: u64,
     /// US dollars for the requests alone; null if nobody knows the price.
     pub prompt_cost_usd: Option<f64>,
-    /// US dollars with replies of 250 tokens, a prior, or as many as they may have; null if nobody knows the price.
+    /// Finished episodes that `typical_cost_usd` and `seconds` are estimated from; 0 if they follow a prior: all steps, replies of
+    /// 250 tokens, 5 s for an answer.
+    pub finished_episodes: u64,
+    /// Requests, if episodes are as long as the finished ones.
+    pub typical_requests: u64,
+    /// US dollars for these requests; null if nobody knows the price.
     pub typical_cost_usd: Option<f64>,
+    /// Seconds for these requests, as many at once as there may be, and no more in a minute than `--requests-per-minute` allows.
+    pub seconds: f64,
     /// US dollars with the longest replies; null if nobody knows the price.
     pub cost_usd_at_most: Option<f64>,
 }
@@ -73,39 +82,58 @@ impl ForecastAnswer {
 }
 
 impl RequestForecast {
-    /// What a model would be asked in these episodes.
+    /// What a model would be asked in the episodes that are still to do, by what those that are finished took.
     pub fn of(
         player: &VlmPlayer,
         subject: &Subject,
-        todo: &[Key],
+        (finished, todo): (&[Key], &[Key]),
         config: &WorldConfig,
+        (in_flight, per_minute): (usize, Option<u32>),
     ) -> Result<Self, Box<dyn std::error::Error + Send + Sync>> {
         let vlm = player.vlm();
         let view = [config.eye.width, config.eye.height_px];
-        let mut forecast = Self {
-            at_most: 0,
-            answered: 0,
-            prompt_tokens: 0,
-            completion_tokens_at_most: 0,
-            prompt_cost_usd: None,
-            typical_cost_usd: None,
-            cost_usd_at_most: None,
-        };
+        let finished: Vec<String> = finished.iter().map(|key| key.file_stem(subject)).collect();
+        let typical = vlm.typical(finished.iter().map(String::as_str))?;
+        let [mut at_most, mut answered_already, mut prompt_tokens, mut requests] = [0; 4];
         for key in todo {
             let answered = vlm.answered(&key.file_stem(subject))?;
             let left = u64::from(config.of(key.experiment).episode.steps).saturating_sub(answered);
-            forecast.answered += answered;
-            forecast.at_most += left;
-            forecast.prompt_tokens += left * estimate::prompt_tokens(vlm.choice(), key.experiment, view)?;
+            answered_already += answered;
+            at_most += left;
+            prompt_tokens += left * estimate::prompt_tokens(vlm.choice(), key.experiment, view)?;
+            requests += typical.map_or(left, |typical| left.min(rounded(typical.steps).saturating_sub(answered)));
         }
-        forecast.completion_tokens_at_most = forecast.at_most * u64::from(vlm.max_output_tokens());
         let prices = vlm.choice().model.prices;
-        forecast.prompt_cost_usd = prices.cost_of_requests(forecast.prompt_tokens);
-        let typical = TYPICAL_REPLY.min(vlm.max_output_tokens().into());
-        forecast.typical_cost_usd = prices.cost_of(forecast.prompt_tokens, forecast.at_most * typical);
-        forecast.cost_usd_at_most = prices.cost_of(forecast.prompt_tokens, forecast.completion_tokens_at_most);
-        Ok(forecast)
+        let longest = u64::from(vlm.max_output_tokens());
+        let reply = typical.and_then(|typical| typical.completion_tokens).map_or(PRIOR_REPLY, rounded).min(longest);
+        let by_prices = prices.cost_of(prompt_tokens * requests / at_most.max(1), requests * reply);
+        let by_answers = typical.and_then(|typical| typical.cost_usd).map(|cost| cost * float(requests));
+        let seconds = typical.map_or(PRIOR_SECONDS, |typical| typical.seconds);
+        let at_once = float(in_flight.min(todo.len()).max(1) as u64);
+        let at_rate = per_minute.map_or(0.0, |count| 60.0 * float(requests) / f64::from(count));
+        Ok(Self {
+            at_most,
+            answered: answered_already,
+            prompt_tokens,
+            completion_tokens_at_most: at_most * longest,
+            prompt_cost_usd: prices.cost_of_requests(prompt_tokens),
+            finished_episodes: typical.map_or(0, |typical| typical.episodes),
+            typical_requests: requests,
+            typical_cost_usd: by_answers.or(by_prices),
+            seconds: at_rate.max(seconds * float(requests) / at_once),
+            cost_usd_at_most: prices.cost_of(prompt_tokens, at_most * longest),
+        })
     }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "nobody sends 2^53 requests")]
+const fn float(count: u64) -> f64 {
+    count as f64
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a mean of small counts")]
+fn rounded(mean: f64) -> u64 {
+    mean.round() as u64
 }
 
 /// Tells what would be recorded of several models, and of all together.
@@ -118,11 +146,12 @@ pub(crate) fn tell_all(out: &mut impl io::Write, answers: &[ForecastAnswer]) -> 
     let unknown = requests.iter().filter(|requests| requests.cost_usd_at_most.is_none()).count();
     let (typical, most) = (sum(|requests| requests.typical_cost_usd), sum(|requests| requests.cost_usd_at_most));
     write!(out, "together: {}, at most {}; ", counted(episodes as u64, "episode"), counted(sent, "request"))?;
-    write!(out, "about {typical} with replies of {TYPICAL_REPLY} tokens, at most {most}")?;
+    write!(out, "about {typical}, at most {most}")?;
     match unknown {
-        0 => writeln!(out),
-        models => writeln!(out, ", and what {} without prices cost", counted(models as u64, "model")),
+        0 => {}
+        models => write!(out, " and what {} without prices cost", counted(models as u64, "model"))?,
     }
+    writeln!(out, "; about {}, one model after the other", time(requests.iter().map(|requests| requests.seconds).sum()))
 }
 
 /// Tells what would be recorded, for people.
@@ -142,19 +171,35 @@ pub(crate) fn tell(out: &mut impl io::Write, answer: &ForecastAnswer) -> io::Res
     }
     let (prompt, completion) = (requests.prompt_tokens, requests.completion_tokens_at_most);
     writeln!(out, "tokens: about {prompt} in requests, at most {completion} in replies")?;
-    match (requests.prompt_cost_usd, requests.typical_cost_usd.zip(requests.cost_usd_at_most)) {
-        (Some(prompt), Some((typical, most))) => writeln!(
+    let basis = match requests.finished_episodes {
+        0 => format!("as a prior: all steps, replies of {PRIOR_REPLY} tokens, {PRIOR_SECONDS} s for an answer"),
+        episodes => format!("as in {}", counted(episodes, "finished episode")),
+    };
+    let (count, time) = (counted(requests.typical_requests, "request"), time(requests.seconds));
+    writeln!(out, "typical: {count}, about {time}, {basis}")?;
+    let RequestForecast { prompt_cost_usd, typical_cost_usd, cost_usd_at_most, .. } = *requests;
+    match (prompt_cost_usd, typical_cost_usd, cost_usd_at_most) {
+        (_, Some(typical), Some(most)) => {
+            writeln!(out, "cost: typical {}, at most {} with the longest replies", dollars(typical), dollars(most))
+        }
+        (_, Some(typical), None) => writeln!(
             out,
-            "cost: about {} for the requests, {} with replies of {TYPICAL_REPLY} tokens, at most {} with the longest replies",
-            dollars(prompt),
-            dollars(typical),
-            dollars(most)
+            "cost: typical {}, at most unknown: the model has no prices; --models FILE gives them",
+            dollars(typical)
         ),
-        (Some(prompt), None) => writeln!(
+        (Some(prompt), None, _) => writeln!(
             out,
             "cost: about {} for the requests, unknown for the replies: the model has no output price; --models FILE gives it",
             dollars(prompt)
         ),
         _ => writeln!(out, "cost: unknown, the model has no price for requests; --models FILE gives prices"),
+    }
+}
+
+fn time(seconds: f64) -> String {
+    match rounded(seconds) {
+        seconds @ 0..120 => format!("{seconds} s"),
+        seconds @ 120..7_200 => format!("{} min", seconds.div_ceil(60)),
+        seconds => format!("{} h", seconds.div_ceil(3_600)),
     }
 }

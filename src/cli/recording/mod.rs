@@ -4,6 +4,8 @@ pub mod dry_run;
 pub mod exec;
 #[cfg(feature = "view")]
 pub mod human;
+pub mod interrupt;
+pub mod probe;
 pub mod registration;
 pub mod several;
 pub mod vlm;

@@ -13,11 +13,13 @@ use exact::escape::visible;
 use trace::model_id::OWN_SERVER;
 use world::agent::vlm::limits::{Account, Limits, Spend};
 use world::agent::vlm::models::{Choice, Contract, Models};
+use world::agent::vlm::probe::{ProbeAnswer, probe};
 use world::agent::vlm::provider::{Patience, Provider};
 use world::agent::vlm::secrets::Secret;
 use world::agent::vlm::wire_format::{Dialect, Effort};
-use world::agent::vlm::{OnOutage, Vlm, spent};
+use world::agent::vlm::{OnOutage, Tier, Vlm};
 use world::agent::{Agent, Lost, Player, Task};
+use world::experiment::Experiment;
 use world::record::plan::slug;
 
 /// A model, who serves it, and what a recording with it may spend.
@@ -45,7 +47,7 @@ pub struct VlmArgs {
     #[arg(long)]
     prompt_only: bool,
     /// Stop before more US dollars are spent on all that the model plays into the folder, over all starts; needs both prices of
-    /// the model
+    /// the model, or a router that says what an answer cost
     #[arg(long, value_name = "USD", value_parser = amount)]
     max_cost: Option<f64>,
     /// Stop before more tokens are used on all that the model plays into the folder, over all starts
@@ -65,12 +67,20 @@ pub struct VlmArgs {
     /// Requests that are out at once, at most; fewer where the provider says that it gets too many
     #[arg(long, value_name = "N", default_value_t = 64)]
     at_once: usize,
+    /// Requests that the account at the provider takes in a minute, over all processes that record into the folder; without it,
+    /// what the provider says counts
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    requests_per_minute: Option<u32>,
     /// Attempts for one step
     #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u32).range(1..=50))]
     attempts: u32,
-    /// Seconds for one answer
-    #[arg(long, value_name = "SECONDS", default_value_t = 180, value_parser = clap::value_parser!(u64).range(1..=3_600))]
-    timeout: u64,
+    /// A service tier at half the price: flex of OpenAI and Google, whose answers take minutes; batch of Anthropic, where the steps
+    /// of all episodes under way go as one batch
+    #[arg(long, value_name = "flex|batch", value_parser = tier)]
+    tier: Option<Tier>,
+    /// Seconds for one answer [default: 180, or 900 with --tier flex]
+    #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..=3_600))]
+    timeout: Option<u64>,
     /// Count a step whose attempts are used up as one without a decision, rather than lose its episode
     #[arg(long)]
     stand_still_on_outage: bool,
@@ -105,19 +115,18 @@ impl VlmArgs {
             let vlm = Arc::new(Vlm::cassette(choice, folder.clone()));
             return Ok(VlmPlayer { vlm, at_once: 1, network: None, ledger: None, slug: String::new() });
         }
-        if self.max_cost.is_some() {
+        // A router says what an answer cost; of others nobody knows it without prices.
+        let may_say = choice.backend.dialect == Dialect::OpenaiCompatible && choice.model.backend != OWN_SERVER;
+        if self.max_cost.is_some() && !may_say {
             choice.check_prices().map_err(Failure::input)?;
         }
-        let network = tokio::runtime::Builder::new_multi_thread()
-            .worker_threads(1)
-            .enable_all()
-            .build()
-            .map_err(|error| Failure::input(format!("cannot start the network's thread: {error}")))?;
-        let provider = self.provider(&choice)?;
+        let network = network()?;
+        let mut provider = self.provider(&choice)?;
+        if self.tier == Some(Tier::Batch) {
+            provider = provider.in_batches();
+        }
         let journals = out.join(JOURNALS);
         let slug = slug(&choice.name);
-        let spent =
-            spent(&Vlm::cassette(choice.clone(), journals.clone()), &journals, &slug).map_err(Failure::input)?;
         let limits = Limits { cost_usd: self.max_cost, tokens: self.max_tokens, requests: self.max_requests };
         let ledger = Some(out.join(LEDGERS).join(format!("{slug}.json")));
         let on_outage = if self.stand_still_on_outage { OnOutage::StandStill } else { OnOutage::Lose };
@@ -126,16 +135,29 @@ impl VlmArgs {
             provider,
             network.handle().clone(),
             journals,
-            Arc::new(Account::new(limits, spent)),
+            Arc::new(Account::new(limits, Spend::default())),
             on_outage,
         );
+        vlm.count_spent(&slug).map_err(Failure::input)?;
         Ok(VlmPlayer { vlm: Arc::new(vlm), at_once: self.at_once.max(1), network: Some(network), ledger, slug })
     }
 
     /// The player of a forecast: knows the journals in the folder of the recording, has no key and sends nothing.
     pub fn forecaster(&self, out: &Path) -> Result<VlmPlayer, Failure> {
         let vlm = Arc::new(Vlm::cassette(self.choice()?, out.join(JOURNALS)));
-        Ok(VlmPlayer { vlm, at_once: 1, network: None, ledger: None, slug: String::new() })
+        Ok(VlmPlayer { vlm, at_once: self.at_once.max(1), network: None, ledger: None, slug: String::new() })
+    }
+
+    /// Asks the model what it takes, with the schema of an experiment and a frame of this size.
+    pub fn probe(&self, experiment: Experiment, view: [u32; 2]) -> Result<ProbeAnswer, Failure> {
+        let choice = self.choice()?;
+        let provider = self.provider(&choice)?;
+        Ok(network()?.block_on(probe(choice, &provider, experiment, view)))
+    }
+
+    /// Requests in a minute, if the user says how many.
+    pub fn requests_per_minute(&self) -> Option<u32> {
+        self.requests_per_minute
     }
 
     /// Whether requests go out, and are not played from an earlier recording.
@@ -163,6 +185,9 @@ impl VlmArgs {
         if self.prompt_only {
             choice.model.contract = Contract::Prompt;
         }
+        if let Some(tier) = self.tier {
+            choice.use_tier(tier).map_err(Failure::input)?;
+        }
         choice.model.accepted.clone_from(&self.accept_model);
         choice.model.max_output_tokens = self.max_output_tokens.or(choice.model.max_output_tokens);
         choice.model.reasoning_effort = self.reasoning_effort.or(choice.model.reasoning_effort);
@@ -180,16 +205,33 @@ impl VlmArgs {
             (Err(_), Dialect::OpenaiCompatible) if self.base_url.is_some() => None,
             (Err(missing), _) => return Err(Failure::input(missing)),
         };
-        let patience =
-            Patience { attempts: self.attempts, timeout: Duration::from_secs(self.timeout), ..Patience::default() };
+        let patience = Patience {
+            attempts: self.attempts,
+            timeout: Duration::from_secs(self.timeout.unwrap_or(if self.tier == Some(Tier::Flex) { 900 } else { 180 })),
+            interval: self.requests_per_minute.map_or(Duration::ZERO, |count| Duration::from_mins(1) / count),
+            ..Patience::default()
+        };
         Provider::new(url, choice.backend.dialect, &choice.model.id, secret, patience, self.at_once)
             .map_err(Failure::input)
     }
 }
 
+fn network() -> Result<Runtime, Failure> {
+    let network = tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build();
+    network.map_err(|error| Failure::input(format!("cannot start the network's thread: {error}")))
+}
+
 fn amount(text: &str) -> Result<f64, String> {
     let value = text.parse::<f64>().map_err(|fault| fault.to_string())?;
     if value.is_finite() && value >= 0.0 { Ok(value) } else { Err("expected a finite number from 0".to_owned()) }
+}
+
+fn tier(text: &str) -> Result<Tier, String> {
+    match text {
+        "flex" => Ok(Tier::Flex),
+        "batch" => Ok(Tier::Batch),
+        _ => Err("expected flex or batch".to_owned()),
+    }
 }
 
 fn effort(text: &str) -> Result<Effort, String> {

@@ -66,6 +66,18 @@ fn what_a_program_starts_ends_with_it() {
 }
 
 #[test]
+#[cfg(target_os = "linux")]
+fn what_leaves_the_group_of_a_program_ends_with_it() {
+    let bench = Bench::new();
+    // A session of its own, and a parent that is gone.
+    let daemon = "(setsid sh -c 'echo $$ >> ids; sleep 600' </dev/null >/dev/null 2>&1 &)";
+    bench.program(&format!("[ $n = 1 ] && {daemon}; {}", three_steps()));
+    let (code, _, said) = outcome(&bench.record(&[]).output().unwrap());
+    assert_eq!(code, Some(0), "{said}");
+    assert!(are_gone(&lines(&bench, "ids", 1)));
+}
+
+#[test]
 fn ctrl_c_ends_programs_with_the_steps_under_way_and_twice_at_once() {
     let bench = Bench::new();
     for times in [1, 2] {

@@ -80,7 +80,7 @@ const SERVED: [Served; 5] = [
             ["Pro", "gemini-2.5-pro", PRICES, "accept-model = \"gemini-3.8-flash\""],
         ],
     ),
-    ("openrouter", "openai-compatible", "/api/v1", [["Gemma", "google/gemma-4-31b-it:nitro", "", "no-max-cost"], NONE]),
+    ("openrouter", "openai-compatible", "/api/v1", [["Gemma", "google/gemma-4-31b-it:nitro", "", ""], NONE]),
     ("local", "openai-compatible", "/v1", [["Own", "own-1", "answers_as = [\"*\"]", "no-max-cost"], NONE]),
 ];
 
@@ -162,7 +162,8 @@ fn study(options: &str, episodes: u64) {
     let each = episodes as f64 / 8.0 * 4.0;
     assert!((cost("Gemma") - 0.000_7 * each).abs() < 1e-6, "{}", cost("Gemma"));
     assert!((cost("GPT 5.1") - 0.001_64 * each).abs() < 1e-6, "{}", cost("GPT 5.1"));
-    assert_eq!(std::fs::read_dir(folder.path().join("runs/ledger")).unwrap().count(), 16);
+    // Two files for each model, and one for each account.
+    assert_eq!(std::fs::read_dir(folder.path().join("runs/ledger")).unwrap().count(), 16 + 5);
     let report = run(folder.path(), &["report", "runs", "--out", "report", "--json"]).json();
     assert_eq!(report["episodes"], episodes);
 }
@@ -170,6 +171,157 @@ fn study(options: &str, episodes: u64) {
 #[test]
 fn a_study_file_is_recorded_in_one_command_and_goes_on_after_a_kill() {
     study("experiment = \"E1,E2\"\nseeds = 1\nruns = 2", 32);
+}
+
+#[test]
+fn a_probe_tells_what_each_model_takes() {
+    let folder = Folder::new();
+    let servers = prepare(&folder, "experiment = \"E1\"\nseeds = 1\nruns = 1");
+    let models = folder.path().join("models.toml");
+    let wrong = "[model.Old]\nbackend = \"anthropic\"\nid = \"claude-sonnet-5-5\"\n\
+                 [model.Rerouted]\nbackend = \"gemini\"\nid = \"gemini-2.5-pro\"\n\
+                 [model.Routed]\nbackend = \"openrouter\"\nid = \"google/gemma\"\nreasoning_effort = \"low\"\n\
+                 extra_body = { provider = { only = [\"a\"], require_parameters = true } }\n";
+    std::fs::write(&models, std::fs::read_to_string(&models).unwrap() + wrong).unwrap();
+    let typed = |words: &[&str]| {
+        let mut command = program(folder.path());
+        command.env("LOOPBACK_KEY", KEY).args(["record", "--probe"]).args(words).output().unwrap()
+    };
+    let probed = |words: &[&str], code| {
+        let output = typed(&[words, &["--json"]].concat());
+        assert_eq!(output.status.code(), Some(code), "{}", stderr(&output));
+        serde_json::from_slice::<Vec<Value>>(&output.stdout).unwrap()
+    };
+
+    let answers = probed(&["study.toml"], 0);
+    let names: Vec<&str> = answers.iter().map(|answer| answer["model"].as_str().unwrap()).collect();
+    assert_eq!(names, ["Flash", "GPT 5.1", "GPT 6.1", "Gemma", "Haiku", "Own", "Pro", "Sonnet"]);
+    let of = |key: &str| answers.iter().map(|answer| answer[key].clone()).collect::<Vec<_>>();
+    // The server of one's own takes the schema and does nothing with it; it names no price.
+    assert_eq!(of("enforces_schema"), [true, true, true, true, true, false, true, true].map(Value::from));
+    assert_eq!((&of("cost_usd")[3], &of("cost_usd")[5]), (&Value::from(0.0007), &Value::Null));
+    assert_eq!(
+        (&of("answered_by")[1], &of("answered_by")[6]),
+        (&"gpt-5.1-2026-09-29".into(), &"gemini-3.8-flash".into())
+    );
+    assert!(of("latency_ms").iter().all(Value::is_u64) && of("fault").iter().all(Value::is_null));
+    let parameter = |answer: &Value, name: &str| {
+        let all = answer["parameters"].as_array().unwrap();
+        all.iter().find(|parameter| parameter["name"] == name).cloned().unwrap_or_default()
+    };
+    assert_eq!(parameter(&answers[1], "temperature")["taken"], true);
+    assert_eq!(parameter(&answers[2], "temperature"), Value::Null, "it is not sent");
+
+    let words = ["--models", "models.toml", "--model", "Old", "--model", "Rerouted", "--model", "Routed"];
+    let [old, rerouted, routed] = probed(&words, 1).try_into().unwrap();
+    let temperature = parameter(&old, "temperature");
+    assert_eq!((&temperature["taken"], &temperature["line"]), (&false.into(), &"temperature = \"default\"".into()));
+    assert_eq!((&old["requests"], &old["enforces_schema"]), (&2.into(), &true.into()));
+    assert_eq!((&rerouted["is_model"], &rerouted["fault"]), (&false.into(), &Value::Null));
+    assert_eq!(parameter(&routed, "extra_body.provider")["taken"], false);
+    assert_eq!(parameter(&routed, "reasoning_effort")["taken"], true);
+
+    let said = String::from_utf8(typed(&words).stdout).unwrap();
+    for line in [
+        "Old (claude-sonnet-5-5): answered by `claude-sonnet-5-5` in ",
+        "  temperature = 0.2: refused: temperature = \"default\"\n",
+        "  contract = \"schema\": taken and enforced\n",
+        "another model answers, `gemini-3.8-flash`: --accept-model gemini-3.8-flash records it",
+    ] {
+        assert!(said.contains(line), "{line}: {said}");
+    }
+    drop(servers);
+    let output = typed(&words[..4]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(!folder.path().join("runs").exists(), "a probe writes nothing");
+}
+
+#[test]
+fn the_flex_tier_is_asked_for_and_costs_half() {
+    let folder = Folder::new();
+    let _servers = prepare(&folder, "");
+    let record = |model: &str, words: &str| {
+        let mut command = program(folder.path());
+        command.env("LOOPBACK_KEY", KEY).args([
+            "record",
+            "--models",
+            "models.toml",
+            "--config",
+            "small.toml",
+            "--no-log",
+        ]);
+        command.args([
+            "--experiment",
+            "E1",
+            "--seeds",
+            "1",
+            "--runs",
+            "2",
+            "--json",
+            "--model",
+            model,
+            "--tier",
+            "flex",
+        ]);
+        command.args(words.split_whitespace()).output().unwrap()
+    };
+    for model in ["GPT 5.1", "Flash"] {
+        let output = record(model, "");
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        let answer: Value = serde_json::from_slice(&output.stdout).unwrap();
+        // Eight answers of 0.00164 dollars at the full price.
+        let cost = answer["spend"]["cost_usd"].as_f64().unwrap();
+        assert!((cost - 8.0 * 0.001_64 / 2.0).abs() < 1e-9, "{model}: {cost}");
+    }
+    let probed = record("Flash", "--probe");
+    let probed: Value = serde_json::from_slice(&probed.stdout).unwrap();
+    let parameters = probed["parameters"].as_array().unwrap();
+    assert!(
+        parameters.iter().any(|sent| sent["name"] == "extra_body.serviceTier" && sent["value"] == "flex"),
+        "{probed}"
+    );
+    let refused = record("Haiku", "");
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(stderr(&refused).contains("the backend `anthropic` has no such tier"), "{}", stderr(&refused));
+}
+
+/// `record` of one model of these servers, in one experiment and seed.
+fn one(folder: &Folder, model: &str, words: &str) -> Command {
+    let mut command = program(folder.path());
+    command.env("LOOPBACK_KEY", KEY).args(["record", "--models", "models.toml", "--config", "small.toml", "--no-log"]);
+    command.args(["--experiment", "E1", "--seeds", "1", "--json", "--model", model]).args(words.split_whitespace());
+    command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    command
+}
+
+#[test]
+fn steps_of_many_episodes_go_as_batches_and_none_is_paid_twice_after_a_kill() {
+    let folder = Folder::new();
+    let servers = prepare(&folder, "");
+    let paid = || servers[1].paid();
+    let record = || one(&folder, "Sonnet", "--runs 6 --tier batch");
+    let batches = || {
+        let mut files = std::fs::read_dir(folder.path().join("runs/ledger")).into_iter().flatten().flatten();
+        let notes = files.find(|file| file.path().to_string_lossy().ends_with(".batches.jsonl"));
+        notes.map_or_else(String::new, |file| std::fs::read_to_string(file.path()).unwrap()).lines().count()
+    };
+    let mut killed = record().spawn().unwrap();
+    // The first step goes alone, the others of the first steps together.
+    while batches() < 2 {
+        assert_eq!(killed.try_wait().unwrap(), None, "it ended before its second batch");
+        sleep(Duration::from_millis(5));
+    }
+    killed.kill().unwrap();
+    killed.wait().unwrap();
+    let output = record().output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let answer: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(answer["recorded"], 6);
+    // 24 answers; without batches each of them is a request.
+    assert_eq!(paid(), 24, "an answer was paid twice");
+    assert!((6..=14).contains(&batches()), "{} batches", batches());
+    let cost = answer["spend"]["cost_usd"].as_f64().unwrap();
+    assert!((cost - 24.0 * 0.001_64 / 2.0).abs() < 1e-9, "{cost}");
 }
 
 #[test]

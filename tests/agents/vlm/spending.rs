@@ -1,7 +1,7 @@
 //! Limits hold over all episodes of a recording and all times that it is started.
 
 use std::process::{Command, Stdio};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use world::agent::vlm::OnOutage;
 use world::agent::vlm::limits::Limits;
@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 
 use super::bench::Bench;
 use super::recordings::{Folder, counting};
-use super::server::{Conduct, Server, decision, whole};
+use super::server::{Conduct, Server, decision, ok, spoken, whole};
 use crate::harness::program::stderr;
 
 #[test]
@@ -234,4 +234,80 @@ fn requests_that_timed_out_or_were_killed_count_with_what_they_may_cost() {
     let answer: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(answer["spend"]["uncosted_usd_at_most"].as_f64(), Some(may_cost));
     assert_eq!((output.status.code(), server.count()), (Some(2), 1), "{}", stderr(&output));
+}
+
+/// A router that says what an answer cost, for a model without prices.
+fn routed(folder: &Folder, server: &Server, words: &str) -> Command {
+    let own = "[backend.router]\ndialect = \"openai-compatible\"\nkey = \"MIRRORSTATS_API_KEY\"\n\
+               [model.own]\nbackend = \"router\"\nid = \"own-1\"\nanswers_as = [\"model-1-*\"]\nmax_output_tokens = 100\n";
+    std::fs::write(folder.path().join("own.toml"), own).unwrap();
+    let words = format!("--models own.toml --backend router --threads 1 --in-flight 16 --json {words}");
+    folder.record(server, "own", &words)
+}
+
+/// <https://openrouter.ai/docs/use-cases/usage-accounting>: `usage.cost`.
+fn with_cost(text: &str, cost: f64) -> Vec<u8> {
+    let mut body = spoken(Dialect::OpenaiCompatible, text, "stop");
+    body["usage"]["cost"] = json!(cost);
+    ok(&body)
+}
+
+#[test]
+fn a_limit_of_cost_is_held_by_what_answers_say_that_they_cost() {
+    let server = Server::start(|at, request| {
+        std::thread::sleep(Duration::from_millis(20));
+        with_cost(&counting(request, 6, at), 0.002)
+    });
+    let folder = Folder::new();
+    let output = routed(&folder, &server, "--seeds 4 --runs 4 --max-cost 0.1").output().unwrap();
+    assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
+    let answer: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let cost = answer["spend"]["cost_usd"].as_f64().unwrap();
+    assert!((0.07..=0.1).contains(&cost) && (cost - 0.002 * server.count() as f64).abs() < 1e-9, "{cost}");
+
+    // One that says nothing is noticed with its first answer.
+    let server = Server::start(|at, request| whole(Dialect::OpenaiCompatible, &counting(request, 6, at)));
+    let folder = Folder::new();
+    let output = routed(&folder, &server, "--seeds 4 --runs 4 --max-cost 0.1").output().unwrap();
+    assert_eq!((output.status.code(), server.count()), (Some(2), 1), "{}", stderr(&output));
+    assert!(stderr(&output).contains("`own` has no input and no output price"), "{}", stderr(&output));
+}
+
+#[test]
+fn a_forecast_follows_the_episodes_that_are_finished() {
+    let server = Server::start(|at, request| with_cost(&counting(request, 6, at), 0.002));
+    let folder = Folder::new();
+    let forecast = |words: &str| {
+        let output = routed(&folder, &server, &format!("--dry-run {words}")).output().unwrap();
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        serde_json::from_slice::<Value>(&output.stdout).unwrap()["requests"].clone()
+    };
+    let prior = forecast("--seeds 1 --runs 4");
+    assert_eq!((&prior["finished_episodes"], &prior["typical_requests"]), (&0.into(), &400.into()));
+    // 400 answers of 5 s, four at once.
+    assert_eq!((&prior["typical_cost_usd"], &prior["seconds"]), (&Value::Null, &500.0.into()));
+    let output = routed(&folder, &server, "--seeds 1 --runs 2").output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let seen = forecast("--seeds 1 --runs 4");
+    assert_eq!((&seen["finished_episodes"], &seen["typical_requests"]), (&2.into(), &12.into()));
+    assert!((seen["typical_cost_usd"].as_f64().unwrap() - 0.024).abs() < 1e-9, "{seen}");
+    // The bound does not follow them: nobody knows the price.
+    assert_eq!((&seen["at_most"], &seen["cost_usd_at_most"]), (&200.into(), &Value::Null));
+    assert_eq!(forecast("--seeds 1 --runs 4 --requests-per-minute 3")["seconds"], 240.0);
+}
+
+#[test]
+fn no_more_requests_go_out_in_a_minute_than_the_account_takes() {
+    let server = Server::start(|at, request| whole(Dialect::OpenaiCompatible, &counting(request, 4, at)));
+    let folder = Folder::new();
+    let start = Instant::now();
+    // One in 50 ms, over both processes.
+    let words = "--seeds 1 --runs 4 --in-flight 2 --requests-per-minute 1200";
+    let both = [(); 2].map(|()| folder.record(&server, "own", words).stderr(Stdio::piped()).spawn().unwrap());
+    for child in both {
+        let output = child.wait_with_output().unwrap();
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    }
+    assert_eq!(server.count(), 16);
+    assert!(start.elapsed() >= Duration::from_millis(15 * 50), "{:?}", start.elapsed());
 }

@@ -1,5 +1,6 @@
 //! What is said where scenes, seeds or participants have several episodes: each counts once.
 
+use report::statistics::text::Length;
 use report::statistics::{Method, Options, OverallMethod, Statistics, Verdict};
 
 use super::{CLUSTERED, RECORDED, Row, by_place, cells, labelled, with_scenes};
@@ -103,4 +104,68 @@ fn episodes_too_few_for_any_verdict_are_told_from_those_that_show_nothing() {
     assert_eq!(answers(2), ["E1 cannot say: 2 episodes", "E1 cannot say: 2 pairs"]);
     assert_eq!(answers(5)[1], "E1 cannot say: 5 pairs");
     assert_eq!(answers(6), ["E1 all 2", "E1 nobody"]);
+}
+
+/// Two models with two episodes per scene; the slower one is fast in scene 0.
+fn timed(scenes: i32) -> Vec<Row<'static>> {
+    let of = |model, base: i64| {
+        let steps = move |scene: i32, run: i32| base + i64::from(scene % 3) + i64::from(run);
+        (0..scenes).flat_map(move |scene| (0..2).map(move |run| ("E1", model, scene, run, true, steps(scene, run))))
+    };
+    let slow = of("slow", 20).map(|row| if row.2 == 0 { (row.0, row.1, row.2, row.3, row.4, 12) } else { row });
+    of("fast", 9).chain(slow).collect()
+}
+
+// scipy 1.17.1: ttest_rel of the means by scene, 9.5 to 11.5 against 12 and 20.5 to 22.5; ttest_ind(equal_var=False)
+#[test]
+fn a_duration_with_repeats_is_tested_by_scene() {
+    let test = |rows: &[Row], label: fn(&Row) -> Option<String>| {
+        let found = with_scenes(rows, RECORDED, label);
+        let of = found.models.iter().find(|family| family.metric == "TTD").unwrap();
+        let said = found.answers.iter().find(|it| it.metric == "TTD").map(|it| it.answer.clone());
+        (of.tests[0].comparison.clone(), said.unwrap())
+    };
+    let (paired, said) = test(&timed(7), by_scene);
+    assert_eq!((paired.method, paired.units.as_ref().unwrap().n), (Method::RestrictedMeanPaired, 7));
+    assert!((paired.p.unwrap() - 0.000_195_354_801_959_960_72).abs() < 1e-12, "{paired:?}");
+    assert_eq!(said, "E1 fast better than slow");
+    let (independent, _) = test(&timed(7), |row| Some(format!("{} {}", row.1, row.2)));
+    assert_eq!(independent.method, Method::RestrictedMean);
+    assert!((independent.p.unwrap() - 0.000_296_762_960_175_590_35).abs() < 1e-12, "{independent:?}");
+    let (few, said) = test(&timed(5), by_scene);
+    assert_eq!((few.p, few.separated, &*said), (None, false, "E1 cannot say: 5 scenes"));
+}
+
+/// An episode without a decision at the horizon took longer; one interrupted before it says nothing about the rest.
+#[test]
+fn interrupted_repeats_leave_durations_untested() {
+    let rows = |interrupted: i64| {
+        let ends = [("fast", -100), ("slow", -100), ("fast", interrupted)];
+        timed(7).into_iter().chain(ends.map(|(model, steps)| ("E1", model, 6, 2, false, steps))).collect::<Vec<Row>>()
+    };
+    let said = |interrupted| {
+        let found = with_scenes(&rows(interrupted), RECORDED, by_scene);
+        found.answers.into_iter().find(|it| it.metric == "TTD").unwrap().answer
+    };
+    assert_eq!(said(-10), "E1 cannot say: 1 interrupted episode");
+    assert_eq!(said(-100), "E1 fast better than slow");
+}
+
+// Python: mean squares within scenes, 3.5 / 7 over 14 episodes and 2.5 / 6 over 13
+// episodes: (0.5 / 14 + 2.5 / 6 / 13) ** 0.5; no rate varies.
+#[test]
+fn the_noise_of_repeats_stands_beside_a_difference() {
+    let mut rows = timed(7);
+    rows.pop();
+    let found = with_scenes(&rows, RECORDED, by_scene);
+    let of = |metric: &str| {
+        let family = found.models.iter().find(|family| family.metric == metric).unwrap();
+        family.tests[0].comparison.repeat_se
+    };
+    assert!((of("TTD").unwrap() - 0.260_318_204_829_335_3).abs() < 1e-12, "{:?}", of("TTD"));
+    assert_eq!(of("TSA"), Some(0.0));
+    let text = found.render(&["TTD".to_owned()], Length::Short, None);
+    assert!(text.contains("SE of repeats"), "{text}");
+    let once = with_scenes(&rows.into_iter().filter(|row| row.3 == 0).collect::<Vec<_>>(), RECORDED, by_scene);
+    assert_eq!(once.models[0].tests[0].comparison.repeat_se, None);
 }

@@ -22,7 +22,7 @@ const PAPER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/fixtures/paper");
 
 /// A server that ends with its owner.
 pub struct Server {
-    _process: Running,
+    process: Running,
     /// Where it is: `http://127.0.0.1:PORT/`, with a token if it has one.
     pub link: String,
     pub port: u16,
@@ -30,6 +30,11 @@ pub struct Server {
 
 impl Server {
     pub fn start(folder: &Path, arguments: &[&str]) -> Self {
+        Self::start_by_link(folder, &[arguments, &["--no-token"]].concat())
+    }
+
+    /// The same with the default: a token in the link.
+    pub fn start_by_link(folder: &Path, arguments: &[&str]) -> Self {
         let mut command = program(folder);
         command.args(["view", "--no-open", "--port", "0"]).args(arguments);
         let mut process = command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
@@ -38,7 +43,11 @@ impl Server {
         let link = link.trim().to_owned();
         assert!(link.starts_with("http://"), "the server says where it is: {link:?}");
         let port = link.split('/').nth(2).unwrap().rsplit_once(':').unwrap().1.parse().unwrap();
-        Self { _process: Running(process), link, port }
+        Self { process: Running(process), link, port }
+    }
+
+    pub fn process_id(&self) -> u32 {
+        self.process.0.id()
     }
 
     /// What it answers to a browser of this machine.

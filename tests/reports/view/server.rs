@@ -1,5 +1,6 @@
 //! What the server answers, and to whom.
 
+use std::io::{Read as _, Write as _};
 use std::path::Path;
 
 use crate::harness::program::wait_for;
@@ -67,14 +68,19 @@ fn an_id_is_looked_up_and_never_a_path() {
 }
 
 #[test]
-fn a_host_needs_a_token_and_the_link_has_it() {
+fn the_link_has_a_token_and_nothing_is_answered_without_it() {
     let folder = tempfile::tempdir().unwrap();
-    let refused = crate::harness::program::run(folder.path(), &["view", RECORDED, "--host", "0.0.0.0"]);
-    assert!(refused.refused().contains("--token"));
+    let [one, other] = [(); 2].map(|()| Server::start_by_link(folder.path(), &[RECORDED]));
+    let token_of = |server: &Server| server.link.split_once("?token=").unwrap().1.to_owned();
+    assert!(token_of(&one).len() >= 32 && token_of(&one) != token_of(&other));
+    assert_eq!([one.get("/").status, one.get("/api/study").status], [401; 2]);
+    assert_eq!(one.get(&format!("/api/study?token={}", token_of(&one))).status, 200);
+    let refused = crate::harness::program::run(folder.path(), &["view", RECORDED, "--host", "0.0.0.0", "--no-token"]);
+    assert!(refused.refused().contains("--no-token"));
     let short = crate::harness::program::run(folder.path(), &["view", RECORDED, "--token", "short"]);
     assert!(short.refused().contains("16"));
     let token = "0123456789abcdef";
-    let server = Server::start(folder.path(), &[RECORDED, "--host", "127.0.0.1", "--token", token]);
+    let server = Server::start_by_link(folder.path(), &[RECORDED, "--host", "127.0.0.1", "--token", token]);
     assert!(server.link.ends_with("?token=0123456789abcdef"), "{}", server.link);
     let host = format!("127.0.0.1:{}", server.port);
     assert_eq!(server.get("/").status, 401);
@@ -86,6 +92,28 @@ fn a_host_needs_a_token_and_the_link_has_it() {
     assert!(cookie.contains("httponly") && cookie.contains("samesite=strict"), "{cookie}");
     let cookie = format!("mirrorstats-{}={token}", server.port);
     assert_eq!(server.ask("GET", "/api/study", &[("Host", &host), ("Cookie", &cookie)], "").status, 200);
+}
+
+#[test]
+fn many_half_sent_requests_do_not_keep_others_out_for_long() {
+    let folder = tempfile::tempdir().unwrap();
+    let server = Server::start(folder.path(), &[RECORDED]);
+    let threads = || std::fs::read_dir(format!("/proc/{}/task", server.process_id())).unwrap().count();
+    let mut open = Vec::new();
+    for _ in 0..100 {
+        let mut stream = std::net::TcpStream::connect(("127.0.0.1", server.port)).unwrap();
+        stream.write_all(b"GET / HTTP/1.1\r\nHost: ").unwrap();
+        open.push(stream);
+    }
+    assert_eq!(server.get("/api/study").status, 200);
+    assert!(threads() <= 12, "{}", threads());
+    for mut stream in open {
+        stream.set_read_timeout(Some(std::time::Duration::from_secs(40))).unwrap();
+        // The server closes it, with or without an answer.
+        let mut rest = Vec::new();
+        let _ = stream.read_to_end(&mut rest);
+        assert!(!String::from_utf8_lossy(&rest).contains(" 200 "));
+    }
 }
 
 #[test]

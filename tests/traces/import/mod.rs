@@ -1,5 +1,7 @@
 //! `mirrorstats import` at the process boundary: what becomes a trace, and that nothing else does.
 
+mod formats;
+mod inspect;
 mod palette;
 mod refusals;
 mod round_trip;

@@ -57,7 +57,7 @@ pub(super) fn bind(document: &Document, columns: &Columns, filter: Option<&Writt
     let mut metrics = IndexMap::new();
     for name in document.metrics.keys() {
         if let Some(bound) = binder.definition(name) {
-            let declared = document.metrics[name].unit.as_ref().is_some_and(|(unit, _)| unit == "rate");
+            let declared = document.metrics[name].said.unit.as_deref() == Some("rate");
             let kind = if bound.rate || declared { Kind::Rate } else { Kind::Quantity };
             metrics.insert(name.clone(), (bound.node, kind));
         }

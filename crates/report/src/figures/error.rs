@@ -13,8 +13,9 @@ pub enum FigureError {
     #[error("there is no episode to draw; check the traces and `--where`")]
     NoEpisodes,
     #[error(
-        "figure `{figure}` needs the metric {metric}, found {known}; include the paper's definitions in the \
-         definition file"
+        "figure `{figure}` shows {}, found {known}; name them under `[figure.{figure}]` in the style, or declare them in the \
+         definitions",
+        .figure.needs(metric)
     )]
     UnknownMetric { figure: FigureName, metric: String, known: String },
     #[error(

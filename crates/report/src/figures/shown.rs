@@ -8,7 +8,7 @@ use serde::Deserialize;
 
 use super::matrix::{Matrix, MetricId};
 use super::{FigureError, FigureName};
-use metric::catalog::Kind;
+use metric::catalog::{Kind, Measures};
 use metric::relations::Relations;
 
 /// What a style says of one figure.
@@ -25,9 +25,13 @@ pub struct FigureSheet {
 pub type FigureSheets = IndexMap<String, FigureSheet>;
 
 /// What every figure shows unless a style says otherwise.
-pub static SHOWN: LazyLock<FigureSheets> = LazyLock::new(|| {
-    toml::from_str(include_str!("../../../../assets/styles/figures.toml")).expect("the file comes with the program")
-});
+pub static SHOWN: LazyLock<FigureSheets> =
+    LazyLock::new(|| toml::from_str(FIGURES).expect("the file comes with the program"));
+/// The same as TOML, for styles to lie over.
+pub const FIGURES: &str = include_str!("../../../../assets/styles/figures.toml");
+
+/// More axes than these cannot be told apart.
+const MOST_AXES: usize = 8;
 
 impl FigureName {
     /// The fewest and the most metrics that it shows; the first so many must be rates.
@@ -44,8 +48,7 @@ impl FigureName {
         }
     }
 
-    /// # Errors
-    /// Fewer metrics than the figure shows, or more.
+    /// An error for fewer metrics than the figure shows, or more.
     pub fn check_count(self, found: usize) -> Result<(), FigureError> {
         let ([fewest, most], _) = self.metrics();
         if (fewest..=most).contains(&found) {
@@ -53,6 +56,23 @@ impl FigureName {
         }
         let wanted = if fewest == most { fewest.to_string() } else { format!("{fewest} to {most}") };
         Err(FigureError::MetricCount { figure: self, wanted, found })
+    }
+
+    /// What it shows of any definitions, or the metric that its style names.
+    pub(super) fn needs(self, metric: &str) -> String {
+        let is_built_in = SHOWN.get(self.name()).and_then(|sheet| sheet.metrics.as_ref());
+        if is_built_in.is_none_or(|listed| listed.iter().all(|name| name != metric)) {
+            return format!("the metric {metric}");
+        }
+        match self {
+            Self::Spider => "three metrics or more",
+            Self::Scatter => "two rates and a duration",
+            Self::CompletionGap => "a rate that `completes` another one",
+            Self::DecisionCurve => "a duration and the rate that is `finished`",
+            Self::Intervals | Self::Slopes => "a rate",
+            Self::Heatmap | Self::E5Outcomes | Self::Gaze => "metrics",
+        }
+        .to_owned()
     }
 }
 
@@ -82,6 +102,13 @@ fn instead<'a>(figure: FigureName, matrix: &Matrix<'a>, listed: &[String]) -> Op
             let known: Vec<_> = listed.iter().filter_map(|name| named(name)).collect();
             Some(if known.is_empty() { all } else { known })
         }
+        FigureName::Spider => (all.len() >= figure.metrics().0[0]).then(|| all.into_iter().take(MOST_AXES).collect()),
+        FigureName::Scatter => {
+            let measuring = |what| all.iter().filter(move |id| id.metric.measures() == Some(what)).copied();
+            let found: Vec<_> =
+                measuring(Measures::Rate).take(2).chain(measuring(Measures::Duration).take(1)).collect();
+            (found.len() == 3).then_some(found)
+        }
         FigureName::Intervals | FigureName::Slopes => {
             all.iter().find(|id| id.metric.kind == Kind::Rate).map(|id| vec![*id])
         }
@@ -91,7 +118,7 @@ fn instead<'a>(figure: FigureName, matrix: &Matrix<'a>, listed: &[String]) -> Op
         FigureName::DecisionCurve => {
             related(|found| found.durations.first().map(|(one, other)| [one, other].map(String::clone)))
         }
-        _ => None,
+        FigureName::E5Outcomes | FigureName::Gaze => None,
     }
 }
 

@@ -185,6 +185,7 @@ mod tests {
             statuses: [("ok".to_owned(), 30), ("repaired".to_owned(), 6), ("refusal".to_owned(), 4)].into(),
             repairs: [("fence".to_owned(), 5), ("case".to_owned(), 2)].into(),
             faults: [].into(),
+            by_episode: [].into(),
             latencies: [(100, 30), (900, 10)].into(),
             prompt_tokens: Total { replies: 40, sum: 48_000 },
             completion_tokens: Total { replies: 40, sum: 3_240 },

@@ -14,6 +14,15 @@ pub enum Looks {
     Any,
 }
 
+impl Looks {
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Once => "one",
+            Self::Any => "any number",
+        }
+    }
+}
+
 /// What differs between a plan and the analysis of these episodes; empty where nothing does.
 pub fn departures(plan: &RegisteredPlan, table: &EpisodeTable, options: &Options, looks: Looks) -> Vec<String> {
     let request = &plan.plan.request;
@@ -35,7 +44,8 @@ pub fn departures(plan: &RegisteredPlan, table: &EpisodeTable, options: &Options
         differ("episodes of a model in an experiment", &episodes, &blocks.episodes());
     }
     differ("confidence", &request.confidence, &options.confidence);
-    differ("looks", &"one", &if looks == Looks::Once { "one" } else { "any number" });
+    let registered = if request.sequential { Looks::Any } else { Looks::Once };
+    differ("looks", &registered.name(), &looks.name());
     let filter = options.selection.as_ref().map_or_else(|| "none".to_owned(), |it| format!("`{}`", it.condition));
     differ("filter", &"none", &filter);
     if let Some(primary) = &plan.primary {

@@ -12,8 +12,12 @@ use serde::{Deserialize, Serialize};
 
 use exact::format::fixed;
 use exact::ratio::Ratio;
+use statistics::clustered::fewest_clusters;
 use statistics::holm;
-use statistics::sample_size::{Clusters, Fisher, MOST_EPISODES, McNemar, OneRate, Power, Rates, settled, smallest};
+use statistics::sample_size::{
+    Anytime, BySeed, Clusters, Fisher, MOST_AT_LOOKS, MOST_EPISODES, McNemar, OneRate, Power, Rates, Seeds, settled,
+    smallest,
+};
 
 /// What a plan is asked.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -34,6 +38,9 @@ pub struct PlanRequest {
     pub discordance: Option<f64>,
     /// A level of chance to hold each model against; null for none.
     pub chance: Option<Ratio>,
+    /// Whether the study is looked at after each run of all seeds, and stops at the first verdict.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub sequential: bool,
 }
 
 /// What of a plan is given.
@@ -74,10 +81,16 @@ pub struct PlannedTest {
     pub runs: Option<u64>,
     /// Episodes per model and experiment.
     pub episodes: Option<u64>,
-    /// The independent episodes that they are worth.
+    /// The independent units that the test counts: the episodes, or the seeds whose episodes resemble each other.
     pub effective: Option<u64>,
     /// The power there.
     pub power: Option<f64>,
+    /// The e-value that stops a sequential study.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub boundary: Option<f64>,
+    /// The episodes that a sequential study is expected to need if the difference is true; `episodes` is its maximum.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub expected: Option<f64>,
 }
 
 /// A test that a plan is for.
@@ -90,6 +103,14 @@ pub enum TestName {
     Unpaired,
     /// One model against a level of chance: the exact binomial test.
     Chance,
+    /// Two models over the same seeds, whose episodes resemble each other: the exact permutation test.
+    PairedSeeds,
+    /// One model against a level of chance, by seed.
+    ChanceSeeds,
+    /// Two models at every look: the e-value of discordant pairs.
+    AnytimePairs,
+    /// One model against a level of chance at every look: its e-value.
+    AnytimeChance,
 }
 
 impl TestName {
@@ -99,6 +120,10 @@ impl TestName {
             Self::Paired => "two models, pairs (exact McNemar)",
             Self::Unpaired => "two models, no pairs (Fisher)",
             Self::Chance => "one model against chance (binomial)",
+            Self::PairedSeeds => "two models, by seed (permutation)",
+            Self::ChanceSeeds => "one model against chance, by seed",
+            Self::AnytimePairs => "two models, pairs at every look (e-value)",
+            Self::AnytimeChance => "one model against chance at every look (e-value)",
         }
     }
 }
@@ -118,18 +143,22 @@ pub enum PlanError {
         fixed(Some(*most), 3)
     )]
     Discordance { discordance: f64, least: f64, most: f64 },
-    #[error("{episodes} episodes: expected at most {MOST_EPISODES} per model and experiment")]
-    TooMany { episodes: u64 },
+    #[error("{episodes} episodes: expected at most {most} per model and experiment")]
+    TooMany { episodes: u64, most: u64 },
 }
 
 pub fn plan(request: PlanRequest) -> Result<Plan, PlanError> {
     request.check()?;
     let level = holm::level(request.confidence).expect("a confidence within 0 and 1, as the command line has it");
     let pairs = (request.models * request.models.saturating_sub(1) / 2).max(1);
-    let mut asked =
-        vec![(TestName::Paired, pairs), (TestName::Paired, 1), (TestName::Unpaired, pairs), (TestName::Unpaired, 1)];
+    let (differences, chance): (&[TestName], _) = match (request.sequential, request.clusters.are_units()) {
+        (true, _) => (&[TestName::AnytimePairs], TestName::AnytimeChance),
+        (false, true) => (&[TestName::PairedSeeds], TestName::ChanceSeeds),
+        (false, false) => (&[TestName::Paired, TestName::Unpaired], TestName::Chance),
+    };
+    let mut asked: Vec<_> = differences.iter().flat_map(|test| [(*test, pairs), (*test, 1)]).collect();
     if request.chance.is_some() {
-        asked.extend([(TestName::Chance, request.models), (TestName::Chance, 1)]);
+        asked.extend([(chance, request.models), (chance, 1)]);
     }
     // One test is its own family.
     asked.dedup();
@@ -139,10 +168,15 @@ pub fn plan(request: PlanRequest) -> Result<Plan, PlanError> {
 }
 
 impl PlanRequest {
+    const fn most(&self) -> u64 {
+        if self.sequential { MOST_AT_LOOKS } else { MOST_EPISODES }
+    }
+
     fn check(&self) -> Result<(), PlanError> {
         if let Given::Runs(runs) = self.given {
             let episodes = runs.saturating_mul(self.clusters.seeds);
-            return if episodes > MOST_EPISODES { Err(PlanError::TooMany { episodes }) } else { Ok(()) };
+            let most = self.most();
+            return if episodes > most { Err(PlanError::TooMany { episodes, most }) } else { Ok(()) };
         }
         let Given::Difference(difference) = self.given else { return Ok(()) };
         let Some(rates) = Rates::apart(difference, self.baseline) else {
@@ -166,21 +200,25 @@ impl PlanRequest {
             Given::Difference(difference) => (Some(difference), self.runs(test, level, difference)),
             Given::Runs(runs) => (self.difference(test, level, runs), Some(runs)),
         };
-        let effective = runs.map(|runs| self.clusters.effective(runs));
+        let episodes = runs.map(|runs| runs * self.clusters.seeds);
+        let mut anytime = difference.and_then(|difference| self.anytime(test, level, difference));
+        let expected = anytime.as_mut().zip(episodes).map(|(anytime, most)| settled(anytime.expected(most)));
         PlannedTest {
             test,
             family,
             level: settled(level),
             difference: difference.map(settled),
             runs,
-            episodes: runs.map(|runs| runs * self.clusters.seeds),
-            effective,
-            power: difference.zip(effective).and_then(|(difference, n)| self.power_of(test, level, difference, n)),
+            episodes,
+            effective: runs.map(|runs| self.clusters.units(runs)),
+            power: difference.zip(runs).map(|(difference, runs)| settled(self.power_of(test, level, difference, runs))),
+            boundary: anytime.map(|anytime| settled(anytime.boundary())),
+            expected,
         }
     }
 
-    fn power_of(&self, test: TestName, level: f64, difference: f64, n: u64) -> Option<f64> {
-        Some(settled(self.test(test, level, difference)?.power(n)))
+    fn power_of(&self, test: TestName, level: f64, difference: f64, runs: u64) -> f64 {
+        self.test(test, level, difference).map_or(0.0, |mut test| self.clusters.power(test.as_mut(), runs))
     }
 
     fn runs(&self, test: TestName, level: f64, difference: f64) -> Option<u64> {
@@ -188,37 +226,66 @@ impl PlanRequest {
     }
 
     fn difference(&self, test: TestName, level: f64, runs: u64) -> Option<f64> {
-        let n = self.clusters.effective(runs);
-        let power = |difference| self.test(test, level, difference).map_or(0.0, |mut test| test.power(n));
+        let power = |difference| self.power_of(test, level, difference, runs);
         smallest(self.power, self.largest_difference(test), power)
     }
 
     fn largest_difference(&self, test: TestName) -> f64 {
-        if test == TestName::Chance {
+        if matches!(test, TestName::Chance | TestName::ChanceSeeds | TestName::AnytimeChance) {
             return self.chance.map_or(0.0, |chance| 1.0 - chance.value());
         }
         let of_rates = self.baseline.map_or(1.0, |baseline| 1.0 - baseline);
-        match self.discordance.filter(|_| test == TestName::Paired) {
+        match self.discordance.filter(|_| test != TestName::Unpaired) {
             None => of_rates,
             Some(share) => of_rates.min(share).min(self.baseline.map_or(1.0, |baseline| 2.0 - 2.0 * baseline - share)),
         }
     }
 
-    /// The test of a true difference; `None` where the rates cannot be.
+    /// The test of a true difference; `None` where the rates cannot be, and where seeds are too few for any verdict.
     fn test(&self, test: TestName, level: f64, difference: f64) -> Option<Box<dyn Power>> {
-        let rates = || Rates::apart(difference, self.baseline);
+        let by_seed = |test| {
+            let Clusters { seeds, icc } = self.clusters;
+            let fewest = holm::level(self.confidence).map_or(usize::MAX, fewest_clusters);
+            (seeds >= fewest as u64).then(|| Box::new(Seeds { test, level, seeds, icc }) as Box<dyn Power>)
+        };
         Some(match test {
-            TestName::Paired => {
-                let discordance = self.discordance.unwrap_or(rates()?.independent_discordance());
-                Box::new(McNemar::new(level, difference, discordance))
-            }
-            TestName::Unpaired => Box::new(Fisher { level, rates: rates()? }),
+            TestName::Paired => Box::new(McNemar::new(level, difference, self.discordance_of(difference)?)),
+            TestName::Unpaired => Box::new(Fisher { level, rates: Rates::apart(difference, self.baseline)? }),
             TestName::Chance => {
-                let chance = self.chance?;
-                let rate = chance.value() + difference;
-                (rate <= 1.0 + 1e-9).then(|| Box::new(OneRate { level, chance, rate }))?
+                let (chance, rate) = self.above_chance(difference)?;
+                Box::new(OneRate { level, chance, rate })
             }
+            TestName::PairedSeeds => {
+                by_seed(BySeed::Pairs { difference, discordance: self.discordance_of(difference)? })?
+            }
+            TestName::ChanceSeeds => {
+                let (chance, rate) = self.above_chance(difference)?;
+                by_seed(BySeed::Rate { chance, rate })?
+            }
+            TestName::AnytimePairs | TestName::AnytimeChance => Box::new(self.anytime(test, level, difference)?),
         })
+    }
+
+    fn anytime(&self, test: TestName, level: f64, difference: f64) -> Option<Anytime> {
+        let every = self.clusters.seeds;
+        match test {
+            TestName::AnytimePairs => Anytime::pairs(level, every, difference, self.discordance_of(difference)?),
+            TestName::AnytimeChance => {
+                self.above_chance(difference).map(|(chance, rate)| Anytime::rate(level, every, chance, rate))
+            }
+            _ => None,
+        }
+    }
+
+    fn discordance_of(&self, difference: f64) -> Option<f64> {
+        Some(self.discordance.unwrap_or(Rates::apart(difference, self.baseline)?.independent_discordance()))
+    }
+
+    /// The level of chance and the true rate above it.
+    fn above_chance(&self, difference: f64) -> Option<(Ratio, f64)> {
+        let chance = self.chance?;
+        let rate = chance.value() + difference;
+        (rate <= 1.0 + 1e-9).then_some((chance, rate.min(1.0)))
     }
 }
 

@@ -12,6 +12,7 @@ const PAPER: PlanRequest = PlanRequest {
     clusters: Clusters { seeds: 3, icc: 0.0 },
     discordance: None,
     chance: None,
+    sequential: false,
 };
 
 #[test]
@@ -21,6 +22,8 @@ fn the_answer_comes_first() {
         PlanRequest { given: Given::Difference(0.3), chance, ..PAPER },
         PlanRequest { chance, ..PAPER },
         PlanRequest { given: Given::Difference(0.3), clusters: Clusters { seeds: 3, icc: 0.1 }, ..PAPER },
+        PlanRequest { given: Given::Runs(3), clusters: Clusters { seeds: 7, icc: 0.1 }, models: 2, chance, ..PAPER },
+        PlanRequest { given: Given::Difference(0.5), models: 2, sequential: true, chance, ..PAPER },
         PlanRequest { given: Given::Runs(1), models: 2, ..PAPER },
         PlanRequest { given: Given::Difference(0.4), baseline: Some(0.5), discordance: Some(0.5), ..PAPER },
     ];
@@ -52,6 +55,7 @@ fn what_cannot_be_is_refused() {
         message(PlanRequest { given: Given::Difference(0.6), baseline: Some(0.5), ..PAPER }),
         message(PlanRequest { given: Given::Difference(0.4), discordance: Some(0.3), ..PAPER }),
         message(PlanRequest { given: Given::Runs(1000), ..PAPER }),
+        message(PlanRequest { given: Given::Runs(300), sequential: true, ..PAPER }),
     ];
     insta::assert_snapshot!(told.join("\n"));
 }

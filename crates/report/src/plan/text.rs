@@ -5,16 +5,21 @@ use std::fmt::Write as _;
 use super::{Given, Plan, PlanRequest, PlannedTest};
 use crate::tables::{Table, push_wrapped};
 use exact::format::{UNDEFINED, fixed};
-use statistics::sample_size::{MOST_EPISODES, Rates};
+use statistics::sample_size::{Clusters, Rates, SEED, STUDIES};
 
 impl Plan {
     /// The whole answer, in lines of at most `width` columns.
     pub fn render(&self, width: Option<usize>) -> String {
         let mut text = String::new();
         push_wrapped(&mut text, &self.answer, width, 2);
-        let header = ["test", "level", "difference", "episodes", "runs per seed", "effective", "power"];
-        let table = Table { names: 2, ..Table::of_texts(header).aligned_right(2..7) };
-        let _ = writeln!(text, "\n{}", table.with(self.tests.iter().map(record)).within(width));
+        let mut header = vec!["test", "level", "difference", "episodes", "runs per seed", "units", "power"];
+        if self.request.sequential {
+            header.extend(["e-value to stop", "expected episodes"]);
+        }
+        let columns = header.len();
+        let table = Table { names: 2, ..Table::of_texts(header).aligned_right(2..columns) };
+        let rows = self.tests.iter().map(|test| record(test).into_iter().take(columns));
+        let _ = writeln!(text, "\n{}", table.with(rows).within(width));
         for assumption in &self.assumptions {
             push_wrapped(&mut text, assumption, width, 2);
         }
@@ -22,7 +27,7 @@ impl Plan {
     }
 }
 
-fn record(test: &PlannedTest) -> [String; 7] {
+fn record(test: &PlannedTest) -> [String; 9] {
     let count = |count: Option<u64>| count.map_or_else(|| UNDEFINED.to_owned(), |count| count.to_string());
     let family = if test.family > 1 { format!(", Holm over {}", test.family) } else { String::new() };
     [
@@ -33,6 +38,8 @@ fn record(test: &PlannedTest) -> [String; 7] {
         count(test.runs),
         count(test.effective),
         fixed(test.power, 3),
+        fixed(test.boundary, 1),
+        fixed(test.expected, 1),
     ]
 }
 
@@ -41,22 +48,29 @@ pub(super) fn answer(request: &PlanRequest, test: &PlannedTest) -> String {
     let family =
         if test.family > 1 { format!(" and Holm's procedure over {} comparisons", test.family) } else { String::new() };
     let seeds = request.clusters.seeds;
+    let by = match (request.sequential, request.clusters.are_units()) {
+        (true, _) => "by pairs, with a look after each run of all seeds",
+        (false, true) => "by seed",
+        (false, false) => "by pairs",
+    };
+    let at_most = if request.sequential { "at most " } else { "" };
     match (request.given, test.runs, test.difference) {
         (Given::Difference(difference), Some(runs), _) => format!(
-            "{} episodes per model and experiment ({runs} for each of {seeds} seeds) show a difference of {difference} with power {power}, by pairs{family}",
+            "{at_most}{} episodes per model and experiment ({runs} for each of {seeds} seeds) show a difference of {difference} with power {power}, {by}{family}",
             seeds * runs
         ),
         (Given::Difference(difference), None, _) => format!(
-            "no number of runs up to {MOST_EPISODES} episodes shows a difference of {difference} with power {power}, by pairs{family}{}",
+            "no number of runs up to {} episodes shows a difference of {difference} with power {power}, {by}{family}{}",
+            request.most(),
             if request.clusters.icc > 0.0 { "; episodes of one seed resemble each other: take more seeds" } else { "" }
         ),
         (Given::Runs(runs), _, Some(difference)) => format!(
-            "{} episodes per model and experiment ({runs} for each of {seeds} seeds) show a difference of {} or more with power {power}, by pairs{family}",
+            "{at_most}{} episodes per model and experiment ({runs} for each of {seeds} seeds) show a difference of {} or more with power {power}, {by}{family}",
             seeds * runs,
             fixed(Some(difference), 3)
         ),
         (Given::Runs(runs), _, None) => format!(
-            "{} episodes per model and experiment ({runs} for each of {seeds} seeds) show no difference with power {power}, by pairs{family}",
+            "{at_most}{} episodes per model and experiment ({runs} for each of {seeds} seeds) show no difference with power {power}, {by}{family}",
             seeds * runs
         ),
     }
@@ -75,19 +89,34 @@ pub(super) fn assumptions(request: &PlanRequest) -> Vec<String> {
         Some(share) => format!("pairs: in a share of {share} one model succeeds and the other does not"),
         None => "pairs: the two models succeed independently in a scene; scenes that are hard for both leave fewer discordant pairs, and need fewer episodes".to_owned(),
     };
-    let clusters = if request.clusters.icc > 0.0 {
+    let Clusters { seeds, icc } = request.clusters;
+    let clusters = if request.clusters.are_units() {
         format!(
-            "seeds: intraclass correlation {}, so that n episodes with r runs per seed are worth n / (1 + (r - 1) x {})",
-            request.clusters.icc, request.clusters.icc
+            "seeds: intraclass correlation {icc}, so that tests count the {seeds} seeds, as `stats` does where seeds are \
+             declared clusters; an episode has the outcome of its seed with probability {}, and one of its own otherwise",
+            fixed(Some(icc.sqrt()), 3)
         )
     } else {
         "seeds: episodes of one seed are no more alike than others (--icc says how far they are)".to_owned()
+    };
+    let power = match (request.sequential, request.clusters.are_units()) {
+        (true, _) => {
+            "power: exact, summed over every outcome at every look; the boundary is that of `stats --sequential`, \
+                      which holds at any number of looks"
+                .to_owned()
+        }
+        (false, true) => format!("power: against chance exact; of pairs from {STUDIES} simulated studies, seed {SEED}"),
+        (false, false) => {
+            "power: exact, summed over every outcome of two-sided tests; it rises in steps, so that a few \
+                           more episodes may have a little less"
+                .to_owned()
+        }
     };
     let mut told = vec![
         format!("rates: {rates}{why}"),
         pairs,
         clusters,
-        "power: exact, summed over every outcome of two-sided tests; it rises in steps, so that a few more episodes may have a little less".to_owned(),
+        power,
         "Holm: the level of the first step, which the smallest p value must meet; later steps ask for less".to_owned(),
     ];
     if let Some(chance) = request.chance {

@@ -10,6 +10,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::compare::{Comparison, Sign};
+use super::losses::LOST;
 use super::study::named;
 use super::{ChanceRow, Contrast, Family, Options, Role, Selection, Statistics, Units, Verdict};
 
@@ -112,11 +113,12 @@ fn unranked(statistics: &Statistics) -> Vec<Answer> {
         let overall: Vec<_> = statistics.overall.iter().filter(|row| row.metric == *metric).collect();
         let separated = overall.iter().filter(|row| row.separated).map(|row| (&*row.first, &*row.second));
         let is_tested = overall.iter().any(|row| row.p.is_some());
-        let unsettled = overall.iter().filter(|row| row.losses.is_some_and(|losses| !losses.agree)).count();
+        let unsettled = overall.iter().filter(|row| row.losses.is_some_and(|losses| !losses.agree));
+        let unsettled: Vec<String> = unsettled.map(|_| LOST.to_owned()).collect();
         let overall = match (overall.len(), is_tested) {
             (0, _) => None,
             (_, false) => Some("over all experiments not tested".to_owned()),
-            (all, true) => Some(differing("over all experiments", all, separated) + &unsettled_pairs(unsettled)),
+            (all, true) => Some(differing("over all experiments", all, separated) + &unsaid_pairs(&unsettled)),
         };
         let parts: Vec<String> = families.map(|family| differing_in(family, confidence)).chain(overall).collect();
         answers.extend(Answer::new("Who differs from whom?", metric, &parts));
@@ -128,11 +130,14 @@ fn unranked(statistics: &Statistics) -> Vec<Answer> {
     answers
 }
 
-fn unsettled_pairs(count: usize) -> String {
-    match count {
+/// The pairs without a verdict, and the reasons, each once.
+fn unsaid_pairs(reasons: &[String]) -> String {
+    let each: BTreeSet<&str> = reasons.iter().map(String::as_str).collect();
+    let each = Vec::from_iter(each).join(" or ");
+    match reasons.len() {
         0 => String::new(),
-        1 => ", cannot say for 1 pair: lost episodes".to_owned(),
-        _ => format!(", cannot say for {count} pairs: lost episodes"),
+        1 => format!(", cannot say for 1 pair: {each}"),
+        count => format!(", cannot say for {count} pairs: {each}"),
     }
 }
 
@@ -186,11 +191,15 @@ fn counted(Units { n, name, .. }: &Units) -> String {
 
 /// Why none of these comparisons can show a difference; `None` where one can.
 fn untested(comparisons: &[&Comparison], confidence: f64) -> Option<String> {
-    let mut tested = comparisons.iter().filter(|found| found.p.is_some() || found.units.is_some()).peekable();
+    let unsaid = |found: &Comparison| found.unsaid(confidence);
+    let is_tried = |found: &&&Comparison| {
+        found.incomparable.is_none() && (found.p.is_some() || found.units.is_some() || unsaid(found).is_some())
+    };
+    let mut tested = comparisons.iter().filter(is_tried).peekable();
     if tested.peek().is_none() {
         return Some(apart(comparisons).unwrap_or_else(|| "not tested".to_owned()));
     }
-    let too_few = tested.map(|found| found.unsaid(confidence)).collect::<Option<Vec<_>>>()?;
+    let too_few = tested.map(|found| unsaid(found)).collect::<Option<Vec<_>>>()?;
     too_few.iter().max_by_key(|units| units.n).map(cannot_say)
 }
 
@@ -208,8 +217,14 @@ fn differing_in(family: &Family, confidence: f64) -> String {
         return format!("{} {why}", family.experiment);
     }
     let separated = family.tests.iter().filter(|test| test.comparison.separated);
-    let unsettled = |test: &&super::PairTest| test.comparison.losses.is_some_and(|losses| !losses.agree);
-    let unsettled = unsettled_pairs(family.tests.iter().filter(unsettled).count());
+    let is_silent = |it: &&Comparison| !it.separated && it.incomparable.is_none();
+    let reason = |it: &Comparison| match it.unsaid(confidence) {
+        Some(units) if units.name == LOST => Some(units.name),
+        Some(units) => Some(counted(&units)),
+        None => it.p.is_none().then(|| "not tested".to_owned()),
+    };
+    let unsaid: Vec<String> = comparisons.iter().copied().filter(is_silent).filter_map(reason).collect();
+    let unsettled = unsaid_pairs(&unsaid);
     let told = differing(&family.experiment, family.tests.len(), separated.map(|test| (&*test.first, &*test.second)));
     [told + &unsettled].into_iter().chain(apart(&comparisons)).collect::<Vec<_>>().join(", ")
 }

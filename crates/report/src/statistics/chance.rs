@@ -196,7 +196,7 @@ impl<'s, 'a> Tested<'s, 'a> {
         let known = block.moments(column);
         let (successes, n) = known.counts()?;
         let of_units: Option<Vec<Moments>> =
-            block.repeats.then(|| study.by_unit(block, column).into_values().collect());
+            block.repeats.then(|| study.by_unit(block, |row| column.get(row)).into_values().collect());
         let tested = |toward: Option<Toward>| {
             let with_lost = |known| toward.map_or(known, |toward| toward.moments(known, block.lost, true));
             let Some(units) = &of_units else {

@@ -9,6 +9,7 @@ use super::chance::Units;
 use super::durations::{decided, is_duration};
 use super::losses::{LossCase, LossCases, Toward, settle};
 use super::matching::Matched;
+use super::retest::repeat_variance;
 use super::study::{Block, Study, Unit};
 use super::units::Sides;
 use exact::moments::Moments;
@@ -21,8 +22,9 @@ use statistics::holm::{holm, level};
 use statistics::interval::{Interval, student_t};
 use statistics::outcomes::ExactTest;
 use statistics::paired::Pairs;
-use statistics::restricted::{Difference, independent, paired, shared_horizon};
+use statistics::restricted::{Difference, by_units, fewest, independent, paired, shared_horizon};
 use statistics::tarone::{Attained, tarone_holm};
+use statistics::units;
 use statistics::unpaired::{fisher, fisher_least_p};
 
 /// How a difference was tested, and what its interval is.
@@ -67,6 +69,10 @@ pub struct Comparison {
     pub interval: Option<Interval>,
     /// Why there is no interval.
     pub withheld: Option<Withheld>,
+    /// The standard error from repeats alone: by how much the difference of means varies if the same scenes are played
+    /// again; none unless both sides repeat scenes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub repeat_se: Option<f64>,
     /// The p value, two-sided: exact and by minimum likelihood for rates, by Student's t for durations.
     pub p: Option<f64>,
     /// The mid-p value of a rate, which is not guaranteed to keep the level.
@@ -107,12 +113,14 @@ impl Compared<'_, '_> {
         let sides = Sides::of(self.study, column, &[(self.first, self.second)]);
         let found = match &sides {
             Some(sides) if rates => self.rates_by_unit(column, sides),
-            _ if !rates && self.is_dependent() => self.of_episodes(column).withheld_as_dependent(),
+            _ if !rates && self.is_dependent() => self.quantity_by_unit(column),
             _ => self.of_episodes(column),
         };
         let lost = if found.p.is_some() { self.first.lost + self.second.lost } else { 0 };
         let losses = LossCases::of(lost, |toward| self.with_lost(column, &found, sides.as_ref(), toward));
-        Comparison { losses, ..found }
+        let noise = |block| repeat_variance(self.study, block, column);
+        let repeat_se = noise(self.first).zip(noise(self.second)).map(|(a, b)| (a + b).sqrt());
+        Comparison { losses, repeat_se, ..found }
     }
 
     /// The test with the lost episodes of both sides: in a comparison by pairs or units, each is a pair against a known
@@ -139,20 +147,46 @@ impl Compared<'_, '_> {
                 LossCase { difference, p: sides.and_then(|sides| sides.test(&lost)).map(|test| test.p) }
             }
             Method::RestrictedMeanPaired | Method::RestrictedMean => {
-                let Some(horizon) = seen.horizon else { return LossCase::default() };
-                let fast = Ending { steps: 1, outcome: Outcome::Correct };
-                let slow = Ending { steps: horizon, outcome: Outcome::Unfinished };
-                let ends = if is_highest { [slow, fast] } else { [fast, slow] };
-                let mut sides = self.endings(column);
-                let counts = if self.matched.pairs.is_some() { [lost; 2] } else { [self.first.lost, self.second.lost] };
-                for ((side, end), count) in sides.iter_mut().zip(ends).zip(counts) {
-                    side.extend((0..count).map(|_| end));
-                }
-                let found = self.restricted(&sides, horizon);
+                let found = seen.horizon.and_then(|horizon| match seen.units {
+                    Some(_) => by_units(
+                        &self.lost_units(self.times(column, horizon)?, horizon, toward),
+                        horizon,
+                        self.confidence,
+                    ),
+                    None => self.restricted(&self.lost_endings(column, horizon, toward), horizon),
+                });
                 LossCase { difference: found.map(|it| it.difference), p: found.and_then(|it| it.p) }
             }
             Method::StudentPaired | Method::Welch => LossCase::default(),
         }
+    }
+
+    /// The ends of both sides and of their lost episodes, which decide at once or never.
+    fn lost_endings(&self, column: &MetricColumn, horizon: i64, toward: Toward) -> [Vec<Ending>; 2] {
+        let fast = Ending { steps: 1, outcome: Outcome::Correct };
+        let slow = Ending { steps: horizon, outcome: Outcome::Unfinished };
+        let ends = if toward == Toward::Highest { [slow, fast] } else { [fast, slow] };
+        let mut sides = self.endings(column);
+        let lost = self.first.lost + self.second.lost;
+        let counts = if self.matched.pairs.is_some() { [lost; 2] } else { [self.first.lost, self.second.lost] };
+        for ((side, end), count) in sides.iter_mut().zip(ends).zip(counts) {
+            side.extend((0..count).map(|_| end));
+        }
+        sides
+    }
+
+    /// The same of units: each lost episode is one of its own.
+    fn lost_units(&self, mut sides: units::Sides, horizon: i64, toward: Toward) -> units::Sides {
+        let one = |steps: i64| Moments::default().with(steps).unwrap_or_default();
+        let ends = if toward == Toward::Highest { [one(horizon), one(1)] } else { [one(1), one(horizon)] };
+        let lost = [self.first.lost, self.second.lost];
+        if sides.shared.is_empty() {
+            sides.first.extend((0..lost[0]).map(|_| ends[0]));
+            sides.second.extend((0..lost[1]).map(|_| ends[1]));
+        } else {
+            sides.shared.extend((0..lost[0] + lost[1]).map(|_| (ends[0], ends[1])));
+        }
+        sides
     }
 
     /// Whether a unit enters the comparison of episodes more than once.
@@ -181,6 +215,40 @@ impl Compared<'_, '_> {
             units: Some(Units::new(self.study, self.first, sides.len(), least, self.confidence)),
             ..Comparison::of(Method::Units, [a.n, b.n])
         }
+    }
+
+    /// A duration by unit where its times up to the horizon are all known; another quantity has no test.
+    fn quantity_by_unit(&self, column: &MetricColumn) -> Comparison {
+        let seen = self.of_episodes(column).withheld_as_dependent();
+        if !is_duration(self.study, &column.name) {
+            return seen;
+        }
+        let rows = || [self.first, self.second].into_iter().flat_map(Block::rows);
+        let Some(horizon) = seen.horizon else { return seen };
+        let unknown = |row: &usize| {
+            let end = decided(self.study, column, *row);
+            end.is_some_and(|end| end.outcome == Outcome::Unfinished && end.steps < horizon)
+        };
+        let unknown = rows().filter(unknown).count() as u64;
+        if unknown > 0 {
+            let units = Units { n: unknown, name: "interrupted episodes".to_owned(), too_few: true };
+            return Comparison { units: Some(units), ..seen };
+        }
+        let Some(sides) = self.times(column, horizon) else { return seen };
+        let is_paired = !sides.shared.is_empty();
+        let n = if is_paired { sides.shared.len() } else { sides.first.len().min(sides.second.len()) };
+        let found = by_units(&sides, horizon, self.confidence);
+        let least = if (n as u64) < fewest_of(self.confidence) { 1.0 } else { 0.0 };
+        let units = Units::new(self.study, self.first, n, least, self.confidence);
+        let method = if is_paired { Method::RestrictedMeanPaired } else { Method::RestrictedMean };
+        let tested = Comparison::of_durations(method, [n as u64; 2], found, self.confidence);
+        Comparison { n: seen.n, units: Some(units), ..tested }
+    }
+
+    /// The times of both sides up to the horizon, by unit.
+    fn times(&self, column: &MetricColumn, horizon: i64) -> Option<units::Sides> {
+        let time = |row| decided(self.study, column, row).map(|end| end.steps.min(horizon));
+        Sides::by(self.study, &[(self.first, self.second)], time).divided()
     }
 
     fn of_episodes(&self, column: &MetricColumn) -> Comparison {
@@ -252,7 +320,7 @@ impl Compared<'_, '_> {
             Some(pairs) => (Method::RestrictedMeanPaired, pairs.len() as u64 - n[0]),
             None => (Method::RestrictedMean, 0),
         };
-        Comparison { undefined, ..Comparison::of_durations(method, n, found) }
+        Comparison { undefined, ..Comparison::of_durations(method, n, found, self.confidence) }
     }
 
     /// The ends of both sides' episodes; of pairs, those of which both have one, in the same order.
@@ -285,6 +353,7 @@ impl Comparison {
             difference: None,
             interval: None,
             withheld: None,
+            repeat_se: None,
             p: None,
             mid_p: None,
             p_least: None,
@@ -309,7 +378,9 @@ impl Comparison {
         Self { interval: None, withheld: Some(Withheld::Dependent), p: None, ..self }
     }
 
-    fn of_durations(method: Method, n: [u64; 2], found: Option<Difference>) -> Self {
+    /// The test needs as many units as any other test, the interval as many as its coverage.
+    fn of_durations(method: Method, n: [u64; 2], found: Option<Difference>, confidence: f64) -> Self {
+        let least = fewest_of(confidence);
         let (interval, withheld) = coverage::given(
             found.and_then(|found| found.interval),
             n[0].min(n[1]),
@@ -321,8 +392,7 @@ impl Comparison {
             difference: found.map(|found| found.difference),
             interval,
             withheld,
-            // The test rests on the same distribution as the interval.
-            p: found.and_then(|found| found.p).filter(|_| interval.is_some()),
+            p: found.and_then(|found| found.p).filter(|_| n[0].min(n[1]) >= least),
             ..Self::of(method, n)
         }
     }
@@ -344,9 +414,13 @@ impl Comparison {
                 let divisions: f64 = (1..=m.min(n)).map(|k| (m.max(n) + k) as f64 / k as f64).product();
                 (if m == n { 2.0 / divisions } else { 1.0 / divisions }, "episodes")
             }
+            Method::RestrictedMeanPaired | Method::RestrictedMean if m.min(n) < fewest_of(confidence) => {
+                (f64::INFINITY, if self.method == Method::RestrictedMean { "episodes" } else { "pairs" })
+            }
             _ => return LossCases::unsettled(self.losses.as_ref()),
         };
-        let is_hopeless = self.p.is_some() && level(confidence).is_some_and(|level| least > level);
+        let is_hopeless =
+            (self.p.is_some() || least == f64::INFINITY) && level(confidence).is_some_and(|level| least > level);
         let hopeless = is_hopeless.then(|| Units { n: m.min(n), name: name.to_owned(), too_few: true });
         hopeless.or_else(|| LossCases::unsettled(self.losses.as_ref()))
     }
@@ -356,6 +430,11 @@ impl Comparison {
         let difference = self.difference.filter(|_| self.separated)?;
         Some(if difference > 0.0 { Sign::Higher } else { Sign::Lower })
     }
+}
+
+/// The fewest units of a test of durations.
+fn fewest_of(confidence: f64) -> u64 {
+    level(confidence).map_or(u64::MAX, |level| fewest(level) as u64)
 }
 
 /// Where the first of two stands.

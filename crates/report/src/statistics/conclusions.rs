@@ -13,14 +13,16 @@ use statistics::power::Detectable;
 pub(super) fn headline(study: &Study) -> Vec<String> {
     let has_level =
         |metric: &str| study.experiments.iter().any(|known| !own_levels(study, known.name, metric).is_empty());
-    let rates = study.rates().map(|column| column.name.as_str()).filter(|metric| has_level(metric));
+    let rates = || study.rates().map(|column| column.name.as_str());
+    let levelled: Vec<&str> = rates().filter(|metric| has_level(metric)).collect();
     let durations = study.relations.durations.iter().map(|(duration, _)| duration.as_str());
-    let durations = durations.filter(|metric| study.column(metric).is_some());
-    let chosen: Vec<String> = rates.chain(durations).map(str::to_owned).collect();
-    if chosen.is_empty() {
-        return study.table.metrics.first().map(|column| column.name.clone()).into_iter().collect();
-    }
-    chosen
+    let durations: Vec<&str> = durations.filter(|metric| study.column(metric).is_some()).collect();
+    let first = match (levelled.is_empty(), durations.is_empty()) {
+        (false, _) => None,
+        (true, false) => rates().next(),
+        (true, true) => study.table.metrics.first().map(|column| column.name.as_str()),
+    };
+    first.into_iter().chain(levelled).chain(durations).map(str::to_owned).collect()
 }
 
 pub(super) fn conclusions(statistics: &Statistics) -> Vec<String> {

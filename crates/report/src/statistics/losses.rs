@@ -9,6 +9,9 @@ use exact::moments::Moments;
 use statistics::holm::{holm, level};
 use statistics::losses::{Fate, Lossy, bounds};
 
+/// What lost episodes are called where they decide.
+pub(super) const LOST: &str = "lost episodes";
+
 /// Losses, or that nothing is known of them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Losses {
@@ -93,7 +96,7 @@ impl LossCases {
     }
 
     pub(super) fn unsettled(cases: Option<&Self>) -> Option<Units> {
-        let units = |cases: &Self| Units { n: cases.lost, name: "lost episodes".to_owned(), too_few: true };
+        let units = |cases: &Self| Units { n: cases.lost, name: LOST.to_owned(), too_few: true };
         cases.filter(|cases| !cases.agree).map(units)
     }
 }

@@ -49,8 +49,6 @@ pub use retest::RetestRow;
 pub use selection::Selection;
 pub use sequential::{Sequential, SequentialChance, SequentialPair, SequentialRate};
 
-pub use warnings::TEXT_SCORES;
-
 use crate::cells::Cells;
 use crate::cells::interval::CONFIDENCE;
 use exact::moments::MomentOverflow;
@@ -216,11 +214,10 @@ impl Statistics {
             headline,
             relations: study.relations.clone(),
         };
-        let from_text = table.declared.from_text;
-        statistics.design_note = warnings::design_note(&statistics, from_text);
+        statistics.design_note = warnings::design_note(&statistics);
         (statistics.answers, statistics.families) = answers::answers(&statistics, options);
         statistics.conclusions = conclusions::conclusions(&statistics);
-        statistics.warnings = warnings::warnings(&statistics, from_text);
+        statistics.warnings = warnings::warnings(&statistics);
         statistics.warnings.extend(statistics.pooled.iter().cloned());
         statistics.warnings.extend(Contrast::left_out(&study));
         Ok(statistics)

@@ -1,13 +1,14 @@
 //! Replies that gave no decision, whose steps are in every number all the same.
 
 use std::cmp::Reverse;
+use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::study::named;
 use exact::escape::visible;
-use score::quality::QualityByCell;
+use score::table::{CONDITION, EpisodeTable, UNUSABLE_REPLIES};
 
 /// How many cells a sentence names before it counts the rest.
 const NAMED_CELLS: usize = 3;
@@ -41,18 +42,30 @@ pub struct UnusableReplies {
 
 impl Replies {
     /// `None` where no reply has a status.
-    pub fn of(quality: &QualityByCell) -> Option<Self> {
-        let whole = quality.whole();
-        let unusable = quality.0.iter().filter(|(_, quality)| quality.unusable() > 0);
-        let cells = unusable.map(|(key, found)| UnusableReplies {
-            experiment: key.experiment.clone(),
-            model: key.model.clone(),
-            condition: quality.has_conditions().then(|| key.condition.clone()),
-            replies: found.replies(),
-            unusable: found.unusable(),
+    pub fn of(table: &EpisodeTable) -> Option<Self> {
+        let label = table.label(UNUSABLE_REPLIES)?;
+        let conditions = table.label(CONDITION).filter(|_| table.has_conditions());
+        let mut cells: BTreeMap<(&str, &str, Option<&str>), [u64; 2]> = BTreeMap::new();
+        for (row, key) in table.keys.iter().enumerate() {
+            let Some((unusable, all)) = label.get(row).and_then(|text| text.split_once('/')) else { continue };
+            let condition = conditions.and_then(|conditions| conditions.get(row));
+            let counts = cells.entry((key.experiment, key.model, condition)).or_default();
+            for (count, text) in counts.iter_mut().zip([unusable, all]) {
+                *count += text.parse::<u64>().unwrap_or(0);
+            }
+        }
+        let sum = |at: usize| cells.values().map(|counts| counts[at]).sum::<u64>();
+        let (unusable, replies) = (sum(0), sum(1));
+        let cells = cells.iter().filter(|(_, [unusable, _])| *unusable > 0);
+        let cells = cells.map(|(&(experiment, model, condition), &[unusable, replies])| UnusableReplies {
+            experiment: experiment.to_owned(),
+            model: model.to_owned(),
+            condition: condition.map(str::to_owned),
+            replies,
+            unusable,
         });
-        let (replies, unusable) = (whole.replies(), whole.unusable());
-        (replies > 0).then(|| Self { replies, unusable, cells: cells.collect() })
+        let cells = cells.collect();
+        (replies > 0).then_some(Self { replies, unusable, cells })
     }
 
     /// How many gave no decision, and in which cells most; `None` where each gave one.

@@ -85,3 +85,18 @@ impl RetestRow {
         })
     }
 }
+
+/// The variance of a block's mean from one time of its scenes to the next; none where no scene has several values.
+#[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
+pub(super) fn repeat_variance(study: &Study, block: &Block, column: &MetricColumn) -> Option<f64> {
+    if !block.repeats {
+        return None;
+    }
+    let moments = |rows: Vec<usize>| {
+        let values = rows.into_iter().filter_map(|row| column.get(row));
+        values.fold(Moments::default(), |sum, value| sum.with(value).expect("a part of a block that was summed whole"))
+    };
+    let parts: Vec<Moments> = Scenes::of(study, block).rows.into_values().map(moments).collect();
+    let n: u64 = parts.iter().map(|part| part.n).sum();
+    Some(variance_components(&parts)?.1 / n as f64)
+}

@@ -140,9 +140,9 @@ impl<'a> Study<'a> {
     }
 
     /// The defined values of each unit of a block.
-    pub fn by_unit(&self, block: &Block, column: &MetricColumn) -> BTreeMap<Unit, Moments> {
+    pub fn by_unit(&self, block: &Block, value: impl Fn(usize) -> Option<i64>) -> BTreeMap<Unit, Moments> {
         let mut units: BTreeMap<Unit, Moments> = BTreeMap::new();
-        for (row, value) in block.rows().filter_map(|row| Some((row, column.get(row)?))) {
+        for (row, value) in block.rows().filter_map(|row| Some((row, value(row)?))) {
             let sum = units.entry(self.unit(row)).or_default();
             *sum = sum.with(value).expect("a part of a block that was summed whole");
         }

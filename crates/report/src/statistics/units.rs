@@ -1,4 +1,4 @@
-//! Two models' rates by unit of analysis: a scene, a declared cluster or a participant counts once.
+//! Two models by unit of analysis: a scene, a declared cluster or a participant counts once.
 
 use std::collections::BTreeMap;
 use std::mem::discriminant;
@@ -6,7 +6,7 @@ use std::mem::discriminant;
 use super::study::{Block, Study, Unit};
 use exact::moments::Moments;
 use score::table::MetricColumn;
-use statistics::units::{UnitTest, difference_test};
+use statistics::units::{self, UnitTest, difference_test};
 
 /// The values of two sides by unit.
 pub(super) struct Sides {
@@ -21,6 +21,15 @@ impl Sides {
         if !study.has_units() {
             return None;
         }
+        let sides = Self::by(study, strata, |row| column.get(row));
+        let repeats = sides.units.values().any(|(a, b)| a.n > 1 || b.n > 1);
+        let shared = sides.units.values().filter(|(a, b)| a.n > 0 && b.n > 0).count();
+        let is_partly_shared = shared > 0 && shared < sides.units.len();
+        (repeats || is_partly_shared).then_some(sides)
+    }
+
+    /// The sides under any value of an episode.
+    pub fn by(study: &Study, strata: &[(&Block, &Block)], value: impl Fn(usize) -> Option<i64>) -> Self {
         let mut units: BTreeMap<Unit, (Moments, Moments)> = BTreeMap::new();
         let add = |sum: &mut Moments, part: Moments| {
             sum.n += part.n;
@@ -28,17 +37,14 @@ impl Sides {
             sum.sum_sq += part.sum_sq;
         };
         for (first, second) in strata {
-            for (unit, part) in study.by_unit(first, column) {
+            for (unit, part) in study.by_unit(first, &value) {
                 add(&mut units.entry(unit).or_default().0, part);
             }
-            for (unit, part) in study.by_unit(second, column) {
+            for (unit, part) in study.by_unit(second, &value) {
                 add(&mut units.entry(unit).or_default().1, part);
             }
         }
-        let repeats = units.values().any(|(a, b)| a.n > 1 || b.n > 1);
-        let shared = units.values().filter(|(a, b)| a.n > 0 && b.n > 0).count();
-        let is_partly_shared = shared > 0 && shared < units.len();
-        (repeats || is_partly_shared).then_some(Self { units })
+        Self { units }
     }
 
     /// The number of units.
@@ -46,17 +52,15 @@ impl Sides {
         self.units.len()
     }
 
-    /// The exact test; `None` also where the units of the two sides are of different kinds.
-    ///
-    /// `lost` are further units of both sides.
-    pub fn test(&self, lost: &[(Moments, Moments)]) -> Option<UnitTest> {
-        let (mut shared, mut first, mut second) = (lost.to_vec(), Vec::new(), Vec::new());
+    /// The units that both sides have and those of one; `None` where the units of the two sides are of different kinds.
+    pub fn divided(&self) -> Option<units::Sides> {
+        let mut sides = units::Sides::default();
         let mut kinds = [None; 2];
         for (unit, &(a, b)) in &self.units {
             match (a.n, b.n) {
-                (0, _) => second.push(b),
-                (_, 0) => first.push(a),
-                _ => shared.push((a, b)),
+                (0, _) => sides.second.push(b),
+                (_, 0) => sides.first.push(a),
+                _ => sides.shared.push((a, b)),
             }
             for (kind, side) in kinds.iter_mut().zip([a, b]) {
                 if side.n > 0 {
@@ -64,6 +68,13 @@ impl Sides {
                 }
             }
         }
-        (kinds[0] == kinds[1]).then(|| difference_test(&shared, &first, &second)).flatten()
+        (kinds[0] == kinds[1]).then_some(sides)
+    }
+
+    /// The exact test of a rate; `lost` are further units of both sides.
+    pub fn test(&self, lost: &[(Moments, Moments)]) -> Option<UnitTest> {
+        let mut sides = self.divided()?;
+        sides.shared.splice(..0, lost.iter().copied());
+        difference_test(&sides)
     }
 }

@@ -9,17 +9,13 @@ use statistics::clustered::fewest_clusters;
 use statistics::design::{Cluster, DesignKind};
 use statistics::holm::level;
 
-/// What a file of scores in text leaves unknown.
-pub const TEXT_SCORES: &str = "scores in CSV and JSON Lines do not carry the kind of episodes, their clusters, losses and reply \
-                           quality, which are unknown here";
-
 /// How many gaps a warning names before it counts the rest.
 const NAMED_GAPS: usize = 5;
 
 /// How much of a scene's name is shown: a fingerprint is long.
 const SCENE_SHOWN: usize = 16;
 
-pub(super) fn design_note(statistics: &Statistics, from_text: bool) -> String {
+pub(super) fn design_note(statistics: &Statistics) -> String {
     let (paired, all) = pairings(statistics);
     if statistics.design.kind == Some(DesignKind::Reconstruction) {
         return "reconstructed episodes: their seeds, runs and scenes are made up, so nothing is paired or clustered and every \
@@ -28,12 +24,6 @@ pub(super) fn design_note(statistics: &Statistics, from_text: bool) -> String {
             .to_owned();
     }
     let has_scenes = matchings(statistics).any(|matching| matching.pairs + matching.alone + matching.repeated > 0);
-    if from_text {
-        return format!(
-            "{TEXT_SCORES}: no test knows clusters, and {}; give the traces, or score them into Parquet",
-            if paired == 0 { "nothing is paired" } else { "pairs are by the column `scene` alone" }
-        );
-    }
     if statistics.design.kind.is_none() && statistics.design.cluster.is_none() && !has_scenes {
         return "the traces declare no design: episodes are taken as independent, nothing is paired or clustered; record or import \
                 them with a column `scene` and the design in the footer to have pairs"
@@ -73,7 +63,7 @@ fn pairings(statistics: &Statistics) -> (usize, usize) {
     (all.iter().filter(|paired| **paired).count(), all.len())
 }
 
-pub(super) fn warnings(statistics: &Statistics, from_text: bool) -> Vec<String> {
+pub(super) fn warnings(statistics: &Statistics) -> Vec<String> {
     let chosen = statistics.selection.as_ref().filter(|selection| selection.by_results);
     let found = [
         chosen.map(Selection::sentence),
@@ -82,7 +72,7 @@ pub(super) fn warnings(statistics: &Statistics, from_text: bool) -> Vec<String> 
         few_seeds(statistics),
         few_episodes(statistics),
         gaps(statistics),
-        losses(statistics, from_text),
+        losses(statistics),
         statistics.replies.as_ref().and_then(Replies::sentence),
     ];
     found.into_iter().flatten().collect()
@@ -95,11 +85,7 @@ fn is_undeclared(statistics: &Statistics) -> bool {
 fn repeated(statistics: &Statistics) -> Option<String> {
     let most = matchings(statistics).map(|matching| matching.repeated).max().filter(|&most| most > 0)?;
     let unpaired = matchings(statistics).any(|matching| matching.repeated > 0 && !matching.paired);
-    let follows = if unpaired {
-        "; a test of a rate counts each scene once, and durations with repeats are not tested"
-    } else {
-        ""
-    };
+    let follows = if unpaired { "; a test counts each scene once" } else { "" };
     Some(format!(
         "up to {most} episodes of a comparison share a scene that one side has more than once: they are not pairs{follows}."
     ))
@@ -117,7 +103,7 @@ fn few_seeds(statistics: &Statistics) -> Option<String> {
     let seeds = if fewest == 1 { "1 seed is".to_owned() } else { format!("{fewest} seeds are") };
     Some(format!(
         "{seeds} too few for a claim about new seeds: no test over fewer than {needed} can reach p = {}. \
-         Rates are tested by seed, durations are not tested; intervals of cells speak of new runs of these seeds.",
+         Tests are by seed; intervals of cells speak of new runs of these seeds.",
         p_value(Some(level)).trim_end_matches('0')
     ))
 }
@@ -155,16 +141,11 @@ fn gaps(statistics: &Statistics) -> Option<String> {
         .then(|| format!("{count}{places} not paired, for want of exactly one episode: {}{rest}.", named.join("; ")))
 }
 
-fn losses(statistics: &Statistics, from_text: bool) -> Option<String> {
+fn losses(statistics: &Statistics) -> Option<String> {
     if !statistics.losses.recorded {
-        let why = if from_text {
-            "these scores do not carry"
-        } else {
-            "neither reply_status nor a list of lost episodes records"
-        };
-        return Some(format!(
-            "{why} how replies came: episodes lost to infrastructure, if any, are counted as the model's own."
-        ));
+        let words = "neither reply_status nor a list of lost episodes records how replies came: episodes lost to \
+                     infrastructure, if any, are counted as the model's own.";
+        return Some(words.to_owned());
     }
     let total = lost(statistics);
     (total > 0).then(|| {

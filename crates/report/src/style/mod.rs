@@ -4,7 +4,6 @@
 //! before anything prints. `default` and `paper` are built in; any other name is a file. `read.rs` reads them.
 
 mod read;
-pub mod shape;
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -24,11 +23,6 @@ pub const MAIN_TABLE: &str = "main";
 /// The table of the metrics that a style names nowhere.
 pub const OTHER_TABLE: &str = "other";
 
-const BUILT_IN: [(&str, &str); 2] = [
-    ("default", include_str!("../../../../assets/styles/default.toml")),
-    ("paper", include_str!("../../../../assets/styles/paper.toml")),
-];
-
 /// A style ready for use.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Style {
@@ -41,9 +35,13 @@ pub struct Style {
     is_built_in: bool,
 }
 
-/// What a style file says, with all that it includes.
-#[derive(Clone, Debug, PartialEq)]
+/// A style file. With an include only what differs has to be said.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+#[schemars(rename = "StyleFile")]
 pub struct Sheet {
+    /// Styles that come first, by name or by path relative to this file; what this file says replaces what they say.
+    pub include: Vec<String>,
     /// The models in the order of their rows; others come after them, by name.
     pub row_order: Vec<String>,
     /// What stands where a value is undefined.
@@ -54,17 +52,19 @@ pub struct Sheet {
     pub print: PrintSheet,
     /// Headers and arrows, by metric.
     pub column: IndexMap<String, ColumnSheet>,
-    /// The tables by name; a name becomes a file name. `main` must be one of them.
+    /// The tables by name; a name becomes a file name. `main` must be one of them, here or in an include.
     pub table: IndexMap<String, TableSheet>,
-    /// What figures show.
+    /// The metrics and the captions of figures, by the name of the figure.
     pub figure: FigureSheets,
 }
 
 /// One table of a style file.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
 pub struct TableSheet {
     /// The first words of the caption, without a full stop.
     pub title: String,
+    /// The sentences after them.
     pub note: String,
     /// The LaTeX label; none if absent.
     pub label: Option<String>,
@@ -74,6 +74,21 @@ pub struct TableSheet {
     pub print: PrintSheet,
     /// The metrics whose undefined cells print as zero and compete as zero (a quirk of the published main table).
     pub undefined_as_zero: Vec<String>,
+}
+
+impl Default for Sheet {
+    fn default() -> Self {
+        Self {
+            include: Vec::new(),
+            row_order: Vec::new(),
+            undefined: "--".to_owned(),
+            emphasis_note: String::new(),
+            print: PrintSheet::default(),
+            column: IndexMap::new(),
+            table: IndexMap::new(),
+            figure: FigureSheets::new(),
+        }
+    }
 }
 
 /// How a metric's column is headed.
@@ -188,24 +203,20 @@ pub enum StyleError {
 }
 
 /// The names of the built-in styles.
-pub fn built_in_names() -> [&'static str; 2] {
-    BUILT_IN.map(|(name, _)| name)
+pub fn built_in_names() -> Vec<&'static str> {
+    read::KIND.built_in_names()
 }
 
 /// The text of a built-in style.
 pub fn built_in(name: &str) -> Option<&'static str> {
-    BUILT_IN.into_iter().find(|(known, _)| *known == name).map(|(_, text)| text)
-}
-
-fn default_undefined() -> String {
-    "--".to_owned()
+    read::KIND.built_in_text(name)
 }
 
 impl Style {
     /// The built-in style of that name, or else the style in that file.
     pub fn load(name_or_path: impl AsRef<Path>) -> Result<Self, StyleError> {
         let path = name_or_path.as_ref();
-        let is_built_in = BUILT_IN.into_iter().any(|(name, _)| path == Path::new(name));
+        let is_built_in = built_in_names().into_iter().any(|name| path == Path::new(name));
         let name = path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
         let read::Read { sheet, named, hash } = read::read(path)?;
         Ok(Self { name, hash, sheet, named, is_built_in })

@@ -1,10 +1,11 @@
 //! The episode table as comma-separated values.
 
+use std::collections::BTreeMap;
 use std::io::{Read, Write};
 
-use super::FormatError;
+use super::{DECLARED_KEY, DeclaredText, FormatError};
 use crate::builder::TableBuilder;
-use crate::table::{EpisodeTable, Header, KeyRef};
+use crate::table::{Declared, EpisodeTable, Header, KeyRef};
 use exact::budget::Limit;
 use metric::catalog::Catalog;
 
@@ -14,7 +15,8 @@ pub(super) fn write(table: &EpisodeTable, out: impl Write) -> Result<(), FormatE
     let mut writer = csv::Writer::from_writer(out);
     let header = table.header();
     let columns = header.labels.iter().chain(&header.metrics).map(String::as_str);
-    writer.write_record(KEYS.into_iter().chain(columns)).map_err(io)?;
+    let declared = DeclaredText::of_table(table)?;
+    writer.write_record(KEYS.into_iter().chain(columns).chain(declared.as_ref().map(|_| DECLARED_KEY))).map_err(io)?;
     for (row, key) in table.keys.iter().enumerate() {
         for text in [key.episode_id, key.model, key.experiment] {
             writer.write_field(text).map_err(io)?;
@@ -27,6 +29,9 @@ pub(super) fn write(table: &EpisodeTable, out: impl Write) -> Result<(), FormatE
         }
         for metric in &table.metrics {
             writer.write_field(metric.get(row).map_or_else(String::new, |value| value.to_string())).map_err(io)?;
+        }
+        if let Some(declared) = &declared {
+            writer.write_field(if row == 0 { declared.as_str() } else { "" }).map_err(io)?;
         }
         writer.write_record(None::<&[u8]>).map_err(io)?;
     }
@@ -87,8 +92,13 @@ pub(super) fn assemble(
     }
     let is_metric = |name: &&String| catalog.metric.contains_key(*name);
     let metric_names: Vec<&String> = header.iter().filter(is_metric).collect();
-    let label_names: Vec<&String> =
-        header.iter().filter(|name| !is_metric(name) && !KEYS.contains(&name.as_str())).collect();
+    let label_names: Vec<&String> = header
+        .iter()
+        .filter(|name| !is_metric(name) && !KEYS.contains(&name.as_str()) && *name != DECLARED_KEY)
+        .collect();
+    let mut declared: Option<Declared> = None;
+    let mut experiments = BTreeMap::new();
+    let declared_at = header.iter().position(|name| name == DECLARED_KEY);
     let column = |name: &String| header.iter().position(|column| column == name).unwrap_or_default();
     let header = Header {
         catalog: catalog.clone(),
@@ -110,8 +120,18 @@ pub(super) fn assemble(
         let value = |name: &&String| cell(column(name)).map(|text| integer(text, line, name)).transpose();
         let metrics: Vec<Option<i64>> = metric_names.iter().map(value).collect::<Result<_, _>>()?;
         builder.push(key, label_names.iter().map(|name| cell(column(name))), metrics);
+        if let Some(text) = declared_at.and_then(cell) {
+            let found = DeclaredText::parse(text)?;
+            experiments.extend(found.experiments);
+            declared = Some(match declared {
+                Some(whole) => whole.joined(found.declared),
+                None => found.declared,
+            });
+        }
     }
-    Ok(builder.finish())
+    let mut table = EpisodeTable { declared: declared.unwrap_or_default(), ..builder.finish() };
+    table.catalog.declare(experiments);
+    Ok(table)
 }
 
 pub(super) fn check_unique(names: &[&str]) -> Result<(), FormatError> {

@@ -4,13 +4,14 @@ use std::io::{BufReader, Read, Write};
 
 use serde_json::{Map, Value};
 
-use super::{FormatError, csv};
+use super::{DECLARED_KEY, DeclaredText, FormatError, csv};
 use crate::table::EpisodeTable;
 use exact::budget::Limit;
 use exact::input::Lines;
 use metric::catalog::Catalog;
 
 pub(super) fn write(table: &EpisodeTable, mut out: impl Write) -> Result<(), FormatError> {
+    let declared = DeclaredText::of_table(table)?;
     for (row, key) in table.keys.iter().enumerate() {
         let mut object = Map::new();
         object.insert("episode_id".into(), key.episode_id.into());
@@ -23,6 +24,10 @@ pub(super) fn write(table: &EpisodeTable, mut out: impl Write) -> Result<(), For
         }
         for metric in &table.metrics {
             object.insert(metric.name.clone(), metric.get(row).map_or(Value::Null, Value::from));
+        }
+        if let Some(declared) = &declared {
+            let value = if row == 0 { declared.as_str().into() } else { Value::Null };
+            object.insert(DECLARED_KEY.to_owned(), value);
         }
         serde_json::to_writer(&mut out, &object).map_err(std::io::Error::from)?;
         out.write_all(b"\n")?;

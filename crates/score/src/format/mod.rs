@@ -1,9 +1,9 @@
 //! The episode table as bytes and back: Parquet, CSV, JSON lines.
 //!
 //! Columns are `episode_id, model, experiment, seed, run`, then the labels, then the metrics by name;
-//! rates are 0 and 1; undefined is null or empty. Parquet carries the definitions in its footer; the
-//! two text formats cannot, nor can the SQL lowering run by hand on another engine, so whoever reads those back names
-//! the definitions.
+//! rates are 0 and 1; undefined is null or empty. Parquet has the definitions and what the traces declare in its footer. The
+//! text formats have what the traces declare in a last column, on the first row; their reader names the definitions, as does
+//! the reader of what the SQL gave on another engine.
 
 mod csv;
 mod footer;
@@ -11,13 +11,14 @@ mod jsonl;
 pub mod parquet;
 mod partition;
 
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 use std::io::{self, Read, Write};
 
 use ::parquet::errors::ParquetError;
+use serde::{Deserialize, Serialize};
 
-use super::table::EpisodeTable;
-use metric::catalog::{Catalog, Kind};
+use super::table::{Declared, EpisodeTable};
+use metric::catalog::{Catalog, Experiment, Kind};
 use trace::TableFile;
 
 pub use self::parquet::{
@@ -112,7 +113,7 @@ pub enum FormatError {
         reason: String,
     },
     /// What the footer says of the recording.
-    #[error("`{DECLARED_KEY}` in the footer is not readable: {0}; score the traces again")]
+    #[error("`{DECLARED_KEY}` is not readable: {0}; score the traces again")]
     Declared(String),
     /// The definitions in the footer.
     #[error("the definitions in the footer are not readable: {0}")]
@@ -150,17 +151,41 @@ pub fn write(table: &EpisodeTable, format: Format, out: impl Write + Send) -> Re
 
 /// Reads a table of one of the text formats; `catalog` tells which columns are metrics.
 pub fn read_text(format: Format, catalog: &Catalog, input: impl Read) -> Result<EpisodeTable, FormatError> {
-    let mut table = match format {
+    checked(match format {
         Format::JsonLines => jsonl::read(catalog, input)?,
         Format::Csv | Format::Parquet => csv::read(catalog, input)?,
-    };
-    table.declared.from_text = true;
-    checked(table)
+    })
 }
 
 /// Reads a table and the definitions that it carries, or those of its partition.
 pub fn read_parquet(input: TableFile, partition: &Partition<'_>) -> Result<EpisodeTable, FormatError> {
     checked(parquet::read(input, partition)?)
+}
+
+/// What the traces declare, as one JSON text; the definitions in Parquet have the experiments already.
+#[derive(Default, PartialEq, Serialize, Deserialize)]
+struct DeclaredText {
+    #[serde(flatten)]
+    declared: Declared,
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    experiments: BTreeMap<String, Experiment>,
+}
+
+impl DeclaredText {
+    /// The text of a table in CSV or JSON Lines; `None` if the traces declare nothing.
+    fn of_table(table: &EpisodeTable) -> Result<Option<String>, FormatError> {
+        let declared = table.declared.clone();
+        Self { declared, experiments: table.catalog.declared().collect() }.text()
+    }
+
+    fn text(&self) -> Result<Option<String>, FormatError> {
+        let text = || serde_json::to_string(self).map_err(|error| FormatError::Declared(error.to_string()));
+        (*self != Self::default()).then(text).transpose()
+    }
+
+    fn parse(text: &str) -> Result<Self, FormatError> {
+        serde_json::from_str(text).map_err(|error| FormatError::Declared(error.to_string()))
+    }
 }
 
 /// A table as scoring gives it: each episode once, of a known experiment, rates 0 and 1.

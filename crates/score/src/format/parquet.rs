@@ -17,18 +17,17 @@ use parquet::file::properties::{EnabledStatistics, WriterProperties};
 use parquet::file::reader::ChunkReader;
 use parquet::file::writer::SerializedFileWriter;
 
-use super::FormatError;
 use super::csv::{KEYS, check_unique};
 use super::footer;
 use super::partition::Partition;
+use super::{DeclaredText, FormatError};
 use crate::builder::TableBuilder;
 use crate::columns;
-use crate::table::{EpisodeTable, Header, KeyRef, TextColumn};
+use crate::table::{Declared, EpisodeTable, Header, KeyRef, TextColumn};
 use metric::catalog::Catalog;
 use parquet_pages::check_footer;
 use parquet_pages::checksums::{self, CREATED_BY, Held};
 use trace::catch_panic::contained;
-use trace::declared::Declared;
 use trace::schema::COLUMNS;
 use trace::{FlatRows, TableFile};
 
@@ -174,10 +173,8 @@ fn properties(header: &Header, declared: &Declared) -> Result<WriterProperties, 
         pair(HASH_KEY, &header.catalog.hash),
         pair(DEFINITIONS_KEY, &definitions),
     ];
-    if *declared != Declared::default() {
-        let text = serde_json::to_string(declared).map_err(|error| FormatError::Definitions(error.to_string()))?;
-        metadata.push(pair(DECLARED_KEY, &text));
-    }
+    let declared = DeclaredText { declared: declared.clone(), ..DeclaredText::default() };
+    metadata.extend(declared.text()?.map(|text| pair(DECLARED_KEY, &text)));
     let mut properties = WriterProperties::builder()
         .set_created_by(CREATED_BY.to_owned())
         .set_compression(Compression::ZSTD(ZstdLevel::default()))
@@ -217,10 +214,8 @@ fn decode(input: TableFile, partition: &Partition<'_>) -> Result<EpisodeTable, F
         (None, None) => return Err(FormatError::Definitions(format!("there is no `{DEFINITIONS_KEY}`"))),
     };
     // Scores of other programs declare nothing.
-    let declared = match footer::value(about.metadata().file_metadata(), DECLARED_KEY) {
-        Some(text) => serde_json::from_str(&text).map_err(|error| FormatError::Declared(error.to_string()))?,
-        None => Declared::default(),
-    };
+    let declared = footer::value(about.metadata().file_metadata(), DECLARED_KEY);
+    let declared = declared.map(|text| DeclaredText::parse(&text)).transpose()?.unwrap_or_default().declared;
     let names: Vec<&str> = about.schema().fields().iter().map(|field| field.name().as_str()).collect();
     check_unique(&names)?;
     // A part without rows has its columns all the same.

@@ -1,19 +1,23 @@
 //! How many episodes a comparison needs, and what a number of episodes can show: exact power by enumeration.
 //!
-//! Rule: the tests are those of a report, at a fixed level, and their power is a sum over every outcome; nothing is
-//! simulated. Power of an exact test rises in a sawtooth, so a size is tried one by one from below.
+//! Rule: the tests are those of a report, at a fixed level, and their power is a sum over every outcome; that of pairs
+//! by seed is simulated, seeded. Power of an exact test rises in a sawtooth, so a size is tried one by one from below.
 
+mod anytime;
 pub mod binomial;
 mod fisher;
 mod mcnemar;
 mod one_rate;
+mod seeds;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use self::anytime::{Anytime, MOST_AT_LOOKS};
 pub use self::fisher::Fisher;
 pub use self::mcnemar::McNemar;
 pub use self::one_rate::OneRate;
+pub use self::seeds::{BySeed, SEED, STUDIES, Seeds};
 pub use super::quantile::settled;
 
 /// How near a p value may exceed the level and count as equal to it: rounding of sums, nothing more.
@@ -26,6 +30,11 @@ pub const MOST_EPISODES: u64 = 2_000;
 pub trait Power {
     /// The probability that the test rejects with `n` episodes per model.
     fn power(&mut self, n: u64) -> f64;
+
+    /// The most episodes per model that a search goes to.
+    fn most(&self) -> u64 {
+        MOST_EPISODES
+    }
 }
 
 /// Two rates.
@@ -75,26 +84,29 @@ pub struct Clusters {
 }
 
 impl Clusters {
-    /// The independent episodes that `runs` per seed are worth, rounded down: n / (1 + (runs - 1) icc) (Kish 1965).
-    #[expect(
-        clippy::cast_precision_loss,
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a number of episodes, no larger than before"
-    )]
-    pub fn effective(self, runs: u64) -> u64 {
-        let design_effect = 1.0 + runs.saturating_sub(1) as f64 * self.icc;
-        ((self.seeds * runs) as f64 / design_effect + TIE) as u64
+    /// Whether the episodes of a seed resemble each other, so that tests count seeds.
+    pub fn are_units(self) -> bool {
+        self.icc > 0.0
+    }
+
+    /// What tests count: the seeds, or the episodes.
+    pub fn units(self, runs: u64) -> u64 {
+        if self.are_units() { self.seeds } else { self.seeds * runs }
+    }
+
+    /// The power of a test with so many runs per seed.
+    pub fn power(self, test: &mut dyn Power, runs: u64) -> f64 {
+        test.power(if self.are_units() { runs } else { self.seeds * runs })
     }
 
     /// The fewest runs per seed with which the power is at least `wanted`; `None` where no number of episodes up to
-    /// [`MOST_EPISODES`] has it.
+    /// [`Power::most`] has it.
     ///
     /// Doubling and bisection find about where; then runs are tried one by one from a fifth, and from twenty, below.
     pub fn runs_for(self, wanted: f64, test: &mut dyn Power) -> Option<u64> {
         const NEAR: u64 = 20;
-        let most = MOST_EPISODES / self.seeds.max(1);
-        let mut has_power = |runs: u64| test.power(self.effective(runs)) >= wanted;
+        let most = test.most() / self.seeds.max(1);
+        let mut has_power = |runs: u64| self.power(test, runs) >= wanted;
         let doubled = std::iter::successors(Some(1), |runs| (*runs < most).then(|| (2 * runs).min(most)));
         let mut enough = doubled.into_iter().find(|runs| has_power(*runs))?;
         let mut too_few = enough / 2;

@@ -2,7 +2,9 @@
 //! `fisher_exact` and `binomtest`; sizes by trying each, smallest differences by `brentq`.
 #![expect(clippy::unreadable_literal, reason = "reference values as their source prints them")]
 
-use super::{Clusters, Fisher, McNemar, OneRate, Power, Rates, smallest};
+use super::{Anytime, BySeed, Clusters, Fisher, McNemar, OneRate, Power, Rates, Seeds, binomial, smallest};
+use crate::paired::Pairs;
+use crate::unpaired::fisher;
 use exact::ratio::Ratio;
 
 const HOLM: f64 = 0.05 / 28.0;
@@ -82,14 +84,61 @@ fn smallest_differences_are_the_known_ones() {
     assert_eq!(smallest(0.8, 1.0, |difference| pairs(0.05, around(difference)).power(5)), None);
 }
 
+/// The p values of `stats` for each outcome decide, weighed by its probability.
 #[test]
-fn episodes_that_resemble_each_other_are_worth_less() {
-    let effective = |icc, runs| Clusters { seeds: 3, icc }.effective(runs);
-    assert_eq!([effective(0.0, 7), effective(0.1, 7), effective(1.0, 7), effective(0.1, 1)], [21, 13, 3, 3]);
-    // However many runs: 3 seeds at 0.1 are worth no more than 30 episodes.
-    assert_eq!(effective(0.1, 100_000), 29);
-    let mut test = pairs(0.05, rates(0.35, 0.65));
-    assert_eq!(Clusters { seeds: 3, icc: 0.1 }.runs_for(0.8, &mut test), None);
+fn power_is_that_of_the_tests_that_statistics_run() {
+    let (level, difference, discordance) = (0.05, 0.4, 0.5);
+    for n in [5_u64, 9, 14] {
+        let outcomes = (0..=n).flat_map(|first| (0..=n - first).map(move |second| (first, second)));
+        let rejected = outcomes.filter(|&(first_only, second_only)| {
+            let pairs = Pairs { first_only, second_only, neither: n - first_only - second_only, both: 0 };
+            pairs.mcnemar().unwrap() <= level
+        });
+        let multinomial = |(a, b): (u64, u64)| {
+            let decided = binomial::probabilities(n, discordance)[usize::try_from(a + b).unwrap()];
+            decided * binomial::probabilities(a + b, 0.9)[usize::try_from(a).unwrap()]
+        };
+        close(McNemar::new(level, difference, discordance).power(n), rejected.map(multinomial).sum());
+        let (rates, mut sum) = (rates(0.2, 0.8), 0.0);
+        let [lower, higher] = [rates.lower, rates.higher].map(|rate| binomial::probabilities(n, rate));
+        for (a, p) in (0..).zip(&lower) {
+            for (b, q) in (0..).zip(&higher) {
+                sum += if fisher((a, n), (b, n)).unwrap().p <= level { p * q } else { 0.0 };
+            }
+        }
+        close(Fisher { level, rates }.power(n), sum);
+    }
+}
+
+// Python, by enumeration: 12 pairs with discordant shares 0.45 and 0.05, e = beta(a + 1/2, b + 1/2) / (pi * 2^-(a + b)),
+// looks after 3, 6, 9 and 12 pairs, rejection where 1 / e <= 0.05.
+#[test]
+fn looks_stop_at_the_boundary_of_sequential_statistics() {
+    let mut test = Anytime::pairs(0.05, 3, 0.4, 0.5).unwrap();
+    close(test.power(12), 0.17797300576576222);
+    close(test.expected(12), 11.874138764824218);
+    close(test.boundary(), 20.0);
+    let mut test = Anytime::rate(0.05, 3, Ratio::new(1, 3).unwrap(), 0.8);
+    close(test.power(12), 0.6052045168640005);
+    close(test.expected(12), 9.823156223999998);
+    // A true hypothesis is ever rejected with at most the level, however many looks.
+    assert!(Anytime::pairs(0.05, 1, 0.0, 0.5).unwrap().power(200) < 0.05);
+}
+
+// Python, by enumeration of all sums of six seeds with three runs, the copied outcome of a seed with probability sqrt(0.2).
+#[test]
+fn seeds_count_once_in_a_plan_too() {
+    let chance = Ratio::new(1, 3).unwrap();
+    let of = |test| Seeds { test, level: 0.05, seeds: 6, icc: 0.2 };
+    close(of(BySeed::Rate { chance, rate: 0.8 }).power(3), 0.5159454035323163);
+    let simulated = of(BySeed::Pairs { difference: 0.5, discordance: 0.6 }).power(3);
+    assert!((simulated - 0.24331089963269045).abs() < 0.035, "{simulated}");
+    // One run for each seed: the test of McNemar over the seeds.
+    close(of(BySeed::Pairs { difference: 0.5, discordance: 0.6 }).power(1), McNemar::new(0.05, 0.5, 0.6).power(6));
+    // However many runs, 3 seeds show nothing.
+    let three = Clusters { seeds: 3, icc: 0.1 };
+    let test = BySeed::Pairs { difference: 0.9, discordance: 0.9 };
+    close(three.power(&mut Seeds { test, level: 0.05, seeds: 3, icc: 0.1 }, 50), 0.0);
 }
 
 #[test]

@@ -77,6 +77,12 @@ impl ImportError {
     }
 }
 
+impl From<Fault> for ImportError {
+    fn from(fault: Fault) -> Self {
+        Self::Faults { told: vec![fault], more: 0 }
+    }
+}
+
 fn listed(told: &[Fault], more: usize) -> String {
     let told = told.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n");
     match more {

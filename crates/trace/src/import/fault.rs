@@ -8,13 +8,15 @@ use exact::escape::visible;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Place {
     pub(super) file: Arc<str>,
+    /// `line` or `row`.
+    pub(super) noun: &'static str,
     /// From 1; blank lines count.
     pub(super) line: u64,
 }
 
 impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}, line {}", visible(&self.file), self.line)
+        write!(f, "{}, {} {}", visible(&self.file), self.noun, self.line)
     }
 }
 
@@ -24,6 +26,8 @@ pub struct Fault {
     /// The file, as it was named.
     pub file: String,
     pub line: Option<u64>,
+    /// `line` or `row`, what `line` counts.
+    pub noun: &'static str,
     /// The key of the object.
     pub key: Option<String>,
     pub expected: String,
@@ -45,7 +49,7 @@ impl Fault {
     }
 
     pub(super) fn at(self, place: &Place) -> Self {
-        Self { file: place.file.to_string(), line: Some(place.line), ..self }
+        Self { file: place.file.to_string(), line: Some(place.line), noun: place.noun, ..self }
     }
 
     pub(super) fn of_key(self, key: &str) -> Self {
@@ -62,15 +66,15 @@ impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", visible(&self.file))?;
         if let Some(line) = self.line {
-            write!(f, ", line {line}")?;
+            write!(f, ", {} {line}", self.noun)?;
         }
         if let Some(key) = &self.key {
             write!(f, ", key `{}`", visible(key))?;
         }
         match self.further_lines {
             0 => {}
-            1 => f.write_str(", and in one more line")?,
-            more => write!(f, ", and in {more} more lines")?,
+            1 => write!(f, ", and in one more {}", self.noun)?,
+            more => write!(f, ", and in {more} more {}s", self.noun)?,
         }
         write!(f, "\n  expected {}\n  found {}\n  help: {}", self.expected, self.found, self.help)
     }

@@ -1,11 +1,10 @@
 //! Where each step lies, and whether the steps of an episode are whole: t = 1, 2, ... each once, the same names in all.
 
 use std::collections::HashMap;
-use std::sync::Arc;
 
 use super::fault::{Fault, Place};
 use super::line::{Members, Value};
-use super::text::Line;
+use super::text::{Line, Text};
 use crate::schema::{COLUMNS, Column};
 use exact::escape::visible;
 
@@ -69,20 +68,20 @@ impl Index {
     }
 
     /// The steps of all episodes, one after the other, each in the order of its t; faults where one is not whole.
-    pub(super) fn into_steps(self, names: &[Arc<str>], faults: &mut super::error::Faults) -> Vec<Step> {
+    pub(super) fn into_steps(self, texts: &[Text], faults: &mut super::error::Faults) -> Vec<Step> {
         let Self { heads, mut steps, .. } = self;
         steps.sort_by_key(|step| (step.episode, step.t));
         for episode in steps.chunk_by(|a, b| a.episode == b.episode) {
             let id = &heads[episode[0].episode].id;
-            faults.extend(sequence_fault(id, episode, names));
+            faults.extend(sequence_fault(id, episode, texts));
         }
         steps
     }
 }
 
 /// The first place where t is not one more than before.
-fn sequence_fault(id: &str, episode: &[Step], names: &[Arc<str>]) -> Option<Fault> {
-    let place = |step: &Step| Place { file: Arc::clone(&names[step.text]), line: step.line };
+fn sequence_fault(id: &str, episode: &[Step], texts: &[Text]) -> Option<Fault> {
+    let place = |step: &Step| texts[step.text].place(step.line);
     let of = format!("of episode `{}`", visible(id));
     let mut before: Option<&Step> = None;
     for step in episode {

@@ -2,6 +2,9 @@
 
 use serde_json::{Value, json};
 
+use super::error::ImportError;
+use super::format::Format;
+use super::text::Text;
 use crate::declared::{Cluster, Origin};
 use crate::schema::colors::palette::Palette;
 use crate::validate::Expected;
@@ -22,7 +25,8 @@ pub struct Limits<'a> {
 }
 
 impl Limits<'_> {
-    pub(super) fn recording(&self, sources: &[String]) -> Value {
+    pub(super) fn recording(&self, texts: &mut [Text]) -> Result<Value, ImportError> {
+        let sources = texts.iter_mut().map(Text::hash).collect::<Result<Vec<_>, _>>()?;
         let origin = if self.is_reconstruction { Origin::Reconstruction } else { Origin::Import };
         let mut recording = json!({ "kind": origin.name(), "sources": sources });
         if let Some(domain) = self.domain {
@@ -34,6 +38,11 @@ impl Limits<'_> {
         if let Some(cluster) = self.cluster {
             recording["design"] = json!({ "cluster": cluster });
         }
-        recording
+        if let Some(source) = texts.iter().find_map(Text::source) {
+            recording["mapping"] = source.mapping.clone();
+            let format = |text: &Text| text.source().map_or(Format::JsonLines, |source| source.format).name();
+            recording["formats"] = texts.iter().map(format).collect();
+        }
+        Ok(recording)
     }
 }

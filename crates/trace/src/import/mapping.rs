@@ -1,11 +1,10 @@
 //! Lines of another shape as flat steps: columns by the paths of their values, constants, and what is nested left out.
 
 use std::collections::BTreeMap;
-use std::io::{self, Write};
 
-use serde_json::{Map, Value};
+use serde_json::{Map, Value, json};
 
-use super::line;
+use crate::schema::domain::is_general;
 use crate::schema::{Kind, column};
 use exact::escape::visible;
 
@@ -15,7 +14,11 @@ pub struct Mapping {
     columns: Vec<(String, Path)>,
     constants: Vec<(String, Value)>,
     left_out: BTreeMap<String, u64>,
+    dropped: BTreeMap<String, u64>,
 }
+
+/// A row of any format: keys and values, nested ones too.
+pub(super) type Row<'a> = [(&'a str, &'a Value)];
 
 /// Where a value is in a line: keys and positions with dots between them, and what is added to an integer there.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -56,42 +59,48 @@ impl Mapping {
         self.columns.is_empty() && self.constants.is_empty()
     }
 
-    /// A note for each key whose lists or objects were left out.
+    /// A note for each key whose lists or objects were left out, and for each kind of record that is not a step.
     pub fn left_out(&self) -> Vec<String> {
-        let note = |(key, lines): (&String, &u64)| {
+        let nested = |(key, rows): (&String, &u64)| {
             format!(
-                "left out: `{}`, a list or an object in {lines} lines; `--map COLUMN={0}.PATH` takes a value out of it",
+                "left out: `{}`, a list or an object in {rows} lines; `--map COLUMN={0}.PATH` takes a value out of it",
                 visible(key)
             )
         };
-        self.left_out.iter().map(note).collect()
+        let dropped = |(what, count): (&String, &u64)| format!("left out: {count} {}", visible(what));
+        self.left_out.iter().map(nested).chain(self.dropped.iter().map(dropped)).collect()
     }
 
-    pub(super) fn write(&mut self, bytes: &[u8], out: &mut impl Write) -> io::Result<()> {
-        let object = line::members(bytes, true).ok().and_then(|_| serde_json::from_slice(bytes.trim_ascii()).ok());
-        match object {
-            Some(Value::Object(object)) => {
-                serde_json::to_writer(&mut *out, &self.flat(object))?;
-                out.write_all(b"\n")
-            }
-            _ => out.write_all(bytes),
-        }
+    /// What a footer says of the mapping.
+    pub(super) fn declared(&self) -> Value {
+        let path =
+            |path: &Path| if path.added == 0 { path.keys.clone() } else { format!("{}+{}", path.keys, path.added) };
+        let columns: Map<String, Value> =
+            self.columns.iter().map(|(name, at)| (name.clone(), json!(path(at)))).collect();
+        let constants: Map<String, Value> = self.constants.iter().cloned().collect();
+        json!({ "map": columns, "set": constants })
     }
 
-    fn flat(&mut self, object: Map<String, Value>) -> Map<String, Value> {
-        let object = Value::Object(object);
+    /// Counts records that are not steps.
+    pub(super) fn count_dropped(&mut self, what: String) {
+        *self.dropped.entry(what).or_default() += 1;
+    }
+
+    /// Whether a value comes from this path or from within it.
+    pub(super) fn reads(&self, keys: &str) -> bool {
+        self.columns.iter().any(|(_, path)| path.is_at(keys) || path.is_within(keys))
+    }
+
+    /// The columns of a row.
+    pub(super) fn flat(&mut self, row: &Row<'_>) -> Map<String, Value> {
         let mut flat: Map<String, Value> =
-            self.columns.iter().map(|(name, path)| (name.clone(), path.value(&object))).collect();
-        let Value::Object(object) = object else { return flat };
-        for (key, value) in object {
-            let is_taken = flat.contains_key(&key) || self.columns.iter().any(|(_, path)| path.keys == key);
-            let is_within =
-                |(_, path): &(String, Path)| path.keys.strip_prefix(&key).is_some_and(|rest| rest.starts_with('.'));
+            self.columns.iter().map(|(name, path)| (name.clone(), path.value(name, row))).collect();
+        for (key, value) in row {
             match value {
-                _ if is_taken => {}
-                Value::Array(_) | Value::Object(_) if self.columns.iter().any(is_within) => {}
-                Value::Array(_) | Value::Object(_) => *self.left_out.entry(key).or_default() += 1,
-                value => drop(flat.insert(key, value)),
+                _ if flat.contains_key(*key) || self.columns.iter().any(|(_, path)| path.is_at(key)) => {}
+                Value::Array(_) | Value::Object(_) if self.columns.iter().any(|(_, path)| path.is_within(key)) => {}
+                Value::Array(_) | Value::Object(_) => *self.left_out.entry((*key).to_owned()).or_default() += 1,
+                value => drop(flat.insert((*key).to_owned(), (*value).clone())),
             }
         }
         flat.extend(self.constants.iter().cloned());
@@ -100,29 +109,47 @@ impl Mapping {
 }
 
 impl Path {
-    /// The value in a line; null where there is none.
-    fn value(&self, line: &Value) -> Value {
-        let found = at(line, &self.keys).cloned().unwrap_or_default();
-        match found.as_i64().and_then(|number| number.checked_add(self.added)) {
+    fn is_at(&self, key: &str) -> bool {
+        self.keys == key
+    }
+
+    fn is_within(&self, key: &str) -> bool {
+        self.keys.strip_prefix(key).is_some_and(|rest| rest.starts_with('.'))
+    }
+
+    /// The value in a row; null where there is none. A number becomes a text where every domain has a text.
+    fn value(&self, name: &str, row: &Row<'_>) -> Value {
+        let member = |key: &str| row.iter().find(|(name, _)| *name == key).map(|(_, value)| *value);
+        let found = within(member, &self.keys).cloned().unwrap_or_default();
+        let found = match found.as_i64().and_then(|number| number.checked_add(self.added)) {
             Some(number) => Value::from(number),
             None => found,
-        }
+        };
+        if found.is_number() && is_general_text(name) { Value::String(found.to_string()) } else { found }
     }
+}
+
+/// Whether traces of every domain have a text in the column of this name.
+pub(super) fn is_general_text(name: &str) -> bool {
+    is_general(name) && column(name).is_some_and(|column| column.stored.kind() == Kind::String)
 }
 
 fn at<'v>(value: &'v Value, path: &str) -> Option<&'v Value> {
     match value {
         value if path.is_empty() => Some(value),
-        Value::Object(members) => members.get(path).or_else(|| {
-            let mut dots = path.match_indices('.');
-            dots.find_map(|(dot, _)| at(members.get(&path[..dot])?, &path[dot + 1..]))
-        }),
+        Value::Object(members) => within(|key| members.get(key), path),
         Value::Array(list) => {
             let (position, rest) = path.split_once('.').unwrap_or((path, ""));
             at(list.get(position.parse::<usize>().ok()?)?, rest)
         }
         _ => None,
     }
+}
+
+/// The value at a path whose first keys are those of `member`. A key may have dots itself.
+fn within<'v>(member: impl Fn(&str) -> Option<&'v Value>, path: &str) -> Option<&'v Value> {
+    let nested = || path.match_indices('.').find_map(|(dot, _)| at(member(&path[..dot])?, &path[dot + 1..]));
+    member(path).or_else(nested)
 }
 
 fn pair(typed: &str, expected: &'static str) -> Result<(String, String), MappingError> {

@@ -14,6 +14,7 @@
 mod columns;
 mod error;
 mod fault;
+mod format;
 mod index;
 mod limits;
 mod line;
@@ -28,6 +29,7 @@ use std::path::Path;
 pub use columns::Own;
 pub use error::ImportError;
 pub use fault::Fault;
+pub use format::Format;
 pub use limits::Limits;
 pub use mapping::{Mapping, MappingError};
 use parquet::errors::ParquetError;
@@ -66,8 +68,7 @@ pub fn import(texts: &mut [Text], out: &Path, limits: Limits<'_>) -> Result<Impo
     }
     faults.extend(columns.faults());
     faults.none()?;
-    let names: Vec<_> = texts.iter().map(Text::shared_name).collect();
-    let steps = index.into_steps(&names, &mut faults);
+    let steps = index.into_steps(texts, &mut faults);
     faults.none()?;
     let file = write(texts, &columns, &steps, out, limits)?;
     check(&file, out, limits.expected)?;
@@ -124,8 +125,7 @@ fn write(
     out: &Path,
     limits: Limits<'_>,
 ) -> Result<NewFile, ImportError> {
-    let hashes = texts.iter_mut().map(Text::hash).collect::<Result<Vec<_>, _>>()?;
-    let recording = limits.recording(&hashes);
+    let recording = limits.recording(texts)?;
     let file = NewFile::create(out).map_err(|error| unwritable(out, error))?;
     let failed = |error: ParquetError| TraceError::Write { file: out.display().to_string(), source: Box::new(error) };
     let mut rows = rows::Rows::new(file, columns, &recording).map_err(failed)?;

@@ -4,12 +4,15 @@
 //! blank lines hold no step and are passed over; blank lines count. A line may end with `\n` or `\r\n`.
 
 use std::fs::File;
-use std::io::{self, BufReader, BufWriter, Read, Seek as _, SeekFrom, Write as _};
+use std::io::{self, BufReader, Read, Seek as _, SeekFrom};
 use std::path::Path;
 use std::sync::Arc;
 
+use serde_json::Value;
+
 use super::error::ImportError;
 use super::fault::{Fault, Place};
+use super::format::{Format, Rows};
 use super::line::{self, Members};
 use super::mapping::Mapping;
 use crate::inputs::Input;
@@ -22,6 +25,8 @@ use exact::input;
 #[derive(Debug)]
 pub struct Text {
     name: Arc<str>,
+    /// What a line is in the file of the user.
+    noun: &'static str,
     reader: BufReader<File>,
     /// Where the reader is, in bytes from the start.
     offset: u64,
@@ -29,6 +34,17 @@ pub struct Text {
     lines: u64,
     /// Whether the lines are rows of a data frame, which holds integers beside nulls as floating-point numbers.
     is_frame: bool,
+    /// The file that the lines were made of, if they were.
+    source: Option<Source>,
+}
+
+/// A file of another shape, and how its rows became steps.
+#[derive(Clone, Debug)]
+pub(super) struct Source {
+    sha256: String,
+    pub(super) format: Format,
+    /// Paths and constants, as footers declare them.
+    pub(super) mapping: Value,
 }
 
 /// One line that is not blank.
@@ -48,7 +64,7 @@ const LONGEST_LINE: Limit = Limit::new("bytes in a line of steps", 16 << 20);
 /// What is piped in is kept on the disk meanwhile.
 const LARGEST_STREAM: Limit = Limit::new("bytes of steps that are piped in", 64 << 30);
 
-const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
+pub(super) const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
 
 impl Text {
     /// The text in this file.
@@ -77,25 +93,24 @@ impl Text {
         Ok(Self { is_frame: true, ..Self::spool(name, rows)? })
     }
 
-    /// The same lines as flat steps, kept in a temporary file.
-    pub fn mapped(mut self, mapping: &mut Mapping) -> Result<Self, ImportError> {
-        let mut file = tempfile::tempfile().map_err(ImportError::read(&self.name))?;
-        let mut out = BufWriter::new(&mut file);
-        loop {
-            let line = self.read_line()?;
-            if line.is_empty() {
-                break;
-            }
-            let line = line.strip_prefix(BYTE_ORDER_MARK).unwrap_or(&line);
-            mapping.write(line, &mut out).map_err(ImportError::read(&self.name))?;
+    /// The rows of a file of this format as lines of flat steps, kept in a temporary file.
+    pub fn mapped(mut self, format: Format, mapping: &mut Mapping) -> Result<Self, ImportError> {
+        if format == Format::JsonLines && mapping.is_empty() {
+            return Ok(self);
         }
-        out.flush().map_err(ImportError::read(&self.name))?;
-        drop(out);
-        Ok(Self::of_file(&self.name, file))
+        let source = Some(Source { sha256: self.hash()?, format, mapping: mapping.declared() });
+        let mut rows = Rows::new(&self.name, mapping)?;
+        match format {
+            Format::JsonLines => while rows.add_line(&self.read_line()?)? {},
+            _ => format.read(self.reader.into_inner(), &mut rows)?,
+        }
+        let lines = Self::of_file(&self.name, rows.finish()?);
+        Ok(Self { noun: format.noun(), source, ..lines })
     }
 
     fn of_file(name: &str, file: File) -> Self {
-        Self { name: name.into(), reader: BufReader::new(file), offset: 0, lines: 0, is_frame: false }
+        let reader = BufReader::new(file);
+        Self { name: name.into(), noun: "line", reader, offset: 0, lines: 0, is_frame: false, source: None }
     }
 
     pub(super) fn members(&self, bytes: &[u8], ended: bool) -> Result<Members, Box<Fault>> {
@@ -111,8 +126,12 @@ impl Text {
         &self.name
     }
 
-    pub(super) fn shared_name(&self) -> Arc<str> {
-        Arc::clone(&self.name)
+    pub(super) const fn source(&self) -> Option<&Source> {
+        self.source.as_ref()
+    }
+
+    pub(super) fn place(&self, line: u64) -> Place {
+        Place { file: Arc::clone(&self.name), noun: self.noun, line }
     }
 
     pub(super) fn rewind(&mut self) -> Result<(), ImportError> {
@@ -122,6 +141,9 @@ impl Text {
     }
 
     pub(super) fn hash(&mut self) -> Result<String, ImportError> {
+        if let Some(source) = &self.source {
+            return Ok(source.sha256.clone());
+        }
         self.rewind()?;
         let hash = hash::of_reader(&mut self.reader).map_err(ImportError::read(&self.name))?;
         self.rewind()?;
@@ -142,7 +164,7 @@ impl Text {
                 bytes.drain(..BYTE_ORDER_MARK.len());
             }
             if !bytes.trim_ascii().is_empty() {
-                let place = Place { file: Arc::clone(&self.name), line: self.lines };
+                let place = self.place(self.lines);
                 return Ok(Some(Line { place, offset, bytes, ended }));
             }
         }

@@ -13,8 +13,8 @@ use arrow::datatypes::{DataType, Int64Type, Schema, SchemaRef};
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{RowSelection, RowSelector};
 
-pub use super::decode_episode::OwnColumn;
-use super::decode_episode::{self, NotAnEpisode};
+use super::decode_episode;
+pub use super::decode_episode::{NotAnEpisode, OwnColumn};
 use crate::catch_panic::contained;
 use crate::diagnostic::{Code, Finding};
 use crate::episode::Episode;

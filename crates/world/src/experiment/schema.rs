@@ -10,7 +10,7 @@ use super::spec::{
     AbsentColumn, Actions, BodyShown, Camera, Colors, Cubes, Decision, MOST_MARKS, MOST_PANES, Mark, Others, Paint,
     PaneKind, Picture, ReplyKey, Start, Stated, Truth, Wall,
 };
-use exact::ratio::Ratio;
+use metric::shape::{Fraction, Level};
 use trace::palette::Color;
 
 /// A file of experiments.
@@ -118,35 +118,6 @@ pub struct HandTable {
     /// The steps of an episode beyond those from the start to the mark; 10 if absent.
     #[schemars(range(max = 1000))]
     pub extra_steps: Option<u32>,
-}
-
-/// A chance level.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
-#[serde(untagged)]
-pub enum Level {
-    /// There is none.
-    None(NoLevel),
-    /// This one.
-    Of(Fraction),
-}
-
-/// The word that says that there is no level.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
-pub enum NoLevel {
-    /// `none`.
-    #[serde(rename = "none")]
-    None,
-}
-
-/// A fraction in quotes such as `1/3`, or a number.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
-#[serde(untagged)]
-pub enum Fraction {
-    /// In quotes.
-    #[schemars(with = "Ratio")]
-    Text(String),
-    /// A decimal is the fraction that it says: `0.25` is 1/4.
-    Number(f64),
 }
 
 /// A mirror, or something in a mirror's place.

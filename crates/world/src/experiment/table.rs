@@ -109,16 +109,14 @@ fn levels(at: &At<'_>, faults: &mut Vec<Fault>) -> IndexMap<String, String> {
         "none" => Some("none".to_owned()),
         _ => at.parse::<Ratio>(faults).map(|ratio| ratio.to_string()),
     };
-    let entries = at.get("chance").into_iter().flat_map(|levels| levels.entries().collect::<Vec<_>>());
-    entries.filter_map(|(metric, at)| Some((metric.to_owned(), level(&at)?))).collect()
+    at.within("chance").filter_map(|(metric, at)| Some((metric.to_owned(), level(&at)?))).collect()
 }
 
 fn references(at: &At<'_>, faults: &mut Vec<Fault>) -> IndexMap<String, Vec<String>> {
-    let entries = at.get("reference").into_iter().flat_map(|levels| levels.entries().collect::<Vec<_>>());
     let mut texts = |levels: &At<'_>| {
         levels.items().filter_map(|at| at.parse::<Ratio>(faults).map(|ratio| ratio.to_string())).collect()
     };
-    entries.map(|(metric, levels)| (metric.to_owned(), texts(&levels))).collect()
+    at.within("reference").map(|(metric, levels)| (metric.to_owned(), texts(&levels))).collect()
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "lengths are checked to be small")]

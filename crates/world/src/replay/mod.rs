@@ -7,6 +7,7 @@
 //! | `frames` | frames of an episode rendered again, some steps at a time |
 //! | `again` | a trace's worlds built anew, its actions repeated, every row held against what comes of it |
 //! | `log` | what an episode's log is told, step by step, by a recording or a replay |
+//! | [`reparse`] | recorded replies read again by the parser of this program |
 //! | [`moments`] | which steps of an episode tell its story |
 //!
 //! Rule: a replay reads the trace alone; what it needs of the world is in the trace's footer.
@@ -24,5 +25,6 @@ pub mod frames;
 #[cfg(feature = "sim")]
 pub mod log;
 pub mod moments;
+pub mod reparse;
 #[cfg(feature = "sim")]
 pub mod verify;

@@ -49,9 +49,12 @@ pub struct PlanArgs {
     /// The share of pairs in which one model alone succeeds [default: as if independent, the worst case]
     #[arg(long, value_name = "SHARE", value_parser = share)]
     pub discordance: Option<f64>,
-    /// Intraclass correlation of the episodes of one seed
+    /// Intraclass correlation of the episodes of one seed: above 0, tests count seeds, as `stats` does
     #[arg(long, value_name = "ICC", default_value = "0", value_parser = share)]
     pub icc: f64,
+    /// Look after each run of all seeds with `stats --sequential`, and stop at the first verdict
+    #[arg(long, conflicts_with = "icc")]
+    pub sequential: bool,
     /// A level of chance to hold each model against as well, such as 1/3
     #[arg(long, value_name = "LEVEL", value_parser = chance)]
     pub chance: Option<Ratio>,
@@ -110,6 +113,7 @@ impl PlanArgs {
             clusters: Clusters { seeds: self.seeds, icc: self.icc },
             discordance: self.discordance,
             chance: self.chance,
+            sequential: self.sequential,
         })
     }
 

@@ -13,7 +13,7 @@ use exact::escape::visible;
 use study::Question;
 use trace::inputs;
 use view::{Options, View, ViewError, export, routes};
-use web::{Guard, check_token};
+use web::{Guard, check_token, new_token};
 
 /// Look at recordings in the browser: the report, every episode step by step, two beside each other
 ///
@@ -40,17 +40,20 @@ pub struct ViewArgs {
     /// The port; 0 for any that is free
     #[arg(long, value_name = "PORT", default_value_t = 7431)]
     port: u16,
-    /// Listen on this address or name too, not on this machine alone; needs --token
-    #[arg(long, value_name = "HOST", requires = "token")]
+    /// Listen on this address or name instead of this machine alone; the connection is not encrypted
+    #[arg(long, value_name = "HOST", conflicts_with = "no_token")]
     host: Option<String>,
-    /// Ask for this word, which the printed link has: at least 16 letters and digits
+    /// The token of the link: at least 16 letters and digits; a new one each time if absent
     #[arg(long, value_name = "TOKEN", value_parser = token)]
     token: Option<String>,
+    /// Let every account of this machine open the page without a token
+    #[arg(long, conflicts_with = "token")]
+    no_token: bool,
     /// Open no browser
     #[arg(long)]
     no_open: bool,
     /// Write the page and all that it shows into this folder instead
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["port", "host", "token", "no_open", "episode"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["port", "host", "token", "no_token", "no_open", "episode"])]
     export: Option<PathBuf>,
     #[command(flatten)]
     threads: ThreadArgs,
@@ -90,7 +93,9 @@ impl ViewArgs {
             Failure::Rendered(format!("error: cannot listen on {host}:{}: {error}\n  help: {help}", self.port))
         };
         let (listener, address) = routes::bind(host, self.port).map_err(taken)?;
-        let guard = Guard::new(address, self.host.as_deref(), self.token.as_deref());
+        let drawn = (self.token.is_none() && !self.no_token).then(new_token).transpose();
+        let drawn = drawn.map_err(|error| Failure::input(format!("cannot make a token: {error}")))?;
+        let guard = Guard::new(address, self.host.as_deref(), self.token.as_deref().or(drawn.as_deref()));
         let link = self
             .episode
             .as_deref()
@@ -98,6 +103,11 @@ impl ViewArgs {
         writeln!(io::stdout(), "{link}")?;
         io::stdout().flush()?;
         output::say(&format!("{} episodes; Ctrl-C ends it", view.episodes()));
+        if !address.ip().is_loopback() {
+            output::say(
+                "note: the connection is not encrypted; anyone on the network can read it. Use a tunnel: `ssh -L`",
+            );
+        }
         if !self.no_open {
             open(&link);
         }

@@ -1,4 +1,4 @@
-//! `rescore`: a report again from its own traces, under other definitions.
+//! `rescore`: a report again from its own traces, under other definitions or with replies read again.
 
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
@@ -10,12 +10,16 @@ use crate::cli::args::ThreadArgs;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::text_table::counted;
 use crate::cli::{output, terminal};
+use exact::escape::visible;
 use report::bundle::Manifest;
 use report::cells::diff::Changes;
 use report::changes::Limit;
-use study::{RescoreRequest, Rescored, WrittenReport, folder_of_rescored};
+use report::tables::Table;
+use study::{RescoreRequest, Rescored, WrittenReport, folder_of_rescored, traces_of};
+use trace::inputs::Input;
+use world::replay::reparse::{Diverged, ReparseAnswer};
 
-/// Make a report again from the traces that it was made of, under other definitions
+/// Make a report again from the traces that it was made of, under other definitions or with replies read again
 ///
 /// The new report keeps the filter, the grouping, the style and the choice of metrics of the old one, which stays as
 /// it is. Traces are found by their hashes: below the current folder, the report's folder and the folders above it,
@@ -25,9 +29,13 @@ pub struct RescoreArgs {
     /// The folder of the report
     #[arg(value_name = "REPORT_DIR")]
     pub report: PathBuf,
-    /// The definitions to score under: `paper`, `extended`, or a TOML file
-    #[arg(long, value_name = "NAME|FILE")]
-    pub definitions: PathBuf,
+    /// The definitions to score under: `paper`, `extended`, or a TOML file [default with --reparse: those that the traces name]
+    #[arg(long, value_name = "NAME|FILE", required_unless_present = "reparse")]
+    pub definitions: Option<PathBuf>,
+    /// Read the kept raw replies again with the parser of this program, and score that: recorded actions stay, what changes is
+    /// listed, and the new traces are in a folder beside that of the new report, `OUT-traces`
+    #[arg(long)]
+    pub reparse: bool,
     /// The folder to write [default: REPORT_DIR-rescored]
     #[arg(short, long, value_name = "DIR")]
     pub out: Option<PathBuf>,
@@ -61,6 +69,8 @@ pub struct RescoreAnswer {
     pub episodes: usize,
     /// Where everything comes from; the same as the new `manifest.json`.
     pub manifest: Manifest,
+    /// What another reading of the replies changes; null without --reparse.
+    pub reparsed: Option<ReparseAnswer>,
     /// What changed from the old report; null where its scores are not readable.
     pub changes: Option<Changes>,
 }
@@ -68,35 +78,50 @@ pub struct RescoreAnswer {
 impl RescoreArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
         let out = folder_of_rescored(&self.report, self.out.as_deref())?;
-        let rescored = self.request(&out).run()?;
+        let mut traces = traces_of(&self.report, &self.traces)?;
+        let mut reparsed = None;
+        if self.reparse {
+            let (answer, new) = reparse(&traces, &out)?;
+            (reparsed, traces) = (Some(answer), new);
+        }
+        let rescored = self.request(&out, traces).run()?;
         output::notes(&rescored.report.notes);
         let written = rescored.report.write(&out)?;
         match &rescored.changes {
             Ok(diff) => output::notes(&diff.notes),
             Err(reason) => output::note(&format!("no comparison with the old report: {reason}")),
         }
-        self.print(&out, written, rescored)
+        self.print(&out, written, rescored, reparsed)
     }
 
-    fn request(&self, out: &Path) -> RescoreRequest {
+    fn request(&self, out: &Path, traces: Vec<Input>) -> RescoreRequest {
         RescoreRequest {
             report: self.report.clone(),
             out: out.to_owned(),
             definitions: self.definitions.clone(),
-            places: self.traces.clone(),
+            traces,
             style: self.style.clone(),
             metrics: self.metrics.clone(),
             threads: self.threads.count(),
         }
     }
 
-    fn print(&self, out: &Path, written: WrittenReport, rescored: Rescored) -> Result<Outcome, Failure> {
+    fn print(
+        &self,
+        out: &Path,
+        written: WrittenReport,
+        rescored: Rescored,
+        reparsed: Option<ReparseAnswer>,
+    ) -> Result<Outcome, Failure> {
         let Rescored { report, changes } = rescored;
         let changes = changes.ok().map(|diff| diff.changes);
         let (out, episodes) = (out.display().to_string(), report.results.episodes.len());
         if self.json {
             let WrittenReport { files, manifest } = written;
-            return output::print_json(&RescoreAnswer { out, files, episodes, manifest, changes });
+            return output::print_json(&RescoreAnswer { out, files, episodes, manifest, reparsed, changes });
+        }
+        if let Some(reparsed) = &reparsed {
+            tell_reparsed(&mut io::stdout().lock(), reparsed, self.limit)?;
         }
         if let Some(changes) = &changes {
             io::stdout().lock().write_all(changes.render(Limit(self.limit), terminal::width()).as_bytes())?;
@@ -104,4 +129,48 @@ impl RescoreArgs {
         output::say(&format!("{}; the report is in {out}", counted(episodes as u64, "episode")));
         Ok(Outcome::Done)
     }
+}
+
+/// Reads the replies of traces again; the new ones are in a folder beside `out`.
+fn reparse(traces: &[Input], out: &Path) -> Result<(ReparseAnswer, Vec<Input>), Failure> {
+    let mut folder = out.as_os_str().to_owned();
+    folder.push("-traces");
+    let folder = Path::new(&folder);
+    for (at, trace) in traces.iter().enumerate() {
+        let target = folder.join(trace.path.file_name().unwrap_or_default());
+        output::check_target(&target, [&trace.path])?;
+        if let Some(other) = traces[..at].iter().find(|other| other.path.file_name() == trace.path.file_name()) {
+            return Err(Failure::input(format!(
+                "`{}` and `{}` have one name",
+                visible(&other.name),
+                visible(&trace.name)
+            )));
+        }
+    }
+    output::make_folder(folder)?;
+    ReparseAnswer::of(traces, folder).map_err(Failure::input)
+}
+
+fn tell_reparsed(out: &mut impl io::Write, answer: &ReparseAnswer, most: usize) -> io::Result<()> {
+    let mut table =
+        Table { names: 2, ..Table::of_texts(["episode", "t", "column", "before", "after"]).aligned_right([1]) };
+    let name = |value: &Option<String>| visible(value.as_deref().unwrap_or("--"));
+    for change in answer.changes.iter().take(most) {
+        let (before, after) = (name(&change.before), name(&change.after));
+        table.push([visible(&change.episode_id), change.t.to_string(), change.column.to_owned(), before, after]);
+    }
+    if !answer.changes.is_empty() {
+        writeln!(out, "{}", table.within(terminal::width()))?;
+    }
+    for Diverged { episode_id, t, recorded, parsed } in answer.diverged.iter().take(most) {
+        let [recorded, parsed] = [recorded, parsed].map(|action| action.unwrap_or("none"));
+        writeln!(
+            out,
+            "{} would have gone on otherwise from t = {t}: the action was {recorded} and would be {parsed}",
+            visible(episode_id)
+        )?;
+    }
+    let (changes, steps) = (counted(answer.changes.len() as u64, "value"), counted(answer.replies, "step"));
+    let diverged = counted(answer.diverged.len() as u64, "episode");
+    writeln!(out, "{changes} changed in {steps} with a reply; {diverged} would have gone on otherwise")
 }

@@ -1,24 +1,29 @@
-//! `mirrorstats import`: JSON lines of steps, of whatever harness, as a trace.
+//! `mirrorstats import`: steps of any harness as a trace.
 
 use std::io;
 use std::path::{Path, PathBuf};
 
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use exact::replace;
 use study::ImportRequest;
-use trace::import::{Mapping, Text};
+use trace::import::{Format, Mapping, Text};
 
-/// Make a trace of JSON lines of steps: episodes of any harness can be scored
+/// Make a trace of steps or logs of another harness, so that its episodes can be scored
 ///
-/// One line is one step: an object with the columns of the schema as keys, as `mirrorstats trace schema step` prints them.
-/// Other keys become columns of their own. Lines of an episode may be in any order and in several files. The trace holds
-/// every line and keeps every rule of `mirrorstats trace validate`, or nothing is written.
+/// One line or row is one step: its keys are columns of the schema, as `mirrorstats trace schema step` prints them. Other
+/// keys become columns of their own. Rows of an episode may be in any order and in several files. The trace holds every row
+/// and keeps every rule of `mirrorstats trace validate`, or nothing is written. Logs of Inspect, inspect-robots and LeRobot
+/// are read as they are; what they hold that is not a step is counted and named.
 #[derive(Clone, Debug, clap::Args)]
 pub struct ImportArgs {
-    /// Files of JSON lines, `-` for standard input
-    #[arg(value_name = "STEPS.jsonl", required = true)]
+    /// Files of steps, `-` for standard input
+    #[arg(value_name = "FILE", required = true)]
     steps: Vec<PathBuf>,
+    /// How the files are written; by default their names and first bytes say it
+    #[arg(long, value_name = "FORMAT", value_parser = formats())]
+    from: Option<Format>,
     /// The trace to write
     #[arg(short, long, value_name = "TRACE.parquet")]
     out: PathBuf,
@@ -60,7 +65,7 @@ impl ImportArgs {
     pub fn run(&self) -> Result<Outcome, Failure> {
         self.check_places()?;
         let mut mapping = Mapping::parse(&self.map, &self.set).map_err(Failure::input)?;
-        let texts = self.steps.iter().map(|path| text(path, &mut mapping)).collect::<Result<Vec<_>, _>>()?;
+        let texts = self.steps.iter().map(|path| text(path, self.from, &mut mapping)).collect::<Result<Vec<_>, _>>()?;
         output::notes(&mapping.left_out());
         let request = ImportRequest {
             out: self.out.clone(),
@@ -82,10 +87,15 @@ impl ImportArgs {
     }
 }
 
-fn text(path: &Path, mapping: &mut Mapping) -> Result<Text, Failure> {
+fn text(path: &Path, from: Option<Format>, mapping: &mut Mapping) -> Result<Text, Failure> {
     let text = if is_standard_input(path) { Text::spool("standard input", io::stdin()) } else { Text::open(path) };
-    let text = if mapping.is_empty() { text } else { text.and_then(|text| text.mapped(mapping)) };
-    text.map_err(Failure::input)
+    let format = from.unwrap_or_else(|| Format::of_file(path));
+    text.and_then(|text| text.mapped(format, mapping)).map_err(Failure::input)
+}
+
+fn formats() -> impl TypedValueParser<Value = Format> {
+    let names = PossibleValuesParser::new(Format::ALL.map(Format::name));
+    names.map(|name| Format::named(&name).expect("it is one of the names"))
 }
 
 fn is_standard_input(path: &Path) -> bool {

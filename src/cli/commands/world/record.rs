@@ -5,8 +5,10 @@ use std::io;
 use std::num::{NonZeroU32, NonZeroUsize};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};
+
+use serde::Serialize;
 
 use super::configured;
 use crate::cli::args::ThreadArgs;
@@ -18,14 +20,15 @@ use crate::cli::human::HumanArgs;
 use crate::cli::options_of;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
-use crate::cli::recording::several;
-use crate::cli::recording::{self, Bar, RecordAnswer};
+use crate::cli::recording::interrupt::{Playing, stop_at_interrupt};
+use crate::cli::recording::{self, Bar, RecordAnswer, probe, several};
 use crate::cli::registration::registration;
 use crate::cli::vlm::VlmArgs;
 use exact::escape::visible;
 use exact::suggest::hint;
 use world::agent::Player;
 use world::agent::scripted::{Renamed, Scripted};
+use world::agent::vlm::probe::ProbeAnswer;
 use world::record::error::StoreError;
 use world::record::index::{Place, RecordingIndex};
 use world::record::metadata::Recordings;
@@ -45,7 +48,7 @@ use world::sim::config::WorldConfig;
 #[expect(clippy::struct_excessive_bools, reason = "a flag each on the command line")]
 pub struct RecordArgs {
     /// A study file: options of this command for all models, [model."NAME"] for one and [condition.NAME] for a condition;
-    /// --dry-run and --json alone may stand beside it
+    /// --dry-run, --probe and --json alone may stand beside it
     #[arg(value_name = "STUDY")]
     study: Option<PathBuf>,
     /// Who plays: oracle, random, guesser, gullible, confabulator, frozen, mimic; vlm, a model behind a provider; human, people
@@ -100,6 +103,10 @@ pub struct RecordArgs {
     /// Say what would be recorded, and what a model's requests may take and cost; record, write and send nothing
     #[arg(long)]
     dry_run: bool,
+    /// Send one request per model and say what it takes: parameters and schema, which model answers, cost and time; record and
+    /// write nothing
+    #[arg(long, conflicts_with = "dry_run")]
+    probe: bool,
     /// Print what became of the episodes as JSON
     #[arg(long)]
     json: bool,
@@ -125,6 +132,9 @@ impl RecordArgs {
         if self.dry_run {
             return self.print_forecasts(&forecasts()?);
         }
+        if self.probe {
+            return self.print_probes(&each);
+        }
         if each.len() > 1 {
             dry_run::tell_all(&mut io::stderr().lock(), &forecasts()?)?;
         }
@@ -148,7 +158,12 @@ impl RecordArgs {
 
     fn print_answers(&self, all: &[Result<Recorded, Failure>]) -> Result<(), Failure> {
         let answers: Vec<&RecordAnswer> = all.iter().flatten().map(|recorded| &recorded.answer).collect();
-        match answers.as_slice() {
+        self.print_list(&answers)
+    }
+
+    /// Prints one answer, or the list of a study or of several models.
+    fn print_list<T: Serialize>(&self, answers: &[T]) -> Result<(), Failure> {
+        match answers {
             all if self.is_list() => output::print_json(&all).map(drop),
             [answer, ..] => output::print_json(answer).map(drop),
             [] => Ok(()),
@@ -182,11 +197,36 @@ impl RecordArgs {
 
     fn print_forecasts(&self, forecasts: &[ForecastAnswer]) -> Result<Outcome, Failure> {
         match forecasts {
-            all if self.json && self.is_list() => output::print_json(&all),
-            [one] if self.json => output::print_json(one),
+            all if self.json => self.print_list(all).map(|()| Outcome::Done),
             [one] => Ok(dry_run::tell(&mut io::stdout().lock(), one).map(|()| Outcome::Done)?),
             all => Ok(dry_run::tell_all(&mut io::stdout().lock(), all).map(|()| Outcome::Done)?),
         }
+    }
+
+    fn print_probes(&self, each: &[Self]) -> Result<Outcome, Failure> {
+        let mut answers = Vec::new();
+        for args in each {
+            let answer = args.probe()?;
+            if !self.json {
+                probe::tell(&mut io::stdout().lock(), &answer)?;
+            }
+            answers.push(answer);
+        }
+        if self.json {
+            self.print_list(&answers)?;
+        }
+        let is_good = answers.iter().all(ProbeAnswer::is_good);
+        Ok(if is_good { Outcome::Done } else { Outcome::CheckFailed })
+    }
+
+    fn probe(&self) -> Result<ProbeAnswer, Failure> {
+        if self.agent != "vlm" || !self.vlm.sends() {
+            return Err(Failure::input("--probe needs a model behind a provider: --agent vlm, without --cassette"));
+        }
+        let config = configured(self.config.as_ref())?;
+        let experiments = experiments::asked(&self.experiment, &config)?;
+        let first = experiments.first().ok_or_else(|| Failure::input("--probe needs an experiment"))?;
+        self.vlm.probe(*first, [config.eye.width, config.eye.height_px])
     }
 
     fn files(&self) -> Vec<&Path> {
@@ -249,9 +289,12 @@ impl RecordArgs {
         let there = RecordingIndex::new(&self.out, subject.clone(), recording);
         let planned = plan.keys();
         let todo = unrecorded(plan, &planned, |experiment| there.recorded(experiment))?;
+        let finished = others(&planned, &todo);
+        let limits = (self.settings(player.as_ref()).in_flight.get(), self.vlm.requests_per_minute());
         let vlm = vlm.filter(|_| self.vlm.sends());
         let requests =
-            vlm.map(|vlm| RequestForecast::of(&vlm, &subject, &todo, config)).transpose().map_err(Failure::input)?;
+            vlm.map(|vlm| RequestForecast::of(&vlm, &subject, (&finished, &todo), config, limits)).transpose();
+        let requests = requests.map_err(Failure::input)?;
         Ok(ForecastAnswer::of(&subject, planned.len(), &todo, config, requests))
     }
 
@@ -282,8 +325,7 @@ impl RecordArgs {
         player.ended(outcome.as_ref().is_ok_and(|tally| !tally.stopped));
         let tally = outcome.map_err(Failure::input)?;
         assembled.map_err(Failure::input)?;
-        let missing: BTreeSet<Key> = todo.iter().copied().collect();
-        let found: Vec<Key> = planned.iter().copied().filter(|key| !missing.contains(key)).collect();
+        let found = others(&planned, &todo);
         let Tally { recorded, elsewhere, lost, under_way, by_limit, steps, stopped, given_up } = tally;
         let all = [found.as_slice(), &recorded, &elsewhere].concat();
         let lost_here = lost.len();
@@ -341,9 +383,6 @@ pub struct Recorded {
     times: Spent,
 }
 
-/// Who plays now.
-type Playing = Arc<Mutex<Option<Arc<dyn Player>>>>;
-
 fn files(plan: &Plan, path: impl Fn(Experiment) -> PathBuf) -> Vec<String> {
     let paths = plan.experiments.iter().map(|experiment| path(*experiment));
     paths.filter(|path| path.exists()).map(|path| path.display().to_string()).collect()
@@ -373,6 +412,12 @@ fn unrecorded(
     Ok(todo)
 }
 
+/// The planned episodes without those to do.
+fn others(planned: &[Key], todo: &[Key]) -> Vec<Key> {
+    let todo: BTreeSet<&Key> = todo.iter().collect();
+    planned.iter().copied().filter(|key| !todo.contains(key)).collect()
+}
+
 fn condition(text: &str) -> Result<String, String> {
     match text {
         "" => Err("expected a name such as near, found nothing".to_owned()),
@@ -382,28 +427,4 @@ fn condition(text: &str) -> Result<String, String> {
         }
         name => Ok(name.to_owned()),
     }
-}
-
-fn stop_at_interrupt(stop: &'static AtomicBool, playing: Playing) -> Result<(), Failure> {
-    ctrlc::set_handler(move || {
-        if stop.swap(true, Ordering::Relaxed) {
-            if let Some(player) = playing.lock().unwrap_or_else(PoisonError::into_inner).as_ref() {
-                player.abandon();
-            }
-            leave(130);
-        }
-    })
-    .map_err(|error| Failure::input(format!("cannot listen for Ctrl-C: {error}")))
-}
-
-/// Ends the process at once, without the exit handlers of libraries: those of the renderer would take apart what other
-/// threads are drawing with. What is lost is temporary, and swept by the next recording.
-#[cfg(unix)]
-fn leave(code: i32) -> ! {
-    signal_hook::low_level::exit(code)
-}
-
-#[cfg(not(unix))]
-fn leave(code: i32) -> ! {
-    std::process::exit(code)
 }

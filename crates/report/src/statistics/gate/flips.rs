@@ -32,12 +32,14 @@ pub struct Played {
     pub frames: Option<String>,
 }
 
-/// The pairs of episodes whose values differ: of equal scenes in their order, or of equal ids where no scene is declared.
+/// The pairs of episodes whose values differ: of equal scenes in their order, or of equal ids where no scene is declared; none of reconstructions.
 pub(super) fn of(study: &Study, column: &MetricColumn, [base, new]: [&Block; 2]) -> Vec<FlippedPair> {
     let id = |row: usize| sides::id(study.table.keys.get(row).episode_id);
     let by_scene = |block: &Block| Scenes::of(study, block).rows;
     let (old, later) = (by_scene(base), by_scene(new));
-    let pairs: Vec<(usize, usize)> = if old.is_empty() || later.is_empty() {
+    let pairs: Vec<(usize, usize)> = if !study.design.has_pairs() {
+        Vec::new()
+    } else if old.is_empty() || later.is_empty() {
         let old: BTreeMap<&str, usize> = base.rows().map(|row| (id(row), row)).collect();
         new.rows().filter_map(|row| Some((*old.get(id(row))?, row))).collect()
     } else {

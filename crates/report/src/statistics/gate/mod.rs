@@ -244,8 +244,8 @@ impl Tried {
 fn units(study: &Study, column: &MetricColumn, [base, new]: [&Block; 2]) -> margin::Units {
     let is_lower = study.better(&column.name) == Better::Lower;
     let mean = |mean: f64| if is_lower { 1.0 - mean } else { mean };
-    let (mut old, mut found) = (study.by_unit(base, column), margin::Units::default());
-    for (unit, moments) in study.by_unit(new, column) {
+    let (mut old, mut found) = (study.by_unit(base, |row| column.get(row)), margin::Units::default());
+    for (unit, moments) in study.by_unit(new, |row| column.get(row)) {
         let Some(first) = moments.mean().map(mean) else { continue };
         match old.remove(&unit).and_then(Moments::mean).map(mean) {
             Some(second) => found.shared.push((first, second)),

@@ -59,7 +59,8 @@ fn mark(cell: &CellRow) -> String {
 /// Rates against their levels; where a rate is shown, so is the same among finished episodes.
 pub(super) fn chance(statistics: &Statistics, shown: Shown, is_full: bool) -> Table {
     let is_shown = |metric: &str| shown(metric) || statistics.relations.whole(metric).is_some_and(shown);
-    let columns = Columns { is_full, has_losses: statistics.chance.iter().any(|row| row.losses.is_some()) };
+    let has_losses = statistics.chance.iter().any(|row| row.losses.is_some());
+    let columns = Columns { is_full, has_losses, has_repeats: false };
     let line = |row: &super::super::ChanceRow| {
         let role = match row.role {
             Role::Chance => "chance",
@@ -91,13 +92,21 @@ const CANNOT_SAY: &str = "cannot say";
 struct Columns {
     is_full: bool,
     has_losses: bool,
+    has_repeats: bool,
 }
 
 impl Columns {
+    fn of<'c>(comparisons: impl Iterator<Item = &'c Comparison> + Clone, is_full: bool) -> Self {
+        let has_losses = comparisons.clone().any(|found| found.losses.is_some());
+        let has_repeats = comparisons.clone().any(|found| found.repeat_se.is_some());
+        Self { is_full, has_losses, has_repeats }
+    }
+
     fn names(self) -> Vec<&'static str> {
         let all = if self.is_full { ["p", "mid-p", "p (Holm)", "p (T-H)"].as_slice() } else { &["p", "p (Holm)"] };
         let lost = self.has_losses.then_some("p with lost episodes");
-        all.iter().copied().chain(lost).collect()
+        let noise = self.has_repeats.then_some("SE of repeats");
+        noise.into_iter().chain(all.iter().copied()).chain(lost).collect()
     }
 
     fn p_values(self, [p, mid_p, adjusted, tarone]: [Option<f64>; 4]) -> Vec<String> {
@@ -117,8 +126,8 @@ fn of_units(units: Option<&Units>) -> String {
 }
 
 pub(super) fn separated(statistics: &Statistics, shown: Shown, is_full: bool) -> Table {
-    let mut compared_pairs = statistics.models.iter().flat_map(|family| &family.tests);
-    let columns = Columns { is_full, has_losses: compared_pairs.any(|test| test.comparison.losses.is_some()) };
+    let tests = statistics.models.iter().flat_map(|family| &family.tests);
+    let columns = Columns::of(tests.map(|test| &test.comparison), is_full);
     let families = statistics.models.iter().filter(|family| shown(&family.metric));
     let lines = families.flat_map(|family| {
         family.tests.iter().filter(|test| test.comparison.separated).map(|test| {
@@ -132,8 +141,7 @@ pub(super) fn separated(statistics: &Statistics, shown: Shown, is_full: bool) ->
 }
 
 pub(super) fn conditions(statistics: &Statistics, shown: Shown, is_full: bool) -> Table {
-    let has_losses = statistics.conditions.iter().any(|contrast| contrast.comparison.losses.is_some());
-    let columns = Columns { is_full, has_losses };
+    let columns = Columns::of(statistics.conditions.iter().map(|contrast| &contrast.comparison), is_full);
     let lines = statistics.conditions.iter().filter(|contrast| shown(&contrast.metric)).map(|contrast| {
         let pair = format!("{} - {}", contrast.baseline, contrast.against);
         let names = [named(&contrast.model, contrast.condition.as_deref()), contrast.metric.clone(), pair];
@@ -162,6 +170,7 @@ fn compared(found: &Comparison, columns: Columns) -> Vec<String> {
     let counts = counts + &of_units(found.units.as_ref());
     let mut line = vec![test.to_owned(), counts, fixed(found.difference, places)];
     line.push(held(found.interval, found.withheld, places));
+    line.extend(columns.has_repeats.then(|| fixed(found.repeat_se, places)));
     line.extend(columns.p_values([found.p, found.mid_p, found.p_adjusted, found.p_tarone]));
     line.extend(columns.lost(found.losses.as_ref()));
     line

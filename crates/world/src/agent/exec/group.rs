@@ -1,11 +1,16 @@
-//! Process groups of programs that run now: each is killed when its episode lets go of it, and all at once when the
-//! process is about to end.
+//! Programs that run now, each with all that it started: they are killed when their episode lets go of them, and all at once
+//! when the process is about to end.
+//!
+//! A program has a process group. What leaves the group (`setsid`) is found by a variable in its environment, on Linux.
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 use std::io;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tokio::process::{Child, Command};
+
+/// The variable that a program and all that it starts have in their environment.
+const MARK: &str = "_MIRRORSTATS_EXEC";
 
 /// The groups of all programs that run now.
 #[derive(Debug, Default)]
@@ -13,7 +18,9 @@ pub struct Groups(Mutex<Running>);
 
 #[derive(Debug, Default)]
 struct Running {
-    ids: BTreeSet<i32>,
+    /// The mark of each, by the id of its group.
+    marks: BTreeMap<i32, String>,
+    started: u64,
     is_over: bool,
 }
 
@@ -22,7 +29,7 @@ impl Groups {
     pub fn kill_all(&self) {
         let mut running = self.running();
         running.is_over = true;
-        running.ids.iter().copied().for_each(kill);
+        running.marks.iter().for_each(|(id, mark)| kill(*id, mark));
     }
 
     fn running(&self) -> MutexGuard<'_, Running> {
@@ -45,9 +52,11 @@ impl Group {
         if running.is_over {
             return Err(io::Error::new(io::ErrorKind::Interrupted, "the recording is being ended"));
         }
-        let child = shell.spawn()?;
+        running.started += 1;
+        let mark = format!("{}-{}", std::process::id(), running.started);
+        let child = shell.env(MARK, &mark).spawn()?;
         let id = child.id().and_then(|id| i32::try_from(id).ok());
-        running.ids.extend(id);
+        running.marks.extend(id.map(|id| (id, mark)));
         Ok((child, Self { id, groups: Arc::clone(groups) }))
     }
 }
@@ -55,21 +64,44 @@ impl Group {
 impl Drop for Group {
     fn drop(&mut self) {
         if let Some(id) = self.id {
-            self.groups.running().ids.remove(&id);
-            kill(id);
+            let mark = self.groups.running().marks.remove(&id).unwrap_or_default();
+            kill(id, &mark);
         }
     }
 }
 
 #[cfg(unix)]
-fn kill(id: i32) {
-    use nix::sys::signal::{Signal, killpg};
+fn kill(id: i32, mark: &str) {
+    use nix::sys::signal::{Signal, kill, killpg};
+    use nix::unistd::Pid;
     // Fails where all of it has ended by itself, which is what is wanted.
-    let _ = killpg(nix::unistd::Pid::from_raw(id), Signal::SIGKILL);
+    let _ = killpg(Pid::from_raw(id), Signal::SIGKILL);
+    // What is killed may have started something in the meantime.
+    for _ in 0..10 {
+        let left = marked(mark);
+        for id in &left {
+            let _ = kill(Pid::from_raw(*id), Signal::SIGKILL);
+        }
+        if left.is_empty() {
+            break;
+        }
+    }
+}
+
+/// The processes with this mark in their environment; none where there is no `/proc`.
+#[cfg(unix)]
+fn marked(mark: &str) -> Vec<i32> {
+    let wanted = format!("{MARK}={mark}");
+    let is_marked = |id: &i32| {
+        let environment = std::fs::read(format!("/proc/{id}/environ")).unwrap_or_default();
+        environment.split(|byte| *byte == 0).any(|variable| variable == wanted.as_bytes())
+    };
+    let processes = std::fs::read_dir("/proc").into_iter().flatten().flatten();
+    processes.filter_map(|entry| entry.file_name().to_str()?.parse().ok()).filter(is_marked).collect()
 }
 
 #[cfg(not(unix))]
-fn kill(_: i32) {
+fn kill(_: i32, _: &str) {
     // The first process is killed with its handle; there are no groups.
 }
 

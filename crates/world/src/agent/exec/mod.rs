@@ -33,7 +33,8 @@ use self::message::{EndMessage, Message, PROTOCOL};
 use self::program::{Failure, Program};
 use self::said::Kept;
 use super::vlm::secrets::{Secret, from_every_key_variable};
-use super::{Agent, Decision, Ended, Farewell, Lost, Observation, Player, Reply, Status, Task, Usage, Words};
+use super::reply::Reading;
+use super::{Agent, Decision, Ended, Farewell, Lost, Observation, Player, Reply, Status, Task, Usage};
 use exact::hash;
 
 /// What the shell's exit code says of a command that there is not, or that cannot be run.
@@ -193,19 +194,8 @@ impl ExecAgent {
                 self.conversation.read(text, usage)
             }
             // With its bytes replaced it might pass for something that the program did not say.
-            Err(fault) => Reply {
-                status: Status::ParseFailed,
-                repairs: Vec::new(),
-                fault: Some(fault.to_string()),
-                action: None,
-                self_color: None,
-                selected_cube: None,
-                mark_report: None,
-                words: Words::default(),
-                raw: Some(self.shared.without_secrets(&String::from_utf8_lossy(line))),
-                usage,
-                model: None,
-            },
+            Err(fault) => Reading::without_decision(Status::ParseFailed, Some(fault.to_string()))
+                .into_reply(self.shared.without_secrets(&String::from_utf8_lossy(line)), usage),
         }
     }
 

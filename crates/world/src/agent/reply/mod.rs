@@ -62,7 +62,7 @@ pub struct Reading {
 }
 
 impl Reading {
-    fn without_decision(status: Status, fault: Option<String>) -> Self {
+    pub(in crate::agent) fn without_decision(status: Status, fault: Option<String>) -> Self {
         Self {
             status,
             repairs: Vec::new(),
@@ -76,9 +76,8 @@ impl Reading {
     }
 
     /// The same after repairs of what carried the text, which come before its own.
-    #[cfg(feature = "sim")]
     #[must_use]
-    pub(in crate::agent) fn after(mut self, carried: &[Repair]) -> Self {
+    pub(crate) fn after(mut self, carried: &[Repair]) -> Self {
         let is_new = |repair: &Repair| !self.repairs.contains(repair);
         let new: Vec<_> = carried.iter().copied().filter(is_new).collect();
         if matches!(self.status, Status::Ok | Status::Repaired) && !new.is_empty() {
@@ -89,7 +88,7 @@ impl Reading {
     }
 
     /// The reply of an agent: this reading, the text it was read from, and what that cost.
-    pub fn into_reply(self, raw: String, usage: Usage) -> Reply {
+    pub fn into_reply(self, raw: impl Into<Option<String>>, usage: Usage) -> Reply {
         Reply {
             status: self.status,
             repairs: self.repairs,
@@ -99,7 +98,7 @@ impl Reading {
             selected_cube: self.selected_cube,
             mark_report: self.mark_report,
             words: self.words,
-            raw: Some(raw),
+            raw: raw.into(),
             usage,
             model: None,
         }

@@ -11,7 +11,8 @@ use super::model::{Memory, Vlm};
 use super::step::{Asked, Step, locked};
 use super::wire_format::Answer;
 use crate::agent::prompt::Prompt;
-use crate::agent::{Agent, Decision, Lost, Observation, Reply, Status, Task, Usage, Words, reply};
+use crate::agent::reply::{self, Reading};
+use crate::agent::{Agent, Decision, Lost, Observation, Reply, Status, Task, Usage};
 use exact::hash;
 
 impl Vlm {
@@ -22,7 +23,8 @@ impl Vlm {
             Memory::Journals(_) => Journal::open(&path)?,
             Memory::Cassette(_) => Journal::cassette(&path)?,
         };
-        Ok(VlmAgent { vlm: Arc::clone(self), task, journal: Arc::new(Mutex::new(journal)), begun: None })
+        let (vlm, episode) = (Arc::clone(self), episode.to_owned());
+        Ok(VlmAgent { vlm, task, episode, journal: Arc::new(Mutex::new(journal)), begun: None })
     }
 }
 
@@ -31,6 +33,7 @@ impl Vlm {
 pub struct VlmAgent {
     vlm: Arc<Vlm>,
     task: Task,
+    episode: String,
     journal: Arc<Mutex<Journal>>,
     begun: Option<Begun>,
 }
@@ -48,7 +51,7 @@ impl VlmAgent {
             .map_err(|fault| self.vlm.halt(Lost::because(format!("the prompt cannot be made: {fault}"))))?;
         let schema = reply::structure(&self.task.experiment.reply);
         // Pixels differ between machines, words do not: a cassette plays on any.
-        let without_frame = self.vlm.body(&words, &schema, "").to_string();
+        let without_frame = self.vlm.choice.body(&words, &schema, "").to_string();
         let question = hash::of_bytes(without_frame.as_bytes());
         let recorded = locked(&self.journal).recorded(observation.t).cloned();
         if let Some(recorded) = recorded {
@@ -64,12 +67,14 @@ impl VlmAgent {
             .frame
             .to_png()
             .map_err(|fault| Lost::because(format!("the frame cannot be encoded: {fault}")))?;
+        let frame = hash::of_bytes(png);
         let step = Step {
             vlm: Arc::clone(&self.vlm),
             journal: Arc::clone(&self.journal),
             t: observation.t,
-            frame: hash::of_bytes(png),
-            body: self.vlm.body(&words, &schema, &STANDARD.encode(png)),
+            id: hash::of_bytes(format!("{} {} {question} {frame}", self.episode, observation.t).as_bytes()),
+            frame,
+            body: self.vlm.choice.body(&words, &schema, &STANDARD.encode(png)),
             question,
             at_most,
         };
@@ -125,7 +130,7 @@ impl VlmAgent {
             latency_ms: Some(latency_ms),
             prompt_tokens: count(answer.prompt_tokens),
             completion_tokens: count(answer.completion_tokens),
-            cost_usd: self.vlm.cost_usd(&answer),
+            cost_usd: self.vlm.choice.cost_usd(&answer),
         };
         let reading = reply::read(&answer.text, &self.task.experiment, answer.ending).after(&answer.repairs);
         Reply { model: answer.model, ..reading.into_reply(answer.text, usage) }
@@ -133,17 +138,5 @@ impl VlmAgent {
 }
 
 fn without_decision(status: Status) -> Reply {
-    Reply {
-        status,
-        repairs: Vec::new(),
-        fault: None,
-        action: None,
-        self_color: None,
-        selected_cube: None,
-        mark_report: None,
-        words: Words::default(),
-        raw: None,
-        usage: Usage::default(),
-        model: None,
-    }
+    Reading::without_decision(status, None).into_reply(None, Usage::default())
 }

@@ -1,22 +1,21 @@
 //! A model, and what all of its episodes share: where answers come from, what may be spent, why to stop.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::pin::pin;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use serde_json::Value;
 use tokio::runtime::Handle;
 use tokio::sync::Notify;
 
-use super::estimate;
-use super::journal::{Journal, JournalError, Recorded};
 use super::limits::{Account, Spend};
-use super::models::{Choice, Contract, merge};
-use super::preflight::Unreachable;
-use super::provider::Provider;
-use super::wire_format::{Answer, Question};
-use crate::agent::{Lost, prompt};
+use super::models::Choice;
+use super::provider::{Provider, Unreachable};
+use super::spending::estimate;
+use super::wire_format::Answer;
+use crate::agent::Lost;
+use crate::agent::reply::Ending;
 
 /// What is done when the attempts for a step are used up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -45,6 +44,33 @@ impl Memory {
     }
 }
 
+/// What answers have cost whose provider says so, for models without prices.
+#[derive(Clone, Copy, Debug, Default)]
+struct Learned {
+    usd: f64,
+    prompt_tokens: f64,
+    completion_tokens: f64,
+}
+
+impl Learned {
+    fn add(&mut self, answer: &Answer) {
+        let counted = [answer.prompt_tokens, answer.completion_tokens];
+        let (Some(usd), [Some(prompt), Some(completion)]) = (answer.cost_usd, counted) else { return };
+        self.usd += usd;
+        // Tokens from a cache have a lower price.
+        self.prompt_tokens += f64::from(prompt.saturating_sub(answer.cached_tokens.unwrap_or(0)));
+        self.completion_tokens += f64::from(completion);
+    }
+
+    /// What these tokens cost at most: each price is bounded by the whole cost over the tokens of its kind.
+    #[expect(clippy::cast_precision_loss, reason = "nobody pays for 2^53 tokens")]
+    fn cost_at_most(self, [prompt, completion]: [u64; 2]) -> Option<f64> {
+        let is_known = self.prompt_tokens > 0.0 && self.completion_tokens > 0.0;
+        let share = prompt as f64 / self.prompt_tokens + completion as f64 / self.completion_tokens;
+        is_known.then_some(self.usd * share)
+    }
+}
+
 /// A model and everything that its episodes share.
 #[derive(Debug)]
 pub struct Vlm {
@@ -55,11 +81,11 @@ pub struct Vlm {
     pub(super) memory: Memory,
     pub(super) account: Arc<Account>,
     pub(super) on_outage: OnOutage,
-    max_output_tokens: u32,
     stop: OnceLock<Lost>,
     stopped: Notify,
     is_known: AtomicBool,
     first: tokio::sync::Mutex<()>,
+    learned: Mutex<Learned>,
     /// Whether the model has answered a request of this recording, so that one that is rejected is wrong by itself.
     pub(super) has_answered: AtomicBool,
 }
@@ -74,36 +100,28 @@ impl Vlm {
         account: Arc<Account>,
         on_outage: OnOutage,
     ) -> Self {
-        Self {
-            max_output_tokens: choice.model.max_output_tokens(),
-            choice,
-            provider: Some(provider),
-            network: Some(network),
-            memory: Memory::Journals(journals),
-            account,
-            on_outage,
-            stop: OnceLock::new(),
-            stopped: Notify::new(),
-            is_known: AtomicBool::new(false),
-            first: tokio::sync::Mutex::default(),
-            has_answered: AtomicBool::new(false),
-        }
+        let (provider, network) = (Some(provider), Some(network));
+        Self { provider, network, account, on_outage, ..Self::of(choice, Memory::Journals(journals)) }
     }
 
     /// A model whose answers are played from journals; no key is needed and nothing is sent.
     pub fn cassette(choice: Choice, folder: PathBuf) -> Self {
+        Self::of(choice, Memory::Cassette(folder))
+    }
+
+    fn of(choice: Choice, memory: Memory) -> Self {
         Self {
-            max_output_tokens: choice.model.max_output_tokens(),
             choice,
             provider: None,
             network: None,
-            memory: Memory::Cassette(folder),
+            memory,
             account: Arc::default(),
             on_outage: OnOutage::default(),
             stop: OnceLock::new(),
             stopped: Notify::new(),
             is_known: AtomicBool::new(false),
             first: tokio::sync::Mutex::default(),
+            learned: Mutex::default(),
             has_answered: AtomicBool::new(false),
         }
     }
@@ -129,7 +147,9 @@ impl Vlm {
     }
 
     pub(super) async fn turn_of_first(&self) -> Option<tokio::sync::MutexGuard<'_, ()>> {
-        let is_over = || self.is_known.load(Ordering::Relaxed) || self.has_answered.load(Ordering::Relaxed);
+        let is_bounded = || !self.account.limits_cost() || self.cost_of([1, 1]).is_some();
+        let has_come = || self.is_known.load(Ordering::Relaxed) || self.has_answered.load(Ordering::Relaxed);
+        let is_over = || has_come() && is_bounded();
         if is_over() {
             return None;
         }
@@ -152,6 +172,15 @@ impl Vlm {
         ))))
     }
 
+    /// Ends a recording with a limit of cost whose model has neither prices nor answers that say what they cost.
+    pub(super) fn check_cost(&self, answer: &Answer) -> Result<(), Lost> {
+        let is_unknown = answer.ending != Ending::Refused && self.cost_of([1, 1]).is_none();
+        match self.choice.check_prices() {
+            Err(error) if is_unknown && self.account.limits_cost() => Err(self.halt(Lost::because(error.to_string()))),
+            _ => Ok(()),
+        }
+    }
+
     /// Whether the provider can be reached; a cassette needs none.
     pub fn connect(&self) -> Result<(), Unreachable> {
         self.provider.as_ref().map_or(Ok(()), Provider::connect)
@@ -159,24 +188,7 @@ impl Vlm {
 
     /// The most tokens that a reply may have.
     pub fn max_output_tokens(&self) -> u32 {
-        self.max_output_tokens
-    }
-
-    /// How many steps of an episode have their answer already.
-    pub fn answered(&self, episode: &str) -> Result<u64, JournalError> {
-        match Journal::cassette(&self.memory.path(episode)) {
-            Ok(journal) => Ok(journal.answers().count() as u64),
-            Err(JournalError::Missing { .. }) => Ok(0),
-            Err(error) => Err(error),
-        }
-    }
-
-    /// Counts what is spent with other processes that record the model into the same folder, by the ledger at this path.
-    /// `slug` is the model's name in the names of episodes.
-    pub fn share_account(&self, ledger: &Path, slug: &str) -> Result<(), Box<dyn std::error::Error>> {
-        let (Memory::Journals(folder), Some(provider)) = (&self.memory, &self.provider) else { return Ok(()) };
-        let journals = || spent(self, folder, slug).map_err(Box::<dyn std::error::Error>::from);
-        self.account.share(ledger, provider.patience().timeout, journals)
+        self.choice.model.max_output_tokens()
     }
 
     /// What was spent, over all starts of the run.
@@ -192,7 +204,7 @@ impl Vlm {
             "backend": self.choice.model.backend,
             "contract": self.choice.model.contract.name(),
             "temperature": self.choice.model.temperature.map_or_else(|| "default".into(), Value::from),
-            "max_output_tokens": self.max_output_tokens,
+            "max_output_tokens": self.max_output_tokens(),
             "identification_version": trace::identification::VERSION,
         });
         if let Some(effort) = self.choice.model.reasoning_effort {
@@ -216,41 +228,25 @@ impl Vlm {
         self.choice.backend.dialect.read(body).ok()?
     }
 
-    /// What an answer cost, US dollars: as the provider says, else by its tokens.
-    pub(super) fn cost_usd(&self, answer: &Answer) -> Option<f64> {
-        answer.cost_usd.or_else(|| self.choice.model.prices.cost_usd(answer))
-    }
-
     /// What a request of so many bytes of words takes at most: tokens of the request and of the reply. No token of words is
     /// less than a byte; of a frame, providers have counted up to twice what they document.
     pub(super) fn at_most(&self, bytes: usize, view: [u32; 2]) -> [u64; 2] {
         let frame = estimate::frame_tokens(self.choice.backend.dialect, view);
-        [bytes as u64 + 2 * frame, self.max_output_tokens.into()]
+        [bytes as u64 + 2 * frame, self.max_output_tokens().into()]
     }
 
-    /// What these tokens of a request and a reply cost, US dollars.
+    /// What these tokens of a request and a reply cost, US dollars: by the prices, else at most by what answers have cost.
     pub(super) fn cost_of(&self, [prompt, completion]: [u64; 2]) -> Option<f64> {
-        self.choice.model.prices.cost_of(prompt, completion)
+        let by_price = self.choice.model.prices.cost_of(prompt, completion);
+        by_price.or_else(|| self.learned().cost_at_most([prompt, completion]))
     }
 
-    /// The body of a request with this frame, as PNG in base64.
-    pub(super) fn body(&self, words: &prompt::Rendered, schema: &Value, png: &str) -> Value {
-        let mut body = self.choice.backend.dialect.body(&self.question(words, schema, png));
-        merge(&mut body, &self.choice.extra_body().into());
-        body
+    pub(super) fn learn_from(&self, answer: &Answer) {
+        self.learned().add(answer);
     }
 
-    fn question<'a>(&'a self, words: &'a prompt::Rendered, schema: &'a Value, png: &'a str) -> Question<'a> {
-        Question {
-            model: &self.choice.model.id,
-            system: &words.system,
-            user: &words.user,
-            png_base64: png,
-            schema: (self.choice.model.contract == Contract::Schema).then_some(schema),
-            temperature: self.choice.model.temperature,
-            max_output_tokens: self.max_output_tokens,
-            reasoning_effort: self.choice.model.reasoning_effort,
-        }
+    fn learned(&self) -> MutexGuard<'_, Learned> {
+        self.learned.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     pub(super) fn halt(&self, lost: Lost) -> Lost {
@@ -273,75 +269,6 @@ impl Vlm {
     }
 }
 
-/// What journals say was spent on this model, for the account of a run that is started again. `slug` is the model's name in
-/// the names of episodes; the journals of other models in the folder have other prices and limits.
-pub fn spent(vlm: &Vlm, folder: &Path, slug: &str) -> Result<Spend, JournalError> {
-    let mut spend = Spend::default();
-    let entries = match std::fs::read_dir(folder) {
-        Ok(entries) => entries,
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(spend),
-        Err(source) => return Err(JournalError::Io { path: folder.to_owned(), source }),
-    };
-    for entry in entries {
-        let path = entry.map_err(|source| JournalError::Io { path: folder.to_owned(), source })?.path();
-        let stem = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
-        if path.extension().is_none_or(|ending| ending != "jsonl") || model_of(stem) != Some(slug) {
-            continue;
-        }
-        let journal = Journal::cassette(&path)?;
-        add_journal(vlm, &journal, &mut spend);
-    }
-    Ok(spend)
-}
-
-fn add_journal(vlm: &Vlm, journal: &Journal, spend: &mut Spend) {
-    let usd = |at_most: Option<[u64; 2]>| at_most.and_then(|tokens| vlm.cost_of(tokens)).unwrap_or(0.0);
-    let requests = journal.requests();
-    spend.requests += requests.sent;
-    for at_most in requests.unanswered {
-        spend.add_unanswered(usd(at_most));
-    }
-    for recorded in journal.answers() {
-        let Recorded::Answer { body, at_most, .. } = recorded else { continue };
-        let answer = vlm.read(body);
-        let cost = answer.as_ref().and_then(|answer| vlm.cost_usd(answer));
-        spend.add_answer(answer.as_ref().map_or(0, tokens), cost, usd(*at_most));
-    }
-}
-
-/// The model in the name of an episode's journal: `slug` in `E1-slug-s1-r3`, and in `E1-slug@near-s1-r3-x2`.
-fn model_of(stem: &str) -> Option<&str> {
-    let without_last = |name, mark: char| {
-        let (rest, last): (&str, &str) = str::rsplit_once(name, '-')?;
-        let number = last.strip_prefix(mark)?;
-        (!number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit())).then_some(rest)
-    };
-    let first = without_last(stem, 'x').unwrap_or(stem);
-    let (_, subject) = without_last(without_last(first, 'r')?, 's')?.split_once('-')?;
-    Some(subject.split_once('@').map_or(subject, |(model, _)| model))
-}
-
 pub(super) fn tokens(answer: &Answer) -> u64 {
     u64::from(answer.prompt_tokens.unwrap_or(0)) + u64::from(answer.completion_tokens.unwrap_or(0))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::model_of;
-
-    #[test]
-    fn a_journal_names_its_model() {
-        for (stem, expected) in [
-            ("E1-gpt-5-1-s1-r3", Some("gpt-5-1")),
-            ("E1-gpt-5-s1-r3-x2", Some("gpt-5")),
-            ("E5-a@near-s1-s2-r10", Some("a")),
-            ("E1-a-s1-r1-s2-r3", Some("a-s1-r1")),
-            ("E1-s2-r3", None),
-            ("E1-a-s2", None),
-            ("notes", None),
-            ("", None),
-        ] {
-            assert_eq!(model_of(stem), expected, "{stem}");
-        }
-    }
 }

@@ -6,9 +6,9 @@
 use std::collections::BTreeMap;
 use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use schemars::JsonSchema;
-use serde::de::Error as _;
 use serde::{Deserialize, Deserializer};
 use serde_json::{Map, Value};
 
@@ -16,6 +16,7 @@ use super::wire_format::{Answer, Dialect, Effort};
 use exact::budget::Limit;
 use exact::input;
 use exact::suggest::hint;
+use toml_spec::{Faults, Source};
 use trace::model_id::{OWN_SERVER, answers_for};
 
 const BUILT_IN: &str = include_str!("../../../../../assets/models.toml");
@@ -37,7 +38,6 @@ pub struct Models {
 #[serde(deny_unknown_fields)]
 pub struct Backend {
     /// The language it speaks.
-    #[schemars(with = "String")]
     pub dialect: Dialect,
     /// Where its paths begin; `--base-url` replaces it.
     pub base_url: Option<String>,
@@ -70,7 +70,7 @@ pub struct Model {
     pub reasoning_effort: Option<Effort>,
     /// The sampling temperature; `default` sends none. The paper's, 0.2, if absent.
     #[serde(default = "paper_temperature", deserialize_with = "temperature")]
-    #[schemars(with = "Value")]
+    #[schemars(with = "Temperature")]
     pub temperature: Option<f64>,
     /// What every request has besides, over what its backend says: tables are merged, other values replaced.
     #[serde(default)]
@@ -89,12 +89,29 @@ fn paper_temperature() -> Option<f64> {
     Some(0.2)
 }
 
+/// A temperature as written.
+#[derive(Deserialize, JsonSchema)]
+#[serde(untagged)]
+enum Temperature {
+    /// Sent with each request.
+    Of(#[schemars(range(min = 0.0))] f64),
+    /// None is sent.
+    Default(DefaultTemperature),
+}
+
+/// The provider's temperature.
+#[derive(Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+enum DefaultTemperature {
+    /// `default`.
+    Default,
+}
+
 fn temperature<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error> {
-    match Value::deserialize(from)? {
-        Value::Number(number) if number.as_f64().is_some_and(|value| value >= 0.0) => Ok(number.as_f64()),
-        Value::String(word) if word == "default" => Ok(None),
-        other => Err(D::Error::custom(format!("the temperature is {other}, expected a number from 0 or \"default\""))),
-    }
+    Temperature::deserialize(from).map(|temperature| match temperature {
+        Temperature::Of(number) => Some(number),
+        Temperature::Default(_) => None,
+    })
 }
 
 /// Puts the members of a value into another one: tables are merged, other values replaced.
@@ -133,10 +150,13 @@ impl Model {
 #[serde(deny_unknown_fields)]
 pub struct Prices {
     /// Of the request.
+    #[schemars(range(min = 0.0))]
     pub input: Option<f64>,
     /// Of the part of the request that the provider has in its cache; as `input` if absent.
+    #[schemars(range(min = 0.0))]
     pub cached_input: Option<f64>,
     /// Of the reply.
+    #[schemars(range(min = 0.0))]
     pub output: Option<f64>,
 }
 
@@ -164,13 +184,6 @@ impl Prices {
     pub fn unknown(self) -> Vec<&'static str> {
         let prices = [("input", self.input), ("output", self.output)];
         prices.into_iter().filter(|(_, price)| price.is_none()).map(|(name, _)| name).collect()
-    }
-
-    fn are_amounts(self) -> bool {
-        [self.input, self.cached_input, self.output]
-            .into_iter()
-            .flatten()
-            .all(|price| price.is_finite() && price >= 0.0)
     }
 }
 
@@ -210,8 +223,8 @@ pub struct Choice {
 pub enum ModelsError {
     #[error("cannot read the models in `{}`: {source}", path.display())]
     Unreadable { path: PathBuf, source: std::io::Error },
-    #[error("the models in `{file}` cannot be used: {fault}")]
-    Invalid { file: String, fault: String },
+    #[error(transparent)]
+    Faults(#[from] Faults),
     #[error(
         "no model is called `{name}`{near}; expected the name or the id of one of: {known}\n  help: `--models FILE` adds models, `--backend NAME` or `--base-url URL` takes any id"
     )]
@@ -259,40 +272,49 @@ const LARGEST: Limit = Limit::new("bytes of a list of models", 1 << 20);
 impl Models {
     /// The built-in models, and those of a user's file over them.
     pub fn load(file: Option<&Path>) -> Result<Self, ModelsError> {
-        let mut models = parse("assets/models.toml", BUILT_IN)?;
+        let mut models = Self::default();
+        models.add("assets/models.toml", BUILT_IN)?;
         if let Some(path) = file {
             let text = input::text(path, LARGEST)
                 .map_err(|source| ModelsError::Unreadable { path: path.to_owned(), source })?;
-            let own = parse(&path.display().to_string(), &text)?;
-            models.backend.extend(own.backend);
-            models.model.extend(own.model);
-        }
-        let origin = || file.map_or("assets/models.toml".to_owned(), |path| path.display().to_string());
-        if let Some((name, _)) = models.backend.iter().find(|(_, backend)| !is_variable(&backend.key)) {
-            // What stands there may be the key itself, and is not repeated.
-            let fault = format!(
-                "the `key` of the backend `{name}` is not the name of an environment variable, such as OPENAI_API_KEY"
-            );
-            return Err(ModelsError::Invalid { file: origin(), fault });
-        }
-        let extras = models.backend.iter().map(|(name, backend)| (name, &backend.extra_body));
-        for (name, extra) in extras.chain(models.model.iter().map(|(name, model)| (name, &model.extra_body))) {
-            if let Some(key) = extra.keys().find(|key| PROTOCOL.contains(&key.as_str())) {
-                let fault = format!("the `extra_body` of `{name}` has `{key}`, which is part of the protocol");
-                return Err(ModelsError::Invalid { file: origin(), fault });
-            }
-        }
-        for (name, model) in &models.model {
-            if !model.prices.are_amounts() {
-                let fault = format!("a price of the model `{name}` is not an amount: expected a finite number from 0");
-                return Err(ModelsError::Invalid { file: origin(), fault });
-            }
-            if !models.backend.contains_key(&model.backend) {
-                let fault = format!("the backend `{}` of the model `{name}` is not there", model.backend);
-                return Err(ModelsError::Invalid { file: origin(), fault });
-            }
+            models.add(&path.display().to_string(), &text)?;
         }
         Ok(models)
+    }
+
+    fn add(&mut self, file: &str, text: &str) -> Result<(), ModelsError> {
+        let source = Source { name: file.to_owned(), text: text.to_owned() };
+        let known = &self.backend;
+        let read = toml_spec::read_source(source, "a file of models", |own: &Self, at, faults| {
+            for (_, backend) in at.within("backend") {
+                if let Some(key) = backend.get("key").filter(|key| !is_variable(key.written())) {
+                    let fault = key.fault("`key` is not the name of an environment variable");
+                    faults.push(fault.help("write the name of the variable with the key, such as OPENAI_API_KEY"));
+                }
+            }
+            for (_, at) in at.within("backend").chain(at.within("model")) {
+                for (key, value) in at.within("extra_body").filter(|(key, _)| PROTOCOL.contains(key)) {
+                    faults.push(value.fault(format!("`extra_body` has `{key}`, which is part of the protocol")));
+                }
+            }
+            let names = || known.keys().chain(own.backend.keys()).map(String::as_str);
+            for (name, at) in at.within("model") {
+                let Some(model) = own.model.get(name) else { continue };
+                if !names().any(|name| name == model.backend) {
+                    let known = names().collect::<Vec<_>>().join(", ");
+                    let fault = at.key("backend").fault(format!("no backend is called `{}`", model.backend));
+                    faults.push(fault.help(format!("expected one of: {known}")));
+                }
+            }
+        });
+        let own = read.map_err(|mut faults| {
+            let shown = Arc::new(Source { name: file.to_owned(), text: without_keys(text) });
+            faults.0.iter_mut().for_each(|fault| fault.place.source = shown.clone());
+            faults
+        })?;
+        self.backend.extend(own.backend);
+        self.model.extend(own.model);
+        Ok(())
     }
 
     /// The model of this name or id; with a backend, any id is one, and so is one that has the form of a provider's ids.
@@ -339,8 +361,34 @@ impl Models {
     }
 }
 
-fn parse(file: &str, text: &str) -> Result<Models, ModelsError> {
-    toml::from_str(text).map_err(|fault| ModelsError::Invalid { file: file.to_owned(), fault: fault.to_string() })
+/// A text of the same length without possible secrets, such as a key in the place of the name of its variable: diagnostics
+/// show lines.
+fn without_keys(text: &str) -> String {
+    let mut shown = String::new();
+    let mut rest = text;
+    while let Some(at) = rest.find("key") {
+        let (before, after) = rest.split_at(at + "key".len());
+        shown.push_str(before);
+        rest = after;
+        let assigned = after.trim_start_matches(['"', '\'', ' ', '\t']).strip_prefix('=');
+        let Some(value) = assigned.map(|value| first_value(value.trim_start_matches([' ', '\t']))) else { continue };
+        if !is_variable(value.trim_matches(['"', '\''])) {
+            let from = after.find(value).unwrap_or_default();
+            shown.push_str(&after[..from]);
+            shown.push_str(&"*".repeat(value.len()));
+            rest = &after[from + value.len()..];
+        }
+    }
+    shown + rest
+}
+
+fn first_value(text: &str) -> &str {
+    let line = text.lines().next().unwrap_or_default();
+    let end = match line.chars().next() {
+        Some(quote @ ('"' | '\'')) => line[1..].find(quote).map(|at| at + 2),
+        _ => line.find([',', '}', '#', ' ']),
+    };
+    &line[..end.unwrap_or(line.len())]
 }
 
 fn backend_of(id: &str) -> Option<&'static str> {
@@ -406,7 +454,10 @@ mod tests {
         assert_eq!(temperature("temperature = \"default\""), Ok(None));
         for wrong in ["-0.1", "\"low\"", "nan", "true"] {
             let fault = temperature(&format!("temperature = {wrong}")).unwrap_err();
-            assert!(fault.contains("expected a number from 0 or \"default\""), "{fault}");
+            assert!(
+                fault.contains(["`temperature` may be 0 or more", "a number"][usize::from(wrong.contains(['l', 'u']))]),
+                "{fault}"
+            );
         }
         let extra = |keys: &str| own(keys).map(|choice| serde_json::Value::from(choice.extra_body()));
         let merged = serde_json::json!({ "top_k": 1, "provider": { "only": ["a"], "require_parameters": true } });
@@ -414,7 +465,7 @@ mod tests {
         let without = serde_json::json!({ "provider": { "require_parameters": false } });
         assert_eq!(extra("extra_body = { provider = { require_parameters = false } }"), Ok(without));
         let fault = extra("extra_body = { messages = [] }").unwrap_err();
-        assert!(fault.contains("`extra_body` of `own` has `messages`, which is part of the protocol"), "{fault}");
+        assert!(fault.contains("`extra_body` has `messages`, which is part of the protocol"), "{fault}");
     }
 
     #[test]
@@ -440,7 +491,7 @@ mod tests {
             let model = format!("[model.own]\nbackend = \"google\"\nid = \"x\"\nprices = {{ input = {price} }}\n");
             std::fs::write(&file, model).unwrap();
             let fault = Models::load(Some(&file)).unwrap_err().to_string();
-            assert!(fault.contains("a price of the model `own` is not an amount"), "{fault}");
+            assert!(fault.contains("`input` may be 0 or more"), "{fault}");
         }
     }
 
@@ -459,7 +510,7 @@ mod tests {
         assert!(with_reasoning.unwrap() > 2_048);
         assert!(most("max_output_tokens = 0").unwrap_err().contains("own.toml"));
         let fault = most("reasoning_effort = \"hard\"").unwrap_err();
-        assert!(fault.contains("`hard`") && fault.contains("`minimal`"), "{fault}");
+        assert!(fault.contains("`hard`") && fault.contains("minimal"), "{fault}");
         // Of the paper's models, those that reason by themselves.
         let models = Models::load(None).unwrap().model;
         let [reasons, replies] = ["Gemini 2.5 Pro", "Ministral 3 14B"].map(|name| models[name].max_output_tokens());
@@ -470,9 +521,15 @@ mod tests {
     fn a_key_in_place_of_its_variable_is_refused_and_not_repeated() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("own.toml");
-        std::fs::write(&file, "[backend.own]\ndialect = \"gemini\"\nkey = \"sk-secret-1\"\n").unwrap();
-        let fault = Models::load(Some(&file)).unwrap_err().to_string();
-        assert!(fault.contains("backend `own`") && fault.contains("environment variable"), "{fault}");
-        assert!(!fault.contains("sk-secret"), "{fault}");
+        for text in [
+            "[backend.own]\ndialect = \"gemini\"\nkey = \"sk-secret-1\"\n",
+            "backend.own = { key = 'sk-secret,1', dialct = \"gemini\" }\n",
+            "[backend.own]\ndialect = \"gemini\"\n\"key\" = sk-secret-1\n",
+        ] {
+            std::fs::write(&file, text).unwrap();
+            let fault = Models::load(Some(&file)).unwrap_err().to_string();
+            assert!(fault.contains("own.toml:") && !fault.contains("secret"), "{fault}");
+            assert!(fault.contains("environment variable") || text.contains("= sk"), "{fault}");
+        }
     }
 }

@@ -5,23 +5,13 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use serde_json::Value;
 
-use super::failure::{Failure, FailureKind};
 use super::journal::{Entry, Journal};
 use super::limits::Reached;
 use super::model::{OnOutage, Vlm, tokens};
-use super::parameter::mend;
-use super::provider::{Provider, Received};
-use super::waiting::Waiting;
+use super::provider::failure::{Failure, FailureKind};
+use super::provider::{Provider, Received, Waiting};
 use super::wire_format::Answer;
 use crate::agent::{Lost, Status};
-
-/// What helps where a model takes no images.
-const SEES: &str = "\n  help: choose a model that sees; a server of one's own may have to be started with the model's part \
-                    for images (llama.cpp: --mmproj FILE)";
-
-/// What helps where a day's quota is used up.
-const TOMORROW: &str = "\n  help: the same command continues when the quota is renewed, or with a higher one; what was \
-                        answered is not asked again";
 
 pub(super) fn locked(journal: &Mutex<Journal>) -> MutexGuard<'_, Journal> {
     journal.lock().unwrap_or_else(PoisonError::into_inner)
@@ -32,6 +22,8 @@ pub(super) struct Step {
     pub(super) vlm: Arc<Vlm>,
     pub(super) journal: Arc<Mutex<Journal>>,
     pub(super) t: i32,
+    /// Names the request among all of a recording: 64 hexadecimal digits.
+    pub(super) id: String,
     pub(super) frame: String,
     pub(super) body: Value,
     pub(super) question: String,
@@ -90,19 +82,7 @@ impl Step {
         if failure.kind == FailureKind::Rejected && self.vlm.has_answered.load(Ordering::Relaxed) {
             return Lost::because(format!("step {}: the provider rejects this request: {}", self.t, failure.detail));
         }
-        let reason = match failure.kind {
-            FailureKind::NoImages => {
-                format!("the model, or the server that runs it, takes no images: {}{SEES}", failure.detail)
-            }
-            FailureKind::DailyQuota => {
-                format!("the provider's quota of the day is used up: {}{TOMORROW}", failure.detail)
-            }
-            _ => {
-                let mend = mend(&failure.detail, &self.vlm.choice.name);
-                format!("the provider refuses the request: {}{mend}", failure.detail)
-            }
-        };
-        self.vlm.halt(Lost::because(reason))
+        self.vlm.halt(Lost::because(failure.explained(&self.vlm.choice.name)))
     }
 
     async fn attempt(&self, provider: &Provider, attempt: u32) -> Result<Asked, Ended> {
@@ -125,15 +105,17 @@ impl Step {
             reserved.refused();
             return Err(ended);
         }
-        match provider.ask(turn, &self.body).await {
+        match provider.ask(turn, &self.id, &self.body).await {
             Ok(received) => {
                 let Received { answer, body, latency } = received;
-                reserved.answered(tokens(&answer), self.vlm.cost_usd(&answer));
+                self.vlm.learn_from(&answer);
+                reserved.answered(tokens(&answer), self.vlm.choice.cost_usd(&answer));
                 let latency_ms = i32::try_from(latency.as_millis()).unwrap_or(i32::MAX);
                 let model = answer.model.clone();
                 self.write(&Entry::Answer { t, attempt, question, latency_ms, model, body })?;
                 self.vlm.note_answered();
                 self.vlm.check_model(answer.model.as_deref()).map_err(Ended::Stopped)?;
+                self.vlm.check_cost(&answer).map_err(Ended::Stopped)?;
                 Ok(Asked::Answer { answer, latency_ms })
             }
             Err(failure) => {

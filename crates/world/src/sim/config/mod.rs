@@ -10,14 +10,14 @@ use std::sync::{Arc, LazyLock};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use toml::{Table, Value};
+use toml::Value;
 
 use crate::experiment::Experiment;
 use crate::experiment::spec::{Camera, Cubes, Others};
 use exact::budget::Limit;
 use exact::hash;
 use exact::input;
-use toml_spec::{At, Fault, Faults, Shape, Source};
+use toml_spec::{At, Fault, Faults, Shape, Source, lay};
 
 const DEFAULT: &str = include_str!("../../../../../assets/world/default.toml");
 
@@ -398,17 +398,6 @@ const BEHIND: (f64, f64, f64) = (-1.1, 2.0, 15.255_118_7);
 
 pub fn metres(millimetres: u32) -> f64 {
     f64::from(millimetres) / 1000.0
-}
-
-fn lay(under: &mut Value, over: Value) {
-    match (under, over) {
-        (Value::Table(under), Value::Table(over)) => {
-            for (key, value) in over {
-                lay(under.entry(key).or_insert_with(|| Value::Table(Table::new())), value);
-            }
-        }
-        (under, over) => *under = over,
-    }
 }
 
 #[cfg(test)]

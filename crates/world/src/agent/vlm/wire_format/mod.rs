@@ -17,7 +17,7 @@ use crate::agent::reply::{Ending, Repair, without_lone_surrogates};
 use exact::names;
 
 /// A language.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Dialect {
     /// `OpenAI`'s chat completions.
@@ -116,6 +116,16 @@ impl Dialect {
             Self::OpenaiChat | Self::OpenaiCompatible => ("authorization", "Bearer "),
             Self::Gemini => ("x-goog-api-key", ""),
             Self::AnthropicMessages => ("x-api-key", ""),
+        }
+    }
+
+    /// The key of the service tier, of providers that have `flex` at half price: <https://platform.openai.com/docs/guides/flex-processing>,
+    /// <https://ai.google.dev/gemini-api/docs/flex-inference>.
+    pub const fn tier_key(self) -> Option<&'static str> {
+        match self {
+            Self::OpenaiChat => Some("service_tier"),
+            Self::Gemini => Some("serviceTier"),
+            Self::OpenaiCompatible | Self::AnthropicMessages => None,
         }
     }
 

@@ -4,19 +4,34 @@
 //! that will not pass (a refused key, an unknown model, a malformed request) is told at once. A provider that declines
 //! what the request is about has answered, whatever the status.
 
+mod batch;
+pub mod concurrency;
+pub mod failure;
+mod parameter;
+mod preflight;
+mod rate_limit;
+mod waiting;
+
+use std::io;
+use std::path::Path;
 use std::time::{Duration, Instant};
 
+pub(super) use parameter::{Mend, refused};
 use reqwest::header::{CONTENT_TYPE, HeaderMap, HeaderName, HeaderValue};
 use reqwest::{Client, Response, StatusCode, Url};
 use serde_json::Value;
+pub(super) use waiting::Waiting;
 
-use super::concurrency::{Pace, Turn};
-use super::failure::{Failure, broken, failed, no_answer, server};
-use super::preflight::{Unreachable, connect};
-use super::rate_limit::{retry_after, retry_info, used_up};
 use super::secrets::Secret;
 use super::wire_format::{Answer, Dialect};
 use crate::agent::reply::Ending;
+use crate::record::plan::slug;
+use batch::Batches;
+use concurrency::{Pace, Turn};
+use failure::{Failure, broken, failed, no_answer, server};
+pub use preflight::Unreachable;
+use preflight::connect;
+use rate_limit::{retry_after, retry_info, used_up};
 
 /// How patient a provider is dealt with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,6 +52,8 @@ pub struct Patience {
     pub longest_wait: Duration,
     /// Bytes of an answer.
     pub largest_answer: usize,
+    /// The time between two requests of an account.
+    pub interval: Duration,
 }
 
 impl Default for Patience {
@@ -50,6 +67,7 @@ impl Default for Patience {
             longest_asked_delay: Duration::from_mins(10),
             longest_wait: Duration::from_hours(1),
             largest_answer: 4 * 1024 * 1024,
+            interval: Duration::ZERO,
         }
     }
 }
@@ -73,6 +91,7 @@ pub struct Provider {
     secret: Option<Secret>,
     patience: Patience,
     pace: Pace,
+    batches: Option<Batches>,
 }
 
 /// A provider that cannot be set up.
@@ -125,13 +144,33 @@ impl Provider {
             .user_agent(concat!("mirrorstats/", env!("CARGO_PKG_VERSION")))
             .build()
             .map_err(|fault| SetupError::Client(fault.to_string()))?;
-        Ok(Self { client, url, dialect, secret, patience, pace: Pace::new(at_once) })
+        Ok(Self { client, url, dialect, secret, patience, pace: Pace::new(at_once, patience.interval), batches: None })
+    }
+
+    /// Sends requests in batches, if the provider is Anthropic.
+    #[must_use]
+    pub fn in_batches(self) -> Self {
+        let mut url = self.url.clone();
+        if let Ok(mut path) = url.path_segments_mut() {
+            path.push("batches");
+        }
+        let batches = Batches::new(self.client.clone(), url, self.secret.clone(), self.patience);
+        Self { batches: Some(batches), ..self }
     }
 
     /// Makes a connection to the address and gives it up again; nothing is sent over it.
     pub fn connect(&self) -> Result<(), Unreachable> {
         connect(&self.url, self.patience.connect_timeout)
             .map_err(|Unreachable { address, fault }| Unreachable { address: self.without_secret(&address), fault })
+    }
+
+    /// Shares when this account takes requests with other processes, by a file in a folder. `key` names the account.
+    pub fn share(&self, folder: &Path, key: &str) -> io::Result<()> {
+        let address = self.url.origin().ascii_serialization();
+        let name = self.without_secret(&format!("at {address} {key}"));
+        let path = folder.join(slug(&name));
+        self.batches.as_ref().map_or(Ok(()), |batches| batches.share(&path.with_extension("batches.jsonl")))?;
+        self.pace.share(&path.with_extension("json"))
     }
 
     pub fn dialect(&self) -> Dialect {
@@ -158,9 +197,12 @@ impl Provider {
         self.pace.turn().await
     }
 
-    /// Sends a request once, in its turn.
-    pub async fn ask(&self, turn: Turn<'_>, body: &Value) -> Result<Received, Failure> {
-        let result = self.exchange(body).await;
+    /// Sends a request once, in its turn. `id` is its own within a recording.
+    pub async fn ask(&self, turn: Turn<'_>, id: &str, body: &Value) -> Result<Received, Failure> {
+        let result = match &self.batches {
+            Some(batches) => batches.ask(id, body).await,
+            None => self.exchange(body).await,
+        };
         drop(turn);
         match &result {
             Ok(_) => self.pace.good(),
@@ -191,16 +233,16 @@ impl Provider {
             response.headers().get(CONTENT_TYPE).and_then(|kind| kind.to_str().ok()).unwrap_or("none").to_owned();
         if !status.is_success() {
             // The status stands, whatever becomes of the words beside it.
-            let said = self.whole(response).await.unwrap_or_default();
+            let said = whole(response, self.patience.largest_answer).await.unwrap_or_default();
             let said = String::from_utf8_lossy(&said).into_owned();
             return match self.declined(status, &said) {
-                Some(answer) => Ok(self.received(answer, said, start.elapsed())),
+                Some(answer) => Ok(received(self.secret.as_ref(), answer, said, start.elapsed())),
                 None => {
                     Err(failed(status, after.or_else(|| retry_info(&said)).or(renewed), &self.without_secret(&said)))
                 }
             };
         }
-        let bytes = self.whole(response).await?;
+        let bytes = whole(response, self.patience.largest_answer).await?;
         let latency = start.elapsed();
         // A paid answer counts whatever its content type says, or if it says none.
         let text = String::from_utf8(bytes).map_err(|fault| server(format!("the answer is not UTF-8: {fault}")))?;
@@ -208,7 +250,7 @@ impl Provider {
             server(format!("expected an answer in JSON, found the content type {kind} and: {fault}"))
         })?;
         let answer = answer.ok_or_else(|| no_answer(&self.without_secret(&text)))?;
-        Ok(self.received(answer, text, latency))
+        Ok(received(self.secret.as_ref(), answer, text, latency))
     }
 
     /// The refusal in an error that is about what the request holds. Providers send it as a bad request, routers also as a
@@ -222,26 +264,28 @@ impl Provider {
         let answer = self.dialect.read(said).ok()??;
         (answer.ending == Ending::Refused).then_some(answer)
     }
+}
 
-    fn received(&self, answer: Answer, body: String, latency: Duration) -> Received {
-        let kept = |text: String| match &self.secret {
-            Some(secret) => secret.without_in_answer(&text),
-            None => text,
-        };
-        let answer = Answer { text: kept(answer.text), model: answer.model.map(kept), ..answer };
-        Received { answer, body: kept(body), latency }
-    }
+/// An answer and its body without the key.
+fn received(secret: Option<&Secret>, answer: Answer, body: String, latency: Duration) -> Received {
+    let kept = |text: String| match secret {
+        Some(secret) => secret.without_in_answer(&text),
+        None => text,
+    };
+    let answer = Answer { text: kept(answer.text), model: answer.model.map(kept), ..answer };
+    Received { answer, body: kept(body), latency }
+}
 
-    async fn whole(&self, mut response: Response) -> Result<Vec<u8>, Failure> {
-        let mut bytes = Vec::new();
-        while let Some(chunk) = response.chunk().await.map_err(broken)? {
-            if bytes.len() + chunk.len() > self.patience.largest_answer {
-                return Err(server(format!("the answer is larger than {} bytes", self.patience.largest_answer)));
-            }
-            bytes.extend_from_slice(&chunk);
+/// The whole body of a response of at most so many bytes.
+async fn whole(mut response: Response, most: usize) -> Result<Vec<u8>, Failure> {
+    let mut bytes = Vec::new();
+    while let Some(chunk) = response.chunk().await.map_err(broken)? {
+        if bytes.len() + chunk.len() > most {
+            return Err(server(format!("the answer is larger than {most} bytes")));
         }
-        Ok(bytes)
+        bytes.extend_from_slice(&chunk);
     }
+    Ok(bytes)
 }
 
 fn address(base_url: &str, path: &str) -> Result<Url, SetupError> {

@@ -4,9 +4,9 @@
 //! providers advise for English; a frame as the provider of its language documents it. Prices that nobody knows give no
 //! cost, rather than a cost of zero.
 
-use super::models::{Choice, Contract};
-use super::wire_format::{Dialect, Question};
 use crate::agent::prompt::Prompt;
+use crate::agent::vlm::models::Choice;
+use crate::agent::vlm::wire_format::Dialect;
 use crate::agent::{Observation, Past, Task, reply};
 use crate::experiment::Experiment;
 use trace::episode::Action;
@@ -22,19 +22,8 @@ const THOUGHT: &str = "I see a wall and part of a mirror to the right. I turn ri
 pub fn prompt_tokens(choice: &Choice, experiment: Experiment, view: [u32; 2]) -> Result<u64, minijinja::Error> {
     let words = Prompt::of(experiment)?.render(&task(experiment), &observation())?;
     let schema = reply::structure(&experiment.reply);
-    let question = Question {
-        model: &choice.model.id,
-        system: &words.system,
-        user: &words.user,
-        png_base64: "",
-        schema: (choice.model.contract == Contract::Schema).then_some(&schema),
-        temperature: choice.model.temperature,
-        max_output_tokens: 0,
-        reasoning_effort: None,
-    };
-    let dialect = choice.backend.dialect;
-    let characters = dialect.body(&question).to_string().chars().count() as u64;
-    Ok(characters.div_ceil(CHARACTERS) + frame_tokens(dialect, view))
+    let characters = choice.body(&words, &schema, "").to_string().chars().count() as u64;
+    Ok(characters.div_ceil(CHARACTERS) + frame_tokens(choice.backend.dialect, view))
 }
 
 /// The tokens of a frame of this width and height.

@@ -1,20 +1,37 @@
 //! Which parameter of a request a provider refuses, and the line of a models' file that mends it.
 
-/// The words by which providers name a parameter, lower case; what it is called; and the line.
-struct Mend {
+use std::num::NonZeroU32;
+
+use serde_json::{Value, json};
+
+use crate::agent::vlm::models::{Contract, Model, merge};
+
+/// A parameter that providers refuse.
+pub(in crate::agent::vlm) struct Mend {
+    /// The words by which they name it, lower case.
     words: &'static [&'static str],
+    /// Its key in a models' file.
+    pub(in crate::agent::vlm) key: &'static str,
     parameter: &'static str,
-    line: &'static str,
+    pub(in crate::agent::vlm) line: &'static str,
+    pub(in crate::agent::vlm) leave_out: fn(&mut Model),
 }
 
+const SHORT: Option<NonZeroU32> = NonZeroU32::new(2_048);
+
 /// In this order: messages about efforts and schemas may name others beside them.
-const MENDS: [Mend; 5] = [
+static MENDS: [Mend; 5] = [
     // OpenRouter with `require_parameters`, HTTP 404: "No endpoints found that can handle the requested parameters."
     // <https://openrouter.ai/docs/features/provider-routing>
     Mend {
         words: &["handle the requested parameters"],
+        key: "extra_body.provider",
         parameter: "one that no provider of the model takes",
         line: "extra_body = { provider = { require_parameters = false } }",
+        leave_out: |model| {
+            let provider = model.extra_body.entry("provider").or_insert(Value::Null);
+            merge(provider, &json!({ "require_parameters": false }));
+        },
     },
     // OpenAI, `param`: "reasoning_effort"; Anthropic: "output_config.effort: ..."; Gemini: "thinking_level" or "Thinking budget".
     Mend {
@@ -26,8 +43,10 @@ const MENDS: [Mend; 5] = [
             "thinking level",
             "thinking budget",
         ],
+        key: "reasoning_effort",
         parameter: "reasoning_effort",
         line: "reasoning_effort = \"low\"    # or another one that the message names",
+        leave_out: |model| model.reasoning_effort = None,
     },
     // OpenAI: "Invalid parameter: 'response_format' of type 'json_schema' is not supported with this model".
     Mend {
@@ -38,27 +57,42 @@ const MENDS: [Mend; 5] = [
             "responsejsonschema",
             "output_config.format",
         ],
+        key: "contract",
         parameter: "the schema of the reply",
         line: "contract = \"prompt\"",
+        leave_out: |model| model.contract = Contract::Prompt,
     },
     // OpenAI: "max_tokens is too large: ..."; Anthropic: "max_tokens: 200000 > 64000, which is the maximum allowed ...".
     Mend {
         words: &["max_completion_tokens", "max_tokens", "max_output_tokens", "maxoutputtokens"],
+        key: "max_output_tokens",
         parameter: "max_output_tokens",
         line: "max_output_tokens = 2048    # or another number that the message allows",
+        leave_out: |model| model.max_output_tokens = SHORT,
     },
     // OpenAI: "Unsupported value: 'temperature' does not support 0.2 with this model. Only the default (1) value is
     // supported."; Anthropic: "`temperature` is deprecated for this model."
-    Mend { words: &["temperature"], parameter: "temperature", line: "temperature = \"default\"" },
+    Mend {
+        words: &["temperature"],
+        key: "temperature",
+        parameter: "temperature",
+        line: "temperature = \"default\"",
+        leave_out: |model| model.temperature = None,
+    },
 ];
 
-pub(super) fn mend(error: &str, model: &str) -> String {
+/// The parameter that an error is about.
+pub(in crate::agent::vlm) fn refused(error: &str) -> Option<&'static Mend> {
     let said = error.to_lowercase().replace("\": \"", "\":\"");
     // What `param` names is meant, whatever else the message says.
     let named = |mend: &&Mend| mend.words.iter().any(|word| said.contains(&format!("\"param\":\"{word}\"")));
     let named_in = |mend: &&Mend| mend.words.iter().any(|word| said.contains(word));
-    let found = MENDS.iter().find(named).or_else(|| MENDS.iter().find(named_in));
-    found.map_or_else(String::new, |Mend { parameter, line, .. }| {
+    MENDS.iter().find(named).or_else(|| MENDS.iter().find(named_in))
+}
+
+/// What helps against an error about a parameter; empty for others.
+pub(in crate::agent::vlm) fn help(error: &str, model: &str) -> String {
+    refused(error).map_or_else(String::new, |Mend { parameter, line, .. }| {
         format!("\n  help: the parameter is {parameter}; in the entry [model.\"{model}\"] of a file for --models:\n    {line}")
     })
 }

@@ -6,12 +6,12 @@ use std::time::Duration;
 
 use backon::{BackoffBuilder as _, ExponentialBackoff, ExponentialBuilder};
 
+use super::Patience;
 use super::failure::Failure;
-use super::provider::Patience;
 
 /// The waits of one step.
 #[derive(Debug)]
-pub(super) struct Waiting {
+pub(in crate::agent::vlm) struct Waiting {
     patience: Patience,
     failed: u32,
     after_failures: ExponentialBackoff,
@@ -20,7 +20,7 @@ pub(super) struct Waiting {
 }
 
 impl Waiting {
-    pub(super) fn new(patience: Patience) -> Self {
+    pub(in crate::agent::vlm) fn new(patience: Patience) -> Self {
         let backoff = ExponentialBuilder::default()
             .with_min_delay(patience.first_delay)
             .with_max_delay(patience.longest_delay)
@@ -31,7 +31,7 @@ impl Waiting {
     }
 
     /// The wait before the next attempt; `None` if there is none.
-    pub(super) fn next(&mut self, failure: &Failure) -> Option<Duration> {
+    pub(in crate::agent::vlm) fn next(&mut self, failure: &Failure) -> Option<Duration> {
         if failure.kind.is_busy() { self.busy(failure.after) } else { self.failed(failure.after) }
     }
 

@@ -9,11 +9,11 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use tokio::sync::Notify;
 
-use super::ledger::{Entry, Ledger, Others};
+use super::ledger::Ledger;
+pub use super::spend::Spend;
+use super::spend::{Entry, Others};
 
 /// The limits of a run; `None` where there is none.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -24,53 +24,6 @@ pub struct Limits {
     pub tokens: Option<u64>,
     /// Requests, repeated ones included.
     pub requests: Option<u64>,
-}
-
-/// What was spent.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Spend {
-    /// US dollars of the replies whose cost is known.
-    pub cost_usd: f64,
-    /// Replies whose cost is not known.
-    pub uncosted: u64,
-    /// Requests without an answer that may have been paid: timed out, broken off, or killed.
-    pub unanswered: u64,
-    /// US dollars at most of these requests, and of the replies whose cost is not known, as far as prices are known.
-    pub uncosted_usd_at_most: f64,
-    /// Tokens of requests and replies together.
-    pub tokens: u64,
-    /// Requests that went out.
-    pub requests: u64,
-}
-
-impl Spend {
-    pub(super) fn add_unanswered(&mut self, at_most_usd: f64) {
-        self.unanswered += 1;
-        self.uncosted_usd_at_most += at_most_usd;
-    }
-
-    pub(super) fn add_answer(&mut self, tokens: u64, cost_usd: Option<f64>, at_most_usd: f64) {
-        self.tokens = self.tokens.saturating_add(tokens);
-        if let Some(cost) = cost_usd {
-            self.cost_usd += cost;
-        } else {
-            self.uncosted += 1;
-            self.uncosted_usd_at_most += at_most_usd;
-        }
-    }
-
-    pub(super) fn add(&mut self, other: &Self) {
-        self.cost_usd += other.cost_usd;
-        self.uncosted += other.uncosted;
-        self.unanswered += other.unanswered;
-        self.uncosted_usd_at_most += other.uncosted_usd_at_most;
-        self.tokens = self.tokens.saturating_add(other.tokens);
-        self.requests += other.requests;
-    }
-
-    fn cost_at_most(&self) -> f64 {
-        self.cost_usd + self.uncosted_usd_at_most
-    }
 }
 
 /// A limit that is reached.
@@ -130,6 +83,16 @@ impl Account {
     pub fn new(limits: Limits, spent: Spend) -> Self {
         let others = Others { spend: spent, ..Others::default() };
         Self { limits, state: Mutex::new(State { others, ..State::default() }), ..Self::default() }
+    }
+
+    /// Whether money is limited.
+    pub(in crate::agent::vlm) fn limits_cost(&self) -> bool {
+        self.limits.cost_usd.is_some()
+    }
+
+    /// Begins with what earlier starts of the run have spent.
+    pub(in crate::agent::vlm) fn begin_with(&self, spent: Spend) {
+        self.state().others.spend = spent;
     }
 
     /// Shares the account with other processes that record into a folder, by the ledger at this path. The first process begins

@@ -5,7 +5,16 @@ use std::time::Duration;
 use reqwest::StatusCode;
 use serde_json::Value;
 
+use super::parameter;
 use crate::agent::Status;
+
+/// What helps where a model takes no images.
+const SEES: &str = "\n  help: choose a model that sees; a server of one's own may have to be started with the model's part \
+                    for images (llama.cpp: --mmproj FILE)";
+
+/// What helps where a day's quota is used up.
+const TOMORROW: &str = "\n  help: the same command continues when the quota is renewed, or with a higher one; what was \
+                        answered is not asked again";
 
 /// Why there is no answer.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -60,11 +69,24 @@ impl FailureKind {
     }
 }
 
-pub(super) fn server(detail: String) -> Failure {
+impl Failure {
+    /// What happened to a request of this model, and what helps.
+    pub(in crate::agent::vlm) fn explained(&self, model: &str) -> String {
+        let Self { kind, detail, .. } = self;
+        match kind {
+            FailureKind::NoImages => format!("the model, or the server that runs it, takes no images: {detail}{SEES}"),
+            FailureKind::DailyQuota => format!("the provider's quota of the day is used up: {detail}{TOMORROW}"),
+            kind if kind.may_pass() => format!("the provider gave no answer: {}: {detail}", kind.status().name()),
+            _ => format!("the provider refuses the request: {detail}{}", parameter::help(detail, model)),
+        }
+    }
+}
+
+pub(in crate::agent::vlm) fn server(detail: String) -> Failure {
     Failure { kind: FailureKind::Server, detail, after: None, may_be_paid: true }
 }
 
-pub(super) fn shortened(text: &str) -> String {
+pub(in crate::agent::vlm) fn shortened(text: &str) -> String {
     const LONGEST: usize = 300;
     let line = text.split_whitespace().collect::<Vec<_>>().join(" ");
     match line.char_indices().nth(LONGEST) {
@@ -74,7 +96,7 @@ pub(super) fn shortened(text: &str) -> String {
 }
 
 /// A failure below HTTP. The address is left out: it may be a private one.
-pub(super) fn broken(error: reqwest::Error) -> Failure {
+pub(in crate::agent::vlm) fn broken(error: reqwest::Error) -> Failure {
     let kind = if error.is_timeout() { FailureKind::Timeout } else { FailureKind::Server };
     let may_be_paid = !error.is_connect();
     let error = error.without_url();
@@ -90,7 +112,7 @@ pub(super) fn broken(error: reqwest::Error) -> Failure {
     Failure { kind, detail, after: None, may_be_paid }
 }
 
-pub(super) fn failed(status: StatusCode, after: Option<Duration>, body: &str) -> Failure {
+pub(in crate::agent::vlm) fn failed(status: StatusCode, after: Option<Duration>, body: &str) -> Failure {
     let kind = match status {
         // Whatever the status: llama.cpp says it as a failure of the server, others as a bad request.
         _ if takes_no_images(body) => FailureKind::NoImages,
@@ -114,7 +136,7 @@ pub(super) fn failed(status: StatusCode, after: Option<Duration>, body: &str) ->
     Failure { kind, detail, after, may_be_paid: kind == FailureKind::Timeout }
 }
 
-pub(super) fn no_answer(body: &str) -> Failure {
+pub(in crate::agent::vlm) fn no_answer(body: &str) -> Failure {
     let kind = if takes_no_images(body) { FailureKind::NoImages } else { FailureKind::Server };
     let detail = format!("the answer is not of the provider's language: {}", shortened(body));
     Failure { kind, detail, after: None, may_be_paid: false }

@@ -1,0 +1,95 @@
+//! JSON as Python writes it: `NaN` and infinities stand for no number, and become null.
+
+use std::io::{self, BufReader, Read};
+
+use memchr::memmem;
+use serde::de::DeserializeOwned;
+
+/// The value of a text, with null for numbers that are none.
+pub(super) fn from_slice<T: DeserializeOwned>(bytes: &[u8]) -> serde_json::Result<T> {
+    match serde_json::from_slice(bytes) {
+        Err(_) if [&b"NaN"[..], b"Infinity"].iter().any(|word| memmem::find(bytes, word).is_some()) => {
+            serde_json::from_reader(WithoutNan::new(bytes))
+        }
+        read => read,
+    }
+}
+
+/// Gives `null` for `NaN`, `Infinity` and `-Infinity` outside of texts.
+pub(super) struct WithoutNan<R> {
+    bytes: io::Bytes<BufReader<R>>,
+    /// What is still to be given; the next byte is its last.
+    pending: Vec<u8>,
+    in_text: bool,
+    escaped: bool,
+}
+
+impl<R: Read> WithoutNan<R> {
+    pub(super) fn new(reader: R) -> Self {
+        Self { bytes: BufReader::new(reader).bytes(), pending: Vec::new(), in_text: false, escaped: false }
+    }
+
+    fn next(&mut self) -> io::Result<Option<u8>> {
+        if let Some(byte) = self.pending.pop() {
+            return Ok(Some(byte));
+        }
+        let Some(byte) = self.bytes.next().transpose()? else { return Ok(None) };
+        if self.in_text {
+            self.in_text = byte != b'"' || self.escaped;
+            self.escaped = byte == b'\\' && !self.escaped;
+            return Ok(Some(byte));
+        }
+        self.in_text = byte == b'"';
+        if !matches!(byte, b'N' | b'I' | b'-') {
+            return Ok(Some(byte));
+        }
+        self.word(byte)
+    }
+
+    /// The first byte of `null`, or of what is not one of the words.
+    fn word(&mut self, first: u8) -> io::Result<Option<u8>> {
+        let mut word = vec![first];
+        while ["NaN", "Infinity", "-Infinity"].iter().any(|whole| whole.as_bytes().starts_with(&word)) {
+            if ["NaN", "Infinity", "-Infinity"].iter().any(|whole| whole.as_bytes() == word) {
+                word = b"null".to_vec();
+                break;
+            }
+            match self.bytes.next().transpose()? {
+                Some(byte) => word.push(byte),
+                None => break,
+            }
+        }
+        self.in_text = word.last() == Some(&b'"');
+        self.pending = word.into_iter().rev().collect();
+        Ok(self.pending.pop())
+    }
+}
+
+impl<R: Read> Read for WithoutNan<R> {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        for (at, slot) in out.iter_mut().enumerate() {
+            match self.next()? {
+                Some(byte) => *slot = byte,
+                None => return Ok(at),
+            }
+        }
+        Ok(out.len())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::{Value, json};
+
+    use super::from_slice;
+
+    #[test]
+    fn only_numbers_that_are_none_become_null() {
+        let text = r#"{"a":NaN,"b":[-Infinity,Infinity,-1.5],"c":"NaN \" Infinity \\","d":"-","e":NaN}"#;
+        let expected = json!({"a": null, "b": [null, null, -1.5], "c": "NaN \" Infinity \\", "d": "-", "e": null});
+        assert_eq!(from_slice::<Value>(text.as_bytes()).unwrap(), expected);
+        for wrong in ["{\"a\":Nan,\"b\":NaN}", "{\"a\":-\"x\",\"b\":NaN}", "{\"a\":NaN", "-Inf"] {
+            from_slice::<Value>(wrong.as_bytes()).unwrap_err();
+        }
+    }
+}

@@ -1,0 +1,149 @@
+//! Files of other harnesses as rows. Each format is one file; all rows go through one mapping and become lines of steps.
+//!
+//! Rule: a key that a format does not say is absent or null, and records that are not steps are counted and named.
+
+mod csv;
+mod eval_archive;
+mod inspect;
+mod inspect_robots;
+mod json;
+mod json_log;
+mod lerobot;
+mod parquet;
+
+use std::fs::File;
+use std::io::{BufWriter, Read as _, Seek as _, Write as _};
+use std::path::Path;
+
+use serde_json::{Map, Value};
+
+use super::error::ImportError;
+use super::fault::Fault;
+use super::line;
+use super::mapping::{Mapping, Row};
+use super::text::BYTE_ORDER_MARK;
+use exact::input;
+
+/// How the steps of a file are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// One object per line.
+    JsonLines,
+    /// A header and one record per step.
+    Csv,
+    /// One row per step, of any shape.
+    Parquet,
+    /// A log of Inspect, `.eval` or `.json`.
+    Inspect,
+    /// The `EvalLog` of inspect-robots.
+    InspectRobots,
+    /// `eval_info.json`, or the Parquet files of a dataset.
+    LeRobot,
+}
+
+exact::names!(Format {
+    JsonLines: "jsonl",
+    Csv: "csv",
+    Parquet: "parquet",
+    Inspect: "inspect",
+    InspectRobots: "inspect-robots",
+    LeRobot: "lerobot",
+});
+
+/// How much of a JSON file says whose it is.
+const HEAD: u64 = 64 << 10;
+
+impl Format {
+    /// The format that a file's name and first bytes show; JSON Lines if they show no other.
+    pub fn of_file(path: &Path) -> Self {
+        match path.extension().and_then(|ending| ending.to_str()) {
+            Some("csv") => Self::Csv,
+            Some("parquet") => Self::Parquet,
+            Some("eval") => Self::Inspect,
+            Some("json") => Self::of_json(path),
+            _ => Self::JsonLines,
+        }
+    }
+
+    fn of_json(path: &Path) -> Self {
+        let mut head = Vec::new();
+        let _ = input::open(path).and_then(|file| file.take(HEAD).read_to_end(&mut head));
+        let head = String::from_utf8_lossy(&head);
+        let has = |key: &str| head.contains(key);
+        match () {
+            () if has("\"inspect_robots_version\"") => Self::InspectRobots,
+            () if has("\"per_episode\"") || has("\"per_task\"") => Self::LeRobot,
+            () if has("\"eval\"") && has("\"status\"") && has("\"version\"") => Self::Inspect,
+            () => Self::JsonLines,
+        }
+    }
+
+    /// What one step of a file is called in messages.
+    pub(super) const fn noun(self) -> &'static str {
+        if matches!(self, Self::JsonLines) { "line" } else { "row" }
+    }
+
+    pub(super) fn read(self, mut file: File, rows: &mut Rows<'_>) -> Result<(), ImportError> {
+        file.rewind().map_err(ImportError::read(&rows.file))?;
+        match self {
+            Self::JsonLines => Ok(()),
+            Self::Csv => csv::read(&file, rows),
+            Self::Parquet => parquet::read(file, rows),
+            Self::Inspect => inspect::read(file, rows),
+            Self::InspectRobots => inspect_robots::read(file, rows),
+            Self::LeRobot => lerobot::read(file, rows),
+        }
+    }
+}
+
+/// Where rows go: through a mapping into a temporary file of lines.
+pub(super) struct Rows<'m> {
+    /// The file of the user, as messages name it.
+    pub(super) file: String,
+    pub(super) mapping: &'m mut Mapping,
+    out: BufWriter<File>,
+}
+
+impl<'m> Rows<'m> {
+    pub(super) fn new(file: &str, mapping: &'m mut Mapping) -> Result<Self, ImportError> {
+        let out = tempfile::tempfile().map_err(ImportError::read(file))?;
+        Ok(Self { file: file.to_owned(), mapping, out: BufWriter::new(out) })
+    }
+
+    pub(super) fn add(&mut self, row: &Row<'_>) -> Result<(), ImportError> {
+        let mut line = serde_json::to_vec(&self.mapping.flat(row)).unwrap_or_default();
+        line.push(b'\n');
+        self.write(&line)
+    }
+
+    pub(super) fn add_object(&mut self, object: &Map<String, Value>) -> Result<(), ImportError> {
+        let row: Vec<_> = object.iter().map(|(key, value)| (key.as_str(), value)).collect();
+        self.add(&row)
+    }
+
+    /// A line of JSON Lines; false at the end. What is not an object stays as it is, for the import to refuse.
+    pub(super) fn add_line(&mut self, line: &[u8]) -> Result<bool, ImportError> {
+        let bytes = line.strip_prefix(BYTE_ORDER_MARK).unwrap_or(line);
+        let object = line::members(bytes, true).ok().and_then(|_| serde_json::from_slice(bytes.trim_ascii()).ok());
+        match object {
+            Some(object) => self.add_object(&object)?,
+            None => self.write(bytes)?,
+        }
+        Ok(!line.is_empty())
+    }
+
+    /// A fault of the whole file, or of a part of it.
+    pub(super) fn fault(&self, part: &str, expected: &str, found: impl Into<String>, help: &str) -> ImportError {
+        let file = if part.is_empty() { self.file.clone() } else { format!("{}, {part}", self.file) };
+        Fault { file, ..Fault::new(expected, found, help) }.into()
+    }
+
+    pub(super) fn finish(self) -> Result<File, ImportError> {
+        let Self { file, out, .. } = self;
+        out.into_inner().map_err(|error| ImportError::read(&file)(error.into_error()))
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> Result<(), ImportError> {
+        self.out.write_all(bytes).map_err(ImportError::read(&self.file))
+    }
+}

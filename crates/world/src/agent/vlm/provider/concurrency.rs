@@ -1,0 +1,228 @@
+//! How many requests a provider gets at once: one more after a round of good answers, half as many after a reply that
+//! says that there were too many; none before a rate limit is renewed, and no more in a minute than the user says.
+//!
+//! When the next request may go out is shared by all processes that record into a folder with the same account.
+
+use std::io;
+use std::path::Path;
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
+use std::time::{Duration, SystemTime};
+
+use serde::{Deserialize, Serialize};
+use tokio::sync::Semaphore;
+use tokio::time::sleep;
+
+use crate::agent::vlm::spending::shared_file::SharedFile;
+
+/// The concurrency of one provider, shared by all episodes.
+#[derive(Debug)]
+pub struct Pace {
+    permits: Semaphore,
+    state: Mutex<State>,
+    /// The time between two requests; zero if the user says nothing.
+    interval: Duration,
+    shared: OnceLock<SharedFile>,
+}
+
+#[derive(Debug)]
+struct State {
+    limit: usize,
+    most: usize,
+    /// Permits to swallow as they come back, after the limit fell below what was out.
+    debt: usize,
+    /// Good answers since the limit last changed.
+    good: usize,
+    gate: Gate,
+}
+
+/// When an account takes requests, as times since 1970.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+struct Gate {
+    /// A rate limit is renewed then.
+    not_before: Duration,
+    /// The next request of the user's rate is due then.
+    next: Duration,
+}
+
+/// A request that may go out; counts as out until it is dropped.
+#[derive(Debug)]
+pub struct Turn<'a> {
+    pace: &'a Pace,
+}
+
+impl Pace {
+    /// At most `most` requests at once, and at least one; one in each `interval`.
+    pub fn new(most: usize, interval: Duration) -> Self {
+        let most = most.clamp(1, Semaphore::MAX_PERMITS);
+        let state = State { limit: most, most, debt: 0, good: 0, gate: Gate::default() };
+        Self { permits: Semaphore::new(most), state: Mutex::new(state), interval, shared: OnceLock::new() }
+    }
+
+    /// Shares when requests may go out with other processes, by a file.
+    pub fn share(&self, path: &Path) -> io::Result<()> {
+        let file = SharedFile::open(path)?;
+        // A second time changes nothing.
+        let _ = self.shared.set(file);
+        Ok(())
+    }
+
+    /// Waits until a request may go out.
+    pub async fn turn(&self) -> Turn<'_> {
+        // The semaphore is never closed, so that there is no other outcome than a permit.
+        if let Ok(permit) = self.permits.acquire().await {
+            permit.forget();
+        }
+        let turn = Turn { pace: self };
+        let mut at = Duration::ZERO;
+        if !self.interval.is_zero() {
+            at = self.gate(|gate| {
+                let due = gate.next.max(gate.not_before).max(now());
+                gate.next = due + self.interval;
+                due
+            });
+        }
+        // A rate limit may be used up while this one waits.
+        while let Some(wait) =
+            at.max(self.gate(|gate| gate.not_before)).checked_sub(now()).filter(|wait| !wait.is_zero())
+        {
+            sleep(wait).await;
+        }
+        turn
+    }
+
+    /// Lets no request out for this time.
+    pub fn pause(&self, wait: Duration) {
+        self.gate(|gate| gate.not_before = gate.not_before.max(now().saturating_add(wait)));
+    }
+
+    /// Looks at when requests may go out, and changes it for all processes.
+    fn gate<T>(&self, change: impl FnOnce(&mut Gate) -> T) -> T {
+        let mut state = self.state();
+        let Some(file) = self.shared.get() else { return change(&mut state.gate) };
+        file.locked(|| {
+            let read: Gate = file.read().unwrap_or_default();
+            let mut gate = read;
+            let outcome = change(&mut gate);
+            if gate != read {
+                // A file that cannot be written shares nothing.
+                let _ = file.write(&gate);
+            }
+            outcome
+        })
+    }
+
+    /// How many requests may be out now.
+    pub fn limit(&self) -> usize {
+        self.state().limit
+    }
+
+    pub fn good(&self) {
+        let mut state = self.state();
+        state.good += 1;
+        if state.good >= state.limit && state.limit < state.most {
+            state.limit += 1;
+            state.good = 0;
+            self.give_back(&mut state);
+        }
+    }
+
+    /// The provider said that it gets too many requests.
+    pub fn too_many(&self) {
+        let mut state = self.state();
+        let lower = (state.limit / 2).max(1);
+        let fewer = state.limit - lower;
+        state.debt += fewer - self.permits.forget_permits(fewer);
+        state.limit = lower;
+        state.good = 0;
+    }
+
+    fn give_back(&self, state: &mut State) {
+        if state.debt > 0 {
+            state.debt -= 1;
+        } else {
+            self.permits.add_permits(1);
+        }
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+fn now() -> Duration {
+    SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default()
+}
+
+impl Drop for Turn<'_> {
+    fn drop(&mut self) {
+        let mut state = self.pace.state();
+        self.pace.give_back(&mut state);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Instant;
+
+    use super::{Duration, Pace};
+
+    fn free(pace: &Pace) -> usize {
+        pace.permits.available_permits()
+    }
+
+    #[tokio::test]
+    async fn too_many_halves_and_good_answers_add_one() {
+        let pace = Pace::new(8, Duration::ZERO);
+        let turns = [pace.turn().await, pace.turn().await, pace.turn().await, pace.turn().await, pace.turn().await];
+        pace.too_many();
+        assert_eq!((pace.limit(), free(&pace)), (4, 0));
+        drop(turns);
+        assert_eq!(free(&pace), 4, "one of five was over the new limit");
+        for _ in 0..4 {
+            pace.good();
+        }
+        assert_eq!((pace.limit(), free(&pace)), (5, 5));
+    }
+
+    #[tokio::test]
+    async fn nobody_asks_before_a_pause_is_over() {
+        let (pace, start) = (Pace::new(2, Duration::ZERO), Instant::now());
+        pace.pause(Duration::from_millis(50));
+        pace.pause(Duration::from_millis(1));
+        let turns = [pace.turn().await, pace.turn().await];
+        assert!(start.elapsed() >= Duration::from_millis(50));
+        drop(turns);
+        assert_eq!(free(&pace), 2);
+    }
+
+    #[tokio::test]
+    async fn processes_of_a_folder_share_pauses_and_the_rate() {
+        let folder = tempfile::tempdir().unwrap();
+        let [one, other] = [(); 2].map(|()| Pace::new(8, Duration::from_millis(20)));
+        for pace in [&one, &other] {
+            pace.share(&folder.path().join("ledger/at.json")).unwrap();
+        }
+        let start = Instant::now();
+        for _ in 0..3 {
+            drop((one.turn().await, other.turn().await));
+        }
+        assert!(start.elapsed() >= Duration::from_millis(100), "six requests, 20 ms apart: {:?}", start.elapsed());
+        one.pause(Duration::from_millis(150));
+        let start = Instant::now();
+        drop(other.turn().await);
+        assert!(start.elapsed() >= Duration::from_millis(140), "{:?}", start.elapsed());
+    }
+
+    #[tokio::test]
+    async fn one_request_is_always_allowed_and_the_most_is_kept() {
+        let pace = Pace::new(2, Duration::ZERO);
+        for _ in 0..5 {
+            pace.too_many();
+        }
+        assert_eq!((pace.limit(), free(&pace)), (1, 1));
+        for _ in 0..9 {
+            pace.good();
+        }
+        assert_eq!((pace.limit(), free(&pace)), (2, 2));
+    }
+}

@@ -1,0 +1,62 @@
+//! One request of a model: its body, and what an answer to it cost.
+
+use serde_json::Value;
+
+use super::models::{Choice, Contract, Prices, merge};
+use super::wire_format::{Answer, Dialect, Question};
+use crate::agent::prompt;
+
+/// A service tier at half the price.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Tier {
+    /// Answers take minutes.
+    Flex,
+    /// Requests go out in batches, whose answers take hours at most.
+    Batch,
+}
+
+/// A provider without a tier.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "the backend `{backend}` has no such tier\n  help: OpenAI (openai-chat) and Google (gemini) have --tier flex, Anthropic \
+     (anthropic-messages) has --tier batch"
+)]
+pub struct NoTier {
+    backend: String,
+}
+
+impl Choice {
+    /// Asks for a tier, at half the price.
+    pub fn use_tier(&mut self, tier: Tier) -> Result<(), NoTier> {
+        match (tier, self.backend.dialect.tier_key(), self.backend.dialect) {
+            (Tier::Flex, Some(key), _) => drop(self.model.extra_body.insert(key.to_owned(), "flex".into())),
+            (Tier::Batch, _, Dialect::AnthropicMessages) => {}
+            _ => return Err(NoTier { backend: self.model.backend.clone() }),
+        }
+        let Prices { input, cached_input, output } = self.model.prices;
+        let [input, cached_input, output] = [input, cached_input, output].map(|price| price.map(|price| price / 2.0));
+        self.model.prices = Prices { input, cached_input, output };
+        Ok(())
+    }
+
+    /// The body of a request with this frame, as PNG in base64.
+    pub(super) fn body(&self, words: &prompt::Rendered, schema: &Value, png: &str) -> Value {
+        let mut body = self.backend.dialect.body(&Question {
+            model: &self.model.id,
+            system: &words.system,
+            user: &words.user,
+            png_base64: png,
+            schema: (self.model.contract == Contract::Schema).then_some(schema),
+            temperature: self.model.temperature,
+            max_output_tokens: self.model.max_output_tokens(),
+            reasoning_effort: self.model.reasoning_effort,
+        });
+        merge(&mut body, &self.extra_body().into());
+        body
+    }
+
+    /// What an answer cost, US dollars: as the provider says, else by its tokens.
+    pub(super) fn cost_usd(&self, answer: &Answer) -> Option<f64> {
+        answer.cost_usd.or_else(|| self.model.prices.cost_usd(answer))
+    }
+}

@@ -1,0 +1,51 @@
+//! A file by which processes tell each other numbers.
+
+use std::fs::{File, OpenOptions};
+use std::io::{self, Read as _, Seek as _, Write as _};
+use std::path::Path;
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use exact::replace::{folder_of, make_folder};
+
+/// A small file that all processes of a folder read and write under its lock. Where the file system has no locks, each process
+/// is alone.
+#[derive(Debug)]
+pub(in crate::agent::vlm) struct SharedFile(File);
+
+impl SharedFile {
+    pub(in crate::agent::vlm) fn open(path: &Path) -> io::Result<Self> {
+        make_folder(folder_of(path))?;
+        OpenOptions::new().create(true).truncate(false).read(true).write(true).open(path).map(Self)
+    }
+
+    pub(in crate::agent::vlm) fn into_file(self) -> File {
+        self.0
+    }
+
+    /// Does this while no other process reads or writes the file.
+    pub(in crate::agent::vlm) fn locked<T>(&self, work: impl FnOnce() -> T) -> T {
+        let _ = self.0.lock();
+        let done = work();
+        let _ = self.0.unlock();
+        done
+    }
+
+    pub(in crate::agent::vlm) fn read<T: DeserializeOwned>(&self) -> io::Result<T> {
+        let mut text = String::new();
+        let mut file = &self.0;
+        file.rewind()?;
+        file.read_to_string(&mut text)?;
+        Ok(serde_json::from_str(&text)?)
+    }
+
+    pub(in crate::agent::vlm) fn write(&self, content: &impl Serialize) -> io::Result<()> {
+        let mut text = serde_json::to_vec(content)?;
+        let before = usize::try_from(self.0.metadata()?.len()).unwrap_or_default();
+        text.resize(text.len().max(before), b' ');
+        let mut file = &self.0;
+        file.rewind()?;
+        file.write_all(&text)
+    }
+}

@@ -1,0 +1,189 @@
+//! Recorded replies read again by the parser of this program.
+//!
+//! Rule: recorded actions stay, since the world has answered them. An episode whose action would have been another one has
+//! diverged from the first such step on, and is named. A reply that the provider declined or cut off stays as it is.
+
+use std::path::Path;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+use serde_json::Value;
+
+use crate::agent::Status;
+use crate::agent::reply::{self, Ending, Reading, Repair};
+use crate::experiment::{Experiment, Spec};
+use trace::episode::{Action, Episode, Step};
+use trace::error::TraceError;
+use trace::inputs::Input;
+use trace::open::TraceFile;
+use trace::renormalize::put_version;
+use trace::schema::RECORDING_KEY;
+use trace::write::merge::{self, NotAnEpisode};
+use trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
+
+/// What another reading of the same replies changes.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct ReparseAnswer {
+    /// The new traces.
+    pub traces: Vec<String>,
+    /// Replies that were read.
+    pub replies: u64,
+    /// Every attribution, decision and status that changes, by trace and row.
+    pub changes: Vec<Change>,
+    /// The episodes that would have gone on otherwise.
+    pub diverged: Vec<Diverged>,
+}
+
+/// A value of a step that changes.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Change {
+    /// The episode.
+    pub episode_id: String,
+    /// The timestep.
+    pub t: usize,
+    /// The column: `self_color`, `selected_cube`, `mark_report` or `reply_status`.
+    pub column: &'static str,
+    /// The recorded value; null where there is none.
+    pub before: Option<String>,
+    /// The value by this program; null where there is none.
+    pub after: Option<String>,
+}
+
+/// The first step of an episode whose action would have been another one.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Diverged {
+    /// The episode.
+    pub episode_id: String,
+    /// The timestep.
+    pub t: usize,
+    /// The recorded action, which stays; null where the agent stood still.
+    pub recorded: Option<&'static str>,
+    /// The action by this program; null where the agent would have stood still.
+    pub parsed: Option<&'static str>,
+}
+
+/// Why no trace was written.
+#[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
+pub enum ReparseError {
+    #[error(transparent)]
+    Trace(#[from] TraceError),
+    #[error("{file}: {error}")]
+    Episode { file: String, error: NotAnEpisode },
+    #[error(
+        "{file}: expected an experiment and the column `reply` of raw replies, found {found}\n  help: leave the trace out; \
+         only recordings of agents that reply in words have them"
+    )]
+    NoReplies { file: String, found: String },
+}
+
+impl ReparseAnswer {
+    /// Reads the replies of traces again, and writes new traces into a folder that is there; their names must differ.
+    pub fn of(inputs: &[Input], folder: &Path) -> Result<(Self, Vec<Input>), ReparseError> {
+        let mut answer = Self::default();
+        let mut written = Vec::new();
+        for input in inputs {
+            let target = folder.join(input.path.file_name().unwrap_or_default());
+            answer.add_trace(input, &target)?;
+            written.push(Input::new(&target));
+        }
+        answer.traces = written.iter().map(|input| input.name.clone()).collect();
+        Ok((answer, written))
+    }
+
+    fn add_trace(&mut self, input: &Input, target: &Path) -> Result<(), ReparseError> {
+        let (mut recording, experiment) = recipe(input)?;
+        put_version(&mut recording);
+        let columns = OptionalColumns::recorded(&recording);
+        let mut writer = TraceWriter::create(target, &TraceMetadata { recording: Some(recording), columns })?;
+        for rows in merge::read(&input.path)? {
+            let failed = |error| ReparseError::Episode { file: input.name.clone(), error };
+            let mut episode = rows.episode().map_err(failed)?;
+            self.add_episode(&mut episode, &experiment);
+            writer.write(&episode)?;
+        }
+        Ok(writer.finish()?)
+    }
+
+    fn add_episode(&mut self, episode: &mut Episode, experiment: &Spec) {
+        let id = episode.episode_id.clone();
+        let mut has_diverged = false;
+        for (at, step) in episode.steps.iter_mut().enumerate() {
+            let Some(reading) = read_again(step, experiment) else { continue };
+            self.replies += 1;
+            if reading.action != step.action && !has_diverged {
+                has_diverged = true;
+                let [recorded, parsed] = [step.action, reading.action].map(|action| action.map(Action::name));
+                self.diverged.push(Diverged { episode_id: id.clone(), t: at + 1, recorded, parsed });
+            }
+            let before = compared(step);
+            put(step, reading);
+            for ((column, before), (_, after)) in before.into_iter().zip(compared(step)) {
+                if before != after {
+                    self.changes.push(Change { episode_id: id.clone(), t: at + 1, column, before, after });
+                }
+            }
+        }
+    }
+}
+
+/// What the footer says of the recording, and its experiment.
+fn recipe(input: &Input) -> Result<(Value, Experiment), ReparseError> {
+    let none = |found: &str| ReparseError::NoReplies { file: input.name.clone(), found: found.to_owned() };
+    let file = TraceFile::open(input).map_err(|findings| {
+        TraceError::of(findings).map_or_else(|| none("a file that cannot be opened"), ReparseError::from)
+    })?;
+    if file.column("reply").is_none() {
+        return Err(none("no such column"));
+    }
+    let recording: Value =
+        file.metadata_value(RECORDING_KEY).and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default();
+    let spec =
+        serde_json::from_value::<Spec>(recording["experiment"].clone()).map_err(|fault| none(&fault.to_string()))?;
+    let experiment = Experiment::of_footer(spec).map_err(|fault| none(&fault.to_string()))?;
+    Ok((recording, experiment))
+}
+
+fn read_again(step: &Step, experiment: &Spec) -> Option<Reading> {
+    let status = step.extra.reply_status.as_deref().and_then(Status::named)?;
+    // How the provider ended them is not in their text.
+    if matches!(status, Status::Refusal | Status::Truncated) {
+        return None;
+    }
+    let reading = reply::read(step.extra.reply.as_deref()?, experiment, Ending::Whole);
+    let repairs = step.extra.reply_repair.as_deref().unwrap_or_default();
+    let carried = [Repair::Surrogate, Repair::ToolCall]
+        .into_iter()
+        .filter(|repair| repairs.split('+').any(|name| name == repair.name()));
+    Some(reading.after(&carried.collect::<Vec<_>>()))
+}
+
+fn compared(step: &Step) -> [(&'static str, Option<String>); 4] {
+    let Step { self_color, selected_cube, extra, .. } = step;
+    let of = |column, value: &Option<String>| (column, value.clone());
+    [
+        of("self_color", self_color),
+        of("selected_cube", selected_cube),
+        of("mark_report", &extra.mark_report),
+        of("reply_status", &extra.reply_status),
+    ]
+}
+
+/// Puts a reading in the place of the recorded one, without its action.
+fn put(step: &mut Step, reading: Reading) {
+    let extra = &mut step.extra;
+    if step.selected_cube != reading.selected_cube {
+        // Its distance was to the recorded cube.
+        extra.cube_distance = None;
+    }
+    step.self_color = reading.self_color;
+    step.selected_cube = reading.selected_cube;
+    extra.mark_report = reading.mark_report;
+    extra.reply_status = Some(reading.status.name().to_owned());
+    extra.reply_repair = Repair::joined(&reading.repairs);
+    extra.reply_fault = reading.fault;
+    extra.view_description = reading.words.view_description;
+    extra.reasoning = reading.words.reasoning;
+    extra.summary = reading.words.summary;
+    extra.identification = reading.words.identification;
+}

@@ -1,0 +1,21 @@
+#!/bin/sh
+# The checks before a release: versions, changelog, generated files, book, report, wheel. Says each check; stops at the first that fails.
+set -eu
+cd "$(dirname "$0")/.."
+version=$(sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml | head -1)
+fail() { echo "release-check: $1" >&2; exit 1; }
+
+echo "release-check: version $version"
+grep -q "^version: $version" CITATION.cff || fail "CITATION.cff has another version: expected $version"
+grep -q "^## \[$version\]" CHANGELOG.md || fail "CHANGELOG.md has no section [$version]: rename Unreleased"
+[ -z "$(git status --porcelain)" ] || fail "the tree is not clean: commit or remove the changes"
+echo "release-check: schemas and reference"
+cargo test --quiet --all-features --test house schemas
+cargo test --quiet --all-features --test command_line reference
+echo "release-check: book"
+scripts/book.sh
+echo "release-check: the paper's report"
+scripts/end-to-end.sh
+echo "release-check: wheel"
+scripts/test-wheel.sh
+echo "release-check: all passed; tag v$version"

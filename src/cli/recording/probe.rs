@@ -1,0 +1,54 @@
+//! What `record --probe` says of a model.
+
+use std::io;
+
+use crate::cli::recording::dollars;
+use crate::cli::text_table::counted;
+use exact::escape::{visible, visible_lines};
+use world::agent::vlm::probe::{ProbeAnswer, ProbedParameter};
+
+/// Tells what a model takes, for people.
+pub(crate) fn tell(out: &mut impl io::Write, answer: &ProbeAnswer) -> io::Result<()> {
+    let (model, id) = (visible(&answer.model), visible(&answer.id));
+    let requests = counted(u64::from(answer.requests), "request");
+    match &answer.fault {
+        Some(fault) => writeln!(out, "{model} ({id}): no answer after {requests}: {}", visible_lines(fault))?,
+        None => writeln!(out, "{model} ({id}): {} after {requests}", answered(answer))?,
+    }
+    let with_line = |parameter: &&ProbedParameter| parameter.line.is_some();
+    if answer.parameters.iter().any(|parameter| with_line(&parameter)) {
+        writeln!(out, "  the entry [model.\"{model}\"] of a file for --models needs the lines below")?;
+    }
+    answer.parameters.iter().try_for_each(|parameter| {
+        let taken = match (parameter.taken, parameter.name.as_str()) {
+            (Some(true), "contract") => schema(answer.enforces_schema).to_owned(),
+            (Some(true), _) => "taken".to_owned(),
+            (Some(false), _) => format!("refused: {}", parameter.line.as_deref().unwrap_or_default()),
+            (None, _) => "unknown".to_owned(),
+        };
+        writeln!(out, "  {} = {}: {taken}", visible(&parameter.name), visible(&parameter.value.to_string()))
+    })
+}
+
+fn answered(answer: &ProbeAnswer) -> String {
+    let by = match (&answer.answered_by, answer.is_model) {
+        (None, _) => "an answer that names no model".to_owned(),
+        (Some(id), true) => format!("answered by `{}`", visible(id)),
+        (Some(id), false) => format!("another model answers, `{0}`: --accept-model {0} records it,", visible(id)),
+    };
+    let count = |tokens: Option<u32>| tokens.map_or_else(|| "an unknown number".to_owned(), |count| count.to_string());
+    let (prompt, completion) = (count(answer.prompt_tokens), count(answer.completion_tokens));
+    let cost = answer.cost_usd.map_or_else(|| "an unknown cost".to_owned(), dollars);
+    format!(
+        "{by} in {} ms, for {cost}: {prompt} of tokens sent, {completion} received,",
+        answer.latency_ms.unwrap_or_default()
+    )
+}
+
+fn schema(is_enforced: Option<bool>) -> &'static str {
+    match is_enforced {
+        Some(true) => "taken and enforced",
+        Some(false) => "taken, and not enforced: the prompt alone asks for the shape of replies",
+        None => "taken; the answer does not show whether it is enforced",
+    }
+}

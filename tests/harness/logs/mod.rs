@@ -1,0 +1,89 @@
+//! Logs of other harnesses: those whose packages make them here, and LeRobot's in their documented layout.
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+use std::sync::Arc;
+
+use arrow::array::RecordBatch;
+use arrow::datatypes::{DataType, Field, Schema};
+use arrow::json::ReaderBuilder;
+use serde_json::{Value, json};
+
+use super::files::repository;
+use super::need;
+use super::program::{clean, succeeds};
+use super::traces::write_rows;
+
+/// Logs of two agents by Inspect's mock model in this folder: see the script.
+pub fn inspect(folder: &Path) {
+    made_by("inspect_logs.py", folder);
+}
+
+/// Logs of two mock policies of inspect-robots in this folder.
+pub fn inspect_robots(folder: &Path) {
+    made_by("robots_logs.py", folder);
+}
+
+fn made_by(script: &str, folder: &Path) {
+    let mut command = clean(Command::new(need::python()), folder.parent().unwrap());
+    command.env("PYTHONPATH", need::harnesses()).env("HOME", folder.parent().unwrap());
+    succeeds(command.arg(repository().join("tests/harness/logs").join(script)).arg(folder));
+}
+
+/// `lerobot-eval`'s answer: who solved which episode.
+pub fn lerobot_evaluation(path: &Path, successes: &[bool]) {
+    let episode = |(at, success): (usize, &bool)| {
+        json!({ "episode_ix": at, "sum_reward": f64::from(u8::from(*success)) + 0.5, "max_reward": null,
+                "success": success, "seed": 1000 + at })
+    };
+    let episodes: Vec<Value> = successes.iter().enumerate().map(episode).collect();
+    let info = json!({ "per_episode": episodes, "aggregated": { "pc_success": 50.0 } });
+    fs::write(path, info.to_string().replace("null", "NaN")).unwrap();
+}
+
+/// A data set of LeRobot, version 3: `data/chunk-000/file-000.parquet` with the frames of all episodes. Episode `i` is
+/// solved at frame `solved[i]`, or never; its actions are smooth, or jump at each frame.
+pub fn lerobot_data_set(folder: &Path, solved: &[Option<u32>], is_smooth: bool) {
+    const FRAMES: u32 = 8;
+    let frame = |episode: usize, solved: Option<u32>, at: u32| {
+        let side = if is_smooth { 0.1 } else { f64::from(at % 2) * 3.0 };
+        json!({
+            "observation.state": [0.5, f64::from(at)], "action": [side, side + f64::from(at) * 0.25],
+            "timestamp": f64::from(at) / 10.0, "frame_index": at, "episode_index": episode,
+            "index": u32::try_from(episode).unwrap() * FRAMES + at, "task_index": 0,
+            "next.reward": 0.0, "next.success": solved == Some(at), "next.done": at + 1 == FRAMES,
+        })
+    };
+    let of_episode = |(episode, solved): (usize, &Option<u32>)| -> Vec<Value> {
+        (0..FRAMES).map(|at| frame(episode, *solved, at)).collect()
+    };
+    let frames: Vec<Value> = solved.iter().enumerate().flat_map(of_episode).collect();
+    let pair = || DataType::new_list(DataType::Float32, true);
+    let schema = Schema::new(
+        [
+            ("observation.state", pair()),
+            ("action", pair()),
+            ("timestamp", DataType::Float32),
+            ("frame_index", DataType::Int64),
+            ("episode_index", DataType::Int64),
+            ("index", DataType::Int64),
+            ("task_index", DataType::Int64),
+            ("next.reward", DataType::Float32),
+            ("next.success", DataType::Boolean),
+            ("next.done", DataType::Boolean),
+        ]
+        .map(|(name, kind)| Field::new(name, kind, true))
+        .to_vec(),
+    );
+    let path = folder.join("data/chunk-000/file-000.parquet");
+    fs::create_dir_all(path.parent().unwrap()).unwrap();
+    write_rows(&path, &[batch(schema, &frames)], None);
+}
+
+/// Rows of JSON in columns of these types.
+pub fn batch(schema: Schema, rows: &[Value]) -> RecordBatch {
+    let mut decoder = ReaderBuilder::new(Arc::new(schema)).build_decoder().unwrap();
+    decoder.serialize(rows).unwrap();
+    decoder.flush().unwrap().unwrap()
+}

@@ -1,0 +1,183 @@
+//! CSV, Parquet of any shape, LeRobot and inspect-robots on their way in.
+
+use std::fs;
+use std::path::Path;
+
+use arrow::datatypes::{DataType, Field, Schema};
+use serde_json::{Value, json};
+
+use crate::harness::logs;
+use crate::harness::program::run;
+use crate::harness::traces::{recording, write_rows};
+
+const DEFINITIONS: &str = r#"
+domain = "arms"
+[column.success]
+type = "bool"
+[metric.SOLVED]
+value = "any(success)"
+[metric.STEPS]
+value = "length()"
+"#;
+
+/// Identity that rows of these tests do not have.
+const SET: [&str; 6] = ["--set", "model=act", "--set", "experiment=reach", "--set", "seed=1"];
+
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("arms.toml"), DEFINITIONS).unwrap();
+    folder
+}
+
+fn import<'a>(file: &'a str, more: &[&'a str]) -> Vec<&'a str> {
+    [&["import", file, "-o", "x.parquet", "--definitions", "arms.toml"], more].concat()
+}
+
+/// The rows of the trace with these columns, as CSV without the header.
+fn queried(at: &Path, columns: &str) -> Vec<String> {
+    let sql = format!("select {columns} from steps order by episode_id, t");
+    let asked = ["query", &sql, "x.parquet", "--definitions", "arms.toml", "--format", "csv"];
+    run(at, &asked).done().lines().skip(1).map(str::to_owned).collect()
+}
+
+#[test]
+fn a_column_of_csv_has_the_type_of_all_its_cells() {
+    let folder = folder();
+    let at = folder.path();
+    let rows = "\u{feff}episode,frame,success,reward,code,note,nothing\n\
+                7,0,False,0.5,007,\"a, \"\"b\"\"\",\n7,1,True,1,12,,\n7,2,,nan,1e3,x,\n";
+    fs::write(at.join("rows.csv"), rows).unwrap();
+    let identity = ["--map", "episode_id=episode", "--map", "t=frame+1", "--map", "run=episode"];
+    let told = run(at, &import("rows.csv", &[&SET[..], &identity].concat())).done();
+    assert!(told.contains("imported 1 episode, 3 steps"), "{told}");
+    for column in ["success (bool", "reward (float", "code (string", "note (string", "nothing (null in every line"] {
+        assert!(told.contains(column), "{column}: {told}");
+    }
+    #[cfg(feature = "polars")]
+    assert_eq!(
+        queried(at, "episode_id, t, run, success, reward, code, note"),
+        ["7,1,7,false,0.5,007,\"a, \"\"b\"\"\"", "7,2,7,true,1.0,12,", "7,3,7,,,1e3,x"]
+    );
+    let declared = recording(&at.join("x.parquet"));
+    assert_eq!(declared["formats"], json!(["csv"]));
+    assert_eq!(declared["mapping"]["map"]["t"], "frame+1");
+    assert_eq!(declared["mapping"]["set"]["seed"], 1);
+    let hash = exact::hash::of_bytes(rows.as_bytes());
+    assert_eq!(declared["sources"], json!([hash]), "the hash is that of the file");
+}
+
+#[test]
+fn csv_that_is_not_a_table_is_refused_with_its_line() {
+    let folder = folder();
+    let at = folder.path();
+    for (rows, words) in [
+        ("a,b\n1,2\n1\n", &["rows.csv, line 3", "found record with 1 fields"][..]),
+        ("a,a\n1,2\n", &["rows.csv, line 1", "found `a` twice"]),
+        ("a,b\n", &["rows.csv", "expected at least one step"]),
+        ("episode_id,t\nx,1.5\n", &["rows.csv, row 1, key `t`", "found 1.5"]),
+    ] {
+        fs::write(at.join("rows.csv"), rows).unwrap();
+        let told = run(at, &import("rows.csv", &SET)).refused();
+        assert!(words.iter().all(|word| told.contains(word)), "{told}");
+    }
+}
+
+#[test]
+fn parquet_of_any_shape_is_mapped() {
+    let folder = folder();
+    let at = folder.path();
+    let meta = DataType::Struct(vec![Field::new("id", DataType::Utf8, true)].into());
+    let schema = Schema::new(vec![
+        Field::new("meta", meta, true),
+        Field::new("frame", DataType::Int32, false),
+        Field::new("state", DataType::new_list(DataType::Float64, true), true),
+        Field::new("success", DataType::Boolean, true),
+        Field::new("score", DataType::Float64, true),
+    ]);
+    let row = |frame: u32| json!({ "meta": { "id": "e" }, "frame": frame, "state": [0.5, 2.0], "success": frame == 1 });
+    write_rows(&at.join("rows.parquet"), &[logs::batch(schema, &[row(0), row(1)])], None);
+    let identity = ["--map", "episode_id=meta.id", "--map", "t=frame+1", "--set", "run=1"];
+    let answer = run(at, &import("rows.parquet", &[&SET[..], &identity].concat())).ends(0);
+    assert!(answer.stderr.contains("left out: `state`, a list or an object in 2 lines"), "{}", answer.stderr);
+    assert!(answer.stdout.contains("score (null in every line)"), "{}", answer.stdout);
+    let state = ["--map", "x=state.1"];
+    let answer = run(at, &import("rows.parquet", &[&SET[..], &identity, &state].concat())).ends(0);
+    assert_eq!(answer.stderr, "");
+    #[cfg(feature = "polars")]
+    assert_eq!(queried(at, "episode_id, t, x, success"), ["e,1,2.0,false", "e,2,2.0,true"]);
+    fs::write(at.join("rows.parquet"), "PAR1 and no more").unwrap();
+    let told = run(at, &import("rows.parquet", &SET)).refused();
+    assert!(told.contains("rows.parquet\n  expected a Parquet file"), "{told}");
+}
+
+#[test]
+fn evaluations_of_lerobot_have_a_row_per_episode() {
+    let folder = folder();
+    let at = folder.path();
+    logs::lerobot_evaluation(&at.join("eval_info.json"), &[true, false, true]);
+    let set = &SET[..4];
+    run(at, &import("eval_info.json", set)).done();
+    #[cfg(feature = "polars")]
+    assert_eq!(
+        queried(at, "episode_id, t, seed, run, success, sum_reward, max_reward"),
+        ["0,1,1000,1,true,1.5,", "1,1,1001,2,false,0.5,", "2,1,1002,3,true,1.5,"]
+    );
+    let info = json!({ "per_task": [{ "task_group": "libero", "task_id": 3, "metrics": {
+        "sum_rewards": [1.0, 0.0], "max_rewards": [1.0, 0.0], "successes": [true, false], "video_paths": [] } }],
+        "overall": {} });
+    fs::write(at.join("eval_info.json"), info.to_string()).unwrap();
+    let told = run(at, &import("eval_info.json", set)).refused();
+    assert!(told.contains("key `seed`") && told.contains("found none"), "{told}");
+    run(at, &import("eval_info.json", &SET)).done();
+    #[cfg(feature = "polars")]
+    assert_eq!(
+        queried(at, "episode_id, run, task, success"),
+        ["libero/3/0,1,libero/3,true", "libero/3/1,2,libero/3,false"]
+    );
+    fs::write(at.join("other.json"), "{\"rows\": []}").unwrap();
+    let told = run(at, &import("other.json", &["--from", "lerobot"])).refused();
+    assert!(told.contains("expected an evaluation of LeRobot") && told.contains("found neither"), "{told}");
+}
+
+#[test]
+fn frames_of_a_lerobot_data_set_are_steps() {
+    let folder = folder();
+    let at = folder.path();
+    logs::lerobot_data_set(at, &[Some(2), None], false);
+    let file = "data/chunk-000/file-000.parquet";
+    let answer = run(at, &import(file, &[&SET[..], &["--from", "lerobot"]].concat())).ends(0);
+    assert!(answer.stdout.starts_with("imported 2 episodes, 16 steps"), "{}", answer.stdout);
+    assert!(answer.stderr.contains("left out: `action`") && answer.stderr.contains("`observation.state`"));
+    #[cfg(feature = "polars")]
+    assert_eq!(
+        queried(at, "episode_id, run, t, success, done, action_change > 4.0")[..4],
+        ["0,1,1,false,false,", "0,1,2,false,false,true", "0,1,3,true,false,true", "0,1,4,false,false,true"]
+    );
+    logs::lerobot_evaluation(&at.join("eval_info.json"), &[true]);
+    let told = run(at, &import(file, &["--from", "inspect"])).refused();
+    assert!(told.contains("expected a log of Inspect"), "{told}");
+}
+
+#[test]
+fn logs_of_inspect_robots_have_a_row_per_trial() {
+    let folder = folder();
+    let at = folder.path();
+    logs::inspect_robots(&at.join("logs"));
+    let both = ["logs/scripted.json", "logs/random.json", "-o", "x.parquet", "--definitions", "arms.toml"];
+    let mapped = ["--map", "hertz=eval.embodiment_info.control_hz"];
+    let answer = run(at, &[&["import"], &both[..], &mapped].concat()).ends(0);
+    assert!(answer.stdout.starts_with("imported 8 episodes, 8 steps"), "{}", answer.stdout);
+    assert!(answer.stderr.contains("left out: `sample`"), "{}", answer.stderr);
+    #[cfg(feature = "polars")]
+    {
+        let rows = queried(at, "model, experiment, seed, run, scene, score_success_at_end, termination, hertz");
+        assert_eq!(rows[0], "random,cubepick-reach,1,1,scene-0,0.0,max_steps,10.0");
+        assert!(rows[4].starts_with("scripted,cubepick-reach,1,1,scene-0,1.0,"), "{rows:?}");
+    }
+    let text = fs::read_to_string(at.join("logs/random.json")).unwrap();
+    let mut log: Value = serde_json::from_str(&text).unwrap();
+    log["version"] = json!(2);
+    fs::write(at.join("new.json"), log.to_string()).unwrap();
+    let told = run(at, &import("new.json", &[])).refused();
+    assert!(told.contains("expected an EvalLog of inspect-robots, version 1") && told.contains("version 2"), "{told}");
+}

@@ -97,8 +97,8 @@ pub(super) fn collect(frame: LazyFrame) -> Result<DataFrame, PolarsError> {
 /// Of a panic on one of its threads, the panic's own message.
 fn cause(message: &str) -> String {
     if message.contains("JoinError::Panic") {
-        let parts = message.split(['"', '\\']).filter(|part| part.starts_with(char::is_alphabetic));
-        let own = parts.filter(|part| !part.contains("JoinError") && !part.contains("unwrap()")).next_back();
+        let mut parts = message.split(['"', '\\']).filter(|part| part.starts_with(char::is_alphabetic));
+        let own = parts.rfind(|part| !part.contains("JoinError") && !part.contains("unwrap()"));
         return own.unwrap_or("it ended in a panic").to_owned();
     }
     let first = message.split("\n\n").find(|part| !part.trim().is_empty()).unwrap_or(message);

@@ -32,8 +32,8 @@ use self::group::Groups;
 use self::message::{EndMessage, Message, PROTOCOL};
 use self::program::{Failure, Program};
 use self::said::Kept;
-use super::vlm::secrets::{Secret, from_every_key_variable};
 use super::reply::Reading;
+use super::vlm::secrets::{Secret, from_every_key_variable};
 use super::{Agent, Decision, Ended, Farewell, Lost, Observation, Player, Reply, Status, Task, Usage};
 use exact::hash;
 

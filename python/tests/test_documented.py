@@ -50,7 +50,15 @@ def test_every_page_with_python_is_run_below():
         "README.md": 1,
         "docs/how-to/python.md": 1,
         "docs/how-to/cluster.md": 1,
+        "docs/tutorials/own-agent.md": 1,
     }
+
+
+def test_the_agent_of_the_tutorial_is_recorded(tmp_path):
+    said = {}
+    exec(compile(*blocks("docs/tutorials/own-agent.md"), "own-agent.md", "exec"), said)
+    answer = ms.record(said["walk"], "E1", seeds=1, runs=1, out=tmp_path, no_log=True, no_frames=True)
+    assert answer["recorded"] == 1 and answer["steps"] > 1
 
 
 def test_the_sql_of_a_page_gives_the_episodes_in_other_libraries(recorded, command, monkeypatch, tmp_path):

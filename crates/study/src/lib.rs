@@ -241,10 +241,10 @@ impl Study {
     pub fn steps(&self, columns: Option<&[String]>) -> Result<Steps, StudyError> {
         let traces = self.source.traces()?;
         if self.question.filter.is_none() {
-            return Ok(Steps::new(traces, columns, None)?);
+            return Ok(Steps::new(traces, columns, None, self.threads)?);
         }
         let kept = self.score()?.episodes.keys.iter().map(|key| key.episode_id.to_owned()).collect();
-        Ok(Steps::new(traces, columns, Some(kept))?)
+        Ok(Steps::new(traces, columns, Some(kept), self.threads)?)
     }
 
     /// The episode table.

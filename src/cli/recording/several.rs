@@ -118,7 +118,7 @@ mod tests {
         let path = folder.path().join("study.toml");
         let of = |text: &str| {
             std::fs::write(&path, text).unwrap();
-            recordings(&path).map(|all| serde_json::Value::from_iter(all))
+            recordings(&path).map(serde_json::Value::from_iter)
         };
         let study =
             "seeds = 1\nno-log = true\nkeep-going = false\n[model.\"B 1\"]\nmax-cost = 2.5\n[model.a]\nseeds = 3\n";

@@ -96,7 +96,7 @@ pub fn plan(query: &Checked, tables: Vec<(Table, LazyFrame)>) -> Result<LazyFram
     };
     let planned = run::plan(&mut context, &statement.to_string()).and_then(|mut frame| {
         // Names and types are resolved here, before a row is read.
-        contained_on_all_threads(|| frame.collect_schema()).map_err(PolarsError::Failed)??;
+        contained_on_all_threads(|| frame.collect_schema()).map_err(PolarsError::panicked)??;
         Ok(frame)
     });
     planned.map_err(|error| match error {
@@ -266,10 +266,10 @@ fn run_into(
 ) -> Result<(), PolarsError> {
     let sink = frame.sink_batches(PlanCallback::new(receive), true, Some(BATCH))?;
     let run = || sink.collect_with_engine(Engine::Streaming);
-    contained_on_all_threads(run).map_err(PolarsError::Failed)??;
+    contained_on_all_threads(run).map_err(PolarsError::panicked)??;
     Ok(())
 }
 
 fn with<T, R>(into: T, finish: impl FnOnce(T) -> Result<R, PolarsError>) -> Result<R, PolarsError> {
-    contained_on_all_threads(|| finish(into)).map_err(PolarsError::Failed)?
+    contained_on_all_threads(|| finish(into)).map_err(PolarsError::panicked)?
 }

@@ -62,8 +62,16 @@ impl From<Inner> for PolarsError {
     }
 }
 
+impl PolarsError {
+    /// What a caught panic of Polars said.
+    #[expect(clippy::needless_pass_by_value, reason = "for `map_err`")]
+    pub(super) fn panicked(words: String) -> Self {
+        Self::Failed(cause(&words))
+    }
+}
+
 pub(super) fn plan(context: &mut SQLContext, statement: &str) -> Result<LazyFrame, PolarsError> {
-    Ok(contained_on_all_threads(|| context.execute(statement)).map_err(PolarsError::Failed)??)
+    Ok(contained_on_all_threads(|| context.execute(statement)).map_err(PolarsError::panicked)??)
 }
 
 /// The stack on which Polars plans: it recurses over the statement, one frame for each of its constructs. Of the memory that
@@ -81,11 +89,18 @@ pub(super) fn on_deep_stack<R: Send>(run: impl FnOnce() -> Result<R, PolarsError
 
 pub(super) fn collect(frame: LazyFrame) -> Result<DataFrame, PolarsError> {
     let run = || frame.collect_with_engine(Engine::Streaming);
-    Ok(contained_on_all_threads(run).map_err(PolarsError::Failed)??.unwrap_single())
+    Ok(contained_on_all_threads(run).map_err(PolarsError::panicked)??.unwrap_single())
 }
 
 /// The cause in a message of Polars: its first paragraph, without the plan that it may print after that.
+///
+/// Of a panic on one of its threads, the panic's own message.
 fn cause(message: &str) -> String {
+    if message.contains("JoinError::Panic") {
+        let mut parts = message.split(['"', '\\']).filter(|part| part.starts_with(char::is_alphabetic));
+        let own = parts.rfind(|part| !part.contains("JoinError") && !part.contains("unwrap()"));
+        return own.unwrap_or("it ended in a panic").to_owned();
+    }
     let first = message.split("\n\n").find(|part| !part.trim().is_empty()).unwrap_or(message);
     first.split_whitespace().collect::<Vec<_>>().join(" ")
 }
@@ -100,5 +115,13 @@ mod tests {
             cause("unable to find column \"x\";\nvalid: [\"y\"]\n\nResolved plan: ..."),
             "unable to find column \"x\"; valid: [\"y\"]"
         );
+    }
+
+    #[test]
+    fn the_cause_of_a_panic_is_its_message() {
+        let inner = r#"JoinError::Panic(Id(4), \"expected equal chunks\", ...)"#;
+        let told = format!("called `Result::unwrap()` on an `Err` value: JoinError::Panic(Id(3), \"{inner}\", ...)");
+        assert_eq!(cause(&told), "expected equal chunks");
+        assert_eq!(cause("JoinError::Panic(Id(3), ...)"), "it ended in a panic");
     }
 }

@@ -1,11 +1,13 @@
 //! The steps of traces as Arrow batches, for programs that go on with them: the same columns of the same types from every
 //! file, null where a file has none.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, VecDeque};
 use std::io;
+use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::vec;
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::{thread, vec};
 
 use arrow::array::{Array as _, ArrayRef, AsArray as _, BooleanArray, RecordBatch, RecordBatchOptions, new_null_array};
 use arrow::compute::{CastOptions, cast, cast_with_options, filter_record_batch};
@@ -28,22 +30,41 @@ const BATCH_ROWS: usize = 8 * 1024;
 /// The column by which episodes are told apart.
 const EPISODE_ID: &str = "episode_id";
 
+/// The batches that a thread is ahead of the reader, at most.
+const AHEAD: usize = 4;
+
 /// The rows of all files in their order, some at a time. No rule of traces is checked, checksums are.
 ///
-/// Nothing follows an error.
+/// Nothing follows an error. A thread per row group decodes ahead.
 pub struct Steps {
-    schema: SchemaRef,
-    files: vec::IntoIter<Pending>,
-    reader: Option<Reader>,
-    episodes: Option<BTreeSet<String>>,
+    shape: Shape,
+    parts: vec::IntoIter<Part>,
+    ahead: VecDeque<Ahead>,
+    threads: NonZeroUsize,
 }
 
-/// A file whose rows are still to come.
-struct Pending {
+/// What rows become.
+#[derive(Clone)]
+struct Shape {
+    schema: SchemaRef,
+    episodes: Option<Arc<BTreeSet<String>>>,
+}
+
+/// A row group whose rows are still to come.
+struct Part {
     name: String,
     path: PathBuf,
     readable: Arc<Readable>,
     expansion: Arc<Expansion>,
+    row_group: usize,
+}
+
+/// Rows, or `None` at the end of a row group.
+type Rows = Result<Option<RecordBatch>, TraceError>;
+
+struct Ahead {
+    name: String,
+    rows: Receiver<Rows>,
 }
 
 struct Reader {
@@ -58,6 +79,7 @@ impl Steps {
         set: &TraceSet,
         columns: Option<&[String]>,
         episodes: Option<BTreeSet<String>>,
+        threads: NonZeroUsize,
     ) -> Result<Self, TraceError> {
         let all = || set.column_names().into_iter().filter(|name| is_readable(set, name)).map(str::to_owned).collect();
         let names: Vec<String> = columns.map_or_else(all, <[String]>::to_vec);
@@ -67,31 +89,34 @@ impl Steps {
             Field::new(name, data_type(set, name, kind), true)
         };
         let schema = Arc::new(Schema::new(names.iter().map(field).collect::<Vec<_>>()));
-        let files = set.files().iter().map(|file| Pending::of(file).map_err(|found| TraceError::from(*found)));
-        let files = files.collect::<Result<Vec<_>, _>>()?.into_iter();
-        Ok(Self { schema, files, reader: None, episodes })
+        let files = set.files().iter().map(|file| Part::of_file(file).map_err(|found| TraceError::from(*found)));
+        let parts: Vec<Vec<Part>> = files.collect::<Result<_, _>>()?;
+        let parts = parts.into_iter().flatten().collect::<Vec<_>>().into_iter();
+        let shape = Shape { schema, episodes: episodes.map(Arc::new) };
+        Ok(Self { shape, parts, ahead: VecDeque::new(), threads })
     }
 
     /// The columns: those of the schema as it has them, others as text, int64, float64 or bool; all may be null.
     pub fn schema(&self) -> SchemaRef {
-        Arc::clone(&self.schema)
+        Arc::clone(&self.shape.schema)
     }
 
-    fn rows(&mut self) -> Option<Result<RecordBatch, Box<Finding>>> {
+    fn rows(&mut self) -> Rows {
         loop {
-            if self.reader.is_none() {
-                match self.files.next()?.reader(&self.schema) {
-                    Ok(reader) => self.reader = Some(reader),
-                    Err(found) => return Some(Err(found)),
-                }
-            }
-            match self.reader.as_mut()?.next() {
-                None => self.reader = None,
-                some => return some,
+            let free = self.threads.get().saturating_sub(self.ahead.len());
+            self.ahead.extend(self.parts.by_ref().take(free).map(|part| part.ahead(self.shape.clone())));
+            let Some(Ahead { name, rows }) = self.ahead.front() else { return Ok(None) };
+            let expected = "a row group that can be read";
+            let gone = || Box::new(Finding::new(Code::Unreadable, name, expected, "a thread that ended early"));
+            match rows.recv().map_err(|_| TraceError::from(*gone()))?? {
+                None => drop(self.ahead.pop_front()),
+                some => return Ok(some),
             }
         }
     }
+}
 
+impl Shape {
     fn complete(&self, rows: &RecordBatch) -> Result<RecordBatch, TraceError> {
         let column = |field: &Arc<Field>| -> Result<ArrayRef, arrow::error::ArrowError> {
             let options = CastOptions { safe: false, ..CastOptions::default() };
@@ -103,7 +128,8 @@ impl Steps {
         let columns = self.schema.fields().iter().map(column).collect::<Result<Vec<_>, _>>();
         // With no column at all there is nothing else to tell how many rows there are.
         let options = RecordBatchOptions::new().with_row_count(Some(rows.num_rows()));
-        let batch = columns.and_then(|columns| RecordBatch::try_new_with_options(self.schema(), columns, &options));
+        let batch =
+            columns.and_then(|columns| RecordBatch::try_new_with_options(Arc::clone(&self.schema), columns, &options));
         let batch = batch.map_err(TraceError::Memory)?;
         let (Some(episodes), Some(ids)) = (&self.episodes, rows.column_by_name(EPISODE_ID)) else { return Ok(batch) };
         let ids = cast(ids, &DataType::Utf8).map_err(TraceError::Memory)?;
@@ -118,12 +144,12 @@ impl Iterator for Steps {
     type Item = Result<RecordBatch, TraceError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        let rows = self.rows()?;
-        let batch = rows.map_err(|found| TraceError::from(*found)).and_then(|rows| self.complete(&rows));
-        if batch.is_err() {
-            (self.reader, self.files) = (None, Vec::new().into_iter());
+        let rows = self.rows();
+        if rows.is_err() {
+            self.ahead.clear();
+            self.parts = Vec::new().into_iter();
         }
-        Some(batch)
+        rows.transpose()
     }
 }
 
@@ -145,21 +171,50 @@ fn data_type(set: &TraceSet, name: &str, kind: Kind) -> DataType {
     }
 }
 
-impl Pending {
-    fn of(file: &TraceFile) -> Result<Self, Box<Finding>> {
-        let (name, path) = (file.name().to_owned(), file.path().to_owned());
-        Ok(Self { name, path, readable: file.footer()?, expansion: Arc::clone(file.expansion()) })
+impl Part {
+    fn of_file(file: &TraceFile) -> Result<Vec<Self>, Box<Finding>> {
+        let readable = file.footer()?;
+        let part = |row_group| Self {
+            name: file.name().to_owned(),
+            path: file.path().to_owned(),
+            readable: Arc::clone(&readable),
+            expansion: Arc::clone(file.expansion()),
+            row_group,
+        };
+        Ok((0..readable.footer.metadata().num_row_groups()).map(part).collect())
+    }
+
+    /// Decodes on a thread of its own, as long as someone reads.
+    fn ahead(self, shape: Shape) -> Ahead {
+        let (sender, rows) = sync_channel(AHEAD);
+        let name = self.name.clone();
+        thread::spawn(move || {
+            let end = self.send(&shape, &sender).map(|()| None);
+            // Nobody reads any more where this fails.
+            let _ = sender.send(end);
+        });
+        Ahead { name, rows }
+    }
+
+    fn send(self, shape: &Shape, sender: &SyncSender<Rows>) -> Result<(), TraceError> {
+        let mut reader = self.reader(&shape.schema).map_err(|found| TraceError::from(*found))?;
+        while let Some(rows) = reader.next() {
+            let rows = shape.complete(&rows.map_err(|found| TraceError::from(*found))?)?;
+            if sender.send(Ok(Some(rows))).is_err() {
+                break;
+            }
+        }
+        Ok(())
     }
 
     fn reader(self, schema: &Schema) -> Result<Reader, Box<Finding>> {
-        let Self { name, path, readable, expansion } = self;
+        let Self { name, path, readable, expansion, row_group } = self;
         let unreadable = |error: io::Error| {
             Box::new(Finding::new(Code::Unreadable, &name, "a file that can be read", error.to_string()))
         };
         let store = Store::new(input::open(&path).map_err(unreadable)?, expansion);
         let metadata = Arc::clone(readable.footer.metadata());
         let (checksums, slot) = (readable.chunks.clone(), FaultSlot::default());
-        let row_groups = (0..metadata.num_row_groups()).collect();
         let described = metadata.file_metadata().schema_descr();
         let wanted = described.columns().iter().enumerate().filter(|(_, column)| {
             let path = column.path().parts();
@@ -170,7 +225,7 @@ impl Pending {
             store,
             metadata: Arc::clone(&metadata),
             checksums,
-            row_groups,
+            row_groups: vec![row_group],
             slot: Arc::clone(&slot),
             writes_out: true,
         };

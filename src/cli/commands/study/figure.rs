@@ -103,7 +103,10 @@ impl FigureArgs {
     fn format(&self) -> Result<FigureFormat, Failure> {
         match (self.format, &self.output) {
             (Some(Format(format)), _) => Ok(format),
-            (None, Some(path)) => FigureFormat::of(path).map_err(Failure::input),
+            (None, Some(path)) => {
+                let hint = |error| Failure::input(format!("{error}; say which one with --format"));
+                FigureFormat::of(path).map_err(hint)
+            }
             (None, None) => Ok(FigureFormat::Svg),
         }
     }

@@ -26,7 +26,7 @@ pub struct EncodeError(#[from] Box<dyn Error + Send + Sync>);
 
 /// A file whose ending is no format of a figure.
 #[derive(Debug, thiserror::Error)]
-#[error("expected a file that ends in {}, found the ending `{ending}`; say which one with --format", endings())]
+#[error("expected a file that ends in {}, found the ending `{ending}`", endings())]
 pub struct UnknownEnding {
     ending: String,
 }
@@ -96,7 +96,7 @@ mod tests {
         }
         assert_eq!(
             Format::of(Path::new("f.jpg")).unwrap_err().to_string(),
-            "expected a file that ends in .svg, .png, .pdf, found the ending `jpg`; say which one with --format"
+            "expected a file that ends in .svg, .png, .pdf, found the ending `jpg`"
         );
     }
 }

@@ -98,7 +98,7 @@ fn reports_statistics_figures_and_differences_know_any_domain() {
     for figure in ["intervals", "heatmap", "spider", "decision-curve"] {
         asked(at, &["figure", figure, "-o", "figure.svg"]);
         let drawn = fs::read_to_string(at.join("figure.svg")).unwrap();
-        assert!(drawn.contains("diffusion") && !drawn.contains("TSA"), "{figure}");
+        assert!(drawn.contains("diffusion") && !drawn.contains("\"TSA\""), "{figure}");
     }
     for (figure, words) in [
         ("gaze", "figure `gaze` needs the steps of each episode"),

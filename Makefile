@@ -1,7 +1,7 @@
 # The two commands of the README: `make demo` and `make test`.
 
 .DELETE_ON_ERROR:
-.PHONY: demo test fmt lint needed unit soak fuzz docs book end-to-end wheel test-wheel bless release-check recorded calibrate bench bench-scores bench-world bench-agents bench-view sheet
+.PHONY: demo test fmt lint needed unit soak fuzz docs book end-to-end wheel test-wheel bless release-check recorded calibrate bench bench-import bench-scores bench-world bench-agents bench-view sheet
 
 ## Build, record a few episodes of the scripted agents, report on them, say where the results are.
 demo:
@@ -120,6 +120,10 @@ bench-world:
 bench-agents:
 	scripts/get-mujoco.sh
 	cargo bench --features sim --bench agents
+
+## Memory and time of the import of 200,000 samples of Inspect, beside `inspect log dump`; SAMPLES says how many.
+bench-import:
+	scripts/bench/import.sh
 
 ## How soon `view` shows a list, an episode and its next frame in Chromium, beside Inspect View, in turns: benches/VIEW.md.
 bench-view:

@@ -97,7 +97,26 @@ fn reports_statistics_figures_and_differences_know_any_domain() {
     run(at, &["table", "verify", "out"]).done();
     let told = asked(at, &["stats", "--by", "model,task"]);
     assert!(told.contains("pull") && told.contains("SUCCESS"), "{told}");
-    asked(at, &["figure", "intervals", "-o", "intervals.svg"]);
+    let durations = asked(at, &["stats"]);
+    assert!(
+        durations.contains("Kaplan-Meier") && durations.contains("Durations: unfinished episodes censored"),
+        "{durations}"
+    );
+    for figure in ["intervals", "heatmap", "spider", "decision-curve"] {
+        asked(at, &["figure", figure, "-o", "figure.svg"]);
+        let drawn = fs::read_to_string(at.join("figure.svg")).unwrap();
+        assert!(drawn.contains("diffusion") && !drawn.contains("\"TSA\""), "{figure}");
+    }
+    for (figure, words) in [
+        ("gaze", "figure `gaze` needs the steps of each episode"),
+        ("e5-outcomes", "figure `e5-outcomes` needs the outcomes of an open question"),
+    ] {
+        let words_of = ["figure", figure, "robots.parquet", "--definitions", "robots.toml", "-o", "none.svg"];
+        let refused = run(at, &words_of).refused();
+        assert!(refused.contains(words), "{refused}");
+    }
+    let refused = run(at, &["sensitivity", "robots.parquet", "--definitions", "robots.toml"]).refused();
+    assert!(refused.contains("of the domain `mirror`") && refused.contains("mirrorstats diff"), "{refused}");
     fs::write(
         at.join("other.toml"),
         "include = [\"robots.toml\"]\n[metric.JERKS]\nvalue = \"count(action_change > 0.2)\"\n",
@@ -105,6 +124,18 @@ fn reports_statistics_figures_and_differences_know_any_domain() {
     .unwrap();
     let told = run(at, &["diff", "robots.toml", "other.toml", "robots.parquet"]).done();
     assert!(told.contains("count(action_change > 0.2)") && told.contains("JERKS"), "{told}");
+    for model in ["act", "diffusion"] {
+        let lines: String = steps()
+            .lines()
+            .filter(|line| line.contains(&format!("\"model\":\"{model}\"")))
+            .collect::<Vec<_>>()
+            .join("\n");
+        fs::write(at.join("some.jsonl"), lines + "\n").unwrap();
+        let out = format!("{model}.parquet");
+        run(at, &["import", "some.jsonl", "-o", &out, "--definitions", "robots.toml"]).done();
+    }
+    let verdict = run(at, &["gate", "act.parquet", "diffusion.parquet", "--definitions", "robots.toml"]).ends(4);
+    assert!(verdict.stdout.contains("SUCCESS") && verdict.stdout.contains("2/6"), "{}", verdict.stdout);
 }
 
 #[test]

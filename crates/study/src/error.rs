@@ -67,6 +67,12 @@ pub enum StudyError {
         /// The file.
         scores: String,
     },
+    /// Traces without a mirror, where its thresholds are asked for.
+    #[error(
+        "expected traces of the domain `mirror`, whose thresholds of evidence vary here; found another domain\n  \
+         help: write the other threshold into a definition file, and compare it with `mirrorstats diff`"
+    )]
+    NoMirror,
     /// Traces that do not record what a threshold is of.
     #[error(
         "expected traces with the column `{column}`, to which a threshold applies: {problem}\n  \

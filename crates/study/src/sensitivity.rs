@@ -29,6 +29,7 @@ use score::score_traces::{self, Outputs};
 use score::table::EpisodeTable;
 use trace::open::TraceSet;
 use trace::schema::RECORDING_KEY;
+use trace::schema::domain::Domain;
 
 /// The column that a threshold applies to.
 const PIXELS: &str = "mirror_self_px";
@@ -260,6 +261,9 @@ fn recorded_px(traces: &TraceSet) -> Vec<u64> {
 }
 
 fn check_pixels(traces: &TraceSet) -> Result<(), StudyError> {
+    if traces.domain() == Domain::Own {
+        return Err(StudyError::NoMirror);
+    }
     let problem = match traces.column(PIXELS) {
         None => "no trace has it".to_owned(),
         Some(found) => match (found.conflict, found.missing_from) {

@@ -98,14 +98,14 @@ impl Text {
         if format == Format::JsonLines && mapping.is_empty() {
             return Ok(self);
         }
-        let source = Some(Source { sha256: self.hash()?, format, mapping: mapping.declared() });
-        let mut rows = Rows::new(&self.name, mapping)?;
+        let source = Source { sha256: self.hash()?, format, mapping: mapping.declared() };
+        let mut rows = Rows::new(&self.name, &source.sha256, mapping)?;
         match format {
             Format::JsonLines => while rows.add_line(&self.read_line()?)? {},
             _ => format.read(self.reader.into_inner(), &mut rows)?,
         }
         let lines = Self::of_file(&self.name, rows.finish()?);
-        Ok(Self { noun: format.noun(), source, ..lines })
+        Ok(Self { noun: format.noun(), source: Some(source), ..lines })
     }
 
     fn of_file(name: &str, file: File) -> Self {

@@ -46,7 +46,7 @@ fn read_evaluation(file: File, rows: &mut Rows<'_>) -> Result<(), ImportError> {
 }
 
 fn add_episode(index: &Value, prefix: &str, episode: &Value, rows: &mut Rows<'_>) -> Result<(), ImportError> {
-    let mut row = identity(index, prefix, 1);
+    let mut row = identity(index, &format!("{}/{prefix}", rows.digits), 1);
     row.extend(episode.as_object().cloned().unwrap_or_default());
     rows.add_object(&row)
 }
@@ -59,7 +59,7 @@ fn read_frames(file: File, rows: &mut Rows<'_>) -> Result<(), ImportError> {
             return Err(rows.fault("", "frames of LeRobot, with `episode_index` and `frame_index`", "none", help));
         };
         let episode = frame.get("episode_index").cloned().unwrap_or_default();
-        let mut row = identity(&episode, "", index.saturating_add(1));
+        let mut row = identity(&episode, &format!("{}/", rows.digits), index.saturating_add(1));
         if let Some(action) = frame.get("action") {
             let follows = before.0 == episode && before.1 + 1 == index;
             row.insert("action_change".to_owned(), json!(follows.then(|| distance(&before.2, action)).flatten()));

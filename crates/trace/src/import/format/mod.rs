@@ -100,14 +100,17 @@ impl Format {
 pub(super) struct Rows<'m> {
     /// The file of the user, as messages name it.
     pub(super) file: String,
+    /// The first digits of its hash: of files that number their episodes from 0, they keep the ids apart.
+    pub(super) digits: String,
     pub(super) mapping: &'m mut Mapping,
     out: BufWriter<File>,
 }
 
 impl<'m> Rows<'m> {
-    pub(super) fn new(file: &str, mapping: &'m mut Mapping) -> Result<Self, ImportError> {
+    pub(super) fn new(file: &str, sha256: &str, mapping: &'m mut Mapping) -> Result<Self, ImportError> {
         let out = tempfile::tempfile().map_err(ImportError::read(file))?;
-        Ok(Self { file: file.to_owned(), mapping, out: BufWriter::new(out) })
+        let digits = sha256.chars().take(8).collect();
+        Ok(Self { file: file.to_owned(), digits, mapping, out: BufWriter::new(out) })
     }
 
     pub(super) fn add(&mut self, row: &Row<'_>) -> Result<(), ImportError> {

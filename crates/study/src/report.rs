@@ -239,20 +239,11 @@ impl Report {
         let mut episodes = Vec::new();
         let all = self.all.as_ref().unwrap_or(&self.results.episodes);
         scores::write(all, Format::Parquet, &mut episodes, self.threads)?;
-        let Self { cells, tables, manifest, illustrations, read, .. } = self;
-        let others = &[self.list_files(), illustrations.clone()].concat();
-        let written = bundle::write(out, &Bundle { cells, tables, episodes: &episodes, manifest, read, others })?;
+        let Self { cells, tables, lists, manifest, illustrations: others, read, .. } = self;
+        let written =
+            bundle::write(out, &Bundle { cells, tables, lists, episodes: &episodes, manifest, read, others })?;
         let inside = |path: &PathBuf| path.strip_prefix(out).unwrap_or(path).display().to_string();
         Ok(WrittenReport { files: written.files.iter().map(inside).collect(), manifest: written.manifest })
-    }
-
-    fn list_files(&self) -> Vec<OutputFile> {
-        let of_list = |ListTable { name, printed, records }: &ListTable| {
-            [("tex", printed.latex()), ("md", printed.markdown()), ("csv", records.csv())].map(|(ending, text)| {
-                OutputFile { path: format!("tables/{name}.{ending}").into(), bytes: text.into_bytes() }
-            })
-        };
-        self.lists.iter().flat_map(of_list).collect()
     }
 
     fn illustrate(&mut self, statistics: &Statistics) -> Result<(), StudyError> {

@@ -7,7 +7,7 @@ use crate::cells::KeyValue;
 use crate::cells::group::CONDITION;
 use crate::statistics::Ranks;
 use crate::style::CellForm;
-use crate::tables::{Align, Column, Emphasis, Look, RowGroup, Table, TableCell, key_field};
+use crate::tables::{Align, Column, Emphasis, ListTable, Look, RowGroup, Table, TableCell, key_field};
 use exact::moments::Moments;
 use exact::number::Decimal;
 use metric::catalog::Better;
@@ -149,6 +149,11 @@ impl MetricTable {
     /// The caption without its title: note and footnotes.
     pub fn sentences(&self) -> impl Iterator<Item = &str> {
         std::iter::once(self.note.as_str()).chain(self.footnotes.iter().map(String::as_str)).filter(|s| !s.is_empty())
+    }
+
+    /// Both forms under the table's name.
+    pub fn list(&self) -> ListTable {
+        ListTable { name: self.name.clone(), printed: self.printed(), records: self.records() }
     }
 
     pub(crate) fn rows(&self) -> impl Iterator<Item = &MetricRow> {

@@ -21,7 +21,7 @@ const NANO: f64 = 1e9;
 /// Data quality by experiment, model and condition; `None` without any cell.
 pub fn of_cells(cells: &QualityByCell) -> Option<ListTable> {
     let keys = if cells.has_conditions() { 3 } else { 2 };
-    let table = || ListTable { name: NAME, printed: printed(cells, keys), records: records(cells, keys) };
+    let table = || ListTable { name: NAME.to_owned(), printed: printed(cells, keys), records: records(cells, keys) };
     (!cells.0.is_empty()).then(table)
 }
 

@@ -137,7 +137,7 @@ impl Ranks {
                 let texts = texts.map(|text| key_field(&KeyValue::Text(text.to_owned())));
                 texts.into_iter().chain([row.best, row.worst].map(|rank| rank.to_string()))
             }));
-        (!self.0.is_empty()).then(|| ListTable { name: "ranks", printed: printed.with(texts), records })
+        (!self.0.is_empty()).then(|| ListTable { name: "ranks".to_owned(), printed: printed.with(texts), records })
     }
 }
 

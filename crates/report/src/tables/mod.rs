@@ -101,11 +101,11 @@ pub enum Emphasis {
 /// The sign that marks a cell of few episodes.
 pub(crate) const DAGGER: char = '†';
 
-/// A list beside the tables of a report.
+/// A table of a report in both forms.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ListTable {
     /// The name of its files.
-    pub name: &'static str,
+    pub name: String,
     /// For people; its sentences say how to read it, and what it cannot say.
     pub printed: Table,
     /// The same in full, for programs: numbers are exact, what is unknown is empty.

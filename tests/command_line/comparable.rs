@@ -27,6 +27,8 @@ pub struct Cell<'a> {
     pub scenes: usize,
     /// How many of the last episodes ended for want of an answer.
     pub lost: usize,
+    /// One in how many episodes takes a step more; 0 for none.
+    pub long: usize,
     /// How many of the first episodes have a reply that gave no decision.
     pub unread: usize,
     /// The kind of the recording, and what its clusters are.
@@ -46,6 +48,7 @@ pub const LIKE: Cell<'_> = Cell {
     declared: usize::MAX,
     scenes: usize::MAX,
     lost: 0,
+    long: 0,
     unread: 0,
     kind: "recording",
     cluster: None,
@@ -84,6 +87,7 @@ impl Cell<'_> {
             false if at < self.unread => "parse_failed",
             _ => "ok",
         };
+        let is_long = self.long > 0 && at.is_multiple_of(self.long);
         let step = |action, is_last: bool| Step {
             action: Some(action),
             self_color: Some(choice.into()),
@@ -101,7 +105,7 @@ impl Cell<'_> {
             fingerprint: (at < self.declared).then(|| self.fingerprint()),
             ..harness::traces::episode(
                 &format!("{experiment}/{model}/s1/r{run}"),
-                vec![step(Action::MoveForward, false), step(last, true)],
+                [vec![step(Action::MoveForward, false); 1 + usize::from(is_long)], vec![step(last, true)]].concat(),
             )
         }
     }
@@ -229,4 +233,34 @@ fn bold_marks_the_models_that_no_test_shows_to_be_worse() {
     Cell { model: "dog", mirror: 1.2, solved: solved(1, 21), ..LIKE }.write(folder.path());
     let table = write(3.0);
     assert!(!table.contains("**21/21"), "{table}");
+}
+
+#[test]
+fn ranks_are_in_a_report_and_lost_episodes_beside_the_test_over_all_experiments() {
+    let folder = two(|_| ());
+    let at = folder.path();
+    Cell { experiment: "E2", solved: solved(21, 21), ..LIKE }.write(&at.join("runs"));
+    Cell { experiment: "E2", model: "bee", lost: 2, solved: solved(0, 21), ..LIKE }.write(&at.join("runs"));
+    run(at, &["report", "runs", "--out", "out"]).done();
+    let read = |name: &str| std::fs::read_to_string(at.join("out").join(name));
+    let ranks = read("tables/ranks.csv").unwrap();
+    for line in
+        ["experiment,metric,model,best,worst", "E1,TSA,ant,1,1", "E1,TSA,bee,2,2", ",TSA,ant,1,1", ",TSA,bee,2,2"]
+    {
+        assert!(ranks.lines().any(|found| found == line), "{line}: {ranks}");
+    }
+    // Every episode takes two steps: nobody decides earlier.
+    assert!(ranks.contains("E1,TTD,ant,1,2"), "{ranks}");
+    let printed = read("tables/ranks.md").unwrap();
+    assert!(printed.contains("| all | ant | 1 | --") && printed.contains("rank 1 are tied for the best"), "{printed}");
+    assert!(read("report.html").unwrap().contains("<section id=\"ranks\">"));
+    run(at, &["report", "runs", "--out", "out", "--style", "paper"]).done();
+    assert!(read("tables/ranks.csv").is_err() && !read("report.html").unwrap().contains("id=\"ranks\""));
+    let stats = run(at, &["stats", "runs", "--full"]).done();
+    let (_, overall) = stats.split_once(" metric  first  second  test").unwrap();
+    assert!(overall.lines().next().unwrap().contains("p with lost episodes"), "{stats}");
+    assert!(
+        overall.lines().any(|line| line.contains("ant    bee") && line.contains("<0.0001, <0.0001   better")),
+        "{stats}"
+    );
 }

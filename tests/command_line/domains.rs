@@ -41,12 +41,35 @@ fn folder() -> tempfile::TempDir {
     folder
 }
 
-/// The words of a command over `robots.parquet`, with its definitions.
 /// What the first row of scores in CSV declares.
 const IMPORTED: &str = r#""{""origin"":""import""}""#;
 
+/// The words of a command over `robots.parquet`, with its definitions.
 fn asked(folder: &Path, words: &[&str]) -> String {
     run(folder, &[words, &["robots.parquet", "--definitions", "robots.toml"]].concat()).done()
+}
+
+#[test]
+fn a_gate_compares_the_policies_of_another_domain() {
+    let folder = folder();
+    let at = folder.path();
+    // The later policy never succeeds.
+    let later = steps().replace("\"success\":true", "\"success\":false");
+    fs::write(at.join("later.jsonl"), later).unwrap();
+    run(at, &["import", "later.jsonl", "-o", "later.parquet", "--definitions", "robots.toml"]).done();
+    let gate = |base: &str, format: &str| {
+        run(at, &["gate", base, "later.parquet", "--definitions", "robots.toml", "--format", format])
+    };
+    let found: Value = serde_json::from_str(&gate("robots.parquet", "json").ends(1).stdout).unwrap();
+    assert_eq!((&found["metric"], &found["cells"][0]["model"]), (&json!("SUCCESS"), &json!("act")));
+    let flip = &found["cells"][0]["flips"][0];
+    assert_eq!((&flip["base"]["episode_id"], &flip["base"]["timesteps"]), (&json!("act-1"), &json!([3])));
+    assert_eq!((&flip["new"]["value"], &found["cells"][0]["new"]["n"]), (&json!(0), &json!(6)));
+    // Scores give the same verdicts, without steps.
+    asked(at, &["score", "-o", "robots.csv"]);
+    let scores: Value = serde_json::from_str(&gate("robots.csv", "json").ends(1).stdout).unwrap();
+    assert_eq!(scores["cells"][0]["why"], found["cells"][0]["why"]);
+    assert_eq!(scores["cells"][0]["flips"][0]["base"]["timesteps"], Value::Null);
 }
 
 #[test]

@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 
 use super::comparable::{Cell, LIKE, solved};
 use crate::harness::program::{Answer, run};
+use resvg::usvg::roxmltree;
 
 /// A folder with `base` and `new`.
 fn two(base: &Cell, new: &Cell) -> tempfile::TempDir {
@@ -23,7 +24,7 @@ fn gate(folder: &Path, words: &[&str]) -> Answer {
     run(folder, &[&["gate", "base", "new"], words].concat())
 }
 
-fn cell(folder: &Path, words: &[&str]) -> (i32, Value) {
+fn cell_of(folder: &Path, words: &[&str]) -> (i32, Value) {
     let answer = gate(folder, &[&["--format", "json"], words].concat());
     let found: Value = serde_json::from_str(&answer.stdout).unwrap();
     assert_eq!(found["verdict"], found["cells"][0]["verdict"]);
@@ -40,7 +41,7 @@ fn each_verdict_has_its_exit_code() {
         (of(21, 21), Cell { mirror: 1.2, ..of(0, 21) }, "not_comparable", 5),
     ] {
         let folder = two(&base, &new);
-        let (found, cell) = cell(folder.path(), &[]);
+        let (found, cell) = cell_of(folder.path(), &[]);
         assert_eq!((cell["verdict"].as_str().unwrap(), found), (verdict, code), "{cell}");
     }
 }
@@ -48,22 +49,22 @@ fn each_verdict_has_its_exit_code() {
 #[test]
 fn a_cell_of_which_nothing_is_said_names_the_episodes_that_would_settle_it() {
     let folder = two(&of(14, 21), &of(13, 21));
-    let (_, found) = cell(folder.path(), &[]);
+    let (_, found) = cell_of(folder.path(), &[]);
     let settled = found["settled_by"].as_u64().unwrap();
     assert!(settled > 21, "{found}");
     assert_eq!(found["why"], format!("about {settled} scenes on each side would settle it"));
     // With so many the same rates hold.
     let n = usize::try_from(settled).unwrap();
     let folder = two(&of(n * 14 / 21, n), &of(n * 14 / 21 - n / 21, n));
-    assert_eq!(cell(folder.path(), &[]).1["verdict"], "held");
+    assert_eq!(cell_of(folder.path(), &[]).1["verdict"], "held");
 }
 
 #[test]
 fn what_differs_is_named_and_may_be_pooled() {
     let folder = two(&of(21, 21), &Cell { mirror: 1.2, ..of(0, 21) });
-    let (_, found) = cell(folder.path(), &[]);
+    let (_, found) = cell_of(folder.path(), &[]);
     assert_eq!(found["why"], "world.mirror.width is 3.0 and 1.2");
-    let (code, found) = cell(folder.path(), &["--pool"]);
+    let (code, found) = cell_of(folder.path(), &["--pool"]);
     assert_eq!((code, &found["verdict"]), (1, &json!("regressed")));
     for format in ["text", "md", "github", "junit", "json"] {
         let answer = gate(folder.path(), &["--pool", "--format", format]).ends(1).stdout;
@@ -78,7 +79,7 @@ fn what_differs_is_named_and_may_be_pooled() {
 #[test]
 fn another_model_of_the_same_world_is_compared_by_its_scenes() {
     let folder = two(&of(21, 21), &Cell { model: "ant-2", ..of(0, 21) });
-    let (code, found) = cell(folder.path(), &[]);
+    let (code, found) = cell_of(folder.path(), &[]);
     assert_eq!((code, &found["model"], &found["base_model"]), (1, &json!("ant-2"), &json!("ant")));
     let flip = &found["flips"][0];
     assert_eq!(
@@ -93,17 +94,17 @@ fn repeats_of_few_scenes_give_no_verdict() {
     let few = |successes| Cell { scenes: 3, ..of(successes, 60) };
     for (base, new) in [(60, 0), (60, 60)] {
         let folder = two(&few(base), &few(new));
-        assert_eq!(cell(folder.path(), &[]).0, 4);
+        assert_eq!(cell_of(folder.path(), &[]).0, 4);
     }
 }
 
 #[test]
 fn a_verdict_that_lost_episodes_could_turn_is_none() {
     let folder = two(&of(21, 21), &Cell { lost: 10, ..of(10, 21) });
-    let (_, without) = cell(folder.path(), &["--where", "run <= 10"]);
+    let (_, without) = cell_of(folder.path(), &["--where", "run <= 10"]);
     assert_eq!(without["new"]["lost"], 0);
     let folder = two(&of(60, 60), &Cell { lost: 30, ..of(60, 60) });
-    let (code, found) = cell(folder.path(), &[]);
+    let (code, found) = cell_of(folder.path(), &[]);
     assert_eq!((code, &found["new"]["lost"], &found["new"]["n"]), (4, &json!(30), &json!(30)));
     assert_eq!(found["why"], "held without the 30 lost episodes, regressed if they count against NEW");
 }
@@ -118,7 +119,7 @@ fn scores_stand_for_traces_and_durations_have_a_margin_in_steps() {
     let found: Value = serde_json::from_str(&answer).unwrap();
     assert_eq!(found["cells"][0]["flips"][0]["base"]["timesteps"], Value::Null);
     // All durations are equal: without spread there is no interval, and no verdict.
-    let (code, found) = cell(folder.path(), &["--metric", "TTD", "--margin", "5"]);
+    let (code, found) = cell_of(folder.path(), &["--metric", "TTD", "--margin", "5"]);
     assert_eq!((code, &found["p_adjusted"]), (4, &Value::Null));
     let message = gate(folder.path(), &["--metric", "TSB"]).refused();
     assert!(message.contains("TSA"), "{message}");
@@ -144,12 +145,60 @@ fn every_format_names_the_flips() {
     assert!(junit.contains("tests=\"1\" failures=\"1\" errors=\"0\" skipped=\"0\""), "{junit}");
 }
 
+/// `JUnit` parses as XML, a workflow command is one line of `::COMMAND title=TITLE::MESSAGE`, Markdown has a table.
+#[test]
+fn every_format_is_well_formed_whatever_the_names_are() {
+    let model = "a<b>&\"c\"|d,e:f%g";
+    let folder = two(&Cell { model, ..of(21, 21) }, &Cell { model, ..of(0, 21) });
+    let text = |format: &str| gate(folder.path(), &["--format", format]).ends(1).stdout;
+    let junit = text("junit");
+    let options = roxmltree::ParsingOptions { allow_dtd: false, ..roxmltree::ParsingOptions::default() };
+    let document = roxmltree::Document::parse_with_options(&junit, options).unwrap();
+    let case = document.descendants().find(|node| node.has_tag_name("testcase")).unwrap();
+    assert_eq!((case.attribute("classname"), case.attribute("name")), (Some("E1"), Some(&*format!("{model} TSA"))));
+    let failure = case.first_element_child().unwrap();
+    assert_eq!(failure.tag_name().name(), "failure");
+    assert_eq!(failure.text().unwrap().lines().count(), 21);
+    let github = text("github");
+    let command = github.strip_prefix("::error title=").unwrap();
+    let (title, message) = command.split_once("::").unwrap();
+    assert_eq!(title, "E1 a<b>&\"c\"|d%2Ce%3Af%25g TSA%3A regressed");
+    assert!(message.ends_with('\n') && message.matches('\n').count() == 1, "{message}");
+    let markdown = text("md");
+    let rows: Vec<&str> = markdown.lines().filter(|line| line.starts_with('|')).collect();
+    let columns = |row: &str| row.replace("\\|", "").matches('|').count();
+    assert!(rows.len() == 3 && rows.iter().all(|row| columns(row) == 9), "{markdown}");
+}
+
+#[test]
+fn durations_name_the_episodes_that_would_settle_them() {
+    // Every third episode of NEW is a step longer.
+    let cell = |long| Cell { long, ..of(21, 21) };
+    let folder = two(&cell(2), &cell(3));
+    let (code, found) = cell_of(folder.path(), &["--metric", "TTD", "--margin", "0.05"]);
+    let settled = found["settled_by"].as_u64().unwrap();
+    assert!(code == 4 && settled > 21, "{found}");
+    assert_eq!(found["why"], format!("about {settled} scenes on each side would settle it"));
+}
+
+#[test]
+fn a_filter_and_unusable_replies_are_beside_every_verdict() {
+    let folder = two(&of(21, 21), &Cell { unread: 21, ..of(0, 21) });
+    for format in ["text", "md", "github", "junit", "json"] {
+        let answer = gate(folder.path(), &["--where", "run <= 20", "--format", format]).ends(1).stdout;
+        let answer = answer.replace('\n', " ");
+        for words in ["NEW: 20 of 40 replies gave no decision (E1 ant 20 of 40)", "run "] {
+            assert!(answer.contains(words), "{format}: {answer}");
+        }
+    }
+}
+
 #[cfg(feature = "view")]
 #[test]
 fn a_flip_leads_to_its_frames_where_a_page_was_exported_beside_the_traces() {
     let folder = two(&of(21, 21), &of(0, 21));
     run(folder.path(), &["view", "new", "--export", "new-page"]).done();
-    let (_, found) = cell(folder.path(), &[]);
+    let (_, found) = cell_of(folder.path(), &[]);
     let flip = &found["flips"][0];
     assert_eq!(flip["new"]["frames"], "new-page/index.html?view=episode&id=E1/ant/s1/r1&t=2");
     // The page has other values of the earlier episodes, whose ids are the same.

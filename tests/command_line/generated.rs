@@ -6,7 +6,7 @@ use std::path::Path;
 use trace::schema::COLUMNS;
 
 use crate::generation::{self, Files, OPTIONAL_COLUMNS, Order, Study};
-use crate::harness::traces::texts;
+use crate::harness::traces::{score_values, texts};
 use crate::{contents, run};
 
 const STEPS: u64 = 10_000;
@@ -47,20 +47,9 @@ fn generated_traces_of_both_orders_keep_every_rule_and_score_the_same() {
         let required = COLUMNS.iter().filter(|column| column.required).count();
         let columns = info["columns"].as_array().unwrap().len();
         assert_eq!(columns, if optional { required + OPTIONAL_COLUMNS.len() } else { required }, "{name}");
-        scores.insert(values(&run(at, &["score", name]).done()));
+        scores.insert(score_values(&run(at, &["score", name]).done()));
     }
     assert_eq!(scores.len(), 1, "the order, or an optional column, changes a score");
-}
-
-/// Scores without what they declare of replies, which only the optional columns have.
-fn values(scores: &str) -> Vec<Vec<String>> {
-    let mut reader = csv::Reader::from_reader(scores.as_bytes());
-    let header = reader.headers().unwrap().clone();
-    let is_value = |at: usize| !["unusable_replies", "mirrorstats.declared"].contains(&&header[at]);
-    let row = |row: csv::StringRecord| {
-        row.iter().enumerate().filter(|(at, _)| is_value(*at)).map(|(_, it)| it.to_owned()).collect()
-    };
-    reader.records().map(|record| row(record.unwrap())).collect()
 }
 
 #[test]

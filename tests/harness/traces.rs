@@ -40,6 +40,18 @@ pub fn write_trace(path: &Path, episodes: &[Episode], columns: OptionalColumns) 
     writer.finish().unwrap();
 }
 
+/// Scores in CSV, row by row, without what the footer and the replies declare.
+pub fn score_values(scores: &str) -> Vec<Vec<String>> {
+    let mut reader = csv::Reader::from_reader(scores.as_bytes());
+    let header = reader.headers().unwrap().clone();
+    let is_value = |at: usize| !["unusable_replies", "mirrorstats.declared"].contains(&&header[at]);
+    let values = |row: &csv::StringRecord| {
+        row.iter().enumerate().filter(|(at, _)| is_value(*at)).map(|(_, text)| text.to_owned()).collect()
+    };
+    let names = values(&header);
+    std::iter::once(names).chain(reader.records().map(|row| values(&row.unwrap()))).collect()
+}
+
 /// Writes rows as another writer does, each batch as a row group at least.
 pub fn write_rows(path: &Path, batches: &[RecordBatch], properties: Option<WriterProperties>) {
     let mut writer = ArrowWriter::try_new(File::create(path).unwrap(), batches[0].schema(), properties).unwrap();

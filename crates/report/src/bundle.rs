@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 use crate::cells::{Cell, Cells};
 use crate::layout::MetricTable;
 use crate::style::Style;
-use crate::tables::{Table, key_field};
+use crate::tables::{ListTable, Table, key_field};
 use exact::hash;
 use exact::number::full_precision;
 use exact::replace::{self, Content, FolderFiles, FolderHoldsInput, TargetIsInput};
@@ -29,6 +29,8 @@ pub struct Bundle<'a> {
     pub cells: &'a Cells,
     /// For `tables/<name>.{tex,md,csv}`.
     pub tables: &'a [MetricTable],
+    /// For the same, after the tables.
+    pub lists: &'a [ListTable],
     /// The bytes of `episodes.parquet`.
     pub episodes: &'a [u8],
     /// For `manifest.json`, which gets its outputs when they are written.
@@ -221,10 +223,10 @@ fn files(bundle: &Bundle) -> Vec<OutputFile> {
     let file = |path: &str, bytes: &[u8]| OutputFile { path: PathBuf::from(path), bytes: bytes.to_vec() };
     let mut files =
         vec![file("cells.csv", cells_csv(bundle.cells).as_bytes()), file("episodes.parquet", bundle.episodes)];
-    for table in bundle.tables {
-        let printed = table.printed();
-        for (ending, text) in [("tex", printed.latex()), ("md", printed.markdown()), ("csv", table.records().csv())] {
-            files.push(file(&format!("tables/{}.{ending}", table.name), text.as_bytes()));
+    for ListTable { name, printed, records } in bundle.tables.iter().map(MetricTable::list).chain(bundle.lists.to_vec())
+    {
+        for (ending, text) in [("tex", printed.latex()), ("md", printed.markdown()), ("csv", records.csv())] {
+            files.push(file(&format!("tables/{name}.{ending}"), text.as_bytes()));
         }
     }
     files.extend_from_slice(bundle.others);

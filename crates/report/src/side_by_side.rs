@@ -9,13 +9,12 @@ use exact::escape::visible;
 impl Comparison {
     /// The whole answer of `compare`, in lines of at most `width` columns.
     pub fn render(&self, width: Option<usize>) -> String {
-        let comparison = self;
         let mut text = String::new();
-        if !comparison.differences.is_empty() {
-            push_differences(&mut text, &comparison.differences, width);
+        if !self.differences.is_empty() {
+            push_differences(&mut text, &self.differences, width);
             text.push('\n');
         }
-        for erratum in &comparison.unused_errata {
+        for erratum in &self.unused_errata {
             let _ = writeln!(
                 text,
                 "erratum not needed: {}, {}, {}, {}: `{}` for `{}`",
@@ -27,17 +26,17 @@ impl Comparison {
                 visible(&erratum.computed),
             );
         }
-        if !comparison.unpublished.is_empty() {
-            let _ = writeln!(text, "not in the published table: {} of our cells", comparison.unpublished.len());
+        if !self.unpublished.is_empty() {
+            let _ = writeln!(text, "not in the published table: {} of our cells", self.unpublished.len());
         }
         let _ = writeln!(
             text,
             "{}: {} cells: {} as published, {} excused by errata, {} differ",
-            visible(&comparison.table),
-            comparison.cells,
-            comparison.same,
-            comparison.excused,
-            comparison.differing
+            visible(&self.table),
+            self.cells,
+            self.same,
+            self.excused,
+            self.differing
         );
         text
     }

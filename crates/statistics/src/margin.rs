@@ -4,6 +4,7 @@
 //! variance under the null hypothesis is never too small. Up to `MOST_ENUMERATED` outcomes the p value is exact: the largest
 //! probability over the rate that the null hypothesis leaves open (Chan 1998); beyond, the normal approximation.
 
+use super::interval::Interval;
 use super::quantile::{normal, normal_below};
 
 /// More outcomes than this are not enumerated.
@@ -87,22 +88,8 @@ impl Units {
         }
     }
 
-    /// The number of units on each side with which one verdict would be likely, if the rates stay as they are.
-    ///
-    /// `level` is two-sided for a difference and one-sided for the margin; the power is 0.8. `None` where no verdict comes
-    /// nearer with more units.
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a positive number, bounded above")]
-    pub fn settling(&self, margin: f64, level: f64) -> Option<u64> {
-        let (difference, variance) = self.spread()?;
-        let needed = |distance: f64, tail: f64| variance * ((normal(tail) + normal(1.0 - POWER)) / distance).powi(2);
-        let told_apart = needed(difference, level / 2.0);
-        let within = if difference > -margin { needed(difference + margin, level) } else { f64::INFINITY };
-        let least = told_apart.min(within).ceil();
-        (least.is_finite() && least < 1e9).then(|| (least as u64).max(self.len() + 1))
-    }
-
-    /// The difference, and the variance of one unit's part in it; a half of a success and a half of a failure are added.
-    fn spread(&self) -> Option<(f64, f64)> {
+    /// The spread of the difference; a half of a success and a half of a failure are added.
+    pub fn spread(&self) -> Option<Spread> {
         let share = |successes: f64, n: f64| (successes + 0.5) / (n + 1.0);
         let pairs = self.pairs().map(|Pairs { gains, losses, n }| {
             let (gained, lost) = (share(gains, n), share(losses, n));
@@ -115,7 +102,43 @@ impl Units {
         let all: Vec<(f64, f64, f64)> = pairs.into_iter().chain(sides).collect();
         let weight: f64 = all.iter().map(|part| part.2).sum();
         let mean = |of: fn(&(f64, f64, f64)) -> f64| all.iter().map(|part| of(part) * part.2).sum::<f64>() / weight;
-        (weight > 0.0).then(|| (mean(|part| part.0), mean(|part| part.1)))
+        let spread = || Spread { gain: mean(|part| part.0), variance: mean(|part| part.1), units: self.len() };
+        (weight > 0.0).then(spread)
+    }
+}
+
+/// How far a difference may vary: what a number of units is planned from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spread {
+    /// The difference; better is up.
+    pub gain: f64,
+    /// The variance of one unit's part in it.
+    pub variance: f64,
+    /// The units on the smaller side.
+    pub units: u64,
+}
+
+impl Spread {
+    /// The spread that an interval of a mean difference shows.
+    #[expect(clippy::cast_precision_loss, reason = "counts of units are far below 2^53")]
+    pub fn of_interval(gain: f64, interval: Interval, confidence: f64, units: u64) -> Self {
+        let se = (interval.high - interval.low) / (2.0 * normal(f64::midpoint(1.0, confidence)));
+        Self { gain, variance: units as f64 * se * se, units }
+    }
+
+    /// The number of units on each side with which one verdict would be likely, if the difference stays as it is.
+    ///
+    /// `level` is two-sided for a difference and one-sided for the margin; the power is 0.8. `None` where no verdict comes
+    /// nearer with more units.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a positive number, bounded above")]
+    pub fn settling(self, margin: f64, level: f64) -> Option<u64> {
+        let needed = |distance: f64, tail: f64| {
+            (self.variance * ((normal(tail) + normal(1.0 - POWER)) / distance).powi(2)).max(0.0)
+        };
+        let told_apart = needed(self.gain, level / 2.0);
+        let within = if self.gain > -margin { needed(self.gain + margin, level) } else { f64::INFINITY };
+        let least = told_apart.min(within).ceil();
+        (least.is_finite() && least < 1e9).then(|| (least as u64).max(self.units + 1))
     }
 }
 
@@ -284,7 +307,7 @@ mod tests {
     // (norm.isf(0.05) + norm.isf(0.2)) ** 2 is 6.182557232; one half of a pair of 21 in each direction: 1/22 of variance.
     #[test]
     fn the_number_that_settles_is_that_of_the_normal_approximation() {
-        assert_eq!(pairs(0, 0, 21).settling(0.1, 0.05), Some(29));
-        assert_eq!(pairs(0, 2, 21).settling(0.1, 0.05).map(|n| n > 100), Some(true));
+        assert_eq!(pairs(0, 0, 21).spread().unwrap().settling(0.1, 0.05), Some(29));
+        assert_eq!(pairs(0, 2, 21).spread().unwrap().settling(0.1, 0.05).map(|n| n > 100), Some(true));
     }
 }

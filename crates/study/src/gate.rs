@@ -1,4 +1,4 @@
-//! Later episodes against earlier ones: one verdict per cell, with the steps that decided each flip and where its frames are.
+//! Later episodes compared with earlier ones: one verdict per cell, with the deciding steps and the frames of each flip.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -30,11 +30,9 @@ impl Study {
         let (old, new) = (base.gated(options)?, self.gated(options)?);
         let design = design_of(&old.declared.clone().joined(new.declared.clone()));
         let mut gate = Gate::of([&old, &new], design, options)?;
-        if options.pool {
-            for (study, table) in [(base, &old), (self, &new)] {
-                let told = pooled::told(table, &study.question.by_over(table))?;
-                gate.pooled.extend(told);
-            }
+        gate.caveats.extend(self.selection(&new).map(|selection| selection.sentence()));
+        for (study, table) in [(base, &old), (self, &new)].into_iter().filter(|_| options.pool) {
+            gate.caveats.extend(pooled::told(table, &study.question.by_over(table))?);
         }
         let flips = || gate.cells.iter().flat_map(|cell| &cell.flips);
         let ids = |of: fn(&report::statistics::FlippedPair) -> &Played| {

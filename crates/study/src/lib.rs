@@ -60,8 +60,9 @@ use ::report::layout::MetricTable;
 use ::report::plan::departures::{Looks, departures};
 use ::report::plan::register::RegisteredPlan;
 use ::report::published;
-use ::report::statistics::{Options, Replies, Selection, Sequential, Statistics, Ties};
+use ::report::statistics::{Options, Ranks, Replies, Selection, Sequential, Statistics};
 use ::report::style::Style;
+use ::report::tables::ListTable;
 use exact::replace;
 use metric::file;
 use metric::names::is_about;
@@ -285,20 +286,22 @@ impl Study {
         lost: &LostCounts,
         cells: &Cells,
         style: &Style,
-    ) -> Result<Vec<MetricTable>, StudyError> {
-        let mut tables = layout::tables(cells, style)?;
+    ) -> Result<(Vec<MetricTable>, Option<ListTable>), StudyError> {
+        let (mut tables, mut ranks) = (layout::tables(cells, style)?, None);
         if tables.iter().any(|table| table.is_tied) {
-            let ties = Ties::of(episodes, &self.undecided(lost), design_of(&episodes.declared), self.question.pool)?;
+            let design = design_of(&episodes.declared);
+            let found = Ranks::of_table(episodes, &self.undecided(lost), design, self.question.pool)?;
             for table in &mut tables {
-                table.mark_ties(&ties, &style.sheet.emphasis_note);
+                table.mark_ties(&found, &style.sheet.emphasis_note);
             }
+            ranks = found.list();
         }
         let chosen = self.selection(episodes).map(|selection| selection.sentence());
         let pooled = self.pooled(episodes)?.unwrap_or_default();
         for table in &mut tables {
             table.footnotes.extend(chosen.iter().chain(&pooled).cloned());
         }
-        Ok(tables)
+        Ok((tables, ranks))
     }
 
     /// The filter; it is by results where it asks for more than what is recorded of an episode before it begins.
@@ -442,8 +445,8 @@ impl Study {
         let published = published::read(published)?;
         let style = Style::load(style)?;
         let counted = self.counted(self.score()?);
-        let tables =
-            self.tables(&counted.results.episodes, &counted.lost, &self.cells_of(&counted.results.episodes)?, &style)?;
+        let cells = self.cells_of(&counted.results.episodes)?;
+        let (tables, _) = self.tables(&counted.results.episodes, &counted.lost, &cells, &style)?;
         Ok(compare(choose(&tables, &published, table, &style)?, &published, errata))
     }
 

@@ -10,7 +10,7 @@ use super::results::Results;
 use report::bundle::Manifest;
 use report::cells::{Cells, KeyValue};
 use report::html::{self, Figure, Page};
-use report::layout::quality::QualityTable;
+use report::layout::quality;
 use report::statistics::Options;
 use report::style::Style;
 use trace::schema::SCHEMA_VERSION;
@@ -59,12 +59,12 @@ impl Study {
         let svgs: Vec<String> = drawings.drawn.iter().map(|(_, figure)| figure.inline_svg()).collect();
         let figures: Vec<Figure> =
             drawings.drawn.iter().zip(&svgs).map(|((name, drawn), svg)| figure_of(*name, drawn, svg)).collect();
-        let quality = results.quality.as_ref().and_then(QualityTable::from_cells);
-        let tables = self.tables(&results.episodes, &lost, &cells, &style)?;
+        let (tables, ranks) = self.tables(&results.episodes, &lost, &cells, &style)?;
+        let lists: Vec<_> = ranks.into_iter().chain(results.quality.as_ref().and_then(quality::of_cells)).collect();
         let manifest =
             Manifest::new(&cells, &style, SCHEMA_VERSION, self.question.filter.clone(), results.inputs.clone());
         let names: &[&str] = match part {
-            Part::Tables if quality.is_some() => &["tables", "quality", "definitions"],
+            Part::Tables if !lists.is_empty() => &["tables", "lists", "definitions"],
             Part::Tables => &["tables", "definitions"],
             Part::Figures => &["figures"],
             Part::Statistics => &["statistics"],
@@ -76,7 +76,7 @@ impl Study {
             manifest: &manifest,
             figures: &figures,
             statistics: statistics.as_ref(),
-            quality: quality.as_ref(),
+            lists: &lists,
             recordings: None,
         };
         let sections = html::sections(&page, names)?;

@@ -15,10 +15,11 @@ use report::cells::Cells;
 use report::figures::{Figure as Drawn, FigureName};
 use report::html::{self, Figure, Page, Recordings};
 use report::layout::MetricTable;
-use report::layout::quality::{self, QualityTable};
+use report::layout::quality;
 use report::plan::departures::Looks;
 use report::statistics::{Options, Replies, Statistics};
 use report::style::{MAIN_TABLE, OTHER_TABLE, Style};
+use report::tables::ListTable;
 use score::format::Format;
 use score::lost_counts::LostCounts;
 use score::table::EpisodeTable;
@@ -55,8 +56,8 @@ pub struct Report {
     pub cells: Cells,
     /// The tables, as the style lays them out.
     pub tables: Vec<MetricTable>,
-    /// What became of the replies; `None` for scores, which do not say.
-    pub quality: Option<QualityTable>,
+    /// Ranks, if the style marks ties, and what became of the replies, if the inputs are traces.
+    pub lists: Vec<ListTable>,
     /// Where everything comes from.
     pub manifest: Manifest,
     /// How many replies gave no decision; `None` where each gave one, and where that is not recorded.
@@ -106,9 +107,9 @@ impl Study {
         let statistics =
             options.figures.then(|| self.statistics_of(&counted, &cells, &Options::default())).transpose()?;
         let Counted { results, all, lost } = counted;
-        let quality = results.quality.as_ref().and_then(QualityTable::from_cells);
         let replies = Replies::of(all.as_ref().unwrap_or(&results.episodes)).and_then(|replies| replies.sentence());
-        let tables = self.tables(&results.episodes, &lost, &cells, &style)?;
+        let (tables, ranks) = self.tables(&results.episodes, &lost, &cells, &style)?;
+        let lists = ranks.into_iter().chain(results.quality.as_ref().and_then(quality::of_cells)).collect();
         let filter = self.question.filter.clone();
         let manifest = Manifest::new(&cells, &style, SCHEMA_VERSION, filter, results.inputs.clone());
         let mut notes = self.notes(&results, &lost);
@@ -122,7 +123,7 @@ impl Study {
             all,
             cells,
             tables,
-            quality,
+            lists,
             manifest,
             replies,
             notes,
@@ -238,20 +239,11 @@ impl Report {
         let mut episodes = Vec::new();
         let all = self.all.as_ref().unwrap_or(&self.results.episodes);
         scores::write(all, Format::Parquet, &mut episodes, self.threads)?;
-        let Self { cells, tables, manifest, illustrations, read, .. } = self;
-        let others = &[self.quality_files(), illustrations.clone()].concat();
-        let written = bundle::write(out, &Bundle { cells, tables, episodes: &episodes, manifest, read, others })?;
+        let Self { cells, tables, lists, manifest, illustrations: others, read, .. } = self;
+        let written =
+            bundle::write(out, &Bundle { cells, tables, lists, episodes: &episodes, manifest, read, others })?;
         let inside = |path: &PathBuf| path.strip_prefix(out).unwrap_or(path).display().to_string();
         Ok(WrittenReport { files: written.files.iter().map(inside).collect(), manifest: written.manifest })
-    }
-
-    fn quality_files(&self) -> Vec<OutputFile> {
-        let file = |ending: &str, text: String| OutputFile {
-            path: format!("tables/{}.{ending}", quality::NAME).into(),
-            bytes: text.into_bytes(),
-        };
-        let Some(QualityTable { printed, records }) = &self.quality else { return Vec::new() };
-        vec![file("tex", printed.latex()), file("md", printed.markdown()), file("csv", records.csv())]
     }
 
     fn illustrate(&mut self, statistics: &Statistics) -> Result<(), StudyError> {
@@ -278,7 +270,7 @@ impl Report {
             manifest: &self.manifest,
             figures: &figures,
             statistics: Some(statistics),
-            quality: self.quality.as_ref(),
+            lists: &self.lists,
             recordings: self.recordings.as_ref(),
         })?)
     }

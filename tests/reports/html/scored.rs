@@ -87,7 +87,7 @@ impl Report {
             manifest: &self.manifest,
             figures: &figures,
             statistics: self.statistics.as_ref(),
-            quality: None,
+            lists: &[],
             recordings: Some(&self.recordings),
         })
     }

@@ -30,7 +30,7 @@ fn report() -> Report {
 
 fn write_to(out: &Path, report: &Report, others: &[OutputFile]) -> Result<Vec<PathBuf>, BundleError> {
     let Report { cells, tables, manifest } = report;
-    let bundle = Bundle { cells, tables, episodes: b"PAR1", manifest, read: &[], others };
+    let bundle = Bundle { cells, tables, lists: &[], episodes: b"PAR1", manifest, read: &[], others };
     write(out, &bundle).map(|written| written.files)
 }
 

@@ -20,17 +20,16 @@ const SHORT_HASH: usize = 12;
 impl Changes {
     /// The whole answer of `diff`, its tables at most `width` columns wide; the last line sums up.
     pub fn render(&self, limit: Limit, width: Option<usize>) -> String {
-        let changes = self;
         let mut text = String::new();
-        let names = &changes.definitions;
+        let names = &self.definitions;
         let _ = writeln!(text, "before: {}\nafter:  {}", origin(&names.before), origin(&names.after));
-        push_section(&mut text, "Written differently", lists::rewritten(&changes.rewritten, limit, width));
-        push_alone(&mut text, "metric", &changes.metrics, limit, |name| visible(name));
-        push_alone(&mut text, "episode", &changes.episodes, limit, |name| visible(&name.episode_id));
-        push_section(&mut text, "Cells that moved", lists::cells(changes, limit, width));
-        push_section(&mut text, "Values that flipped, by metric", lists::flips_by_metric(&changes.flips));
-        push_section(&mut text, "Episodes that flipped", lists::flips(&changes.flips, limit, width));
-        let _ = writeln!(text, "\n{}", sum(changes));
+        push_section(&mut text, "Written differently", lists::rewritten(&self.rewritten, limit, width));
+        push_alone(&mut text, "metric", &self.metrics, limit, |name| visible(name));
+        push_alone(&mut text, "episode", &self.episodes, limit, |name| visible(&name.episode_id));
+        push_section(&mut text, "Cells that moved", lists::cells(self, limit, width));
+        push_section(&mut text, "Values that flipped, by metric", lists::flips_by_metric(&self.flips));
+        push_section(&mut text, "Episodes that flipped", lists::flips(&self.flips, limit, width));
+        let _ = writeln!(text, "\n{}", sum(self));
         text
     }
 }

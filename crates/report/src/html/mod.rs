@@ -26,8 +26,8 @@ use crate::bundle::Manifest;
 use crate::cells::Cells;
 use crate::cells::group::GroupError;
 use crate::layout::MetricTable;
-use crate::layout::quality::QualityTable;
 use crate::statistics::Statistics;
+use crate::tables::ListTable;
 use score::table::EpisodeTable;
 
 pub use command::{Recordings, word};
@@ -46,8 +46,8 @@ pub struct Page<'a> {
     pub figures: &'a [Figure<'a>],
     /// What can be concluded; none leaves the section out.
     pub statistics: Option<&'a Statistics>,
-    /// What became of the replies; none leaves the section out.
-    pub quality: Option<&'a QualityTable>,
+    /// The lists below the statistics, a section each.
+    pub lists: &'a [ListTable],
     /// What the episodes are of; none where no command looks into them, as into scores.
     pub recordings: Option<&'a Recordings>,
 }
@@ -80,7 +80,7 @@ pub enum HtmlError {
 }
 
 /// Some sections of the page by themselves, for a page that is put together in the browser: `tables`, `figures`, `statistics`,
-/// `quality`, `definitions`, each as its element.
+/// `lists`, `definitions`, each as its element.
 pub fn sections(page: &Page<'_>, names: &[&str]) -> Result<Vec<String>, HtmlError> {
     let content = page::content(page)?;
     names.iter().map(|name| Ok(template::section(name, &content)?)).collect()

@@ -14,10 +14,10 @@ use crate::bundle::Manifest;
 use crate::cells::Cells;
 use crate::cells::group::group;
 use crate::figures;
-use crate::layout::quality::QualityTable;
 use crate::layout::{MetricColumn, MetricRow, MetricRows, MetricTable, heading, row_key};
 use crate::statistics::Statistics;
 use crate::statistics::text::Length;
+use crate::tables::ListTable;
 use exact::escape::visible;
 use metric::catalog::Better;
 use score::table::{EpisodeTable, KeyRef};
@@ -40,7 +40,7 @@ pub(super) fn content(page: &Page<'_>) -> Result<Value, HtmlError> {
         figures => page.figures.iter().map(figure).collect::<Vec<_>>(),
         pair => Serde(pair::heading(page.statistics)),
         statistics => Serde(page.statistics.map(statistics)),
-        quality => Serde(page.quality.map(quality)),
+        lists => Serde(page.lists.iter().map(list).collect::<Vec<_>>()),
         metrics => Serde(metrics),
         lets => Serde(definitions::lets(catalog)),
         experiments => Serde(definitions::experiments(catalog)),
@@ -125,8 +125,10 @@ fn statistics(statistics: &Statistics) -> Json {
     })
 }
 
-fn quality(QualityTable { printed, .. }: &QualityTable) -> Json {
+fn list(ListTable { name, printed, .. }: &ListTable) -> Json {
     json!({
+        "name": name,
+        "title": printed.title,
         "notes": printed.sentences.iter().map(|text| visible(text)).collect::<Vec<_>>(),
         "header": printed.columns.iter().map(|column| visible(&column.heading)).collect::<Vec<_>>(),
         "rows": printed.rows().map(|row| row.iter().map(|cell| visible(&cell.text)).collect()).collect::<Vec<Json>>(),

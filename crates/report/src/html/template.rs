@@ -17,7 +17,7 @@ const TEMPLATES: [(&str, &str); 9] = [
     ("figures.html", include_str!("../../../../assets/templates/figures.html")),
     ("pair.html", include_str!("../../../../assets/templates/pair.html")),
     ("statistics.html", include_str!("../../../../assets/templates/statistics.html")),
-    ("quality.html", include_str!("../../../../assets/templates/quality.html")),
+    ("lists.html", include_str!("../../../../assets/templates/lists.html")),
     ("definitions.html", include_str!("../../../../assets/templates/definitions.html")),
     ("provenance.html", include_str!("../../../../assets/templates/provenance.html")),
 ];

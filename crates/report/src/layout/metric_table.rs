@@ -5,9 +5,9 @@
 
 use crate::cells::KeyValue;
 use crate::cells::group::CONDITION;
-use crate::statistics::Ties;
+use crate::statistics::Ranks;
 use crate::style::CellForm;
-use crate::tables::{Align, Column, Emphasis, Look, RowGroup, Table, TableCell, key_field};
+use crate::tables::{Align, Column, Emphasis, ListTable, Look, RowGroup, Table, TableCell, key_field};
 use exact::moments::Moments;
 use exact::number::Decimal;
 use metric::catalog::Better;
@@ -122,7 +122,7 @@ impl MetricTable {
     /// Sets the models that are tied for the best in bold, and says so with `note`.
     ///
     /// Nothing where rows are anything else than a model in an experiment, or where the style does not ask for ties.
-    pub fn mark_ties(&mut self, ties: &Ties, note: &str) {
+    pub fn mark_ties(&mut self, ranks: &Ranks, note: &str) {
         let place = |name: &str| self.keys.iter().position(|key| key == name);
         let (Some(experiment), Some(model)) = (place("experiment"), place("model")) else { return };
         let condition = place(CONDITION);
@@ -135,7 +135,7 @@ impl MetricTable {
             let condition = condition.map(text);
             let name = condition.map_or_else(|| text(model), |condition| format!("{} [{condition}]", text(model)));
             for (cell, column) in row.cells.iter_mut().zip(&self.columns) {
-                if ties.has(&row.key[experiment].to_string(), &name, &column.metric) {
+                if ranks.is_tied(&row.key[experiment].to_string(), &name, &column.metric) {
                     cell.emphasis = Emphasis::Bold;
                     is_marked = true;
                 }
@@ -149,6 +149,11 @@ impl MetricTable {
     /// The caption without its title: note and footnotes.
     pub fn sentences(&self) -> impl Iterator<Item = &str> {
         std::iter::once(self.note.as_str()).chain(self.footnotes.iter().map(String::as_str)).filter(|s| !s.is_empty())
+    }
+
+    /// Both forms under the table's name.
+    pub fn list(&self) -> ListTable {
+        ListTable { name: self.name.clone(), printed: self.printed(), records: self.records() }
     }
 
     pub(crate) fn rows(&self) -> impl Iterator<Item = &MetricRow> {

@@ -5,13 +5,12 @@
 use std::collections::BTreeMap;
 
 use crate::cells::KeyValue;
-use crate::tables::{Column, Look, Table, key_field};
+use crate::tables::{Column, ListTable, Look, Table, key_field};
 use exact::escape::visible;
 use exact::format::fixed;
 use score::quality::{CellKey, Quality, QualityByCell, REPLY_STATUSES};
 
-/// The name of its files.
-pub const NAME: &str = "quality";
+const NAME: &str = "quality";
 /// The text of what is not recorded.
 const UNKNOWN: &str = "--";
 /// The shares of replies whose latency is told.
@@ -19,24 +18,11 @@ const MEDIAN: f64 = 0.5;
 const SLOW: f64 = 0.95;
 const NANO: f64 = 1e9;
 
-/// Data quality by experiment, model and condition.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct QualityTable {
-    /// For people; its sentences say how to read it, and what it cannot say.
-    pub printed: Table,
-    /// The same in full, for programs: counts are exact, what is not recorded is empty.
-    pub records: Table,
-}
-
-impl QualityTable {
-    /// The table of these cells; `None` without any.
-    pub fn from_cells(cells: &QualityByCell) -> Option<Self> {
-        if cells.0.is_empty() {
-            return None;
-        }
-        let keys = if cells.has_conditions() { 3 } else { 2 };
-        Some(Self { printed: printed(cells, keys), records: records(cells, keys) })
-    }
+/// Data quality by experiment, model and condition; `None` without any cell.
+pub fn of_cells(cells: &QualityByCell) -> Option<ListTable> {
+    let keys = if cells.has_conditions() { 3 } else { 2 };
+    let table = || ListTable { name: NAME.to_owned(), printed: printed(cells, keys), records: records(cells, keys) };
+    (!cells.0.is_empty()).then(table)
 }
 
 fn keys_and<'a>(keys: usize, others: impl IntoIterator<Item = &'a str>) -> impl Iterator<Item = &'a str> {
@@ -173,7 +159,8 @@ fn record(key: &CellKey, quality: &Quality, keys: usize) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::QualityTable;
+    use super::of_cells;
+    use crate::tables::ListTable;
     use score::quality::{CellKey, Quality, QualityByCell, Total};
 
     fn cells(condition: &str) -> QualityByCell {
@@ -197,18 +184,18 @@ mod tests {
 
     #[test]
     fn what_is_not_recorded_is_not_zero() {
-        let table = QualityTable::from_cells(&cells("default")).unwrap().printed;
+        let table = of_cells(&cells("default")).unwrap().printed;
         let rows: Vec<Vec<&str>> =
             table.rows().map(|row| row.iter().map(|cell| cell.text.as_str()).collect()).collect();
         assert_eq!(rows[1][2..], ["1", "--", "7", "--", "--", "--", "--", "--", "--"]);
         assert_eq!(rows[0][5..8], ["4/40 (10.0 %)", "refusal 4", "6: case 2, fence 5"]);
         assert_eq!(rows[0][8..], ["100; 95 % within 900", "1200 + 81", "0.0123"]);
-        assert!(QualityTable::from_cells(&QualityByCell::default()).is_none());
+        assert!(of_cells(&QualityByCell::default()).is_none());
     }
 
     #[test]
     fn every_format_escapes_its_names() {
-        let QualityTable { printed, records } = QualityTable::from_cells(&cells("near")).unwrap();
+        let ListTable { printed, records, .. } = of_cells(&cells("near")).unwrap();
         insta::assert_snapshot!(records.csv(), @r"
         experiment,model,condition,episodes,lost,steps,replies,ok,repaired,parse_failed,schema_invalid,refusal,truncated,empty,rate_limited,server_error,timeout,unusable,other_status,repairs,latency_median_ms,latency_95_ms,prompt_tokens,completion_tokens,cost_usd
         E1,'=m,near,2,1,40,40,30,6,0,0,4,0,0,0,0,0,4,0,case 2; fence 5,100,900,48000,3240,0.012345678

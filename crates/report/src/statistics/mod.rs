@@ -43,7 +43,7 @@ pub use losses::{LossCase, LossCases, LossRow, Losses};
 pub use matching::Matching;
 pub use models::{Family, Gap, PairTest, Reach};
 pub use overall::{ImprovementRow, OverallMethod, OverallRow};
-pub use ranks::{RankRow, Ties};
+pub use ranks::{RankRow, Ranks};
 pub use replies::{Replies, UnusableReplies};
 pub use retest::RetestRow;
 pub use selection::Selection;

@@ -3,19 +3,29 @@
 //! Rule: a model is below another where it is shown to be worse, and nowhere else. Those that are below none are tied for the
 //! best. A family with models that are not comparable has no ranks.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::conclusions::headline;
 use super::models::compared;
 use super::study::Study;
-use super::{Family, OverallRow};
+use super::{Family, OverallRow, overall};
+use crate::cells::KeyValue;
 use crate::cells::interval::CONFIDENCE;
+use crate::tables::{Column, ListTable, Look, Table, key_field};
+use exact::escape::visible;
+use exact::format::UNDEFINED;
 use exact::moments::MomentOverflow;
 use score::lost_counts::LostCounts;
 use score::table::EpisodeTable;
 use statistics::design::Design;
+
+/// What stands for all experiments.
+pub(super) const ALL: &str = "all";
+const SENTENCE: &str = "The ranks that the tests leave open, adjusted by Holm within each experiment and metric. Models that may have \
+                        rank 1 are tied for the best.";
 
 /// The ranks of one model under one metric.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -45,6 +55,11 @@ impl RankRow {
         rows
     }
 
+    /// `2`, or `1-3` where the tests leave several ranks open.
+    pub(super) fn interval(&self) -> String {
+        if self.best == self.worst { self.best.to_string() } else { format!("{}-{}", self.best, self.worst) }
+    }
+
     fn of_family(family: &Family) -> Vec<Self> {
         if family.tests.iter().any(|test| test.comparison.incomparable.is_some()) {
             return Vec::new();
@@ -67,32 +82,62 @@ fn ranks(experiment: Option<&str>, metric: &str, models: &[&str], shown: &[(&str
     models.iter().map(row).collect()
 }
 
-/// The models that are tied for the best where not all are: experiment, model and metric of each.
+/// The ranks of a table at the usual confidence, in each experiment and over all of them.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Ties(BTreeSet<(String, String, String)>);
+pub struct Ranks(Vec<RankRow>);
 
-impl Ties {
-    /// The ties of a table at the usual confidence.
-    ///
+impl Ranks {
     /// # Errors
     /// Sums of squares beyond 128 bits.
-    pub fn of(table: &EpisodeTable, lost: &LostCounts, design: Design, pool: bool) -> Result<Self, MomentOverflow> {
+    pub fn of_table(
+        table: &EpisodeTable,
+        lost: &LostCounts,
+        design: Design,
+        pool: bool,
+    ) -> Result<Self, MomentOverflow> {
         let mut study = Study::of(table, design, Some(lost))?;
         study.pool = pool;
-        let families = compared(&study, None, CONFIDENCE).0;
-        let mut tied = BTreeSet::new();
-        for family in &families {
-            let rows = RankRow::of_family(family);
-            let is_told = rows.iter().any(|row| row.best > 1);
-            let best = rows.into_iter().filter(|row| is_told && row.best == 1);
-            tied.extend(best.map(|row| (family.experiment.clone(), row.model, row.metric)));
-        }
-        Ok(Self(tied))
+        let overall = overall::rates(&study, &headline(&study), CONFIDENCE);
+        Ok(Self(RankRow::all(&compared(&study, None, CONFIDENCE).0, &overall)))
     }
 
     /// Whether a model is tied for the best, and another one is not.
-    pub fn has(&self, experiment: &str, model: &str, metric: &str) -> bool {
-        self.0.contains(&(experiment.to_owned(), model.to_owned(), metric.to_owned()))
+    pub fn is_tied(&self, experiment: &str, model: &str, metric: &str) -> bool {
+        let is_of = |row: &&RankRow| row.experiment.as_deref() == Some(experiment) && row.metric == metric;
+        let mut family = self.0.iter().filter(is_of);
+        family.clone().any(|row| row.model == model && row.best == 1) && family.any(|row| row.best > 1)
+    }
+
+    /// A line per experiment and model with the ranks under each metric; `None` without a comparison.
+    pub fn list(&self) -> Option<ListTable> {
+        let mut metrics: Vec<&str> = Vec::new();
+        let mut lines: BTreeMap<(bool, &str, &str), BTreeMap<&str, String>> = BTreeMap::new();
+        for row in &self.0 {
+            if !metrics.contains(&&*row.metric) {
+                metrics.push(&row.metric);
+            }
+            let experiment = row.experiment.as_deref();
+            let line = lines.entry((experiment.is_none(), experiment.unwrap_or(ALL), &row.model)).or_default();
+            line.insert(&row.metric, row.interval());
+        }
+        let texts = lines.iter().map(|((_, experiment, model), ranks)| {
+            let cells = metrics.iter().map(|metric| ranks.get(metric).map_or(UNDEFINED, String::as_str));
+            [*experiment, *model].into_iter().chain(cells).map(visible).collect::<Vec<_>>()
+        });
+        let columns = ["experiment", "model"].into_iter().chain(metrics.iter().copied());
+        let printed = Table {
+            title: "Ranks".to_owned(),
+            sentences: vec![SENTENCE.to_owned()],
+            label: Some("tab:ranks".to_owned()),
+            ..Table::list(Look::Ruled, 2, columns.map(Column::left))
+        };
+        let records =
+            Table::of_texts(["experiment", "metric", "model", "best", "worst"]).with(self.0.iter().map(|row| {
+                let texts = [row.experiment.as_deref().unwrap_or_default(), &row.metric, &row.model];
+                let texts = texts.map(|text| key_field(&KeyValue::Text(text.to_owned())));
+                texts.into_iter().chain([row.best, row.worst].map(|rank| rank.to_string()))
+            }));
+        (!self.0.is_empty()).then(|| ListTable { name: "ranks".to_owned(), printed: printed.with(texts), records })
     }
 }
 

@@ -101,6 +101,17 @@ pub enum Emphasis {
 /// The sign that marks a cell of few episodes.
 pub(crate) const DAGGER: char = '†';
 
+/// A table of a report in both forms.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ListTable {
+    /// The name of its files.
+    pub name: String,
+    /// For people; its sentences say how to read it, and what it cannot say.
+    pub printed: Table,
+    /// The same in full, for programs: numbers are exact, what is unknown is empty.
+    pub records: Table,
+}
+
 impl Table {
     /// An empty list; the first `names` columns name a row.
     pub fn list(look: Look, names: usize, columns: impl IntoIterator<Item = Column>) -> Self {

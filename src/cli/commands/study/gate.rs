@@ -1,4 +1,4 @@
-//! `mirrorstats gate`: later episodes against earlier ones, with an exit code for each verdict.
+//! `mirrorstats gate`: compares later episodes with earlier ones; each verdict has an exit code.
 
 use std::ffi::OsString;
 use std::io::{self, Write as _};
@@ -8,27 +8,28 @@ use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::{output, terminal};
 use report::statistics::{GateFormat, GateOptions, GateVerdict};
 
-/// Hold new episodes against old ones: improved, held, regressed, cannot say
+/// Compare new episodes with old ones: improved, held, regressed, cannot say
 ///
-/// A cell is an experiment and a model. A cell has held if a loss of the margin or more is excluded; it has regressed if it is
-/// shown to be worse and has not held. A model whose name changed is compared if each side has one model.
+/// Each experiment and model gets one verdict. It is `held` if a loss of the margin or more is excluded, and `regressed` if the
+/// new episodes are worse and a loss of the margin is not excluded. If each side has one model, the model may change its name.
 ///
-/// Exit codes: 0 all improved or held; 1 some regressed; 5 some not comparable; 4 cannot say for some; 2 bad usage or input.
+/// Exit codes: 0 all improved or held; 1 a regression; 5 not comparable; 4 cannot say; 2 bad usage or input. A regression comes
+/// before not comparable, which comes before cannot say.
 #[derive(Clone, Debug, clap::Args)]
 pub struct GateArgs {
-    /// The episodes before: a trace, a folder, a quoted glob or a file of scores
+    /// The old episodes: a trace, a folder, a quoted glob or a file of scores
     #[arg(value_name = "BASE")]
     pub base: OsString,
-    /// The episodes after
+    /// The new episodes
     #[arg(value_name = "NEW")]
     pub new: OsString,
-    /// The metric [default: the first one of the definitions with a better direction]
+    /// The metric to compare [default: the first metric of the definitions with a better direction]
     #[arg(long, value_name = "METRIC")]
     pub metric: Option<String>,
-    /// The largest loss that is accepted, in the unit of the metric
+    /// The largest acceptable loss, in the unit of the metric
     #[arg(long, value_name = "LOSS", default_value_t = 0.1, value_parser = margin)]
     pub margin: f64,
-    /// One minus the level of every verdict, over all cells
+    /// The confidence of all verdicts together
     #[arg(long, value_name = "LEVEL", default_value = "0.95", value_parser = super::stats::confidence)]
     pub confidence: f64,
     /// Definitions: `paper`, `extended`, or a TOML file [default: those that the traces name, else paper]
@@ -37,10 +38,10 @@ pub struct GateArgs {
     /// Only episodes where this holds, in the language of definitions
     #[arg(long = "where", value_name = "EXPR")]
     pub condition: Option<String>,
-    /// Compare episodes that were recorded differently: in another world, with other prompts
+    /// Compare episodes even if their settings differ, such as the world or the prompts
     #[arg(long)]
     pub pool: bool,
-    /// How verdicts are printed
+    /// Output format
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,
     #[command(flatten)]
@@ -50,7 +51,7 @@ pub struct GateArgs {
 /// The formats by name.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum Format {
-    /// A table, and the flipped episodes
+    /// A table, then the flipped episodes
     #[default]
     Text,
     /// Markdown

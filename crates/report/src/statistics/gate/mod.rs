@@ -1,7 +1,7 @@
-//! Later episodes against earlier ones, cell by cell: improved, held, regressed, or why neither can be said.
+//! Later episodes compared with earlier ones, cell by cell: improved, held, regressed, or why no verdict is given.
 //!
 //! Rule: a loss within the margin is accepted, so that `held` comes before `regressed`. Every verdict is adjusted by Holm over
-//! the cells, rests on the unit of analysis, and stands whatever lost episodes would have shown.
+//! the cells, rests on the unit of analysis, and holds for every outcome of the lost episodes.
 
 mod flips;
 mod sides;
@@ -14,6 +14,7 @@ pub use flips::{FlippedPair, Played};
 pub use text::GateFormat;
 
 use self::sides::{Fill, Sides, joined};
+use super::Replies;
 use super::chance::Units;
 use super::compare::{Compared, Comparison};
 use super::matching::{Matched, Scenes};
@@ -41,7 +42,7 @@ pub struct GateOptions {
     pub pool: bool,
 }
 
-/// Where the later episodes of a cell stand.
+/// The verdict on the later episodes of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum GateVerdict {
@@ -68,8 +69,8 @@ pub struct Gate {
     pub confidence: f64,
     /// The gravest verdict: regressed, not comparable, cannot say, held, improved.
     pub verdict: GateVerdict,
-    /// Settings that differ and were declared not to matter, a sentence each.
-    pub pooled: Vec<String>,
+    /// Settings that differ and were declared not to matter, the filter, and replies without a decision: a sentence each.
+    pub caveats: Vec<String>,
     /// The cells, in the order of the experiments, then by model and condition.
     pub cells: Vec<GateCell>,
 }
@@ -128,7 +129,7 @@ pub struct GateSide {
 /// One cell before its verdict.
 struct Tried {
     comparison: Comparison,
-    units: margin::Units,
+    spread: Option<margin::Spread>,
     held: Option<f64>,
 }
 
@@ -158,14 +159,18 @@ impl Gate {
         }
         let verdict = cells.iter().map(|cell| cell.verdict).max().unwrap_or(GateVerdict::CannotSay);
         let GateOptions { metric, margin, confidence, .. } = options.clone();
-        let mut pooled = Vec::new();
+        let mut caveats = Vec::new();
         for setting in sides.barrier().into_iter().chain(apart(&study)).filter(|_| options.pool) {
             let sentence = format!("Compared though they differ (--pool): {setting}.");
-            if !pooled.contains(&sentence) {
-                pooled.push(sentence);
+            if !caveats.contains(&sentence) {
+                caveats.push(sentence);
             }
         }
-        Ok(Self { metric, margin, confidence, verdict, pooled, cells })
+        for (side, table) in [("BASE", base), ("NEW", new)] {
+            let replies = Replies::of(table).and_then(|replies| replies.sentence());
+            caveats.extend(replies.map(|sentence| format!("{side}: {sentence}")));
+        }
+        Ok(Self { metric, margin, confidence, verdict, caveats, cells })
     }
 }
 
@@ -224,7 +229,7 @@ impl Tried {
         if is_rate {
             let units = units(study, column, [base, new]);
             let held = units.non_inferior(options.margin);
-            return Self { comparison: at(options.confidence), units, held };
+            return Self { comparison: at(options.confidence), spread: units.spread(), held };
         }
         // Every verdict on a quantity is by its interval, at the level of Bonferroni.
         #[expect(clippy::cast_precision_loss, reason = "few cells")]
@@ -236,7 +241,12 @@ impl Tried {
         let is_within = within.interval.is_some_and(|interval| bound(interval) > -options.margin);
         let shown = |is_shown: bool| if is_shown { 0.0 } else { 1.0 };
         let comparison = Comparison { p: Some(shown(is_apart)), ..at(options.confidence) };
-        Self { comparison, units: margin::Units::default(), held: Some(shown(is_within)) }
+        let units = comparison.n[0].min(comparison.n[1]);
+        let spread = comparison.difference.zip(comparison.interval).map(|(difference, interval)| {
+            let gain = if is_lower { -difference } else { difference };
+            margin::Spread::of_interval(gain, interval, options.confidence, units)
+        });
+        Self { comparison, spread, held: Some(shown(is_within)) }
     }
 }
 
@@ -315,11 +325,14 @@ impl GateCell {
         };
         #[expect(clippy::cast_precision_loss, reason = "few cells")]
         let settled_by = (verdict == GateVerdict::CannotSay)
-            .then(|| tried.units.settling(options.margin, alpha / tests.max(1) as f64))
+            .then(|| tried.spread?.settling(options.margin, alpha / tests.max(1) as f64))
             .flatten();
         let name = study.unit_name(block);
         let why = match (verdict, settled_by) {
             (GateVerdict::CannotSay, Some(n)) => format!("about {n} {name} on each side would settle it"),
+            (GateVerdict::CannotSay, None) if tried.comparison.interval.is_none() && !is_rate => {
+                "the values have no interval: too few, too alike, or several per scene".to_owned()
+            }
             (GateVerdict::CannotSay, None) => format!("too few {name} for any verdict"),
             _ => why,
         };

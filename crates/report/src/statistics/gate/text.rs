@@ -17,7 +17,7 @@ pub enum GateFormat {
     Markdown,
     /// Workflow commands of GitHub Actions, a line per cell.
     Github,
-    /// `JUnit` XML: a regression is a failure, a cell that is not comparable an error, one of which nothing can be said skipped.
+    /// `JUnit` XML: a regression is a failure, a cell that is not comparable an error, a cell without a verdict skipped.
     Junit,
 }
 
@@ -65,7 +65,7 @@ impl Gate {
                 push_wrapped(&mut text, &format!("  - {}", visible(&words(flip))), width, 4);
             }
         }
-        for sentence in &self.pooled {
+        for sentence in &self.caveats {
             text.push('\n');
             push_wrapped(&mut text, &visible(sentence), width, 0);
         }
@@ -81,7 +81,7 @@ impl Gate {
             let about = format!("{}, {}: {}", cell.experiment, cell.name(), words(flip));
             let _ = writeln!(text, "{}- {}", if at == 0 { "\n" } else { "" }, escape(&visible(&about)));
         }
-        for sentence in &self.pooled {
+        for sentence in &self.caveats {
             let _ = writeln!(text, "\n{}", escape(&visible(sentence)));
         }
         text + "\n" + &self.sum() + "\n"
@@ -142,7 +142,7 @@ impl Gate {
 
     fn sentence(&self, cell: &GateCell) -> String {
         let own = format!("{}: {}; base {}, new {}.", name(cell.verdict), cell.why, side(cell.base), side(cell.new));
-        std::iter::once(&own).chain(&self.pooled).cloned().collect::<Vec<_>>().join(" ")
+        std::iter::once(&own).chain(&self.caveats).cloned().collect::<Vec<_>>().join(" ")
     }
 
     fn sum(&self) -> String {

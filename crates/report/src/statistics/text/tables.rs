@@ -1,5 +1,6 @@
 //! The tables of `stats`, one function each: a line per row of the statistics whose metric is shown.
 
+use super::super::ranks::ALL;
 use super::super::study::named;
 use super::super::{
     CellRow, Comparison, Intervals, LossCases, Method, OverallMethod, Role, Sign, Statistics, Units, Verdict,
@@ -87,6 +88,9 @@ pub(super) fn chance(statistics: &Statistics, shown: Shown, is_full: bool) -> Ta
 /// The verdict where no outcome of so few units or of the lost episodes would have been one.
 const CANNOT_SAY: &str = "cannot say";
 
+/// The heading of the p values with all lost episodes taken both ways.
+const WITH_LOST: &str = "p with lost episodes";
+
 /// Which p values a table has.
 #[derive(Clone, Copy)]
 struct Columns {
@@ -104,7 +108,7 @@ impl Columns {
 
     fn names(self) -> Vec<&'static str> {
         let all = if self.is_full { ["p", "mid-p", "p (Holm)", "p (T-H)"].as_slice() } else { &["p", "p (Holm)"] };
-        let lost = self.has_losses.then_some("p with lost episodes");
+        let lost = self.has_losses.then_some(WITH_LOST);
         let noise = self.has_repeats.then_some("SE of repeats");
         noise.into_iter().chain(all.iter().copied()).chain(lost).collect()
     }
@@ -191,6 +195,7 @@ pub(super) const fn method(method: Method) -> (&'static str, usize) {
 /// Two models over all experiments: all of them where `is_full`, else those that are told apart.
 pub(super) fn overall(statistics: &Statistics, shown: Shown, is_full: bool) -> Table {
     let rows = statistics.overall.iter().filter(|row| shown(&row.metric) && (is_full || row.separated));
+    let columns = Columns { is_full, has_losses: rows.clone().any(|row| row.losses.is_some()) };
     let lines = rows.map(|row| {
         let test = match row.method {
             OverallMethod::MantelHaenszel => "exact conditional",
@@ -207,19 +212,21 @@ pub(super) fn overall(statistics: &Statistics, shown: Shown, is_full: bool) -> T
         line.extend([row.experiments.len().to_string(), fixed(row.difference, 3), plain(row.interval, 3)]);
         let p_values = if is_full { vec![row.p, row.mid_p, row.p_adjusted] } else { vec![row.p, row.p_adjusted] };
         line.extend(p_values.into_iter().map(p_value));
+        line.extend(columns.lost(row.losses.as_ref()));
         line.push(verdict.to_owned());
         line
     });
     let p_values = if is_full { ["p", "mid-p", "p (Holm)"].as_slice() } else { &["p", "p (Holm)"] };
-    let numbers = [&["experiments", "difference", "interval"], p_values, &["verdict"]].concat();
+    let lost = columns.has_losses.then_some(WITH_LOST);
+    let numbers = ["experiments", "difference", "interval"].iter().chain(p_values).copied().chain(lost);
+    let numbers: Vec<&str> = numbers.chain(["verdict"]).collect();
     Table::plain(&["metric", "first", "second", "test"], &numbers).with(lines)
 }
 
 pub(super) fn ranks(statistics: &Statistics, shown: Shown) -> Table {
     let lines = statistics.ranks.iter().filter(|row| shown(&row.metric)).map(|row| {
-        let experiment = row.experiment.as_deref().unwrap_or("all");
-        let ranks = if row.best == row.worst { row.best.to_string() } else { format!("{}-{}", row.best, row.worst) };
-        [experiment, &row.metric, &row.model].map(str::to_owned).into_iter().chain([ranks])
+        let experiment = row.experiment.as_deref().unwrap_or(ALL);
+        [experiment, &row.metric, &row.model].map(str::to_owned).into_iter().chain([row.interval()])
     });
     Table::plain(&["experiment", "metric", "model"], &["ranks"]).with(lines)
 }

@@ -1,11 +1,11 @@
 //! How often tests and families of tests reject what is true.
 
+use crate::tarone::{Attained, tarone_holm};
 use exact::ratio::Ratio;
 use statistics::chance;
 use statistics::holm::holm;
 use statistics::paired::Pairs;
 use statistics::random::SplitMix64;
-use statistics::tarone::{Attained, tarone_holm};
 use statistics::unpaired::{fisher, fisher_least_p};
 
 use crate::{LEVEL, N, SEED, binomial, happens, heading, largest, rates, row, share, successes};

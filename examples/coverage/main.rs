@@ -5,6 +5,7 @@
 mod errors;
 mod intervals;
 mod looks;
+mod tarone;
 mod units;
 
 use statistics::random::SplitMix64;

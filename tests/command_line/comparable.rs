@@ -162,6 +162,8 @@ fn models_of_two_worlds_prompts_or_step_budgets_are_not_compared() {
         assert_eq!(answer, "E1 ant better than bee");
         let sentence = format!("Compared though they differ (--pool): {setting}.");
         assert_eq!(found["pooled"], json!([sentence]));
+        let sequential = run(folder.path(), &["stats", "runs", "--pool", "--sequential", "--json"]).json();
+        assert_eq!(sequential["pooled"], json!([sentence]));
         assert!(run(folder.path(), &["stats", "runs", "--pool"]).done().contains("(--pool)"));
     }
 }

@@ -68,7 +68,24 @@ fn stats_and_report_name_each_departure_from_the_plan() {
     {
         assert!(departures.iter().any(|departure| departure.starts_with(words)), "{words}: {departures:?}");
     }
-    assert!(departures.contains(&"confidence: 0.95 registered, 0.9 found"), "{departures:?}");
+    for words in [
+        "confidence: 0.95 registered, 0.9 found",
+        "scenes of a model in an experiment: 21 registered, 0 found",
+        "test: pairs of equal scenes registered, episodes that are not all pairs of equal scenes found",
+    ] {
+        assert!(departures.contains(&words), "{departures:?}");
+    }
+    let declare = ["--where", "TSA = 1", "--model", "a", "--experiment", "E1", "--experiment", "E9", "--sequential"];
+    run(at, &[&["plan", "--runs", "7", "--register", "declared.json"], declare.as_slice()].concat()).done();
+    let declared = run(at, &["stats", ".", "--plan", "declared.json"]).done();
+    for words in [
+        "models: a registered, ",
+        "experiments: E1, E9 registered, ",
+        "filter: `TSA = 1` registered, none found",
+        "looks: any",
+    ] {
+        assert!(declared.contains(words), "{words}: {declared}");
+    }
     assert_eq!(
         (found["answers"][0]["metric"].as_str(), found["answers"][0]["role"].as_str()),
         (Some("TTD"), Some("primary"))

@@ -29,6 +29,5 @@ pub mod sample_size;
 pub mod sequential;
 pub mod stratified;
 pub mod survival;
-pub mod tarone;
 pub mod units;
 pub mod unpaired;

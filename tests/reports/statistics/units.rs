@@ -77,6 +77,27 @@ fn a_scene_of_four_experiments_counts_once() {
     assert_eq!((row.method, row.p, row.separated), (OverallMethod::Units, Some(0.21875), false));
 }
 
+// Six pairs: the least p of McNemar's test is 1/32, above 0.05 / 10. Five models against 1/3: 1/3^6 is below 0.05 / 5.
+#[test]
+fn a_family_without_any_possible_verdict_is_told_from_one_without_a_difference() {
+    let rows: Vec<Row> = ["a", "b", "c", "d", "e"]
+        .into_iter()
+        .flat_map(|model| (0..6).map(move |scene| ("E1", model, scene, 0, model < "c", 9)))
+        .collect();
+    let found = with_scenes(&rows, RECORDED, by_scene);
+    let answers: Vec<&str> = found.answers.iter().filter(|it| it.metric == "TSA").map(|it| &*it.answer).collect();
+    assert_eq!(answers, ["E1 a, b", "E1 cannot say: 6 pairs for 10 comparisons"]);
+}
+
+/// 3 scenes of one model against 40 of another, 3 of them shared.
+#[test]
+fn the_smaller_side_is_named() {
+    let of = |model, scenes: i32, solved| (0..scenes).map(move |scene| ("E1", model, scene, 0, solved, 9));
+    let rows: Vec<Row> = of("a", 3, true).chain(of("b", 40, false)).collect();
+    let found = with_scenes(&rows, RECORDED, by_scene);
+    assert!(found.answers.iter().any(|it| it.answer == "E1 cannot say: 3 scenes"), "{:?}", found.answers);
+}
+
 // 11 pairs 11:0, else 1 of 11 against 11 of 11.
 #[test]
 fn half_of_the_episodes_in_pairs_do_not_hide_the_other_half() {
@@ -104,6 +125,8 @@ fn episodes_too_few_for_any_verdict_are_told_from_those_that_show_nothing() {
     assert_eq!(answers(2), ["E1 cannot say: 2 episodes", "E1 cannot say: 2 pairs"]);
     assert_eq!(answers(5)[1], "E1 cannot say: 5 pairs");
     assert_eq!(answers(6), ["E1 all 2", "E1 nobody"]);
+    // 3 episodes: the least p is 1/27, above 0.05 / 2.
+    assert_eq!(answers(3)[0], "E1 cannot say: 3 episodes for 2 models");
 }
 
 /// Two models with two episodes per scene; the slower one is fast in scene 0.

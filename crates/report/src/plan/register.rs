@@ -35,6 +35,15 @@ pub struct RegisteredPlan {
     /// The metric of the primary question; absent where none is declared.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub primary: Option<String>,
+    /// The names of the experiments that are analysed; empty where none are declared.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub experiment_names: Vec<String>,
+    /// The names of the models; empty where none are declared.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub model_names: Vec<String>,
+    /// The filter of the analysis; absent where all episodes are analysed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub filter: Option<String>,
     /// SHA-256 over all of the above, 64 hexadecimal digits.
     pub sha256: String,
 }
@@ -53,15 +62,26 @@ impl RegisteredPlan {
     /// Registers a plan; experiments and prompts may be empty.
     pub fn new(plan: Plan, definitions: NamedHash, experiments: Vec<NamedHash>, prompts: Vec<NamedHash>) -> Self {
         let (format, version, sha256) = (FORMAT.to_owned(), VERSION, String::new());
-        let open = Self { format, version, plan, definitions, experiments, prompts, primary: None, sha256 };
-        Self { sha256: open.content_hash(), ..open }
+        Self {
+            format,
+            version,
+            plan,
+            definitions,
+            experiments,
+            prompts,
+            primary: None,
+            experiment_names: Vec::new(),
+            model_names: Vec::new(),
+            filter: None,
+            sha256,
+        }
+        .sealed()
     }
 
-    /// The same plan with a primary metric.
+    /// The same plan with the hash of its content.
     #[must_use]
-    pub fn with_primary(self, metric: Option<String>) -> Self {
-        let open = Self { primary: metric, ..self };
-        Self { sha256: open.content_hash(), ..open }
+    pub fn sealed(self) -> Self {
+        Self { sha256: self.content_hash(), ..self }
     }
 
     /// Reads a plan as it was registered.

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use super::compare::{Comparison, Sign};
 use super::losses::LOST;
 use super::study::named;
-use super::{ChanceRow, Contrast, Family, Options, Role, Selection, Statistics, Units, Verdict};
+use super::{ChanceRow, Contrast, Family, Method, Options, Reach, Role, Selection, Statistics, Units, Verdict};
 
 /// The most pairs that an experiment's answer names; more are counted.
 const MOST_NAMED: usize = 6;
@@ -165,6 +165,10 @@ fn above_in(experiment: &str, rows: &[&ChanceRow], confidence: f64) -> String {
     if let Some((_, units)) = unsaid.iter().max_by_key(|(_, units)| units.n).filter(|_| unsaid.len() == rows.len()) {
         return format!("{about} {}", cannot_say(units));
     }
+    let family: Vec<&ChanceRow> = rows.iter().map(|row| **row).collect();
+    if let Some(units) = ChanceRow::hopeless(&family, confidence) {
+        return format!("{about} {} for {} models", cannot_say(&units), rows.len());
+    }
     let below = if below.is_empty() { String::new() } else { format!(" (below: {})", names(&below, rows.len())) };
     let unsaid = unsaid.iter().map(|(model, units)| format!("cannot say for {model}: {}", counted(units)));
     let told = format!("{about} {}{below}", names(&above, rows.len()));
@@ -215,6 +219,10 @@ fn differing_in(family: &Family, confidence: f64) -> String {
     let comparisons: Vec<&Comparison> = family.tests.iter().map(|test| &test.comparison).collect();
     if let Some(why) = untested(&comparisons, confidence) {
         return format!("{} {why}", family.experiment);
+    }
+    if let Some(Reach { method, n, tests, family: None, .. }) = family.detectable {
+        let name = if method == Method::Mcnemar { "pairs" } else { "episodes" };
+        return format!("{} cannot say: {n} {name} for {tests} comparisons", family.experiment);
     }
     let separated = family.tests.iter().filter(|test| test.comparison.separated);
     let is_silent = |it: &&Comparison| !it.separated && it.incomparable.is_none();

@@ -15,7 +15,6 @@ use statistics::chance::{exact_test, least_p};
 use statistics::clustered::fewest_clusters;
 use statistics::holm::{holm, level};
 use statistics::outcomes::ExactTest;
-use statistics::tarone::{Attained, tarone_holm};
 use statistics::units::rate_test;
 
 /// One rate against one level.
@@ -44,8 +43,6 @@ pub struct ChanceRow {
     pub mid_p: f64,
     /// `p` adjusted by Holm's method over the models of the experiment, against this level.
     pub p_adjusted: f64,
-    /// `p` adjusted by Tarone and Holm: tests of too few episodes to reach it do not count.
-    pub p_tarone: f64,
     /// What the value adjusted by Holm says at the level of significance.
     pub verdict: Verdict,
     /// The units of analysis where some have several episodes: the test counts each once.
@@ -125,12 +122,7 @@ impl ChanceRow {
             .collect();
         settle(&mut tested.iter_mut().map(|tested| (tested.seen, &mut tested.losses)).collect::<Vec<_>>(), confidence);
         let adjusted = holm(&tested.iter().map(|tested| tested.test.p).collect::<Vec<_>>());
-        let attained = |tested: &Tested| Attained { p: tested.test.p, least: tested.least };
-        let by_tarone = tarone_holm(&tested.iter().map(attained).collect::<Vec<_>>());
-        let row = |(Tested { block, successes, n, test, units, losses, .. }, (p_adjusted, p_tarone)): (
-            Tested,
-            (f64, f64),
-        )| Self {
+        let row = |(Tested { block, successes, n, test, units, losses, .. }, p_adjusted): (Tested, f64)| Self {
             experiment: experiment.name.to_owned(),
             model: block.model.to_owned(),
             condition: block.condition(),
@@ -142,7 +134,6 @@ impl ChanceRow {
             p: test.p,
             mid_p: test.mid_p,
             p_adjusted,
-            p_tarone,
             verdict: Verdict::of(
                 successes,
                 n,
@@ -154,7 +145,7 @@ impl ChanceRow {
             units,
             losses,
         };
-        tested.into_iter().zip(adjusted.into_iter().zip(by_tarone)).map(row).collect()
+        tested.into_iter().zip(adjusted).map(row).collect()
     }
 
     /// The units or episodes that are too few for any verdict, or the lost ones that decide it; none elsewhere.
@@ -166,6 +157,17 @@ impl ChanceRow {
             None => hopeless().then(|| Units { n: self.n, name: "episodes".to_owned(), too_few: true }),
         }
         .or_else(|| LossCases::unsettled(self.losses.as_ref()))
+    }
+
+    /// The largest number of units or episodes, if no outcome of any of these models could pass Holm's first step.
+    pub(super) fn hopeless(family: &[&Self], confidence: f64) -> Option<Units> {
+        #[expect(clippy::cast_precision_loss, reason = "a family has few tests")]
+        let first_step = level(confidence)? / family.len() as f64;
+        let counted =
+            |row: &Self| row.units.clone().unwrap_or(Units { n: row.n, name: "episodes".to_owned(), too_few: true });
+        let is_hopeless = |row: &&Self| least_p(counted(row).n, row.level).is_none_or(|least| least > first_step);
+        let most = family.iter().map(|row| counted(row)).max_by_key(|units| units.n)?;
+        family.iter().all(is_hopeless).then_some(most)
     }
 
     /// The model as it is compared.
@@ -180,7 +182,6 @@ struct Tested<'s, 'a> {
     successes: u64,
     n: u64,
     test: ExactTest,
-    least: f64,
     units: Option<Units>,
     seen: LossCase,
     losses: Option<LossCases>,
@@ -215,7 +216,7 @@ impl<'s, 'a> Tested<'s, 'a> {
         let (test, least) = tested(None)?;
         let units = of_units.as_ref().map(|units| Units::new(study, block, units.len(), least, confidence));
         let losses = LossCases::of(block.lost, |toward| case(Some(toward)));
-        Some(Self { block, successes, n, test, least, units, seen: case(None), losses })
+        Some(Self { block, successes, n, test, units, seen: case(None), losses })
     }
 }
 

@@ -23,9 +23,8 @@ use statistics::interval::{Interval, student_t};
 use statistics::outcomes::ExactTest;
 use statistics::paired::Pairs;
 use statistics::restricted::{Difference, by_units, fewest, independent, paired, shared_horizon};
-use statistics::tarone::{Attained, tarone_holm};
 use statistics::units;
-use statistics::unpaired::{fisher, fisher_least_p};
+use statistics::unpaired::fisher;
 
 /// How a difference was tested, and what its interval is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
@@ -77,12 +76,8 @@ pub struct Comparison {
     pub p: Option<f64>,
     /// The mid-p value of a rate, which is not guaranteed to keep the level.
     pub mid_p: Option<f64>,
-    /// The least p value that the test could have reached, given its discordant pairs or margins.
-    pub p_least: Option<f64>,
     /// `p` adjusted by Holm's method over the family.
     pub p_adjusted: Option<f64>,
-    /// `p` adjusted by Tarone and Holm: tests that could not have reached it do not count.
-    pub p_tarone: Option<f64>,
     /// Whether the value adjusted by Holm reaches the level of significance.
     pub separated: bool,
     /// The units of analysis of both sides where the test counts each once, however many episodes it has.
@@ -120,7 +115,7 @@ impl Compared<'_, '_> {
         let losses = LossCases::of(lost, |toward| self.with_lost(column, &found, sides.as_ref(), toward));
         let noise = |block| repeat_variance(self.study, block, column);
         let repeat_se = noise(self.first).zip(noise(self.second)).map(|(a, b)| (a + b).sqrt());
-        Comparison { losses, repeat_se, ..found }
+        Comparison { repeat_se, losses, ..found }
     }
 
     /// The test with the lost episodes of both sides: in a comparison by pairs or units, each is a pair against a known
@@ -211,7 +206,6 @@ impl Compared<'_, '_> {
             withheld: Some(Withheld::Dependent),
             pairs: self.matched.pairs.as_ref().filter(|_| !self.is_dependent()).map(table),
             p: test.map(|test| test.p),
-            p_least: test.map(|test| test.least),
             units: Some(Units::new(self.study, self.first, sides.len(), least, self.confidence)),
             ..Comparison::of(Method::Units, [a.n, b.n])
         }
@@ -272,7 +266,7 @@ impl Compared<'_, '_> {
             undefined: rows.len() as u64 - pairs.n(),
             difference: pairs.difference(),
             interval: pairs.interval(self.confidence),
-            ..Comparison::of(Method::Mcnemar, [pairs.n(); 2]).tested(test, pairs.mcnemar_least_p())
+            ..Comparison::of(Method::Mcnemar, [pairs.n(); 2]).tested(test)
         }
     }
 
@@ -301,8 +295,7 @@ impl Compared<'_, '_> {
                 successes: Some([first.0, second.0]),
                 difference,
                 interval: newcombe(first, second, self.confidence),
-                ..Comparison::of(Method::Fisher, [a.n, b.n])
-                    .tested(fisher(first, second), fisher_least_p(first, second))
+                ..Comparison::of(Method::Fisher, [a.n, b.n]).tested(fisher(first, second))
             };
         }
         let spread = [a, b].iter().any(|side| side.se(StandardError::Sample).is_some_and(|se| se > 0.0));
@@ -356,9 +349,7 @@ impl Comparison {
             repeat_se: None,
             p: None,
             mid_p: None,
-            p_least: None,
             p_adjusted: None,
-            p_tarone: None,
             separated: false,
             units: None,
             losses: None,
@@ -397,8 +388,8 @@ impl Comparison {
         }
     }
 
-    fn tested(self, test: Option<ExactTest>, least: Option<f64>) -> Self {
-        Self { p: test.map(|test| test.p), mid_p: test.map(|test| test.mid_p), p_least: least, ..self }
+    fn tested(self, test: Option<ExactTest>) -> Self {
+        Self { p: test.map(|test| test.p), mid_p: test.map(|test| test.mid_p), ..self }
     }
 
     /// The units, pairs or episodes that are too few for any verdict, or the lost episodes that decide it; none elsewhere.
@@ -451,13 +442,9 @@ pub(super) fn adjust<'c>(family: impl Iterator<Item = &'c mut Comparison>, confi
     let seen = |it: &Comparison| LossCase { difference: it.difference, p: it.p };
     settle(&mut tested.iter_mut().map(|it| (seen(it), &mut it.losses)).collect::<Vec<_>>(), confidence);
     let p_values: Vec<f64> = tested.iter().filter_map(|comparison| comparison.p).collect();
-    let attained: Option<Vec<Attained>> =
-        tested.iter().map(|it| Some(Attained { p: it.p?, least: it.p_least? })).collect();
-    let by_tarone = attained.map(|attained| tarone_holm(&attained));
-    for (at, (comparison, adjusted)) in tested.iter_mut().zip(holm(&p_values)).enumerate() {
+    for (comparison, adjusted) in tested.iter_mut().zip(holm(&p_values)) {
         let too_few = comparison.units.as_ref().is_some_and(|units| units.too_few);
         comparison.p_adjusted = Some(adjusted);
-        comparison.p_tarone = by_tarone.as_ref().map(|adjusted| adjusted[at]);
         comparison.separated = level(confidence).is_some_and(|level| adjusted <= level)
             && !too_few
             && comparison.losses.is_none_or(|losses| losses.agree);

@@ -39,6 +39,9 @@ pub struct Sequential {
     /// The departures from the registered plan; null without a plan.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub departures: Option<Vec<String>>,
+    /// Settings that differ within a cell or between models that are compared, and were declared not to matter.
+    #[serde(default)]
+    pub pooled: Vec<String>,
     /// The rates that have a level to be compared with.
     pub headline: Vec<String>,
     /// Every rate of every model.
@@ -144,6 +147,7 @@ impl Sequential {
             episodes: table.len(),
             selection: options.selection.clone(),
             departures: None,
+            pooled: super::pooled(&study, options),
             headline: headline_rates(&study),
             rates: SequentialRate::all(&study, options.confidence),
             chance: SequentialChance::all(&study, options.confidence),

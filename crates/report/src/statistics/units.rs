@@ -47,9 +47,13 @@ impl Sides {
         Self { units }
     }
 
-    /// The number of units.
+    /// The units on the smaller side.
     pub fn len(&self) -> usize {
-        self.units.len()
+        let [first, second] = self
+            .units
+            .values()
+            .fold([0, 0], |[first, second], (a, b)| [first + usize::from(a.n > 0), second + usize::from(b.n > 0)]);
+        first.min(second)
     }
 
     /// The units that both sides have and those of one; `None` where the units of the two sides are of different kinds.

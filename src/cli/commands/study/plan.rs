@@ -64,6 +64,15 @@ pub struct PlanArgs {
     /// The metric of the primary question that a registered plan declares, such as TSA
     #[arg(long, value_name = "NAME", requires = "register")]
     pub primary: Option<String>,
+    /// An experiment that a registered plan analyses; may be repeated
+    #[arg(long, value_name = "NAME", requires = "register")]
+    pub experiment: Vec<String>,
+    /// A model that a registered plan compares; may be repeated
+    #[arg(long, value_name = "NAME", requires = "register")]
+    pub model: Vec<String>,
+    /// The filter of the analysis that a registered plan declares, in the language of definitions
+    #[arg(long = "where", value_name = "EXPR", requires = "register")]
+    pub condition: Option<String>,
     /// Write the plan, the hash of the definitions and its own hash to a new file
     #[arg(long, value_name = "FILE")]
     pub register: Option<PathBuf>,
@@ -145,7 +154,14 @@ impl PlanArgs {
         let definitions = NamedHash { name: catalog.name, sha256: catalog.hash };
         let (experiments, prompts) = self.recorded()?;
         let registered = RegisteredPlan::new(plan.clone(), definitions, experiments, prompts);
-        let registered = registered.with_primary(self.primary.clone());
+        let registered = RegisteredPlan {
+            primary: self.primary.clone(),
+            experiment_names: self.experiment.clone(),
+            model_names: self.model.clone(),
+            filter: self.condition.clone(),
+            ..registered
+        }
+        .sealed();
         let mut new = output::create(file)?;
         let written = new.write_all(registered.to_json().as_bytes()).and_then(|()| new.commit_new());
         written.map_err(|error| match error.kind() {

@@ -107,7 +107,7 @@ fn sections(statistics: &Statistics, shown: tables::Shown, length: Length, perce
         (
             format!(
                 "Against chance: exact binomial test, two-sided by minimum likelihood; Holm over the models{}",
-                if is_full { "; mid-p need not keep the level, Tarone-Holm is no verdict" } else { "" }
+                if is_full { "; mid-p need not keep the level" } else { "" }
             ),
             tables::chance(statistics, shown, is_full),
         ),

@@ -33,6 +33,9 @@ impl Sequential {
         if let Some(selection) = &sequential.selection {
             push_wrapped(&mut text, &selection.sentence(), width, 0);
         }
+        for sentence in &sequential.pooled {
+            push_wrapped(&mut text, &visible(sentence), width, 0);
+        }
         departures(&mut text, sequential.departures.as_deref(), width);
         list(&mut text, "What this is for", &PURPOSE.map(str::to_owned), width);
         let pairs: Vec<&SequentialPair> = sequential.models.iter().filter(|pair| shown(&pair.metric)).collect();

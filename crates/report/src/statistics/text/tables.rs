@@ -75,7 +75,7 @@ pub(super) fn chance(statistics: &Statistics, shown: Shown, is_full: bool) -> Ta
         };
         let mut line = vec![row.experiment.clone(), row.name(), row.metric.clone(), format!("{role} {}", row.level)];
         line.push(format!("{}/{}{}", row.successes, row.n, of_units(row.units.as_ref())));
-        line.extend(columns.p_values([Some(row.p), Some(row.mid_p), Some(row.p_adjusted), Some(row.p_tarone)]));
+        line.extend(columns.p_values([Some(row.p), Some(row.mid_p), Some(row.p_adjusted)]));
         line.extend(columns.lost(row.losses.as_ref()));
         line.push(verdict.to_owned());
         line
@@ -100,21 +100,21 @@ struct Columns {
 }
 
 impl Columns {
-    fn of<'c>(comparisons: impl Iterator<Item = &'c Comparison> + Clone, is_full: bool) -> Self {
+    fn of<'c>(mut comparisons: impl Iterator<Item = &'c Comparison> + Clone, is_full: bool) -> Self {
         let has_losses = comparisons.clone().any(|found| found.losses.is_some());
-        let has_repeats = comparisons.clone().any(|found| found.repeat_se.is_some());
+        let has_repeats = comparisons.any(|found| found.repeat_se.is_some());
         Self { is_full, has_losses, has_repeats }
     }
 
     fn names(self) -> Vec<&'static str> {
-        let all = if self.is_full { ["p", "mid-p", "p (Holm)", "p (T-H)"].as_slice() } else { &["p", "p (Holm)"] };
+        let all = if self.is_full { ["p", "mid-p", "p (Holm)"].as_slice() } else { &["p", "p (Holm)"] };
         let lost = self.has_losses.then_some(WITH_LOST);
         let noise = self.has_repeats.then_some("SE of repeats");
         noise.into_iter().chain(all.iter().copied()).chain(lost).collect()
     }
 
-    fn p_values(self, [p, mid_p, adjusted, tarone]: [Option<f64>; 4]) -> Vec<String> {
-        let shown = if self.is_full { vec![p, mid_p, adjusted, tarone] } else { vec![p, adjusted] };
+    fn p_values(self, [p, mid_p, adjusted]: [Option<f64>; 3]) -> Vec<String> {
+        let shown = if self.is_full { vec![p, mid_p, adjusted] } else { vec![p, adjusted] };
         shown.into_iter().map(p_value).collect()
     }
 
@@ -130,8 +130,8 @@ fn of_units(units: Option<&Units>) -> String {
 }
 
 pub(super) fn separated(statistics: &Statistics, shown: Shown, is_full: bool) -> Table {
-    let tests = statistics.models.iter().flat_map(|family| &family.tests);
-    let columns = Columns::of(tests.map(|test| &test.comparison), is_full);
+    let pairs = statistics.models.iter().flat_map(|family| &family.tests);
+    let columns = Columns::of(pairs.map(|test| &test.comparison), is_full);
     let families = statistics.models.iter().filter(|family| shown(&family.metric));
     let lines = families.flat_map(|family| {
         family.tests.iter().filter(|test| test.comparison.separated).map(|test| {
@@ -175,7 +175,7 @@ fn compared(found: &Comparison, columns: Columns) -> Vec<String> {
     let mut line = vec![test.to_owned(), counts, fixed(found.difference, places)];
     line.push(held(found.interval, found.withheld, places));
     line.extend(columns.has_repeats.then(|| fixed(found.repeat_se, places)));
-    line.extend(columns.p_values([found.p, found.mid_p, found.p_adjusted, found.p_tarone]));
+    line.extend(columns.p_values([found.p, found.mid_p, found.p_adjusted]));
     line.extend(columns.lost(found.losses.as_ref()));
     line
 }

@@ -67,7 +67,6 @@ fn walk(config: &WorldConfig, first: i32, mut eye: Option<Camera>) -> Spent {
     spent
 }
 
-/// What switching between worlds costs an eye: the same frames of one world and of eight by turns.
 fn switching(config: &WorldConfig) -> [Duration; 2] {
     const FRAMES: usize = 64;
     let mut eye = Camera::new(config).expect("there is something to draw with");

@@ -29,13 +29,12 @@ const SIZES: [usize; 6] = [3, 5, 7, 12, 21, 60];
 struct Design {
     scenes: usize,
     repeats: usize,
-    /// Whether models share their scenes.
+    /// True if models share their scenes.
     paired: bool,
-    /// How often an episode copies: of one episode per scene, what all models share; of several, the model's first one.
     copied: f64,
     /// The chance of a decision in each step.
     deciding: f64,
-    /// Whether half of the models succeed in 0.9 of episodes and decide four times as fast.
+    /// True if half of the models succeed in 0.9 of episodes and decide four times as fast.
     differing: bool,
 }
 

@@ -44,7 +44,6 @@ pub fn trace(data: &[u8]) {
     scan_and_validate(&scratch::file("trace.parquet", data));
 }
 
-/// What a scan takes `validate` takes, too; both count the same steps.
 fn scan_and_validate(path: &Path) {
     let input = Input::new(path);
     let report = validate(std::slice::from_ref(&input), None, NonZeroUsize::MIN).expect("threads can be started");

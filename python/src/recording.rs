@@ -28,7 +28,7 @@ pub struct PythonAgent {
     model: String,
     source: Option<String>,
     is_base64: bool,
-    /// Whether what the function raises loses its episode; else it ends the recording.
+    /// True if what the function raises loses its episode; else it ends the recording.
     is_lost: bool,
     /// Gives the function of an episode, which takes a message as JSON and gives the text of a reply.
     listeners: Py<PyAny>,
@@ -81,7 +81,6 @@ fn listener(function: Py<PyAny>, failed: impl Fn(Python<'_>, PyErr) -> String + 
     })
 }
 
-/// What was raised and where, for the list of lost episodes.
 fn words(py: Python<'_>, fault: &PyErr) -> String {
     let traced = fault.traceback(py).and_then(|traceback| traceback.format().ok());
     traced.map_or_else(|| fault.to_string(), |traceback| format!("{fault}\n{}", traceback.trim_end()))

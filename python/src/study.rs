@@ -195,7 +195,6 @@ impl Study {
     }
 }
 
-/// What is computed the first time, as a table.
 fn once(kept: &OnceLock<RecordBatch>, compute: impl FnOnce() -> PyResult<RecordBatch>) -> PyResult<Table> {
     if let Some(batch) = kept.get() {
         return Ok(Table::new(batch.clone()));

@@ -57,7 +57,6 @@ struct Cli {
     errors: ErrorFormat,
 }
 
-/// What `--version` prints; `-V` prints the version alone.
 fn long_version() -> String {
     format!("{}\nfeatures: {}", env!("CARGO_PKG_VERSION"), features::present())
 }

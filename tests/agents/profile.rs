@@ -57,7 +57,7 @@ impl Profiles {
         profile.and_then(|profile| profile.get(metric)).copied().unwrap_or_default()
     }
 
-    /// Whether there are episodes of an agent in an experiment.
+    /// Returns true if there are episodes of an agent in an experiment.
     pub fn has(&self, experiment: &str, agent: &str) -> bool {
         self.0.contains_key(&(experiment.to_owned(), agent.to_owned()))
     }

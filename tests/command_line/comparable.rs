@@ -34,7 +34,7 @@ pub struct Cell<'a> {
     /// The kind of the recording, and what its clusters are.
     pub kind: &'a str,
     pub cluster: Option<&'a str>,
-    /// Whether each episode is solved.
+    /// True if each episode is solved.
     pub solved: Vec<bool>,
 }
 

@@ -34,7 +34,7 @@ const HIDDEN: [char; 13] = [
     '\u{e000}',
 ];
 
-/// Whether every character only shows itself; line breaks are the program's own.
+/// Returns true if every character only shows itself; line breaks are the program's own.
 fn is_tame(text: &str) -> bool {
     text.chars().all(|c| c == '\n' || !(c.is_control() || HIDDEN.contains(&c)))
 }

@@ -26,7 +26,7 @@ pub struct Fault {
     pub at: usize,
     /// What it fails with; 0 ends the process instead.
     pub error: i32,
-    /// Whether all later calls of the kind fail too.
+    /// True if all later calls of the kind fail too.
     pub stays: bool,
 }
 

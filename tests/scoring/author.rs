@@ -20,7 +20,7 @@ pub struct Vocabulary {
     pub float_literals: &'static [f64],
     pub text_literals: &'static [&'static str],
     pub patterns: &'static [&'static str],
-    /// Whether any two integers may be multiplied; otherwise one of them is a small constant, and nothing overflows.
+    /// True if any two integers may be multiplied; otherwise one of them is a small constant, and nothing overflows.
     pub products: bool,
 }
 

@@ -199,7 +199,7 @@ fn a_worker_may_be_killed(cluster: &mut Cluster) {
     work_was_done_again(&fs::read_to_string(log).unwrap());
 }
 
-/// Whether both executors have finished tasks of the statement itself, and have more to do.
+/// Returns true if both executors have finished tasks of the statement itself, and have more to do.
 fn in_the_middle(page: &str) -> bool {
     let look = || {
         let id = get(page)?[0]["id"].as_str()?.to_owned();

@@ -23,7 +23,7 @@ pub struct Catalog {
     /// What the traces are about; absent where that is the mirror.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub domain: Option<String>,
-    /// Whether experiments that are not listed are accepted.
+    /// True if experiments that are not listed are accepted.
     pub open: bool,
     /// Named expressions, as written.
     #[serde(rename = "let")]
@@ -126,7 +126,7 @@ pub struct Experiment {
     pub chance: IndexMap<String, Option<Ratio>>,
     /// Reference levels by metric: what some blind strategies would reach, where no chance level applies.
     pub reference: IndexMap<String, Vec<Ratio>>,
-    /// Whether the traces declare it, and the definitions do not know it; then the hash of the definitions is without it.
+    /// True if the traces declare it, and the definitions do not know it; then the hash of the definitions is without it.
     #[serde(default, skip_serializing_if = "is_false")]
     pub is_declared: bool,
 }

@@ -68,7 +68,7 @@ pub struct Columns {
 pub struct Fallback {
     /// An expression over columns that every trace has.
     pub expression: &'static str,
-    /// Whether some trace has the column.
+    /// True if some trace has the column.
     pub is_read: bool,
 }
 
@@ -121,7 +121,7 @@ impl Columns {
         self.schema.get(name).copied()
     }
 
-    /// Whether a column of the schema keeps its name for itself.
+    /// Returns true if a column of the schema keeps its name for itself.
     pub fn is_reserved(&self, name: &str) -> bool {
         self.schema.contains_key(name) && !self.free.iter().any(|free| free == name)
     }

@@ -202,7 +202,6 @@ pub enum ReplaceError {
     Faults(#[from] Faults),
 }
 
-/// How often an expression has a value, in words.
 const fn per(level: Level) -> &'static str {
     match level {
         Level::Constant => "a constant",

@@ -47,7 +47,7 @@ pub struct Explanation {
 pub struct NamedExpression {
     /// Its name.
     pub name: String,
-    /// Whether it has one value per step; else it has one per episode.
+    /// True if it has one value per step; else it has one per episode.
     pub every_step: bool,
     /// The expression as written.
     pub expression: String,

@@ -65,7 +65,7 @@ pub struct Document {
     pub file_hash: Option<String>,
     /// The built-in definitions that it is or includes, by name.
     pub built_on: Vec<&'static str>,
-    /// Whether unlisted experiments are accepted.
+    /// True if unlisted experiments are accepted.
     pub open: bool,
     /// What the traces are about, where that is not the mirror: any name.
     pub domain: Option<String>,
@@ -122,7 +122,7 @@ pub enum FileError {
     Unreadable {
         /// As it was typed.
         path: String,
-        /// Why.
+        /// The reason.
         source: std::io::Error,
     },
     /// The file has faults.
@@ -204,7 +204,6 @@ impl MetricEntry {
         }
     }
 
-    /// The other metrics that it names: the key, the name, its location.
     pub(super) fn relations(&self) -> impl Iterator<Item = (&'static str, &str, &Place)> {
         let finished = self.said.finished.iter().map(|name| ("finished", name.as_str(), &self.finished));
         finished.chain(self.said.completes.iter().map(|name| ("completes", name.as_str(), &self.completes)))

@@ -110,7 +110,7 @@ pub(super) fn faults(document: &Document, kind: impl Fn(&str) -> Kind) -> Vec<Fa
     faults
 }
 
-/// Why a metric cannot measure what its definition says, and what to do.
+/// The reason why a metric cannot measure what its definition says, and what to do.
 fn misfit(name: &str, entry: &MetricEntry, is_rate: bool) -> Option<(String, &'static str)> {
     let said = &entry.said;
     let unit = said.unit.as_deref().unwrap_or_default();

@@ -12,7 +12,7 @@ pub fn mentioned(expression: &str) -> Vec<String> {
     found
 }
 
-/// Whether an expression asks for values of these names alone, and for no aggregate of steps.
+/// Returns true if an expression asks for values of these names alone, and for no aggregate of steps.
 pub fn is_about(expression: &str, is_known: &dyn Fn(&str) -> bool) -> bool {
     fn holds(expr: &Expr, is_known: &dyn Fn(&str) -> bool) -> bool {
         let own = match &expr.kind {

@@ -16,7 +16,7 @@ const ALL: Range = (i64::MIN as i128, i64::MAX as i128);
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Suspect {
     pub node: NodeId,
-    /// Whether it does so in every trace, being made of constants alone.
+    /// True if it does so in every trace, being made of constants alone.
     pub certain: bool,
 }
 

@@ -159,7 +159,7 @@ pub enum Aggregate {
 }
 
 impl Aggregate {
-    /// Whether it asks at which steps a predicate holds, and nothing of the steps at which it does not.
+    /// Returns true if it asks at which steps a predicate holds, and nothing of the steps at which it does not.
     pub const fn searches(self) -> bool {
         matches!(self, Self::First | Self::Last | Self::Any | Self::Count)
     }

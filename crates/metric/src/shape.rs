@@ -17,7 +17,7 @@ pub struct DefinitionFile {
     /// Definitions to start from: built-in names (`paper`, `extended`) or paths relative to this file.
     #[serde(default)]
     pub include: Vec<String>,
-    /// Whether experiments that are not listed are accepted. A file that lists none accepts all.
+    /// True if experiments that are not listed are accepted. A file that lists none accepts all.
     pub open: Option<bool>,
     /// What the traces are about: `mirror`, or any other name, where the columns of the mirror mean nothing.
     pub domain: Option<String>,
@@ -42,7 +42,7 @@ pub struct ColumnShape {
     /// The type of its values.
     #[serde(rename = "type")]
     pub ty: Type,
-    /// Whether it is constant in an episode.
+    /// True if it is constant in an episode.
     #[serde(default)]
     pub constant: bool,
     /// The only texts that it holds, null apart; any if absent.

@@ -297,7 +297,7 @@ impl Runs {
         &self.values
     }
 
-    /// Whether a run starts at nothing but these rows, which ascend.
+    /// Returns true if a run starts at nothing but these rows, which ascend.
     pub fn start_only_at(&self, rows: &[usize]) -> bool {
         let mut rows = rows.iter();
         self.starts().skip(1).all(|(start, _)| rows.by_ref().find(|row| **row >= start) == Some(&start))
@@ -313,7 +313,7 @@ impl Runs {
     }
 }
 
-/// Whether every key is one of `count` values.
+/// Returns true if every key is one of `count` values.
 pub(crate) fn all_within(keys: &[i32], count: usize) -> bool {
     // A negative key counts as the largest of all.
     keys.iter().map(|key| key.cast_unsigned()).max().is_none_or(|largest| (largest as usize) < count)

@@ -73,9 +73,6 @@ pub use types::{Refused, normal_column, text_type, with_texts_as_keys};
 use stored::verified::Verified;
 
 /// Reads all pages of a column, checks their headers and checksums, and decodes none.
-///
-/// # Errors
-/// For the first page that contradicts the footer or a checksum; what and where is left in `slot`.
 pub fn verify(store: &Store, place: Place<'_>, slot: &FaultSlot) -> Result<()> {
     Verified::new(store, place, Arc::clone(slot))?.walk()
 }

@@ -40,9 +40,6 @@ pub enum Refused {
 
 /// A column as the Parquet library decodes it, held as `held`: truth values, 64 bits, or [`text_type`]. Keys lead to values,
 /// and texts are UTF-8.
-///
-/// # Errors
-/// For a column of another kind, or an integer above the largest of 64 bits with a sign.
 pub fn normal_column(column: &ArrayRef, held: &DataType) -> Result<ArrayRef, Refused> {
     match column.data_type() {
         same if same == held => {

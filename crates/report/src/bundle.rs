@@ -185,10 +185,6 @@ pub struct Written {
 }
 
 /// Writes the report into the folder `out`, in place of the report that is there.
-///
-/// # Errors
-/// Where `out` is no folder or cannot be written, and where a file that is read is in the way. The folder is then as it
-/// was; where the system cannot exchange folders, and an error comes while files are moved, it has no manifest.
 pub fn write(out: &Path, bundle: &Bundle) -> Result<Written, BundleError> {
     let mut files = files(bundle);
     let manifest = bundle.manifest.with_outputs(&files);
@@ -207,9 +203,6 @@ pub fn write(out: &Path, bundle: &Bundle) -> Result<Written, BundleError> {
 }
 
 /// That no file of the report which is in `out` is among those that are read: a new report there would replace it.
-///
-/// # Errors
-/// When one is.
 pub fn check_old(out: &Path, read: &[PathBuf]) -> Result<(), BundleError> {
     check_inputs(out, &old::files(out), read)
 }

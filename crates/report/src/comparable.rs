@@ -62,7 +62,7 @@ impl<'a> Recorded<'a> {
         found
     }
 
-    /// Whether each episode has a fingerprint.
+    /// Returns true if each episode has a fingerprint.
     pub const fn is_declared(&self) -> bool {
         self.undeclared == 0
     }

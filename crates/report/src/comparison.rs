@@ -49,7 +49,7 @@ pub struct Difference {
     pub published: String,
     /// What we print.
     pub computed: String,
-    /// Why that is the publication's slip, where errata say so.
+    /// The reason why that is the publication's slip, where errata say so.
     pub excused_by: Option<String>,
 }
 
@@ -71,7 +71,7 @@ pub enum ComparisonError {
 }
 
 impl Comparison {
-    /// Whether every difference is excused.
+    /// Returns true if every difference is excused.
     pub fn holds(&self) -> bool {
         self.differing == 0
     }

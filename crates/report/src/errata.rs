@@ -43,7 +43,7 @@ pub struct Erratum {
     pub published: String,
     /// What follows from the data.
     pub computed: String,
-    /// Why the difference is the publication's.
+    /// The reason why the difference is the publication's.
     pub reason: String,
 }
 
@@ -95,7 +95,7 @@ impl Errata {
 }
 
 impl Erratum {
-    /// Whether it is about this cell of this table.
+    /// Returns true if it is about this cell of this table.
     pub fn is_about(&self, table: &str, cell: &CellLabel) -> bool {
         let CellLabel { experiment, model, metric } = cell;
         (self.table.as_str(), &self.experiment, &self.model, &self.metric) == (table, experiment, model, metric)

@@ -15,9 +15,6 @@ pub const KEYS: [&str; 5] = ["episode_id", "model", "experiment", "seed", "run"]
 
 /// One row per episode, as `score` writes it: `episode_id`, `model`, `experiment` (text), `seed`, `run` (int32), further
 /// key columns (text, nullable), then one column per metric (int64; null where it is undefined, a rate is 0 or 1).
-///
-/// # Errors
-/// Texts of one column that are longer than 2 GiB together.
 pub fn record_batch(table: &EpisodeTable) -> Result<RecordBatch, ArrowError> {
     let schema = Arc::new(schema(&table.header()));
     let columns = (0..schema.fields().len()).map(|column| values(table, column, 0..table.len()));
@@ -44,10 +41,6 @@ pub(super) fn texts(table: &EpisodeTable, column: usize) -> Option<&TextColumn> 
     }
 }
 
-/// Some values of a column of the schema.
-///
-/// # Errors
-/// Texts that are longer than 2 GiB together.
 pub(super) fn values(table: &EpisodeTable, column: usize, rows: Range<usize>) -> Result<ArrayRef, ArrowError> {
     if let Some(texts) = texts(table, column) {
         return texts_of(texts, rows);

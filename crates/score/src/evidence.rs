@@ -73,7 +73,7 @@ pub struct Fact {
     pub value: Option<String>,
     /// The timesteps that decided it, ascending.
     pub timesteps: Vec<i64>,
-    /// Whether it is a column of the episode, the same at every timestep.
+    /// True if it is a column of the episode, the same at every timestep.
     pub is_of_episode: bool,
 }
 
@@ -96,9 +96,6 @@ pub enum EvidenceError {
 }
 
 /// Finds an episode in some traces and explains its scores.
-///
-/// # Errors
-/// When the traces are not as they must be, or hold no such episode.
 pub fn explain(
     traces: &TraceSet,
     definitions: &Definitions,
@@ -132,9 +129,6 @@ pub fn explain(
 }
 
 /// Explains every episode of these names that the traces hold, in one pass; `--where` does not count.
-///
-/// # Errors
-/// When the traces are not as they must be.
 pub fn explain_each(
     traces: &TraceSet,
     definitions: &Definitions,
@@ -182,10 +176,6 @@ impl<'a> Reader<'a> {
         plan.add_nodes(logical, logical.needed_by(logical.outputs.iter().map(|output| output.node)));
     }
 
-    /// What decided the metrics of one episode of a batch.
-    ///
-    /// # Errors
-    /// When a number leaves 64 bits.
     pub(super) fn episode(
         &self,
         batch: &EpisodeBatch,

@@ -109,7 +109,7 @@ impl Candidates {
         Ok([of_side(&readers[0])?, of_side(&readers[1])?])
     }
 
-    /// Whether some metric differs, per episode; `None` where there is no metric that can.
+    /// Returns true if some metric differs, per episode; `None` where there is no metric that can.
     fn differs(&self, values: &Evaluated) -> Result<Option<BooleanArray>, EngineError> {
         let [old, new] = [values.scores(&self.sides[0])?, values.scores(&self.sides[1])?];
         let pairs = old.metrics.iter().zip(&new.metrics);

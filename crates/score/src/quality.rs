@@ -52,7 +52,7 @@ pub struct Quality {
     pub statuses: BTreeMap<String, u64>,
     /// Repairs by name; a reply with two is counted under both.
     pub repairs: BTreeMap<String, u64>,
-    /// Why replies gave no decision, in the words of their parser.
+    /// The reason why replies gave no decision, in the words of their parser.
     #[serde(skip)]
     pub faults: BTreeMap<String, u64>,
     /// Unusable and all replies of each episode with a reply.
@@ -184,13 +184,13 @@ impl QualityByCell {
         self.0.values_mut().flat_map(|quality| std::mem::take(&mut quality.by_episode)).collect()
     }
 
-    /// Whether a cell has another condition than the default one.
+    /// Returns true if a cell has another condition than the default one.
     pub fn has_conditions(&self) -> bool {
         let default = schema::column(CONDITION).and_then(Column::default_text);
         self.0.keys().any(|key| Some(key.condition.as_str()) != default)
     }
 
-    /// Whether any trace records how replies came.
+    /// Returns true if any trace records how replies came.
     pub fn is_recorded(&self) -> bool {
         self.0.values().any(|quality| !quality.statuses.is_empty())
     }
@@ -358,7 +358,6 @@ impl<'a> Columns<'a> {
         }
     }
 
-    /// The unusable replies of some rows, and all.
     fn replies(&self, rows: Range<usize>) -> Option<[u64; 2]> {
         let status = self.status.as_ref()?;
         let codes = rows.filter_map(|row| status.code(row));

@@ -132,7 +132,7 @@ fn set_fallbacks(columns: &mut Columns, is_read: impl Fn(&str) -> bool) {
     }
 }
 
-/// Whether a column of this name has a value in each row of each trace.
+/// Returns true if a column of this name has a value in each row of each trace.
 pub fn has_value(name: &str) -> bool {
     COLUMNS.iter().any(|column| column.name == name && column.required && !column.nullable)
 }
@@ -218,7 +218,7 @@ fn column_problem(traces: &TraceSet, column: &str) -> Option<(String, String)> {
 pub struct Outputs<'a> {
     /// Further key columns: columns that are constant in an episode.
     pub labels: &'a [String],
-    /// Whether the timelines of the first definitions are wanted.
+    /// True if the timelines of the first definitions are wanted.
     pub timelines: bool,
     /// What to read of the replies of the episodes that the first definitions keep.
     pub quality: Option<&'a QualityReader>,
@@ -433,7 +433,7 @@ fn experiments(definitions: &[&Definitions]) -> Option<Vec<String>> {
     })
 }
 
-/// Whether a column of the schema has one value in all steps of an episode.
+/// Returns true if a column of the schema has one value in all steps of an episode.
 pub fn is_constant(name: &str) -> bool {
     COLUMNS.iter().any(|column| column.name == name && column.constant)
 }

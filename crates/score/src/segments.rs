@@ -30,7 +30,7 @@ impl<'a> Segments<'a> {
         self.offsets.len().saturating_sub(1)
     }
 
-    /// Whether there is no episode.
+    /// Returns true if there is no episode.
     pub fn is_empty(self) -> bool {
         self.len() == 0
     }

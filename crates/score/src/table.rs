@@ -138,7 +138,7 @@ impl EpisodeTable {
         }
     }
 
-    /// Whether some episode was recorded under another condition than the default one.
+    /// Returns true if some episode was recorded under another condition than the default one.
     pub fn has_conditions(&self) -> bool {
         let default = schema::column(CONDITION).and_then(Column::default_text);
         self.label(CONDITION).is_some_and(|column| column.iter().flatten().any(|condition| Some(condition) != default))
@@ -159,7 +159,7 @@ impl EpisodeTable {
         self.keys.len()
     }
 
-    /// Whether there is no episode.
+    /// Returns true if there is no episode.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -188,7 +188,7 @@ impl EpisodeKeys {
         self.seed.len()
     }
 
-    /// Whether there is no episode.
+    /// Returns true if there is no episode.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -207,7 +207,7 @@ impl EpisodeKeys {
         }
     }
 
-    /// Whether other columns have the same key in each row; says no where equal keys are held in two ways.
+    /// Returns true if other columns have the same key in each row; says no where equal keys are held in two ways.
     pub fn has_keys_of(&self, other: &Self) -> bool {
         let is_same = |of: fn(&Self) -> &TextColumn| {
             let (a, b) = (of(self), of(other));
@@ -304,7 +304,7 @@ impl TextColumn {
         self.codes.len()
     }
 
-    /// Whether there is no row.
+    /// Returns true if there is no row.
     pub fn is_empty(&self) -> bool {
         self.codes.is_empty()
     }
@@ -371,7 +371,7 @@ impl MetricColumn {
         (0..self.array().len()).map(|row| self.get(row))
     }
 
-    /// Whether another column has the same value in each row; says no where equal values are held in two ways.
+    /// Returns true if another column has the same value in each row; says no where equal values are held in two ways.
     pub fn has_values_of(&self, other: &Self) -> bool {
         match (&self.values, &other.values) {
             (MetricValues::Bools(a), MetricValues::Bools(b)) => a == b,

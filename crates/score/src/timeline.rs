@@ -29,7 +29,7 @@ pub struct Timeline {
     pub claim: Option<u32>,
     /// The first `done`.
     pub decision: Option<u32>,
-    /// Whether the decision came with a commitment to a colour.
+    /// True if the decision came with a commitment to a colour.
     pub answered: bool,
 }
 

@@ -192,7 +192,6 @@ fn equal_to<N: ArrowNativeType>(
     truths
 }
 
-/// What each row's key stands for. Mostly it is one key that fulfils something, or one that does not.
 fn look_up<N: ArrowNativeType>(keys: &[N], fulfilled: &[bool]) -> Vec<bool> {
     let alone = |wanted: bool| {
         let mut keys = (0..fulfilled.len()).filter(|key| fulfilled[*key] == wanted);

@@ -136,7 +136,6 @@ impl Incidence {
 }
 
 impl Point {
-    /// What a decision of everyone still waiting would take off the mean here.
     #[expect(clippy::cast_precision_loss, reason = "steps are far below 2^53")]
     fn gain(&self, horizon: i64) -> f64 {
         self.before * (horizon - self.steps) as f64

@@ -37,7 +37,7 @@ pub enum Cluster {
 }
 
 impl Design {
-    /// Whether equal scenes make pairs: the scenes of a reconstruction are as made up as its outcomes.
+    /// Returns true if equal scenes make pairs: the scenes of a reconstruction are as made up as its outcomes.
     pub fn has_pairs(self) -> bool {
         self.kind != Some(DesignKind::Reconstruction)
     }

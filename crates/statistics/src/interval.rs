@@ -29,7 +29,7 @@ impl Interval {
         Self { low: self.low.clamp(least, most), high: self.high.clamp(least, most) }
     }
 
-    /// Whether `value` lies between the bounds, bounds included.
+    /// Returns true if `value` lies between the bounds, bounds included.
     pub fn contains(self, value: f64) -> bool {
         self.low <= value && value <= self.high
     }

@@ -62,7 +62,7 @@ impl Units {
         (self.shared.len() + self.first.len().min(self.second.len())) as u64
     }
 
-    /// Whether there is no unit to compare.
+    /// Returns true if there is no unit to compare.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

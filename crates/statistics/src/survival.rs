@@ -71,13 +71,12 @@ impl RestrictedMean {
     }
 }
 
-/// What makes a variance that divides by n one that divides by n - 1; 1 for a single episode, which has no variance.
 #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
 pub(super) fn small_sample(n: u64) -> f64 {
     if n > 1 { n as f64 / (n - 1) as f64 } else { 1.0 }
 }
 
-/// Whether a standard error is more than the rounding of steps up to `horizon`.
+/// Returns true if a standard error is more than the rounding of steps up to `horizon`.
 #[expect(clippy::cast_precision_loss, reason = "steps are far below 2^53")]
 pub(super) fn has_spread(se: f64, horizon: i64) -> bool {
     se > 1e-12 * horizon as f64

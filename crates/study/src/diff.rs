@@ -185,7 +185,6 @@ impl Side {
         }
     }
 
-    /// What scores it under the metrics `common`; `None` for scores.
     fn bind(
         &self,
         common: &[String],

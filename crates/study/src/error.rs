@@ -114,7 +114,7 @@ pub enum StudyError {
     EvidenceLet {
         /// The definition file.
         definitions: String,
-        /// Why.
+        /// The reason.
         source: ReplaceError,
     },
     /// A file is not the one that was opened.

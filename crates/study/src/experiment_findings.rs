@@ -27,7 +27,6 @@ pub fn experiment_findings(definitions: &Path, inputs: &[Input]) -> Result<Vec<F
     Ok(found)
 }
 
-/// What `validate` says where scoring refuses.
 fn finding(error: DeclarationError) -> Finding {
     Finding::new(Code::InvalidMetadata, error.file, error.expected, error.found).with_help(error.help)
 }

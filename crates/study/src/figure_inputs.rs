@@ -44,7 +44,7 @@ pub struct FigureInputs<'a> {
 pub struct Drawings {
     /// Those that can be drawn.
     pub drawn: Vec<(FigureName, Figure)>,
-    /// Why each other one cannot.
+    /// The reason why each other one cannot.
     pub left_out: Vec<(FigureName, FigureError)>,
 }
 

@@ -92,7 +92,6 @@ impl Study {
     }
 }
 
-/// The metric of this name.
 pub(super) fn check_metric<'t>(table: &'t EpisodeTable, name: &str) -> Result<&'t Metric, StudyError> {
     let found = table.catalog.metric.get(name).filter(|_| table.metric(name).is_some());
     found.ok_or_else(|| {

@@ -29,9 +29,9 @@ pub struct ImportRequest {
     pub definitions: PathBuf,
     /// Names of colours with commas between them, a file of names, or `default`.
     pub palette: Option<PathBuf>,
-    /// Whether the episodes of one seed are more alike than chance.
+    /// True if the episodes of one seed are more alike than chance.
     pub clusters_by_seed: bool,
-    /// Whether the steps are rebuilt from published numbers.
+    /// True if the steps are rebuilt from published numbers.
     pub reconstruction: bool,
 }
 

@@ -25,7 +25,7 @@ pub enum Source {
 pub struct ScoreFile {
     pub input: Input,
     pub format: Format,
-    /// Whether it says what it was computed with; text and what other engines write does not.
+    /// True if it says what it was computed with; text and what other engines write does not.
     pub carries_definitions: bool,
 }
 

@@ -324,7 +324,6 @@ impl Study {
         self.statistics_of(&counted, &cells, options)
     }
 
-    /// What cells mix though it was recorded differently, where that does not matter.
     fn pooled(&self, episodes: &EpisodeTable) -> Result<Option<Vec<String>>, StudyError> {
         self.question.pool.then(|| pooled::told(episodes, &self.question.by_over(episodes))).transpose()
     }

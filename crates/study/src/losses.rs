@@ -158,7 +158,6 @@ fn with_failures(table: &EpisodeTable) -> EpisodeTable {
     EpisodeTable { declared: table.declared.clone(), ..builder.finish() }
 }
 
-/// What a metric says of an episode that failed; `None` where that is not known.
 fn failure(catalog: &Catalog, metric: &str) -> Option<i64> {
     let metric = catalog.metric.get(metric)?;
     match (metric.kind, metric.better) {

@@ -24,7 +24,7 @@ pub enum ProvenanceError {
     NoManifest {
         /// Where it was looked for.
         path: PathBuf,
-        /// Why it is not readable.
+        /// The reason why it is not readable.
         source: io::Error,
     },
     /// A manifest that does not say what a report was made of.

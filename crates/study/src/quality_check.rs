@@ -26,7 +26,7 @@ pub struct QualityLimits {
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct QualityCheckAnswer {
-    /// Whether every limit could be checked and none is exceeded.
+    /// True if every limit could be checked and none is exceeded.
     pub holds: bool,
     /// The limits that are exceeded.
     pub violations: Vec<Violation>,

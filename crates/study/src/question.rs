@@ -25,7 +25,7 @@ pub const DEFAULT_DEFINITIONS: &str = "paper";
 pub struct Question {
     /// Definitions by name or path; those that scores carry, or that the experiments of the traces name, if absent.
     pub definitions: Option<PathBuf>,
-    /// Whether experiments that need different definitions are each scored by their own, beside each other; else refused.
+    /// True if experiments that need different definitions are each scored by their own, beside each other; else refused.
     pub each: bool,
     /// These definitions, found in the traces.
     pub parts: Vec<ScoredAlike>,
@@ -36,7 +36,7 @@ pub struct Question {
     /// The columns that cells are grouped by; experiment and model if absent, and the condition where there is more than the
     /// default one.
     pub by: Option<Vec<String>>,
-    /// Whether a cell may hold episodes that were recorded differently.
+    /// True if a cell may hold episodes that were recorded differently.
     pub pool: bool,
     /// What lost episodes count as.
     pub lost: LostAs,

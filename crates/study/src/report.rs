@@ -35,7 +35,7 @@ pub const MOST_LISTED: usize = 20_000;
 pub struct ReportOptions {
     /// `default`, `paper`, or the path of a style file.
     pub style: PathBuf,
-    /// Whether figures and `report.html` are in it.
+    /// True if figures and `report.html` are in it.
     pub figures: bool,
 }
 
@@ -150,7 +150,6 @@ impl Study {
         })
     }
 
-    /// What a reader of the tables must know of the data, one sentence each.
     fn notes(&self, results: &Results, lost: &LostCounts) -> Vec<String> {
         let mut notes = Vec::new();
         if let Some(undeclared) = undeclared(&results.episodes) {
@@ -174,7 +173,7 @@ impl Study {
     }
 }
 
-/// Whether what is analysed is what was registered before the recording; `None` where no plan was.
+/// Returns true if what is analysed is what was registered before the recording; `None` where no plan was.
 fn registered(episodes: &EpisodeTable) -> Option<String> {
     let plan = episodes.declared.registration.as_ref()?;
     let short = |hash: &str| hash.chars().take(12).collect::<String>();
@@ -187,7 +186,6 @@ fn registered(episodes: &EpisodeTable) -> Option<String> {
     Some(format!("the recording follows the registered plan {}: {verdict}", short(&plan.sha256)))
 }
 
-/// What the traces do not declare, in one line; `None` where they declare it.
 fn undeclared(episodes: &EpisodeTable) -> Option<String> {
     let lacks = |label: &str| episodes.label(label).is_none();
     let what = match (lacks("fingerprint"), lacks("scene")) {

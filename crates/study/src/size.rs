@@ -16,7 +16,7 @@ const MOST_COMPARISONS: Limit =
 const MOST_CELLS: Limit =
     Limit::new("cells, groups times metrics; group by fewer columns or leave metrics out", 200_000);
 
-/// Whether the comparisons that a report of these episodes makes are within the budget.
+/// Returns true if the comparisons that a report of these episodes makes are within the budget.
 ///
 /// # Errors
 /// [`StudyError::Exceeded`] if not.
@@ -32,7 +32,7 @@ pub(super) fn check_comparisons(episodes: &EpisodeTable) -> Result<(), StudyErro
     Ok(MOST_COMPARISONS.check(pairs.saturating_mul(episodes.metrics.len() as u64))?)
 }
 
-/// Whether the cells are within the budget.
+/// Returns true if the cells are within the budget.
 ///
 /// # Errors
 /// [`StudyError::Exceeded`] if not.

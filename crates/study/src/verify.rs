@@ -86,7 +86,7 @@ pub enum VerifyError {
     Unreadable {
         /// Which.
         path: PathBuf,
-        /// Why not.
+        /// The reason for the refusal.
         source: io::Error,
     },
 }
@@ -143,7 +143,7 @@ fn listed(folder: &Path) -> Result<BTreeMap<String, Output>, VerifyError> {
     Ok(listed)
 }
 
-/// Why an output cannot be a file of a report.
+/// The reason why an output cannot be a file of a report.
 fn fault(output: &Output) -> Option<String> {
     let shown = visible(&output.path);
     let is_plain = |part: &str| matches!(Path::new(part).components().collect::<Vec<_>>()[..], [Component::Normal(_)]);
@@ -176,7 +176,6 @@ fn find(folder: &Path, inside: &str, there: &mut BTreeMap<String, Metadata>) -> 
     Ok(())
 }
 
-/// How a file that is listed is not as it should be.
 fn difference(
     folder: &Path,
     path: &str,
@@ -208,7 +207,7 @@ fn kind_of(about: &Metadata) -> &'static str {
 }
 
 impl Verification {
-    /// Whether all files are as the manifest says, and there are no others.
+    /// Returns true if all files are as the manifest says, and there are no others.
     pub fn holds(&self) -> bool {
         self.differences.is_empty()
     }

@@ -33,7 +33,6 @@ pub struct FileKind {
 /// A text of some kind and its location.
 pub struct FileText {
     pub source: Source,
-    /// The folder of its relative paths; the current one if absent.
     folder: Option<PathBuf>,
     /// The canonical path; absent for texts without a file.
     pub path: Option<PathBuf>,

@@ -48,7 +48,6 @@ impl Written {
     }
 }
 
-/// Where each byte of `text` begins in the TOML literal `raw` that spells it; `None` if it does not.
 fn string_starts(raw: &str, text: &str) -> Option<Vec<usize>> {
     let (open, escapes) = opening(raw)?;
     let mut starts = Vec::with_capacity(text.len() + 1);
@@ -78,7 +77,6 @@ fn opening(raw: &str) -> Option<(usize, bool)> {
     Some((quotes + dropped, quote == '"'))
 }
 
-/// How many bytes spell the character `decoded`.
 fn spelling(rest: &str, decoded: char, escapes: bool) -> Option<usize> {
     let first = rest.chars().next()?;
     if decoded == '\n' && rest.starts_with("\r\n") {

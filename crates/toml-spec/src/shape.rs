@@ -259,7 +259,6 @@ impl<'a> Walk<'a> {
     }
 }
 
-/// A value of any shape.
 fn as_written(value: &DeValue<'_>) -> Value {
     match value {
         DeValue::String(text) => Value::String(text.to_string()),

@@ -70,7 +70,7 @@ pub struct Declared {
     /// Episodes that failures kept from being recorded: in no trace.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub unrecorded: Vec<LostEpisode>,
-    /// Whether every file says which episodes were lost.
+    /// True if every file says which episodes were lost.
     #[serde(default, skip_serializing_if = "is_false")]
     pub losses_recorded: bool,
 }

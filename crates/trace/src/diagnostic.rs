@@ -13,7 +13,7 @@ use exact::escape::visible;
 /// What helps where the system lets the process open no more files.
 pub const MORE_FILES: &str = "raise the limit of open files, as in `ulimit -n 1024`, and run the command again";
 
-/// Whether words of the system say that too many files are open.
+/// Returns true if words of the system say that too many files are open.
 pub fn is_short_of_files(words: &str) -> bool {
     // EMFILE and ENFILE.
     words.contains("(os error 24)") || words.contains("(os error 23)")

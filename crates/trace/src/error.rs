@@ -23,7 +23,7 @@ pub enum TraceError {
     Read {
         /// What was to be read, as the user named it.
         what: String,
-        /// Why not.
+        /// The reason for the refusal.
         source: io::Error,
     },
     /// An argument gives no trace.
@@ -43,7 +43,7 @@ pub enum TraceError {
     Part {
         /// The file.
         file: String,
-        /// Why not.
+        /// The reason for the refusal.
         source: Box<dyn std::error::Error + Send + Sync>,
     },
     /// Threads could not be started.
@@ -51,7 +51,7 @@ pub enum TraceError {
     Threads {
         /// How many were asked for.
         threads: usize,
-        /// Why not.
+        /// The reason for the refusal.
         source: io::Error,
     },
     /// A column was asked for that the traces cannot give.
@@ -82,7 +82,7 @@ pub enum TraceError {
     Write {
         /// The file, as named.
         file: String,
-        /// Why not.
+        /// The reason for the refusal.
         source: Box<dyn std::error::Error + Send + Sync>,
     },
 }

@@ -18,7 +18,7 @@ pub enum GlobError {
     Folder(PathBuf, io::Error),
 }
 
-/// Whether a text has characters that make a glob of it.
+/// Returns true if a text has characters that make a glob of it.
 pub fn is_glob(text: &str) -> bool {
     text.contains(['*', '?', '['])
 }
@@ -55,7 +55,6 @@ fn fits(pattern: &Pattern, path: &Path) -> bool {
     path.file_name().is_some_and(|name| pattern.matches(&name.to_string_lossy()))
 }
 
-/// What is in a folder; nothing in what is none.
 fn entries(folder: &Path) -> Result<Vec<PathBuf>, GlobError> {
     let place = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
     if !place.is_dir() {

@@ -100,7 +100,7 @@ pub struct ColumnInfo {
     /// Its logical type; `unsupported` also where files differ.
     #[serde(rename = "type")]
     pub kind: Kind,
-    /// Whether the schema knows it.
+    /// True if the schema knows it.
     pub known: bool,
     /// A file that does not have it.
     pub missing_from: Option<String>,

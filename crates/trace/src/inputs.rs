@@ -166,12 +166,11 @@ fn traces_at(path: &Path) -> Result<Vec<PathBuf>, TraceError> {
     Ok(traces)
 }
 
-/// Whether a folder is what `mirrorstats report` writes: its Parquet file holds scores, no steps.
+/// Returns true if a folder is what `mirrorstats report` writes: its Parquet file holds scores, no steps.
 fn is_report(folder: &Path) -> bool {
     ["manifest.json", "cells.csv", "episodes.parquet"].iter().all(|name| folder.join(name).is_file())
 }
 
-/// Whether a name is that of a note or of something unfinished: `_SUCCESS`, `_temporary`, `.part-0.parquet.crc`.
 fn is_left_over(name: &OsStr) -> bool {
     name.to_string_lossy().starts_with(['_', '.'])
 }

@@ -34,7 +34,6 @@ fn words(id: &str) -> Vec<String> {
     id.split(['-', '.', '@', '_']).filter(|word| !word.is_empty()).map(str::to_owned).collect()
 }
 
-/// Whether words name a snapshot alone: a date or a number of at least three digits, `preview`, `exp`, `latest`.
 fn is_snapshot(words: &[String]) -> bool {
     let is_number = |word: &&String| word.len() > 1 && word.bytes().all(|byte| byte.is_ascii_digit());
     let digits: usize = words.iter().filter(is_number).map(String::len).sum();

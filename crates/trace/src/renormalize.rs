@@ -33,7 +33,7 @@ const VERSION_KEY: &str = "identification_version";
 pub struct RenormalizeAnswer {
     /// The version of the rule of this program.
     pub identification_version: String,
-    /// Whether new traces were written.
+    /// True if new traces were written.
     pub written: bool,
     /// The traces, by name.
     pub files: Vec<RenormalizedFile>,
@@ -184,7 +184,6 @@ impl Old {
         Ok(Self { set: TraceSet::of(vec![file]), recording })
     }
 
-    /// What changes; the new trace of `target` is written to another path, if anything is written.
     fn renormalized(
         &self,
         name: &str,

@@ -54,7 +54,7 @@ impl ReplyCounts {
         self
     }
 
-    /// Whether replies of this status gave a decision.
+    /// Returns true if replies of this status gave a decision.
     pub fn is_read(status: &str) -> bool {
         READ.contains(&status)
     }

@@ -71,7 +71,7 @@ pub(super) fn answer(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewEr
     }))
 }
 
-/// Whether both have the same frame at a step; null where one has none.
+/// Returns true if both have the same frame at a step; null where one has none.
 pub(super) fn same_frame(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewError> {
     let t = number(query, "t")?.unwrap_or(1);
     let frame = |side| snapshot.frame(&snapshot.episode(required(query, side)?)?, t);

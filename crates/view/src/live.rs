@@ -22,12 +22,11 @@ const SPAN: Duration = Duration::from_secs(10);
 pub(super) struct Watch {
     last: Option<Instant>,
     counted: Vec<(Instant, u64)>,
-    /// Why the newest state cannot be shown; the one before it is.
+    /// The reason why the newest state cannot be shown; the one before it is.
     fault: Option<String>,
 }
 
 impl View {
-    /// What is under way, after a look at the files: a newer state is shown from now on, if there is one.
     pub(super) fn live(&self) -> Value {
         // Whoever comes while another one looks gets what was found before.
         if let Ok(mut watch) = self.watch.try_lock()

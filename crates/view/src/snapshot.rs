@@ -31,7 +31,7 @@ pub(super) struct Snapshot {
     pub scored: Option<Arc<Scored>>,
     /// Episodes under way, by their logs.
     pub running: Vec<Running>,
-    /// Why others that are under way cannot be shown.
+    /// The reason why others that are under way cannot be shown.
     pub unreadable: Vec<String>,
     /// The state of the files.
     pub stamps: Vec<Stamp>,

@@ -99,7 +99,7 @@ impl Guard {
         format!("{link}{}{}", if link.contains('?') { '&' } else { '?' }, query.join("&"))
     }
 
-    /// Whether a request may be answered; what to say otherwise.
+    /// Returns true if a request may be answered; what to say otherwise.
     fn check(&self, method: &Method, headers: &HeaderMap, query: &str) -> Result<(), (StatusCode, &'static str)> {
         let text = |name: HeaderName| headers.get(name).and_then(|value| value.to_str().ok());
         let mut hosts = headers.get_all(header::HOST).iter();
@@ -130,7 +130,7 @@ impl Guard {
         Ok(())
     }
 
-    /// Whether `Host` names this server and nothing else.
+    /// Returns true if `Host` names this server and nothing else.
     fn is_own(&self, host: &str) -> bool {
         let (name, port) = match host.rsplit_once(':') {
             Some((name, port)) if !port.ends_with(']') => (name, port.parse().ok()),
@@ -191,7 +191,7 @@ fn is_same(a: &str, b: &str) -> bool {
     a.len() == b.len() && a.bytes().zip(b.bytes()).fold(0, |all, (a, b)| all | (a ^ b)) == 0
 }
 
-/// Whether a token is one that a link and a cookie can hold, and that nobody guesses.
+/// Returns true if a token is one that a link and a cookie can hold, and that nobody guesses.
 pub fn check_token(token: &str) -> Result<(), String> {
     let is_plain = token.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"-_.~".contains(&byte));
     if token.len() < 16 || !is_plain {

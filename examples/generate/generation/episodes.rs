@@ -30,7 +30,7 @@ pub struct Study {
     pub seed: u64,
     /// Steps of all episodes together.
     pub steps: u64,
-    /// Whether steps have values in optional columns.
+    /// True if steps have values in optional columns.
     pub optional: bool,
     episodes: u64,
     /// The number of steps of the last episode, which is cut to give `steps` in all.

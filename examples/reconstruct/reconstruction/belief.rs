@@ -30,17 +30,17 @@ pub enum Belief {
 }
 
 impl Belief {
-    /// Whether the mirror was seen before the end.
+    /// Returns true if the mirror was seen before the end.
     pub const fn consulted(self) -> bool {
         matches!(self, Self::Unresolved | Self::Grounded | Self::Lucky | Self::Corrected | Self::Stubborn)
     }
 
-    /// Whether a colour was claimed before the mirror was seen.
+    /// Returns true if a colour was claimed before the mirror was seen.
     pub const fn confabulated(self) -> bool {
         matches!(self, Self::Lucky | Self::Corrected | Self::Stubborn | Self::BlindRight | Self::BlindWrong)
     }
 
-    /// Whether the true colour was said before the end.
+    /// Returns true if the true colour was said before the end.
     pub const fn attributed(self) -> bool {
         matches!(self, Self::Grounded | Self::Lucky | Self::Corrected | Self::BlindRight)
     }

@@ -18,7 +18,7 @@ pub struct Erratum {
     pub metric: &'static str,
     /// Mean and standard error to read instead; `None` for undefined.
     pub read_as: Option<(&'static str, &'static str)>,
-    /// Why.
+    /// The reason why.
     pub reason: &'static str,
 }
 

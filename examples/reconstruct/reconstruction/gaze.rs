@@ -6,7 +6,7 @@ use super::outline::Outline;
 /// The mean length of a look into the mirror, in steps.
 const LOOK: usize = 6;
 
-/// Whether the mirror is in view at each step: `gaze` steps in a few looks of several steps.
+/// Returns true if the mirror is in view at each step: `gaze` steps in a few looks of several steps.
 ///
 /// The first look begins early more often than late, after the first step where a claim must precede it, and before
 /// the last step exactly where the mirror was consulted.

@@ -107,7 +107,6 @@ fn cast(pair: &Pair, counts: &Counts, generator: &mut Generator) -> Result<Vec<P
 
 /// What the lengths and gazes of a pair must keep to.
 struct Limits<'a> {
-    /// How many trajectories without `done` end before the budget.
     cut: usize,
     /// The fewest steps of an episode.
     fewest: usize,

@@ -5,12 +5,12 @@ use metric::catalog::StandardError;
 
 use super::published::{Pair, Source, Value};
 
-/// Whether integers with these moments print as everything that is published about a metric.
+/// Returns true if integers with these moments print as everything that is published about a metric.
 pub fn matches(pair: &Pair, metric: &str, moments: Moments) -> bool {
     pair.prints(metric).iter().all(|print| value(print.source, metric, moments) == print.value)
 }
 
-/// Whether the mean alone prints as everything that is published about a metric.
+/// Returns true if the mean alone prints as everything that is published about a metric.
 pub fn matches_mean(pair: &Pair, metric: &str, moments: Moments) -> bool {
     let mean = |source| moments.mean().map(|mean| number(source, mean));
     pair.prints(metric).iter().all(|print| mean(print.source) == print.value.as_ref().map(|value| value.mean.clone()))

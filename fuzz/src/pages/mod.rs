@@ -97,7 +97,6 @@ fn depth(refusal: &Refusal) -> Depth {
     }
 }
 
-/// What the program reads; its paths must agree.
 fn ours(mutant: &Mutant) -> Result<ArrayRef, Refusal> {
     let column = OneColumn::new(mutant.metadata.clone(), START, mutant.bytes.clone())?;
     let checked = column.checked(0, mutant.at_once);
@@ -151,7 +150,7 @@ fn joined(rows: &[ArrayRef], ty: &DataType) -> ArrayRef {
     if rows.is_empty() { new_empty_array(ty) } else { concat(&rows).expect("arrays of one type") }
 }
 
-/// Whether rows are the same, floats to the bit.
+/// Returns true if rows are the same, floats to the bit.
 fn same(ours: &ArrayRef, theirs: &ArrayRef) -> bool {
     match ours.data_type() {
         DataType::Float64 => {

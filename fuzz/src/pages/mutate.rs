@@ -134,7 +134,6 @@ fn apply(base: &Base, pages: &mut Vec<(Page, Changes)>, footer: &mut [u8; 2], ch
     }
 }
 
-/// Where the levels of a page are: in those that are not compressed, or at the start of the body behind their length.
 fn levels(base: &Base, page: &Page) -> usize {
     match page.header.kind {
         0 if base.optional => {

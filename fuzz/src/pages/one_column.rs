@@ -27,7 +27,6 @@ use crate::quiet::contained;
 pub struct OneColumn {
     footer: ArrowReaderMetadata,
     held: DataType,
-    /// Where the bytes start in the file.
     start: u64,
     bytes: Bytes,
 }
@@ -136,7 +135,6 @@ impl OneColumn {
     }
 }
 
-/// How a trace holds a column that is stored as `stored`.
 fn held_as(stored: &DataType, is_text: bool) -> DataType {
     match stored {
         DataType::Boolean => DataType::Boolean,

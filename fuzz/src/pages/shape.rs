@@ -33,7 +33,7 @@ pub struct Base {
     pub metadata: Arc<ParquetMetaData>,
     /// Its codec.
     pub codec: Compression,
-    /// Whether there may be nulls.
+    /// True if there may be nulls.
     pub optional: bool,
     /// Its pages.
     pub pages: Vec<Page>,

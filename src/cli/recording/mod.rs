@@ -65,7 +65,7 @@ pub struct RecordAnswer {
     pub stopped_by_limit: usize,
     /// What was spent on all that the model played into the folder, over all starts; null for agents that cost nothing.
     pub spend: Option<Spend>,
-    /// Whether the recording was stopped before its end.
+    /// True if the recording was stopped before its end.
     pub stopped: bool,
     /// The traces of these episodes.
     pub traces: Vec<String>,
@@ -199,7 +199,6 @@ fn waiting(id: &str, held: Held) -> String {
     format!("waiting for {}{others}: {process} records it into the same folder; Ctrl-C ends the waiting", visible(id))
 }
 
-/// How many replies could not be read, and why, in words; `None` if all could.
 fn unreadable(counts: &ReplyCounts) -> Option<String> {
     let (bad, all) = (counts.all_unreadable(), counts.replies);
     let noun = if all == 1 { "reply" } else { "replies" };

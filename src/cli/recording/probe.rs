@@ -7,7 +7,6 @@ use crate::cli::text_table::counted;
 use exact::escape::{visible, visible_lines};
 use world::agent::vlm::probe::{ProbeAnswer, ProbedParameter};
 
-/// Tells what a model takes, for people.
 pub(crate) fn tell(out: &mut impl io::Write, answer: &ProbeAnswer) -> io::Result<()> {
     let (model, id) = (visible(&answer.model), visible(&answer.id));
     let requests = counted(u64::from(answer.requests), "request");

@@ -59,7 +59,7 @@ pub fn recordings(path: &Path) -> Result<Vec<Options>, Failure> {
         .collect())
 }
 
-/// Why a recording could not go on.
+/// The reason why a recording could not go on.
 pub fn stopped(recorded: &Result<Recorded, Failure>) -> Option<String> {
     match recorded {
         Ok(recorded) => recorded.gave_up.clone(),

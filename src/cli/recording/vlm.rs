@@ -160,7 +160,7 @@ impl VlmArgs {
         self.requests_per_minute
     }
 
-    /// Whether requests go out, and are not played from an earlier recording.
+    /// Returns true if requests go out, and are not played from an earlier recording.
     pub fn sends(&self) -> bool {
         self.cassette.is_none()
     }

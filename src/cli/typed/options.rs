@@ -12,9 +12,6 @@ use crate::cli::outcome::Failure;
 pub type Options = Map<String, Value>;
 
 /// A command's options. No settings of a file or of the environment are looked at.
-///
-/// # Errors
-/// A name that is no option, a value that it cannot have.
 pub fn options_of<A: clap::Args>(verb: &str, options: &Options) -> Result<A, Failure> {
     let name = format!("{NAME} {verb}");
     let command = A::augment_args(clap::Command::new(name.clone()).bin_name(&name).no_binary_name(true));
@@ -29,7 +26,6 @@ pub fn option_names<A: clap::Args>() -> Vec<String> {
     command.get_arguments().filter_map(|argument| argument.get_long().map(str::to_owned)).collect()
 }
 
-/// What is wrong with an option, without clap's usage and hints, which speak of a command line.
 fn told(error: &clap::Error) -> String {
     let context = |kind| match error.get(kind) {
         Some(ContextValue::String(text)) => Some(text.clone()),

@@ -38,7 +38,7 @@ impl EngineArgs {
     }
 }
 
-/// Whether an output is a folder that Spark writes, rather than a file that is written here.
+/// Returns true if an output is a folder that Spark writes, rather than a file that is written here.
 pub fn is_folder(output: &Path) -> bool {
     let name = output.to_string_lossy();
     is_uri(&name) || Format::of_name(&name).is_err() && !is_stream(output)

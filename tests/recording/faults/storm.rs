@@ -30,7 +30,7 @@ fn record(home: &Path) -> Command {
 struct Started {
     child: Child,
     reads: bool,
-    /// Whether it goes on until it is killed.
+    /// True if it goes on until it is killed.
     serves: bool,
 }
 

@@ -23,7 +23,7 @@ fn all_in(color: Color) -> World {
     World::new(drawn.config(), scene).unwrap()
 }
 
-/// Whether a pixel and its neighbours show the same thing: what smoothing leaves alone.
+/// Returns true if a pixel and its neighbours show the same thing: what smoothing leaves alone.
 fn is_inner(image: &LabelImage, x: usize, y: usize) -> bool {
     let inside = x > 0 && y > 0 && x + 1 < image.width && y + 1 < image.height;
     inside

@@ -119,7 +119,7 @@ fn likest(pixel: &[u8]) -> Option<Color> {
     palette.chain(neutral).min_by(|(_, one), (_, other)| distance(*one).total_cmp(&distance(*other)))?.0
 }
 
-/// Whether a pixel is of a head, which is darker than anything else without a colour.
+/// Returns true if a pixel is of a head, which is darker than anything else without a colour.
 fn is_head(pixel: &[u8]) -> bool {
     pixel.iter().all(|part| *part < 72) && pixel.iter().max().unwrap() - pixel.iter().min().unwrap() < 12
 }

@@ -202,7 +202,7 @@ impl Browser {
         serde_json::from_value(self.value(expression)).unwrap()
     }
 
-    /// Whether an expression holds.
+    /// Returns true if an expression holds.
     pub fn holds(&mut self, expression: &str) -> bool {
         self.value(expression).as_bool().unwrap_or_else(|| panic!("{expression} is not a truth value"))
     }

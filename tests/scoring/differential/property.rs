@@ -76,7 +76,7 @@ pub fn load(traces: &TraceSet, text: &str) -> Definitions {
     Definitions::from_toml("random", text, &columns(traces)).unwrap_or_else(|faults| panic!("{faults}\n{text}"))
 }
 
-/// Whether both engines come to the same, all metrics at once; metric by metric where they refuse.
+/// Returns true if both engines come to the same, all metrics at once; metric by metric where they refuse.
 fn disagreement(traces: &TraceSet, definitions: &Definitions) -> Option<String> {
     let (expected, found) = (native(traces, definitions), polars(traces, definitions));
     if expected.is_err() || expected != found {

@@ -105,10 +105,6 @@ impl Visitor for Bare {
     }
 }
 
-/// Names the columns of every select, and divides grouping sets.
-///
-/// # Errors
-/// In words, too many grouping sets.
 pub(super) fn rewrite(statement: &mut Statement) -> Result<(), String> {
     match statement.visit(&mut Rewriter) {
         ControlFlow::Continue(()) => Ok(()),
@@ -282,10 +278,6 @@ fn null_like(key: &Expr) -> Expr {
     parsed.unwrap_or_else(|_| Expr::value(Value::Null))
 }
 
-/// Puts values in the place of subqueries that are values by themselves, the innermost first.
-///
-/// # Errors
-/// The first error of `value`.
 pub(super) fn substitute<E>(
     statement: &mut Statement,
     value: impl FnMut(&Query, Asked) -> Result<Value, E>,

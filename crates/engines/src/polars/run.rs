@@ -63,7 +63,6 @@ impl From<Inner> for PolarsError {
 }
 
 impl PolarsError {
-    /// What a caught panic of Polars said.
     #[expect(clippy::needless_pass_by_value, reason = "for `map_err`")]
     pub(super) fn panicked(words: String) -> Self {
         Self::Failed(cause(&words))
@@ -78,7 +77,6 @@ pub(super) fn plan(context: &mut SQLContext, statement: &str) -> Result<LazyFram
 /// is set aside as much is used as the statement needs.
 const STACK: usize = 256 << 20;
 
-/// What `run` gives, on a stack for statements as deep as definitions may be.
 pub(super) fn on_deep_stack<R: Send>(run: impl FnOnce() -> Result<R, PolarsError> + Send) -> Result<R, PolarsError> {
     thread::scope(|scope| {
         let thread = thread::Builder::new().stack_size(STACK).spawn_scoped(scope, run);

@@ -22,7 +22,6 @@ pub(super) fn of_failure(failed: &Failed, cluster: &Cluster) -> SparkError {
     SparkError::Failed { cause: if named { failed.name.clone() } else { cause } }
 }
 
-/// What the log of a Spark says that did not get as far as the driver, or lost it.
 pub(super) fn of_log(log: &[u8], cluster: &Cluster) -> SparkError {
     let log = String::from_utf8_lossy(log);
     let line = |word: &str| log.lines().find(|line| line.contains(word)).map(|line| shortened(line, &cluster.settings));

@@ -11,7 +11,6 @@ use super::SparkError;
 pub(super) struct Spark {
     /// The program `spark-submit`.
     pub(super) program: PathBuf,
-    /// What `SPARK_HOME` must be for it, where that is not known to it.
     pub(super) home: Option<PathBuf>,
 }
 

@@ -101,7 +101,7 @@ pub enum SparkError {
     System {
         /// What was tried.
         what: String,
-        /// Why not.
+        /// The reason for the refusal.
         source: std::io::Error,
     },
     /// The definitions cannot be said in Spark's SQL.

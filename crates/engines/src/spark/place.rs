@@ -16,7 +16,6 @@ impl Place {
         made.map(Self).map_err(|source| SparkError::System { what: "make a temporary folder".into(), source })
     }
 
-    /// Where the driver writes the table, if Spark does not.
     pub(super) fn table(&self) -> PathBuf {
         self.0.path().join("table.jsonl")
     }

@@ -31,7 +31,6 @@ pub(super) struct Request {
     statement: String,
     results: Vec<(String, &'static str)>,
     metadata: Map<String, Value>,
-    /// Where Spark writes; `table` is written by the driver if absent.
     folder: Option<String>,
     table: String,
     answer: String,

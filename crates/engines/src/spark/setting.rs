@@ -41,7 +41,7 @@ impl Setting {
         &self.value
     }
 
-    /// Whether the value must not stand on a command line, which others on this machine can read.
+    /// Returns true if the value must not stand on a command line, which others on this machine can read.
     pub(super) fn is_secret(&self) -> bool {
         let key = self.key.to_ascii_lowercase();
         ["secret", "password", "token", "credential", "access.key", "accesskey", "account.key", "apikey", "api.key"]

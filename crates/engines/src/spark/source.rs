@@ -73,7 +73,7 @@ impl Sources {
     }
 }
 
-/// Whether an argument is a URI for Spark (`s3a://bucket/runs`, `hdfs:/runs`, `file:///runs`) and no file here.
+/// Returns true if an argument is a URI for Spark (`s3a://bucket/runs`, `hdfs:/runs`, `file:///runs`) and no file here.
 pub fn is_uri(argument: &str) -> bool {
     let scheme = argument.split_once(":/").map_or("", |(scheme, _)| scheme);
     // A single letter is a drive.

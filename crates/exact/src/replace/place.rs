@@ -76,7 +76,7 @@ pub(super) fn checksum(before: &[u8]) -> String {
     hash::of_bytes(before)[..CHECK].to_owned()
 }
 
-/// Whether a name is one that [`temporary`](super::temporary) gives.
+/// Returns true if a name is one that [`temporary`](super::temporary) gives.
 pub(super) fn is_temporary(name: &OsStr) -> bool {
     let name = name.as_encoded_bytes();
     name.starts_with(PREFIX.as_bytes())

@@ -58,7 +58,7 @@ pub fn check_folder<P: AsRef<Path>>(
     Err(FolderHoldsInput { folder: folder.display().to_string(), input: name })
 }
 
-/// Whether two paths lead to one existing file: links are followed, and hard links are one file.
+/// Returns true if two paths lead to one existing file: links are followed, and hard links are one file.
 #[cfg(unix)]
 pub fn is_same_file(a: &Path, b: &Path) -> bool {
     use std::os::unix::fs::MetadataExt as _;
@@ -66,7 +66,7 @@ pub fn is_same_file(a: &Path, b: &Path) -> bool {
     matches!((place(a), place(b)), (Ok(a), Ok(b)) if a == b)
 }
 
-/// Whether two paths lead to one existing file: links are followed.
+/// Returns true if two paths lead to one existing file: links are followed.
 #[cfg(not(unix))]
 pub fn is_same_file(a: &Path, b: &Path) -> bool {
     matches!((fs::canonicalize(a), fs::canonicalize(b)), (Ok(a), Ok(b)) if a == b)

@@ -112,7 +112,6 @@ impl Binder<'_> {
         self.faults.append(&mut faults);
     }
 
-    /// What a `let` or a metric came to; `None` once its faults have been told.
     fn definition(&mut self, name: &str) -> Option<Bound> {
         match self.states.get(name) {
             Some(State::Done(bound)) => return Some(*bound),

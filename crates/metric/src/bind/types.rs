@@ -75,7 +75,6 @@ impl Scope<'_, '_> {
         self.as_number(bound, expr)
     }
 
-    /// What `expr` came to, as a number.
     pub(super) fn as_number(&mut self, bound: Bound, expr: &Expr) -> Option<Bound> {
         match bound.ty {
             Some(Type::Int | Type::Float) => Some(bound),

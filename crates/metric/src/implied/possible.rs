@@ -141,7 +141,7 @@ impl Traces<'_> {
         Possible { values, may_be_null: of(moment).may_be_null || !is_there }
     }
 
-    /// Whether a predicate can hold only where `x` has a value.
+    /// Returns true if a predicate can hold only where `x` has a value.
     fn asks_for(&self, predicate: NodeId, x: NodeId) -> bool {
         match self.plan.node(predicate).op {
             Op::And(a, b) => self.asks_for(a, x) || self.asks_for(b, x),

@@ -47,7 +47,6 @@ impl Layout<'_> {
         Some((pass, read, format!("{check} AS g{}", id.index())))
     }
 
-    /// Whether a node overflows in an episode, as 0 or 1.
     fn verdict(&self, id: NodeId) -> String {
         let node = self.plan.node(id);
         let overflows = match node.op {
@@ -58,7 +57,7 @@ impl Layout<'_> {
         format!("CASE WHEN {overflows} THEN 1 ELSE 0 END")
     }
 
-    /// Whether an operation on integers leaves 64 bits.
+    /// Returns true if an operation on integers leaves 64 bits.
     fn overflows(&self, id: NodeId) -> String {
         let double = |id: &NodeId| format!("CAST({} AS DOUBLE)", self.value(*id));
         let exact = match &self.plan.node(id).op {
@@ -73,7 +72,6 @@ impl Layout<'_> {
     }
 }
 
-/// Whether an integer that may have wrapped is not what it is in doubles: wrapping moves it by 2^64, rounding by far less.
 fn far_apart(integer: &str, double: &str) -> String {
     format!("(ABS(CAST({integer} AS DOUBLE) - {double}) > CAST(4.0e18 AS DOUBLE))")
 }

@@ -25,7 +25,6 @@ pub(super) struct Layout<'p> {
     passes: BTreeMap<NodeId, usize>,
     lists: BTreeMap<NodeId, Windowed>,
     pub(super) shared: BTreeSet<NodeId>,
-    /// How many steps before `s` the step is of which is written.
     pub(super) lag: Cell<usize>,
     written: Rc<Cell<usize>>,
 }
@@ -103,7 +102,6 @@ impl<'p> Layout<'p> {
         self.needed.iter().copied().filter(is_shared).collect()
     }
 
-    /// Whether a value is a column of the table of steps, and read there: of the steps before there is no such table.
     pub(super) fn is_shared(&self, id: NodeId) -> bool {
         self.lag.get() == 0 && self.shared.contains(&id)
     }

@@ -29,7 +29,6 @@ struct Reads {
     earlier: BTreeMap<usize, BTreeSet<NodeId>>,
     /// The nodes that were gone through, and of how many steps before.
     seen: BTreeSet<(usize, NodeId)>,
-    /// How many steps before the step is of which is read.
     lag: usize,
 }
 

@@ -65,7 +65,6 @@ impl Stated {
     }
 }
 
-/// Where the digits of the footer's own checksum lie in the JSON of this length: before a quote and a brace.
 fn digits(length: usize) -> std::ops::Range<usize> {
     length - 10..length - 2
 }

@@ -28,7 +28,7 @@ pub(crate) struct Contents {
 /// that are stored as what differs from the one before.
 struct Texts {
     lengths: Vec<u32>,
-    /// Whether keys are written out; the library does that to those before a page without keys, too.
+    /// True if keys are written out; the library does that to those before a page without keys, too.
     writes_out: bool,
     behind_keys: u64,
     added: u64,
@@ -235,7 +235,6 @@ fn no_levels(stored: Bytes, rows: usize) -> Result<(), Fault> {
     over.map_err(|Unsupported| levels("some above 0"))
 }
 
-/// How many numbers of one bit are 1; there are `count`.
 fn ones(stored: Bytes, count: usize) -> Result<usize, Unsupported> {
     let mut ones = 0;
     let mut hybrid = Hybrid::new(stored, 1, count)?;

@@ -31,7 +31,7 @@ pub enum Form {
 pub struct Cursor {
     pages: Pages,
     physical: Physical,
-    /// Whether there may be nulls.
+    /// True if there may be nulls.
     optional: bool,
     form: Form,
     dictionary: Option<Dictionary>,

@@ -24,7 +24,7 @@ pub struct Library {
     pub row_groups: Vec<usize>,
     /// Where the first fault of a page is left.
     pub slot: FaultSlot,
-    /// Whether texts are asked for row by row, not as keys into a dictionary.
+    /// True if texts are asked for row by row, not as keys into a dictionary.
     pub writes_out: bool,
 }
 

@@ -286,7 +286,6 @@ mod tests {
 
     use super::{Hybrid, Number, Span};
 
-    /// What some runs decode to, read `most` at a time.
     fn read<N: Number + Into<i64>>(data: &[u8], width: u8, count: usize, most: usize) -> Vec<i64> {
         let mut hybrid = Hybrid::new(Bytes::copy_from_slice(data), width, count).ok().unwrap();
         let mut found: Vec<N> = Vec::new();

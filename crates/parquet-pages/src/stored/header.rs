@@ -41,7 +41,7 @@ pub(crate) struct About {
     pub(crate) physical: Physical,
     /// The bytes of a value of `FIXED_LEN_BYTE_ARRAY`.
     pub(crate) width: usize,
-    /// Whether there may be nulls.
+    /// True if there may be nulls.
     pub(crate) optional: bool,
     pub(crate) rows: usize,
 }
@@ -103,7 +103,6 @@ impl Header {
         if seen & required == required { Ok(()) } else { Err(Fault::Invalid("fields that are missing")) }
     }
 
-    /// What is wrong with a page of a flat column of which `read` values came before: expected and found.
     pub(crate) fn fault(&self, about: &About, read: usize) -> Option<(String, String)> {
         let fault = |expected: String, found: String| Some((expected, found));
         if self.whole > most(about.codec, self.stored) || (self.is_stored_plain(about) && self.whole != self.stored) {

@@ -109,7 +109,7 @@ pub struct InfeasibleCell {
     pub published: String,
     /// What of the cell is infeasible.
     pub field: Field,
-    /// Why, in a sentence.
+    /// The reason why, in a sentence.
     pub reason: String,
     /// What some data could print in its place, the nearest below and above.
     pub nearest: Vec<String>,
@@ -128,7 +128,7 @@ pub struct ZeroCell {
 }
 
 impl Audit {
-    /// Whether some data can give each cell.
+    /// Returns true if some data can give each cell.
     pub fn holds(&self) -> bool {
         self.infeasible.is_empty()
     }

@@ -69,7 +69,7 @@ pub(super) struct Solved {
 }
 
 impl Refused {
-    /// Whether some data would print the cell under another rounding, beside the same others.
+    /// Returns true if some data would print the cell under another rounding, beside the same others.
     pub(super) fn is_feasible(
         &self,
         row: &Row,
@@ -221,7 +221,6 @@ impl Question<'_> {
         })
     }
 
-    /// What is known of `n` values of the metric.
     pub(super) fn sample(&self, n: u64) -> Sample {
         let (low, high) = self.definitions.implied[self.metric].range;
         Sample {

@@ -62,7 +62,6 @@ fn push_cells(text: &mut String, audit: &Audit, width: Option<usize>) {
     }
 }
 
-/// What the cell would take to be feasible, and what that would cost.
 fn other_roundings(cell: &InfeasibleCell, audit: &Audit) -> String {
     let Some(table) = audit.tables.iter().find(|table| table.table == cell.table) else { return String::new() };
     let costs = cell.feasible_rounded.iter().map(|rounding| match infeasible_under(table, *rounding) {

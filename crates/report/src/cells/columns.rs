@@ -12,9 +12,6 @@ use metric::catalog::{Kind, Metric};
 /// One row per cell: the key columns as text (null where the key is missing), then `metric` and `unit` (text), `n`, `sum` and
 /// `sum_sq` (int64), `mean`, `se` (float64; null where undefined), `interval` (text, its method), `ci_low` and `ci_high`
 /// (float64), all three null where the interval is undefined or withheld.
-///
-/// # Errors
-/// A sum beyond 64 bits.
 pub fn record_batch(cells: &Cells) -> Result<RecordBatch, ArrowError> {
     let rows: Vec<Cell> = cells.all().collect();
     let mut columns: Vec<(&str, ArrayRef)> = Vec::new();

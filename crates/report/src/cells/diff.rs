@@ -162,7 +162,7 @@ impl Changes {
         })
     }
 
-    /// Whether every number is as it was, of the same metrics over the same episodes.
+    /// Returns true if every number is as it was, of the same metrics over the same episodes.
     pub fn is_empty(&self) -> bool {
         let same = |only: [usize; 2]| only == [0, 0];
         self.cells.is_empty()

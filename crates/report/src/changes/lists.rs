@@ -32,7 +32,6 @@ pub(super) fn cells(changes: &Changes, limit: Limit, width: Option<usize>) -> Op
     List { header, names: changes.by.len() + 1, rows, count: changes.cells.len() }.render(limit, width)
 }
 
-/// How often each metric went from which value to which: `0 -> 1`; a quantity may only rise or fall.
 pub(super) fn flips_by_metric(flips: &[Flip]) -> Option<String> {
     let mut counts: IndexMap<&str, IndexMap<&str, usize>> = IndexMap::new();
     for flip in flips {

@@ -45,7 +45,6 @@ pub(super) fn value(value: Option<i64>) -> String {
     value.map_or_else(|| UNDEFINED.to_owned(), |value| value.to_string())
 }
 
-/// How many values a cell has: `21 -> 20`.
 pub(super) fn n(numbers: &Pair<Option<Numbers>>) -> String {
     let one = |numbers: Option<Numbers>| numbers.map_or_else(|| "no episode".to_owned(), |cell| cell.n.to_string());
     pair(&Pair { before: one(numbers.before), after: one(numbers.after) })

@@ -58,7 +58,7 @@ impl Outcomes {
         (!rows.is_empty()).then(|| Self { experiment: experiment.to_owned(), rows })
     }
 
-    /// Whether there is an episode that [`of`](Self::of) would count.
+    /// Returns true if there is an episode that [`of`](Self::of) would count.
     pub fn are_there(episodes: &EpisodeTable) -> bool {
         open_question(episodes).is_some()
     }

@@ -16,7 +16,7 @@ pub struct Still {
     pub action: String,
     /// What was claimed, in words.
     pub claim: String,
-    /// Whether mirror evidence was in view.
+    /// True if mirror evidence was in view.
     pub visible: bool,
     /// The moments of the story that it is.
     pub moments: Vec<&'static str>,

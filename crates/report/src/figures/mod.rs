@@ -130,12 +130,10 @@ struct Scene<'a> {
     matrix: &'a Matrix<'a>,
     roster: &'a Roster<'a>,
     metrics: &'a [MetricId<'a>],
-    /// The width of a figure that takes all of it, px.
     width: f64,
 }
 
 impl Scene<'_> {
-    /// The widest that names of models beside rows get, px.
     fn name_room(&self) -> f64 {
         NAME_ROOM.min(self.width / 3.0)
     }

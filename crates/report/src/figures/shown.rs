@@ -58,7 +58,6 @@ impl FigureName {
         Err(FigureError::MetricCount { figure: self, wanted, found })
     }
 
-    /// What it shows of any definitions, or the metric that its style names.
     pub(super) fn needs(self, metric: &str) -> String {
         let is_built_in = SHOWN.get(self.name()).and_then(|sheet| sheet.metrics.as_ref());
         if is_built_in.is_none_or(|listed| listed.iter().all(|name| name != metric)) {

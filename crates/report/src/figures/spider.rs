@@ -80,7 +80,6 @@ impl Radar<'_> {
         }
     }
 
-    /// Where `share` of an axis lies.
     fn place(&self, axis: usize, share: f64) -> Point {
         let (x, y) = polar(RADIUS * share, self.angle(axis));
         (self.center.0 + x, self.center.1 + y)

@@ -42,7 +42,6 @@ impl fmt::Display for FigureWidth {
 }
 
 impl FigureWidth {
-    /// The width to lay a figure out at, px: wider than it is printed where its text may still shrink.
     pub(super) fn layout(self) -> f64 {
         self.px.max((self.px / LEAST_SCALE).min(FULL_WIDTH))
     }

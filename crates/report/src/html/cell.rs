@@ -50,7 +50,6 @@ fn element(emphasis: Emphasis) -> &'static str {
     }
 }
 
-/// Where the interval of a rate lies between 0 and 1, for the eye alone; three digits are finer than a pixel.
 fn strip(metric: &Metric, moments: &Moments, interval: Option<Interval>) -> Option<Json> {
     let place = |share: f64| Decimal::of_float(share, 3).map(Decimal::compact);
     let Interval { low, high } = interval.filter(|_| metric.kind == Kind::Rate)?;

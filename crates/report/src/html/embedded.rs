@@ -23,10 +23,8 @@ const LARGEST_SAFE: u64 = (1 << 53) - 1;
 struct Embedded<'a> {
     undefined: &'a str,
     metrics: BTreeMap<&'a str, &'a Json>,
-    /// What each group of episodes is called: `E1 · GPT 5.1`.
     groups: Vec<String>,
     episodes: Episodes,
-    /// What looks into an episode: before its id, and behind it.
     commands: Json,
     /// Every two models against each other.
     pairs: Json,

@@ -54,7 +54,6 @@ fn by_exact_mean(a: &MetricCell, b: &MetricCell) -> Ordering {
     compare_fractions(fraction(a), fraction(b))
 }
 
-/// How `a.0 / a.1` compares with `b.0 / b.1`, both lower terms positive: whole parts, then remainders upside down.
 fn compare_fractions(a: (i128, i128), b: (i128, i128)) -> Ordering {
     let whole = a.0.div_euclid(a.1).cmp(&b.0.div_euclid(b.1));
     let rests = (a.0.rem_euclid(a.1), b.0.rem_euclid(b.1));

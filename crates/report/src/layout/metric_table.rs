@@ -28,7 +28,7 @@ pub struct MetricTable {
     /// The text of an undefined value.
     pub undefined: String,
     pub form: CellForm,
-    /// Whether bold marks ties for the best, which [`MetricTable::mark_ties`] sets.
+    /// True if bold marks ties for the best, which [`MetricTable::mark_ties`] sets.
     pub is_tied: bool,
     /// The key columns of a row, as the episodes were grouped.
     pub keys: Vec<String>,
@@ -71,7 +71,7 @@ pub struct MetricRow {
 pub struct MetricCell {
     pub value: Value,
     pub emphasis: Emphasis,
-    /// Whether it rests on so few episodes that a dagger says so.
+    /// True if it rests on so few episodes that a dagger says so.
     pub is_marked: bool,
     /// All episodes of the row, defined or not.
     pub episodes: u64,

@@ -14,7 +14,6 @@ const BY_PAIRS: &str = "pairs of equal scenes";
 const BY_SEED: &str = "seeds, each counted once";
 
 impl TestName {
-    /// What it compares.
     const fn pairing(self) -> &'static str {
         match self {
             Self::PairedSeeds | Self::ChanceSeeds => BY_SEED,
@@ -143,7 +142,6 @@ impl<'a> Blocks<'a> {
         range(self.0.values().map(&count))
     }
 
-    /// What tests compare, as [`TestName::pairing`] says it.
     fn pairing(&self, by_seed: bool) -> &'static str {
         let blocks: Vec<_> = self.0.iter().collect();
         let is_shared = blocks.windows(2).all(|two| two[0].0.0 != two[1].0.0 || two[0].1.scenes == two[1].1.scenes);

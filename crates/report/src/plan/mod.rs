@@ -38,7 +38,7 @@ pub struct PlanRequest {
     pub discordance: Option<f64>,
     /// A level of chance to hold each model against; null for none.
     pub chance: Option<Ratio>,
-    /// Whether the study is looked at after each run of all seeds, and stops at the first verdict.
+    /// True if the study is looked at after each run of all seeds, and stops at the first verdict.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub sequential: bool,
 }
@@ -281,7 +281,6 @@ impl PlanRequest {
         Some(self.discordance.unwrap_or(Rates::apart(difference, self.baseline)?.independent_discordance()))
     }
 
-    /// The level of chance and the true rate above it.
     fn above_chance(&self, difference: f64) -> Option<(Ratio, f64)> {
         let chance = self.chance?;
         let rate = chance.value() + difference;

@@ -85,9 +85,6 @@ impl RegisteredPlan {
     }
 
     /// Reads a plan as it was registered.
-    ///
-    /// # Errors
-    /// What is wrong with it and what to do: no registered plan, or one that was changed.
     pub fn parse(text: &str) -> Result<Self, String> {
         let plan: Self = serde_json::from_str(text).map_err(|error| {
             format!("expected a registered plan: {error}\n  help: `mirrorstats plan ... --register FILE` writes one")
@@ -99,7 +96,7 @@ impl RegisteredPlan {
         Err(format!("{words}\n  help: take the file as it was registered, or register anew"))
     }
 
-    /// Whether it is as it was registered.
+    /// Returns true if it is as it was registered.
     pub fn is_unchanged(&self) -> bool {
         self.sha256 == self.content_hash()
     }

@@ -34,7 +34,7 @@ pub struct Level {
 /// What the row of the definitions as they are stands for.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Reference {
-    /// Whether the evidence is what was recorded as such; definitions may say otherwise.
+    /// True if the evidence is what was recorded as such; definitions may say otherwise.
     pub is_recorded: bool,
     /// The thresholds in pixels that the footers declare, ascending; none where they declare none.
     pub px: Vec<u64>,

@@ -28,7 +28,7 @@ pub struct Answer {
     pub metric: String,
     /// The answer, in a line.
     pub answer: String,
-    /// Whether it is the declared primary one.
+    /// True if it is the declared primary one.
     #[serde(default)]
     pub role: AnswerRole,
     /// What the episodes were chosen by, pooled over or short of, a phrase each.
@@ -130,7 +130,6 @@ fn unranked(statistics: &Statistics) -> Vec<Answer> {
     answers
 }
 
-/// The pairs without a verdict, and the reasons, each once.
 fn unsaid_pairs(reasons: &[String]) -> String {
     let each: BTreeSet<&str> = reasons.iter().map(String::as_str).collect();
     let each = Vec::from_iter(each).join(" or ");
@@ -193,7 +192,7 @@ fn counted(Units { n, name, .. }: &Units) -> String {
     format!("{n} {name}")
 }
 
-/// Why none of these comparisons can show a difference; `None` where one can.
+/// The reason why none of these comparisons can show a difference; `None` where one can.
 fn untested(comparisons: &[&Comparison], confidence: f64) -> Option<String> {
     let unsaid = |found: &Comparison| found.unsaid(confidence);
     let is_tried = |found: &&&Comparison| {

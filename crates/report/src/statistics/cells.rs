@@ -39,7 +39,7 @@ pub struct CellRow {
     pub se: Option<f64>,
     /// The intervals that fit the kind.
     pub intervals: Intervals,
-    /// Whether a conditional metric rests on fewer than five episodes here.
+    /// True if a conditional metric rests on fewer than five episodes here.
     pub few: bool,
 }
 
@@ -60,11 +60,11 @@ pub enum Intervals {
     Quantity {
         /// Student's t with n - 1 degrees of freedom, within the values that a mean of steps can have.
         student_t: Option<Interval>,
-        /// Why there is none.
+        /// The reason why there is none.
         student_t_withheld: Option<Withheld>,
         /// Bias-corrected and accelerated bootstrap, seeded; none for very many values.
         bootstrap: Option<Interval>,
-        /// Why there is none.
+        /// The reason why there is none.
         bootstrap_withheld: Option<Withheld>,
     },
 }

@@ -60,7 +60,7 @@ pub struct Units {
     pub n: u64,
     /// Their name, in the plural.
     pub name: String,
-    /// Whether they are too few for a verdict: no symmetric test of so many can reach the level of significance.
+    /// True if they are too few for a verdict: no symmetric test of so many can reach the level of significance.
     pub too_few: bool,
 }
 

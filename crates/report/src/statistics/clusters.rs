@@ -33,7 +33,7 @@ pub struct ClusterRow {
     pub se: Option<f64>,
     /// What takes seeds as independent instead; none for fewer than two seeds.
     pub by_seed: Option<Clustered>,
-    /// Why it has no interval.
+    /// The reason why it has no interval.
     pub withheld: Option<Withheld>,
 }
 

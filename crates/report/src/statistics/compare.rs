@@ -66,7 +66,7 @@ pub struct Comparison {
     pub difference: Option<f64>,
     /// Its interval, not adjusted for the number of comparisons.
     pub interval: Option<Interval>,
-    /// Why there is no interval.
+    /// The reason why there is no interval.
     pub withheld: Option<Withheld>,
     /// The standard error from repeats alone: by how much the difference of means varies if the same scenes are played
     /// again; none unless both sides repeat scenes.
@@ -78,7 +78,7 @@ pub struct Comparison {
     pub mid_p: Option<f64>,
     /// `p` adjusted by Holm's method over the family.
     pub p_adjusted: Option<f64>,
-    /// Whether the value adjusted by Holm reaches the level of significance.
+    /// True if the value adjusted by Holm reaches the level of significance.
     pub separated: bool,
     /// The units of analysis of both sides where the test counts each once, however many episodes it has.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -184,7 +184,7 @@ impl Compared<'_, '_> {
         sides
     }
 
-    /// Whether a unit enters the comparison of episodes more than once.
+    /// Returns true if a unit enters the comparison of episodes more than once.
     fn is_dependent(&self) -> bool {
         let Some(pairs) = &self.matched.pairs else {
             return self.first.repeats || self.second.repeats;

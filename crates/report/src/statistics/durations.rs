@@ -34,7 +34,7 @@ pub struct DurationRow {
     pub median_interval: Option<MedianInterval>,
     /// The mean up to the horizon, which is the same for all models of the experiment unless it was given.
     pub restricted: Option<RestrictedMean>,
-    /// Why the restricted mean has no interval.
+    /// The reason why the restricted mean has no interval.
     pub withheld: Option<Withheld>,
     /// The time to a correct decision, up to the same horizon.
     pub correct: Option<CorrectRow>,
@@ -51,11 +51,11 @@ pub struct CorrectRow {
     pub median: Option<i64>,
     /// The mean of the steps to a correct decision, where a wrong decision and none both count as the horizon.
     pub restricted: RestrictedMean,
-    /// Why it has no interval.
+    /// The reason why it has no interval.
     pub withheld: Option<Withheld>,
 }
 
-/// Whether a metric is a duration whose end is known.
+/// Returns true if a metric is a duration whose end is known.
 pub(super) fn is_duration(study: &Study, metric: &str) -> bool {
     study.relations.finished(metric).is_some_and(|finished| study.column(finished).is_some())
 }

@@ -15,7 +15,7 @@ pub(super) const LOST: &str = "lost episodes";
 /// Losses, or that nothing is known of them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Losses {
-    /// Whether the traces say how each reply came: without that, losses cannot be told from failures.
+    /// True if the traces say how each reply came: without that, losses cannot be told from failures.
     pub recorded: bool,
     /// The rates of every experiment and model that lost an episode.
     pub rows: Vec<LossRow>,
@@ -54,7 +54,7 @@ pub struct LossCases {
     pub lowest: LossCase,
     /// Every lost episode raises it as far as it can.
     pub highest: LossCase,
-    /// Whether the verdict is the same in both cases as without the lost episodes; otherwise there is none.
+    /// True if the verdict is the same in both cases as without the lost episodes; otherwise there is none.
     pub agree: bool,
 }
 

@@ -21,7 +21,7 @@ pub struct Matching {
     pub repeated: u64,
     /// Episodes of either side without a declared scene.
     pub undeclared: u64,
-    /// Whether the two are compared by their pairs: at least half of the episodes of each side are in one.
+    /// True if the two are compared by their pairs: at least half of the episodes of each side are in one.
     pub paired: bool,
 }
 

@@ -79,7 +79,7 @@ pub struct Options {
     pub caveats: Vec<String>,
     /// The metric of the primary question, as a registered plan names it; the first headline metric by default.
     pub primary: Option<String>,
-    /// Whether probabilities of improvement are computed, each of which resamples all episodes of two models.
+    /// True if probabilities of improvement are computed, each of which resamples all episodes of two models.
     pub improvements: bool,
 }
 
@@ -224,7 +224,6 @@ impl Statistics {
     }
 }
 
-/// What was taken together though it was recorded differently, each setting once.
 fn pooled(study: &Study, options: &Options) -> Vec<String> {
     let Some(mut sentences) = options.pooled.clone() else { return Vec::new() };
     let models = study.experiments.iter().flat_map(|experiment| {

@@ -96,7 +96,6 @@ impl<'s, 'a> Field<'s, 'a> {
         Self { study, blocks: &experiment.blocks, scenes, matched }
     }
 
-    /// How the episodes of two blocks fit together, the first of the two being `first`.
     fn matched(&self, first: usize, second: usize) -> Matched {
         let found = &self.matched[triangle(self.blocks.len(), first.min(second), first.max(second))];
         let turned = |&(a, b): &(usize, usize)| if first < second { (a, b) } else { (b, a) };

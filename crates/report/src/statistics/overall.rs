@@ -60,7 +60,7 @@ pub struct OverallRow {
     pub mid_p: Option<f64>,
     /// `p` adjusted by Holm's method over all pairs of models under the metric.
     pub p_adjusted: Option<f64>,
-    /// Whether the adjusted value reaches the level of significance.
+    /// True if the adjusted value reaches the level of significance.
     pub separated: bool,
     /// The test with the lost episodes of both sides; none where none was lost.
     #[serde(default, skip_serializing_if = "Option::is_none")]

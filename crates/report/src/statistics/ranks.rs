@@ -87,8 +87,6 @@ fn ranks(experiment: Option<&str>, metric: &str, models: &[&str], shown: &[(&str
 pub struct Ranks(Vec<RankRow>);
 
 impl Ranks {
-    /// # Errors
-    /// Sums of squares beyond 128 bits.
     pub fn of_table(
         table: &EpisodeTable,
         lost: &LostCounts,
@@ -101,7 +99,7 @@ impl Ranks {
         Ok(Self(RankRow::all(&compared(&study, None, CONFIDENCE).0, &overall)))
     }
 
-    /// Whether a model is tied for the best, and another one is not.
+    /// Returns true if a model is tied for the best, and another one is not.
     pub fn is_tied(&self, experiment: &str, model: &str, metric: &str) -> bool {
         let is_of = |row: &&RankRow| row.experiment.as_deref() == Some(experiment) && row.metric == metric;
         let mut family = self.0.iter().filter(is_of);

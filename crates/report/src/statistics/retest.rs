@@ -86,7 +86,6 @@ impl RetestRow {
     }
 }
 
-/// The variance of a block's mean from one time of its scenes to the next; none where no scene has several values.
 #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
 pub(super) fn repeat_variance(study: &Study, block: &Block, column: &MetricColumn) -> Option<f64> {
     if !block.repeats {

@@ -10,7 +10,7 @@ use exact::escape::visible;
 pub struct Selection {
     /// The condition, as typed.
     pub condition: String,
-    /// Whether it depends on what the agents did, and not on what was recorded alone.
+    /// True if it depends on what the agents did, and not on what was recorded alone.
     pub by_results: bool,
 }
 

@@ -38,7 +38,7 @@ pub(super) struct Study<'a> {
     pub experiments: Vec<Experiment<'a>>,
     /// Which metrics belong together.
     pub relations: Relations,
-    /// Whether settings that differ do not matter.
+    /// True if settings that differ do not matter.
     pub pool: bool,
     ranges: BTreeMap<&'a str, Interval>,
 }
@@ -59,7 +59,7 @@ pub(super) struct Block<'a> {
     moments: BTreeMap<&'a str, Moments>,
     /// Lost episodes, in no row.
     pub lost: u64,
-    /// Whether a unit has several episodes.
+    /// True if a unit has several episodes.
     pub repeats: bool,
 }
 
@@ -192,7 +192,7 @@ impl<'a> Study<'a> {
         self.table.catalog.metric.get(name)
     }
 
-    /// Whether a larger mean comes first.
+    /// Returns true if a larger mean comes first.
     pub fn better(&self, metric: &str) -> Better {
         self.metric(metric).map_or(Better::Neither, |metric| metric.better)
     }
@@ -224,7 +224,7 @@ impl<'a> Block<'a> {
         named(self.model, self.condition)
     }
 
-    /// Whether another block is of the same model under the same condition.
+    /// Returns true if another block is of the same model under the same condition.
     pub fn is_same_subject(&self, other: &Self) -> bool {
         (self.model, self.condition) == (other.model, other.condition)
     }

@@ -237,7 +237,7 @@ impl Style {
         if faults.is_empty() { Ok(()) } else { Err(Faults(faults).in_order().into()) }
     }
 
-    /// Whether the style came with the program.
+    /// Returns true if the style came with the program.
     pub fn is_built_in(&self) -> bool {
         self.is_built_in
     }

@@ -78,7 +78,6 @@ fn metrics(at: &At<'_>) -> Vec<(String, Place)> {
     at.within("column").map(|(metric, at)| (metric.to_owned(), at.name_place())).chain(listed).collect()
 }
 
-/// What one file says by itself.
 fn check(at: &At<'_>, faults: &mut Vec<Fault>) {
     for (name, table) in at.within("table") {
         let is_plain = |b: u8| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'-' || b == b'_';
@@ -115,7 +114,6 @@ fn check(at: &At<'_>, faults: &mut Vec<Fault>) {
     }
 }
 
-/// What the file and its includes leave out, reported in the file itself.
 fn check_tables(sheet: &Sheet, at: &At<'_>, faults: &mut Vec<Fault>) {
     if !sheet.table.contains_key(MAIN_TABLE) {
         let message = format!("there is no table `{MAIN_TABLE}`: every report needs one");

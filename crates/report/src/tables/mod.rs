@@ -31,7 +31,7 @@ pub struct Table {
     pub columns: Vec<Column>,
     /// How many of the first columns name a row.
     pub names: usize,
-    /// Whether bold marks all that are tied for the best.
+    /// True if bold marks all that are tied for the best.
     pub is_tied: bool,
     /// The rows, in groups that are headed together.
     pub groups: Vec<RowGroup>,
@@ -79,12 +79,12 @@ pub struct TableCell {
     pub text: String,
     /// How sure the text is: `± 0.11`, `[0.22, 0.47]`.
     pub detail: Option<String>,
-    /// Whether emphasis covers the detail too.
+    /// True if emphasis covers the detail too.
     pub is_whole: bool,
-    /// Whether LaTeX sets it as mathematics.
+    /// True if LaTeX sets it as mathematics.
     pub is_number: bool,
     pub emphasis: Emphasis,
-    /// Whether a dagger marks it.
+    /// True if a dagger marks it.
     pub is_marked: bool,
 }
 

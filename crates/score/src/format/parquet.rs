@@ -60,7 +60,7 @@ pub fn holds_scores(file: &impl ChunkReader, folders: &[(String, Option<String>)
     !names.iter().any(|name| is_of_steps(name)) && KEYS.iter().all(|key| names.contains(key))
 }
 
-/// Whether a file of scores carries the definitions that gave them.
+/// Returns true if a file of scores carries the definitions that gave them.
 pub fn holds_definitions(file: &impl ChunkReader) -> bool {
     metadata(file).is_some_and(|metadata| footer::value(metadata.file_metadata(), DEFINITIONS_KEY).is_some())
 }

@@ -50,7 +50,7 @@ pub(super) fn split(plan: &Plan, condition: NodeId) -> (NodeId, Vec<(Comparison,
     (rest, windows)
 }
 
-/// Whether a lookup of this value should look up its columns and compute from what they hold there: once per episode
+/// Returns true if a lookup of this value should look up its columns and compute from what they hold there: once per episode
 /// instead of once per timestep. Not where a timestep that is not looked at could leave 64 bits.
 pub(super) fn computes_after_lookup(plan: &Plan, value: NodeId) -> bool {
     let node = plan.node(value);

@@ -29,7 +29,7 @@ pub struct Search {
 }
 
 impl Search {
-    /// Whether `count` integers from `low` to `high` have this sum and this sum of squares.
+    /// Returns true if `count` integers from `low` to `high` have this sum and this sum of squares.
     pub fn is_attained(&mut self, count: i128, (low, high): (i128, i128), sum: i128, squares: i128) -> bool {
         let shifted = Question {
             count,

@@ -51,7 +51,7 @@ impl Sample {
         (n * i128::from(self.range.0), n * i128::from(self.range.1))
     }
 
-    /// Whether the printed means lie between those of the ends of a span: two divisions, where [`Sample::sums`]
+    /// Returns true if the printed means lie between those of the ends of a span: two divisions, where [`Sample::sums`]
     /// bisects.
     pub fn reaches(&self, (least, most): Span, prints: &[Print]) -> bool {
         prints.iter().all(|print| {
@@ -133,7 +133,6 @@ fn printing_as(span: Span, target: Decimal, shown: impl Fn(i128) -> Option<Decim
     (from, beyond - 1)
 }
 
-/// What 128 bits cannot hold is larger than anything printed.
 fn compare(printed: Option<Decimal>, target: Decimal) -> Ordering {
     printed.map_or(Ordering::Greater, |printed| printed.cmp_value(target))
 }

@@ -16,11 +16,8 @@ pub struct Anytime {
     every: u64,
     shares: [f64; 3],
     hypothesis: Ratio,
-    /// The fewest and the most wins among so many wins and losses that lead to no rejection.
     within: Vec<(u64, u64)>,
-    /// The probability of each number of losses and wins without a rejection so far.
     running: Vec<Vec<f64>>,
-    /// The probability of a rejection at each look so far.
     stopped: Vec<f64>,
 }
 
@@ -80,7 +77,6 @@ impl Anytime {
         self.running = next;
     }
 
-    /// Takes out what is rejected now, and returns its probability.
     fn look(&mut self) -> f64 {
         for decided in self.within.len() as u64..self.running.len() as u64 {
             let bounds = self.bounds(decided);
@@ -95,7 +91,6 @@ impl Anytime {
         rejected
     }
 
-    /// With more wins and losses, as many wins or more are needed on either side.
     fn bounds(&self, decided: u64) -> (u64, u64) {
         let rejects = |wins: &u64| {
             against_level(*wins, decided, self.hypothesis).is_some_and(|evidence| evidence.p <= self.level)

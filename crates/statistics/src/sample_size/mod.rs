@@ -31,7 +31,6 @@ pub trait Power {
     /// The probability that the test rejects with `n` episodes per model.
     fn power(&mut self, n: u64) -> f64;
 
-    /// The most episodes per model that a search goes to.
     fn most(&self) -> u64 {
         MOST_EPISODES
     }
@@ -84,7 +83,7 @@ pub struct Clusters {
 }
 
 impl Clusters {
-    /// Whether the episodes of a seed resemble each other, so that tests count seeds.
+    /// Returns true if the episodes of a seed resemble each other, so that tests count seeds.
     pub fn are_units(self) -> bool {
         self.icc > 0.0
     }

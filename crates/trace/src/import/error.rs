@@ -52,7 +52,7 @@ pub enum ImportError {
     Read {
         /// As it was named.
         file: String,
-        /// Why not.
+        /// The reason for the refusal.
         source: io::Error,
     },
     /// A text is not what it was a moment before.

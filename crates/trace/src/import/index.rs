@@ -10,7 +10,6 @@ use exact::escape::visible;
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Step {
-    /// Which episode, in the order of their first lines.
     pub(super) episode: usize,
     t: i64,
     pub(super) text: usize,

@@ -20,7 +20,7 @@ pub struct Limits<'a> {
     pub palette: Option<&'a Palette>,
     /// What episodes share that are more alike than chance; nothing if `None`.
     pub cluster: Option<Cluster>,
-    /// Whether the steps were rebuilt from published numbers, which leave the rest of them open.
+    /// True if the steps were rebuilt from published numbers, which leave the rest of them open.
     pub is_reconstruction: bool,
 }
 

@@ -71,7 +71,6 @@ impl Mapping {
         self.left_out.iter().map(nested).chain(self.dropped.iter().map(dropped)).collect()
     }
 
-    /// What a footer says of the mapping.
     pub(super) fn declared(&self) -> Value {
         let path =
             |path: &Path| if path.added == 0 { path.keys.clone() } else { format!("{}+{}", path.keys, path.added) };
@@ -81,17 +80,14 @@ impl Mapping {
         json!({ "map": columns, "set": constants })
     }
 
-    /// Counts records that are not steps.
     pub(super) fn count_dropped(&mut self, what: String) {
         *self.dropped.entry(what).or_default() += 1;
     }
 
-    /// Whether a value comes from this path or from within it.
     pub(super) fn reads(&self, keys: &str) -> bool {
         self.columns.iter().any(|(_, path)| path.is_at(keys) || path.is_within(keys))
     }
 
-    /// The columns of a row.
     pub(super) fn flat(&mut self, row: &Row<'_>) -> Map<String, Value> {
         let mut flat: Map<String, Value> =
             self.columns.iter().map(|(name, path)| (name.clone(), path.value(name, row))).collect();
@@ -129,7 +125,6 @@ impl Path {
     }
 }
 
-/// Whether traces of every domain have a text in the column of this name.
 pub(super) fn is_general_text(name: &str) -> bool {
     is_general(name) && column(name).is_some_and(|column| column.stored.kind() == Kind::String)
 }

@@ -25,16 +25,14 @@ use exact::input;
 #[derive(Debug)]
 pub struct Text {
     name: Arc<str>,
-    /// What a line is in the file of the user.
     noun: &'static str,
     reader: BufReader<File>,
     /// Where the reader is, in bytes from the start.
     offset: u64,
     /// Lines that were read since the start.
     lines: u64,
-    /// Whether the lines are rows of a data frame, which holds integers beside nulls as floating-point numbers.
+    /// True if the lines are rows of a data frame, which holds integers beside nulls as floating-point numbers.
     is_frame: bool,
-    /// The file that the lines were made of, if they were.
     source: Option<Source>,
 }
 
@@ -43,7 +41,6 @@ pub struct Text {
 pub(super) struct Source {
     sha256: String,
     pub(super) format: Format,
-    /// Paths and constants, as footers declare them.
     pub(super) mapping: Value,
 }
 
@@ -52,9 +49,8 @@ pub(super) struct Source {
 pub(super) struct Line {
     pub(super) place: Place,
     pub(super) offset: u64,
-    /// What it holds, without the byte order mark.
     pub(super) bytes: Vec<u8>,
-    /// Whether it ends with a line feed; the last one of a file that was cut off does not.
+    /// True if it ends with a line feed; the last one of a file that was cut off does not.
     pub(super) ended: bool,
 }
 

@@ -15,7 +15,7 @@ pub enum LogError {
         doing: &'static str,
         /// The log.
         file: String,
-        /// Why not.
+        /// The reason for the refusal.
         source: io::Error,
     },
     /// The bytes are not those of a log.

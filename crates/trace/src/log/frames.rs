@@ -191,7 +191,7 @@ pub fn unfinished_shapes(path: &Path) -> Result<BTreeMap<u64, Vec<Shape>>, LogEr
     Ok(found)
 }
 
-/// Whether a file begins as a log does.
+/// Returns true if a file begins as a log does.
 pub fn is_log(path: &Path) -> bool {
     records(path).is_ok()
 }

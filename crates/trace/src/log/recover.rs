@@ -45,9 +45,9 @@ pub struct Losses {
     pub damaged_chunks: usize,
     /// What is damaged beside chunks: records that cannot be read, checksums that do not hold.
     pub damage: Vec<String>,
-    /// Why the log does not say any more how it was recorded, if it does not.
+    /// The reason why the log does not say any more how it was recorded, if it does not.
     pub recording: Option<String>,
-    /// Why reading ended before the end of the log, if it did.
+    /// The reason why reading ended before the end of the log, if it did.
     pub cut: Option<String>,
 }
 

@@ -251,7 +251,7 @@ impl<'a> RowGroup<'a> {
         Box::new(finding.in_row_group(self.index))
     }
 
-    /// Why a column is refused whose rows from `first` on were decoded.
+    /// The reason why a column is refused whose rows from `first` on were decoded.
     fn refusal(&self, refused: Refused, column: usize, first: usize) -> Box<Finding> {
         let at_column = |finding: Finding| Box::new(finding.in_column(&self.layout.columns[column].name));
         match refused {

@@ -161,7 +161,7 @@ impl TraceSet {
         (present || seen.is_some()).then_some(ColumnUse { kind, missing_from, conflict })
     }
 
-    /// Whether some file has the schema's column of this name.
+    /// Returns true if some file has the schema's column of this name.
     pub fn declares(&self, name: &str) -> bool {
         self.files.iter().any(|file| file.declares(name))
     }

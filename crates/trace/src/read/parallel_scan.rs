@@ -29,7 +29,6 @@ pub(crate) struct Episodes {
     pub(crate) file: usize,
     pub(crate) columns: Vec<Column>,
     pub(crate) offsets: Vec<usize>,
-    /// Where the rows come from, ascending by `at`; the first is at row 0.
     pub(crate) pieces: Vec<Piece>,
 }
 
@@ -277,7 +276,7 @@ struct Joiner<'a, W, R> {
     receive: R,
     open: Vec<Rows>,
     file: usize,
-    /// Whether the file had a fault, after which nothing of it counts.
+    /// True if the file had a fault, after which nothing of it counts.
     failed: bool,
 }
 

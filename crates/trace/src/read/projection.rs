@@ -22,7 +22,7 @@ pub(crate) struct LayoutColumn {
     pub(crate) name: String,
     pub(crate) kind: Kind,
     pub(crate) known: Option<&'static Column>,
-    /// Whether it must be the same in all rows of an episode.
+    /// True if it must be the same in all rows of an episode.
     pub(crate) constant: bool,
     pub(crate) values: Vec<String>,
 }

@@ -184,7 +184,6 @@ impl Part {
         Ok((0..readable.footer.metadata().num_row_groups()).map(part).collect())
     }
 
-    /// Decodes on a thread of its own, as long as someone reads.
     fn ahead(self, shape: Shape) -> Ahead {
         let (sender, rows) = sync_channel(AHEAD);
         let name = self.name.clone();

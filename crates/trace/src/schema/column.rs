@@ -14,11 +14,11 @@ pub struct Column {
     /// The type that the writer stores; readers take any of the same [`Kind`].
     #[serde(rename = "type")]
     pub stored: Stored,
-    /// Whether every trace has the column.
+    /// True if every trace has the column.
     pub required: bool,
-    /// Whether a row may have none.
+    /// True if a row may have none.
     pub nullable: bool,
-    /// Whether the value is the same in all rows of an episode.
+    /// True if the value is the same in all rows of an episode.
     pub constant: bool,
     /// What a number counts or measures.
     pub unit: Option<&'static str>,
@@ -161,7 +161,7 @@ impl Column {
         Self { default: Some(default), ..self }
     }
 
-    /// Whether the column counts something, so that a negative number is a fault.
+    /// Returns true if the column counts something, so that a negative number is a fault.
     pub fn counts(&self) -> bool {
         matches!(self.unit, Some("px" | "ms" | "tokens" | "USD" | "agents" | "mm"))
     }

@@ -25,7 +25,7 @@ pub struct SchemaDocument {
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Rule {
     pub code: Code,
-    /// Whether breaking it makes a trace unusable.
+    /// True if breaking it makes a trace unusable.
     pub severity: Severity,
     pub rule: &'static str,
     /// What to do where it does not.

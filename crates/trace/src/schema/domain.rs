@@ -57,7 +57,7 @@ impl Domain {
         if name == MIRROR { Self::Mirror } else { Self::Own }
     }
 
-    /// Whether the schema's column means something here.
+    /// Returns true if the schema's column means something here.
     pub fn has(self, column: &Column) -> bool {
         self == Self::Mirror || is_general(column.name)
     }
@@ -75,16 +75,16 @@ pub struct DeclaredColumn {
     pub kind: Kind,
     /// The only texts that it holds, null apart; any if empty.
     pub values: Vec<String>,
-    /// Whether it is the same in all rows of an episode.
+    /// True if it is the same in all rows of an episode.
     pub constant: bool,
 }
 
-/// Whether every trace has the column, whatever its domain.
+/// Returns true if every trace has the column, whatever its domain.
 pub fn is_identity(name: &str) -> bool {
     IDENTITY.contains(&name)
 }
 
-/// Whether a column of the schema is that of every domain.
+/// Returns true if a column of the schema is that of every domain.
 pub fn is_general(name: &str) -> bool {
     IDENTITY.contains(&name) || GENERAL.contains(&name)
 }

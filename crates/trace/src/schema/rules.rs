@@ -55,7 +55,7 @@ pub struct Known<'a> {
 
 impl Column {
     // Beside the rules, since a column by itself does not know which columns hold colours.
-    /// Whether the column's text names something, so that an empty one is a fault.
+    /// Returns true if the column's text names something, so that an empty one is a fault.
     pub fn names(&self) -> bool {
         self.stored == Stored::String && (self.required || self.constant || colors::column(self.name).is_some())
     }

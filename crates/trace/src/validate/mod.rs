@@ -42,13 +42,13 @@ pub struct Validation {
 pub struct CheckedFile {
     /// Its name.
     pub name: String,
-    /// Whether all of its rows were checked; not so where the file cannot be read to its end.
+    /// True if all of its rows were checked; not so where the file cannot be read to its end.
     pub complete: bool,
     /// Episodes that were checked.
     pub episodes: u64,
     /// Their rows.
     pub steps: u64,
-    /// Whether it has checksums; without them damage may not be found.
+    /// True if it has checksums; without them damage may not be found.
     pub checksums: Checksums,
 }
 

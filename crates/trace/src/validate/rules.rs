@@ -92,7 +92,7 @@ fn may_break(rule: &Rule<'_>, held: &Held, offsets: &[usize]) -> bool {
     }
 }
 
-/// Whether one of some values, what stands in the place of nulls included, is none that the rule allows. Counted
+/// Returns true if one of some values, what stands in the place of nulls included, is none that the rule allows. Counted
 /// without an early end, which the compiler turns into few instructions.
 fn has_odd(rule: &Rule<'_>, values: &ArrayRef) -> bool {
     if let Some(texts) = values.as_string_opt::<i32>() {
@@ -105,7 +105,7 @@ fn has_odd(rule: &Rule<'_>, values: &ArrayRef) -> bool {
     floats.is_some_and(|floats| floats.values().iter().any(|value| !rule.allows_float(*value)))
 }
 
-/// Whether the same bits are in all rows of each episode; null values may be the same and are not looked at.
+/// Returns true if the same bits are in all rows of each episode; null values may be the same and are not looked at.
 fn is_constant(values: &ArrayRef, offsets: &[usize]) -> bool {
     fn uniform<V: Copy + PartialEq>(values: &[V]) -> bool {
         let Some(first) = values.first() else { return true };

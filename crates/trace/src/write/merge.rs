@@ -106,7 +106,7 @@ impl EpisodeRows {
         Ok(Self { rows: rows.map_err(|error| unreadable(&self.episode_id, error.into()))?, ..self.clone() })
     }
 
-    /// Whether there is no step, which no episode of a file has.
+    /// Returns true if there is no step, which no episode of a file has.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

@@ -206,7 +206,6 @@ fn expected(rule: &Rule<'_>) -> String {
     }
 }
 
-/// What breaks a rule, and for a colour what to write instead.
 fn found(rule: &Rule<'_>, value: Value<'_>) -> String {
     match (rule.asks, value) {
         (Requirement::Color(color, palette), Value::Text(text)) => {

@@ -85,7 +85,7 @@ pub struct Reply {
     pub status: Status,
     /// What had to be repaired to read it, in order.
     pub repairs: Vec<Repair>,
-    /// Why it gave no decision, for people; `None` where it gave one, or the status says all.
+    /// The reason why it gave no decision, for people; `None` where it gave one, or the status says all.
     pub fault: Option<String>,
     /// The action; `None` where the reply gave none: the body stands still.
     pub action: Option<Action>,
@@ -245,12 +245,12 @@ pub trait Player: Send + Sync {
 
     fn agent(&self, task: Task, episode_id: &str) -> Result<Box<dyn Agent>, Lost>;
 
-    /// Whether the agent looks at frames; one that does not may be given empty ones.
+    /// Returns true if the agent looks at frames; one that does not may be given empty ones.
     fn looks(&self) -> bool {
         true
     }
 
-    /// Whether its agents wait for something outside of this process, so that a recording takes its time.
+    /// Returns true if its agents wait for something outside of this process, so that a recording takes its time.
     fn waits(&self) -> bool {
         false
     }
@@ -267,7 +267,6 @@ pub trait Player: Send + Sync {
 
     fn resumes(&self) {}
 
-    /// What was spent so far on all that it played into the folder, over all starts; `None` for agents that cost nothing.
     #[cfg(feature = "sim")]
     fn spend(&self) -> Option<vlm::limits::Spend> {
         None

@@ -139,7 +139,6 @@ impl Experiment {
     }
 }
 
-/// What the built-in experiments are, in their order.
 fn built_in_specs() -> Vec<&'static Spec> {
     let names = built_in_names().into_iter();
     names.filter_map(|name| Experiment::parse(name).ok()).map(|experiment| &experiment.known().spec).collect()

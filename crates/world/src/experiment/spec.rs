@@ -421,22 +421,22 @@ pub enum Camera {
 names!(Camera { Eye: "eye", Behind: "behind" });
 
 impl Spec {
-    /// Whether there are cubes of which one is to be selected.
+    /// Returns true if there are cubes of which one is to be selected.
     pub const fn has_candidates(&self) -> bool {
         matches!(self.layout.cubes, Cubes::Candidates { .. })
     }
 
-    /// Whether a reply names a cube.
+    /// Returns true if a reply names a cube.
     pub fn asks_for_cube(&self) -> bool {
         self.reply.contains(&ReplyKey::SelectedCube)
     }
 
-    /// Whether a reply says how the agent knows itself.
+    /// Returns true if a reply says how the agent knows itself.
     pub fn asks_for_identification(&self) -> bool {
         self.reply.contains(&ReplyKey::Identification)
     }
 
-    /// Whether a reply names a mark.
+    /// Returns true if a reply names a mark.
     pub fn asks_for_mark(&self) -> bool {
         self.reply.contains(&ReplyKey::Mark)
     }

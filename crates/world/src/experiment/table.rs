@@ -160,7 +160,6 @@ fn scenes(
     (owner.map_or_else(|| name.to_owned(), |owner| owner.scenes.clone()), own)
 }
 
-/// What is drawn. Where the scenes are another experiment's, it may be said again, and must be the same.
 fn layout(table: &ExperimentTable, at: &At<'_>, owner: Option<&Layout>, wall: Wall, faults: &mut Vec<Fault>) -> Layout {
     let default = owner.cloned().unwrap_or_else(|| Layout {
         colors: Colors::default(),
@@ -313,7 +312,7 @@ fn prompt(name: String, at: &At<'_>, beside: &Beside<'_>, faults: &mut Vec<Fault
     }
 }
 
-/// Whether each mark shows before the last step.
+/// Returns true if each mark shows before the last step.
 fn check_marks(marks: &[Mark], steps: Option<u32>, at: &At<'_>, faults: &mut Vec<Fault>) {
     for (n, mark) in marks.iter().enumerate() {
         if let Some(steps) = steps.filter(|steps| mark.from_t > *steps) {

@@ -44,7 +44,7 @@ pub(super) fn check(log: &Path, trace: &Path, recording: &Value, episodes: &[Epi
     Err(StoreError::ForeignLog { path: log.to_owned(), fault, help })
 }
 
-/// Why a log does not belong to these episodes.
+/// The reason why a log does not belong to these episodes.
 fn fault_of(
     found: &Recovered,
     trace: &Path,

@@ -78,7 +78,7 @@ pub(super) fn lock_of(folder: &Path) -> PathBuf {
     folder.join(".lock")
 }
 
-/// Whether this open file is the one at `path`.
+/// Returns true if this open file is the one at `path`.
 #[cfg(unix)]
 pub(super) fn is_at(file: &File, path: &Path) -> bool {
     use std::os::unix::fs::MetadataExt as _;
@@ -86,7 +86,7 @@ pub(super) fn is_at(file: &File, path: &Path) -> bool {
     matches!((file.metadata(), fs::metadata(path)), (Ok(ours), Ok(there)) if place(&ours) == place(&there))
 }
 
-/// Whether this open file is the one at `path`; a file that is open can be neither removed nor replaced.
+/// Returns true if this open file is the one at `path`; a file that is open can be neither removed nor replaced.
 #[cfg(not(unix))]
 pub(super) fn is_at(_: &File, path: &Path) -> bool {
     path.exists()

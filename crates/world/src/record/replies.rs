@@ -44,7 +44,7 @@ pub struct UnreadableReply {
     pub status: String,
     /// The beginning of what was replied, characters that act on a terminal escaped; null if there is no text.
     pub text: Option<String>,
-    /// Why it gave none, in the words of its parser, shortened likewise; null where the status says all.
+    /// The reason why it gave none, in the words of its parser, shortened likewise; null where the status says all.
     pub fault: Option<String>,
 }
 

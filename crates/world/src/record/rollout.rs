@@ -94,7 +94,7 @@ pub struct Played {
     pub model: Option<String>,
     /// Another id that came later in the episode, and the step of its first answer.
     pub other_model: Option<(i32, String)>,
-    /// Whether a hand has reached its mark, which ends an episode.
+    /// True if a hand has reached its mark, which ends an episode.
     pub is_reached: bool,
 }
 

@@ -56,9 +56,9 @@ pub struct Settings {
     pub threads: NonZeroUsize,
     /// Episodes under way at once, over all threads.
     pub in_flight: NonZeroUsize,
-    /// Whether frames are drawn for agents that do not look, and are kept in the log.
+    /// True if frames are drawn for agents that do not look, and are kept in the log.
     pub frames: bool,
-    /// Whether a log is written.
+    /// True if a log is written.
     pub log: bool,
     /// Replies in a row without a decision that end the recording; `None` for no number.
     pub max_unusable: Option<NonZeroU32>,
@@ -81,7 +81,7 @@ pub struct Tally {
     pub elsewhere: Vec<Key>,
     /// The recording was stopped before its end.
     pub stopped: bool,
-    /// Why it was, if the agent could not answer.
+    /// The reason why it was, if the agent could not answer.
     pub given_up: Option<GivenUp>,
 }
 

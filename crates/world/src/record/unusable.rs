@@ -42,7 +42,6 @@ impl fmt::Display for GivenUp {
 /// The unusable replies in a row over a recording.
 #[derive(Debug)]
 pub(super) struct Unusable {
-    /// How many in a row end the recording; `None` for no number.
     most: Option<NonZeroU32>,
     found: Mutex<Found>,
 }

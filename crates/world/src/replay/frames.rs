@@ -57,7 +57,7 @@ pub fn frames(
     }
 }
 
-/// Whether a trace says how its world was made, and this program can make it.
+/// Returns true if a trace says how its world was made, and this program can make it.
 pub fn is_recipe(recording: Option<&Value>) -> bool {
     Recipe::of(recording).is_ok()
 }

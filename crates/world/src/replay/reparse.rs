@@ -127,7 +127,6 @@ impl ReparseAnswer {
     }
 }
 
-/// What the footer says of the recording, and its experiment.
 fn recipe(input: &Input) -> Result<(Value, Experiment), ReparseError> {
     let none = |found: &str| ReparseError::NoReplies { file: input.name.clone(), found: found.to_owned() };
     let file = TraceFile::open(input).map_err(|findings| {
@@ -169,7 +168,6 @@ fn compared(step: &Step) -> [(&'static str, Option<String>); 4] {
     ]
 }
 
-/// Puts a reading in the place of the recorded one, without its action.
 fn put(step: &mut Step, reading: Reading) {
     let extra = &mut step.extra;
     if step.selected_cube != reading.selected_cube {

@@ -105,7 +105,6 @@ names!(Piece {
 });
 
 impl Piece {
-    /// How far forward it is swung, degrees.
     fn swing(self, stride: Stride, config: &BodyConfig) -> f64 {
         let side = match stride {
             Stride::Standing => return 0.0,

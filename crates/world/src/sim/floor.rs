@@ -78,19 +78,19 @@ pub struct FloorPlan {
 }
 
 impl FloorPlan {
-    /// Whether a body's axis may be at a point, `clearance` further from cubes than touching.
+    /// Returns true if a body's axis may be at a point, `clearance` further from cubes than touching.
     pub fn admits(&self, spot: [f64; 2], clearance: f64) -> bool {
         spot.iter().all(|at| at.abs() <= self.reach)
             && self.squares.iter().all(|square| square.distance(spot) >= self.radius + clearance)
     }
 
-    /// Whether a body may go straight from one point to another.
+    /// Returns true if a body may go straight from one point to another.
     pub fn is_passable(&self, from: [f64; 2], to: [f64; 2]) -> bool {
         to.iter().all(|at| at.abs() <= self.reach)
             && self.squares.iter().all(|square| square.distance_to_line(from, to) >= self.radius)
     }
 
-    /// Whether a body that goes straight from one point to another touches a body at `other`.
+    /// Returns true if a body that goes straight from one point to another touches a body at `other`.
     pub fn is_blocked_by(&self, from: [f64; 2], to: [f64; 2], other: [f64; 2]) -> bool {
         distance_to_line(other, from, to) < 2.0 * self.radius
     }

@@ -39,7 +39,7 @@ impl<'a> Place<'a> {
         in_room(self.body, self.local(from_mark))
     }
 
-    /// Whether it may be there.
+    /// Returns true if it may be there.
     pub fn is_free(&self, from_mark: [i32; 3]) -> bool {
         let half = self.hand.half();
         let [ahead, left, up] = self.local(from_mark);
@@ -55,7 +55,7 @@ impl<'a> Place<'a> {
         self.task.step_mm * from_mark.iter().map(|steps| steps.unsigned_abs()).sum::<u32>()
     }
 
-    /// Whether the mark counts as reached from there.
+    /// Returns true if the mark counts as reached from there.
     pub fn is_reached(&self, from_mark: [i32; 3]) -> bool {
         self.distance_mm(from_mark) <= self.task.within * self.task.step_mm
     }

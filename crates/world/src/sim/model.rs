@@ -203,7 +203,7 @@ impl Stage {
         self.data.model().id_to_name(MjtObjBase::mjOBJ_GEOM, geom).unwrap_or_default()
     }
 
-    /// Whether a geom is in the scene.
+    /// Returns true if a geom is in the scene.
     pub fn is_shown(&self, geom: usize) -> bool {
         self.data.model().geom_group()[geom] != group::HIDDEN
     }

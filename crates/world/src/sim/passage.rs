@@ -21,7 +21,7 @@ pub fn eye(config: &WorldConfig, pane: &HungPane, body: Pose) -> Pose {
     }
 }
 
-/// Whether pictures of a look through a pane are flipped.
+/// Returns true if pictures of a look through a pane are flipped.
 pub const fn is_flipped(pane: &HungPane) -> bool {
     !matches!(pane.kind, PaneKind::Window)
 }

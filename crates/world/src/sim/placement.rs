@@ -72,7 +72,7 @@ pub struct DoesNotFit {
     pub help: String,
 }
 
-/// Why an experiment does not fit into a room, found by drawing a study of it; `None` where it fits.
+/// The reason why an experiment does not fit into a room, found by drawing a study of it; `None` where it fits.
 pub fn crowded(config: &WorldConfig, experiment: Experiment) -> Option<DoesNotFit> {
     let world = config.of(experiment);
     let widest = world.room.size - 2.0 * world.placement.wall_margin;
@@ -309,7 +309,7 @@ impl Drawing<'_> {
     }
 }
 
-/// Whether any of the mirror is within the field of view, whatever stands before it.
+/// Returns true if any of the mirror is within the field of view, whatever stands before it.
 pub(super) fn is_in_view(config: &WorldConfig, mirror: MirrorPlace, pose: Pose) -> bool {
     const POINTS: i32 = 64;
     // Towards the edge of the view, so that a mirror that almost shows counts.

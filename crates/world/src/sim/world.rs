@@ -41,7 +41,6 @@ pub struct World {
     hand: VecDeque<[i32; 3]>,
     stage: Stage,
     beyond: Vec<Stage>,
-    /// What every pixel of the view shows, once somebody has asked.
     labels: OnceCell<LabelImage>,
 }
 
@@ -105,7 +104,7 @@ impl World {
         self.doubles[pane].as_ref().map(|double| double.figure)
     }
 
-    /// Whether the own body wears a mark at some step.
+    /// Returns true if the own body wears a mark at some step.
     pub fn has_own_mark(&self) -> bool {
         self.scene.marks.iter().any(|mark| mark.wearer == 0)
     }
@@ -141,7 +140,7 @@ impl World {
         i32::try_from(place.distance_mm(*self.hand.back()?)).ok()
     }
 
-    /// Whether the hand has reached the mark.
+    /// Returns true if the hand has reached the mark.
     pub fn is_reached(&self) -> bool {
         Place::of(&self.scene, &self.config)
             .zip(self.hand.back())
@@ -153,7 +152,6 @@ impl World {
         self.hand_back(0)
     }
 
-    /// Where the hand was so many steps ago; before there is such a past, at the start.
     fn hand_back(&self, steps: u32) -> Option<[f64; 3]> {
         let at = self.hand.len().saturating_sub(1 + steps as usize);
         Some(Place::of(&self.scene, &self.config)?.center(*self.hand.get(at)?))
@@ -279,7 +277,6 @@ impl World {
         }
     }
 
-    /// What a look sees of the bodies. Those that a pane does not show are hidden on its stage.
     fn moment(&self, look: Look) -> Moment {
         let (figures, t, beyond, late) = match look {
             Look::Direct => (self.figures(), self.t, None, 0),

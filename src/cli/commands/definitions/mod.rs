@@ -69,7 +69,7 @@ pub enum Action {
 /// The answer of `check` for a program.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct CheckAnswer {
-    /// Whether the definitions have no fault.
+    /// True if the definitions have no fault.
     pub ok: bool,
     /// The hash of the resolved definitions; null with faults.
     pub hash: Option<String>,

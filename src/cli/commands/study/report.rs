@@ -91,7 +91,7 @@ impl ReportArgs {
         if !self.no_figures {
             output::say(&format!("open {}", self.out.join("report.html").display()));
         }
-        output::say("next: `mirrorstats stats` with the same traces tells what these numbers can bear");
+        output::say("next: `mirrorstats stats` tests these differences");
         Ok(Outcome::Done)
     }
 }

@@ -87,7 +87,6 @@ impl ScoreArgs {
         self.output.as_ref().map_or(Ok(()), |path| output::check_target(path, read))
     }
 
-    /// What Spark is to compute, of files of this machine or of URIs that it alone can read.
     fn spark_job(&self) -> Result<SparkJob, Failure> {
         let cluster = self.engine.cluster();
         if are_uris(&self.traces.traces)? {

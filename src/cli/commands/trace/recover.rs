@@ -46,7 +46,7 @@ pub struct RecoverAnswer {
     pub episodes: usize,
     /// Their rows.
     pub steps: usize,
-    /// Whether a trace was written; not so without an episode.
+    /// True if a trace was written; not so without an episode.
     pub written: bool,
     /// What is lost.
     pub losses: Losses,

@@ -161,7 +161,6 @@ impl RecordArgs {
         self.print_list(&answers)
     }
 
-    /// Prints one answer, or the list of a study or of several models.
     fn print_list<T: Serialize>(&self, answers: &[T]) -> Result<(), Failure> {
         match answers {
             all if self.is_list() => output::print_json(&all).map(drop),
@@ -275,7 +274,6 @@ impl RecordArgs {
         Ok(Plan { experiments, seeds: self.seeds, runs: self.runs, repeats: self.repeats, shard: self.shard })
     }
 
-    /// What recording would come to.
     fn forecast(&self) -> Result<ForecastAnswer, Failure> {
         let config = &configured(self.config.as_ref())?;
         let plan = &self.planned(config)?;
@@ -376,7 +374,7 @@ impl RecordArgs {
 pub struct Recorded {
     /// What became of the episodes.
     pub answer: RecordAnswer,
-    /// Why the agent could not go on, if it could not.
+    /// The reason why the agent could not go on, if it could not.
     pub gave_up: Option<String>,
     lost_list: PathBuf,
     elapsed: Duration,
@@ -412,7 +410,6 @@ fn unrecorded(
     Ok(todo)
 }
 
-/// The planned episodes without those to do.
 fn others(planned: &[Key], todo: &[Key]) -> Vec<Key> {
     let todo: BTreeSet<&Key> = todo.iter().collect();
     planned.iter().copied().filter(|key| !todo.contains(key)).collect()

@@ -30,7 +30,7 @@ pub struct FolderFiles<'a> {
     pub old: &'a dyn Fn(&Path) -> Vec<PathBuf>,
 }
 
-/// Whether a folder has files of both sides, because a replacement in place was broken off.
+/// Returns true if a folder has files of both sides, because a replacement in place was broken off.
 pub fn is_unfinished(folder: &Path) -> bool {
     folder.join(NOTE).is_file()
 }
@@ -41,7 +41,7 @@ pub fn is_unfinished(folder: &Path) -> bool {
 pub struct FolderError {
     /// Where.
     pub path: PathBuf,
-    /// Why.
+    /// The reason.
     pub source: io::Error,
 }
 

@@ -53,9 +53,6 @@ impl FigureFormat {
     }
 
     /// The format that the ending of `path` asks for, in any case; SVG where there is no ending.
-    ///
-    /// # Errors
-    /// Any other ending.
     pub fn of(path: &Path) -> Result<Self, UnknownEnding> {
         let Some(ending) = path.extension().and_then(OsStr::to_str) else { return Ok(Self::Svg) };
         let named = Self::ALL.iter().copied().find(|format| format.ending().eq_ignore_ascii_case(ending));
@@ -63,9 +60,6 @@ impl FigureFormat {
     }
 
     /// The figure as bytes of this format.
-    ///
-    /// # Errors
-    /// When a picture has no room in memory or is too large for a page.
     pub fn encode(self, figure: &Figure) -> Result<Vec<u8>, EncodeError> {
         match self {
             Self::Svg => Ok(figure.svg().into_bytes()),

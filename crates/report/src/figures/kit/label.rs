@@ -36,7 +36,6 @@ pub fn cut(text: &str, room: f64, lettering: Lettering) -> String {
     }
 }
 
-/// How many of the first letters fit into `room` px.
 fn within(letters: impl Iterator<Item = char>, room: f64, lettering: Lettering) -> usize {
     let mut taken = 0.0;
     let fits = |letter: &char| {

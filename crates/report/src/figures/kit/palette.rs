@@ -96,7 +96,7 @@ pub struct ModelStyle {
     pub color: Rgb,
     /// The shape of its marker.
     pub marker: Shape,
-    /// Whether the marker is an outline.
+    /// True if the marker is an outline.
     #[serde(default)]
     pub hollow: bool,
     /// The dash of its line.

@@ -13,7 +13,6 @@ pub struct Figure {
 }
 
 impl Figure {
-    /// What is on `sheet` down to `height` px; `title` and `caption` are for those who do not see it.
     pub(in crate::figures) fn new(sheet: Sheet, height: f64, title: &str, caption: impl Into<String>) -> Self {
         let caption = caption.into();
         Self { drawing: sheet.finish(height, title, &caption), caption }
@@ -40,18 +39,12 @@ impl Figure {
     }
 
     /// The picture as PNG.
-    ///
-    /// # Errors
-    /// When there is no room for the pixels.
     #[cfg(feature = "raster")]
     pub fn png(&self) -> Result<Vec<u8>, ConvertError> {
         convert::png(&convert::tree(&self.inline_svg())?)
     }
 
     /// The picture as a PDF of one page.
-    ///
-    /// # Errors
-    /// When the page is too large for a PDF.
     #[cfg(feature = "raster")]
     pub fn pdf(&self) -> Result<Vec<u8>, ConvertError> {
         convert::pdf(&convert::tree(&self.inline_svg())?)

@@ -38,7 +38,7 @@ pub struct GateOptions {
     pub margin: f64,
     /// One minus the level of every verdict.
     pub confidence: f64,
-    /// Whether settings that differ do not matter.
+    /// True if settings that differ do not matter.
     pub pool: bool,
 }
 
@@ -135,9 +135,6 @@ struct Tried {
 
 impl Gate {
     /// The verdict on every cell that either side has.
-    ///
-    /// # Errors
-    /// Sums of squares beyond 128 bits.
     pub fn of([base, new]: [&EpisodeTable; 2], design: Design, options: &GateOptions) -> Result<Self, MomentOverflow> {
         let sides = Sides::of(base, new);
         let barrier = sides.barrier().filter(|_| !options.pool);

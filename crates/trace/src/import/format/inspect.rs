@@ -46,7 +46,6 @@ fn read_archive(file: File, rows: &mut Rows<'_>) -> Result<(), ImportError> {
     Ok(())
 }
 
-/// A sample whose parts are members below one folder, each with the number of its first item.
 fn chunked(archive: &mut EvalArchive, folder: &str) -> Result<Map<String, Value>, String> {
     let mut sample: Map<String, Value> = archive.json(&format!("{folder}sample.json"))?;
     let metadata = format!("{folder}metadata.json");
@@ -212,7 +211,6 @@ fn scores(scores: &Value, rows: &mut Rows<'_>) -> Vec<(String, Value)> {
     columns
 }
 
-/// A score as Inspect counts it.
 fn number(value: &Value) -> Option<f64> {
     match value {
         Value::Bool(value) => Some(f64::from(u8::from(*value))),
@@ -226,7 +224,6 @@ fn number(value: &Value) -> Option<f64> {
     }
 }
 
-/// Puts texts in the place of references to them, by hash or by position.
 fn resolve(value: &mut Value, attachments: &Value) {
     match value {
         Value::String(text) => {

@@ -18,7 +18,6 @@ pub(super) fn from_slice<T: DeserializeOwned>(bytes: &[u8]) -> serde_json::Resul
 /// Gives `null` for `NaN`, `Infinity` and `-Infinity` outside of texts.
 pub(super) struct WithoutNan<R> {
     bytes: io::Bytes<BufReader<R>>,
-    /// What is still to be given; the next byte is its last.
     pending: Vec<u8>,
     in_text: bool,
     escaped: bool,

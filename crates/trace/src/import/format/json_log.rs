@@ -48,7 +48,6 @@ impl<'de> Visitor<'de> for &mut JsonLog<'_, '_> {
         f.write_str(if self.log.is_some() { "a list of samples" } else { "the object of a log" })
     }
 
-    /// No samples.
     fn visit_unit<E>(self) -> Result<(), E> {
         Ok(())
     }

@@ -79,7 +79,6 @@ fn identity(episode: &Value, prefix: &str, t: i64) -> Map<String, Value> {
     columns.map(|(name, value)| (name.to_owned(), value)).into_iter().collect()
 }
 
-/// The Euclidean distance of two actions; none if they are not lists of the same length.
 fn distance(a: &Value, b: &Value) -> Option<f64> {
     let (a, b) = (a.as_array()?, b.as_array()?);
     let squares = a.iter().zip(b).map(|(a, b)| Some((a.as_f64()? - b.as_f64()?).powi(2)));

@@ -78,7 +78,6 @@ impl Format {
         }
     }
 
-    /// What one step of a file is called in messages.
     pub(super) const fn noun(self) -> &'static str {
         if matches!(self, Self::JsonLines) { "line" } else { "row" }
     }
@@ -98,7 +97,6 @@ impl Format {
 
 /// Where rows go: through a mapping into a temporary file of lines.
 pub(super) struct Rows<'m> {
-    /// The file of the user, as messages name it.
     pub(super) file: String,
     /// The first digits of its hash: of files that number their episodes from 0, they keep the ids apart.
     pub(super) digits: String,
@@ -124,7 +122,6 @@ impl<'m> Rows<'m> {
         self.add(&row)
     }
 
-    /// A line of JSON Lines; false at the end. What is not an object stays as it is, for the import to refuse.
     pub(super) fn add_line(&mut self, line: &[u8]) -> Result<bool, ImportError> {
         let bytes = line.strip_prefix(BYTE_ORDER_MARK).unwrap_or(line);
         let object = line::members(bytes, true).ok().and_then(|_| serde_json::from_slice(bytes.trim_ascii()).ok());
@@ -135,7 +132,6 @@ impl<'m> Rows<'m> {
         Ok(!line.is_empty())
     }
 
-    /// A fault of the whole file, or of a part of it.
     pub(super) fn fault(&self, part: &str, expected: &str, found: impl Into<String>, help: &str) -> ImportError {
         let file = if part.is_empty() { self.file.clone() } else { format!("{}, {part}", self.file) };
         Fault { file, ..Fault::new(expected, found, help) }.into()

@@ -45,7 +45,6 @@ fn sum_fault(file: &str, declared: i64, groups: &[RowGroupMetaData]) -> Option<F
     Some(Finding::new(Code::CorruptFooter, file, format!("row groups of {declared} rows together"), found))
 }
 
-/// What is wrong with a row group; `ranges` gets where its columns lie.
 fn group_fault(file: &str, bytes: u64, group: &RowGroupMetaData, ranges: &mut Vec<(u64, u64)>) -> Option<Finding> {
     let rows = group.num_rows();
     let mut stored = 0_u64;

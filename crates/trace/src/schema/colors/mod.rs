@@ -42,7 +42,7 @@ pub fn column(name: &str) -> Option<ColorColumn> {
 }
 
 impl ColorColumn {
-    /// Whether the column may hold this text. The empty text is left to the rule about names.
+    /// Returns true if the column may hold this text. The empty text is left to the rule about names.
     pub fn may_hold(self, text: &str, palette: Option<&Palette>) -> bool {
         if text.is_empty() || self.word == Some(text) {
             return true;

@@ -55,7 +55,7 @@ pub fn normal(name: &str) -> String {
     words.join(" ").to_lowercase()
 }
 
-/// Whether a character does not show, as [`STRAY`] lists them for engines that match patterns.
+/// Returns true if a character does not show, as [`STRAY`] lists them for engines that match patterns.
 fn hides(c: char) -> bool {
     let is_mark = matches!(c, '\u{ad}' | '\u{61c}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}');
     c.is_control() || is_mark || matches!(c, '\u{2060}'..='\u{206f}' | '\u{feff}' | '\u{e0000}'..='\u{e007f}')

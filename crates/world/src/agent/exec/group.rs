@@ -18,7 +18,6 @@ pub struct Groups(Mutex<Running>);
 
 #[derive(Debug, Default)]
 struct Running {
-    /// The mark of each, by the id of its group.
     marks: BTreeMap<i32, String>,
     started: u64,
     is_over: bool,

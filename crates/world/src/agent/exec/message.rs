@@ -68,7 +68,7 @@ pub struct ObservationMessage {
     pub position: Position,
     /// Where the body faces: degrees, counter-clockwise from +x.
     pub orientation: f32,
-    /// Whether the last move was blocked.
+    /// True if the last move was blocked.
     pub wall_warning: bool,
     /// What was done in the step before: w, s, a, d; null at t = 1 and after a reply that could not be used.
     pub last_action: Option<String>,

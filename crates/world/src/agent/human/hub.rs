@@ -20,7 +20,7 @@ pub struct Question {
     pub user: String,
     /// The step, from 1.
     pub t: i32,
-    /// Whether it is of a practice episode.
+    /// True if it is of a practice episode.
     pub is_practice: bool,
     /// The keys of a reply.
     pub keys: Vec<&'static str>,

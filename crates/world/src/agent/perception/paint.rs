@@ -58,7 +58,6 @@ fn nearest(pixel: [f64; 3]) -> u8 {
     best.1
 }
 
-/// How far a pixel is from a paint under the light that suits it best.
 fn unexplained(pixel: [f64; 3], paint: [f64; 3]) -> f64 {
     let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     let light = (dot(pixel, paint) / dot(paint, paint)).clamp(LIGHT.0, LIGHT.1);

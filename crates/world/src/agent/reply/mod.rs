@@ -49,7 +49,7 @@ pub struct Reading {
     pub status: Status,
     /// What had to be repaired, in order; empty unless `Repaired`.
     pub repairs: Vec<Repair>,
-    /// Why there is no decision, for people; `None` where there is one.
+    /// The reason why there is no decision, for people; `None` where there is one.
     pub fault: Option<String>,
     pub action: Option<Action>,
     /// The cube: a colour or `none`.

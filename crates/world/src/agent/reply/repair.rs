@@ -297,7 +297,6 @@ enum Piece<'a> {
 struct Pieces<'a> {
     text: &'a str,
     at: usize,
-    /// What stood last outside of strings, white space apart: a string in single quotes begins after `{`, `[`, `,` or `:` only.
     before: char,
 }
 

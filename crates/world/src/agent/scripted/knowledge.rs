@@ -110,7 +110,7 @@ impl Knowledge {
             .min_by(|one, other| one.nearest.total_cmp(&other.nearest))
     }
 
-    /// Whether the axis of a body may be at a place, as far as walls go.
+    /// Returns true if the axis of a body may be at a place, as far as walls go.
     pub fn is_open(&self, place: Place) -> bool {
         self.room.holds(place, GIRTH)
     }

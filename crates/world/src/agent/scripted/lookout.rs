@@ -51,7 +51,7 @@ impl Lookouts {
         }
     }
 
-    /// Whether everything has been seen.
+    /// Returns true if everything has been seen.
     pub fn are_over(&self) -> bool {
         self.done.len() >= LOOKOUTS
     }

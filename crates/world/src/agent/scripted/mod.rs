@@ -87,7 +87,7 @@ impl Scripted {
         }
     }
 
-    /// Whether it plays where a hand is to reach a mark.
+    /// Returns true if it plays where a hand is to reach a mark.
     pub const fn has_hand(self) -> bool {
         matches!(self, Self::Oracle | Self::Mimic | Self::Random | Self::Frozen)
     }
@@ -156,7 +156,6 @@ impl crate::agent::Player for Renamed {
     }
 }
 
-/// What traces say of a script. The first version is not written: traces were recorded before there was a second.
 fn described(name: &str, version: u32) -> serde_json::Value {
     let mut description = serde_json::json!({ "scripted": name });
     if version > 1 {

@@ -9,7 +9,7 @@ use super::knowledge::Knowledge;
 pub struct Belief {
     /// The colour that it claims; `None` is `unknown`.
     pub claim: Option<Color>,
-    /// Whether it acts on the claim.
+    /// True if it acts on the claim.
     pub settled: bool,
 }
 

@@ -106,7 +106,7 @@ impl Room {
         self.walls[side as usize]
     }
 
-    /// Whether a place is in the room, `margin` metres from the walls that are known.
+    /// Returns true if a place is in the room, `margin` metres from the walls that are known.
     pub fn holds(&self, place: Place, margin: f64) -> bool {
         Side::ALL.into_iter().all(|side| self.wall(side).is_none_or(|wall| side.out(place) <= wall - margin))
     }
@@ -127,7 +127,7 @@ impl Room {
         Side::ALL.into_iter().filter(is_mirror)
     }
 
-    /// Whether any wall is one.
+    /// Returns true if any wall is one.
     pub fn has_mirror(&self) -> bool {
         self.mirrors().next().is_some()
     }

@@ -21,7 +21,7 @@ pub struct Obstacle {
 
 /// Where one may walk.
 pub struct Ground<'a> {
-    /// Whether the body's axis may be at a place, as far as walls go.
+    /// True if the body's axis may be at a place, as far as walls go.
     pub is_open: &'a dyn Fn(Place) -> bool,
     pub obstacles: &'a [Obstacle],
     /// How far one step leads, m.
@@ -107,7 +107,7 @@ pub fn after(pose: Pose, action: Action, step: f64) -> Pose {
     }
 }
 
-/// Whether a step may end at `to`. Whoever is too near to something already may go away from it.
+/// Returns true if a step may end at `to`. Whoever is too near to something already may go away from it.
 fn is_free(ground: &Ground<'_>, from: Place, to: Place) -> bool {
     let clear = |obstacle: &Obstacle| {
         let (before, behind) = (obstacle.place.distance(from), obstacle.place.distance(to));

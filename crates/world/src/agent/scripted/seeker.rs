@@ -49,7 +49,7 @@ pub struct Seeker<C> {
     chance: Chance,
     looked_from: Vec<Place>,
     guess: Option<Color>,
-    /// Whether it had made up its mind before this step.
+    /// True if it had made up its mind before this step.
     has_claimed: bool,
     /// Turns since it last changed its place.
     turns: u32,

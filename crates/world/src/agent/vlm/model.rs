@@ -62,7 +62,6 @@ impl Learned {
         self.completion_tokens += f64::from(completion);
     }
 
-    /// What these tokens cost at most: each price is bounded by the whole cost over the tokens of its kind.
     #[expect(clippy::cast_precision_loss, reason = "nobody pays for 2^53 tokens")]
     fn cost_at_most(self, [prompt, completion]: [u64; 2]) -> Option<f64> {
         let is_known = self.prompt_tokens > 0.0 && self.completion_tokens > 0.0;
@@ -86,7 +85,7 @@ pub struct Vlm {
     is_known: AtomicBool,
     first: tokio::sync::Mutex<()>,
     learned: Mutex<Learned>,
-    /// Whether the model has answered a request of this recording, so that one that is rejected is wrong by itself.
+    /// True if the model has answered a request of this recording, so that one that is rejected is wrong by itself.
     pub(super) has_answered: AtomicBool,
 }
 
@@ -131,12 +130,11 @@ impl Vlm {
         &self.choice
     }
 
-    /// Why no further request makes sense: a refused key, a limit that is reached, a full disk.
+    /// The reason why no further request makes sense: a refused key, a limit that is reached, a full disk.
     pub fn stopped(&self) -> Option<&str> {
         self.stop.get().map(|lost| lost.cause.as_str())
     }
 
-    /// What an episode is lost to that wants to send a request after the end.
     pub(super) fn end(&self) -> Option<Lost> {
         self.stop.get().cloned()
     }
@@ -181,7 +179,7 @@ impl Vlm {
         }
     }
 
-    /// Whether the provider can be reached; a cassette needs none.
+    /// Returns true if the provider can be reached; a cassette needs none.
     pub fn connect(&self) -> Result<(), Unreachable> {
         self.provider.as_ref().map_or(Ok(()), Provider::connect)
     }
@@ -235,7 +233,6 @@ impl Vlm {
         [bytes as u64 + 2 * frame, self.max_output_tokens().into()]
     }
 
-    /// What these tokens of a request and a reply cost, US dollars: by the prices, else at most by what answers have cost.
     pub(super) fn cost_of(&self, [prompt, completion]: [u64; 2]) -> Option<f64> {
         let by_price = self.choice.model.prices.cost_of(prompt, completion);
         by_price.or_else(|| self.learned().cost_at_most([prompt, completion]))

@@ -213,7 +213,7 @@ pub struct Choice {
     pub name: String,
     pub model: Model,
     pub backend: Backend,
-    /// Whether a file of models has it, and knows its prices and parameters.
+    /// True if a file of models has it, and knows its prices and parameters.
     pub is_known: bool,
 }
 
@@ -403,7 +403,7 @@ fn backend_of(id: &str) -> Option<&'static str> {
     }
 }
 
-/// Whether this may name an environment variable: letters, digits and `_`, not a digit first.
+/// Returns true if this may name an environment variable: letters, digits and `_`, not a digit first.
 fn is_variable(name: &str) -> bool {
     let is_word = name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
     is_word && !name.is_empty() && !name.starts_with(|first: char| first.is_ascii_digit())

@@ -43,7 +43,7 @@ pub struct ProbeAnswer {
     pub latency_ms: Option<u64>,
     /// Requests that went out.
     pub requests: u32,
-    /// Why there is no answer, and what to do; null if there is one.
+    /// The reason why there is no answer, and what to do; null if there is one.
     pub fault: Option<String>,
 }
 
@@ -54,14 +54,14 @@ pub struct ProbedParameter {
     pub name: String,
     /// What was sent.
     pub value: Value,
-    /// Whether the provider takes it; null without an answer.
+    /// True if the provider takes it; null without an answer.
     pub taken: Option<bool>,
     /// The line of a file for --models that mends it; null unless it was refused.
     pub line: Option<String>,
 }
 
 impl ProbeAnswer {
-    /// Whether a recording with these settings would work.
+    /// Returns true if a recording with these settings would work.
     pub fn is_good(&self) -> bool {
         self.fault.is_none() && self.is_model && self.parameters.iter().all(|parameter| parameter.taken == Some(true))
     }
@@ -145,7 +145,6 @@ pub async fn probe(mut choice: Choice, provider: &Provider, experiment: Experime
     }
 }
 
-/// Takes the parameter that the provider refuses out of the request.
 fn left_out(failure: &Failure, choice: &mut Choice) -> Option<&'static Mend> {
     let mend = refused(&failure.detail).filter(|_| !failure.kind.may_pass())?;
     let before = choice.clone();

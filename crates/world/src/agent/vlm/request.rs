@@ -55,7 +55,6 @@ impl Choice {
         body
     }
 
-    /// What an answer cost, US dollars: as the provider says, else by its tokens.
     pub(super) fn cost_usd(&self, answer: &Answer) -> Option<f64> {
         answer.cost_usd.or_else(|| self.model.prices.cost_usd(answer))
     }

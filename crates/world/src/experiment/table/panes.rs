@@ -21,7 +21,7 @@ pub(super) fn panes(tables: &[MirrorTable], list: &At<'_>, faults: &mut Vec<Faul
     panes
 }
 
-/// Why a mirror cannot be on a wall beside those before it.
+/// The reason why a mirror cannot be on a wall beside those before it.
 fn quarrel(before: &[Pane], wall: Wall) -> Option<&'static str> {
     let first = before.first()?.wall.quarter();
     let across = first.map(|quarter| (quarter + 2) % 4);

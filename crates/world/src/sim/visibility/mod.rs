@@ -35,7 +35,7 @@ impl World {
         take(self)
     }
 
-    /// Whether there is mirror evidence in view, by the configured threshold.
+    /// Returns true if there is mirror evidence in view, by the configured threshold.
     pub const fn is_mirror_visible(&self, visibility: &Visibility) -> bool {
         visibility.self_px >= self.config().evidence.mirror_self_px
     }

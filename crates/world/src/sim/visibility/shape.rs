@@ -127,7 +127,6 @@ fn pixels(from: f64, to: f64, count: usize) -> Option<[usize; 2]> {
     (first < last).then_some([first, last])
 }
 
-/// Where a ray first meets a capsule about `axis`; `offset` is from its centre to where the ray starts.
 fn capsule(offset: Vector, ray: Vector, axis: Vector, half: f64, radius: f64) -> Option<f64> {
     let [offset_along, ray_along] = [dot(offset, axis), dot(ray, axis)];
     let [offset_ray, ray_ray] = [dot(offset, ray), dot(ray, ray)];
@@ -166,7 +165,6 @@ fn capsule(offset: Vector, ray: Vector, axis: Vector, half: f64, radius: f64) ->
     (nearest < f64::INFINITY).then_some(nearest)
 }
 
-/// Where a ray first meets a box; `offset` is from its centre to where the ray starts.
 fn cuboid(offset: Vector, ray: Vector, axes: &[Vector; 3], halves: Vector) -> Option<f64> {
     let (mut enters, mut leaves) = (f64::NEG_INFINITY, f64::INFINITY);
     for (axis, half) in axes.iter().zip(halves) {

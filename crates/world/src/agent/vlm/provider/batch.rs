@@ -36,7 +36,6 @@ type Outcome = Result<Received, Failure>;
 #[derive(Debug, Serialize, Deserialize)]
 struct Note {
     batch: String,
-    /// The ids of its requests.
     requests: Vec<String>,
 }
 
@@ -56,16 +55,11 @@ struct Inner {
 
 #[derive(Debug, Default)]
 struct State {
-    /// Requests that no batch has yet.
     queue: Vec<(String, Value)>,
     is_gathering: bool,
-    /// Steps that wait for an outcome, by the id of their request.
     waiting: HashMap<String, oneshot::Sender<Outcome>>,
-    /// The batch of each request that was submitted by an earlier start.
     earlier: HashMap<String, String>,
-    /// Requests of batches that are followed.
     under_way: HashSet<String>,
-    /// Outcomes that no step has asked for yet.
     kept: HashMap<String, Outcome>,
 }
 
@@ -75,7 +69,6 @@ impl Batches {
         Self(Arc::new(Inner { client, url, secret, patience, notes, state }))
     }
 
-    /// Notes batches in this file, and knows those of earlier starts that are in it.
     pub(super) fn share(&self, path: &Path) -> io::Result<()> {
         make_folder(folder_of(path))?;
         let lines = match input::lines(path, LONGEST_LINE) {
@@ -92,7 +85,6 @@ impl Batches {
         Ok(())
     }
 
-    /// The outcome of a request, in whatever batch it goes.
     pub(super) async fn ask(&self, id: &str, body: &Value) -> Outcome {
         let (sender, outcome) = oneshot::channel();
         if let Some(outcome) = self.0.enqueue(id, body, sender) {
@@ -124,7 +116,6 @@ impl Inner {
         None
     }
 
-    /// Submits what waits, once nothing more has come for a while.
     async fn gather(self: Arc<Self>) {
         let mut before = 0;
         loop {
@@ -164,7 +155,6 @@ impl Inner {
         }
     }
 
-    /// Waits for the end of a batch, and gives its outcomes to the steps that wait for them.
     async fn follow(self: Arc<Self>, batch: String, ids: Vec<String>) {
         let (start, mut wait) = (Instant::now(), self.patience.first_delay);
         let results = loop {
@@ -213,7 +203,6 @@ impl Inner {
         if status.is_success() { Ok(text) } else { Err(failed(status, after, &text)) }
     }
 
-    /// The request that a line of results is of, and its outcome.
     fn outcome(&self, line: &str, latency: Duration) -> Option<(String, Outcome)> {
         let line: Value = serde_json::from_str(line).ok()?;
         let result = &line["result"];

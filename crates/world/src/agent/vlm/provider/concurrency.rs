@@ -19,7 +19,6 @@ use crate::agent::vlm::spending::shared_file::SharedFile;
 pub struct Pace {
     permits: Semaphore,
     state: Mutex<State>,
-    /// The time between two requests; zero if the user says nothing.
     interval: Duration,
     shared: OnceLock<SharedFile>,
 }
@@ -38,9 +37,7 @@ struct State {
 /// When an account takes requests, as times since 1970.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 struct Gate {
-    /// A rate limit is renewed then.
     not_before: Duration,
-    /// The next request of the user's rate is due then.
     next: Duration,
 }
 
@@ -95,7 +92,6 @@ impl Pace {
         self.gate(|gate| gate.not_before = gate.not_before.max(now().saturating_add(wait)));
     }
 
-    /// Looks at when requests may go out, and changes it for all processes.
     fn gate<T>(&self, change: impl FnOnce(&mut Gate) -> T) -> T {
         let mut state = self.state();
         let Some(file) = self.shared.get() else { return change(&mut state.gate) };

@@ -58,19 +58,18 @@ impl FailureKind {
         }
     }
 
-    /// Whether another attempt may do better.
+    /// Returns true if another attempt may do better.
     pub const fn may_pass(self) -> bool {
         self.is_busy() || matches!(self, Self::Server | Self::Timeout)
     }
 
-    /// Whether the provider only puts the request off.
+    /// Returns true if the provider only puts the request off.
     pub const fn is_busy(self) -> bool {
         matches!(self, Self::RateLimited | Self::Overloaded)
     }
 }
 
 impl Failure {
-    /// What happened to a request of this model, and what helps.
     pub(in crate::agent::vlm) fn explained(&self, model: &str) -> String {
         let Self { kind, detail, .. } = self;
         match kind {
@@ -175,7 +174,7 @@ fn takes_no_images(body: &str) -> bool {
     NO_IMAGES.iter().any(|words| said.contains(words))
 }
 
-/// Whether too many requests means that there is no money left, which waiting does not mend.
+/// Returns true if too many requests means that there is no money left, which waiting does not mend.
 fn is_out_of_credit(body: &str) -> bool {
     const CODE: &str = "insufficient_quota";
     let error = serde_json::from_str::<Value>(body).map(|mut body| body["error"].take()).unwrap_or_default();

@@ -266,7 +266,6 @@ impl Provider {
     }
 }
 
-/// An answer and its body without the key.
 fn received(secret: Option<&Secret>, answer: Answer, body: String, latency: Duration) -> Received {
     let kept = |text: String| match secret {
         Some(secret) => secret.without_in_answer(&text),
@@ -276,7 +275,6 @@ fn received(secret: Option<&Secret>, answer: Answer, body: String, latency: Dura
     Received { answer, body: kept(body), latency }
 }
 
-/// The whole body of a response of at most so many bytes.
 async fn whole(mut response: Response, most: usize) -> Result<Vec<u8>, Failure> {
     let mut bytes = Vec::new();
     while let Some(chunk) = response.chunk().await.map_err(broken)? {

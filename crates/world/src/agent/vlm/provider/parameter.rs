@@ -8,9 +8,7 @@ use crate::agent::vlm::models::{Contract, Model, merge};
 
 /// A parameter that providers refuse.
 pub(in crate::agent::vlm) struct Mend {
-    /// The words by which they name it, lower case.
     words: &'static [&'static str],
-    /// Its key in a models' file.
     pub(in crate::agent::vlm) key: &'static str,
     parameter: &'static str,
     pub(in crate::agent::vlm) line: &'static str,
@@ -81,7 +79,6 @@ static MENDS: [Mend; 5] = [
     },
 ];
 
-/// The parameter that an error is about.
 pub(in crate::agent::vlm) fn refused(error: &str) -> Option<&'static Mend> {
     let said = error.to_lowercase().replace("\": \"", "\":\"");
     // What `param` names is meant, whatever else the message says.
@@ -90,7 +87,6 @@ pub(in crate::agent::vlm) fn refused(error: &str) -> Option<&'static Mend> {
     MENDS.iter().find(named).or_else(|| MENDS.iter().find(named_in))
 }
 
-/// What helps against an error about a parameter; empty for others.
 pub(in crate::agent::vlm) fn help(error: &str, model: &str) -> String {
     refused(error).map_or_else(String::new, |Mend { parameter, line, .. }| {
         format!("\n  help: the parameter is {parameter}; in the entry [model.\"{model}\"] of a file for --models:\n    {line}")

@@ -85,12 +85,10 @@ impl Account {
         Self { limits, state: Mutex::new(State { others, ..State::default() }), ..Self::default() }
     }
 
-    /// Whether money is limited.
     pub(in crate::agent::vlm) fn limits_cost(&self) -> bool {
         self.limits.cost_usd.is_some()
     }
 
-    /// Begins with what earlier starts of the run have spent.
     pub(in crate::agent::vlm) fn begin_with(&self, spent: Spend) {
         self.state().others.spend = spent;
     }
@@ -146,7 +144,6 @@ impl Account {
         Begun { account: Arc::clone(self), left: steps }
     }
 
-    /// What the request may cost; `None` while requests in flight decide.
     fn reserve_now(&self, state: &mut State, at_most_usd: Option<f64>) -> Result<Option<f64>, Reached> {
         let spend = state.spend();
         if let Some(limit) = self.limits.requests.filter(|limit| spend.requests >= *limit) {
@@ -298,7 +295,7 @@ mod tests {
         Arc::new(Account::new(limits, spent))
     }
 
-    /// Whether something is still waited for after a while.
+    /// Returns true if something is still waited for after a while.
     async fn waits<T>(work: impl Future<Output = T>) -> bool {
         timeout(Duration::from_millis(20), work).await.is_err()
     }

@@ -24,7 +24,6 @@ impl SharedFile {
         self.0
     }
 
-    /// Does this while no other process reads or writes the file.
     pub(in crate::agent::vlm) fn locked<T>(&self, work: impl FnOnce() -> T) -> T {
         let _ = self.0.lock();
         let done = work();

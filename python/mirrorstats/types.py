@@ -73,7 +73,6 @@ class _ChanceRow(TypedDict):
     p: float
     mid_p: float
     p_adjusted: float
-    p_tarone: float
     verdict: Literal["above", "below", "not_separated"]
 
 
@@ -140,9 +139,7 @@ class _Contrast(TypedDict):
     withheld: Optional[Withheld]
     p: Optional[float]
     mid_p: Optional[float]
-    p_least: Optional[float]
     p_adjusted: Optional[float]
-    p_tarone: Optional[float]
     separated: bool
 
 
@@ -150,6 +147,7 @@ class Contrast(_Contrast, total=False):
     """How much a model's mean differs between two experiments, by pairs where their scenes agree."""
 
     condition: Optional[str]
+    repeat_se: Optional[float]
     units: Optional[Units]
     losses: Optional[LossCases]
     incomparable: Optional[str]
@@ -576,15 +574,14 @@ class _PairTest(TypedDict):
     withheld: Optional[Withheld]
     p: Optional[float]
     mid_p: Optional[float]
-    p_least: Optional[float]
     p_adjusted: Optional[float]
-    p_tarone: Optional[float]
     separated: bool
 
 
 class PairTest(_PairTest, total=False):
     """One model against another."""
 
+    repeat_se: Optional[float]
     units: Optional[Units]
     losses: Optional[LossCases]
     incomparable: Optional[str]
@@ -787,7 +784,7 @@ if TYPE_CHECKING:
         @overload
         def __getitem__(self, key: Literal["verdict"], /) -> Literal["improved", "held", "cannot_say", "not_comparable", "regressed"]: ...
         @overload
-        def __getitem__(self, key: Literal["pooled"], /) -> list[str]: ...
+        def __getitem__(self, key: Literal["caveats"], /) -> list[str]: ...
         @overload
         def __getitem__(self, key: Literal["cells"], /) -> list[GateCell]: ...
         def __getitem__(self, key: str, /) -> Any: ...

@@ -43,6 +43,8 @@ fn the_library_promises_these_names_and_no_others() {
     Figure
     FigureFormat
     FigureName
+    FigureOptions
+    FigureWidth
     Flip
     Group
     KeyValue

@@ -32,6 +32,7 @@ mod quality;
 mod readme;
 #[cfg(all(feature = "polars", feature = "raster", feature = "sim", feature = "view"))]
 mod reference;
+#[cfg(all(feature = "polars", feature = "raster", feature = "sim", feature = "view"))]
 mod reference_files;
 mod refusals;
 #[cfg(unix)]

@@ -84,7 +84,6 @@ pub fn create(path: &Path) -> Result<NewFile, Failure> {
 }
 
 /// Makes a folder and those above it.
-#[cfg(feature = "sim")]
 pub fn make_folder(folder: &Path) -> Result<(), Failure> {
     replace::make_folder(folder).map_err(|error| {
         let words = "help: is there a file of that name, and is the folder above it writable?";

@@ -1,6 +1,7 @@
 //! CSV, Parquet of any shape, LeRobot and inspect-robots on their way in.
 
 use std::fs;
+#[cfg(feature = "polars")]
 use std::path::Path;
 
 use arrow::datatypes::{DataType, Field, Schema};
@@ -34,6 +35,7 @@ fn import<'a>(file: &'a str, more: &[&'a str]) -> Vec<&'a str> {
 }
 
 /// The rows of the trace with these columns, as CSV without the header.
+#[cfg(feature = "polars")]
 fn queried(at: &Path, columns: &str) -> Vec<String> {
     let sql = format!("select {columns} from steps order by episode_id, t");
     let asked = ["query", &sql, "x.parquet", "--definitions", "arms.toml", "--format", "csv"];

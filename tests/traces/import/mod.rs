@@ -1,6 +1,7 @@
 //! `mirrorstats import` at the process boundary: what becomes a trace, and that nothing else does.
 
 mod formats;
+#[cfg(feature = "polars")]
 mod inspect;
 mod palette;
 mod refusals;

@@ -10,7 +10,7 @@ use exact::replace;
 use study::ImportRequest;
 use trace::import::{Format, Mapping, Text};
 
-/// Make a trace of steps or logs of another harness, so that its episodes can be scored
+/// Make a trace of another harness's steps or logs
 ///
 /// One line or row is one step: its keys are columns of the schema, as `mirrorstats trace schema step` prints them. Other
 /// keys become columns of their own. Rows of an episode may be in any order and in several files. The trace holds every row

@@ -79,11 +79,16 @@ fn a_condition_is_a_column_of_traces_tables_and_figures() {
     let glimpses = fixture("glimpses.parquet").display().to_string();
     assert!(run(at, &["score", &glimpses]).done().starts_with("episode_id,model,experiment,seed,run,TSA,"));
     assert!(
-        run(at, &["score", "wide"]).done().starts_with("episode_id,model,experiment,seed,run,scene,fingerprint,TSA,")
+        run(at, &["score", "wide"])
+            .done()
+            .starts_with("episode_id,model,experiment,seed,run,scene,fingerprint,unusable_replies,TSA,")
     );
     // Older and newer traces together, and files of scores of either.
     let both = run(at, &["score", &glimpses, "narrow"]).done();
-    assert!(both.starts_with("episode_id,model,experiment,seed,run,condition,scene,fingerprint,TSA,"), "{both}");
+    assert!(
+        both.starts_with("episode_id,model,experiment,seed,run,condition,scene,fingerprint,unusable_replies,TSA,"),
+        "{both}"
+    );
     run(at, &["score", &glimpses, "-o", "old.csv"]).done();
     run(at, &["score", "narrow", "-o", "new.csv"]).done();
     assert_eq!(run(at, &["score", "old.csv", "new.csv"]).done().lines().count(), both.lines().count());

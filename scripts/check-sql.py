@@ -17,9 +17,11 @@ def run(*arguments):
 
 
 def native(program, folder, extra):
-    rows = csv.reader(io.StringIO(run(program, "score", folder, *extra)))
-    next(rows)
-    return [(*row[:3], int(row[3]), int(row[4]), *(int(v) if v else None for v in row[5:])) for row in rows]
+    header, *rows = csv.reader(io.StringIO(run(program, "score", folder, *extra)))
+    # Labels come before the metrics, what the traces declare behind them.
+    labels = {"scene", "fingerprint", "unusable_replies", "mirrorstats.declared"}
+    metrics = [at for at, name in enumerate(header) if at >= 5 and name not in labels]
+    return [(*row[:3], int(row[3]), int(row[4]), *(int(row[at]) if row[at] else None for at in metrics)) for row in rows]
 
 
 def independent(program, dialect, folder, extra):

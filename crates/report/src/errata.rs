@@ -85,10 +85,9 @@ impl Errata {
         let source = Source { name: path.display().to_string(), text };
         Ok(toml_spec::read_source(source, "a list of errata", |errata: &Self, at, faults| {
             for (n, erratum) in errata.erratum.iter().enumerate() {
-                if erratum.reason.trim().is_empty() {
-                    let reason = at.key("erratum").item(n).key("reason");
-                    faults.push(reason.fault("expected a reason, found none").help("say why the publication errs"));
-                }
+                let reason = at.key("erratum").item(n).get("reason").filter(|_| erratum.reason.trim().is_empty());
+                let fault = reason.map(|reason| reason.fault("expected a reason, found none"));
+                faults.extend(fault.map(|fault| fault.help("say why the publication errs")));
             }
         })?)
     }

@@ -44,7 +44,7 @@ impl Limit {
         self.most.saturating_mul(factor())
     }
 
-    /// Returns true if so many are allowed.
+    /// Returns true if the limit allows this number.
     pub fn check(&self, found: u64) -> Result<(), Exceeded> {
         let most = self.most();
         if found > most { Err(Exceeded { what: self.what, most }) } else { Ok(()) }

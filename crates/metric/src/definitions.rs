@@ -13,7 +13,7 @@ use super::plan::{NodeId, Output, Plan};
 use exact::hash;
 use exact::ratio::Ratio;
 use exact::suggest::nearest;
-use toml_spec::{Fault, Faults, Place, Source, Written};
+use toml_spec::{Fault, Faults, Source, Written};
 
 /// Checked definitions.
 #[derive(Clone, Debug)]
@@ -256,20 +256,9 @@ fn experiment_faults(document: &Document) -> Vec<Fault> {
     for entry in document.experiments.values() {
         let chance = entry.chance.iter().map(|(name, (_, place))| (name, place));
         let reference = entry.reference.iter().map(|(name, (_, place))| (name, place));
-        faults.extend(chance.chain(reference).filter_map(|(name, place)| unknown_metric(document, name, place)));
+        faults.extend(chance.chain(reference).filter_map(|(name, place)| document.unknown_metric(name, place)));
     }
     faults
-}
-
-/// The fault of a name that is no metric of the document.
-pub(super) fn unknown_metric(document: &Document, name: &str, place: &Place) -> Option<Fault> {
-    let metrics = &document.metrics;
-    if metrics.contains_key(name) {
-        return None;
-    }
-    let near = nearest(name, metrics.keys().map(String::as_str));
-    let fault = Fault::new(place.clone(), format!("`{name}` is no metric of these definitions"));
-    Some(fault.help_if(near.map(|near| format!("did you mean `{near}`?"))))
 }
 
 /// A level of chance of a rate is a probability.

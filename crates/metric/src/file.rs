@@ -34,6 +34,7 @@ use crate::columns::Type;
 use exact::budget::Limit;
 use exact::hash;
 use exact::ratio::Ratio;
+use exact::suggest::nearest;
 use toml_spec::{At, Fault, Faults, FileKind, FileText, Part, Place, Source, Written};
 
 /// Definitions are written by hand, or by a program that spells out a family of metrics.
@@ -161,6 +162,16 @@ fn document(name: String, file: FileText) -> Result<Document, FileError> {
 }
 
 impl Document {
+    /// The fault of a name that is not a metric of the document.
+    pub(super) fn unknown_metric(&self, name: &str, place: &Place) -> Option<Fault> {
+        if self.metrics.contains_key(name) {
+            return None;
+        }
+        let near = nearest(name, self.metrics.keys().map(String::as_str));
+        let fault = Fault::new(place.clone(), format!("`{name}` is no metric of these definitions"));
+        Some(fault.help_if(near.map(|near| format!("did you mean `{near}`?"))))
+    }
+
     fn add(&mut self, at: &At<'_>, part: &Part, faults: &mut Vec<Fault>) {
         self.built_on.extend(part.built_in);
         let Some(file) = toml_spec::read::<DefinitionFile>(at, "a definition file", faults) else { return };

@@ -7,7 +7,6 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::catalog::{Kind, Metric};
-use super::definitions::unknown_metric;
 use super::file::{Document, MetricEntry};
 use toml_spec::{Fault, Place};
 
@@ -87,7 +86,7 @@ fn range(declared: Option<Measures>, range: Option<ValueRange>, unit: &str) -> V
 
 pub(super) fn relation_faults(document: &Document) -> Vec<Fault> {
     let names = document.metrics.values().flat_map(MetricEntry::relations);
-    names.filter_map(|(_, name, place)| unknown_metric(document, name, place)).collect()
+    names.filter_map(|(_, name, place)| document.unknown_metric(name, place)).collect()
 }
 
 pub(super) fn faults(document: &Document, kind: impl Fn(&str) -> Kind) -> Vec<Fault> {

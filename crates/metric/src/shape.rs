@@ -112,9 +112,9 @@ pub struct MetricShape {
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Level {
-    /// There is none.
+    /// No level.
     None(NoLevel),
-    /// This one.
+    /// The level.
     Of(Fraction),
 }
 

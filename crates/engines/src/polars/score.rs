@@ -85,7 +85,7 @@ fn check_overflow(traces: &TraceSet, definitions: &Definitions, steps: &LazyFram
     Ok(())
 }
 
-/// Returns true if Polars stopped by itself: a division does, and every operation where it was built with overflow checks.
+/// Returns true if Polars stopped at an overflow: always at a division, elsewhere in builds with overflow checks.
 fn stopped_at_overflow(words: &str) -> bool {
     words.contains("with overflow") || words.contains("overflow in integer division")
 }

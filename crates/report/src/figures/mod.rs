@@ -61,7 +61,7 @@ pub struct Input<'a> {
     pub timelines: Option<&'a [Timeline]>,
     /// A heading of its own.
     pub title: Option<&'a str>,
-    /// The width on paper; as wide as it is drawn if None.
+    /// The width on paper; `None` for the width as drawn.
     pub width: Option<FigureWidth>,
 }
 

@@ -30,7 +30,7 @@ pub static SHOWN: LazyLock<FigureSheets> =
 /// The same as TOML, for styles to lie over.
 pub const FIGURES: &str = include_str!("../../../../assets/styles/figures.toml");
 
-/// More axes than these cannot be told apart.
+/// With more axes the labels overlap.
 const MOST_AXES: usize = 8;
 
 impl FigureName {

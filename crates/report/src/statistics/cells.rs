@@ -60,11 +60,11 @@ pub enum Intervals {
     Quantity {
         /// Student's t with n - 1 degrees of freedom, within the values that a mean of steps can have.
         student_t: Option<Interval>,
-        /// The reason why there is none.
+        /// The reason for a missing interval.
         student_t_withheld: Option<Withheld>,
         /// Bias-corrected and accelerated bootstrap, seeded; none for very many values.
         bootstrap: Option<Interval>,
-        /// The reason why there is none.
+        /// The reason for a missing interval.
         bootstrap_withheld: Option<Withheld>,
     },
 }

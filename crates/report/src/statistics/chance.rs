@@ -8,11 +8,11 @@ use serde::{Deserialize, Serialize};
 
 use super::losses::{LossCase, LossCases, Toward, settle};
 use super::study::{Block, Experiment, Study, named};
+use super::units::Units;
 use exact::moments::Moments;
 use exact::ratio::Ratio;
 use score::table::MetricColumn;
 use statistics::chance::{exact_test, least_p};
-use statistics::clustered::fewest_clusters;
 use statistics::holm::{holm, level};
 use statistics::outcomes::ExactTest;
 use statistics::units::rate_test;
@@ -51,24 +51,6 @@ pub struct ChanceRow {
     /// The test with the lost episodes of the model; none where it lost none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub losses: Option<LossCases>,
-}
-
-/// Scenes, seeds or participants with several episodes.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-pub struct Units {
-    /// How many there are.
-    pub n: u64,
-    /// Their name, in the plural.
-    pub name: String,
-    /// True if they are too few for a verdict: no symmetric test of so many can reach the level of significance.
-    pub too_few: bool,
-}
-
-impl Units {
-    pub(super) fn new(study: &Study, block: &Block, n: usize, least: f64, confidence: f64) -> Self {
-        let too_few = level(confidence).is_none_or(|level| least > level || n < fewest_clusters(level));
-        Self { n: n as u64, name: study.unit_name(block).to_owned(), too_few }
-    }
 }
 
 /// What a level stands for.

@@ -5,13 +5,13 @@ use std::collections::BTreeSet;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::chance::Units;
 use super::durations::{decided, is_duration};
 use super::losses::{LossCase, LossCases, Toward, settle};
 use super::matching::Matched;
 use super::retest::repeat_variance;
 use super::study::{Block, Study, Unit};
 use super::units::Sides;
+use super::units::Units;
 use exact::moments::Moments;
 use metric::catalog::{Kind, StandardError};
 use score::table::MetricColumn;

@@ -3,8 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::chance::Units;
 use super::study::{Block, Study};
+use super::units::Units;
 use exact::moments::Moments;
 use statistics::holm::{holm, level};
 use statistics::losses::{Fate, Lossy, bounds};
@@ -15,7 +15,7 @@ pub(super) const LOST: &str = "lost episodes";
 /// Losses, or that nothing is known of them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Losses {
-    /// True if the traces say how each reply came: without that, losses cannot be told from failures.
+    /// True if the traces record how each reply ended; otherwise losses look like failures.
     pub recorded: bool,
     /// The rates of every experiment and model that lost an episode.
     pub rows: Vec<LossRow>,
@@ -54,7 +54,7 @@ pub struct LossCases {
     pub lowest: LossCase,
     /// Every lost episode raises it as far as it can.
     pub highest: LossCase,
-    /// True if the verdict is the same in both cases as without the lost episodes; otherwise there is none.
+    /// True if the verdict is the same in both cases and without the lost episodes; otherwise the data give no verdict.
     pub agree: bool,
 }
 

@@ -33,7 +33,7 @@ use serde::{Deserialize, Serialize};
 
 pub use answers::{Answer, AnswerRole};
 pub use cells::{CellRow, FEW, Intervals};
-pub use chance::{ChanceRow, Role, Units, Verdict};
+pub use chance::{ChanceRow, Role, Verdict};
 pub use clusters::ClusterRow;
 pub use compare::{Comparison, Method, Sign};
 pub use conditions::Contrast;
@@ -48,6 +48,7 @@ pub use replies::{Replies, UnusableReplies};
 pub use retest::RetestRow;
 pub use selection::Selection;
 pub use sequential::{Sequential, SequentialChance, SequentialPair, SequentialRate};
+pub use units::Units;
 
 use crate::cells::Cells;
 use crate::cells::interval::CONFIDENCE;

@@ -22,7 +22,7 @@ use score::lost_counts::LostCounts;
 use score::table::EpisodeTable;
 use statistics::design::Design;
 
-/// What stands for all experiments.
+/// The name of all experiments together.
 pub(super) const ALL: &str = "all";
 const SENTENCE: &str = "The ranks that the tests leave open, adjusted by Holm within each experiment and metric. Models that may have \
                         rank 1 are tied for the best.";

@@ -3,10 +3,33 @@
 use std::collections::BTreeMap;
 use std::mem::discriminant;
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use super::study::{Block, Study, Unit};
 use exact::moments::Moments;
 use score::table::MetricColumn;
+use statistics::clustered::fewest_clusters;
+use statistics::holm::level;
 use statistics::units::{self, UnitTest, difference_test};
+
+/// Scenes, seeds or participants with several episodes.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Units {
+    /// How many there are.
+    pub n: u64,
+    /// Their name, in the plural.
+    pub name: String,
+    /// True if the units are too few for a verdict: no symmetric test can reach the level of significance.
+    pub too_few: bool,
+}
+
+impl Units {
+    pub(super) fn new(study: &Study, block: &Block, n: usize, least: f64, confidence: f64) -> Self {
+        let too_few = level(confidence).is_none_or(|level| least > level || n < fewest_clusters(level));
+        Self { n: n as u64, name: study.unit_name(block).to_owned(), too_few }
+    }
+}
 
 /// The values of two sides by unit.
 pub(super) struct Sides {

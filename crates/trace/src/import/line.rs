@@ -11,6 +11,8 @@ use serde::de::{Deserialize, DeserializeSeed, Deserializer, IgnoredAny, MapAcces
 use super::fault::Fault;
 use exact::escape::{exact, visible};
 
+pub(super) const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
+
 /// A value of a step.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {

@@ -13,7 +13,7 @@ use serde_json::Value;
 use super::error::ImportError;
 use super::fault::{Fault, Place};
 use super::format::{Format, Rows};
-use super::line::{self, Members};
+use super::line::{self, BYTE_ORDER_MARK, Members};
 use super::mapping::Mapping;
 use crate::inputs::Input;
 use crate::schema::{self, Kind};
@@ -59,8 +59,6 @@ const LONGEST_LINE: Limit = Limit::new("bytes in a line of steps", 16 << 20);
 
 /// What is piped in is kept on the disk meanwhile.
 const LARGEST_STREAM: Limit = Limit::new("bytes of steps that are piped in", 64 << 30);
-
-pub(super) const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
 
 impl Text {
     /// The text in this file.

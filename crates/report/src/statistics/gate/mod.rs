@@ -15,10 +15,10 @@ pub use text::GateFormat;
 
 use self::sides::{Fill, Sides, joined};
 use super::Replies;
-use super::chance::Units;
 use super::compare::{Compared, Comparison};
 use super::matching::{Matched, Scenes};
 use super::study::{Block, Study};
+use super::units::Units;
 use crate::comparable::Varied;
 use exact::format::{fixed, p_value};
 use exact::moments::{MomentOverflow, Moments};

@@ -5,26 +5,24 @@
 
 use std::collections::HashMap;
 use std::fs::File;
-use std::io::{Read as _, Seek as _};
+use std::io::{self, Read as _, Seek as _};
 
 use serde_json::{Map, Value, json};
 
+use super::Rows;
 use super::eval_archive::EvalArchive;
-use super::json::WithoutNan;
-use super::{Rows, json_log};
 use crate::import::error::ImportError;
 
 const ARCHIVE: &[u8; 4] = b"PK\x03\x04";
 const ATTACHMENT: &str = "attachment://";
 
-pub(super) fn read(mut file: File, rows: &mut Rows<'_>) -> Result<(), ImportError> {
+pub(super) fn is_archive(file: &mut File) -> io::Result<bool> {
     let mut start = [0; 4];
     let is_archive = file.read_exact(&mut start).is_ok() && start == *ARCHIVE;
-    file.rewind().map_err(ImportError::read(&rows.file))?;
-    if is_archive { read_archive(file, rows) } else { json_log::read(WithoutNan::new(file), rows) }
+    file.rewind().map(|()| is_archive)
 }
 
-fn read_archive(file: File, rows: &mut Rows<'_>) -> Result<(), ImportError> {
+pub(super) fn read_archive(file: File, rows: &mut Rows<'_>) -> Result<(), ImportError> {
     let help = "copy the log again; `inspect log recover` mends one whose writer was ended";
     let expected = "a log of Inspect, an archive with a directory at its end";
     let mut archive = EvalArchive::open(file).map_err(|found| rows.fault("", expected, found, help))?;

@@ -19,10 +19,10 @@ use serde_json::{Map, Value};
 
 use super::error::ImportError;
 use super::fault::Fault;
-use super::line;
+use super::line::{self, BYTE_ORDER_MARK};
 use super::mapping::{Mapping, Row};
-use super::text::BYTE_ORDER_MARK;
 use exact::input;
+use json::WithoutNan;
 
 /// How the steps of a file are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -88,7 +88,10 @@ impl Format {
             Self::JsonLines => Ok(()),
             Self::Csv => csv::read(&file, rows),
             Self::Parquet => parquet::read(file, rows),
-            Self::Inspect => inspect::read(file, rows),
+            Self::Inspect if inspect::is_archive(&mut file).map_err(ImportError::read(&rows.file))? => {
+                inspect::read_archive(file, rows)
+            }
+            Self::Inspect => json_log::read(WithoutNan::new(file), rows),
             Self::InspectRobots => inspect_robots::read(file, rows),
             Self::LeRobot => lerobot::read(file, rows),
         }

@@ -48,7 +48,7 @@ impl Vlm {
         self.account.share(ledger, provider.patience().timeout, journals)
     }
 
-    /// What the journals of these finished episodes say; `None` if there is none.
+    /// Reads the journals of these finished episodes; `None` without a journal.
     pub fn typical<'a>(&self, episodes: impl Iterator<Item = &'a str>) -> Result<Option<Typical>, JournalError> {
         let (mut count, mut steps, mut seconds) = (0, Vec::new(), Vec::new());
         let (mut costs, mut tokens) = (Vec::new(), Vec::new());

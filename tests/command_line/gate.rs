@@ -131,7 +131,11 @@ fn every_format_names_the_flips() {
     let folder = two(&of(21, 21), &Cell { prompt: "p", ..of(0, 21) });
     let text = |format: &str| gate(folder.path(), &["--format", format]).ends(1).stdout;
     let flip = "E1/ant/s1/r1 1 (step 2) -> E1/ant/s1/r1 0 (step 2)";
-    assert!(text("text").contains(flip) && text("text").ends_with("\nregressed: 1 regressed\n"), "{}", text("text"));
+    assert!(
+        text("text").contains(flip) && text("text").ends_with("\nverdict: regressed; cells: 1 regressed\n"),
+        "{}",
+        text("text")
+    );
     assert!(text("md").contains("| E1 | ant | regressed |"), "{}", text("md"));
     let github = text("github");
     assert!(github.starts_with("::error title=E1 ant TSA%3A regressed::regressed: worse by 1.000, p "), "{github}");

@@ -12,7 +12,7 @@ use crate::cli::output;
 use exact::escape::visible;
 use trace::model_id::OWN_SERVER;
 use world::agent::vlm::limits::{Account, Limits, Spend};
-use world::agent::vlm::models::{Choice, Contract, Models};
+use world::agent::vlm::models::{Choice, Contract, Models, ModelsError};
 use world::agent::vlm::probe::{ProbeAnswer, probe};
 use world::agent::vlm::provider::{Patience, Provider};
 use world::agent::vlm::secrets::Secret;
@@ -169,7 +169,10 @@ impl VlmArgs {
         let Some(name) = self.name() else {
             return Err(Failure::input("--agent vlm needs --model, such as --model \"Claude Sonnet 4.6\""));
         };
-        let models = Models::load(self.models.as_deref()).map_err(Failure::input)?;
+        let models = Models::load(self.models.as_deref()).map_err(|error| match error {
+            ModelsError::Faults(faults) => Failure::Faults(faults),
+            error => Failure::input(error),
+        })?;
         let backend = self.backend.as_deref().or(self.base_url.is_some().then_some(OWN_SERVER));
         let mut choice = models.choose(name, backend).map_err(Failure::input)?;
         if !choice.is_known && choice.model.backend != OWN_SERVER {

@@ -113,11 +113,15 @@ fn unranked(statistics: &Statistics) -> Vec<Answer> {
         let overall: Vec<_> = statistics.overall.iter().filter(|row| row.metric == *metric).collect();
         let separated = overall.iter().filter(|row| row.separated).map(|row| (&*row.first, &*row.second));
         let is_tested = overall.iter().any(|row| row.p.is_some());
+        // Where no experiment could show a difference, silence over all of them is no answer either.
+        let is_unsayable = !overall.iter().any(|row| row.separated)
+            && families.clone().all(|family| unsayable(family, confidence).is_some());
         let unsettled = overall.iter().filter(|row| row.losses.is_some_and(|losses| !losses.agree));
         let unsettled: Vec<String> = unsettled.map(|_| LOST.to_owned()).collect();
         let overall = match (overall.len(), is_tested) {
             (0, _) => None,
             (_, false) => Some("over all experiments not tested".to_owned()),
+            _ if is_unsayable => Some("over all experiments cannot say".to_owned()),
             (all, true) => Some(differing("over all experiments", all, separated) + &unsaid_pairs(&unsettled)),
         };
         let parts: Vec<String> = families.map(|family| differing_in(family, confidence)).chain(overall).collect();
@@ -214,15 +218,23 @@ fn apart(comparisons: &[&Comparison]) -> Option<String> {
     Some(format!("{count}not comparable ({setting})"))
 }
 
-fn differing_in(family: &Family, confidence: f64) -> String {
+/// The reason why no test of a family could show a difference.
+fn unsayable(family: &Family, confidence: f64) -> Option<String> {
     let comparisons: Vec<&Comparison> = family.tests.iter().map(|test| &test.comparison).collect();
-    if let Some(why) = untested(&comparisons, confidence) {
+    untested(&comparisons, confidence).or_else(|| match family.detectable {
+        Some(Reach { method, n, tests, family: None, .. }) => {
+            let name = if method == Method::Mcnemar { "pairs" } else { "episodes" };
+            Some(format!("cannot say: {n} {name} for {tests} comparisons"))
+        }
+        _ => None,
+    })
+}
+
+fn differing_in(family: &Family, confidence: f64) -> String {
+    if let Some(why) = unsayable(family, confidence) {
         return format!("{} {why}", family.experiment);
     }
-    if let Some(Reach { method, n, tests, family: None, .. }) = family.detectable {
-        let name = if method == Method::Mcnemar { "pairs" } else { "episodes" };
-        return format!("{} cannot say: {n} {name} for {tests} comparisons", family.experiment);
-    }
+    let comparisons: Vec<&Comparison> = family.tests.iter().map(|test| &test.comparison).collect();
     let separated = family.tests.iter().filter(|test| test.comparison.separated);
     let is_silent = |it: &&Comparison| !it.separated && it.incomparable.is_none();
     let reason = |it: &Comparison| match it.unsaid(confidence) {

@@ -7,7 +7,7 @@ use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::terminal;
 use report::comparison::Comparison;
-use report::errata::Errata;
+use report::errata::{Errata, ErrataError};
 
 /// The style that printed the published tables.
 const PAPER_STYLE: &str = "paper";
@@ -53,7 +53,10 @@ impl CompareArgs {
 
     fn errata(&self) -> Result<Errata, Failure> {
         match &self.errata {
-            Some(path) => Errata::read(path).map_err(Failure::input),
+            Some(path) => Errata::read(path).map_err(|error| match error {
+                ErrataError::Faults(faults) => Failure::Faults(faults),
+                error @ ErrataError::Unreadable { .. } => Failure::input(error),
+            }),
             None if self.style == Path::new(PAPER_STYLE) => Ok(Errata::of_paper()),
             None => Ok(Errata::default()),
         }

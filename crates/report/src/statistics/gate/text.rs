@@ -156,7 +156,7 @@ impl Gate {
         let count = |verdict| self.cells.iter().filter(|cell| cell.verdict == verdict).count();
         let counts = order.into_iter().map(|verdict| (count(verdict), name(verdict))).filter(|(count, _)| *count > 0);
         let counts: Vec<String> = counts.map(|(count, name)| format!("{count} {name}")).collect();
-        format!("{}: {}", name(self.verdict), counts.join(", "))
+        format!("verdict: {}; cells: {}", name(self.verdict), counts.join(", "))
     }
 }
 

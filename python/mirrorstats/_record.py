@@ -80,14 +80,34 @@ def record(
     asked.update(experiment=toml_file(experiment, "experiment", spool), seeds=seeds, runs=runs, out=text(out, spool))
     if isinstance(agent, str):
         return _told(Recorded(_native.record(json.dumps({**asked, "agent": agent, "model": model}))))
+    playing: set[int] = set()
     function = {
         "model": model or getattr(agent, "__name__", type(agent).__name__),
         "source": _source(agent),
         "is_base64": images != "path",
         "is_lost": on_error == "lose",
-        "listeners": lambda: _listener(agent, images == "array"),
+        "listeners": lambda: _listener(agent, images == "array", playing),
     }
-    return _told(Recorded(_native.record(json.dumps({**asked, "agent": "function"}), function)))
+    try:
+        return _told(Recorded(_native.record(json.dumps({**asked, "agent": "function"}), function)))
+    finally:
+        _interrupt(playing.copy())
+
+
+def _interrupt(threads: set[int]) -> None:
+    """Ends functions that still run, for the interpreter aborts if a thread of the native library is inside it when it exits.
+
+    What sleeps outside the interpreter is not waited for: it does not come back before the end.
+    """
+    import ctypes
+    import sys
+    import time
+
+    for thread in threads:
+        ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), ctypes.py_object(KeyboardInterrupt))
+    end = time.monotonic() + 0.3
+    while threads & sys._current_frames().keys() and time.monotonic() < end:
+        time.sleep(0.005)
 
 
 def _check_options(options: dict[str, Any]) -> None:
@@ -123,14 +143,22 @@ def _source(agent: Any) -> Optional[str]:
         return None
 
 
-def _listener(agent: Any, is_array: bool) -> Callable[[str], str]:
-    """What the native library calls in one episode, on a thread of its own, with messages as JSON."""
+def _listener(agent: Any, is_array: bool, playing: set[int]) -> Callable[[str], str]:
+    """What the native library calls in one episode, on a thread of its own that is in `playing` then, with messages as JSON."""
     import inspect
+    import threading
 
     function = agent() if isinstance(agent, type) else agent
     loop: Any = None
 
     def listen(line: str) -> str:
+        playing.add(threading.get_ident())
+        try:
+            return heard(line)
+        finally:
+            playing.discard(threading.get_ident())
+
+    def heard(line: str) -> str:
         nonlocal loop
         message = json.loads(line)
         if is_array and "image" in message:

@@ -17,6 +17,7 @@ use arrow::json::{ReaderBuilder, WriterBuilder};
 use arrow::util::display::{ArrayFormatter, FormatOptions};
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyCapsule};
 
@@ -227,6 +228,13 @@ impl Steps {
     /// A `pandas.DataFrame`; integers beside nulls stay integers (`Int64`).
     fn to_pandas<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         to_pandas(slf)
+    }
+
+    // Pickle's own words are of Python's machinery.
+    #[expect(clippy::unused_self, reason = "a method of Python")]
+    fn __reduce__(&self) -> PyResult<()> {
+        let words = "steps are read from their files and cannot be pickled: pickle the study, or `steps.to_polars()`";
+        Err(PyTypeError::new_err(words))
     }
 
     fn __repr__(&self) -> String {

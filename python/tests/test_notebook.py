@@ -187,6 +187,8 @@ def test_answers_can_be_pickled(paper, tmp_path):
     assert (tmp_path / "figure.png").read_bytes().startswith(b"\x89PNG")
     assert stats == study.stats() and len(stats.tests) and str(stats) == str(study.stats())
     assert pickle.loads(pickle.dumps(study.cells)).to_polars().equals(study.cells.to_polars())
+    with pytest.raises(TypeError, match="pickle the study, or `steps.to_polars\\(\\)`"):
+        pickle.dumps(study.steps())
 
 
 def test_errors_are_of_a_kind_and_speak_of_arguments(paper, tmp_path):

@@ -6,6 +6,7 @@ import pathlib
 import signal
 import subprocess
 import sys
+import threading
 import time
 import tomllib
 
@@ -189,6 +190,24 @@ def test_an_interrupt_ends_a_recording(tmp_path):
     assert time.monotonic() - since < 1, "the agent sleeps for a minute, and is not waited for"
     said, _ = started.communicate(timeout=60)
     assert said == "" and started.returncode == 0
+
+
+def test_an_interrupt_ends_an_agent_that_never_returns(tmp_path):
+    turns = 0
+
+    def loops(message):
+        nonlocal turns
+        while True:
+            turns += 1
+
+    threading.Timer(1, signal.raise_signal, [signal.SIGINT]).start()
+    since = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        ms.record(loops, "E1", seeds=1, runs=2, out=tmp_path, in_flight=2, no_log=True, on_error="lose")
+    before = turns
+    assert before > 0 and time.monotonic() - since < 2
+    time.sleep(0.1)
+    assert turns == before, "a thread that still runs aborts the interpreter when it exits"
 
 
 def test_an_interrupt_ends_the_command_as_it_ends_the_program(tmp_path):

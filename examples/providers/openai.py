@@ -22,7 +22,7 @@ def answer(at, path, headers, body, text):
     if body.get("service_tier") == "flex" and at % 5 == 0:
         error = {"message": "Resource unavailable", "type": "resource_unavailable", "param": None, "code": "resource_unavailable"}
         return 429, {"content-type": "application/json"}, {"error": error}
-    left = {"x-ratelimit-remaining-requests": str(at % 17), "x-ratelimit-reset-requests": "30ms"}
+    left = {"x-ratelimit-limit-requests": "60", "x-ratelimit-remaining-requests": str(at % 17), "x-ratelimit-reset-requests": "30ms"}
     usage = {"prompt_tokens": 1000, "completion_tokens": 100, "prompt_tokens_details": {"cached_tokens": 400}}
     choice = {"index": 0, "finish_reason": "stop", "message": {"role": "assistant", "content": reply(text)}}
     said = {"object": "chat.completion", "model": body["model"] + "-2026-09-29", "choices": [choice], "usage": usage}

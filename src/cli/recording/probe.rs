@@ -6,6 +6,7 @@ use crate::cli::recording::dollars;
 use crate::cli::text_table::counted;
 use exact::escape::{visible, visible_lines};
 use world::agent::vlm::probe::{ProbeAnswer, ProbedParameter};
+use world::agent::vlm::provider::rate_limit::RateLimit;
 
 pub(crate) fn tell(out: &mut impl io::Write, answer: &ProbeAnswer) -> io::Result<()> {
     let (model, id) = (visible(&answer.model), visible(&answer.id));
@@ -13,6 +14,12 @@ pub(crate) fn tell(out: &mut impl io::Write, answer: &ProbeAnswer) -> io::Result
     match &answer.fault {
         Some(fault) => writeln!(out, "{model} ({id}): no answer after {requests}: {}", visible_lines(fault))?,
         None => writeln!(out, "{model} ({id}): {} after {requests}", answered(answer))?,
+    }
+    for limit in &answer.rate_limits {
+        let RateLimit { counts, remaining, limit, renewed } = limit;
+        let of = limit.map_or_else(String::new, |limit| format!(" of {limit}"));
+        let renewed = renewed.as_ref().map_or_else(String::new, |at| format!(", renewed: {}", visible(at)));
+        writeln!(out, "  rate limit: {remaining}{of} {counts} left{renewed}")?;
     }
     let with_line = |parameter: &&ProbedParameter| parameter.line.is_some();
     if answer.parameters.iter().any(|parameter| with_line(&parameter)) {

@@ -210,6 +210,11 @@ fn a_probe_tells_what_each_model_takes() {
         all.iter().find(|parameter| parameter["name"] == name).cloned().unwrap_or_default()
     };
     assert_eq!(parameter(&answers[1], "temperature")["taken"], true);
+    let limit = |at: usize| &answers[at]["rate_limits"][0];
+    assert_eq!((&limit(1)["counts"], &limit(1)["limit"]), (&"requests".into(), &60.0.into()));
+    assert!(limit(1)["remaining"].is_number() && limit(1)["renewed"] == "30ms");
+    assert!(limit(7)["remaining"].is_number() && limit(7)["limit"].is_null(), "Anthropic's headers");
+    assert_eq!(answers[0]["rate_limits"], Value::Array(Vec::new()), "Gemini states none");
     assert_eq!(parameter(&answers[2], "temperature"), Value::Null, "it is not sent");
 
     let words = ["--models", "models.toml", "--model", "Old", "--model", "Rerouted", "--model", "Routed"];
@@ -226,6 +231,7 @@ fn a_probe_tells_what_each_model_takes() {
         "Old (claude-sonnet-5-5): answered by `claude-sonnet-5-5` in ",
         "  temperature = 0.2: refused: temperature = \"default\"\n",
         "  contract = \"schema\": taken and enforced\n",
+        " requests left, renewed: ",
         "another model answers, `gemini-3.8-flash`: --accept-model gemini-3.8-flash records it",
     ] {
         assert!(said.contains(line), "{line}: {said}");

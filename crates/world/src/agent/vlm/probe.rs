@@ -11,6 +11,7 @@ use serde_json::Value;
 
 use super::models::{Choice, Contract};
 use super::provider::failure::Failure;
+use super::provider::rate_limit::RateLimit;
 use super::provider::{Mend, Provider, Received, Waiting, refused};
 use crate::agent::prompt::Rendered;
 use crate::agent::{Status, reply};
@@ -41,6 +42,8 @@ pub struct ProbeAnswer {
     pub cost_usd: Option<f64>,
     /// From sending the answered request to the whole answer, ms; null without an answer.
     pub latency_ms: Option<u64>,
+    /// The limits of the account that the answer's headers state; none where the provider states them elsewhere.
+    pub rate_limits: Vec<RateLimit>,
     /// Requests that went out.
     pub requests: u32,
     /// The reason why there is no answer, and what to do; null if there is one.
@@ -82,7 +85,7 @@ impl ProbeAnswer {
     }
 
     fn note_answer(&mut self, received: Received, choice: &Choice, experiment: Experiment) {
-        let Received { answer, latency, .. } = received;
+        let Received { answer, latency, rate_limits, .. } = received;
         for parameter in &mut self.parameters {
             parameter.taken.get_or_insert(true);
         }
@@ -96,7 +99,7 @@ impl ProbeAnswer {
         (self.prompt_tokens, self.completion_tokens) = (answer.prompt_tokens, answer.completion_tokens);
         self.cost_usd = choice.cost_usd(&answer);
         self.latency_ms = u64::try_from(latency.as_millis()).ok();
-        self.answered_by = answer.model;
+        (self.answered_by, self.rate_limits) = (answer.model, rate_limits);
     }
 
     fn note_refused(&mut self, mend: &Mend) {

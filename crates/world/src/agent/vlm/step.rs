@@ -107,7 +107,7 @@ impl Step {
         }
         match provider.ask(turn, &self.id, &self.body).await {
             Ok(received) => {
-                let Received { answer, body, latency } = received;
+                let Received { answer, body, latency, .. } = received;
                 self.vlm.learn_from(&answer);
                 reserved.answered(tokens(&answer), self.vlm.choice.cost_usd(&answer));
                 let latency_ms = i32::try_from(latency.as_millis()).unwrap_or(i32::MAX);

@@ -9,7 +9,7 @@ pub mod concurrency;
 pub mod failure;
 mod parameter;
 mod preflight;
-mod rate_limit;
+pub mod rate_limit;
 mod waiting;
 
 use std::io;
@@ -31,7 +31,7 @@ use concurrency::{Pace, Turn};
 use failure::{Failure, broken, failed, no_answer, server};
 pub use preflight::Unreachable;
 use preflight::connect;
-use rate_limit::{retry_after, retry_info, used_up};
+use rate_limit::{RateLimit, retry_after, retry_info, stated, used_up};
 
 /// How patient a provider is dealt with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -80,6 +80,8 @@ pub struct Received {
     pub body: String,
     /// From sending the request to the end of the answer.
     pub latency: Duration,
+    /// The limits of the account that headers state.
+    pub rate_limits: Vec<RateLimit>,
 }
 
 /// A provider that requests can be sent to.
@@ -227,7 +229,7 @@ impl Provider {
         let start = Instant::now();
         let response = self.client.post(self.url.clone()).json(body).send().await.map_err(broken)?;
         let (status, after) = (response.status(), retry_after(response.headers()));
-        let renewed = used_up(response.headers());
+        let (renewed, rate_limits) = (used_up(response.headers()), stated(response.headers()));
         self.pause(renewed);
         let kind =
             response.headers().get(CONTENT_TYPE).and_then(|kind| kind.to_str().ok()).unwrap_or("none").to_owned();
@@ -250,7 +252,7 @@ impl Provider {
             server(format!("expected an answer in JSON, found the content type {kind} and: {fault}"))
         })?;
         let answer = answer.ok_or_else(|| no_answer(&self.without_secret(&text)))?;
-        Ok(received(self.secret.as_ref(), answer, text, latency))
+        Ok(Received { rate_limits, ..received(self.secret.as_ref(), answer, text, latency) })
     }
 
     /// The refusal in an error that is about what the request holds. Providers send it as a bad request, routers also as a
@@ -272,7 +274,7 @@ fn received(secret: Option<&Secret>, answer: Answer, body: String, latency: Dura
         None => text,
     };
     let answer = Answer { text: kept(answer.text), model: answer.model.map(kept), ..answer };
-    Received { answer, body: kept(body), latency }
+    Received { answer, body: kept(body), latency, rate_limits: Vec::new() }
 }
 
 async fn whole(mut response: Response, most: usize) -> Result<Vec<u8>, Failure> {

@@ -4,22 +4,57 @@ use std::time::{Duration, SystemTime};
 
 use arrow::compute::kernels::cast_utils::string_to_timestamp_nanos;
 use reqwest::header::{HeaderMap, RETRY_AFTER};
+use schemars::JsonSchema;
+use serde::Serialize;
 use serde_json::Value;
 
-/// What is left of a limit and when it is renewed: `OpenAI` and servers that follow it, then Anthropic.
-const LEFT: [[&str; 2]; 4] = [
-    ["x-ratelimit-remaining-requests", "x-ratelimit-reset-requests"],
-    ["x-ratelimit-remaining-tokens", "x-ratelimit-reset-tokens"],
-    ["anthropic-ratelimit-requests-remaining", "anthropic-ratelimit-requests-reset"],
-    ["anthropic-ratelimit-tokens-remaining", "anthropic-ratelimit-tokens-reset"],
+/// What a limit counts, what is left of it, when it is renewed, and how much it is: `OpenAI` and servers that follow it, then
+/// Anthropic.
+const LIMITS: [[&str; 4]; 4] = [
+    ["requests", "x-ratelimit-remaining-requests", "x-ratelimit-reset-requests", "x-ratelimit-limit-requests"],
+    ["tokens", "x-ratelimit-remaining-tokens", "x-ratelimit-reset-tokens", "x-ratelimit-limit-tokens"],
+    [
+        "requests",
+        "anthropic-ratelimit-requests-remaining",
+        "anthropic-ratelimit-requests-reset",
+        "anthropic-ratelimit-requests-limit",
+    ],
+    [
+        "tokens",
+        "anthropic-ratelimit-tokens-remaining",
+        "anthropic-ratelimit-tokens-reset",
+        "anthropic-ratelimit-tokens-limit",
+    ],
 ];
+
+/// A rate limit of the account, as the headers of an answer have it.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct RateLimit {
+    /// What it counts: `requests` or `tokens`.
+    pub counts: String,
+    /// What is left of it.
+    pub remaining: f64,
+    /// How much it is; null if the provider does not say.
+    pub limit: Option<f64>,
+    /// When it is whole again, as the provider says it: a time such as `6m0s`, or a date; null if it does not.
+    pub renewed: Option<String>,
+}
+
+/// The limits that headers state.
+pub(super) fn stated(headers: &HeaderMap) -> Vec<RateLimit> {
+    let text = |name: &str| headers.get(name)?.to_str().ok().map(str::trim);
+    let number = |name: &str| text(name)?.parse().ok().filter(|number: &f64| number.is_finite());
+    let limit = |[counts, remaining, renewed, limit]: [&str; 4]| {
+        let (remaining, renewed) = (number(remaining)?, text(renewed).map(str::to_owned));
+        Some(RateLimit { counts: counts.to_owned(), remaining, limit: number(limit), renewed })
+    };
+    LIMITS.into_iter().filter_map(limit).collect()
+}
 
 /// The time until every limit that is used up is renewed; `None` if something is left of all of them.
 pub(super) fn used_up(headers: &HeaderMap) -> Option<Duration> {
-    let text = |name: &str| headers.get(name)?.to_str().ok();
-    let is_used_up =
-        |name: &str| text(name).and_then(|left| left.trim().parse::<f64>().ok()).is_some_and(|left| left <= 0.0);
-    LEFT.iter().filter(|[left, _]| is_used_up(left)).filter_map(|[_, reset]| until(text(reset)?.trim())).max()
+    let used_up = stated(headers).into_iter().filter(|limit| limit.remaining <= 0.0);
+    used_up.filter_map(|limit| until(limit.renewed.as_deref()?)).max()
 }
 
 /// The time until a limit is renewed: `6m0s`, `20ms`, or a date as in RFC 3339.
@@ -83,7 +118,7 @@ mod tests {
 
     use reqwest::header::{HeaderMap, HeaderName, HeaderValue, RETRY_AFTER};
 
-    use super::{retry_after, until, used_up};
+    use super::{RateLimit, retry_after, stated, until, used_up};
 
     #[test]
     fn the_wait_asked_for_is_read_or_left() {
@@ -115,6 +150,10 @@ mod tests {
             ("x-ratelimit-reset-tokens", "6h"),
         ];
         assert_eq!(used_up(&headers(&tokens_left)), Some(Duration::from_millis(60_500)));
+        let tokens = stated(&headers(&[&tokens_left[..], &[("x-ratelimit-limit-tokens", "150000")]].concat())).pop();
+        let renewed = Some("6h".to_owned());
+        let limit = RateLimit { counts: "tokens".into(), remaining: 149_984.0, limit: Some(150_000.0), renewed };
+        assert_eq!(tokens, Some(limit));
         let anthropic = [
             ("anthropic-ratelimit-tokens-remaining", "0"),
             ("anthropic-ratelimit-tokens-reset", "2199-01-01T00:00:00Z"),

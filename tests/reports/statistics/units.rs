@@ -125,8 +125,29 @@ fn episodes_too_few_for_any_verdict_are_told_from_those_that_show_nothing() {
     assert_eq!(answers(2), ["E1 cannot say: 2 episodes", "E1 cannot say: 2 pairs"]);
     assert_eq!(answers(5)[1], "E1 cannot say: 5 pairs");
     assert_eq!(answers(6), ["E1 all 2", "E1 nobody"]);
-    // 3 episodes: the least p is 1/27, above 0.05 / 2.
-    assert_eq!(answers(3)[0], "E1 cannot say: 3 episodes for 2 models");
+    assert_eq!(answers(5)[0], "E1 cannot say: 5 episodes");
+}
+
+// 6 episodes against 1/3: the least p is 1/729, above 0.05 / 37.
+#[test]
+fn episodes_too_few_for_so_many_models_are_told_too() {
+    let models: Vec<String> = (0..37).map(|at| format!("m{at}")).collect();
+    let rows: Vec<Row> =
+        models.iter().flat_map(|model| (0..6).map(move |at| ("E1", model.as_str(), at, 0, true, 9))).collect();
+    let found = with_scenes(&rows, RECORDED, by_scene);
+    let told = found.answers.iter().find(|it| it.metric == "TSA").unwrap();
+    assert_eq!(told.answer, "E1 cannot say: 6 episodes for 37 models");
+}
+
+// 2 of 2 against 1/10: p is 1/100, and two episodes are as few as elsewhere.
+#[test]
+fn two_episodes_say_nothing_however_low_the_level_is() {
+    let rows: Vec<Row> = (0..2).map(|at| ("E5", "a", at, 0, true, 9)).collect();
+    let found = with_scenes(&rows, RECORDED, by_scene);
+    let row = found.chance.iter().find(|row| row.metric == "TSA").unwrap();
+    assert!((row.p - 0.01).abs() < 1e-12 && row.verdict == Verdict::NotSeparated, "{row:?}");
+    let told = found.answers.iter().find(|it| it.metric == "TSA").unwrap();
+    assert_eq!(told.answer, "E5 (reference 1/10) cannot say: 2 episodes");
 }
 
 /// Two models with two episodes per scene; the slower one is fast in scene 0.

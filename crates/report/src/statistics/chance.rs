@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::losses::{LossCase, LossCases, Toward, settle};
 use super::study::{Block, Experiment, Study, named};
-use super::units::Units;
+use super::units::{Units, too_few};
 use exact::moments::Moments;
 use exact::ratio::Ratio;
 use score::table::MetricColumn;
@@ -121,7 +121,9 @@ impl ChanceRow {
                 n,
                 chance,
                 level(confidence).is_some_and(|level| p_adjusted <= level)
-                    && !units.as_ref().is_some_and(|units: &Units| units.too_few)
+                    && !units
+                        .as_ref()
+                        .map_or_else(|| few_episodes(n, chance, confidence), |units: &Units| units.too_few)
                     && losses.is_none_or(|losses: LossCases| losses.agree),
             ),
             units,
@@ -132,13 +134,10 @@ impl ChanceRow {
 
     /// The units or episodes that are too few for any verdict, or the lost ones that decide it; none elsewhere.
     pub(super) fn unsaid(&self, confidence: f64) -> Option<Units> {
-        let hopeless =
-            || least_p(self.n, self.level).zip(level(confidence)).is_some_and(|(least, level)| least > level);
-        match &self.units {
-            Some(units) => units.too_few.then(|| units.clone()),
-            None => hopeless().then(|| Units { n: self.n, name: "episodes".to_owned(), too_few: true }),
-        }
-        .or_else(|| LossCases::unsettled(self.losses.as_ref()))
+        let episodes =
+            || Units { n: self.n, name: "episodes".to_owned(), too_few: few_episodes(self.n, self.level, confidence) };
+        let units = self.units.clone().unwrap_or_else(episodes);
+        units.too_few.then_some(units).or_else(|| LossCases::unsettled(self.losses.as_ref()))
     }
 
     /// The largest number of units or episodes, if no outcome of any of these models could pass Holm's first step.
@@ -156,6 +155,10 @@ impl ChanceRow {
     pub fn name(&self) -> String {
         named(&self.model, self.condition.as_deref())
     }
+}
+
+fn few_episodes(n: u64, level: Ratio, confidence: f64) -> bool {
+    least_p(n, level).is_none_or(|least| too_few(usize::try_from(n).unwrap_or(usize::MAX), least, confidence))
 }
 
 /// One rate of one block against one level.

@@ -26,9 +26,13 @@ pub struct Units {
 
 impl Units {
     pub(super) fn new(study: &Study, block: &Block, n: usize, least: f64, confidence: f64) -> Self {
-        let too_few = level(confidence).is_none_or(|level| least > level || n < fewest_clusters(level));
-        Self { n: n as u64, name: study.unit_name(block).to_owned(), too_few }
+        Self { n: n as u64, name: study.unit_name(block).to_owned(), too_few: too_few(n, least, confidence) }
     }
+}
+
+/// True if no symmetric test of so many units or episodes, or none with this least p value, can reach the level.
+pub(super) fn too_few(n: usize, least: f64, confidence: f64) -> bool {
+    level(confidence).is_none_or(|level| least > level || n < fewest_clusters(level))
 }
 
 /// The values of two sides by unit.

@@ -118,6 +118,16 @@ fn scores_stand_for_traces_and_durations_have_a_margin_in_steps() {
     let answer = run(folder.path(), &["gate", "base.parquet", "new.parquet", "--format", "json"]).ends(1).stdout;
     let found: Value = serde_json::from_str(&answer).unwrap();
     assert_eq!(found["cells"][0]["flips"][0]["base"]["timesteps"], Value::Null);
+    let told = found["caveats"].to_string();
+    assert!(told.contains("base: scores do not say which steps decided") && told.contains("new: scores"), "{told}");
+    // In the folder of the traces they have steps; the other side still has none.
+    std::fs::rename(folder.path().join("base.parquet"), folder.path().join("base/scores.parquet")).unwrap();
+    let answer = run(folder.path(), &["gate", "base/scores.parquet", "new.parquet", "--format", "json"]).ends(1).stdout;
+    let beside: Value = serde_json::from_str(&answer).unwrap();
+    let flip = &beside["cells"][0]["flips"][0];
+    assert!(flip["base"]["timesteps"].is_array() && flip["new"]["timesteps"].is_null(), "{flip}");
+    assert!(!beside["caveats"].to_string().contains("base: scores"), "{beside}");
+    std::fs::remove_file(folder.path().join("base/scores.parquet")).unwrap();
     // All durations are equal: without spread there is no interval, and no verdict.
     let (code, found) = cell_of(folder.path(), &["--metric", "TTD", "--margin", "5"]);
     assert_eq!((code, &found["p_adjusted"]), (4, &Value::Null));

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::slice;
 
 use serde_json::Value;
 
@@ -16,6 +17,8 @@ use metric::definitions::UnknownMetric;
 use report::statistics::{Gate, GateOptions, Played};
 use score::evidence;
 use score::table::EpisodeTable;
+use trace::inputs::{self, Input};
+use trace::open::TraceSet;
 
 /// The file that tells a page which `view --export` wrote, and the one that names its episodes.
 const PAGE: [&str; 2] = ["assets/view.js", "data/list.js"];
@@ -43,6 +46,15 @@ impl Study {
         for flip in gate.cells.iter_mut().flat_map(|cell| &mut cell.flips) {
             before.add_to(&mut flip.base);
             after.add_to(&mut flip.new);
+        }
+        let unshown = |of: fn(&report::statistics::FlippedPair) -> &Played| {
+            gate.cells.iter().flat_map(|cell| &cell.flips).any(|flip| of(flip).timesteps.is_none())
+        };
+        let sides = [("base", base, unshown(|flip| &flip.base)), ("new", self, unshown(|flip| &flip.new))];
+        for (side, ..) in sides.into_iter().filter(|(_, study, is_unshown)| *is_unshown && !study.has_steps()) {
+            gate.caveats.push(format!(
+                "{side}: scores do not say which steps decided a flip; traces in their folder do, if they give the same value."
+            ));
         }
         Ok(gate)
     }
@@ -75,19 +87,42 @@ impl Study {
     }
 
     fn shown(&self, ids: &BTreeSet<String>, metric: &str) -> Result<Shown, StudyError> {
-        let Source::Traces(traces) = &self.source else { return Ok(Shown::default()) };
-        if ids.is_empty() {
-            return Ok(Shown::default());
+        match &self.source {
+            _ if ids.is_empty() => Ok(Shown::default()),
+            Source::Traces(traces) => self.shown_by(traces, ids, metric),
+            // What lies beside scores may be of other episodes, and is no fault of theirs.
+            Source::Scores(_) => {
+                Ok(self.traces_beside().and_then(|traces| self.shown_by(&traces, ids, metric).ok()).unwrap_or_default())
+            }
         }
+    }
+
+    fn has_steps(&self) -> bool {
+        matches!(self.source, Source::Traces(_))
+    }
+
+    fn folders(&self) -> BTreeSet<PathBuf> {
+        self.inputs.iter().filter_map(|input| input.path.parent().map(Path::to_owned)).collect()
+    }
+
+    fn traces_beside(&self) -> Option<TraceSet> {
+        let inside = |folder: &PathBuf| {
+            let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+            inputs::resolve(&[folder.into()], std::io::empty()).unwrap_or_default()
+        };
+        let is_trace = |input: &Input| matches!(Source::open(slice::from_ref(input)), Ok(Source::Traces(_)));
+        let traces: Vec<Input> = self.folders().iter().flat_map(inside).filter(is_trace).collect();
+        TraceSet::open(&traces).ok().filter(|_| !traces.is_empty())
+    }
+
+    fn shown_by(&self, traces: &TraceSet, ids: &BTreeSet<String>, metric: &str) -> Result<Shown, StudyError> {
         let mut definitions = self.question.bind(traces)?;
         definitions.select(&[metric.to_owned()])?;
         let evidence = evidence::explain_each(traces, &definitions, ids, self.threads)?;
         let evidence =
             evidence.into_values().filter_map(|found| Some((found.episode_id, found.metrics.into_iter().next()?)));
         let evidence = evidence.map(|(id, found)| (id, (found.value, found.timesteps))).collect();
-        let folders: BTreeSet<PathBuf> =
-            self.inputs.iter().filter_map(|input| input.path.parent().map(Path::to_owned)).collect();
-        let pages = folders.iter().flat_map(|folder| pages_beside(folder, metric)).collect();
+        let pages = self.folders().iter().flat_map(|folder| pages_beside(folder, metric)).collect();
         Ok(Shown { evidence, pages })
     }
 }

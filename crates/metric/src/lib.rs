@@ -1,7 +1,7 @@
 //! Definition files: metrics as data, checked and planned.
 //!
 //! ```text
-//! file.rs ──► syntax ─────► bind ─────► plan.rs ──► (kernels in score)
+//! file.rs ──► syntax ─────► bind ─────► logical_plan ──► (kernels in score)
 //! (TOML)      (SQL text)    (names,     (typed
 //!                            types,      operations)
 //!                            levels)
@@ -12,22 +12,21 @@
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
 mod bind;
-pub mod catalog;
+mod catalogs;
 pub mod columns;
 pub mod definitions;
-pub mod explain;
 pub mod file;
 mod functions;
 pub mod implied;
-mod measure;
+mod logical_plan;
 pub mod names;
-pub mod overflow;
-pub mod plan;
-mod print;
-pub mod relations;
-pub mod restore;
 #[cfg(test)]
 mod schema_columns;
 pub mod shape;
 pub mod sql;
 pub mod syntax;
+
+use catalogs::measure;
+pub use catalogs::{catalog, relations, restore};
+
+pub use logical_plan::{explain, overflow, plan};

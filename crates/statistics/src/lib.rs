@@ -4,30 +4,22 @@
 
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
-pub mod bootstrap;
 pub mod chance;
-pub mod clustered;
-pub mod competing;
-pub mod contrast;
-pub mod coverage;
+mod comparisons;
 pub mod design;
-mod endings;
+mod durations;
 pub mod feasible;
-pub mod holm;
-pub mod improvement;
-pub mod interval;
-pub mod letter_display;
+mod intervals;
 pub mod losses;
-pub mod margin;
 pub mod outcomes;
-pub mod paired;
 pub mod power;
-mod quantile;
-pub mod random;
-pub mod restricted;
 pub mod sample_size;
 pub mod sequential;
-pub mod stratified;
-pub mod survival;
-pub mod units;
-pub mod unpaired;
+
+use durations::endings;
+pub use durations::{competing, restricted, survival};
+
+pub use comparisons::{contrast, holm, improvement, letter_display, margin, paired, stratified, units, unpaired};
+
+use intervals::quantile;
+pub use intervals::{bootstrap, clustered, coverage, interval, random};

@@ -11,39 +11,25 @@
 
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
-mod audit;
 mod backend;
-mod between;
-mod design;
-mod diff;
-mod empty_filter;
+mod compare;
+mod definitions;
 mod error;
-mod expected;
-mod experiment_findings;
-mod figure_inputs;
-mod findings;
-mod gate;
-mod import;
-mod input_hashes;
-mod inputs;
 mod losses;
-mod overview;
-mod own_definitions;
-mod pooled;
-mod provenance;
-mod quality_check;
+mod output;
 #[cfg(feature = "polars")]
 mod query;
-mod question;
-mod report;
-mod rescore;
-mod results;
-mod scan;
-mod scored_alike;
-mod scores;
-mod sensitivity;
+mod read;
 mod size;
-pub mod verify;
+
+pub use output::verify;
+use output::{audit, figure_inputs, overview, provenance, quality_check, report};
+
+use compare::{design, diff, gate, pooled, sensitivity};
+
+use definitions::{own_definitions, question, rescore, scored_alike};
+
+use read::{expected, experiment_findings, findings, import, input_hashes, inputs, results, scan, scores};
 
 use std::ffi::OsString;
 use std::num::NonZeroUsize;
@@ -60,12 +46,11 @@ use ::report::layout::MetricTable;
 use ::report::plan::departures::{Looks, departures};
 use ::report::plan::register::RegisteredPlan;
 use ::report::published;
-use ::report::statistics::{Options, Ranks, Replies, Selection, Sequential, Statistics};
+use ::report::statistics::{Options, Ranks};
 use ::report::style::Style;
 use ::report::tables::ListTable;
 use exact::replace;
 use metric::file;
-use metric::names::is_about;
 use score::evidence::{self, Evidence};
 use score::lost_counts::LostCounts;
 use score::score_traces;
@@ -98,7 +83,6 @@ pub use sensitivity::{DEFAULT_THRESHOLDS, SensitivityReport, Thresholds, Thresho
 
 use design::design_of;
 use inputs::Stamp;
-use losses::Counted;
 
 /// Inputs that are open, and the question that is put to them.
 #[derive(Debug)]
@@ -304,79 +288,9 @@ impl Study {
         Ok((tables, ranks))
     }
 
-    /// The filter; it is by results where it asks for more than what is recorded of an episode before it begins.
-    fn selection(&self, episodes: &EpisodeTable) -> Option<Selection> {
-        let condition = self.question.filter.clone()?;
-        let is_key = |name: &str| episodes.label(name).is_some() || score_traces::is_constant(name);
-        let by_results = !is_about(&condition, &is_key);
-        Some(Selection { condition, by_results })
-    }
-
-    /// The statistics of the cells: intervals, tests, comparisons.
-    ///
-    /// # Errors
-    /// As [`Study::score`]; sums of squares beyond 128 bits.
-    pub fn statistics(&self, options: &Options) -> Result<Statistics, StudyError> {
-        let results = self.scan(Outputs { losses: true, ..Outputs::default() })?;
-        self.check_filter(results.episodes.len())?;
-        let counted = self.counted(results);
-        let cells = self.cells_of(&counted.results.episodes)?;
-        self.statistics_of(&counted, &cells, options)
-    }
-
-    fn pooled(&self, episodes: &EpisodeTable) -> Result<Option<Vec<String>>, StudyError> {
-        self.question.pool.then(|| pooled::told(episodes, &self.question.by_over(episodes))).transpose()
-    }
-
     /// A sentence about traces whose checksums are another file's.
     pub fn stale_checksums(&self) -> Option<String> {
         self.source.traces().ok().and_then(|traces| stale_note(traces.files()))
-    }
-
-    fn undecided(&self, lost: &LostCounts) -> LostCounts {
-        if self.question.lost == LostAs::Nothing { lost.clone() } else { LostCounts::default() }
-    }
-
-    fn statistics_of(&self, counted: &Counted, cells: &Cells, options: &Options) -> Result<Statistics, StudyError> {
-        let Counted { results, lost, .. } = counted;
-        let declared = &results.episodes.declared;
-        let (is_known, total) = (results.lost.is_some() || declared.losses_recorded || !lost.is_empty(), lost.total());
-        let beside = self.undecided(lost);
-        let (design, selection) = (design_of(declared), self.selection(&results.episodes));
-        let replies = Replies::of(counted.all.as_ref().unwrap_or(&results.episodes));
-        let lost = is_known.then_some(beside);
-        let failures = (self.question.lost == LostAs::Failure && total > 0).then_some(total);
-        let as_failures = failures.map(|total| format!("{total} lost episodes counted as failures"));
-        let primary = self.plan.as_ref().and_then(|plan| plan.primary.clone());
-        let pooled = self.pooled(&results.episodes)?;
-        let mut options = Options { lost, design, selection, pooled, replies, primary, ..options.clone() };
-        let departures = self.departures(&results.episodes, &options, Looks::Once);
-        let departed = departures.as_ref().map_or(0, Vec::len);
-        let departed = (departed > 0).then(|| format!("departures from the registered plan: {departed}"));
-        options.caveats = as_failures.into_iter().chain(departed).collect();
-        let mut statistics = Statistics::of(&results.episodes, cells, &options)?;
-        statistics.departures = departures;
-        if let Some(total) = failures {
-            let words = format!("{total} lost episodes are counted as failures in every rate that each episode has.");
-            statistics.warnings.push(words);
-        }
-        statistics.warnings.extend(self.stale_checksums());
-        Ok(statistics)
-    }
-
-    /// What may be said while the study still runs: confidence sequences and e-values.
-    ///
-    /// # Errors
-    /// As [`Study::statistics`].
-    pub fn sequential(&self, options: &Options) -> Result<Sequential, StudyError> {
-        let results = self.scan(Outputs { losses: true, ..Outputs::default() })?;
-        self.check_filter(results.episodes.len())?;
-        let episodes = self.counted(results).results.episodes;
-        size::check_comparisons(&episodes)?;
-        let (design, selection) = (design_of(&episodes.declared), self.selection(&episodes));
-        let options = Options { design, selection, pooled: self.pooled(&episodes)?, ..options.clone() };
-        let departures = self.departures(&episodes, &options, Looks::Any);
-        Ok(Sequential { departures, ..Sequential::of(&episodes, &options)? })
     }
 
     /// One figure, with the models in the order of a style.

@@ -8,37 +8,36 @@
 //! | `validate` | the rules that whole episodes keep, alone and together |
 //! | `import` | from JSON lines to a trace |
 //! | `log` | MCAP logs of recordings: written, read, recovered |
+//! | `footers` | what files declare of themselves: clusters, experiments, answering models, checksums |
+//! | `episodes` | one episode: steps, hash, pictures, colours, losses, replies |
+//! | `texts` | rules over free text: attributions, names of models |
 //!
 //! `scan` reads for scoring: `read` and `validate` in one pass. Rule: only this crate opens traces. It knows no metric.
 
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
-pub mod answered;
 pub mod catch_panic;
-pub mod checksums;
-pub mod declared;
-pub mod declared_experiment;
 pub mod diagnostic;
-pub mod episode;
-pub mod episode_hash;
+mod episodes;
 pub mod error;
-pub mod frame;
+mod footers;
 mod glob_paths;
-pub mod identification;
 pub mod import;
 pub mod info;
 pub mod inputs;
 pub mod log;
-pub mod lost;
-pub mod model_id;
-pub mod palette;
 mod read;
-pub mod renormalize;
-pub mod replies;
 pub mod scan;
 pub mod schema;
+mod texts;
 pub mod validate;
 pub mod write;
+
+pub use texts::{identification, model_id, renormalize};
+
+pub use episodes::{episode, episode_hash, frame, lost, palette, replies};
+
+pub use footers::{answered, checksums, declared, declared_experiment};
 
 pub use read::flat::FlatRows;
 pub use read::flat::TableFile;

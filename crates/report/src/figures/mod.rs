@@ -7,25 +7,17 @@
 //! One file per figure. They share `matrix` (the cells as figures see them), `missing` (what a plot cannot show) and the
 //! drawing [`kit`].
 
-pub mod e5_outcomes;
-pub mod film_strip;
-pub mod gaze;
 pub mod kit;
-pub mod sensitivity;
 
-mod completion_gap;
-mod decision_curve;
+mod charts;
 mod error;
-mod heatmap;
-mod intervals;
-mod matrix;
 mod missing;
 mod name;
-mod scatter;
 pub mod shown;
-mod slopes;
-mod spider;
 mod width;
+
+use charts::{completion_gap, decision_curve, heatmap, intervals, matrix, scatter, slopes, spider};
+pub use charts::{e5_outcomes, film_strip, gaze, sensitivity};
 
 pub use error::FigureError;
 #[cfg(feature = "raster")]

@@ -6,27 +6,19 @@
 //! design: paired where scenes are equal, by clusters where they are declared, of independent episodes elsewhere.
 
 mod answers;
-mod cells;
-mod chance;
-mod clusters;
-mod compare;
+mod comparisons;
 mod conclusions;
-mod conditions;
-mod durations;
 mod gate;
-mod losses;
-mod matching;
-mod models;
-mod overall;
-mod ranks;
+mod rates;
 mod replies;
-mod retest;
 mod selection;
-mod sequential;
 mod study;
 pub mod text;
-mod units;
 mod warnings;
+
+use rates::{cells, chance, clusters, durations, overall, ranks, sequential};
+
+use comparisons::{compare, conditions, losses, matching, models, retest, units};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

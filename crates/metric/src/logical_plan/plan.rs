@@ -1,0 +1,314 @@
+//! The checked plan: typed operations over columns, each shared by everything that uses it.
+//!
+//! A plan is a list of nodes in which operands come before their users, so a single pass from the
+//! front evaluates it. Equal operations are one node: what two metrics share is computed once.
+//! Its lowerings (the kernels in `score`) need nothing but this file.
+
+use std::collections::HashMap;
+
+use crate::catalog::Kind;
+use crate::columns::{Level, Type};
+
+/// The position of a node in its plan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct NodeId(pub(crate) usize);
+
+impl NodeId {
+    /// The position as an index into [`Plan::nodes`].
+    pub const fn index(self) -> usize {
+        self.0
+    }
+}
+
+/// One operation, its type and how often it has a value.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Node {
+    pub op: Op,
+    /// The type of the result.
+    pub ty: Type,
+    /// How often there is a result.
+    pub level: Level,
+}
+
+/// The operations. Unless said otherwise a null operand gives null (SQL's three-valued logic), and
+/// operands have been brought to one type and one level, save that any operand may be a constant.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub enum Op {
+    /// A column of the trace.
+    Column(String),
+    /// The timestep t, 1-based.
+    Time,
+    /// The number of steps of the episode, T.
+    Length,
+    Constant(Constant),
+    /// An episode's value for each of its steps, or a constant for each episode or step.
+    Spread(NodeId),
+    /// Logical negation.
+    Not(NodeId),
+    /// Kleene's conjunction: false if either is false.
+    And(NodeId, NodeId),
+    /// Kleene's disjunction: true if either is true.
+    Or(NodeId, NodeId),
+    /// A comparison of two values of one type.
+    Compare(Comparison, NodeId, NodeId),
+    /// Whether two values differ, null being a value like others; never null.
+    Distinct(NodeId, NodeId),
+    /// Whether there is no value; never null.
+    IsNull(NodeId),
+    /// Whether a truth value is true; never null.
+    IsTrue(NodeId),
+    /// Whether a truth value is false; never null.
+    IsFalse(NodeId),
+    /// Sum, difference, product, quotient or remainder; a result beyond 64 bits is an error.
+    Arithmetic(Arithmetic, NodeId, NodeId),
+    /// The value with the other sign.
+    Negate(NodeId),
+    /// The value after the first condition that is true, else the last value, else null.
+    Case {
+        /// Conditions and values, in order.
+        branches: Vec<(NodeId, NodeId)>,
+        otherwise: Option<NodeId>,
+    },
+    /// The first value that is not null.
+    Coalesce(Vec<NodeId>),
+    /// Whether a text contains a match of a regular expression (syntax of the `regex` crate).
+    Matches(NodeId, String),
+    /// 1 for true, 0 for false.
+    IntFromBool(NodeId),
+    /// The same number as a float.
+    FloatFromInt(NodeId),
+    /// One value per episode out of one value per step.
+    Aggregate(Aggregate, NodeId),
+    /// The value of the first operand at the timestep given by the second; null where there is no such step.
+    At(NodeId, NodeId),
+    /// The value at step t - 1 of the same episode; null at the first step.
+    Lag(NodeId),
+}
+
+/// A constant; floats by their bits so that equal constants are one node.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub enum Constant {
+    /// Null of the node's type.
+    Null,
+    Bool(bool),
+    Int(i64),
+    /// The bits of a double.
+    Float(u64),
+    Text(String),
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[expect(missing_docs, reason = "the names say it")]
+pub enum Comparison {
+    Equal,
+    NotEqual,
+    Less,
+    LessEqual,
+    Greater,
+    GreaterEqual,
+}
+
+impl Comparison {
+    /// The comparison that holds with its operands exchanged.
+    #[must_use]
+    pub const fn flipped(self) -> Self {
+        match self {
+            Self::Equal => Self::Equal,
+            Self::NotEqual => Self::NotEqual,
+            Self::Less => Self::Greater,
+            Self::LessEqual => Self::GreaterEqual,
+            Self::Greater => Self::Less,
+            Self::GreaterEqual => Self::LessEqual,
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Arithmetic {
+    /// `x + y`
+    Add,
+    /// `x - y`
+    Subtract,
+    /// `x * y`
+    Multiply,
+    /// `div(x, y)`: integers alone; towards zero; null where y is 0.
+    Quotient,
+    /// `x % y`: integers alone; the sign of x; null where y is 0.
+    Remainder,
+}
+
+/// What leads from steps down to an episode. A null predicate counts as not holding.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Aggregate {
+    /// The t of the first step where the predicate holds, or null.
+    First,
+    /// The t of the last step where the predicate holds, or null.
+    Last,
+    /// Whether it holds at some step; never null.
+    Any,
+    /// Whether it holds at every step; never null.
+    All,
+    /// At how many steps it holds; never null.
+    Count,
+    /// The smallest value, nulls apart; null where there is none.
+    Min,
+    /// The largest value, nulls apart; null where there is none.
+    Max,
+    /// The sum of the values, nulls apart; null where there is none.
+    Sum,
+}
+
+impl Aggregate {
+    /// Returns true if it asks at which steps a predicate holds, and nothing of the steps at which it does not.
+    pub const fn searches(self) -> bool {
+        matches!(self, Self::First | Self::Last | Self::Any | Self::Count)
+    }
+}
+
+/// A metric or a named expression and the node that holds it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Output {
+    /// The metric's name.
+    pub name: String,
+    /// A rate or a quantity.
+    pub kind: Kind,
+    /// Its value per episode: a truth value for most rates, else an integer.
+    pub node: NodeId,
+}
+
+/// Everything that scoring needs to know of some definitions.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Plan {
+    nodes: Vec<Node>,
+    /// The metrics, in the order of the catalog.
+    pub outputs: Vec<Output>,
+    /// The named expressions in the order of definition, for evidence.
+    pub lets: Vec<(String, NodeId)>,
+    /// Aggregates and lookups as they were first written, for evidence.
+    pub sources: HashMap<NodeId, String>,
+    /// Which episodes count; all if absent. An episode-level truth value.
+    pub filter: Option<NodeId>,
+}
+
+impl Plan {
+    /// The nodes, operands before their users.
+    pub fn nodes(&self) -> &[Node] {
+        &self.nodes
+    }
+
+    /// The positions of all nodes, operands before their users.
+    pub fn ids(&self) -> impl DoubleEndedIterator<Item = NodeId> + use<> {
+        (0..self.nodes.len()).map(NodeId)
+    }
+
+    pub fn node(&self, id: NodeId) -> &Node {
+        &self.nodes[id.0]
+    }
+
+    /// Keeps the metrics of these names, in the order of the plan.
+    pub fn select(&mut self, names: &[String]) {
+        self.outputs.retain(|output| names.contains(&output.name));
+    }
+
+    /// The nodes that these need, themselves included, in order.
+    pub fn needed_by(&self, roots: impl IntoIterator<Item = NodeId>) -> Vec<NodeId> {
+        let mut needed = vec![false; self.nodes.len()];
+        roots.into_iter().for_each(|root| needed[root.0] = true);
+        for at in (0..self.nodes.len()).rev() {
+            if needed[at] {
+                self.nodes[at].op.operands().into_iter().for_each(|operand| needed[operand.0] = true);
+            }
+        }
+        (0..self.nodes.len()).filter(|&at| needed[at]).map(NodeId).collect()
+    }
+
+    /// The columns among some nodes, with their levels.
+    pub fn columns(&self, nodes: &[NodeId]) -> Vec<(&str, Level)> {
+        let column = |id: &NodeId| match &self.node(*id).op {
+            Op::Column(name) => Some((name.as_str(), self.node(*id).level)),
+            _ => None,
+        };
+        nodes.iter().filter_map(column).collect()
+    }
+}
+
+impl Op {
+    /// The nodes that this one reads.
+    pub fn operands(&self) -> Vec<NodeId> {
+        let mut operands = Vec::new();
+        let _ = self.with_operands(|operand| {
+            operands.push(operand);
+            operand
+        });
+        operands
+    }
+
+    /// The same operation on other nodes: what `to` gives for each operand, in order.
+    #[must_use]
+    pub fn with_operands(&self, mut to: impl FnMut(NodeId) -> NodeId) -> Self {
+        match self {
+            Self::Column(_) | Self::Time | Self::Length | Self::Constant(_) => self.clone(),
+            Self::Spread(x) => Self::Spread(to(*x)),
+            Self::Not(x) => Self::Not(to(*x)),
+            Self::And(x, y) => Self::And(to(*x), to(*y)),
+            Self::Or(x, y) => Self::Or(to(*x), to(*y)),
+            Self::Compare(comparison, x, y) => Self::Compare(*comparison, to(*x), to(*y)),
+            Self::Distinct(x, y) => Self::Distinct(to(*x), to(*y)),
+            Self::IsNull(x) => Self::IsNull(to(*x)),
+            Self::IsTrue(x) => Self::IsTrue(to(*x)),
+            Self::IsFalse(x) => Self::IsFalse(to(*x)),
+            Self::Arithmetic(op, x, y) => Self::Arithmetic(*op, to(*x), to(*y)),
+            Self::Negate(x) => Self::Negate(to(*x)),
+            Self::Case { branches, otherwise } => Self::Case {
+                branches: branches.iter().map(|(when, then)| (to(*when), to(*then))).collect(),
+                otherwise: otherwise.map(&mut to),
+            },
+            Self::Coalesce(values) => Self::Coalesce(values.iter().map(|value| to(*value)).collect()),
+            Self::Matches(x, pattern) => Self::Matches(to(*x), pattern.clone()),
+            Self::IntFromBool(x) => Self::IntFromBool(to(*x)),
+            Self::FloatFromInt(x) => Self::FloatFromInt(to(*x)),
+            Self::Aggregate(aggregate, x) => Self::Aggregate(*aggregate, to(*x)),
+            Self::At(x, moment) => Self::At(to(*x), to(*moment)),
+            Self::Lag(x) => Self::Lag(to(*x)),
+        }
+    }
+}
+
+/// Builds a plan, one node an operation.
+#[derive(Debug, Default)]
+pub(crate) struct Builder {
+    plan: Plan,
+    known: HashMap<(Op, Type, Level), NodeId>,
+    lags: Vec<u8>,
+}
+
+impl Builder {
+    pub(crate) fn add(&mut self, op: Op, ty: Type, level: Level) -> NodeId {
+        *self.known.entry((op, ty, level)).or_insert_with_key(|(op, ty, level)| {
+            let deepest = op.operands().iter().map(|operand| self.lags[operand.0]).max().unwrap_or(0);
+            self.lags.push(match op {
+                Op::Lag(_) => deepest.saturating_add(1),
+                Op::Aggregate(..) | Op::At(..) => 0,
+                _ => deepest,
+            });
+            self.plan.nodes.push(Node { op: op.clone(), ty: *ty, level: *level });
+            NodeId(self.plan.nodes.len() - 1)
+        })
+    }
+
+    pub(crate) fn lags(&self, id: NodeId) -> u8 {
+        self.lags[id.0]
+    }
+
+    pub(crate) fn remember(&mut self, id: NodeId, text: &str) {
+        self.plan.sources.entry(id).or_insert_with(|| text.to_owned());
+    }
+
+    pub(crate) fn node(&self, id: NodeId) -> &Node {
+        self.plan.node(id)
+    }
+
+    pub(crate) fn finish(self) -> Plan {
+        self.plan
+    }
+}

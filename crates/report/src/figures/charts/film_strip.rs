@@ -1,0 +1,100 @@
+//! The paper's qualitative figure: frames of one episode in a row, what was done and claimed at each, and its moments.
+
+use crate::figures::Figure;
+use crate::figures::kit::{Fill, Frame, MARGIN, Mark, PALETTE, Rgb, Sheet, Stroke, label, lettering};
+
+/// One step as the strip shows it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Still {
+    /// The timestep.
+    pub t: i32,
+    /// The frame, PNG, and its pixels in a row and in a column.
+    pub png: Vec<u8>,
+    /// See `png`.
+    pub size: (u32, u32),
+    /// What was done, in words.
+    pub action: String,
+    /// What was claimed, in words.
+    pub claim: String,
+    /// True if mirror evidence was in view.
+    pub visible: bool,
+    /// The moments of the story that it is.
+    pub moments: Vec<&'static str>,
+}
+
+/// The colour of what was in view, and of the story's moments.
+const SEEN: Rgb = Rgb(0, 119, 187);
+/// The width of a frame, px.
+const WIDTH: f64 = 160.0;
+const GAP: f64 = 6.0;
+/// From one line of text to the next, px.
+const LINE: f64 = 15.0;
+
+/// The strip of these steps.
+pub fn film_strip(title: &str, stills: &[Still]) -> Figure {
+    let count = stills.len().max(1);
+    #[expect(clippy::cast_precision_loss, reason = "a strip has few frames")]
+    let count = count as f64;
+    let heading = lettering::heading();
+    let width = (2.0 * MARGIN + count * (WIDTH + GAP) - GAP).max(2.0 * MARGIN + heading.width(title));
+    let mut sheet = Sheet::new(width);
+    let mut y = MARGIN + LINE / 2.0;
+    sheet.text((MARGIN, y), title, heading);
+    y += LINE;
+    let (mut left, mut bottom) = (MARGIN, y);
+    for still in stills {
+        bottom = bottom.max(draw(&mut sheet, still, left, y));
+        left += WIDTH + GAP;
+    }
+    Figure::new(sheet, bottom + MARGIN, title, described(stills))
+}
+
+fn draw(sheet: &mut Sheet, still: &Still, left: f64, top: f64) -> f64 {
+    let moments = still.moments.join(", ");
+    let label = lettering::label();
+    sheet.text((left, top + LINE / 2.0), &moments, label.semibold());
+    let frame = Frame::new(left, top + LINE, WIDTH, WIDTH * ratio(still.size));
+    let mark = Mark::new(format!("t = {}", still.t))
+        .with("t", still.t)
+        .with("action", &still.action)
+        .with("claim", &still.claim)
+        .with("mirror", if still.visible { "visible" } else { "not visible" });
+    sheet.mark(&mark, |sheet| {
+        sheet.picture(frame, &still.png);
+        if !still.moments.is_empty() {
+            let outline = Stroke::solid(SEEN, 2.0);
+            sheet.line(&corners(frame), outline);
+        }
+    });
+    let mut y = frame.bottom() + LINE * 0.8;
+    let mirror = if still.visible { "mirror evidence in view" } else { "no mirror evidence" };
+    let eye = Frame::new(left, y - 4.0, 8.0, 8.0);
+    let paint = if still.visible { SEEN } else { PALETTE.surface.quiet };
+    sheet.rectangle(eye, Fill::plain(paint));
+    for (at, words) in
+        [mirror.to_owned(), format!("t = {}: {}", still.t, still.action), still.claim.clone()].iter().enumerate()
+    {
+        let indent = if at == 0 { 12.0 } else { 0.0 };
+        let lettering = lettering::tick();
+        sheet.text((left + indent, y), &label::cut(words, WIDTH - indent, lettering), lettering);
+        y += LINE;
+    }
+    y - LINE / 2.0
+}
+
+fn corners(frame: Frame) -> [(f64, f64); 5] {
+    let (left, top, right, bottom) = (frame.left, frame.top, frame.right(), frame.bottom());
+    [(left, top), (right, top), (right, bottom), (left, bottom), (left, top)]
+}
+
+fn ratio((width, height): (u32, u32)) -> f64 {
+    if width == 0 { 0.75 } else { f64::from(height) / f64::from(width) }
+}
+
+fn described(stills: &[Still]) -> String {
+    let words = stills.iter().map(|still| {
+        let moments = if still.moments.is_empty() { String::new() } else { format!(" ({})", still.moments.join(", ")) };
+        format!("t = {}{moments}: {}, {}", still.t, still.action, still.claim)
+    });
+    words.collect::<Vec<_>>().join("; ")
+}

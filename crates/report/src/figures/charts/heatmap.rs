@@ -1,0 +1,121 @@
+//! `heatmap`: models by experiments and metrics; the colour says how good, the number is the mean.
+
+use crate::figures::kit::{
+    Align, Arrangement, Frame, Lettering, MARGIN, PALETTE, Panels, Sheet, label, leading, legend, lettering, many,
+    panels, tiles,
+};
+use crate::figures::matrix::{MetricId, Reading};
+use crate::figures::missing;
+use crate::figures::{Drawn, Scene};
+use metric::catalog::Kind;
+
+const ROW: f64 = 17.0;
+const LEAST_CELL: f64 = 22.0;
+const WIDEST_CELL: f64 = 46.0;
+const BLOCK_GAP: f64 = 10.0;
+const MOST_BLOCKS: usize = 8;
+/// Room for the scale and the signs below, px.
+const LEAST_WIDTH: f64 = 430.0;
+
+pub fn draw(scene: Scene<'_>) -> Drawn {
+    let Scene { matrix, roster, metrics, width: all } = scene;
+    let (labels, label_width) = tiles::row_labels(&roster.names(), scene.name_room());
+    let left = MARGIN + label_width + 8.0;
+    let room = all - MARGIN - left;
+    let least = many(metrics.len()) * LEAST_CELL;
+    let columns = panels::fitting(matrix.experiments.len(), MOST_BLOCKS, room, [least, BLOCK_GAP]);
+    let cell = (room - BLOCK_GAP * many(columns - 1)) / many((columns * metrics.len()).max(1));
+    let cell = cell.clamp(LEAST_CELL, WIDEST_CELL);
+    let blocks_width = cell * many(columns * metrics.len()) + BLOCK_GAP * many(columns - 1);
+    let head = Head::new(metrics, cell);
+    let height = head.height + ROW * many(labels.len());
+    let arranged = Arrangement { left, columns, height, gap: BLOCK_GAP };
+    let width = left + blocks_width + MARGIN;
+    let panels = Panels::new(&matrix.experiments, &matrix.titles(&matrix.experiments), width, arranged);
+    let mut sheet = panels.sheet(width.max(LEAST_WIDTH.min(all)));
+    for first in panels.bodies.iter().step_by(columns) {
+        for (row, label) in labels.iter().enumerate() {
+            sheet.text((MARGIN, first.top + head.height + ROW * (many(row) + 0.5)), label, lettering::label());
+        }
+    }
+    for (experiment, body) in matrix.experiments.iter().zip(&panels.bodies) {
+        head.draw(&mut sheet, *body);
+        draw_block(&mut sheet, scene, experiment, metrics, Frame { top: body.top + head.height, ..*body });
+    }
+    let height = draw_key(&mut sheet, scene, metrics, panels.bottom + 12.0);
+    (sheet, height)
+}
+
+fn draw_key(sheet: &mut Sheet, scene: Scene<'_>, metrics: &[MetricId<'_>], top: f64) -> f64 {
+    let scale = tiles::scale(sheet, (MARGIN, top), |share| PALETTE.ramp.goodness.at(share), ["worse", "better"]);
+    let matrix = scene.matrix;
+    let readings = matrix.pairs().flat_map(|(e, m)| metrics.iter().map(move |metric| matrix.reading(e, m, *metric)));
+    legend::draw_signs(sheet, (scale + 24.0, top), missing::signs(readings)).max(top + 14.0) + MARGIN
+}
+
+/// The names of the metrics above their columns; upright where a column is too narrow for one of them.
+struct Head<'a> {
+    metrics: &'a [MetricId<'a>],
+    lettering: Lettering,
+    height: f64,
+}
+
+impl<'a> Head<'a> {
+    fn new(metrics: &'a [MetricId<'a>], cell: f64) -> Self {
+        const TALLEST: f64 = 60.0;
+        let level = lettering::tick().aligned(Align::Middle);
+        let widest = metrics.iter().map(|metric| level.width(metric.name)).fold(0.0, f64::max);
+        if widest <= cell {
+            return Self { metrics, lettering: level, height: leading(level) + 2.0 };
+        }
+        Self { metrics, lettering: level.aligned(Align::Start).upwards(), height: widest.min(TALLEST) + 5.0 }
+    }
+
+    fn draw(&self, sheet: &mut Sheet, body: Frame) {
+        let cell = body.width / many(self.metrics.len());
+        for (column, metric) in self.metrics.iter().enumerate() {
+            let middle = body.left + cell * (many(column) + 0.5);
+            let at = if self.lettering.upwards {
+                (middle, body.top + self.height - 3.0)
+            } else {
+                (middle, body.top + leading(self.lettering) / 2.0)
+            };
+            let room = if self.lettering.upwards { self.height - 5.0 } else { cell };
+            sheet.text(at, &label::cut(metric.name, room, self.lettering), self.lettering);
+        }
+    }
+}
+
+/// One experiment's cells in `body`.
+fn draw_block(sheet: &mut Sheet, scene: Scene<'_>, experiment: &str, metrics: &[MetricId<'_>], body: Frame) {
+    let cell = body.width / many(metrics.len());
+    for (column, metric) in metrics.iter().enumerate() {
+        for (row, member) in scene.roster.0.iter().enumerate() {
+            let corner = (body.left + cell * many(column), body.top + ROW * many(row));
+            let frame = Frame::new(corner.0, corner.1, cell, ROW).inset(0.5);
+            draw_cell(sheet, scene, (experiment, member.model, *metric), frame);
+        }
+    }
+}
+
+fn draw_cell(sheet: &mut Sheet, scene: Scene<'_>, key: (&str, &str, MetricId<'_>), frame: Frame) {
+    let (experiment, model, metric) = key;
+    let reading = scene.matrix.reading(experiment, model, metric);
+    let goodness = scene.matrix.goodness(experiment, model, metric);
+    let mark = reading.mark(experiment, model, metric.name);
+    sheet.mark(&mark, |sheet| match (reading, goodness) {
+        (Reading::Empty, _) => tiles::empty(sheet, frame),
+        (_, None) => tiles::undefined(sheet, frame),
+        (_, Some(goodness)) => {
+            tiles::known(sheet, frame, PALETTE.ramp.goodness.at(goodness), &texts(reading, metric));
+        }
+    });
+}
+
+fn texts(reading: Reading, metric: MetricId<'_>) -> Vec<String> {
+    let places: &[u32] = match metric.metric.kind {
+        Kind::Rate => &[2, 1],
+        Kind::Quantity => &[1, 0],
+    };
+    places.iter().filter_map(|&places| Some(reading.decimal(places)?.to_string())).collect()
+}

@@ -1,0 +1,206 @@
+//! The cells as figures see them: experiments by models, each with a reading per metric.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::cells::{Cells, Group, KeyValue};
+use crate::figures::kit::Mark;
+use crate::figures::{FigureError, FigureName};
+use exact::moments::Moments;
+use exact::number::Decimal;
+use metric::catalog::{Better, Catalog, Kind, Metric};
+
+/// What a cell says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reading {
+    /// There is no episode of this model in this experiment.
+    Empty,
+    /// There are that many episodes, and the metric is undefined in all of them.
+    Undefined(u64),
+    /// The moments of at least one value.
+    Known(Moments),
+}
+
+impl Reading {
+    /// The mean, where there is one.
+    pub fn mean(self) -> Option<f64> {
+        self.moments().and_then(Moments::mean)
+    }
+
+    /// How many values there are.
+    pub fn n(self) -> u64 {
+        self.moments().map_or(0, |moments| moments.n)
+    }
+
+    /// The moments, where there is a value.
+    pub fn moments(self) -> Option<Moments> {
+        match self {
+            Self::Known(moments) => Some(moments),
+            Self::Empty | Self::Undefined(_) => None,
+        }
+    }
+
+    /// The mean with so many digits behind the point, correctly rounded from the exact fraction.
+    pub fn decimal(self, places: u32) -> Option<Decimal> {
+        let moments = self.moments()?;
+        Decimal::of_ratio(moments.sum, i128::from(moments.n), places)
+    }
+
+    /// The value for a reader who hovers: the mean in full and what it is made of.
+    pub fn words(self) -> String {
+        match self {
+            Self::Empty => "no episodes".to_owned(),
+            Self::Undefined(episodes) => format!("undefined (0 of {episodes} episodes)"),
+            Self::Known(moments) => {
+                let mean = self.decimal(4).map(|mean| mean.to_string()).unwrap_or_default();
+                format!("{mean} ({}/{n}, n = {n})", moments.sum, n = moments.n)
+            }
+        }
+    }
+
+    /// The mark of one cell: its experiment, model, metric, value and number of episodes.
+    pub fn mark(self, experiment: &str, model: &str, metric: &str) -> Mark {
+        Mark::new(format!("{experiment} · {model} · {metric}: {}", self.words()))
+            .with("experiment", experiment)
+            .with("model", model)
+            .with("metric", metric)
+            .value(self.mean())
+            .with("n", self.n())
+    }
+}
+
+/// Experiments by models.
+#[derive(Clone, Debug)]
+pub struct Matrix<'a> {
+    cells: &'a Cells,
+    groups: BTreeMap<(&'a str, &'a str), &'a Group>,
+    /// The experiments that have episodes, in the order of the definitions, unknown ones last by name.
+    pub experiments: Vec<&'a str>,
+    pub models: Vec<&'a str>,
+}
+
+impl<'a> Matrix<'a> {
+    /// Cells by experiment and model as a matrix.
+    pub fn new(cells: &'a Cells) -> Result<Self, FigureError> {
+        let fault = || FigureError::Grouping { found: cells.by.join(",") };
+        let place = |name: &str| cells.by.iter().position(|key| key == name).ok_or_else(fault);
+        let (experiment, model) = (place("experiment")?, place("model")?);
+        if cells.by.len() != 2 {
+            return Err(fault());
+        }
+        let mut groups = BTreeMap::new();
+        for group in &cells.groups {
+            let (KeyValue::Text(experiment), KeyValue::Text(model)) = (&group.key[experiment], &group.key[model])
+            else {
+                return Err(fault());
+            };
+            groups.insert((experiment.as_str(), model.as_str()), group);
+        }
+        if groups.is_empty() {
+            return Err(FigureError::NoEpisodes);
+        }
+        let mut experiments: Vec<_> = groups.keys().map(|&(e, _)| e).collect::<BTreeSet<_>>().into_iter().collect();
+        experiments.sort_by_key(|e| cells.catalog.experiment_rank(e));
+        let models = groups.keys().map(|&(_, m)| m).collect::<BTreeSet<_>>().into_iter().collect();
+        Ok(Self { cells, groups, experiments, models })
+    }
+
+    /// Every experiment with every model, whether or not it has episodes.
+    pub fn pairs(&self) -> impl Iterator<Item = (&'a str, &'a str)> {
+        self.experiments.iter().flat_map(|&experiment| self.models.iter().map(move |&model| (experiment, model)))
+    }
+
+    /// The place of a metric among the cells.
+    pub fn metric(&self, figure: FigureName, name: &str) -> Result<MetricId<'a>, FigureError> {
+        let found = self.cells.metrics.iter().position(|metric| metric == name).and_then(|at| self.metric_at(at));
+        found.ok_or_else(|| FigureError::UnknownMetric {
+            figure,
+            metric: name.to_owned(),
+            known: self.cells.metrics.join(", "),
+        })
+    }
+
+    /// The definitions of the metrics.
+    pub fn catalog(&self) -> &'a Catalog {
+        &self.cells.catalog
+    }
+
+    /// All metrics in the order of the cells.
+    pub fn metrics(&self) -> Vec<MetricId<'a>> {
+        (0..self.cells.metrics.len()).filter_map(|at| self.metric_at(at)).collect()
+    }
+
+    fn metric_at(&self, at: usize) -> Option<MetricId<'a>> {
+        let name = self.cells.metrics.get(at)?;
+        Some(MetricId { name, at, metric: self.cells.catalog.metric.get(name)? })
+    }
+
+    /// What the cell of `model` in `experiment` says of `metric`.
+    pub fn reading(&self, experiment: &str, model: &str, metric: MetricId<'_>) -> Reading {
+        let Some(group) = self.groups.get(&(experiment, model)) else { return Reading::Empty };
+        match group.moments.get(metric.at) {
+            Some(&moments) if moments.n > 0 => Reading::Known(moments),
+            _ => Reading::Undefined(group.episodes),
+        }
+    }
+
+    /// The mean on a scale from 0, the worst, to 1, the best; `None` where there is no mean.
+    ///
+    /// A rate is taken as it is, or from 1 where less is better. A quantity is set between the least and the
+    /// greatest mean of its experiment; where all are equal nothing ranks them, and each stands at a half.
+    pub fn goodness(&self, experiment: &str, model: &str, metric: MetricId<'_>) -> Option<f64> {
+        let mean = self.reading(experiment, model, metric).mean()?;
+        let share = match metric.metric.kind {
+            Kind::Rate => mean,
+            Kind::Quantity => {
+                let (low, high) = self.span(experiment, metric)?;
+                if high > low { (mean - low) / (high - low) } else { 0.5 }
+            }
+        };
+        Some(match metric.metric.better {
+            Better::Lower => 1.0 - share,
+            Better::Higher | Better::Neither => share,
+        })
+    }
+
+    /// The least and the greatest mean of an experiment; `None` where there is no mean.
+    pub fn span(&self, experiment: &str, metric: MetricId<'_>) -> Option<(f64, f64)> {
+        let means = self.models.iter().filter_map(|model| self.reading(experiment, model, metric).mean());
+        means.fold(None, |span, mean| {
+            let (low, high) = span.unwrap_or((mean, mean));
+            Some((low.min(mean), high.max(mean)))
+        })
+    }
+
+    /// The value of blind guessing, where there is one.
+    pub fn chance(&self, experiment: &str, metric: MetricId<'_>) -> Option<f64> {
+        self.cells.catalog.chance(experiment, metric.name).map(exact::ratio::Ratio::value)
+    }
+
+    /// What some blind strategies would reach where there is no chance level, as text and value.
+    pub fn references(&self, experiment: &str, metric: MetricId<'_>) -> Vec<(String, f64)> {
+        let known = self.cells.catalog.experiment.get(experiment).and_then(|e| e.reference.get(metric.name));
+        known.into_iter().flatten().map(|level| (level.to_string(), level.value())).collect()
+    }
+
+    /// The experiments' titles, empty where the definitions have none.
+    pub fn titles(&self, experiments: &[&str]) -> Vec<&'a str> {
+        let title = |name: &&str| self.cells.catalog.experiment.get(*name).map_or("", |e| e.title.as_str());
+        experiments.iter().map(title).collect()
+    }
+}
+
+/// A metric that is there.
+#[derive(Clone, Copy, Debug)]
+pub struct MetricId<'a> {
+    pub name: &'a str,
+    pub metric: &'a Metric,
+    at: usize,
+}
+
+impl MetricId<'_> {
+    /// The name as the end of an attribute's name.
+    pub fn attribute(self) -> String {
+        let plain = |c: char| if c.is_ascii_alphanumeric() || c == '_' { c.to_ascii_lowercase() } else { '-' };
+        self.name.chars().map(plain).collect()
+    }
+}

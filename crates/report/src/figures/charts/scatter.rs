@@ -1,0 +1,104 @@
+//! `scatter`: one rate against another, one point per model and experiment, its size a relative duration.
+
+use crate::figures::kit::{
+    Arrangement, Frame, MARGIN, Mark, Member, PALETTE, Panels, Plot, Sheet, Stroke, Swatch, dodge, legend, marker,
+    panels, rate_ticks,
+};
+use crate::figures::matrix::{MetricId, Reading};
+use crate::figures::missing::{self, Strip};
+use crate::figures::{Drawn, Scene};
+
+const MOST_COLUMNS: usize = 3;
+const LEAST_PANEL: f64 = 120.0;
+/// The radius of the slowest model's marker, px; area goes by relative duration.
+const LARGEST: f64 = 5.6;
+/// The radius below which a shape cannot be told, px.
+const SMALLEST: f64 = 2.0;
+/// Room for the numbers and the title of the axis at the left, px.
+const AXIS_ROOM: f64 = 34.0;
+const AXIS_BELOW: f64 = 28.0;
+
+pub fn draw(scene: Scene<'_>) -> Drawn {
+    let Scene { matrix, roster, metrics, width: all } = scene;
+    let ids = [metrics[0], metrics[1], metrics[2]];
+    let gap = AXIS_ROOM + 8.0;
+    let left = MARGIN + AXIS_ROOM;
+    let (columns, width) = panels::most(MOST_COLUMNS, all - left - MARGIN, [LEAST_PANEL, gap]);
+    let strips: Vec<_> = matrix.experiments.iter().map(|e| Strip::new(matrix, roster, e, &ids[..2], width)).collect();
+    let below = AXIS_BELOW + strips.iter().map(Strip::height).fold(0.0, f64::max);
+    let arranged = Arrangement { left, columns, height: width + below, gap };
+    let panels = Panels::new(&matrix.experiments, &matrix.titles(&matrix.experiments), all, arranged);
+    let mut sheet = panels.sheet(all);
+    for ((experiment, body), strip) in matrix.experiments.iter().zip(&panels.bodies).zip(&strips) {
+        let plot = Plot::new(Frame { height: width, ..*body }, -0.06..1.06, -0.06..1.06);
+        axes(&mut sheet, &plot, ids);
+        points(&mut sheet, scene, experiment, ids, &plot);
+        strip.draw(&mut sheet, (body.left, body.top + width + AXIS_BELOW));
+    }
+    let signs = signs(ids).into_iter().chain(missing::strip_signs(&strips)).collect();
+    let height = legend::around(&mut sheet, roster, &panels, Swatch::Marker, signs);
+    (sheet, height)
+}
+
+fn axes(sheet: &mut Sheet, plot: &Plot, [x, y, _]: [MetricId<'_>; 3]) {
+    plot.x_axis(sheet, &rate_ticks());
+    plot.y_axis(sheet, &rate_ticks());
+    plot.x_title(sheet, x.name);
+    plot.y_title(sheet, y.name, 26.0);
+    sheet.line(&[plot.at(0.0, 0.0), plot.at(1.0, 1.0)], diagonal());
+}
+
+fn diagonal() -> Stroke {
+    Stroke { color: PALETTE.surface.axis, width: 1.0, dash: &[4.0, 3.0] }
+}
+
+fn points(sheet: &mut Sheet, scene: Scene<'_>, experiment: &str, ids: [MetricId<'_>; 3], plot: &Plot) {
+    let slowest = scene.matrix.span(experiment, ids[2]).map(|(_, slowest)| slowest);
+    let readings = |member: &Member<'_>| ids.map(|id| scene.matrix.reading(experiment, member.model, id));
+    let seen = scene.roster.0.iter().filter_map(|member| {
+        let [x, y, duration] = readings(member);
+        Some((*member, x.mean()?, y.mean()?, radius(duration.mean(), slowest)))
+    });
+    let mut seen: Vec<_> = seen.collect();
+    // The large first, so that they do not hide the small.
+    seen.sort_by(|a, b| b.3.total_cmp(&a.3));
+    let places: Vec<_> = seen.iter().map(|&(_, x, y, _)| plot.at(x, y)).collect();
+    let places = dodge::fanned(&places, 7.0);
+    for ((member, x, y, radius), place) in seen.into_iter().zip(places) {
+        let [of_x, reading, duration] = readings(&member);
+        let words = [reading, of_x, duration].map(Reading::words);
+        let names = [ids[1], ids[0], ids[2]].map(|id| id.name);
+        let parts: Vec<_> = names.iter().zip(&words).map(|(name, words)| format!("{name}: {words}")).collect();
+        let title = format!("{experiment} · {} · {}", member.model, parts.join(" · "));
+        let mark = Mark::new(title)
+            .with("experiment", experiment)
+            .with("model", member.model)
+            .with("metric", ids[1].name)
+            .value(Some(y))
+            .with("n", reading.n())
+            .number(ids[0].attribute(), Some(x))
+            .number(ids[2].attribute(), duration.mean());
+        sheet.mark(&mark, |sheet| marker::draw(sheet, place, radius, member.style));
+    }
+}
+
+/// Area by duration relative to the slowest; the smallest size where there is none.
+fn radius(duration: Option<f64>, slowest: Option<f64>) -> f64 {
+    match (duration, slowest) {
+        (Some(duration), Some(slowest)) if slowest > 0.0 => {
+            (LARGEST * (duration / slowest).max(0.0).sqrt()).max(SMALLEST)
+        }
+        _ => SMALLEST,
+    }
+}
+
+fn signs([x, y, duration]: [MetricId<'_>; 3]) -> Vec<(Swatch, String)> {
+    let ring = |share: f64| Swatch::Ring(radius(Some(share), Some(1.0)));
+    vec![
+        (ring(1.0), format!("{} of the slowest model", duration.name)),
+        (ring(0.5), "half of it".to_owned()),
+        (ring(0.2), "a fifth of it".to_owned()),
+        (Swatch::Rule(diagonal()), format!("{} = {}", y.name, x.name)),
+        (Swatch::None, "points with the same values are fanned out".to_owned()),
+    ]
+}

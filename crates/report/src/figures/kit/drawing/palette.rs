@@ -1,0 +1,200 @@
+//! Colours, markers and dashes: `assets/palette.toml`, read once.
+
+use std::sync::LazyLock;
+
+use serde::Deserialize;
+
+use crate::figures::kit::frame::many;
+use crate::figures::kit::look::{Rgb, Stroke};
+
+/// The palette of all figures.
+pub static PALETTE: LazyLock<Palette> = LazyLock::new(|| {
+    let text = include_str!("../../../../../../assets/palette.toml");
+    toml::from_str(text).expect("the built-in palette is well-formed: a test reads it")
+});
+
+/// Everything that has a colour.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Palette {
+    /// The models whose style is the one at their place.
+    pub pinned: Vec<String>,
+    pub surface: Surface,
+    /// Values as colours.
+    pub ramp: Ramps,
+    /// The outcomes of an open question.
+    pub outcome: Outcome,
+    /// Landmarks of an episode.
+    pub gaze: Gaze,
+    pub style: Vec<ModelStyle>,
+}
+
+/// What is not data.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Surface {
+    /// Text that is read first.
+    pub text: Rgb,
+    /// Text that is read second.
+    pub quiet: Rgb,
+    /// Grid lines.
+    pub rule: Rgb,
+    /// Axes and frames.
+    pub axis: Rgb,
+    pub paper: Rgb,
+    /// Hatches and crosses of missing values.
+    pub hatch: Rgb,
+    /// Levels of chance.
+    pub chance: Rgb,
+    /// Reference levels.
+    pub reference: Rgb,
+}
+
+/// Values as colours, from low to high.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Ramps {
+    /// From the worst to the best.
+    pub goodness: Ramp,
+    /// From nothing to the largest rise.
+    pub rise: Ramp,
+    /// From nothing to the largest fall.
+    pub fall: Ramp,
+}
+
+/// The outcomes of an open question.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Outcome {
+    pub correct: Rgb,
+    /// Another colour.
+    pub wrong: Rgb,
+    /// `unknown`, or none given.
+    pub uncommitted: Rgb,
+}
+
+/// Landmarks of an episode.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Gaze {
+    /// The steps of an episode.
+    pub episode: Rgb,
+    /// Steps with the mirror in view.
+    pub visible: Rgb,
+    pub first_sight: Rgb,
+    /// The first claim of a colour.
+    pub claim: Rgb,
+    /// The step of the decision.
+    pub decision: Rgb,
+}
+
+/// How one model is drawn.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ModelStyle {
+    /// The colour of its line and marker.
+    pub color: Rgb,
+    /// The shape of its marker.
+    pub marker: Shape,
+    /// True if the marker is an outline.
+    #[serde(default)]
+    pub hollow: bool,
+    /// The dash of its line.
+    pub dash: Vec<f64>,
+}
+
+impl ModelStyle {
+    pub fn stroke(&'static self, width: f64) -> Stroke {
+        Stroke { color: self.color, width, dash: &self.dash }
+    }
+}
+
+/// The shapes of markers; the names say what they are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Shape {
+    Circle,
+    Square,
+    Triangle,
+    TriangleDown,
+    Diamond,
+    Pentagon,
+    Hexagon,
+    Star,
+    Cross,
+    Bar,
+}
+
+/// Colours at even distances, mixed linearly in between.
+#[derive(Debug, Deserialize)]
+pub struct Ramp(Vec<Rgb>);
+
+impl Ramp {
+    /// The colour at `share` of the way, held to [0, 1].
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "inside the ramp by construction")]
+    pub fn at(&self, share: f64) -> Rgb {
+        let steps = self.0.len().saturating_sub(1);
+        let place = share.clamp(0.0, 1.0) * many(steps);
+        let below = (place.floor() as usize).min(steps.saturating_sub(1));
+        let part = place - many(below);
+        let (from, to) = (self.0[below], self.0[(below + 1).min(steps)]);
+        let mix = |a: u8, b: u8| (f64::from(a) + (f64::from(b) - f64::from(a)) * part).round() as u8;
+        Rgb(mix(from.0, to.0), mix(from.1, to.1), mix(from.2, to.2))
+    }
+}
+
+/// The colour of text that can be read on `ground`: by relative luminance, as the web's guidelines define it.
+pub fn text_on(ground: Rgb) -> Rgb {
+    // Where contrast with white and with the text colour are about equal.
+    const MIDDLE: f64 = 0.21;
+    let surface = &PALETTE.surface;
+    if luminance(ground) < MIDDLE { surface.paper } else { surface.text }
+}
+
+/// Relative luminance in [0, 1] (WCAG 2.2).
+pub fn luminance(Rgb(red, green, blue): Rgb) -> f64 {
+    let linear = |channel: u8| {
+        let share = f64::from(channel) / 255.0;
+        if share <= 0.04045 { share / 12.92 } else { ((share + 0.055) / 1.055).powf(2.4) }
+    };
+    0.2126 * linear(red) + 0.7152 * linear(green) + 0.0722 * linear(blue)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashSet;
+
+    use super::{PALETTE, Ramp, luminance};
+
+    #[test]
+    fn twenty_models_can_be_told_apart_without_colour() {
+        let kinds: HashSet<_> = PALETTE.style.iter().map(|style| (style.marker, style.hollow)).collect();
+        assert_eq!((PALETTE.style.len(), kinds.len()), (20, 20));
+        assert!(PALETTE.pinned.len() < PALETTE.style.len());
+    }
+
+    #[test]
+    fn every_model_stands_out_from_the_paper() {
+        for style in &PALETTE.style {
+            assert!(1.05 / (luminance(style.color) + 0.05) > 2.0, "{style:?}");
+        }
+    }
+
+    #[test]
+    fn ramps_darken_all_the_way_so_that_grey_print_keeps_the_order() {
+        let falls = |ramp: &Ramp| {
+            (0..100).all(|i| {
+                let at = |i: i32| luminance(ramp.at(f64::from(i) / 100.0));
+                at(i) > at(i + 1)
+            })
+        };
+        assert!(falls(&PALETTE.ramp.goodness) && falls(&PALETTE.ramp.rise) && falls(&PALETTE.ramp.fall));
+    }
+
+    #[test]
+    fn outcomes_differ_in_lightness() {
+        let outcome = &PALETTE.outcome;
+        let [dark, middle, light] = [outcome.correct, outcome.wrong, outcome.uncommitted].map(luminance);
+        assert!(dark + 0.2 < middle && middle + 0.2 < light);
+    }
+}

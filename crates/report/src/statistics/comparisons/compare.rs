@@ -1,0 +1,452 @@
+//! One block minus another under one metric: by their pairs where they have pairs, else as independent samples.
+
+use std::collections::BTreeSet;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::statistics::durations::{decided, is_duration};
+use crate::statistics::losses::{LossCase, LossCases, Toward, settle};
+use crate::statistics::matching::Matched;
+use crate::statistics::retest::repeat_variance;
+use crate::statistics::study::{Block, Study, Unit};
+use crate::statistics::units::Sides;
+use crate::statistics::units::Units;
+use exact::moments::Moments;
+use metric::catalog::{Kind, StandardError};
+use score::table::MetricColumn;
+use statistics::competing::{Ending, Outcome};
+use statistics::contrast::{newcombe, welch};
+use statistics::coverage::{self, Withheld};
+use statistics::holm::{holm, level};
+use statistics::interval::{Interval, student_t};
+use statistics::outcomes::ExactTest;
+use statistics::paired::Pairs;
+use statistics::restricted::{Difference, by_units, fewest, independent, paired, shared_horizon};
+use statistics::units;
+use statistics::unpaired::fisher;
+
+/// How a difference was tested, and what its interval is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// Pairs of a rate: the exact test of `McNemar`, Newcombe's interval for pairs.
+    Mcnemar,
+    /// Independent rates: Fisher's exact test, Newcombe's hybrid score interval.
+    Fisher,
+    /// Pairs of a duration: restricted means, Student's t interval and test of their difference.
+    RestrictedMeanPaired,
+    /// Independent durations: the same with Satterthwaite's degrees of freedom.
+    RestrictedMean,
+    /// Pairs of another quantity: Student's t interval of the differences; no test.
+    StudentPaired,
+    /// Independent samples of another quantity: Welch's t interval; no test.
+    Welch,
+    /// Rates of scenes, seeds or participants with several episodes, or of which some are pairs: the exact permutation
+    /// test within shared units and among the others; no interval.
+    Units,
+}
+
+/// The first minus the second.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Comparison {
+    /// The test and the interval.
+    pub method: Method,
+    /// The episodes compared: of each side those in which the metric is defined; of pairs, those defined in both.
+    pub n: [u64; 2],
+    /// The successes among them; none for quantities.
+    pub successes: Option<[u64; 2]>,
+    /// The 2x2 table; none where the samples are independent.
+    pub pairs: Option<Pairs>,
+    /// Pairs left out because the metric is undefined in one episode or both.
+    pub undefined: u64,
+    /// The horizon of restricted means, in steps.
+    pub horizon: Option<i64>,
+    /// The first mean minus the second, over the episodes compared.
+    pub difference: Option<f64>,
+    /// Its interval, not adjusted for the number of comparisons.
+    pub interval: Option<Interval>,
+    /// The reason why there is no interval.
+    pub withheld: Option<Withheld>,
+    /// The standard error from repeats alone: by how much the difference of means varies if the same scenes are played
+    /// again; none unless both sides repeat scenes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub repeat_se: Option<f64>,
+    /// The p value, two-sided: exact and by minimum likelihood for rates, by Student's t for durations.
+    pub p: Option<f64>,
+    /// The mid-p value of a rate, which is not guaranteed to keep the level.
+    pub mid_p: Option<f64>,
+    /// `p` adjusted by Holm's method over the family.
+    pub p_adjusted: Option<f64>,
+    /// True if the value adjusted by Holm reaches the level of significance.
+    pub separated: bool,
+    /// The units of analysis of both sides where the test counts each once, however many episodes it has.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub units: Option<Units>,
+    /// The test with the lost episodes of both sides; none where none was lost.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub losses: Option<LossCases>,
+    /// The setting in which the two sides were recorded differently, so that nothing is compared.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub incomparable: Option<String>,
+}
+
+/// What two blocks are compared by.
+pub(in crate::statistics) struct Compared<'s, 'a> {
+    pub study: &'s Study<'a>,
+    pub first: &'s Block<'a>,
+    pub second: &'s Block<'a>,
+    pub matched: &'s Matched,
+    pub horizon: Option<i64>,
+    pub confidence: f64,
+}
+
+impl Compared<'_, '_> {
+    /// The comparison under one metric, not adjusted yet.
+    pub fn under(&self, column: &MetricColumn) -> Comparison {
+        let rates = self.study.kind(&column.name) == Kind::Rate;
+        let sides = Sides::of(self.study, column, &[(self.first, self.second)]);
+        let found = match &sides {
+            Some(sides) if rates => self.rates_by_unit(column, sides),
+            _ if !rates && self.is_dependent() => self.quantity_by_unit(column),
+            _ => self.of_episodes(column),
+        };
+        let lost = if found.p.is_some() { self.first.lost + self.second.lost } else { 0 };
+        let losses = LossCases::of(lost, |toward| self.with_lost(column, &found, sides.as_ref(), toward));
+        let noise = |block| repeat_variance(self.study, block, column);
+        let repeat_se = noise(self.first).zip(noise(self.second)).map(|(a, b)| (a + b).sqrt());
+        Comparison { repeat_se, losses, ..found }
+    }
+
+    /// The test with the lost episodes of both sides: in a comparison by pairs or units, each is a pair against a known
+    /// outcome, which is the most that it can do.
+    fn with_lost(&self, column: &MetricColumn, seen: &Comparison, sides: Option<&Sides>, toward: Toward) -> LossCase {
+        let is_highest = toward == Toward::Highest;
+        let lost = self.first.lost + self.second.lost;
+        let rate = |block: &Block, is_first| toward.moments(block.moments(column), block.lost, is_first);
+        let (a, b) = (rate(self.first, true), rate(self.second, false));
+        let difference = a.mean().zip(b.mean()).map(|(a, b)| a - b);
+        match seen.method {
+            Method::Mcnemar => {
+                let mut pairs = seen.pairs.unwrap_or_default();
+                *(if is_highest { &mut pairs.first_only } else { &mut pairs.second_only }) += lost;
+                LossCase { difference: pairs.difference(), p: pairs.mcnemar() }
+            }
+            Method::Fisher => {
+                let test = a.counts().zip(b.counts()).and_then(|(a, b)| fisher(a, b));
+                LossCase { difference, p: test.map(|test| test.p) }
+            }
+            Method::Units => {
+                let one = |is_first| toward.moments(Moments::default(), 1, is_first);
+                let lost: Vec<_> = (0..lost).map(|_| (one(true), one(false))).collect();
+                LossCase { difference, p: sides.and_then(|sides| sides.test(&lost)).map(|test| test.p) }
+            }
+            Method::RestrictedMeanPaired | Method::RestrictedMean => {
+                let found = seen.horizon.and_then(|horizon| match seen.units {
+                    Some(_) => by_units(
+                        &self.lost_units(self.times(column, horizon)?, horizon, toward),
+                        horizon,
+                        self.confidence,
+                    ),
+                    None => self.restricted(&self.lost_endings(column, horizon, toward), horizon),
+                });
+                LossCase { difference: found.map(|it| it.difference), p: found.and_then(|it| it.p) }
+            }
+            Method::StudentPaired | Method::Welch => LossCase::default(),
+        }
+    }
+
+    /// The ends of both sides and of their lost episodes, which decide at once or never.
+    fn lost_endings(&self, column: &MetricColumn, horizon: i64, toward: Toward) -> [Vec<Ending>; 2] {
+        let fast = Ending { steps: 1, outcome: Outcome::Correct };
+        let slow = Ending { steps: horizon, outcome: Outcome::Unfinished };
+        let ends = if toward == Toward::Highest { [slow, fast] } else { [fast, slow] };
+        let mut sides = self.endings(column);
+        let lost = self.first.lost + self.second.lost;
+        let counts = if self.matched.pairs.is_some() { [lost; 2] } else { [self.first.lost, self.second.lost] };
+        for ((side, end), count) in sides.iter_mut().zip(ends).zip(counts) {
+            side.extend((0..count).map(|_| end));
+        }
+        sides
+    }
+
+    /// The same of units: each lost episode is one of its own.
+    fn lost_units(&self, mut sides: units::Sides, horizon: i64, toward: Toward) -> units::Sides {
+        let one = |steps: i64| Moments::default().with(steps).unwrap_or_default();
+        let ends = if toward == Toward::Highest { [one(horizon), one(1)] } else { [one(1), one(horizon)] };
+        let lost = [self.first.lost, self.second.lost];
+        if sides.shared.is_empty() {
+            sides.first.extend((0..lost[0]).map(|_| ends[0]));
+            sides.second.extend((0..lost[1]).map(|_| ends[1]));
+        } else {
+            sides.shared.extend((0..lost[0] + lost[1]).map(|_| (ends[0], ends[1])));
+        }
+        sides
+    }
+
+    /// Returns true if a unit enters the comparison of episodes more than once.
+    fn is_dependent(&self) -> bool {
+        let Some(pairs) = &self.matched.pairs else {
+            return self.first.repeats || self.second.repeats;
+        };
+        let units: BTreeSet<Unit> = pairs.iter().map(|&(row, _)| self.study.unit(row)).collect();
+        units.len() < pairs.len()
+    }
+
+    fn rates_by_unit(&self, column: &MetricColumn, sides: &Sides) -> Comparison {
+        let (a, b) = (self.first.moments(column), self.second.moments(column));
+        let test = sides.test(&[]);
+        let least = test.map_or(1.0, |test| test.least);
+        let table = |rows: &Vec<(usize, usize)>| {
+            Pairs::of(rows.iter().filter_map(|&(a, b)| Some((column.get(a)?, column.get(b)?))))
+        };
+        Comparison {
+            successes: a.counts().zip(b.counts()).map(|(a, b)| [a.0, b.0]),
+            difference: a.mean().zip(b.mean()).map(|(a, b)| a - b),
+            withheld: Some(Withheld::Dependent),
+            pairs: self.matched.pairs.as_ref().filter(|_| !self.is_dependent()).map(table),
+            p: test.map(|test| test.p),
+            units: Some(Units::new(self.study, self.first, sides.len(), least, self.confidence)),
+            ..Comparison::of(Method::Units, [a.n, b.n])
+        }
+    }
+
+    /// A duration by unit where its times up to the horizon are all known; another quantity has no test.
+    fn quantity_by_unit(&self, column: &MetricColumn) -> Comparison {
+        let seen = self.of_episodes(column).withheld_as_dependent();
+        if !is_duration(self.study, &column.name) {
+            return seen;
+        }
+        let rows = || [self.first, self.second].into_iter().flat_map(Block::rows);
+        let Some(horizon) = seen.horizon else { return seen };
+        let unknown = |row: &usize| {
+            let end = decided(self.study, column, *row);
+            end.is_some_and(|end| end.outcome == Outcome::Unfinished && end.steps < horizon)
+        };
+        let unknown = rows().filter(unknown).count() as u64;
+        if unknown > 0 {
+            let units = Units { n: unknown, name: "interrupted episodes".to_owned(), too_few: true };
+            return Comparison { units: Some(units), ..seen };
+        }
+        let Some(sides) = self.times(column, horizon) else { return seen };
+        let is_paired = !sides.shared.is_empty();
+        let n = if is_paired { sides.shared.len() } else { sides.first.len().min(sides.second.len()) };
+        let found = by_units(&sides, horizon, self.confidence);
+        let least = if (n as u64) < fewest_of(self.confidence) { 1.0 } else { 0.0 };
+        let units = Units::new(self.study, self.first, n, least, self.confidence);
+        let method = if is_paired { Method::RestrictedMeanPaired } else { Method::RestrictedMean };
+        let tested = Comparison::of_durations(method, [n as u64; 2], found, self.confidence);
+        Comparison { n: seen.n, units: Some(units), ..tested }
+    }
+
+    /// The times of both sides up to the horizon, by unit.
+    fn times(&self, column: &MetricColumn, horizon: i64) -> Option<units::Sides> {
+        let time = |row| decided(self.study, column, row).map(|end| end.steps.min(horizon));
+        Sides::by(self.study, &[(self.first, self.second)], time).divided()
+    }
+
+    fn of_episodes(&self, column: &MetricColumn) -> Comparison {
+        if is_duration(self.study, &column.name) {
+            return self.durations(column);
+        }
+        let rates = self.study.kind(&column.name) == Kind::Rate;
+        match &self.matched.pairs {
+            Some(pairs) if rates => self.paired_rate(column, pairs),
+            Some(pairs) => self.paired_quantity(column, pairs),
+            None => self.independent(column, rates),
+        }
+    }
+
+    fn paired_rate(&self, column: &MetricColumn, rows: &[(usize, usize)]) -> Comparison {
+        let pairs = Pairs::of(rows.iter().filter_map(|&(a, b)| Some((column.get(a)?, column.get(b)?))));
+        let test = pairs.mcnemar().zip(pairs.mcnemar_mid_p()).map(|(p, mid_p)| ExactTest { p, mid_p });
+        Comparison {
+            successes: Some([pairs.both + pairs.first_only, pairs.both + pairs.second_only]),
+            pairs: Some(pairs),
+            undefined: rows.len() as u64 - pairs.n(),
+            difference: pairs.difference(),
+            interval: pairs.interval(self.confidence),
+            ..Comparison::of(Method::Mcnemar, [pairs.n(); 2]).tested(test)
+        }
+    }
+
+    fn paired_quantity(&self, column: &MetricColumn, rows: &[(usize, usize)]) -> Comparison {
+        let mut differences = rows.iter().filter_map(|&(a, b)| column.get(a)?.checked_sub(column.get(b)?));
+        // No sum of squares that 128 bits cannot hold: then there is no interval.
+        let moments = differences.try_fold(Moments::default(), Moments::with).unwrap_or_default();
+        let interval = student_t(&moments, StandardError::Sample, self.confidence);
+        let spread = moments.se(StandardError::Sample).is_some_and(|se| se > 0.0);
+        let (interval, withheld) = coverage::given(interval, moments.n, coverage::STUDENT, spread);
+        Comparison {
+            undefined: rows.len() as u64 - moments.n,
+            difference: moments.mean(),
+            interval,
+            withheld,
+            ..Comparison::of(Method::StudentPaired, [moments.n; 2])
+        }
+    }
+
+    fn independent(&self, column: &MetricColumn, rates: bool) -> Comparison {
+        let (a, b) = (self.first.moments(column), self.second.moments(column));
+        let difference = a.mean().zip(b.mean()).map(|(a, b)| a - b);
+        let counted = rates.then(|| a.counts().zip(b.counts())).flatten();
+        if let Some((first, second)) = counted {
+            return Comparison {
+                successes: Some([first.0, second.0]),
+                difference,
+                interval: newcombe(first, second, self.confidence),
+                ..Comparison::of(Method::Fisher, [a.n, b.n]).tested(fisher(first, second))
+            };
+        }
+        let spread = [a, b].iter().any(|side| side.se(StandardError::Sample).is_some_and(|se| se > 0.0));
+        let (interval, withheld) =
+            coverage::given(welch(&a, &b, self.confidence), a.n.min(b.n), coverage::WELCH, spread);
+        Comparison { difference, interval, withheld, ..Comparison::of(Method::Welch, [a.n, b.n]) }
+    }
+
+    fn durations(&self, column: &MetricColumn) -> Comparison {
+        let sides = self.endings(column);
+        let horizon = self.horizon.or_else(|| shared_horizon(&sides[0], &sides[1]));
+        let found = horizon.and_then(|horizon| self.restricted(&sides, horizon));
+        let n = sides.map(|side| side.len() as u64);
+        let (method, undefined) = match &self.matched.pairs {
+            Some(pairs) => (Method::RestrictedMeanPaired, pairs.len() as u64 - n[0]),
+            None => (Method::RestrictedMean, 0),
+        };
+        Comparison { undefined, ..Comparison::of_durations(method, n, found, self.confidence) }
+    }
+
+    /// The ends of both sides' episodes; of pairs, those of which both have one, in the same order.
+    fn endings(&self, column: &MetricColumn) -> [Vec<Ending>; 2] {
+        let ending = |row: usize| decided(self.study, column, row);
+        match &self.matched.pairs {
+            Some(pairs) => pairs.iter().filter_map(|&(a, b)| ending(a).zip(ending(b))).unzip().into(),
+            None => [self.first, self.second].map(|block| block.rows().filter_map(ending).collect()),
+        }
+    }
+
+    fn restricted(&self, [first, second]: &[Vec<Ending>; 2], horizon: i64) -> Option<Difference> {
+        if self.matched.pairs.is_none() {
+            return independent(first, second, horizon, self.confidence);
+        }
+        let pairs: Vec<_> = first.iter().copied().zip(second.iter().copied()).collect();
+        paired(&pairs, horizon, self.confidence)
+    }
+}
+
+impl Comparison {
+    fn of(method: Method, n: [u64; 2]) -> Self {
+        Self {
+            method,
+            n,
+            successes: None,
+            pairs: None,
+            undefined: 0,
+            horizon: None,
+            difference: None,
+            interval: None,
+            withheld: None,
+            repeat_se: None,
+            p: None,
+            mid_p: None,
+            p_adjusted: None,
+            separated: false,
+            units: None,
+            losses: None,
+            incomparable: None,
+        }
+    }
+
+    pub(in crate::statistics) fn unless(self, incomparable: Option<String>) -> Self {
+        if incomparable.is_none() {
+            return self;
+        }
+        let Self { method, n, successes, .. } = self;
+        Self { successes, withheld: Some(Withheld::Incomparable), incomparable, ..Self::of(method, n) }
+    }
+
+    fn withheld_as_dependent(self) -> Self {
+        Self { interval: None, withheld: Some(Withheld::Dependent), p: None, ..self }
+    }
+
+    /// The test needs as many units as any other test, the interval as many as its coverage.
+    fn of_durations(method: Method, n: [u64; 2], found: Option<Difference>, confidence: f64) -> Self {
+        let least = fewest_of(confidence);
+        let (interval, withheld) = coverage::given(
+            found.and_then(|found| found.interval),
+            n[0].min(n[1]),
+            coverage::DIFFERENCE,
+            found.is_none_or(|found| found.p.is_some()),
+        );
+        Self {
+            horizon: found.map(|found| found.horizon),
+            difference: found.map(|found| found.difference),
+            interval,
+            withheld,
+            p: found.and_then(|found| found.p).filter(|_| n[0].min(n[1]) >= least),
+            ..Self::of(method, n)
+        }
+    }
+
+    fn tested(self, test: Option<ExactTest>) -> Self {
+        Self { p: test.map(|test| test.p), mid_p: test.map(|test| test.mid_p), ..self }
+    }
+
+    /// The units, pairs or episodes that are too few for any verdict, or the lost episodes that decide it; none elsewhere.
+    #[expect(clippy::cast_precision_loss, reason = "few episodes: more of them are never too few")]
+    pub(in crate::statistics) fn unsaid(&self, confidence: f64) -> Option<Units> {
+        if let Some(units) = &self.units {
+            return units.too_few.then(|| units.clone()).or_else(|| LossCases::unsettled(self.losses.as_ref()));
+        }
+        let [m, n] = self.n;
+        let (least, name) = match self.method {
+            Method::Mcnemar => (0.5f64.powf(m as f64 - 1.0), "pairs"),
+            Method::Fisher => {
+                let divisions: f64 = (1..=m.min(n)).map(|k| (m.max(n) + k) as f64 / k as f64).product();
+                (if m == n { 2.0 / divisions } else { 1.0 / divisions }, "episodes")
+            }
+            Method::RestrictedMeanPaired | Method::RestrictedMean if m.min(n) < fewest_of(confidence) => {
+                (f64::INFINITY, if self.method == Method::RestrictedMean { "episodes" } else { "pairs" })
+            }
+            _ => return LossCases::unsettled(self.losses.as_ref()),
+        };
+        let is_hopeless =
+            (self.p.is_some() || least == f64::INFINITY) && level(confidence).is_some_and(|level| least > level);
+        let hopeless = is_hopeless.then(|| Units { n: m.min(n), name: name.to_owned(), too_few: true });
+        hopeless.or_else(|| LossCases::unsettled(self.losses.as_ref()))
+    }
+
+    /// Whether the first is shown to be above or below the second; none where neither is.
+    pub fn sign(&self) -> Option<Sign> {
+        let difference = self.difference.filter(|_| self.separated)?;
+        Some(if difference > 0.0 { Sign::Higher } else { Sign::Lower })
+    }
+}
+
+/// The fewest units of a test of durations.
+fn fewest_of(confidence: f64) -> u64 {
+    level(confidence).map_or(u64::MAX, |level| fewest(level) as u64)
+}
+
+/// Where the first of two stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sign {
+    /// Above the second.
+    Higher,
+    /// Below it.
+    Lower,
+}
+
+pub(in crate::statistics) fn adjust<'c>(family: impl Iterator<Item = &'c mut Comparison>, confidence: f64) {
+    let mut tested: Vec<&mut Comparison> = family.filter(|comparison| comparison.p.is_some()).collect();
+    let seen = |it: &Comparison| LossCase { difference: it.difference, p: it.p };
+    settle(&mut tested.iter_mut().map(|it| (seen(it), &mut it.losses)).collect::<Vec<_>>(), confidence);
+    let p_values: Vec<f64> = tested.iter().filter_map(|comparison| comparison.p).collect();
+    for (comparison, adjusted) in tested.iter_mut().zip(holm(&p_values)) {
+        let too_few = comparison.units.as_ref().is_some_and(|units| units.too_few);
+        comparison.p_adjusted = Some(adjusted);
+        comparison.separated = level(confidence).is_some_and(|level| adjusted <= level)
+            && !too_few
+            && comparison.losses.is_none_or(|losses| losses.agree);
+    }
+}

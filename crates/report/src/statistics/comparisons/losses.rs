@@ -1,0 +1,140 @@
+//! Episodes that the infrastructure ended, and what they could have changed.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::statistics::study::{Block, Study};
+use crate::statistics::units::Units;
+use exact::moments::Moments;
+use statistics::holm::{holm, level};
+use statistics::losses::{Fate, Lossy, bounds};
+
+/// What lost episodes are called where they decide.
+pub(in crate::statistics) const LOST: &str = "lost episodes";
+
+/// Losses, or that nothing is known of them.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Losses {
+    /// True if the traces record how each reply ended; otherwise losses look like failures.
+    pub recorded: bool,
+    /// The rates of every experiment and model that lost an episode.
+    pub rows: Vec<LossRow>,
+}
+
+/// One rate with lost episodes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct LossRow {
+    /// The experiment.
+    pub experiment: String,
+    /// The model.
+    pub model: String,
+    /// The condition, where there are several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub condition: Option<String>,
+    /// The metric.
+    pub metric: String,
+    /// The rate without the lost episodes, and its bounds with them.
+    #[serde(flatten)]
+    pub lossy: Lossy,
+}
+
+impl Losses {
+    pub(in crate::statistics) fn of(study: &Study, recorded: bool, confidence: f64) -> Self {
+        let rows = study.blocks().flat_map(|block| of_block(study, block, confidence)).collect();
+        Self { recorded, rows }
+    }
+}
+
+/// A test with its lost episodes taken both ways; the verdict stands if it is the same in both, after Holm's adjustment.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct LossCases {
+    /// The episodes lost, of both sides.
+    pub lost: u64,
+    /// Every lost episode lowers the difference as far as it can: all of the first fail, all of the second succeed.
+    pub lowest: LossCase,
+    /// Every lost episode raises it as far as it can.
+    pub highest: LossCase,
+    /// True if the verdict is the same in both cases and without the lost episodes; otherwise the data give no verdict.
+    pub agree: bool,
+}
+
+/// A difference and its p value, not adjusted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct LossCase {
+    /// The first minus the second; of a rate against a level, the rate minus the level.
+    pub difference: Option<f64>,
+    /// The p value.
+    pub p: Option<f64>,
+}
+
+/// Which way lost episodes are taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::statistics) enum Toward {
+    Lowest,
+    Highest,
+}
+
+impl Toward {
+    /// The moments of a rate with the lost episodes of its side, which is the first or the second of a difference.
+    pub fn moments(self, known: Moments, lost: u64, is_first: bool) -> Moments {
+        let lost = usize::try_from(lost).unwrap_or(usize::MAX);
+        let (zeros, ones) = if (self == Self::Highest) == is_first { (0, lost) } else { (lost, 0) };
+        known.with_truths(zeros, ones).unwrap_or(known)
+    }
+}
+
+impl LossCases {
+    /// Both cases; `None` without a lost episode.
+    pub(in crate::statistics) fn of(lost: u64, case: impl Fn(Toward) -> LossCase) -> Option<Self> {
+        let both = || Self { lost, lowest: case(Toward::Lowest), highest: case(Toward::Highest), agree: true };
+        (lost > 0).then(both)
+    }
+
+    pub(in crate::statistics) fn turned(self) -> Self {
+        let turned = |case: LossCase| LossCase { difference: case.difference.map(|it| -it), ..case };
+        Self { lowest: turned(self.highest), highest: turned(self.lowest), ..self }
+    }
+
+    pub(in crate::statistics) fn unsettled(cases: Option<&Self>) -> Option<Units> {
+        let units = |cases: &Self| Units { n: cases.lost, name: LOST.to_owned(), too_few: true };
+        cases.filter(|cases| !cases.agree).map(units)
+    }
+}
+
+pub(in crate::statistics) fn settle(tests: &mut [(LossCase, &mut Option<LossCases>)], confidence: f64) {
+    let verdicts = |case: fn(LossCase, LossCases) -> LossCase| -> Vec<Option<bool>> {
+        let of = |(seen, cases): &(LossCase, &mut Option<LossCases>)| cases.map_or(*seen, |cases| case(*seen, cases));
+        let cases: Vec<LossCase> = tests.iter().map(of).collect();
+        let adjusted = holm(&cases.iter().map(|case| case.p.unwrap_or(1.0)).collect::<Vec<_>>());
+        let is_shown = |p: f64| level(confidence).is_some_and(|level| p <= level);
+        let sign = |(case, p): (&LossCase, f64)| is_shown(p).then(|| case.difference.is_some_and(|it| it > 0.0));
+        cases.iter().zip(adjusted).map(sign).collect()
+    };
+    let (without, lowest) = (verdicts(|seen, _| seen), verdicts(|_, cases| cases.lowest));
+    let highest = verdicts(|_, cases| cases.highest);
+    for (at, (_, cases)) in tests.iter_mut().enumerate() {
+        if let Some(cases) = cases {
+            cases.agree = lowest[at] == without[at] && highest[at] == without[at];
+        }
+    }
+}
+
+fn of_block(study: &Study, block: &Block, confidence: f64) -> Vec<LossRow> {
+    let lost = usize::try_from(block.lost).unwrap_or(usize::MAX);
+    let row = |metric: &str, lossy| LossRow {
+        experiment: block.experiment.to_owned(),
+        model: block.model.to_owned(),
+        condition: block.condition(),
+        metric: metric.to_owned(),
+        lossy,
+    };
+    study
+        .rates()
+        .filter_map(|column| {
+            let kept = block.rows().map(|at| (column.get(at), Fate::Kept));
+            bounds(kept.chain(std::iter::repeat_n((None, Fate::Lost), lost)), confidence)
+                .map(|lossy| row(&column.name, lossy))
+        })
+        .filter(|row| row.lossy.lost > 0)
+        .collect()
+}

@@ -1,0 +1,232 @@
+//! Models against each other in one experiment: by pairs or not, and sets of ties instead of ranks.
+
+use std::cmp::Ordering;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::statistics::compare::{Compared, Comparison, Method, adjust};
+use crate::statistics::durations::{self, is_duration};
+use crate::statistics::matching::{Matched, Matching, Scenes};
+use crate::statistics::study::{Block, Experiment, Study};
+use metric::catalog::{Better, Kind};
+use score::table::MetricColumn;
+use statistics::holm::level;
+use statistics::letter_display::tied_sets;
+use statistics::power::{Detectable, detectable, detectable_unpaired};
+
+/// All comparisons of models under one rate or duration in one experiment.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Family {
+    /// The experiment.
+    pub experiment: String,
+    /// The metric, a rate or a duration.
+    pub metric: String,
+    /// The models, best mean first (of durations the restricted mean); by name where means are equal. A model with
+    /// conditions is there once per condition, as `model [condition]`.
+    pub models: Vec<String>,
+    /// Sets of models that no adjusted test tells apart, each as large as can be; they may overlap.
+    pub tied: Vec<Vec<String>>,
+    /// Every pair of models, in the order of `models`.
+    pub tests: Vec<PairTest>,
+    /// What this many episodes could have shown of a rate; none for a duration.
+    pub detectable: Option<Reach>,
+}
+
+/// The smallest differences that could have been shown; none where no outcome would have been enough.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Reach {
+    /// The test that this is said of.
+    pub method: Method,
+    /// The most pairs that any two models share, or the most episodes that both of two models have.
+    pub n: u64,
+    /// The number of tests in the family.
+    pub tests: usize,
+    /// In a single test.
+    pub single: Option<Detectable>,
+    /// In the first step of Holm's procedure over the family.
+    pub family: Option<Detectable>,
+}
+
+/// One model against another.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PairTest {
+    /// The model with the better mean.
+    pub first: String,
+    /// The other one.
+    pub second: String,
+    /// How their episodes fit together.
+    pub matching: Matching,
+    /// The first minus the second, adjusted over all pairs of models in the experiment.
+    #[serde(flatten)]
+    pub comparison: Comparison,
+}
+
+/// A scene that models have with which this one is compared by pairs, and that this one has not, or more than once.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Gap {
+    /// The experiment.
+    pub experiment: String,
+    /// The model.
+    pub model: String,
+    /// The condition, where there are several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub condition: Option<String>,
+    /// The scene, as the traces name it.
+    pub scene: String,
+    /// How many episodes there are instead of one.
+    pub episodes: usize,
+}
+
+/// Every pair of blocks of an experiment, matched once for all metrics.
+pub(in crate::statistics) struct Field<'s, 'a> {
+    study: &'s Study<'a>,
+    blocks: &'s [Block<'a>],
+    scenes: Vec<Scenes>,
+    matched: Vec<Matched>,
+}
+
+impl<'s, 'a> Field<'s, 'a> {
+    pub fn of(study: &'s Study<'a>, experiment: &'s Experiment<'a>) -> Self {
+        let scenes: Vec<Scenes> = experiment.blocks.iter().map(|block| Scenes::of(study, block)).collect();
+        let mut matched = Vec::new();
+        for (at, first) in scenes.iter().enumerate() {
+            matched.extend(scenes[at + 1..].iter().map(|second| Matched::of(first, second)));
+        }
+        Self { study, blocks: &experiment.blocks, scenes, matched }
+    }
+
+    fn matched(&self, first: usize, second: usize) -> Matched {
+        let found = &self.matched[triangle(self.blocks.len(), first.min(second), first.max(second))];
+        let turned = |&(a, b): &(usize, usize)| if first < second { (a, b) } else { (b, a) };
+        let pairs = found.pairs.as_ref().map(|pairs| pairs.iter().map(turned).collect());
+        Matched { matching: found.matching, pairs }
+    }
+
+    fn test(&self, column: &MetricColumn, (first, second): (usize, usize), ask: Asked) -> PairTest {
+        let matched = self.matched(first, second);
+        let (first, second) = (&self.blocks[first], &self.blocks[second]);
+        let (study, Asked { horizon, confidence }) = (self.study, ask);
+        let compared = Compared { study, first, second, matched: &matched, horizon, confidence };
+        let comparison = compared.under(column).unless(study.incomparable(first, second));
+        PairTest { first: first.name(), second: second.name(), matching: matched.matching, comparison }
+    }
+
+    fn gaps(&self) -> Vec<Gap> {
+        let mut gaps = Vec::new();
+        for (at, block) in self.blocks.iter().enumerate() {
+            let partners = (0..self.blocks.len()).filter(|&other| other != at).filter(|&other| {
+                self.matched[triangle(self.blocks.len(), at.min(other), at.max(other))].matching.paired
+            });
+            let mut scenes: Vec<usize> = partners.flat_map(|other| self.scenes[other].rows.keys().copied()).collect();
+            if scenes.is_empty() {
+                continue;
+            }
+            scenes.extend(self.scenes[at].rows.keys());
+            scenes.sort_unstable();
+            scenes.dedup();
+            gaps.extend(scenes.into_iter().filter_map(|scene| self.gap(block, at, scene)));
+        }
+        gaps
+    }
+
+    fn gap(&self, block: &Block, at: usize, scene: usize) -> Option<Gap> {
+        let episodes = self.scenes[at].rows.get(&scene).map_or(0, Vec::len);
+        let row = self.scenes.iter().find_map(|scenes| scenes.rows.get(&scene)?.first().copied())?;
+        (episodes != 1).then(|| Gap {
+            experiment: block.experiment.to_owned(),
+            model: block.model.to_owned(),
+            condition: block.condition(),
+            scene: self.study.scenes().and_then(|scenes| scenes.get(row)).unwrap_or_default().to_owned(),
+            episodes,
+        })
+    }
+}
+
+/// What was asked of every comparison.
+#[derive(Clone, Copy)]
+struct Asked {
+    horizon: Option<i64>,
+    confidence: f64,
+}
+
+/// The place of a pair among the pairs of `count` members, listed row by row of the upper triangle.
+fn triangle(count: usize, a: usize, b: usize) -> usize {
+    a * (2 * count - a - 1) / 2 + (b - a - 1)
+}
+
+pub(in crate::statistics) fn compared(study: &Study, horizon: Option<i64>, confidence: f64) -> (Vec<Family>, Vec<Gap>) {
+    let (mut families, mut gaps) = (Vec::new(), Vec::new());
+    for experiment in study.experiments.iter().filter(|experiment| experiment.blocks.len() > 1) {
+        let field = Field::of(study, experiment);
+        for column in &study.table.metrics {
+            if is_duration(study, &column.name) {
+                // Models are ordered and compared up to one horizon, that of the table of durations.
+                let horizon = horizon.or_else(|| durations::horizon_of(study, experiment, column));
+                families.push(Family::of(experiment.name, column, &field, Asked { horizon, confidence }));
+            } else if study.kind(&column.name) == Kind::Rate {
+                families.push(Family::of(experiment.name, column, &field, Asked { horizon: None, confidence }));
+            }
+        }
+        gaps.extend(field.gaps());
+    }
+    (families, gaps)
+}
+
+impl Family {
+    fn of(experiment: &str, column: &MetricColumn, field: &Field, ask: Asked) -> Self {
+        let order = best_first(field, column, ask.horizon);
+        let mut tests = Vec::new();
+        for (at, &first) in order.iter().enumerate() {
+            tests.extend(order[at + 1..].iter().map(|&second| field.test(column, (first, second), ask)));
+        }
+        adjust(tests.iter_mut().map(|test| &mut test.comparison), ask.confidence);
+        let models: Vec<String> = order.iter().map(|&at| field.blocks[at].name()).collect();
+        let tied = tied_sets(models.len(), |a, b| tests[triangle(models.len(), a, b)].comparison.separated);
+        Self {
+            experiment: experiment.to_owned(),
+            metric: column.name.clone(),
+            tied: tied.into_iter().map(|set| set.into_iter().map(|member| models[member].clone()).collect()).collect(),
+            models,
+            detectable: Reach::of(&tests, ask.confidence),
+            tests,
+        }
+    }
+}
+
+impl Reach {
+    #[expect(clippy::cast_precision_loss, reason = "a family has few tests")]
+    fn of(tests: &[PairTest], confidence: f64) -> Option<Self> {
+        let of_method = |method| {
+            let tested =
+                tests.iter().map(|test| &test.comparison).filter(move |it| it.method == method && it.p.is_some());
+            tested.map(|it| it.n[0].min(it.n[1])).max().map(|n| (method, n))
+        };
+        let (method, n) = of_method(Method::Mcnemar).or_else(|| of_method(Method::Fisher))?;
+        let count = tests.iter().filter(|test| test.comparison.p.is_some()).count();
+        let least = if method == Method::Mcnemar { detectable } else { detectable_unpaired };
+        let at = |tests: usize| level(confidence).and_then(|level| least(n, level / tests as f64));
+        Some(Self { method, n, tests: count, single: at(1), family: at(count.max(1)) })
+    }
+}
+
+fn best_first(field: &Field, column: &MetricColumn, horizon: Option<i64>) -> Vec<usize> {
+    let mean = |block: &Block| match horizon {
+        Some(horizon) => durations::restricted(field.study, block, column, horizon),
+        None => block.moments(column).mean(),
+    };
+    let means: Vec<Option<f64>> = field.blocks.iter().map(mean).collect();
+    let better = field.study.better(&column.name);
+    let mut order: Vec<usize> = (0..field.blocks.len()).collect();
+    // Blocks are ordered by name, and the sort keeps that order.
+    order.sort_by(|&a, &b| by_mean(means[a], means[b], better));
+    order
+}
+
+pub(in crate::statistics) fn by_mean(a: Option<f64>, b: Option<f64>, better: Better) -> Ordering {
+    match (a, b) {
+        (Some(a), Some(b)) if better == Better::Lower => a.total_cmp(&b),
+        (Some(a), Some(b)) => b.total_cmp(&a),
+        (a, b) => b.is_some().cmp(&a.is_some()),
+    }
+}

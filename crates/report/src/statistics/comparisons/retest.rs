@@ -1,0 +1,101 @@
+//! The same scene played again by the same model: how often a verdict comes out otherwise.
+//!
+//! Rule: what one scene gives from one time to the next is noise, and a difference has to exceed it. Every two times of a
+//! scene count once, each scene with the same weight.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::statistics::matching::Scenes;
+use crate::statistics::study::{Block, Study};
+use exact::moments::Moments;
+use score::table::MetricColumn;
+use statistics::clustered::variance_components;
+
+/// The verdicts of one model on scenes that it played more than once.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct RetestRow {
+    /// The experiment.
+    pub experiment: String,
+    /// The model.
+    pub model: String,
+    /// The condition, where there are more than the default one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub condition: Option<String>,
+    /// The metric, a rate.
+    pub metric: String,
+    /// Scenes that were played at least twice with a defined value.
+    pub scenes: u64,
+    /// The episodes of these scenes.
+    pub episodes: u64,
+    /// The scenes whose verdicts are not all the same.
+    pub unstable: u64,
+    /// The chance that two times of a scene, both taken at random, give different verdicts: the mean over scenes of
+    /// 2 k (m - k) / (m (m - 1)) for k successes in m times (Fleiss 1971, one minus the agreement of a subject).
+    pub flipped: f64,
+    /// How much the rate varies from scene to scene, by analysis of variance; none where that is not estimable.
+    #[serde(default)]
+    pub between_scenes: Option<f64>,
+    /// How much it varies from one time of a scene to the next.
+    #[serde(default)]
+    pub within_scenes: Option<f64>,
+}
+
+impl RetestRow {
+    pub(in crate::statistics) fn all(study: &Study) -> Vec<Self> {
+        if !study.design.has_pairs() {
+            return Vec::new();
+        }
+        let of_block = |block| {
+            let scenes = Scenes::of(study, block);
+            study.rates().filter_map(|column| Self::of(block, &scenes, column)).collect::<Vec<_>>()
+        };
+        study.blocks().flat_map(of_block).collect()
+    }
+
+    #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
+    fn of(block: &Block, scenes: &Scenes, column: &MetricColumn) -> Option<Self> {
+        let (mut count, mut episodes, mut unstable, mut flipped) = (0, 0, 0, 0.0);
+        let mut parts = Vec::new();
+        for rows in scenes.rows.values() {
+            let values: Vec<i64> = rows.iter().filter_map(|row| column.get(*row)).collect();
+            let (times, successes) = (values.len() as u64, values.iter().filter(|value| **value == 1).count() as u64);
+            if times < 2 {
+                continue;
+            }
+            count += 1;
+            let (ones, all) = (usize::try_from(successes).ok()?, values.len());
+            parts.push(Moments::default().with_truths(all - ones, ones).ok()?);
+            episodes += times;
+            unstable += u64::from(successes > 0 && successes < times);
+            flipped += (2 * successes * (times - successes)) as f64 / (times * (times - 1)) as f64;
+        }
+        let components = variance_components(&parts);
+        (count > 0).then(|| Self {
+            experiment: block.experiment.to_owned(),
+            model: block.model.to_owned(),
+            condition: block.condition.map(str::to_owned),
+            metric: column.name.clone(),
+            scenes: count,
+            episodes,
+            unstable,
+            flipped: flipped / count as f64,
+            between_scenes: components.map(|(between, _)| between),
+            within_scenes: components.map(|(_, within)| within),
+        })
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
+pub(in crate::statistics) fn repeat_variance(study: &Study, block: &Block, column: &MetricColumn) -> Option<f64> {
+    if !block.repeats {
+        return None;
+    }
+    let moments = |rows: Vec<usize>| {
+        let values = rows.into_iter().filter_map(|row| column.get(row));
+        values.fold(Moments::default(), |sum, value| sum.with(value).expect("a part of a block that was summed whole"))
+    };
+    let parts: Vec<Moments> = Scenes::of(study, block).rows.into_values().map(moments).collect();
+    let n: u64 = parts.iter().map(|part| part.n).sum();
+    Some(variance_components(&parts)?.1 / n as f64)
+}

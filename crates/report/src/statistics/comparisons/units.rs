@@ -1,0 +1,111 @@
+//! Two models by unit of analysis: a scene, a declared cluster or a participant counts once.
+
+use std::collections::BTreeMap;
+use std::mem::discriminant;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::statistics::study::{Block, Study, Unit};
+use exact::moments::Moments;
+use score::table::MetricColumn;
+use statistics::clustered::fewest_clusters;
+use statistics::holm::level;
+use statistics::units::{self, UnitTest, difference_test};
+
+/// Scenes, seeds or participants with several episodes.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Units {
+    /// How many there are.
+    pub n: u64,
+    /// Their name, in the plural.
+    pub name: String,
+    /// True if the units are too few for a verdict: no symmetric test can reach the level of significance.
+    pub too_few: bool,
+}
+
+impl Units {
+    pub(in crate::statistics) fn new(study: &Study, block: &Block, n: usize, least: f64, confidence: f64) -> Self {
+        Self { n: n as u64, name: study.unit_name(block).to_owned(), too_few: too_few(n, least, confidence) }
+    }
+}
+
+/// True if no symmetric test of so many units or episodes, or none with this least p value, can reach the level.
+pub(in crate::statistics) fn too_few(n: usize, least: f64, confidence: f64) -> bool {
+    level(confidence).is_none_or(|level| least > level || n < fewest_clusters(level))
+}
+
+/// The values of two sides by unit.
+pub(in crate::statistics) struct Sides {
+    units: BTreeMap<Unit, (Moments, Moments)>,
+}
+
+impl Sides {
+    /// The sides of all strata together, so that a unit of several strata counts once.
+    ///
+    /// `None` where each episode is a unit, or all units are pairs of one episode each.
+    pub fn of(study: &Study, column: &MetricColumn, strata: &[(&Block, &Block)]) -> Option<Self> {
+        if !study.has_units() {
+            return None;
+        }
+        let sides = Self::by(study, strata, |row| column.get(row));
+        let repeats = sides.units.values().any(|(a, b)| a.n > 1 || b.n > 1);
+        let shared = sides.units.values().filter(|(a, b)| a.n > 0 && b.n > 0).count();
+        let is_partly_shared = shared > 0 && shared < sides.units.len();
+        (repeats || is_partly_shared).then_some(sides)
+    }
+
+    /// The sides under any value of an episode.
+    pub fn by(study: &Study, strata: &[(&Block, &Block)], value: impl Fn(usize) -> Option<i64>) -> Self {
+        let mut units: BTreeMap<Unit, (Moments, Moments)> = BTreeMap::new();
+        let add = |sum: &mut Moments, part: Moments| {
+            sum.n += part.n;
+            sum.sum += part.sum;
+            sum.sum_sq += part.sum_sq;
+        };
+        for (first, second) in strata {
+            for (unit, part) in study.by_unit(first, &value) {
+                add(&mut units.entry(unit).or_default().0, part);
+            }
+            for (unit, part) in study.by_unit(second, &value) {
+                add(&mut units.entry(unit).or_default().1, part);
+            }
+        }
+        Self { units }
+    }
+
+    /// The units on the smaller side.
+    pub fn len(&self) -> usize {
+        let [first, second] = self
+            .units
+            .values()
+            .fold([0, 0], |[first, second], (a, b)| [first + usize::from(a.n > 0), second + usize::from(b.n > 0)]);
+        first.min(second)
+    }
+
+    /// The units that both sides have and those of one; `None` where the units of the two sides are of different kinds.
+    pub fn divided(&self) -> Option<units::Sides> {
+        let mut sides = units::Sides::default();
+        let mut kinds = [None; 2];
+        for (unit, &(a, b)) in &self.units {
+            match (a.n, b.n) {
+                (0, _) => sides.second.push(b),
+                (_, 0) => sides.first.push(a),
+                _ => sides.shared.push((a, b)),
+            }
+            for (kind, side) in kinds.iter_mut().zip([a, b]) {
+                if side.n > 0 {
+                    kind.get_or_insert(discriminant(unit));
+                }
+            }
+        }
+        (kinds[0] == kinds[1]).then_some(sides)
+    }
+
+    /// The exact test of a rate; `lost` are further units of both sides.
+    pub fn test(&self, lost: &[(Moments, Moments)]) -> Option<UnitTest> {
+        let mut sides = self.divided()?;
+        sides.shared.splice(..0, lost.iter().copied());
+        difference_test(&sides)
+    }
+}

@@ -1,0 +1,154 @@
+//! Every cell with its count and its intervals.
+
+use indexmap::IndexMap;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::cells::group::membership;
+use crate::cells::interval::{bounded, cell_interval};
+use crate::cells::{Cells, Group, KeyValue};
+use crate::statistics::study::Study;
+use exact::moments::Moments;
+use metric::catalog::{Kind, Metric, StandardError};
+use score::table::EpisodeTable;
+use statistics::bootstrap;
+use statistics::coverage::{self, Withheld};
+use statistics::interval::{Interval, clopper_pearson, jeffreys, wilson};
+
+/// Conditional metrics with fewer defined episodes than this are marked.
+pub const FEW: u64 = 5;
+
+/// One cell: the episodes of one group under one metric.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct CellRow {
+    /// The group, by the columns grouped by.
+    pub key: IndexMap<String, KeyValue>,
+    /// The metric.
+    pub metric: String,
+    /// A rate or a quantity.
+    pub kind: Kind,
+    /// The episodes of the group.
+    pub episodes: u64,
+    /// Those in which the metric is defined: the denominator.
+    pub n: u64,
+    /// The sum of the values; for a rate, the successes.
+    pub sum: i128,
+    /// The arithmetic mean.
+    pub mean: Option<f64>,
+    /// The standard error that the definition asks for.
+    pub se: Option<f64>,
+    /// The intervals that fit the kind.
+    pub intervals: Intervals,
+    /// True if a conditional metric rests on fewer than five episodes here.
+    pub few: bool,
+}
+
+/// Intervals of a mean, by kind.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged, deny_unknown_fields)]
+pub enum Intervals {
+    /// Of a rate, from its counts.
+    Rate {
+        /// Score interval, the default.
+        wilson: Option<Interval>,
+        /// Exact interval.
+        clopper_pearson: Option<Interval>,
+        /// Equal-tailed credible interval.
+        jeffreys: Option<Interval>,
+    },
+    /// Of the mean of a quantity.
+    Quantity {
+        /// Student's t with n - 1 degrees of freedom, within the values that a mean of steps can have.
+        student_t: Option<Interval>,
+        /// The reason for a missing interval.
+        student_t_withheld: Option<Withheld>,
+        /// Bias-corrected and accelerated bootstrap, seeded; none for very many values.
+        bootstrap: Option<Interval>,
+        /// The reason for a missing interval.
+        bootstrap_withheld: Option<Withheld>,
+    },
+}
+
+impl CellRow {
+    /// All cells, in the order of the groups and metrics.
+    pub(in crate::statistics) fn all(study: &Study, cells: &Cells, confidence: f64) -> Vec<Self> {
+        let rows = rows_by_group(study.table, cells);
+        let groups = cells.groups.iter().zip(&rows);
+        groups.flat_map(|(group, rows)| Self::of_group(study, cells, group, rows, confidence)).collect()
+    }
+
+    fn of_group(study: &Study, cells: &Cells, group: &Group, rows: &[usize], confidence: f64) -> Vec<Self> {
+        let key: IndexMap<String, KeyValue> = cells.by.iter().cloned().zip(group.key.iter().cloned()).collect();
+        let of_metric = |(metric, moments)| {
+            let moments: &Moments = moments;
+            let metric: &String = metric;
+            let kind = study.kind(metric);
+            let definition = study.metric(metric);
+            let se = definition.map_or(StandardError::Sample, |definition| definition.se);
+            let intervals = match (definition, kind, moments.counts()) {
+                (_, Kind::Rate, Some((k, n))) => Intervals::rate(k, n, confidence),
+                (None, ..) => Intervals::NONE,
+                (Some(definition), ..) => Intervals::quantity(study, (metric, definition), moments, rows, confidence),
+            };
+            Self {
+                key: key.clone(),
+                metric: metric.clone(),
+                kind,
+                episodes: group.episodes,
+                n: moments.n,
+                sum: moments.sum,
+                mean: moments.mean(),
+                se: moments.se(se),
+                intervals,
+                few: moments.n < FEW && definition.is_some_and(|definition| definition.when.is_some()),
+            }
+        };
+        cells.metrics.iter().zip(&group.moments).map(of_metric).collect()
+    }
+}
+
+impl Intervals {
+    /// Of a metric that the catalog does not describe.
+    const NONE: Self = Self::Quantity {
+        student_t: None,
+        student_t_withheld: Some(Withheld::Undefined),
+        bootstrap: None,
+        bootstrap_withheld: Some(Withheld::Undefined),
+    };
+
+    fn rate(successes: u64, n: u64, confidence: f64) -> Self {
+        Self::Rate {
+            wilson: wilson(successes, n, confidence),
+            clopper_pearson: clopper_pearson(successes, n, confidence),
+            jeffreys: jeffreys(successes, n, confidence),
+        }
+    }
+
+    fn quantity(
+        study: &Study,
+        (name, metric): (&str, &Metric),
+        moments: &Moments,
+        rows: &[usize],
+        confidence: f64,
+    ) -> Self {
+        let range = study.range(name);
+        // 10,000 resamples are drawn only where their interval may be given.
+        let resampled = (moments.n >= coverage::BOOTSTRAP && moments.has_spread())
+            .then(|| bootstrap::mean(&values(study, name, rows), confidence))
+            .flatten();
+        let (student_t, student_t_withheld) = cell_interval(moments, metric, range, confidence);
+        let (bootstrap, bootstrap_withheld) = bounded(resampled, moments, range, coverage::BOOTSTRAP);
+        Self::Quantity { student_t, student_t_withheld, bootstrap, bootstrap_withheld }
+    }
+}
+
+fn values(study: &Study, metric: &str, rows: &[usize]) -> Vec<i64> {
+    study.column(metric).map_or_else(Vec::new, |column| rows.iter().filter_map(|&row| column.get(row)).collect())
+}
+
+fn rows_by_group(table: &EpisodeTable, cells: &Cells) -> Vec<Vec<usize>> {
+    let mut rows = vec![Vec::new(); cells.groups.len()];
+    let groups = membership(table, &cells.by).expect("the cells are grouped by columns of this table");
+    groups.into_iter().zip(0..).for_each(|(group, row)| rows[group].push(row));
+    rows
+}

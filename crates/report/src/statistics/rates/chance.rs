@@ -1,0 +1,234 @@
+//! Rates against the levels of blind guessing, by the exact binomial test.
+//!
+//! Rule: a rate that counts unfinished episodes as failures stands beside the same rate among finished episodes
+//! ([`Relations`](metric::relations::Relations)): who does not finish is below chance under the first and need not guess.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::statistics::losses::{LossCase, LossCases, Toward, settle};
+use crate::statistics::study::{Block, Experiment, Study, named};
+use crate::statistics::units::{Units, too_few};
+use exact::moments::Moments;
+use exact::ratio::Ratio;
+use score::table::MetricColumn;
+use statistics::chance::{exact_test, least_p};
+use statistics::holm::{holm, level};
+use statistics::outcomes::ExactTest;
+use statistics::units::rate_test;
+
+/// One rate against one level.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ChanceRow {
+    /// The experiment.
+    pub experiment: String,
+    /// The model.
+    pub model: String,
+    /// The condition, where there are several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub condition: Option<String>,
+    /// The metric.
+    pub metric: String,
+    /// What the level is.
+    pub role: Role,
+    /// The level.
+    pub level: Ratio,
+    /// The successes.
+    pub successes: u64,
+    /// The episodes in which the metric is defined.
+    pub n: u64,
+    /// The exact p value, two-sided by minimum likelihood.
+    pub p: f64,
+    /// The mid-p value, which is not guaranteed to keep the level.
+    pub mid_p: f64,
+    /// `p` adjusted by Holm's method over the models of the experiment, against this level.
+    pub p_adjusted: f64,
+    /// What the value adjusted by Holm says at the level of significance.
+    pub verdict: Verdict,
+    /// The units of analysis where some have several episodes: the test counts each once.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub units: Option<Units>,
+    /// The test with the lost episodes of the model; none where it lost none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub losses: Option<LossCases>,
+}
+
+/// What a level stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Role {
+    /// The rate of blind guessing.
+    Chance,
+    /// What some blind strategy would reach, where no chance level applies.
+    Reference,
+}
+
+/// Where a rate stands against a level.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// Shown to be above.
+    Above,
+    /// Shown to be below.
+    Below,
+    /// Not shown to differ.
+    NotSeparated,
+}
+
+impl ChanceRow {
+    /// Every rate against every level that its experiment has.
+    pub(in crate::statistics) fn all(study: &Study, confidence: f64) -> Vec<Self> {
+        let mut rows = Vec::new();
+        for experiment in &study.experiments {
+            for column in study.rates() {
+                for (role, level) in levels(study, experiment.name, &column.name) {
+                    rows.extend(Self::family(study, experiment, &column.name, (role, level), confidence));
+                }
+            }
+        }
+        rows
+    }
+
+    fn family(
+        study: &Study,
+        experiment: &Experiment,
+        metric: &str,
+        (role, chance): (Role, Ratio),
+        confidence: f64,
+    ) -> Vec<Self> {
+        let Some(column) = study.column(metric) else { return Vec::new() };
+        let mut tested: Vec<_> = experiment
+            .blocks
+            .iter()
+            .filter_map(|block| Tested::of(study, block, column, (chance, confidence)))
+            .collect();
+        settle(&mut tested.iter_mut().map(|tested| (tested.seen, &mut tested.losses)).collect::<Vec<_>>(), confidence);
+        let adjusted = holm(&tested.iter().map(|tested| tested.test.p).collect::<Vec<_>>());
+        let row = |(Tested { block, successes, n, test, units, losses, .. }, p_adjusted): (Tested, f64)| Self {
+            experiment: experiment.name.to_owned(),
+            model: block.model.to_owned(),
+            condition: block.condition(),
+            metric: metric.to_owned(),
+            role,
+            level: chance,
+            successes,
+            n,
+            p: test.p,
+            mid_p: test.mid_p,
+            p_adjusted,
+            verdict: Verdict::of(
+                successes,
+                n,
+                chance,
+                level(confidence).is_some_and(|level| p_adjusted <= level)
+                    && !units
+                        .as_ref()
+                        .map_or_else(|| few_episodes(n, chance, confidence), |units: &Units| units.too_few)
+                    && losses.is_none_or(|losses: LossCases| losses.agree),
+            ),
+            units,
+            losses,
+        };
+        tested.into_iter().zip(adjusted).map(row).collect()
+    }
+
+    /// The units or episodes that are too few for any verdict, or the lost ones that decide it; none elsewhere.
+    pub(in crate::statistics) fn unsaid(&self, confidence: f64) -> Option<Units> {
+        let episodes =
+            || Units { n: self.n, name: "episodes".to_owned(), too_few: few_episodes(self.n, self.level, confidence) };
+        let units = self.units.clone().unwrap_or_else(episodes);
+        units.too_few.then_some(units).or_else(|| LossCases::unsettled(self.losses.as_ref()))
+    }
+
+    /// The largest number of units or episodes, if no outcome of any of these models could pass Holm's first step.
+    pub(in crate::statistics) fn hopeless(family: &[&Self], confidence: f64) -> Option<Units> {
+        #[expect(clippy::cast_precision_loss, reason = "a family has few tests")]
+        let first_step = level(confidence)? / family.len() as f64;
+        let counted =
+            |row: &Self| row.units.clone().unwrap_or(Units { n: row.n, name: "episodes".to_owned(), too_few: true });
+        let is_hopeless = |row: &&Self| least_p(counted(row).n, row.level).is_none_or(|least| least > first_step);
+        let most = family.iter().map(|row| counted(row)).max_by_key(|units| units.n)?;
+        family.iter().all(is_hopeless).then_some(most)
+    }
+
+    /// The model as it is compared.
+    pub fn name(&self) -> String {
+        named(&self.model, self.condition.as_deref())
+    }
+}
+
+fn few_episodes(n: u64, level: Ratio, confidence: f64) -> bool {
+    least_p(n, level).is_none_or(|least| too_few(usize::try_from(n).unwrap_or(usize::MAX), least, confidence))
+}
+
+/// One rate of one block against one level.
+struct Tested<'s, 'a> {
+    block: &'s Block<'a>,
+    successes: u64,
+    n: u64,
+    test: ExactTest,
+    units: Option<Units>,
+    seen: LossCase,
+    losses: Option<LossCases>,
+}
+
+impl<'s, 'a> Tested<'s, 'a> {
+    fn of(
+        study: &Study,
+        block: &'s Block<'a>,
+        column: &MetricColumn,
+        (chance, confidence): (Ratio, f64),
+    ) -> Option<Self> {
+        let known = block.moments(column);
+        let (successes, n) = known.counts()?;
+        let of_units: Option<Vec<Moments>> =
+            block.repeats.then(|| study.by_unit(block, |row| column.get(row)).into_values().collect());
+        let tested = |toward: Option<Toward>| {
+            let with_lost = |known| toward.map_or(known, |toward| toward.moments(known, block.lost, true));
+            let Some(units) = &of_units else {
+                let (successes, n) = with_lost(known).counts()?;
+                return Some((exact_test(successes, n, chance)?, least_p(n, chance)?));
+            };
+            let one = |toward: Toward| toward.moments(Moments::default(), 1, true);
+            let lost = (0..block.lost).filter_map(|_| toward.map(one));
+            rate_test(&units.iter().copied().chain(lost).collect::<Vec<_>>(), chance)
+        };
+        let difference = |toward: Option<Toward>| {
+            let mean = toward.map_or(known, |toward| toward.moments(known, block.lost, true)).mean();
+            mean.map(|mean| mean - chance.value())
+        };
+        let case = |toward| LossCase { difference: difference(toward), p: tested(toward).map(|(test, _)| test.p) };
+        let (test, least) = tested(None)?;
+        let units = of_units.as_ref().map(|units| Units::new(study, block, units.len(), least, confidence));
+        let losses = LossCases::of(block.lost, |toward| case(Some(toward)));
+        Some(Self { block, successes, n, test, units, seen: case(None), losses })
+    }
+}
+
+impl Verdict {
+    pub(in crate::statistics) fn of(successes: u64, n: u64, level: Ratio, is_shown: bool) -> Self {
+        let seen = i128::from(successes) * i128::from(level.denominator());
+        let expected = i128::from(level.numerator()) * i128::from(n);
+        match is_shown {
+            true if seen > expected => Self::Above,
+            true if seen < expected => Self::Below,
+            _ => Self::NotSeparated,
+        }
+    }
+}
+
+pub(in crate::statistics) fn levels(study: &Study, experiment: &str, metric: &str) -> Vec<(Role, Ratio)> {
+    let own = own_levels(study, experiment, metric);
+    match study.relations.whole(metric) {
+        Some(whole) if own.is_empty() => own_levels(study, experiment, whole),
+        _ => own,
+    }
+}
+
+pub(in crate::statistics) fn own_levels(study: &Study, experiment: &str, metric: &str) -> Vec<(Role, Ratio)> {
+    let catalog = &study.table.catalog;
+    let chance = catalog.chance(experiment, metric).map(|level| (Role::Chance, level));
+    let references = catalog.experiment.get(experiment).and_then(|known| known.reference.get(metric));
+    let references = references.into_iter().flatten().map(|&level| (Role::Reference, level));
+    chance.into_iter().chain(references).collect()
+}

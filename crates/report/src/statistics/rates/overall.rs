@@ -1,0 +1,283 @@
+//! Models against each other over all experiments, each of which is a stratum.
+//!
+//! Rule: only experiments that both models have, recorded alike. Where the two are paired in all of them, all pairs are pooled; else every
+//! stratum is a 2x2 table of independent episodes.
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::statistics::durations::{decided, is_duration};
+use crate::statistics::losses::{LossCase, LossCases, Toward, settle};
+use crate::statistics::matching::{Matched, Scenes};
+use crate::statistics::study::{Block, Study};
+use crate::statistics::units::Sides;
+use exact::moments::Moments;
+use metric::catalog::Kind;
+use score::table::MetricColumn;
+use statistics::clustered::fewest_clusters;
+use statistics::competing::Outcome;
+use statistics::holm::{holm, level};
+use statistics::improvement::{Improvement, probability_of_improvement};
+use statistics::interval::Interval;
+use statistics::outcomes::ExactTest;
+use statistics::paired::Pairs;
+use statistics::stratified::{Stratum, common_difference, exact, pooled};
+
+/// How two rates were compared over several experiments.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum OverallMethod {
+    /// The exact conditional test over the experiments; the Mantel-Haenszel difference with Klingenberg's interval.
+    MantelHaenszel,
+    /// The exact test of `McNemar` over the pairs of all experiments; Newcombe's interval for pairs.
+    PooledMcnemar,
+    /// The exact permutation test over scenes, seeds or participants, each of which counts once over all experiments.
+    Units,
+}
+
+/// Two models under one rate, over all experiments that both have.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct OverallRow {
+    /// The metric.
+    pub metric: String,
+    /// One model, the better one where they differ.
+    pub first: String,
+    /// The other.
+    pub second: String,
+    /// The experiments, each a stratum.
+    pub experiments: Vec<String>,
+    /// The test and the interval.
+    pub method: OverallMethod,
+    /// The first minus the second, as one difference for all strata.
+    pub difference: Option<f64>,
+    /// Its interval, not adjusted.
+    pub interval: Option<Interval>,
+    /// The exact p value, two-sided by minimum likelihood; none where there are too many episodes to enumerate.
+    pub p: Option<f64>,
+    /// The mid-p value, which is not guaranteed to keep the level.
+    pub mid_p: Option<f64>,
+    /// `p` adjusted by Holm's method over all pairs of models under the metric.
+    pub p_adjusted: Option<f64>,
+    /// True if the adjusted value reaches the level of significance.
+    pub separated: bool,
+    /// The test with the lost episodes of both sides; none where none was lost.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub losses: Option<LossCases>,
+}
+
+/// How often an episode of one model decides earlier than one of another, averaged over the experiments that both have.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ImprovementRow {
+    /// The metric, a duration: earlier is better, and an episode that never decides is later than all that do.
+    pub metric: String,
+    /// One model.
+    pub first: String,
+    /// The other.
+    pub second: String,
+    /// The experiments, each a stratum of the same weight.
+    pub experiments: Vec<String>,
+    /// The probability, ties counted half, with its stratified bootstrap interval.
+    #[serde(flatten)]
+    pub improvement: Improvement,
+}
+
+/// Two models' blocks, one pair per experiment.
+struct Couple<'s, 'a> {
+    first: String,
+    second: String,
+    strata: Vec<(&'s Block<'a>, &'s Block<'a>)>,
+}
+
+impl<'s, 'a> Couple<'s, 'a> {
+    fn all(study: &'s Study<'a>) -> Vec<Self> {
+        let mut subjects: BTreeMap<String, BTreeMap<usize, &'s Block<'a>>> = BTreeMap::new();
+        for (at, experiment) in study.experiments.iter().enumerate() {
+            for block in &experiment.blocks {
+                subjects.entry(block.name()).or_default().insert(at, block);
+            }
+        }
+        let mut couples = Vec::new();
+        for (at, (first, here)) in subjects.iter().enumerate() {
+            for (second, there) in subjects.iter().skip(at + 1) {
+                let both = here.iter().filter_map(|(experiment, &block)| Some((block, *there.get(experiment)?)));
+                let strata: Vec<_> = both.filter(|(a, b)| study.incomparable(a, b).is_none()).collect();
+                if strata.len() > 1 {
+                    couples.push(Self { first: first.clone(), second: second.clone(), strata });
+                }
+            }
+        }
+        couples
+    }
+
+    fn experiments(&self) -> Vec<String> {
+        self.strata.iter().map(|(block, _)| block.experiment.to_owned()).collect()
+    }
+
+    fn pairs(&self, study: &Study) -> Option<Vec<Vec<(usize, usize)>>> {
+        let matched = |(first, second): &(&Block, &Block)| {
+            Matched::of(&Scenes::of(study, first), &Scenes::of(study, second)).pairs
+        };
+        self.strata.iter().map(matched).collect()
+    }
+
+    fn rate(
+        &self,
+        study: &Study,
+        column: &MetricColumn,
+        pairs: Option<&[Vec<(usize, usize)>]>,
+        confidence: f64,
+    ) -> OverallRow {
+        let sides = Sides::of(study, column, &self.strata);
+        let of = |toward| self.taken(column, pairs, sides.as_ref(), (toward, confidence));
+        let case = |row: &OverallRow| LossCase { difference: row.difference, p: row.p };
+        let row = of(None);
+        let lost = self.strata.iter().map(|(a, b)| a.lost + b.lost).sum();
+        let losses = LossCases::of(lost, |toward| case(&of(Some(toward)))).filter(|_| row.p.is_some());
+        OverallRow { losses, ..row }
+    }
+
+    fn taken(
+        &self,
+        column: &MetricColumn,
+        pairs: Option<&[Vec<(usize, usize)>]>,
+        sides: Option<&Sides>,
+        (toward, confidence): (Option<Toward>, f64),
+    ) -> OverallRow {
+        let row = self.by_episodes(column, pairs, toward, confidence);
+        let Some(sides) = sides else { return row };
+        let few = level(confidence).is_none_or(|level| sides.len() < fewest_clusters(level));
+        let pair = |toward: Toward| [true, false].map(|is_first| toward.moments(Moments::default(), 1, is_first));
+        let lost = self.strata.iter().map(|(a, b)| a.lost + b.lost).sum::<u64>();
+        let lost: Vec<_> = (0..lost).filter_map(|_| toward.map(|toward| pair(toward).into())).collect();
+        let p = sides.test(&lost).filter(|_| !few).map(|test| test.p);
+        OverallRow { method: OverallMethod::Units, interval: None, p, mid_p: None, ..row }
+    }
+
+    fn by_episodes(
+        &self,
+        column: &MetricColumn,
+        pairs: Option<&[Vec<(usize, usize)>]>,
+        toward: Option<Toward>,
+        confidence: f64,
+    ) -> OverallRow {
+        let row = |method, difference, interval, test: Option<ExactTest>| OverallRow {
+            metric: column.name.clone(),
+            first: self.first.clone(),
+            second: self.second.clone(),
+            experiments: self.experiments(),
+            method,
+            difference,
+            interval,
+            p: test.map(|test| test.p),
+            mid_p: test.map(|test| test.mid_p),
+            p_adjusted: None,
+            separated: false,
+            losses: None,
+        };
+        if let Some(strata) = pairs {
+            let of_stratum = |rows: &Vec<(usize, usize)>| {
+                let values = rows.iter().filter_map(|&(a, b)| Some((column.get(a)?, column.get(b)?)));
+                Pairs::of(values)
+            };
+            let mut all = pooled(&strata.iter().map(of_stratum).collect::<Vec<_>>());
+            let lost: u64 = self.strata.iter().map(|(a, b)| a.lost + b.lost).sum();
+            match toward {
+                Some(Toward::Lowest) => all.second_only += lost,
+                Some(Toward::Highest) => all.first_only += lost,
+                None => {}
+            }
+            let test = all.mcnemar().zip(all.mcnemar_mid_p()).map(|(p, mid_p)| ExactTest { p, mid_p });
+            return row(OverallMethod::PooledMcnemar, all.difference(), all.interval(confidence), test);
+        }
+        let strata: Vec<Stratum> = self
+            .strata
+            .iter()
+            .filter_map(|(a, b)| {
+                let [first, second] = [(a, true), (b, false)].map(|(block, is_first)| {
+                    let known = block.moments(column);
+                    toward.map_or(known, |toward| toward.moments(known, block.lost, is_first)).counts()
+                });
+                Some(Stratum { first: first?, second: second? })
+            })
+            .filter(|stratum| stratum.first.1 > 0 && stratum.second.1 > 0)
+            .collect();
+        let common = common_difference(&strata, confidence);
+        row(
+            OverallMethod::MantelHaenszel,
+            common.map(|common| common.difference),
+            common.and_then(|common| common.interval),
+            common.and_then(|_| exact(&strata)),
+        )
+    }
+
+    fn improvement(&self, study: &Study, column: &MetricColumn, confidence: f64) -> Option<ImprovementRow> {
+        // Later is larger: a side that decides earlier is the second of the two that are compared.
+        let steps = |block: &Block| -> Vec<i64> {
+            let endings = block.rows().filter_map(|row| decided(study, column, row));
+            endings.map(|it| if it.outcome == Outcome::Unfinished { i64::MAX } else { it.steps }).collect()
+        };
+        let strata: Vec<(Vec<i64>, Vec<i64>)> = self.strata.iter().map(|(a, b)| (steps(b), steps(a))).collect();
+        let strata: Vec<(&[i64], &[i64])> = strata.iter().map(|(b, a)| (b.as_slice(), a.as_slice())).collect();
+        Some(ImprovementRow {
+            metric: column.name.clone(),
+            first: self.first.clone(),
+            second: self.second.clone(),
+            experiments: self.experiments(),
+            improvement: probability_of_improvement(&strata, confidence)?,
+        })
+    }
+}
+
+pub(in crate::statistics) fn rates(study: &Study, metrics: &[String], confidence: f64) -> Vec<OverallRow> {
+    let couples = Couple::all(study);
+    let pairs: Vec<_> = couples.iter().map(|couple| couple.pairs(study)).collect();
+    let is_rate = |metric: &&String| study.kind(metric) == Kind::Rate;
+    let mut all = Vec::new();
+    for column in metrics.iter().filter(is_rate).filter_map(|metric| study.column(metric)) {
+        let of = |(couple, pairs): (&Couple, &Option<Vec<_>>)| couple.rate(study, column, pairs.as_deref(), confidence);
+        let mut rows: Vec<OverallRow> = couples.iter().zip(&pairs).map(of).collect();
+        adjust(&mut rows, confidence);
+        all.extend(rows.into_iter().map(|row| row.better_first(study)));
+    }
+    all
+}
+
+pub(in crate::statistics) fn improvements(study: &Study, metrics: &[String], confidence: f64) -> Vec<ImprovementRow> {
+    let couples = Couple::all(study);
+    let durations = metrics.iter().filter(|metric| is_duration(study, metric));
+    let columns: Vec<&MetricColumn> = durations.filter_map(|metric| study.column(metric)).collect();
+    let of = |column| couples.iter().filter_map(move |couple| couple.improvement(study, column, confidence));
+    columns.into_iter().flat_map(of).collect()
+}
+
+fn adjust(rows: &mut [OverallRow], confidence: f64) {
+    let seen = |row: &OverallRow| LossCase { difference: row.difference, p: row.p };
+    let tested = rows.iter_mut().filter(|row| row.p.is_some());
+    settle(&mut tested.map(|row| (seen(row), &mut row.losses)).collect::<Vec<_>>(), confidence);
+    let p_values: Vec<f64> = rows.iter().filter_map(|row| row.p).collect();
+    for (row, adjusted) in rows.iter_mut().filter(|row| row.p.is_some()).zip(holm(&p_values)) {
+        row.p_adjusted = Some(adjusted);
+        row.separated =
+            level(confidence).is_some_and(|level| adjusted <= level) && row.losses.is_none_or(|losses| losses.agree);
+    }
+}
+
+impl OverallRow {
+    fn better_first(self, study: &Study) -> Self {
+        let lower_is_better = study.better(&self.metric) == metric::catalog::Better::Lower;
+        let is_worse = |difference: f64| if lower_is_better { difference > 0.0 } else { difference < 0.0 };
+        if !self.difference.is_some_and(is_worse) {
+            return self;
+        }
+        Self {
+            first: self.second,
+            second: self.first,
+            difference: self.difference.map(|difference| -difference),
+            interval: self.interval.map(|Interval { low, high }| Interval { low: -high, high: -low }),
+            losses: self.losses.map(LossCases::turned),
+            ..self
+        }
+    }
+}

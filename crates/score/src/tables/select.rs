@@ -1,0 +1,111 @@
+//! Part of an episode table: some metrics, some episodes.
+//!
+//! A table of scores has no steps, so a condition can name its keys, its labels and its metrics, and
+//! no aggregate. It is evaluated by the same engine, each episode standing as one step.
+
+use std::sync::Arc;
+
+use arrow::array::{ArrayRef, DictionaryArray, Int64Array, RecordBatch, RecordBatchOptions};
+use arrow::datatypes::{Field, Int32Type, Schema};
+use arrow::error::ArrowError;
+
+use crate::error::EngineError;
+use crate::evaluate::Batch;
+use crate::physical::PhysicalPlan;
+use crate::segments::Segments;
+use crate::table::EpisodeTable;
+use exact::suggest::nearest;
+use metric::columns::{Column, Columns, Level, Type};
+use metric::definitions::{Definitions, UnknownMetric};
+use metric::file::FileError;
+use toml_spec::Faults;
+
+/// Why a part of a table cannot be had.
+#[derive(Debug, thiserror::Error)]
+pub enum SelectError {
+    /// A metric that the table does not have.
+    #[error(transparent)]
+    Metric(#[from] UnknownMetric),
+    /// The condition is not one over scores.
+    #[error(transparent)]
+    Condition(#[from] Faults),
+    /// The condition could not be evaluated.
+    #[error(transparent)]
+    Engine(#[from] EngineError),
+    /// The table could not be laid out in columns.
+    #[error("the scores cannot be laid out in columns: {0}")]
+    Layout(#[from] ArrowError),
+}
+
+/// The metrics named (all if absent) of the episodes where `condition` holds (all if absent).
+pub fn select(
+    table: EpisodeTable,
+    metrics: Option<&[String]>,
+    condition: Option<&str>,
+) -> Result<EpisodeTable, SelectError> {
+    let mut table = match condition {
+        Some(condition) => filtered(&table, condition)?,
+        None => table,
+    };
+    if let Some(names) = metrics {
+        let known: Vec<String> = table.metrics.iter().map(|metric| metric.name.clone()).collect();
+        if let Some(name) = names.iter().find(|name| !known.contains(name)) {
+            let near = nearest(name, known.iter().map(String::as_str)).map(str::to_owned);
+            return Err(UnknownMetric { name: name.clone(), near, known }.into());
+        }
+        table.metrics.retain(|metric| names.contains(&metric.name));
+    }
+    Ok(table)
+}
+
+fn filtered(table: &EpisodeTable, condition: &str) -> Result<EpisodeTable, SelectError> {
+    let columns = columns(table);
+    let none = match Definitions::from_toml("scores", "", &columns) {
+        Ok(none) => none,
+        Err(FileError::Faults(faults)) => return Err(faults.into()),
+        Err(FileError::Unreadable { .. }) => unreachable!("a text includes no file"),
+    };
+    let definitions = none.filtered("--where", condition, &columns)?;
+    let offsets: Vec<usize> = (0..=table.len()).collect();
+    let episodes = rows(table)?;
+    let steps = RecordBatch::try_new_with_options(
+        Arc::new(Schema::empty()),
+        vec![],
+        &RecordBatchOptions::new().with_row_count(Some(table.len())),
+    )?;
+    let batch = Batch { segments: Segments::new(&offsets), steps: &steps, texts: &[], episodes: &episodes };
+    let plan = PhysicalPlan::of(&[&definitions.plan]);
+    let kept = plan.evaluate(&batch)?.scores(&plan.scores()[0])?.kept;
+    let kept: Vec<usize> = kept.iter().flat_map(|kept| kept.values().set_indices()).collect();
+    Ok(table.taken(&kept))
+}
+
+fn columns(table: &EpisodeTable) -> Columns {
+    let column = |ty| Column { ty, level: Level::Episode };
+    let texts = ["episode_id", "model", "experiment"].map(|name| (name.to_owned(), column(Type::Text)));
+    let ints = ["seed", "run"].map(|name| (name.to_owned(), column(Type::Int)));
+    let labels = table.labels.iter().map(|label| (label.name.clone(), column(Type::Text)));
+    let metrics = table.metrics.iter().map(|metric| (metric.name.clone(), column(Type::Int)));
+    let columns: Columns = texts.into_iter().chain(ints).chain(labels).chain(metrics).collect();
+    columns.with_help("scores have their keys and metrics alone; a condition on steps needs the traces")
+}
+
+/// The table as columns that the engine takes.
+fn rows(table: &EpisodeTable) -> Result<RecordBatch, ArrowError> {
+    let text =
+        |values: Vec<Option<&str>>| Arc::new(values.into_iter().collect::<DictionaryArray<Int32Type>>()) as ArrayRef;
+    let int = |values: Vec<Option<i64>>| Arc::new(Int64Array::from(values)) as ArrayRef;
+    let keys = || table.keys.iter();
+    let mut columns = vec![
+        ("episode_id", text(keys().map(|key| Some(key.episode_id)).collect())),
+        ("model", text(keys().map(|key| Some(key.model)).collect())),
+        ("experiment", text(keys().map(|key| Some(key.experiment)).collect())),
+        ("seed", int(keys().map(|key| Some(key.seed.into())).collect())),
+        ("run", int(keys().map(|key| Some(key.run.into())).collect())),
+    ];
+    columns.extend(table.labels.iter().map(|label| (label.name.as_str(), text(label.values.iter().collect()))));
+    columns.extend(table.metrics.iter().map(|metric| (metric.name.as_str(), int(metric.iter().collect()))));
+    let fields: Vec<Field> =
+        columns.iter().map(|(name, array)| Field::new(*name, array.data_type().clone(), true)).collect();
+    RecordBatch::try_new(Arc::new(Schema::new(fields)), columns.into_iter().map(|(_, array)| array).collect())
+}

@@ -1,0 +1,430 @@
+//! The episode table: one row per episode, its keys and one integer per metric, in Arrow columns.
+
+use std::ops::Range;
+
+use arrow::array::{
+    Array, ArrayRef, AsArray as _, BooleanArray, Int32Array, Int64Array, LargeStringArray, UInt32Array,
+};
+use arrow::compute::take;
+
+use exact::moments::{MomentOverflow, Moments};
+use metric::catalog::Catalog;
+pub use trace::declared::Declared;
+use trace::schema::{self, Column};
+
+/// Scores of some episodes, ordered by experiment, model, seed, run, `episode_id` (bytes and integers, ascending).
+#[derive(Clone, Debug, PartialEq)]
+pub struct EpisodeTable {
+    /// The definitions that gave the values.
+    pub catalog: Catalog,
+    /// The keys, one row per episode.
+    pub keys: EpisodeKeys,
+    /// Further columns that are constant in an episode (`body_color`, ...), where they were asked for.
+    pub labels: Vec<LabelColumn>,
+    /// The metrics in the order of the catalog, or of the selection made.
+    pub metrics: Vec<MetricColumn>,
+    /// What the traces declare of how they were recorded.
+    pub declared: Declared,
+}
+
+/// The key columns of a table.
+#[derive(Clone, Debug)]
+pub struct EpisodeKeys {
+    pub(crate) experiment: TextColumn,
+    pub(crate) model: TextColumn,
+    pub(crate) seed: Int32Array,
+    pub(crate) run: Int32Array,
+    pub(crate) episode_id: TextColumn,
+}
+
+/// The label of what a study varies besides the model.
+pub const CONDITION: &str = "condition";
+
+/// The label of episodes that were lost for want of an answer.
+pub const LOST: &str = "lost";
+
+/// The label of an episode's replies: those that gave no decision, of all, such as `3/20`.
+pub const UNUSABLE_REPLIES: &str = "unusable_replies";
+
+/// What names an episode. The derived order is the order of the table.
+#[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct EpisodeKey {
+    /// `E1`..`E5` in the paper.
+    pub experiment: String,
+    /// The model's name in tables.
+    pub model: String,
+    /// The seed of the block of runs.
+    pub seed: i32,
+    /// The run within the seed.
+    pub run: i32,
+    /// Unique in a report.
+    pub episode_id: String,
+}
+
+/// An [`EpisodeKey`] in a table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[expect(missing_docs, reason = "the fields are those of `EpisodeKey`")]
+pub struct KeyRef<'a> {
+    pub experiment: &'a str,
+    pub model: &'a str,
+    pub seed: i32,
+    pub run: i32,
+    pub episode_id: &'a str,
+}
+
+/// A column of text: a code per row, null where there is no text, and the text of each code.
+#[derive(Clone, Debug)]
+pub struct TextColumn {
+    pub(crate) codes: UInt32Array,
+    pub(crate) texts: LargeStringArray,
+}
+
+/// A further key column: text, null where the trace has null.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LabelColumn {
+    /// The column's name in the trace.
+    pub name: String,
+    pub values: TextColumn,
+}
+
+/// The values of one metric, null where it is undefined.
+#[derive(Clone, Debug)]
+pub struct MetricColumn {
+    /// The metric's name in the catalog.
+    pub name: String,
+    pub(crate) values: MetricValues,
+}
+
+#[derive(Clone, Debug)]
+pub(crate) enum MetricValues {
+    /// Truth values, for 0 and 1.
+    Bools(BooleanArray),
+    /// Integers.
+    Ints(Int64Array),
+}
+
+/// The names of a table's columns.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Header {
+    /// The definitions that gave the values.
+    pub catalog: Catalog,
+    /// The names of the further key columns.
+    pub labels: Vec<String>,
+    /// The names of the metrics, in their order.
+    pub metrics: Vec<String>,
+}
+
+/// Why two tables are not one.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum JoinError {
+    /// They were computed under different definitions.
+    #[error("expected scores under one set of definitions, found `{0}` and another `{1}`; score the traces again")]
+    Definitions(String, String),
+    /// They have different columns.
+    #[error("expected the columns {0}, found {1}")]
+    Columns(String, String),
+    /// They share an episode.
+    #[error("the episode `{0}` is in two files of scores; leave one out")]
+    Episode(String),
+}
+
+impl EpisodeTable {
+    /// The names of the columns.
+    pub fn header(&self) -> Header {
+        Header {
+            catalog: self.catalog.clone(),
+            labels: self.labels.iter().map(|label| label.name.clone()).collect(),
+            metrics: self.metrics.iter().map(|metric| metric.name.clone()).collect(),
+        }
+    }
+
+    /// Returns true if some episode was recorded under another condition than the default one.
+    pub fn has_conditions(&self) -> bool {
+        let default = schema::column(CONDITION).and_then(Column::default_text);
+        self.label(CONDITION).is_some_and(|column| column.iter().flatten().any(|condition| Some(condition) != default))
+    }
+
+    /// The further key column of this name, if the table has it.
+    pub fn label(&self, name: &str) -> Option<&TextColumn> {
+        self.labels.iter().find(|label| label.name == name).map(|label| &label.values)
+    }
+
+    /// The metric of this name, if the table has it.
+    pub fn metric(&self, name: &str) -> Option<&MetricColumn> {
+        self.metrics.iter().find(|metric| metric.name == name)
+    }
+
+    /// The number of episodes.
+    pub fn len(&self) -> usize {
+        self.keys.len()
+    }
+
+    /// Returns true if there is no episode.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The rows at these positions, in this order.
+    #[must_use]
+    pub fn taken(&self, rows: &[usize]) -> Self {
+        let rows: UInt32Array = rows.iter().map(|row| narrow(*row)).collect::<Vec<_>>().into();
+        let label = |label: &LabelColumn| LabelColumn { name: label.name.clone(), values: label.values.taken(&rows) };
+        Self {
+            catalog: self.catalog.clone(),
+            keys: self.keys.taken(&rows),
+            labels: self.labels.iter().map(label).collect(),
+            metrics: self.metrics.iter().map(|metric| metric.taken(&rows)).collect(),
+            declared: self.declared.clone(),
+        }
+    }
+}
+
+pub(crate) fn narrow(row: usize) -> u32 {
+    u32::try_from(row).expect("2^32 episodes do not fit into memory")
+}
+
+impl EpisodeKeys {
+    pub fn len(&self) -> usize {
+        self.seed.len()
+    }
+
+    /// Returns true if there is no episode.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The key of a row.
+    ///
+    /// # Panics
+    /// For a row that is not there.
+    pub fn get(&self, row: usize) -> KeyRef<'_> {
+        KeyRef {
+            experiment: self.experiment.get(row).unwrap_or_default(),
+            model: self.model.get(row).unwrap_or_default(),
+            seed: self.seed.value(row),
+            run: self.run.value(row),
+            episode_id: self.episode_id.get(row).unwrap_or_default(),
+        }
+    }
+
+    /// Returns true if other columns have the same key in each row; says no where equal keys are held in two ways.
+    pub fn has_keys_of(&self, other: &Self) -> bool {
+        let is_same = |of: fn(&Self) -> &TextColumn| {
+            let (a, b) = (of(self), of(other));
+            a.codes == b.codes && a.texts == b.texts
+        };
+        self.seed == other.seed
+            && self.run == other.run
+            && is_same(|keys| &keys.experiment)
+            && is_same(|keys| &keys.model)
+            && is_same(|keys| &keys.episode_id)
+    }
+
+    /// The experiment of each row.
+    pub fn experiments(&self) -> &TextColumn {
+        &self.experiment
+    }
+
+    /// The model of each row.
+    pub fn models(&self) -> &TextColumn {
+        &self.model
+    }
+
+    /// The id of each row.
+    pub fn episode_ids(&self) -> &TextColumn {
+        &self.episode_id
+    }
+
+    /// The seed of a row.
+    ///
+    /// # Panics
+    /// For a row that is not there.
+    pub fn seed(&self, row: usize) -> i32 {
+        self.seed.value(row)
+    }
+
+    /// The run of a row.
+    ///
+    /// # Panics
+    /// For a row that is not there.
+    pub fn run(&self, row: usize) -> i32 {
+        self.run.value(row)
+    }
+
+    /// The keys, in order.
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = KeyRef<'_>> + Clone {
+        (0..self.len()).map(|row| self.get(row))
+    }
+
+    pub(crate) fn taken(&self, rows: &UInt32Array) -> Self {
+        let ints = |column: &Int32Array| taken(column, rows).as_primitive().clone();
+        Self {
+            experiment: self.experiment.taken(rows),
+            model: self.model.taken(rows),
+            seed: ints(&self.seed),
+            run: ints(&self.run),
+            episode_id: self.episode_id.taken(rows),
+        }
+    }
+}
+
+pub(crate) fn taken(column: &dyn Array, rows: &UInt32Array) -> ArrayRef {
+    take(column, rows, None).expect("the rows are those of the column")
+}
+
+impl PartialEq for EpisodeKeys {
+    fn eq(&self, other: &Self) -> bool {
+        self.iter().eq(other.iter())
+    }
+}
+
+impl KeyRef<'_> {
+    /// The same key on its own.
+    pub fn to_owned(&self) -> EpisodeKey {
+        EpisodeKey {
+            experiment: self.experiment.to_owned(),
+            model: self.model.to_owned(),
+            seed: self.seed,
+            run: self.run,
+            episode_id: self.episode_id.to_owned(),
+        }
+    }
+}
+
+impl EpisodeKey {
+    /// The same key, borrowed.
+    pub fn as_ref(&self) -> KeyRef<'_> {
+        let Self { experiment, model, seed, run, episode_id } = self;
+        KeyRef { experiment, model, seed: *seed, run: *run, episode_id }
+    }
+}
+
+impl TextColumn {
+    pub fn len(&self) -> usize {
+        self.codes.len()
+    }
+
+    /// Returns true if there is no row.
+    pub fn is_empty(&self) -> bool {
+        self.codes.is_empty()
+    }
+
+    /// The text of a row; `None` for null.
+    ///
+    /// # Panics
+    /// For a row that is not there.
+    pub fn get(&self, row: usize) -> Option<&str> {
+        self.codes.is_valid(row).then(|| self.texts.value(self.codes.value(row) as usize))
+    }
+
+    /// A number that stands for the text of a row; `None` for null. Equal texts have one number, but for episode ids, of
+    /// which each row has its own.
+    ///
+    /// # Panics
+    /// For a row that is not there.
+    pub fn code(&self, row: usize) -> Option<usize> {
+        self.codes.is_valid(row).then(|| self.codes.value(row) as usize)
+    }
+
+    /// The bytes of the longest text; 0 where there is none.
+    pub(crate) fn longest(&self) -> usize {
+        let offsets = self.texts.value_offsets().windows(2);
+        let longest = offsets.map(|ends| ends[1] - ends[0]).max().unwrap_or_default();
+        usize::try_from(longest).unwrap_or_default()
+    }
+
+    /// The texts of all rows.
+    pub fn iter(&self) -> impl Iterator<Item = Option<&str>> {
+        (0..self.len()).map(|row| self.get(row))
+    }
+
+    pub(crate) fn taken(&self, rows: &UInt32Array) -> Self {
+        Self { codes: taken(&self.codes, rows).as_primitive().clone(), texts: self.texts.clone() }
+    }
+}
+
+impl PartialEq for TextColumn {
+    fn eq(&self, other: &Self) -> bool {
+        self.iter().eq(other.iter())
+    }
+}
+
+impl MetricColumn {
+    /// A column of these values.
+    pub fn new(name: impl Into<String>, values: impl IntoIterator<Item = Option<i64>>) -> Self {
+        Self { name: name.into(), values: MetricValues::Ints(values.into_iter().collect()) }
+    }
+
+    /// The value of a row; `None` where the metric is undefined.
+    ///
+    /// # Panics
+    /// For a row that is not there.
+    pub fn get(&self, row: usize) -> Option<i64> {
+        match &self.values {
+            MetricValues::Bools(bools) => bools.is_valid(row).then(|| bools.value(row).into()),
+            MetricValues::Ints(ints) => ints.is_valid(row).then(|| ints.value(row)),
+        }
+    }
+
+    /// The values of all rows.
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = Option<i64>> + Clone {
+        (0..self.array().len()).map(|row| self.get(row))
+    }
+
+    /// Returns true if another column has the same value in each row; says no where equal values are held in two ways.
+    pub fn has_values_of(&self, other: &Self) -> bool {
+        match (&self.values, &other.values) {
+            (MetricValues::Bools(a), MetricValues::Bools(b)) => a == b,
+            (MetricValues::Ints(a), MetricValues::Ints(b)) => a == b,
+            _ => false,
+        }
+    }
+
+    /// How many values of these rows are 0, and how many are 1, where all of them are truth values.
+    ///
+    /// # Panics
+    /// For rows that are not there.
+    pub fn count_truths(&self, rows: Range<usize>) -> Option<(usize, usize)> {
+        let MetricValues::Bools(bools) = &self.values else { return None };
+        let some = bools.slice(rows.start, rows.len());
+        Some((some.false_count(), some.true_count()))
+    }
+
+    /// The defined values of some rows, added to `moments`.
+    ///
+    /// # Errors
+    /// When a sum leaves 128 bits.
+    ///
+    /// # Panics
+    /// If a row is out of range.
+    pub fn add_moments(&self, moments: Moments, rows: Range<usize>) -> Result<Moments, MomentOverflow> {
+        // A few rows are faster one by one than as a slice of bits.
+        let counts = if rows.len() < 16 { None } else { self.count_truths(rows.clone()) };
+        match counts {
+            Some((zeros, ones)) => moments.with_truths(zeros, ones),
+            None => rows.filter_map(|row| self.get(row)).try_fold(moments, Moments::with),
+        }
+    }
+
+    pub(crate) fn array(&self) -> &dyn Array {
+        match &self.values {
+            MetricValues::Bools(bools) => bools,
+            MetricValues::Ints(ints) => ints,
+        }
+    }
+
+    pub(crate) fn taken(&self, rows: &UInt32Array) -> Self {
+        let values = taken(self.array(), rows);
+        let values = match &self.values {
+            MetricValues::Bools(_) => MetricValues::Bools(values.as_boolean().clone()),
+            MetricValues::Ints(_) => MetricValues::Ints(values.as_primitive().clone()),
+        };
+        Self { name: self.name.clone(), values }
+    }
+}
+
+impl PartialEq for MetricColumn {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name && self.iter().eq(other.iter())
+    }
+}

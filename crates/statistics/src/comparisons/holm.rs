@@ -1,0 +1,60 @@
+//! Many tests at once: p values that keep their promise for the whole family.
+
+use crate::quantile;
+
+/// The level that a test of this confidence is held to: 0.05 for 0.95; `None` outside (0, 1).
+pub fn level(confidence: f64) -> Option<f64> {
+    quantile::tail(confidence).map(|tail| 2.0 * tail)
+}
+
+/// Holm's step-down adjustment (Holm 1979): valid whatever the dependence between the tests.
+///
+/// An adjusted value is to be compared with the level of the whole family. The order is that of the input;
+/// no value falls below its own p value or exceeds 1.
+#[expect(clippy::cast_precision_loss, reason = "a family has few tests")]
+pub fn holm(p_values: &[f64]) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..p_values.len()).collect();
+    order.sort_by(|&a, &b| p_values[a].total_cmp(&p_values[b]));
+    let mut adjusted = vec![0.0; p_values.len()];
+    let mut reached = 0.0f64;
+    for (rank, index) in order.into_iter().enumerate() {
+        let remaining = (p_values.len() - rank) as f64;
+        reached = reached.max((remaining * p_values[index]).min(1.0));
+        adjusted[index] = reached;
+    }
+    adjusted
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::{holm, level};
+
+    // statsmodels 0.15.0: multipletests(p, method="holm")[1]
+    #[test]
+    fn the_adjustment_is_the_known_one() {
+        let found = holm(&[0.01, 0.04, 0.03, 0.005, 0.2, 0.6]);
+        let expected = [0.05, 0.12, 0.12, 0.03, 0.4, 0.6];
+        assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-15), "{found:?}");
+        assert!(holm(&[]).is_empty());
+    }
+
+    #[test]
+    fn the_level_is_what_the_confidence_leaves() {
+        assert_eq!((level(0.95), level(0.99), level(1.0)), (Some(0.05), Some(0.01), None));
+    }
+
+    proptest! {
+        #[test]
+        fn the_adjustment_keeps_order_and_bounds(p in prop::collection::vec(0.0f64..=1.0, 1..30)) {
+            let adjusted = holm(&p);
+            for i in 0..p.len() {
+                prop_assert!(adjusted[i] >= p[i] && adjusted[i] <= 1.0);
+                for j in 0..p.len() {
+                    prop_assert!(p[i] > p[j] || adjusted[i] <= adjusted[j]);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,11 @@
+//! Tests between two groups, their families, and sets of ties.
+
+pub mod contrast;
+pub mod holm;
+pub mod improvement;
+pub mod letter_display;
+pub mod margin;
+pub mod paired;
+pub mod stratified;
+pub mod units;
+pub mod unpaired;

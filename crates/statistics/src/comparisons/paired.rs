@@ -1,0 +1,206 @@
+//! Two rates over the same episodes: who solved what the other did not.
+//!
+//! Rule: only pairs in which both values are defined count. Agreement says nothing about a difference;
+//! the test sees the discordant pairs alone, the interval sees all.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::chance;
+use crate::interval::{Interval, wilson};
+use exact::ratio::Ratio;
+
+/// The 2x2 table of paired outcomes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Pairs {
+    /// Both are 1.
+    pub both: u64,
+    /// Only the first is 1.
+    pub first_only: u64,
+    /// Only the second is 1.
+    pub second_only: u64,
+    /// Both are 0.
+    pub neither: u64,
+}
+
+impl Pairs {
+    /// The table of these pairs of values, of which 1 is a success and everything else a failure.
+    pub fn of(values: impl IntoIterator<Item = (i64, i64)>) -> Self {
+        let mut pairs = Self::default();
+        for value in values {
+            match value {
+                (1, 1) => pairs.both += 1,
+                (1, _) => pairs.first_only += 1,
+                (_, 1) => pairs.second_only += 1,
+                _ => pairs.neither += 1,
+            }
+        }
+        pairs
+    }
+
+    pub fn n(self) -> u64 {
+        self.both + self.first_only + self.second_only + self.neither
+    }
+
+    /// The first rate minus the second; `None` without a pair.
+    #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
+    pub fn difference(self) -> Option<f64> {
+        (self.n() > 0).then(|| (self.first_only as f64 - self.second_only as f64) / self.n() as f64)
+    }
+
+    /// The exact two-sided test of no difference (`McNemar` 1947; as a sign test: Dixon and Mood 1946).
+    ///
+    /// Under no difference a discordant pair falls either way with probability 1/2. 1 where no pair is
+    /// discordant; `None` without a pair.
+    pub fn mcnemar(self) -> Option<f64> {
+        match (self.n(), self.discordant()) {
+            (0, _) => None,
+            (_, 0) => Some(1.0),
+            (_, discordant) => chance::two_sided(self.first_only, discordant, Ratio::new(1, 2)?),
+        }
+    }
+
+    /// The mid-p value of [`Pairs::mcnemar`] (Fagerland, Lydersen and Laake 2013, BMC Medical Research Methodology 13:91).
+    ///
+    /// Less conservative than the exact test and **not guaranteed to keep the level**. 1 where no pair is discordant;
+    /// `None` without a pair.
+    pub fn mcnemar_mid_p(self) -> Option<f64> {
+        match (self.n(), self.discordant()) {
+            (0, _) => None,
+            (_, 0) => Some(1.0),
+            (_, discordant) => Some(chance::exact_test(self.first_only, discordant, Ratio::new(1, 2)?)?.mid_p),
+        }
+    }
+
+    /// The least p value that [`Pairs::mcnemar`] could have given with as many discordant pairs: 2^(1 - d).
+    ///
+    /// 1 where no pair is discordant; `None` without a pair.
+    pub fn mcnemar_least_p(self) -> Option<f64> {
+        let halvings = i32::try_from(self.discordant().saturating_sub(1)).unwrap_or(i32::MAX);
+        (self.n() > 0).then(|| 0.5f64.powi(halvings))
+    }
+
+    pub fn discordant(self) -> u64 {
+        self.first_only + self.second_only
+    }
+
+    /// The interval of [`Pairs::difference`]: square and add, with the correlation of the pairs
+    /// (Newcombe 1998, Statistics in Medicine 17:2635, method 10).
+    ///
+    /// `None` without a pair and for a confidence outside (0, 1).
+    pub fn interval(self, confidence: f64) -> Option<Interval> {
+        let (n, difference) = (self.n(), self.difference()?);
+        let first = Arms::of(self.both + self.first_only, n, confidence)?;
+        let second = Arms::of(self.both + self.second_only, n, confidence)?;
+        let phi = self.correlation();
+        let reach = |a: f64, b: f64| (a * a - 2.0 * phi * a * b + b * b).max(0.0).sqrt();
+        Some(Interval {
+            low: (difference - reach(first.down, second.up)).max(-1.0),
+            high: (difference + reach(first.up, second.down)).min(1.0),
+        })
+    }
+
+    /// Newcombe's phi: continuity-corrected towards 0 where positive, 0 where a margin is empty.
+    #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
+    fn correlation(self) -> f64 {
+        let [a, b, c, d] = [self.both, self.first_only, self.second_only, self.neither].map(|count| count as f64);
+        let margins = (a + b) * (c + d) * (a + c) * (b + d);
+        let excess = a * d - b * c;
+        let corrected = if excess > 0.0 { (excess - self.n() as f64 / 2.0).max(0.0) } else { excess };
+        if margins > 0.0 { corrected / margins.sqrt() } else { 0.0 }
+    }
+}
+
+/// How far the Wilson bounds of a rate reach down and up from it.
+struct Arms {
+    down: f64,
+    up: f64,
+}
+
+impl Arms {
+    #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
+    fn of(successes: u64, n: u64, confidence: f64) -> Option<Self> {
+        let rate = successes as f64 / n as f64;
+        wilson(successes, n, confidence).map(|bounds| Self { down: rate - bounds.low, up: bounds.high - rate })
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::unreadable_literal, reason = "reference values as their sources print them")]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::Pairs;
+
+    fn pairs([both, first_only, second_only, neither]: [u64; 4]) -> Pairs {
+        Pairs { both, first_only, second_only, neither }
+    }
+
+    // statsmodels 0.15.0: mcnemar([[0, b], [c, 0]], exact=True).pvalue
+    #[test]
+    fn the_exact_test_is_the_known_one() {
+        for (b, c, expected) in
+            [(5, 0, 0.0625), (6, 0, 0.03125), (8, 1, 0.0390625), (10, 3, 0.09228515625), (4, 4, 1.0), (0, 0, 1.0)]
+        {
+            assert_eq!(pairs([3, b, c, 4]).mcnemar(), Some(expected), "{b}-{c}");
+        }
+    }
+
+    // Python fractions over comb(n, j) / 2**n; Fagerland et al. 2013: p minus the probability of the counts seen, 1 minus
+    // half of it where both counts are equal.
+    #[test]
+    fn the_mid_p_value_and_the_least_p_value_are_the_known_ones() {
+        for (b, c, mid_p, least) in [
+            (1, 0, 0.5, 1.0),
+            (5, 0, 0.03125, 0.0625),
+            (8, 1, 0.021484375, 0.00390625),
+            (10, 3, 0.057373046875, 0.000244140625),
+            (4, 4, 0.86328125, 0.0078125),
+            (20, 9, 0.04277394525706768, 3.725290298461914e-09),
+            (0, 0, 1.0, 1.0),
+        ] {
+            let found = pairs([3, b, c, 4]);
+            assert!((found.mcnemar_mid_p().unwrap() - mid_p).abs() < 1e-15, "{b}-{c}");
+            assert_eq!(found.mcnemar_least_p(), Some(least));
+        }
+        assert_eq!(pairs([0, 5000, 0, 0]).mcnemar_least_p(), Some(0.0));
+    }
+
+    // Python: method 10 written out over the Wilson limits of statsmodels 0.15.0, proportion_confint(k, n, 0.05, "wilson")
+    #[test]
+    fn the_interval_is_the_known_one() {
+        for (table, low, high) in [
+            ([36, 12, 2, 0], 0.0569295840032387, 0.340427602974941),
+            ([10, 8, 1, 2], 0.0557733667386439, 0.552373622263244),
+            ([54, 0, 0, 0], -0.0664135880908963, 0.0664135880908963),
+            ([53, 1, 0, 0], -0.0496216618894039, 0.0977143748878192),
+            ([0, 30, 0, 24], 0.407969089767531, 0.679975358277704),
+            ([0, 0, 0, 21], -0.154639018924847, 0.154639018924847),
+            ([5, 5, 5, 6], -0.277846012710692, 0.277846012710692),
+            ([1, 9, 10, 1], -0.414259614423976, 0.333028514535466),
+        ] {
+            let found = pairs(table).interval(0.95).unwrap();
+            assert!((found.low - low).abs() < 1e-10 && (found.high - high).abs() < 1e-10, "{table:?}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn no_pair_has_no_answer() {
+        let none = Pairs::default();
+        assert_eq!((none.difference(), none.mcnemar(), none.interval(0.95)), (None, None, None));
+        assert_eq!((none.mcnemar_mid_p(), none.mcnemar_least_p()), (None, None));
+    }
+
+    proptest! {
+        #[test]
+        fn exchanging_the_two_turns_the_sign(table in prop::array::uniform4(0u64..40)) {
+            prop_assume!(table.iter().sum::<u64>() > 0);
+            let (here, there) = (pairs(table), pairs([table[0], table[2], table[1], table[3]]));
+            let (a, b) = (here.interval(0.95).unwrap(), there.interval(0.95).unwrap());
+            prop_assert!((a.low + b.high).abs() < 1e-12 && (a.high + b.low).abs() < 1e-12);
+            prop_assert_eq!(here.mcnemar(), there.mcnemar());
+            prop_assert!(a.contains(here.difference().unwrap()));
+            prop_assert!((0.0..=1.0).contains(&here.mcnemar().unwrap()));
+        }
+    }
+}

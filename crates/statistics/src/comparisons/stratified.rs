@@ -1,0 +1,342 @@
+//! Two independent rates in several strata (experiments): one common difference, one test of none.
+//!
+//! Rule: sides are compared within a stratum alone, so that strata of unequal difficulty and unequal size do not
+//! confound them. A stratum without an episode of one side says nothing and is left out. Episodes that are paired
+//! belong to [`pooled`].
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::interval::Interval;
+use crate::outcomes::{ExactTest, Outcomes};
+use crate::paired::Pairs;
+use crate::quantile;
+use crate::unpaired::tables;
+
+/// The most multiplications that the exact test takes: a fraction of a second.
+const MOST_PRODUCTS: usize = 1 << 24;
+
+/// One stratum: the successes and the episodes of each side.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Stratum {
+    /// The successes and the episodes of the first.
+    pub first: (u64, u64),
+    /// The successes and the episodes of the second.
+    pub second: (u64, u64),
+}
+
+/// The Mantel-Haenszel risk difference.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct CommonDifference {
+    /// The first rate minus the second, averaged over the strata with the weights m n / (m + n).
+    pub difference: f64,
+    /// Its interval; `None` where the strata leave no spread to judge by.
+    pub interval: Option<Interval>,
+}
+
+/// The Cochran-Mantel-Haenszel test of no difference in any stratum.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct CochranMantelHaenszel {
+    /// Chi-squared with 1 degree of freedom.
+    pub statistic: f64,
+    /// Its p value, by the limit of many episodes.
+    pub p: f64,
+    /// The same with a continuity correction of 1/2, which never makes it negative.
+    pub statistic_corrected: f64,
+    /// Its p value.
+    pub p_corrected: f64,
+}
+
+/// The common difference of the rates (Greenland and Robins 1985) and its score interval
+/// (Klingenberg 2014, Statistics in Medicine 33:2968), which inverts the test with Sato's variance (Sato 1989).
+///
+/// `None` where no stratum has episodes of both sides, where a stratum has more successes than episodes, and for a
+/// confidence outside (0, 1).
+pub fn common_difference(strata: &[Stratum], confidence: f64) -> Option<CommonDifference> {
+    let z = quantile::normal(quantile::tail(confidence)?);
+    let sums = terms(strata)?.iter().fold(Sums::default(), Sums::with);
+    let difference = sums.excess / sums.weight;
+    let scale = z * z / (sums.weight * sums.weight);
+    let middle = difference + scale * sums.slope / 2.0;
+    let reach = (middle * middle - difference * difference + scale * sums.constant).max(0.0).sqrt();
+    let bounds = Interval { low: middle - reach, high: middle + reach }.within(-1.0, 1.0);
+    Some(CommonDifference { difference, interval: (bounds.low < bounds.high).then_some(bounds) })
+}
+
+/// The test without and with continuity correction (Cochran 1954; Mantel and Haenszel 1959).
+///
+/// `None` as in [`common_difference`], and where no stratum has both a success and a failure.
+pub fn cochran_mantel_haenszel(strata: &[Stratum]) -> Option<CochranMantelHaenszel> {
+    let terms = terms(strata)?;
+    let variance: f64 = terms.iter().map(Term::variance).sum();
+    let excess = terms.iter().map(Term::excess).sum::<f64>().abs();
+    let statistic = |excess: f64| excess * excess / variance;
+    if variance <= 0.0 {
+        return None;
+    }
+    let (plain, corrected) = (statistic(excess), statistic((excess - 0.5).max(0.0)));
+    Some(CochranMantelHaenszel {
+        statistic: plain,
+        p: quantile::chi_squared_above(plain),
+        statistic_corrected: corrected,
+        p_corrected: quantile::chi_squared_above(corrected),
+    })
+}
+
+/// The exact conditional test of no difference in any stratum: given the margins of each, the successes of the first
+/// side are a sum of hypergeometric counts (Mehta, Patel and Gray 1985). Two-sided by minimum likelihood.
+///
+/// `mid_p` is less conservative and not guaranteed to keep the level. `None` as in [`common_difference`], and where the
+/// sum has so many values that the asymptotic test serves better.
+pub fn exact(strata: &[Stratum]) -> Option<ExactTest> {
+    let terms = terms(strata)?;
+    let seen = terms.iter().map(|term| term.seen).sum();
+    let all: Option<Vec<Outcomes>> = terms.iter().map(Term::outcomes).collect();
+    let mut all = all?.into_iter();
+    let mut sum = all.next()?;
+    let mut products = 0usize;
+    for next in all {
+        products = products.saturating_add(sum.len().saturating_mul(next.len()));
+        if products > MOST_PRODUCTS {
+            return None;
+        }
+        sum = sum.plus(&next);
+    }
+    Some(sum.test(seen))
+}
+
+/// The pairs of all strata in one table: for matched pairs, [`Pairs::mcnemar`] of it is the exact conditional test.
+///
+/// Each pair is a stratum of its own, within whatever larger stratum; given its margins a concordant pair cannot fall
+/// otherwise, and a discordant one falls either way with probability 1/2. So nothing is lost by pooling.
+pub fn pooled(strata: &[Pairs]) -> Pairs {
+    strata.iter().fold(Pairs::default(), |sum, pairs| Pairs {
+        both: sum.both + pairs.both,
+        first_only: sum.first_only + pairs.first_only,
+        second_only: sum.second_only + pairs.second_only,
+        neither: sum.neither + pairs.neither,
+    })
+}
+
+/// The strata with episodes of both sides; `None` where there is none, or one has more successes than episodes.
+fn terms(strata: &[Stratum]) -> Option<Vec<Term>> {
+    if strata.iter().any(|stratum| stratum.first.0 > stratum.first.1 || stratum.second.0 > stratum.second.1) {
+        return None;
+    }
+    let has_both = |stratum: &&Stratum| stratum.first.1 > 0 && stratum.second.1 > 0;
+    let terms: Vec<Term> = strata.iter().filter(has_both).map(Term::of).collect();
+    (!terms.is_empty()).then_some(terms)
+}
+
+/// One stratum as numbers: `x` of `m` succeed on the first side, `y` of `n` on the second.
+struct Term {
+    seen: u64,
+    stratum: Stratum,
+    x: f64,
+    m: f64,
+    y: f64,
+    n: f64,
+}
+
+impl Term {
+    #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
+    fn of(stratum: &Stratum) -> Self {
+        let ((x, m), (y, n)) = (stratum.first, stratum.second);
+        Self { seen: x, stratum: *stratum, x: x as f64, m: m as f64, y: y as f64, n: n as f64 }
+    }
+
+    fn excess(&self) -> f64 {
+        (self.x * self.n - self.y * self.m) / (self.m + self.n)
+    }
+
+    fn variance(&self) -> f64 {
+        let (all, successes) = (self.m + self.n, self.x + self.y);
+        self.m * self.n * successes * (all - successes) / (all * all * (all - 1.0))
+    }
+
+    fn outcomes(&self) -> Option<Outcomes> {
+        tables(self.stratum.first, self.stratum.second)
+    }
+}
+
+/// Sums over strata; Sato's variance at a difference d is (slope d + constant) / weight².
+#[derive(Default)]
+struct Sums {
+    weight: f64,
+    excess: f64,
+    slope: f64,
+    constant: f64,
+}
+
+impl Sums {
+    fn with(self, term: &Term) -> Self {
+        let Term { x, m, y, n, .. } = term;
+        let all = m + n;
+        let slope = (m * m * y - n * n * x + m * n * (n - m) / 2.0) / (all * all);
+        let constant = (x * (n - y) + y * (m - x)) / (2.0 * all);
+        Self {
+            weight: self.weight + m * n / all,
+            excess: self.excess + term.excess(),
+            slope: self.slope + slope,
+            constant: self.constant + constant,
+        }
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::unreadable_literal, reason = "reference values as their sources print them")]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::{Stratum, cochran_mantel_haenszel, common_difference, exact, pooled};
+    use crate::paired::Pairs;
+    use crate::unpaired::fisher;
+
+    type Counts = ((u64, u64), (u64, u64));
+
+    const THREE: [Counts; 3] = [((15, 21), (9, 21)), ((12, 21), (8, 20)), ((18, 21), (14, 19))];
+    const SPARSE: [Counts; 4] = [((1, 2), (0, 3)), ((2, 2), (1, 4)), ((0, 1), (0, 2)), ((3, 4), (1, 3))];
+    const OPPOSITE: [Counts; 2] = [((21, 21), (0, 21)), ((7, 7), (0, 9))];
+    /// Admissions of men and women at Berkeley in 1973 by department, as `UCBAdmissions` of R.
+    const BERKELEY: [Counts; 6] = [
+        ((512, 825), (89, 108)),
+        ((353, 560), (17, 25)),
+        ((120, 325), (202, 593)),
+        ((138, 417), (131, 375)),
+        ((53, 191), (94, 393)),
+        ((22, 373), (24, 341)),
+    ];
+
+    fn strata(counts: &[Counts]) -> Vec<Stratum> {
+        counts.iter().map(|&(first, second)| Stratum { first, second }).collect()
+    }
+
+    fn close(found: f64, expected: f64) {
+        assert!((found / expected - 1.0).abs() < 1e-9, "found {found}, expected {expected}");
+    }
+
+    // statsmodels 0.15.0: StratifiedTable(tables).test_null_odds(correction); it takes p from 1 - cdf, which leaves the
+    // least ones few digits: those are scipy 1.17.1 chi2.sf(statistic, 1).
+    #[test]
+    fn the_test_is_the_known_one() {
+        for (counts, statistic, p, statistic_corrected, p_corrected) in [
+            (&THREE[..], 5.145414138110284, 0.023307850255107176, 4.317784713811399, 0.03771599246980417),
+            (&SPARSE, 4.740606936416186, 0.02945867668977764, 2.9134754335260125, 0.08784239303713393),
+            (&BERKELEY, 1.5246066604434356, 0.21692369705551817, 1.4269462285866883, 0.23226346281704802),
+            (&OPPOSITE, 55.99322799097065, 7.272107530649127e-14, 52.18206620496205, 5.058601785675439e-13),
+        ] {
+            let found = cochran_mantel_haenszel(&strata(counts)).unwrap();
+            close(found.statistic, statistic);
+            close(found.p, p);
+            close(found.statistic_corrected, statistic_corrected);
+            close(found.p_corrected, p_corrected);
+        }
+    }
+
+    // Python: fractions for the sums, scipy 1.17.1 brentq for the roots of (d - x)² = z² (slope x + constant) / weight².
+    #[test]
+    fn the_common_difference_is_the_known_one() {
+        for (counts, difference, low, high) in [
+            (&THREE[..], 0.19389031143929017, 0.025098064301969435, 0.3511478414166653),
+            (&SPARSE, 0.47093023255813954, 0.019775569362376663, 0.7580276416446508),
+            (&[((56, 70), (48, 80))], 0.2, 0.05155486778686341, 0.33678356079317234),
+            (&BERKELEY, -0.018425196190852512, -0.047366881345320196, 0.010748058332670306),
+            (&OPPOSITE, 1.0, 0.8669624650841862, 1.0),
+        ] {
+            let found = common_difference(&strata(counts), 0.95).unwrap();
+            let interval = found.interval.unwrap();
+            close(found.difference, difference);
+            close(interval.low, low);
+            close(interval.high, high);
+        }
+    }
+
+    // Python: fractions, the hypergeometric probabilities of the strata convolved.
+    #[test]
+    fn the_exact_test_is_the_known_one() {
+        for (counts, p, mid_p) in [
+            (&THREE[..], 0.0348427546215399, 0.02902267571595362),
+            (&SPARSE, 0.053714285714285714, 0.03485714285714286),
+            (&OPPOSITE, 1.623990870612546e-16, 8.11995435306273e-17),
+        ] {
+            let found = exact(&strata(counts)).unwrap();
+            assert!((found.p / p - 1.0).abs() < 1e-9 && (found.mid_p / mid_p - 1.0).abs() < 1e-9, "{found:?}");
+        }
+        let one = strata(&[((8, 10), (1, 6))]);
+        assert_eq!(exact(&one), fisher((8, 10), (1, 6)));
+    }
+
+    #[test]
+    fn what_says_nothing_has_no_answer_and_no_interval_without_a_width() {
+        let lone = strata(&[((1, 2), (0, 0)), ((0, 0), (3, 4))]);
+        assert_eq!((common_difference(&lone, 0.95), cochran_mantel_haenszel(&lone), exact(&lone)), (None, None, None));
+        let wrong = strata(&[((3, 2), (1, 2))]);
+        assert_eq!(
+            (common_difference(&wrong, 0.95), cochran_mantel_haenszel(&wrong), exact(&wrong)),
+            (None, None, None)
+        );
+        let never = strata(&[((0, 7), (0, 7)), ((0, 3), (0, 3))]);
+        let found = common_difference(&never, 0.95).unwrap();
+        assert_eq!((found.difference, found.interval), (0.0, None));
+        assert_eq!(cochran_mantel_haenszel(&never), None);
+        assert_eq!(exact(&never).map(|test| (test.p, test.mid_p)), Some((1.0, 1.0)));
+        assert_eq!(common_difference(&strata(&THREE), 1.0), None);
+    }
+
+    #[test]
+    fn a_stratum_of_one_side_changes_nothing() {
+        let mut more = strata(&THREE);
+        more.push(Stratum { first: (3, 7), second: (0, 0) });
+        assert_eq!(common_difference(&more, 0.95), common_difference(&strata(&THREE), 0.95));
+        assert_eq!(exact(&more), exact(&strata(&THREE)));
+    }
+
+    #[test]
+    fn very_many_episodes_have_no_exact_test() {
+        let many = strata(&[((250_000, 500_000), (250_100, 500_000)); 60]);
+        assert_eq!(exact(&many), None);
+        assert!(cochran_mantel_haenszel(&many).is_some());
+    }
+
+    // Each pair as a stratum of its own: the exact conditional test is McNemar's over the discordant pairs.
+    #[test]
+    fn pairs_as_strata_are_mcnemars_test() {
+        let experiments = [
+            Pairs { both: 5, first_only: 6, second_only: 1, neither: 3 },
+            Pairs { both: 2, first_only: 4, second_only: 2, neither: 1 },
+        ];
+        let together = pooled(&experiments);
+        assert_eq!(together, Pairs { both: 7, first_only: 10, second_only: 3, neither: 4 });
+        let single = |(x, y): (u64, u64), count: u64| (0..count).map(move |_| ((x, 1), (y, 1)));
+        let each: Vec<Counts> = experiments
+            .iter()
+            .flat_map(|pairs| {
+                let concordant = single((1, 1), pairs.both).chain(single((0, 0), pairs.neither));
+                concordant.chain(single((1, 0), pairs.first_only)).chain(single((0, 1), pairs.second_only))
+            })
+            .collect();
+        let found = exact(&strata(&each)).unwrap();
+        assert!((found.p - together.mcnemar().unwrap()).abs() < 1e-12);
+        assert!((found.mid_p - together.mcnemar_mid_p().unwrap()).abs() < 1e-12);
+    }
+
+    proptest! {
+        #[test]
+        fn exchanging_the_sides_turns_the_sign(counts in prop::collection::vec(prop::array::uniform4(0u64..12), 1..5)) {
+            let here: Vec<Stratum> = counts
+                .iter()
+                .map(|&[a, b, c, d]| Stratum { first: (a, a + b + 1), second: (c, c + d + 1) })
+                .collect();
+            let there: Vec<Stratum> =
+                here.iter().map(|stratum| Stratum { first: stratum.second, second: stratum.first }).collect();
+            let (a, b) = (common_difference(&here, 0.95).unwrap(), common_difference(&there, 0.95).unwrap());
+            prop_assert!((a.difference + b.difference).abs() < 1e-12);
+            if let (Some(a), Some(b)) = (a.interval, b.interval) {
+                prop_assert!((a.low + b.high).abs() < 1e-9 && (a.high + b.low).abs() < 1e-9);
+            }
+            prop_assert!(a.interval.is_none_or(|interval| interval.low - 1e-12 <= a.difference && a.difference <= interval.high + 1e-12));
+            let (a, b) = (exact(&here).unwrap(), exact(&there).unwrap());
+            prop_assert!((a.p - b.p).abs() < 1e-9 && 0.0 < a.p && a.p <= 1.0 && a.mid_p <= a.p);
+        }
+    }
+}

@@ -1,0 +1,249 @@
+//! Time to a correct decision: a wrong decision ends the wait for good, so it competes and does not censor.
+//!
+//! Rule: an episode without a decision says only that it takes longer than its length. A decision in step t comes
+//! before censoring in step t. With every decision taken as correct, all this is the Kaplan-Meier curve.
+
+use std::collections::BTreeMap;
+
+pub use crate::endings::{Ending, Outcome};
+use crate::endings::{RiskSet, risk_sets};
+use crate::survival::RestrictedMean;
+
+/// How near a share must come to one half to count as having reached it: rounding only.
+const HALF: f64 = 0.5 - 1e-12;
+
+/// The Aalen-Johansen curve (Aalen and Johansen 1978): the share of episodes decided correctly by each step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Incidence {
+    points: Vec<Point>,
+}
+
+/// One step at which an episode ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Point {
+    steps: i64,
+    at_risk: f64,
+    correct: f64,
+    wrong: f64,
+    censored: f64,
+    /// The share undecided before this step.
+    before: f64,
+    is_correct: f64,
+    is_wrong: f64,
+}
+
+/// What each kind of episode adds to a restricted mean: its derivative by the episode's weight.
+///
+/// The sum of squares over the episodes is the variance by the infinitesimal jackknife (Jaeckel 1972; Efron 1982,
+/// chapter 6), which for one cause is Greenwood's.
+#[derive(Clone, Debug)]
+pub struct Influence {
+    points: BTreeMap<i64, [f64; 3]>,
+}
+
+impl Incidence {
+    /// The curve of these episodes; `None` without any.
+    #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
+    pub fn of(endings: &[Ending]) -> Option<Self> {
+        let (mut is_correct, mut is_wrong) = (0.0, 0.0);
+        let of_step = |RiskSet { steps, at_risk, ended, before, .. }: RiskSet| {
+            let at_risk = at_risk as f64;
+            let [correct, wrong, censored] = ended.map(|count| count as f64);
+            is_correct += before * correct / at_risk;
+            is_wrong += before * wrong / at_risk;
+            Point { steps, at_risk, correct, wrong, censored, before, is_correct, is_wrong }
+        };
+        let points: Vec<Point> = risk_sets(endings).into_iter().map(of_step).collect();
+        (!points.is_empty()).then_some(Self { points })
+    }
+
+    /// The shares decided correctly and wrongly by the end of a step; the rest is undecided.
+    pub fn shares(&self, steps: i64) -> [f64; 2] {
+        let last = self.points.iter().rev().find(|point| point.steps <= steps);
+        last.map_or([0.0; 2], |point| [point.is_correct, point.is_wrong])
+    }
+
+    /// The first step by which at least half of all episodes are decided correctly; `None` where that is never seen.
+    pub fn median(&self) -> Option<i64> {
+        self.points.iter().find(|point| point.is_correct >= HALF).map(|point| point.steps)
+    }
+
+    /// The last step that the curve is known to, and `None` where it is known for ever: all decided.
+    pub fn known_until(&self) -> Option<i64> {
+        self.points.last().filter(|last| last.at_risk > last.correct + last.wrong).map(|last| last.steps)
+    }
+
+    /// The mean of the steps to a correct decision, where later than `horizon` and never both count as `horizon`:
+    /// the horizon minus the area under the curve (Andersen 2013).
+    ///
+    /// `None` for a horizon that is not positive or lies beyond what the curve is known to, and for a confidence
+    /// outside (0, 1). Its standard error is the infinitesimal jackknife's times sqrt(n / (n - 1)).
+    pub fn restricted_mean(&self, horizon: i64, confidence: f64) -> Option<RestrictedMean> {
+        if horizon <= 0 || self.known_until().is_some_and(|known| known < horizon) {
+            return None;
+        }
+        let variance = self.variance(&self.influence(horizon));
+        RestrictedMean::of(horizon, self.mean(horizon), variance, self.n(), confidence)
+    }
+
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count")]
+    pub fn n(&self) -> u64 {
+        self.points.first().map_or(0, |first| first.at_risk as u64)
+    }
+
+    #[expect(clippy::cast_precision_loss, reason = "steps are far below 2^53")]
+    pub(crate) fn mean(&self, horizon: i64) -> f64 {
+        let area: f64 = self.early(horizon).map(|point| point.gain(horizon) * point.correct / point.at_risk).sum();
+        horizon as f64 - area
+    }
+
+    fn variance(&self, influence: &Influence) -> f64 {
+        let of_point = |point: &Point| {
+            let [taken, correct, wrong] = influence.points[&point.steps];
+            let square = |x: f64| x * x;
+            point.correct * square(correct - taken)
+                + point.wrong * square(wrong - taken)
+                + point.censored * square(taken)
+        };
+        self.points.iter().map(of_point).sum()
+    }
+
+    /// What every episode of this curve adds to the restricted mean.
+    pub fn influence(&self, horizon: i64) -> Influence {
+        // What a larger share of decisions at a step takes away from the gains of all later steps.
+        let mut later = 0.0;
+        let mut slopes = Vec::with_capacity(self.points.len());
+        for point in self.points.iter().rev() {
+            let gain = if point.steps < horizon { point.gain(horizon) } else { 0.0 };
+            let left = 1.0 - (point.correct + point.wrong) / point.at_risk;
+            let lost = if left > 0.0 { later / left } else { 0.0 };
+            slopes.push([lost - gain, lost]);
+            later += gain * point.correct / point.at_risk;
+        }
+        let mut taken = 0.0;
+        let mut points = BTreeMap::new();
+        for (point, slopes) in self.points.iter().zip(slopes.into_iter().rev()) {
+            let [correct, wrong] = slopes.map(|slope| slope / point.at_risk);
+            taken += (correct * point.correct + wrong * point.wrong) / point.at_risk;
+            points.insert(point.steps, [taken, correct, wrong]);
+        }
+        Influence { points }
+    }
+
+    fn early(&self, horizon: i64) -> impl Iterator<Item = &Point> {
+        self.points.iter().take_while(move |point| point.steps < horizon)
+    }
+}
+
+impl Point {
+    #[expect(clippy::cast_precision_loss, reason = "steps are far below 2^53")]
+    fn gain(&self, horizon: i64) -> f64 {
+        self.before * (horizon - self.steps) as f64
+    }
+}
+
+impl Influence {
+    /// What one episode of the curve adds.
+    ///
+    /// # Panics
+    /// For an episode that is not of the curve.
+    pub fn of(&self, ending: Ending) -> f64 {
+        let [taken, correct, wrong] = self.points[&ending.steps];
+        match ending.outcome {
+            Outcome::Correct => correct - taken,
+            Outcome::Wrong => wrong - taken,
+            Outcome::Unfinished => -taken,
+        }
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::unreadable_literal, reason = "reference values as their sources print them")]
+pub(super) mod tests {
+    use super::{Ending, Incidence, Outcome};
+    use crate::survival::Survival;
+
+    /// Endings: the steps, and `c` for correct, `w` for wrong, `-` for unfinished.
+    pub fn endings(written: &str) -> Vec<Ending> {
+        let outcome = |kind: &str| match kind {
+            "c" => Outcome::Correct,
+            "w" => Outcome::Wrong,
+            _ => Outcome::Unfinished,
+        };
+        let ending = |word: &str| {
+            let (steps, kind) = word.split_at(word.len() - 1);
+            Ending { steps: steps.parse().unwrap(), outcome: outcome(kind) }
+        };
+        written.split_whitespace().map(ending).collect()
+    }
+
+    pub const FIRST: &str = "5c 12w 100- 30c 100- 44w 61c 80- 8c 77c 100- 15w 100- 90c 33c";
+
+    pub fn close(found: f64, expected: f64) {
+        assert!((found - expected).abs() < 1e-9 * expected.abs().max(1.0), "found {found}, expected {expected}");
+    }
+
+    // statsmodels 0.15.0: CumIncidenceRight(time, status).cinc
+    #[test]
+    fn the_curve_is_the_known_one() {
+        let curve = Incidence::of(&endings(FIRST)).unwrap();
+        for (steps, correct, wrong) in [
+            (4, 0.0, 0.0),
+            (5, 0.06666666666666667, 0.0),
+            (15, 0.13333333333333333, 0.13333333333333333),
+            (61, 0.33333333333333337, 0.2),
+            (89, 0.4, 0.2),
+            (90, 0.48000000000000004, 0.2),
+            (1000, 0.48000000000000004, 0.2),
+        ] {
+            let [found_correct, found_wrong] = curve.shares(steps);
+            close(found_correct, correct);
+            close(found_wrong, wrong);
+        }
+        assert_eq!((curve.median(), curve.known_until(), curve.n()), (None, Some(100), 15));
+        assert_eq!(Incidence::of(&endings("7c 9c 11w 100-")).unwrap().median(), Some(9));
+    }
+
+    // Python, exact fractions: the mean as a function of the episodes' weights, differentiated by each weight with a
+    // step of 1e-12, squared and summed; times sqrt(n / (n - 1)). scipy 1.17.1 for the bounds: logit, expit, t.ppf.
+    #[test]
+    fn the_restricted_mean_is_the_known_one() {
+        let curve = Incidence::of(&endings(FIRST)).unwrap();
+        let factor = (15.0f64 / 14.0).sqrt();
+        for (horizon, mean, se) in
+            [(80, 62.266666666666666, 7.0461757423862625), (60, 49.06666666666667, 4.97323205139646)]
+        {
+            let found = curve.restricted_mean(horizon, 0.95).unwrap();
+            close(found.mean, mean);
+            close(found.se, se * factor);
+        }
+        let interval = curve.restricted_mean(80, 0.95).unwrap().interval.unwrap();
+        close(interval.low, 42.449578820355754);
+        close(interval.high, 73.28078969128643);
+        assert_eq!(curve.restricted_mean(101, 0.95), None);
+        assert_eq!(curve.restricted_mean(0, 0.95), None);
+    }
+
+    #[test]
+    fn without_wrong_decisions_it_is_the_kaplan_meier_curve() {
+        let steps = [6, 6, 6, -6, 7, -9, 10, -10, -11, 13, 16, -17, -19, -20, 22, 23, -25, -32, -32, -34, -35i64];
+        let ending =
+            |&d: &i64| Ending { steps: d.abs(), outcome: if d > 0 { Outcome::Correct } else { Outcome::Unfinished } };
+        let endings: Vec<Ending> = steps.iter().map(ending).collect();
+        let (curve, survival) = (Incidence::of(&endings).unwrap(), Survival::of(&endings).unwrap());
+        for horizon in [5, 6, 20, 35] {
+            let (a, b) =
+                (curve.restricted_mean(horizon, 0.95).unwrap(), survival.restricted_mean(horizon, 0.95).unwrap());
+            close(a.mean, b.mean);
+            close(a.se, b.se);
+        }
+    }
+
+    #[test]
+    fn a_wrong_decision_is_never_a_correct_one_later() {
+        let found = Incidence::of(&endings("10w 10w 10w")).unwrap().restricted_mean(100, 0.95).unwrap();
+        assert_eq!((found.mean, found.interval), (100.0, None));
+        let censored = Incidence::of(&endings("10- 20c 20c")).unwrap();
+        close(censored.restricted_mean(100, 0.95).unwrap().mean, 20.0);
+    }
+}

@@ -1,0 +1,55 @@
+//! Episodes as they end, and the walk over their risk sets that every curve is made of.
+
+use std::collections::BTreeMap;
+
+/// One episode: the steps until it ended, and how.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Ending {
+    /// The steps until the decision, or until the recording stopped.
+    pub steps: i64,
+    pub outcome: Outcome,
+}
+
+/// How an episode ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// With the decision that is waited for.
+    Correct,
+    /// With another one, after which that decision cannot come any more.
+    Wrong,
+    /// Without a decision: censored.
+    Unfinished,
+}
+
+/// The episodes at one step at which some ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct RiskSet {
+    pub steps: i64,
+    /// The episodes that lasted until here.
+    pub at_risk: u64,
+    /// Those that ended here, by [`Outcome`].
+    pub ended: [u64; 3],
+    /// The share undecided before this step.
+    pub before: f64,
+    /// The share undecided after it.
+    pub after: f64,
+}
+
+/// The steps at which an episode ended, ascending. A decision in a step comes before censoring in that step.
+#[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
+pub(crate) fn risk_sets(endings: &[Ending]) -> Vec<RiskSet> {
+    let mut ends: BTreeMap<i64, [u64; 3]> = BTreeMap::new();
+    for ending in endings {
+        ends.entry(ending.steps).or_default()[ending.outcome as usize] += 1;
+    }
+    let (mut at_risk, mut before) = (endings.len() as u64, 1.0);
+    let of_step = |(steps, ended): (i64, [u64; 3])| {
+        let undecided = at_risk - ended[Outcome::Correct as usize] - ended[Outcome::Wrong as usize];
+        let after = before * (undecided as f64 / at_risk as f64);
+        let set = RiskSet { steps, at_risk, ended, before, after };
+        at_risk -= ended.iter().sum::<u64>();
+        before = after;
+        set
+    };
+    ends.into_iter().map(of_step).collect()
+}

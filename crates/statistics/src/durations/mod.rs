@@ -1,0 +1,6 @@
+//! Times to an event: survival, competing endings, restricted means.
+
+pub mod competing;
+pub(crate) mod endings;
+pub mod restricted;
+pub mod survival;

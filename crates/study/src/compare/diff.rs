@@ -1,0 +1,344 @@
+//! Two sides of a comparison: definitions, scores or a report's folder, to cells and episodes that differ, and to the
+//! timesteps that decided where they do.
+//!
+//! Rule: only metrics that both sides have are scored, so that a side may have others that these traces do not bear.
+
+use std::collections::BTreeMap;
+use std::ffi::OsStr;
+use std::io;
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+
+use crate::error::StudyError;
+use crate::inputs::{ScoreFile, Source, Stamp};
+use crate::{LostAs, Question, Study, own_definitions, scores};
+use exact::suggest::nearest;
+use metric::definitions::{Definitions, UnknownMetric};
+use report::cells::diff::{Changes, Flip, Overlap};
+use report::cells::group::DEFAULT_BY;
+use report::layout::TableOrder;
+use report::style::Style;
+use score::evidence::{self, Evidence};
+use score::flips;
+use score::score_traces::{self, ScoreError};
+use score::table::EpisodeTable;
+use trace::inputs::{self, Input};
+use trace::open::TraceSet;
+
+/// What stands on one side.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// Definitions by name or path.
+    Definitions(PathBuf),
+    /// Files of scores, the parts of one table.
+    Scores(Vec<ScoreFile>),
+}
+
+/// What to compare.
+#[derive(Clone, Debug)]
+pub struct DiffRequest {
+    /// The metrics; all if absent.
+    pub metrics: Option<Vec<String>>,
+    /// The episodes, by a condition that holds on both sides; all if absent.
+    pub filter: Option<String>,
+    /// The columns that cells are grouped by.
+    pub by: Vec<String>,
+    /// The definitions of scores that do not carry them; the default ones if absent.
+    pub definitions_of_scores: Option<PathBuf>,
+    /// How many threads to use.
+    pub threads: NonZeroUsize,
+}
+
+impl Default for DiffRequest {
+    fn default() -> Self {
+        Self {
+            metrics: None,
+            filter: None,
+            by: DEFAULT_BY.map(str::to_owned).to_vec(),
+            definitions_of_scores: None,
+            threads: std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN),
+        }
+    }
+}
+
+/// What differs between two sides.
+#[derive(Clone, Debug)]
+pub struct Diff {
+    /// Cells and episodes that changed, in the order of tables.
+    pub changes: Changes,
+    /// What there is to say about flips whose timesteps are not known, one sentence each.
+    pub notes: Vec<String>,
+}
+
+/// Both sides, scored.
+#[derive(Debug)]
+pub(crate) struct Pair {
+    pub before: Scored,
+    pub after: Scored,
+    /// What decided each difference, where one scan scored both sides.
+    pub evidence: Option<[BTreeMap<String, Evidence>; 2]>,
+}
+
+/// One side, scored.
+#[derive(Debug)]
+pub(crate) struct Scored {
+    /// Its episodes, under the metrics that both sides have.
+    pub table: EpisodeTable,
+    /// All its metrics among those asked for.
+    pub metrics: Vec<String>,
+    /// What scored it; `None` for scores that were read, which carry their definitions as text.
+    pub definitions: Option<Definitions>,
+}
+
+/// Compares two sides; `traces` score definitions, and tell which timesteps decided where both sides are scores.
+///
+/// # Errors
+/// What is wrong with definitions, scores or traces; a metric that neither side has; definitions without traces.
+pub fn diff(old: &Side, new: &Side, traces: &[Input], request: &DiffRequest) -> Result<Diff, StudyError> {
+    let inputs = traces;
+    let style = Style::load("default")?;
+    let stamps = traces.iter().map(Stamp::of).collect::<Result<Vec<_>, _>>()?;
+    let traces = if traces.is_empty() { None } else { Some(Source::open(traces)?.into_traces()?) };
+    let pair = Pair::score(old, new, traces.as_ref(), request)?;
+    if pair.before.table.is_empty() && pair.after.table.is_empty() {
+        new.study(inputs, request)?.check_filter(0)?;
+    }
+    let mut changes = pair.changes(&request.by)?;
+    TableOrder { catalog: &pair.after.table.catalog, style: &style }.sort(&mut changes);
+    let notes = match &traces {
+        Some(traces) => {
+            let mut notes = pair.explain(&mut changes, traces, request.threads)?;
+            notes.extend([&pair.before, &pair.after].into_iter().filter_map(|side| side.unscored(traces)));
+            notes
+        }
+        None => Vec::new(),
+    };
+    stamps.iter().try_for_each(Stamp::check)?;
+    Ok(Diff { changes, notes })
+}
+
+impl Side {
+    /// What an argument names.
+    ///
+    /// # Errors
+    /// A folder or a Parquet file that holds no scores.
+    pub fn of(argument: impl AsRef<Path>) -> Result<Self, StudyError> {
+        let path = argument.as_ref();
+        let inside = path.join("episodes.parquet");
+        let inputs = if inside.is_file() {
+            vec![Input::new(inside)]
+        } else if path.is_dir() {
+            // A folder of parts, as a cluster writes them, is one table.
+            inputs::resolve(&[path.as_os_str().to_owned()], io::empty())?
+        } else {
+            vec![Input::new(path)]
+        };
+        match ScoreFile::all(&inputs)? {
+            Some(scores) => Ok(Self::Scores(scores)),
+            None if path.is_dir() || (path.extension() == Some(OsStr::new("parquet")) && path.exists()) => {
+                Err(StudyError::NoSide { argument: path.display().to_string() })
+            }
+            None => Ok(Self::Definitions(path.to_owned())),
+        }
+    }
+
+    fn question(&self, request: &DiffRequest) -> Question {
+        let definitions = match self {
+            Self::Definitions(name) => Some(name.clone()),
+            Self::Scores(files) if files.iter().any(|file| file.carries_definitions) => None,
+            Self::Scores(_) => request.definitions_of_scores.clone(),
+        };
+        Question {
+            definitions,
+            filter: request.filter.clone(),
+            metrics: None,
+            by: Some(request.by.clone()),
+            pool: true,
+            lost: LostAs::Nothing,
+            ..Question::default()
+        }
+    }
+
+    fn study(&self, traces: &[Input], request: &DiffRequest) -> Result<Study, StudyError> {
+        let inputs = match self {
+            Self::Definitions(_) => traces.to_vec(),
+            Self::Scores(files) => files.iter().map(|file| file.input.clone()).collect(),
+        };
+        Study::of(inputs)?.threads(request.threads).asked(self.question(request))
+    }
+
+    fn read(
+        &self,
+        traces: Option<&TraceSet>,
+        request: &DiffRequest,
+    ) -> Result<(Vec<String>, Option<EpisodeTable>), StudyError> {
+        match self {
+            Self::Definitions(name) => {
+                let columns = traces.map_or_else(score_traces::schema_columns, score_traces::trace_columns);
+                let definitions = Definitions::load(name, &columns)?;
+                Ok((definitions.catalog.metric.keys().cloned().collect(), None))
+            }
+            Self::Scores(files) => {
+                let table = scores::read(files, &Question { by: None, ..self.question(request) })?;
+                Ok((table.metrics.iter().map(|metric| metric.name.clone()).collect(), Some(table)))
+            }
+        }
+    }
+
+    fn bind(
+        &self,
+        common: &[String],
+        traces: Option<&TraceSet>,
+        request: &DiffRequest,
+    ) -> Result<Option<Definitions>, StudyError> {
+        match (self, traces) {
+            (Self::Scores(_), _) => Ok(None),
+            (Self::Definitions(name), None) => Err(StudyError::NoTraces { name: name.display().to_string() }),
+            (Self::Definitions(_), Some(traces)) => {
+                let question = Question { metrics: Some(common.to_vec()), ..self.question(request) };
+                question.bind(traces).map(Some)
+            }
+        }
+    }
+}
+
+impl Pair {
+    fn score(old: &Side, new: &Side, traces: Option<&TraceSet>, request: &DiffRequest) -> Result<Self, StudyError> {
+        let (old_metrics, old_table) = old.read(traces, request)?;
+        let (new_metrics, new_table) = new.read(traces, request)?;
+        check_known(request.metrics.as_deref(), &old_metrics, &new_metrics)?;
+        let wanted = |name: &String| request.metrics.as_ref().is_none_or(|metrics| metrics.contains(name));
+        let [before, after] =
+            [old_metrics, new_metrics].map(|names| names.into_iter().filter(wanted).collect::<Vec<String>>());
+        let common: Vec<String> = after.iter().filter(|name| before.contains(name)).cloned().collect();
+        let of_common = |table: Option<EpisodeTable>| {
+            table.map(|mut table| {
+                table.metrics.retain(|metric| common.contains(&metric.name));
+                table
+            })
+        };
+        let definitions = [old.bind(&common, traces, request)?, new.bind(&common, traces, request)?];
+        let (tables, evidence) =
+            score_sides(&definitions, [of_common(old_table), of_common(new_table)], traces, request)?;
+        let ([old_definitions, new_definitions], [old_table, new_table]) = (definitions, tables);
+        Ok(Self {
+            evidence,
+            before: Scored { table: old_table, metrics: before, definitions: old_definitions },
+            after: Scored { table: new_table, metrics: after, definitions: new_definitions },
+        })
+    }
+
+    /// What changed between the sides, its metrics those asked for.
+    ///
+    /// # Errors
+    /// Columns to group by that a side does not have; sums that leave 128 bits.
+    pub(crate) fn changes(&self, by: &[String]) -> Result<Changes, StudyError> {
+        let mut changes = Changes::of(&self.before.table, &self.after.table, by)?;
+        changes.metrics = Overlap::of(&self.before.metrics, &self.after.metrics);
+        Ok(changes)
+    }
+
+    /// Adds the timesteps that decided each flip; returns what there is to say about those that are not known.
+    ///
+    /// # Errors
+    /// What is wrong with the rows of the traces.
+    pub(crate) fn explain(
+        &self,
+        changes: &mut Changes,
+        traces: &TraceSet,
+        threads: NonZeroUsize,
+    ) -> Result<Vec<String>, StudyError> {
+        if let Some([before, after]) = &self.evidence {
+            changes.explain_before(before);
+            changes.explain_after(after);
+            return Ok(Vec::new());
+        }
+        let wanted = changes.flipped_episodes();
+        let mut notes = Vec::new();
+        if wanted.is_empty() {
+            return Ok(notes);
+        }
+        let metrics = changes.flipped_metrics();
+        let mut evidence = |side: &Scored, word| match side.definitions(traces, &metrics) {
+            Ok(definitions) => Ok(evidence::explain_each(traces, &definitions, &wanted, threads)?),
+            Err(error @ (ScoreError::Carried(_) | ScoreError::Column { .. })) => {
+                notes.push(format!("the timesteps that decided {word} are not known: {error}"));
+                Ok(BTreeMap::new())
+            }
+            Err(error) => Err(StudyError::from(error)),
+        };
+        let (before, after) = (evidence(&self.before, "before")?, evidence(&self.after, "after")?);
+        changes.explain_before(&before);
+        changes.explain_after(&after);
+        if notes.is_empty() {
+            notes.extend(unexplained(changes));
+        }
+        Ok(notes)
+    }
+}
+
+impl Scored {
+    fn unscored(&self, traces: &TraceSet) -> Option<String> {
+        let is_kept = |name: &str| self.table.keys.iter().any(|key| key.experiment == name);
+        match own_definitions::unscored(self.definitions.as_ref()?, traces, is_kept)? {
+            StudyError::NotScored { experiment, definitions, own } => Some(format!(
+                "`{definitions}` does not score the experiment `{experiment}`, as `{own}` does: its zeros there mean nothing"
+            )),
+            _ => None,
+        }
+    }
+
+    fn definitions(&self, traces: &TraceSet, metrics: &[String]) -> Result<Definitions, ScoreError> {
+        match &self.definitions {
+            None => score_traces::restored(traces, &self.table.catalog, metrics),
+            Some(definitions) => {
+                let mut definitions = definitions.clone();
+                definitions.select(metrics)?;
+                Ok(definitions)
+            }
+        }
+    }
+}
+
+/// The tables of both sides, and what decided where they differ.
+type ScoredSides = ([EpisodeTable; 2], Option<[BTreeMap<String, Evidence>; 2]>);
+
+fn score_sides(
+    definitions: &[Option<Definitions>; 2],
+    read: [Option<EpisodeTable>; 2],
+    traces: Option<&TraceSet>,
+    request: &DiffRequest,
+) -> Result<ScoredSides, StudyError> {
+    let labels = Question { by: Some(request.by.clone()), ..Question::default() }.labels();
+    let score = |traces, definitions| score_traces::score(traces, definitions, &labels, request.threads);
+    match (definitions, read, traces) {
+        ([None, None], [Some(old), Some(new)], _) => Ok(([old, new], None)),
+        ([Some(old), Some(new)], _, Some(traces)) => {
+            let pair = flips::score_pair(traces, [old, new], &labels, request.threads)?;
+            Ok((pair.tables, Some(pair.evidence)))
+        }
+        ([Some(old), None], [_, Some(new)], Some(traces)) => Ok(([score(traces, old)?, new], None)),
+        ([None, Some(new)], [Some(old), _], Some(traces)) => Ok(([old, score(traces, new)?], None)),
+        _ => Err(StudyError::NoScores),
+    }
+}
+
+fn check_known(asked: Option<&[String]>, old: &[String], new: &[String]) -> Result<(), UnknownMetric> {
+    let known = || new.iter().chain(old.iter().filter(|name| !new.contains(name)));
+    match asked.unwrap_or_default().iter().find(|name| !known().any(|known| known == *name)) {
+        None => Ok(()),
+        Some(name) => {
+            let near = nearest(name, known().map(String::as_str)).map(str::to_owned);
+            Err(UnknownMetric { name: name.clone(), near, known: known().cloned().collect() })
+        }
+    }
+}
+
+fn unexplained(changes: &Changes) -> Option<String> {
+    let lacks = |flip: &&Flip| flip.timesteps.before.is_none() || flip.timesteps.after.is_none();
+    let count = changes.flips.iter().filter(lacks).count();
+    (count > 0).then(|| {
+        let all = changes.flips.len();
+        format!("{count} of {all} flips are not explained: the traces lack their episodes, or give other scores")
+    })
+}

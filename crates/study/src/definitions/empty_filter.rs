@@ -1,0 +1,80 @@
+//! A filter that keeps no episode: how many there are, and what the columns that it names hold.
+//!
+//! Rule: what cannot bear a conclusion is refused. Reports, statistics, figures and comparisons of no episode are errors;
+//! tables for programs (`score`, `query`) stay tables without rows, and a note says so.
+
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+
+use crate::error::StudyError;
+use crate::inputs::Source;
+use crate::{Question, Study, scores};
+use exact::escape::visible;
+use metric::names::mentioned;
+use report::cells::KeyValue;
+use report::cells::group::{KEY_COLUMNS, column_values};
+use score::score_traces;
+use score::table::EpisodeTable;
+
+/// Values of a column that are listed.
+const LISTED: usize = 8;
+
+impl Study {
+    /// Refuses an answer about no episode where the filter is why there is none.
+    ///
+    /// # Errors
+    /// [`StudyError::EmptyFilter`]; what is wrong with the inputs without the filter.
+    pub(crate) fn check_filter(&self, episodes: usize) -> Result<(), StudyError> {
+        match self.empty_filter(episodes)? {
+            None => Ok(()),
+            Some(words) => Err(StudyError::EmptyFilter { words }),
+        }
+    }
+
+    /// What there is to say about a filter that keeps none of the episodes; `None` where it keeps some, or there is none.
+    ///
+    /// # Errors
+    /// What is wrong with the inputs without the filter.
+    pub fn empty_filter(&self, episodes: usize) -> Result<Option<String>, StudyError> {
+        let Some(filter) = self.question.filter.as_deref().filter(|_| episodes == 0) else { return Ok(None) };
+        let names = mentioned(filter);
+        let all = self.unfiltered(&names)?;
+        let noun = if all.len() == 1 { "episode" } else { "episodes" };
+        let mut words = format!("the filter `{}` keeps none of {} {noun}", visible(filter), all.len());
+        for name in &names {
+            if let Some(values) = column_values(&all, name) {
+                let _ = write!(words, "\n  {}: {}", visible(name), listed(&values));
+            }
+        }
+        Ok(Some(words))
+    }
+
+    fn unfiltered(&self, names: &[String]) -> Result<EpisodeTable, StudyError> {
+        let Question { definitions, each, parts, .. } = self.question.clone();
+        let whole = Question { definitions, each, parts, ..Question::default() };
+        let traces = match &self.source {
+            Source::Scores(files) => return scores::read(files, &whole),
+            Source::Traces(traces) => traces,
+        };
+        let is_label =
+            |name: &&String| !KEY_COLUMNS.contains(&name.as_str()) && score_traces::check_label(traces, name).is_ok();
+        let labels: Vec<String> = names.iter().filter(is_label).cloned().collect();
+        let known = whole.load(&score_traces::trace_columns(traces))?.catalog.metric;
+        let metrics = names.iter().filter(|name| known.contains_key(*name)).cloned().collect();
+        let question = Question { metrics: Some(metrics), ..whole };
+        Ok(score_traces::score(traces, &question.bind(traces)?, &labels, self.threads)?)
+    }
+}
+
+fn listed(values: &BTreeSet<KeyValue>) -> String {
+    let one = |value: &KeyValue| match value {
+        KeyValue::Missing => "null".to_owned(),
+        KeyValue::Int(value) => value.to_string(),
+        KeyValue::Text(text) => format!("'{}'", visible(text)),
+    };
+    let mut shown: Vec<String> = values.iter().take(LISTED).map(one).collect();
+    if values.len() > LISTED {
+        shown.push(format!("... ({} in all)", values.len()));
+    }
+    shown.join(", ")
+}

@@ -1,0 +1,181 @@
+//! Which definitions score which experiment: a footer names them, or the built-in experiment of the same name does.
+//!
+//! Rule: without definitions asked for, each experiment is scored by its own. Definitions that include all others score a
+//! mixture; any other mixture is refused, with the questions that would do. Definitions asked for must score what they keep.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use crate::error::StudyError;
+use crate::scored_alike::ScoredAlike;
+use crate::{DEFAULT_DEFINITIONS, Question, Study};
+use metric::columns::Columns;
+use metric::definitions::Definitions;
+use metric::file;
+use score::table::EpisodeTable;
+use trace::declared_experiment::DeclaredExperiment;
+use trace::open::{TraceFile, TraceSet};
+use trace::schema::Domain;
+
+/// The definitions of reaching, whose traces have no colours.
+const WITHOUT_COLORS: &str = "reach";
+
+/// The definitions that an experiment names, and the hash of a file; `None` for the default ones.
+fn own(declared: &DeclaredExperiment) -> Option<(String, Option<String>)> {
+    if let Some(name) = &declared.definitions {
+        return Some((name.clone(), declared.definitions_hash.clone()));
+    }
+    // Traces from before footers named them: built-in definitions list the experiment, or the task has no colours.
+    let lists = |name: &&str| file::read(name).is_ok_and(|document| document.experiments.contains_key(&declared.name));
+    let listed = file::built_in_names().into_iter().find(lists);
+    let name = listed.or_else(|| (!declared.absent.is_empty()).then_some(WITHOUT_COLORS))?;
+    (name != DEFAULT_DEFINITIONS).then(|| (name.to_owned(), None))
+}
+
+fn groups(traces: &TraceSet) -> Vec<ScoredAlike> {
+    let mut by_name: BTreeMap<(String, Option<String>), BTreeSet<String>> = BTreeMap::new();
+    let default = || (DEFAULT_DEFINITIONS.to_owned(), None);
+    let mut unnamed = None;
+    for file in traces.files() {
+        if file.experiments().is_empty() {
+            unnamed = Some(default());
+            by_name.entry(default()).or_default();
+        }
+        for declared in file.experiments() {
+            let names = by_name.entry(own(declared).unwrap_or_else(default)).or_default();
+            names.insert(declared.name.clone());
+        }
+    }
+    let all: Vec<(String, Option<String>)> = by_name.keys().cloned().collect();
+    for one in &all {
+        let includes = |(other, hash): &&(String, Option<String>)| {
+            let built_on = file::built_in(other).and_then(|_| file::read(other).ok()).map(|document| document.built_on);
+            (other, hash) != (&one.0, &one.1) && hash.is_none() && built_on.is_some_and(|on| on.contains(&&*one.0))
+        };
+        let Some(other) = all.iter().find(includes).filter(|_| one.1.is_none()) else { continue };
+        let names = by_name.remove(one).unwrap_or_default();
+        by_name.entry(other.clone()).or_default().extend(names);
+        unnamed = unnamed.map(|unnamed| if unnamed == *one { other.clone() } else { unnamed });
+    }
+    let listed = |names: &mut dyn Iterator<Item = &String>| {
+        names.map(|name| format!("'{}'", name.replace('\'', "''"))).collect::<Vec<_>>().join(", ")
+    };
+    let group = |(key, experiments): (&(String, Option<String>), &BTreeSet<String>)| {
+        let others = by_name.iter().filter(|(other, _)| *other != key).flat_map(|(_, names)| names);
+        let condition = if unnamed.as_ref() == Some(key) {
+            format!("experiment not in ({})", listed(&mut others.into_iter()))
+        } else {
+            format!("experiment in ({})", listed(&mut experiments.iter()))
+        };
+        let (definitions, hash) = key.clone();
+        ScoredAlike { definitions, hash, experiments: experiments.clone(), condition }
+    };
+    by_name.iter().map(group).collect()
+}
+
+/// The definitions that score all experiments of some traces, each as its own do; `None` for the default ones.
+///
+/// # Errors
+/// Experiments that need different definitions; definitions that are a file of the one who recorded.
+fn chosen(traces: &TraceSet) -> Result<Option<PathBuf>, StudyError> {
+    let groups = groups(traces);
+    match &groups[..] {
+        [] => Ok(None),
+        [one] if one.is_built_in() => {
+            Ok(Some(&one.definitions).filter(|name| *name != DEFAULT_DEFINITIONS).map(PathBuf::from))
+        }
+        [one] => Err(StudyError::DefinitionsElsewhere { group: one.clone() }),
+        _ => Err(StudyError::DefinitionsDiffer { groups }),
+    }
+}
+
+impl Question {
+    /// The question with the definitions that the experiments of these traces name, where it asks for none.
+    pub fn resolved(mut self, traces: &TraceSet) -> Result<Self, StudyError> {
+        if traces.domain() == Domain::Own {
+            check_domain(self.definitions_name(), traces)?;
+        }
+        if self.definitions.is_some() {
+            return Ok(self);
+        }
+        match chosen(traces) {
+            Ok(name) => self.definitions = name,
+            Err(StudyError::DefinitionsDiffer { groups })
+                if self.each && groups.iter().all(ScoredAlike::is_built_in) =>
+            {
+                self.parts = groups;
+            }
+            Err(error) => return Err(error),
+        }
+        Ok(self)
+    }
+
+    pub(crate) fn load(&self, columns: &Columns) -> Result<Definitions, StudyError> {
+        if self.definitions.is_none() && !self.parts.is_empty() {
+            let whole = side_by_side(&self.parts, columns)?;
+            return whole.ok_or_else(|| StudyError::DefinitionsDiffer { groups: self.parts.clone() });
+        }
+        Ok(Definitions::load(self.definitions_name(), columns)?)
+    }
+}
+
+/// Refuses definitions of the mirror for traces of another domain. What cannot be read is told where it is loaded.
+fn check_domain(definitions: &Path, traces: &TraceSet) -> Result<(), StudyError> {
+    let is_mirror = file::read(definitions).is_ok_and(|document| document.domain.is_none());
+    let first = traces.files().first().filter(|_| is_mirror);
+    first.map_or(Ok(()), |first| {
+        Err(StudyError::OtherDomain { file: first.name().to_owned(), definitions: definitions.display().to_string() })
+    })
+}
+
+/// Each experiment under its own definitions, in one; `None` where two of these give one name another meaning.
+fn side_by_side(groups: &[ScoredAlike], columns: &Columns) -> Result<Option<Definitions>, StudyError> {
+    let part = |group: &ScoredAlike| {
+        let definitions = Definitions::load(&group.definitions, columns)?;
+        let elsewhere = |name: &&String| groups.iter().any(|other| other.experiments.contains(*name));
+        let known = definitions.catalog.experiment.keys().filter(|name| !elsewhere(name));
+        let experiments = group.experiments.iter().chain(known).cloned().collect();
+        Ok((definitions, experiments))
+    };
+    let parts = groups.iter().map(part).collect::<Result<Vec<_>, StudyError>>()?;
+    Ok(Definitions::side_by_side(&parts, columns).transpose()?)
+}
+
+/// Refuses episodes of an experiment that some definitions do not score, where its own would: a false zero is no score.
+///
+/// # Errors
+/// [`StudyError::NotScored`].
+pub(crate) fn check(definitions: &Definitions, traces: &TraceSet, episodes: &EpisodeTable) -> Result<(), StudyError> {
+    unscored(definitions, traces, |name| episodes.keys.iter().any(|key| key.experiment == name)).map_or(Ok(()), Err)
+}
+
+pub(crate) fn unscored(
+    definitions: &Definitions,
+    traces: &TraceSet,
+    is_kept: impl Fn(&str) -> bool,
+) -> Option<StudyError> {
+    let declared = traces.files().iter().flat_map(TraceFile::experiments);
+    let mut not_scored = declared.filter_map(|declared| {
+        let (own, hash) = own(declared)?;
+        (!definitions.scores(&declared.name, &own, hash.as_deref())).then_some((&declared.name, own))
+    });
+    let (experiment, own) = not_scored.find(|(name, _)| is_kept(name))?;
+    let (experiment, definitions) = (experiment.clone(), definitions.catalog.name.clone());
+    Some(StudyError::NotScored { experiment, definitions, own })
+}
+
+impl Study {
+    /// The experiments by their definitions, where each is scored by its own beside others; else none.
+    pub fn parts(&self) -> &[ScoredAlike] {
+        &self.question.parts
+    }
+
+    /// The definitions that score all experiments of the traces, as their footers name them; `None` for the default ones.
+    ///
+    /// # Errors
+    /// Scores in the place of traces; experiments that need different definitions; definitions that are a file of the one
+    /// who recorded.
+    pub fn own_definitions(&self) -> Result<Option<PathBuf>, StudyError> {
+        chosen(self.traces()?)
+    }
+}

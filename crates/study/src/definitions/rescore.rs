@@ -1,0 +1,156 @@
+//! A report again from its own traces, under other definitions.
+//!
+//! Rule: the new report keeps the filter, the grouping, the style and the choice of metrics of the old one, which stays
+//! as it is. Traces are found by their hashes.
+
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+
+use crate::diff::{Diff, Pair, Scored};
+use crate::error::StudyError;
+use crate::report::{Report, ReportOptions};
+use crate::{LostAs, Question, Study, provenance};
+use exact::input;
+use report::bundle::Manifest;
+use report::layout::TableOrder;
+use report::style::Style;
+use score::format::{self, Partition};
+use score::table::EpisodeTable;
+use trace::inputs::Input;
+
+/// What to make again, and what to change.
+#[derive(Clone, Debug)]
+pub struct RescoreRequest {
+    /// The folder of the report.
+    pub report: PathBuf,
+    /// The definitions to score under, by name or path; those that the traces name if absent.
+    pub definitions: Option<PathBuf>,
+    /// The traces: those of [`traces_of`], or others in their place.
+    pub traces: Vec<Input>,
+    /// The folder that the new report is for.
+    pub out: PathBuf,
+    /// Another style than the report's.
+    pub style: Option<PathBuf>,
+    /// Other metrics than the report's.
+    pub metrics: Option<Vec<String>>,
+    /// How many threads to use.
+    pub threads: NonZeroUsize,
+}
+
+/// The traces of a report, found by their hashes in folders or files, or in the current folder, the report's folder and those
+/// above it if `places` is empty.
+///
+/// # Errors
+/// A folder that is no report, traces that are not what they were.
+pub fn traces_of(report: &Path, places: &[PathBuf]) -> Result<Vec<Input>, StudyError> {
+    Ok(provenance::traces(&provenance::manifest(report)?, &provenance::places(report, places))?)
+}
+
+/// A report made again.
+#[derive(Debug)]
+pub struct Rescored {
+    /// The new report.
+    pub report: Report,
+    /// What changed from the old one, or why that is not known.
+    pub changes: Result<Diff, String>,
+}
+
+impl RescoreRequest {
+    /// Makes the report again.
+    ///
+    /// # Errors
+    /// A folder that is no report, whatever is wrong with the definitions.
+    pub fn run(&self) -> Result<Rescored, StudyError> {
+        let manifest = provenance::manifest(&self.report)?;
+        let options = ReportOptions { style: self.style(&manifest)?, figures: has_figures(&self.report) };
+        let study = Study::of(self.traces.clone())?.threads(self.threads).asked(self.question(&manifest))?;
+        study.source.traces()?;
+        study.check_folder(&self.out, &options)?;
+        let before = self.scores_before(&manifest);
+        let mut report = study.report(&options)?;
+        report.notes.extend(study.stale_checksums());
+        let changes = match before {
+            Ok(before) => Ok(changes(&study, before, &report)?),
+            Err(reason) => Err(reason),
+        };
+        Ok(Rescored { report, changes })
+    }
+
+    fn question(&self, manifest: &Manifest) -> Question {
+        let selected = manifest.metrics.len() < manifest.definitions.metric.len();
+        Question {
+            definitions: self.definitions.clone(),
+            filter: manifest.filter.clone(),
+            metrics: self.metrics.clone().or_else(|| selected.then(|| manifest.metrics.clone())),
+            by: Some(manifest.by.clone()),
+            pool: true,
+            lost: LostAs::Nothing,
+            ..Question::default()
+        }
+    }
+
+    /// The name or path of the style, which must be the report's own unless another is asked for.
+    fn style(&self, manifest: &Manifest) -> Result<PathBuf, StudyError> {
+        if let Some(style) = &self.style {
+            return Ok(style.clone());
+        }
+        let (name, expected) = (manifest.style.name.clone(), manifest.style.sha256.clone());
+        match Style::load(&name) {
+            Ok(style) if style.hash == expected => Ok(name.into()),
+            Ok(style) => Err(StudyError::StyleChanged { name, expected, found: style.hash }),
+            Err(_) => Err(StudyError::StyleGone { name, expected }),
+        }
+    }
+
+    /// The scores of the old report, or why they cannot be had.
+    fn scores_before(&self, manifest: &Manifest) -> Result<EpisodeTable, String> {
+        let path = self.report.join("episodes.parquet");
+        let file = input::open(&path).map_err(|error| format!("{}: {error}", path.display()))?;
+        let table = format::read_parquet(file, &Partition::default())
+            .map_err(|error| format!("{}: {error}", path.display()))?;
+        if table.catalog.hash == manifest.definitions.hash {
+            return Ok(table);
+        }
+        Err(format!("{}: its definitions are not those of the manifest", path.display()))
+    }
+}
+
+/// The folder that a report is made again into: `out`, or `REPORT-rescored`; never the report itself.
+///
+/// # Errors
+/// A folder that is the report; a path that cannot be resolved.
+pub fn folder_of_rescored(report: &Path, out: Option<&Path>) -> Result<PathBuf, StudyError> {
+    let place = |path: &Path| std::path::absolute(path).and_then(|path| path.canonicalize().or(Ok(path)));
+    let out = match out {
+        Some(out) => out.to_owned(),
+        None => beside(report)?,
+    };
+    if place(&out)? == place(report)? {
+        return Err(StudyError::OntoItself { out: out.display().to_string() });
+    }
+    Ok(out)
+}
+
+fn beside(report: &Path) -> Result<PathBuf, StudyError> {
+    let named = if report.file_name().is_some() { report.to_owned() } else { report.canonicalize()? };
+    let mut name = named.file_name().unwrap_or_default().to_owned();
+    name.push("-rescored");
+    Ok(named.with_file_name(name))
+}
+
+fn changes(study: &Study, before: EpisodeTable, report: &Report) -> Result<Diff, StudyError> {
+    let traces = study.source.traces()?;
+    let names = |table: &EpisodeTable| table.metrics.iter().map(|metric| metric.name.clone()).collect();
+    let scored = |table: EpisodeTable, definitions| Scored { metrics: names(&table), table, definitions };
+    let definitions = study.question.bind(traces)?;
+    let after = scored(report.results.episodes.clone(), Some(definitions));
+    let pair = Pair { before: scored(before, None), after, evidence: None };
+    let mut changes = pair.changes(&report.cells.by)?;
+    TableOrder { catalog: &report.cells.catalog, style: &report.style }.sort(&mut changes);
+    let notes = pair.explain(&mut changes, traces, study.threads)?;
+    Ok(Diff { changes, notes })
+}
+
+fn has_figures(report: &Path) -> bool {
+    report.join("figures").is_dir() || report.join("report.html").is_file()
+}

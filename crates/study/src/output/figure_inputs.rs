@@ -1,0 +1,115 @@
+//! What figures are drawn from, and the figures of a report.
+
+use std::borrow::Cow;
+use std::path::PathBuf;
+
+use crate::error::StudyError;
+use crate::results::Results;
+use report::bundle::OutputFile;
+use report::cells::Cells;
+use report::cells::group::{DEFAULT_BY, group};
+use report::figures::{self, Figure, FigureError, FigureFormat, FigureName, FigureWidth, Input};
+use report::style::Style;
+
+/// How a figure looks.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FigureOptions {
+    /// `default`, `paper`, or the path of a style file, for the order of models, metrics and captions.
+    pub style: PathBuf,
+    /// The metrics shown, in the order of their roles; those of the style if None.
+    pub metrics: Option<Vec<String>>,
+    /// A heading of its own.
+    pub title: Option<String>,
+    /// The width on paper; as wide as it is drawn if None.
+    pub width: Option<FigureWidth>,
+}
+
+impl Default for FigureOptions {
+    fn default() -> Self {
+        Self { style: PathBuf::from("default"), metrics: None, title: None, width: None }
+    }
+}
+
+/// What figures are drawn from.
+#[derive(Debug)]
+pub struct FigureInputs<'a> {
+    cells: Cells,
+    style: &'a Style,
+    options: FigureOptions,
+    results: Cow<'a, Results>,
+}
+
+/// The figures of a report.
+#[derive(Debug, Default)]
+pub struct Drawings {
+    /// Those that can be drawn.
+    pub drawn: Vec<(FigureName, Figure)>,
+    /// The reason why each other one cannot.
+    pub left_out: Vec<(FigureName, FigureError)>,
+}
+
+impl<'a> FigureInputs<'a> {
+    /// Groups the episodes as figures show them: by experiment and model, a model under another condition as one of its own.
+    ///
+    /// # Errors
+    /// Sums of squares that leave 128 bits.
+    pub fn of(results: &'a Results, style: &'a Style) -> Result<Self, StudyError> {
+        let results = results.with_conditions_as_models();
+        let cells = group(&results.episodes, &DEFAULT_BY.map(str::to_owned))?;
+        Ok(Self { cells, style, options: FigureOptions::default(), results })
+    }
+
+    pub(crate) fn with(self, options: FigureOptions) -> Self {
+        Self { options, ..self }
+    }
+
+    /// One figure.
+    ///
+    /// # Errors
+    /// When the inputs lack what the figure needs.
+    pub fn draw(&self, name: FigureName) -> Result<Figure, FigureError> {
+        figures::draw(name, &self.input())
+    }
+
+    /// Every figure that can be drawn, and why each other one cannot.
+    pub fn draw_all(&self) -> Drawings {
+        let mut drawings = Drawings::default();
+        for name in FigureName::ALL {
+            match self.draw(name) {
+                Ok(figure) => drawings.drawn.push((name, figure)),
+                Err(error) => drawings.left_out.push((name, error)),
+            }
+        }
+        drawings
+    }
+
+    fn input(&self) -> Input<'_> {
+        Input {
+            cells: &self.cells,
+            order: &self.style.sheet.row_order,
+            sheets: &self.style.sheet.figure,
+            episodes: Some(&self.results.episodes),
+            outcomes: self.results.outcomes.as_ref(),
+            timelines: self.results.timelines.as_deref(),
+            title: self.options.title.as_deref(),
+            width: self.options.width,
+        }
+    }
+}
+
+impl Drawings {
+    /// The figures in every format, as files of a report.
+    ///
+    /// # Errors
+    /// When a picture has no room in memory.
+    pub fn files(&self) -> Result<Vec<OutputFile>, StudyError> {
+        let mut files = Vec::new();
+        for (name, figure) in &self.drawn {
+            for format in FigureFormat::ALL {
+                let path = format!("figures/{name}.{}", format.ending()).into();
+                files.push(OutputFile { path, bytes: format.encode(figure)? });
+            }
+        }
+        Ok(files)
+    }
+}

@@ -1,0 +1,93 @@
+//! The sections of a report for some episodes that are scored already: what a page shows that is put together while it is
+//! looked at.
+
+use crate::Study;
+use crate::error::StudyError;
+use crate::figure_inputs::FigureInputs;
+use crate::losses::Counted;
+use crate::report::figure_of;
+use crate::results::Results;
+use report::bundle::Manifest;
+use report::cells::{Cells, KeyValue};
+use report::html::{self, Figure, Page};
+use report::layout::quality;
+use report::statistics::Options;
+use report::style::Style;
+use trace::schema::SCHEMA_VERSION;
+
+/// Which sections.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// Tables, data quality, definitions.
+    Tables,
+    /// Every figure that can be drawn.
+    Figures,
+    /// What can be concluded, and every interval and test.
+    Statistics,
+}
+
+/// Some sections of a report.
+#[derive(Clone, Debug)]
+pub struct Overview {
+    /// Each as its element, in the order of the page.
+    pub sections: Vec<String>,
+    pub episodes: usize,
+    /// The columns that cells are grouped by.
+    pub by: Vec<String>,
+    /// The values of these columns for each group, as the rows of the tables number them; `None` for null.
+    pub groups: Vec<Vec<Option<String>>>,
+}
+
+impl Study {
+    /// Makes sections of the report of these results, which a scan of this study gave, or some of its episodes.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the style; a cell that mixes episodes which were recorded differently.
+    pub fn overview(&self, results: Results, style: &str, part: Part) -> Result<Overview, StudyError> {
+        let style = Style::load(style)?;
+        let counted = self.counted(results);
+        let cells = self.cells_of(&counted.results.episodes)?;
+        let statistics = match part {
+            Part::Statistics => Some(self.statistics_of(&counted, &cells, &Options::default())?),
+            Part::Tables | Part::Figures => None,
+        };
+        let Counted { results, lost, .. } = counted;
+        let drawings = match part {
+            Part::Figures => FigureInputs::of(&results, &style)?.draw_all(),
+            Part::Tables | Part::Statistics => crate::Drawings::default(),
+        };
+        let svgs: Vec<String> = drawings.drawn.iter().map(|(_, figure)| figure.inline_svg()).collect();
+        let figures: Vec<Figure> =
+            drawings.drawn.iter().zip(&svgs).map(|((name, drawn), svg)| figure_of(*name, drawn, svg)).collect();
+        let (tables, ranks) = self.tables(&results.episodes, &lost, &cells, &style)?;
+        let lists: Vec<_> = ranks.into_iter().chain(results.quality.as_ref().and_then(quality::of_cells)).collect();
+        let manifest =
+            Manifest::new(&cells, &style, SCHEMA_VERSION, self.question.filter.clone(), results.inputs.clone());
+        let names: &[&str] = match part {
+            Part::Tables if !lists.is_empty() => &["tables", "lists", "definitions"],
+            Part::Tables => &["tables", "definitions"],
+            Part::Figures => &["figures"],
+            Part::Statistics => &["statistics"],
+        };
+        let page = Page {
+            tables: &tables,
+            cells: &cells,
+            episodes: &results.episodes,
+            manifest: &manifest,
+            figures: &figures,
+            statistics: statistics.as_ref(),
+            lists: &lists,
+            recordings: None,
+        };
+        let sections = html::sections(&page, names)?;
+        Ok(Overview { sections, episodes: results.episodes.len(), by: cells.by.clone(), groups: groups(&cells) })
+    }
+}
+
+fn groups(cells: &Cells) -> Vec<Vec<Option<String>>> {
+    let text = |value: &KeyValue| match value {
+        KeyValue::Missing => None,
+        value => Some(value.to_string()),
+    };
+    cells.groups.iter().map(|group| group.key.iter().map(text).collect()).collect()
+}

@@ -1,0 +1,279 @@
+//! The report of a study: tables, figures, a page, and the folder that holds them.
+
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+
+use crate::error::StudyError;
+use crate::figure_inputs::{Drawings, FigureInputs};
+use crate::losses::Counted;
+use crate::results::{Outputs, Results};
+use crate::{DEFAULT_DEFINITIONS, LostAs, Source, Study, scores};
+use exact::replace;
+use exact::suggest::hint;
+use report::bundle::{self, Bundle, BundleError, Manifest, OutputFile};
+use report::cells::Cells;
+use report::figures::{Figure as Drawn, FigureName};
+use report::html::{self, Figure, Page, Recordings};
+use report::layout::MetricTable;
+use report::layout::quality;
+use report::plan::departures::Looks;
+use report::statistics::{Options, Replies, Statistics};
+use report::style::{MAIN_TABLE, OTHER_TABLE, Style};
+use report::tables::ListTable;
+use score::format::Format;
+use score::lost_counts::LostCounts;
+use score::table::EpisodeTable;
+use trace::answered;
+use trace::checksums::missing_note;
+use trace::schema::SCHEMA_VERSION;
+
+/// The most episodes that a page lists.
+pub const MOST_LISTED: usize = 20_000;
+
+/// How a report looks.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ReportOptions {
+    /// `default`, `paper`, or the path of a style file.
+    pub style: PathBuf,
+    /// True if figures and `report.html` are in it.
+    pub figures: bool,
+}
+
+impl Default for ReportOptions {
+    fn default() -> Self {
+        Self { style: PathBuf::from("default"), figures: true }
+    }
+}
+
+/// A report, in memory.
+#[derive(Debug)]
+pub struct Report {
+    /// What the scan gave: one row per episode, and more.
+    pub results: Results,
+    /// All episodes, where some were lost: those in `results` are the ones that count.
+    all: Option<EpisodeTable>,
+    /// The cells, grouped as the study says.
+    pub cells: Cells,
+    /// The tables, as the style lays them out.
+    pub tables: Vec<MetricTable>,
+    /// Ranks, if the style marks ties, and what became of the replies, if the inputs are traces.
+    pub lists: Vec<ListTable>,
+    /// Where everything comes from.
+    pub manifest: Manifest,
+    /// How many replies gave no decision; `None` where each gave one, and where that is not recorded.
+    pub replies: Option<String>,
+    /// What the folder lacks and why, one sentence each.
+    pub notes: Vec<String>,
+    pub(crate) style: Style,
+    threads: NonZeroUsize,
+    recordings: Option<Recordings>,
+    illustrations: Vec<OutputFile>,
+    read: Vec<PathBuf>,
+    inputs: usize,
+}
+
+/// A report that was written.
+#[derive(Clone, Debug)]
+pub struct WrittenReport {
+    /// The paths of its files inside the folder, in order.
+    pub files: Vec<String>,
+    /// Its manifest, with the outputs.
+    pub manifest: Manifest,
+}
+
+impl Study {
+    /// Refuses a folder whose report has a file that this study reads, before anything is read.
+    ///
+    /// # Errors
+    /// When it has one.
+    pub fn check_folder(&self, out: &Path, options: &ReportOptions) -> Result<(), StudyError> {
+        bundle::check_old(out, &self.files_read(Some(&options.style)))?;
+        self.check_out(out)
+    }
+
+    /// Makes the report of the study.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the style, the inputs or the definitions.
+    pub fn report(&self, options: &ReportOptions) -> Result<Report, StudyError> {
+        // Small files first: a slip in the style should not cost a pass over the traces.
+        let style = Style::load(&options.style)?;
+        let figures: &[FigureName] = if options.figures { &FigureName::ALL } else { &[] };
+        let outputs = Outputs { losses: true, quality: true, hashes: true, ..Outputs::of_figures(figures) };
+        let results = self.scan(outputs)?;
+        self.check_filter(results.episodes.len())?;
+        let counted = self.counted(results);
+        let cells = self.cells_of(&counted.results.episodes)?;
+        let statistics =
+            options.figures.then(|| self.statistics_of(&counted, &cells, &Options::default())).transpose()?;
+        let Counted { results, all, lost } = counted;
+        let replies = Replies::of(all.as_ref().unwrap_or(&results.episodes)).and_then(|replies| replies.sentence());
+        let (tables, ranks) = self.tables(&results.episodes, &lost, &cells, &style)?;
+        let lists = ranks.into_iter().chain(results.quality.as_ref().and_then(quality::of_cells)).collect();
+        let filter = self.question.filter.clone();
+        let manifest = Manifest::new(&cells, &style, SCHEMA_VERSION, filter, results.inputs.clone());
+        let mut notes = self.notes(&results, &lost);
+        let own = Options { selection: self.selection(&results.episodes), ..Options::default() };
+        let departures = self.departures(&results.episodes, &own, Looks::Once).into_iter().flatten();
+        notes.extend(departures.map(|departure| format!("departure from the registered plan: {departure}")));
+        let (illustrations, read) = (Vec::new(), self.files_read(Some(&options.style)));
+        let (threads, recordings) = (self.threads, self.recordings(&manifest));
+        let mut report = Report {
+            results,
+            all,
+            cells,
+            tables,
+            lists,
+            manifest,
+            replies,
+            notes,
+            style,
+            threads,
+            recordings,
+            illustrations,
+            read,
+            inputs: self.inputs.len(),
+        };
+        if let Some(statistics) = &statistics {
+            report.illustrate(statistics)?;
+        }
+        Ok(report)
+    }
+
+    fn recordings(&self, manifest: &Manifest) -> Option<Recordings> {
+        let Source::Traces(_) = &self.source else { return None };
+        // As a manifest names files: by no absolute path.
+        let named = |path: &PathBuf| bundle::Input::new(path, String::new(), 0).path;
+        Some(Recordings {
+            paths: manifest.inputs.iter().map(|input| input.path.clone()).collect(),
+            definitions: self.question.definitions.as_ref().map(named).filter(|name| name != DEFAULT_DEFINITIONS),
+        })
+    }
+
+    fn notes(&self, results: &Results, lost: &LostCounts) -> Vec<String> {
+        let mut notes = Vec::new();
+        if let Some(undeclared) = undeclared(&results.episodes) {
+            notes.push(undeclared);
+        }
+        notes.extend(registered(&results.episodes));
+        notes.extend(self.source.traces().ok().and_then(|traces| missing_note(traces.files())));
+        if let Source::Traces(set) = &self.source {
+            notes.extend(answered::by_others(set.files()));
+        }
+        let total = lost.total();
+        if total > 0 {
+            let (noun, verb) = if total == 1 { ("episode", "was") } else { ("episodes", "were") };
+            let counted = match self.question.lost {
+                LostAs::Nothing => "in no denominator (--lost as-failure counts them)",
+                LostAs::Failure => "counted as failures",
+            };
+            notes.push(format!("{total} {noun} {verb} lost for want of an answer: {counted}; see tables/quality.md"));
+        }
+        notes
+    }
+}
+
+/// Returns true if what is analysed is what was registered before the recording; `None` where no plan was.
+fn registered(episodes: &EpisodeTable) -> Option<String> {
+    let plan = episodes.declared.registration.as_ref()?;
+    let short = |hash: &str| hash.chars().take(12).collect::<String>();
+    let own = &episodes.catalog.hash;
+    let verdict = match &plan.definitions {
+        None => "it names no definitions".to_owned(),
+        Some(hash) if hash == own => "the definitions are those that it names".to_owned(),
+        Some(hash) => format!("the definitions are others ({}) than those that it names ({})", short(own), short(hash)),
+    };
+    Some(format!("the recording follows the registered plan {}: {verdict}", short(&plan.sha256)))
+}
+
+fn undeclared(episodes: &EpisodeTable) -> Option<String> {
+    let lacks = |label: &str| episodes.label(label).is_none();
+    let what = match (lacks("fingerprint"), lacks("scene")) {
+        (true, true) => "what they were recorded with, nor which episodes share a scene",
+        (true, false) => "what they were recorded with",
+        (false, true) => "which episodes share a scene",
+        (false, false) => return None,
+    };
+    Some(format!("the traces do not declare {what} (schema version 1): pooled and unpaired as they are"))
+}
+
+impl Report {
+    /// The table that is shown first.
+    pub fn main_table(&self) -> Option<&MetricTable> {
+        self.tables.iter().find(|table| table.name == MAIN_TABLE).or(self.tables.first())
+    }
+
+    /// The metrics that the style names nowhere, where there are too many of them for the main table.
+    pub fn other_table(&self) -> Option<&MetricTable> {
+        self.tables.iter().find(|table| table.name == OTHER_TABLE)
+    }
+
+    /// The table of this name.
+    ///
+    /// # Errors
+    /// Where the style has none: which there are.
+    pub fn table(&self, name: &str) -> Result<&MetricTable, StudyError> {
+        self.tables.iter().find(|table| table.name == name).ok_or_else(|| {
+            let known = || self.tables.iter().map(|table| table.name.as_str());
+            let (style, known, hint) =
+                (self.style.name.clone(), known().collect::<Vec<_>>().join(", "), hint(name, known()));
+            StudyError::NoTable { name: name.to_owned(), style, known, hint }
+        })
+    }
+
+    /// A table as Markdown; `None` where the style has no table of this name.
+    pub fn markdown(&self, name: &str) -> Option<String> {
+        self.tables.iter().find(|table| table.name == name).map(|table| table.printed().markdown())
+    }
+
+    /// Writes the folder of the report, in place of the report that is there.
+    ///
+    /// # Errors
+    /// Where `out` is no folder or cannot be written; the folder is then as it was, or has no manifest. A file of the old
+    /// report that this one is made from.
+    pub fn write(&self, out: &Path) -> Result<WrittenReport, StudyError> {
+        bundle::check_old(out, &self.read)?;
+        replace::check_folder(out, &self.read[..self.inputs]).map_err(BundleError::from)?;
+        let mut episodes = Vec::new();
+        let all = self.all.as_ref().unwrap_or(&self.results.episodes);
+        scores::write(all, Format::Parquet, &mut episodes, self.threads)?;
+        let Self { cells, tables, lists, manifest, illustrations: others, read, .. } = self;
+        let written =
+            bundle::write(out, &Bundle { cells, tables, lists, episodes: &episodes, manifest, read, others })?;
+        let inside = |path: &PathBuf| path.strip_prefix(out).unwrap_or(path).display().to_string();
+        Ok(WrittenReport { files: written.files.iter().map(inside).collect(), manifest: written.manifest })
+    }
+
+    fn illustrate(&mut self, statistics: &Statistics) -> Result<(), StudyError> {
+        let drawings = FigureInputs::of(&self.results, &self.style)?.draw_all();
+        self.notes.extend(drawings.left_out.iter().map(|(name, reason)| format!("no figure `{name}`: {reason}")));
+        self.illustrations = drawings.files()?;
+        if self.results.episodes.len() > MOST_LISTED {
+            self.notes.push(format!("no report.html: it lists at most {MOST_LISTED} episodes"));
+        } else {
+            let bytes = self.page(&drawings, statistics)?.into_bytes();
+            self.illustrations.push(OutputFile { path: "report.html".into(), bytes });
+        }
+        Ok(())
+    }
+
+    fn page(&self, drawings: &Drawings, statistics: &Statistics) -> Result<String, StudyError> {
+        let svgs: Vec<String> = drawings.drawn.iter().map(|(_, figure)| figure.inline_svg()).collect();
+        let figures: Vec<Figure> =
+            drawings.drawn.iter().zip(&svgs).map(|((name, drawn), svg)| figure_of(*name, drawn, svg)).collect();
+        Ok(html::render(&Page {
+            tables: &self.tables,
+            cells: &self.cells,
+            episodes: &self.results.episodes,
+            manifest: &self.manifest,
+            figures: &figures,
+            statistics: Some(statistics),
+            lists: &self.lists,
+            recordings: self.recordings.as_ref(),
+        })?)
+    }
+}
+
+pub(crate) fn figure_of<'a>(name: FigureName, drawn: &'a Drawn, svg: &'a str) -> Figure<'a> {
+    Figure { name: name.name(), title: name.title(), caption: drawn.caption(), svg }
+}

@@ -1,0 +1,238 @@
+//! Whether the files of a report's folder are those that its manifest lists.
+//!
+//! Rule: nothing outside of the folder is looked at, whatever the manifest says, and no link is followed.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::fs::{self, Metadata};
+use std::io;
+use std::path::{Component, Path, PathBuf};
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::input_hashes::of_file;
+use exact::escape::visible;
+use report::bundle::{MANIFEST, Output};
+
+/// The longest manifest that is read; that of the paper has 20 KB.
+const LONGEST: u64 = 64 << 20;
+
+/// As much of a manifest as is needed; that of other versions may have more.
+#[derive(Deserialize)]
+struct Listed {
+    #[serde(default)]
+    outputs: Vec<Output>,
+    /// Only to tell the manifest of a report from another file of that name.
+    #[serde(rename = "schema_version")]
+    _schema_version: u32,
+}
+
+/// What was found in the folder of a report.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Verification {
+    /// How many files the manifest lists.
+    pub files: usize,
+    /// Files that are not as the manifest says, by path.
+    pub differences: Vec<Difference>,
+}
+
+/// A file that is not as the manifest says.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Difference {
+    /// The path inside the folder, `/` between its parts.
+    pub path: String,
+    /// What is the matter with it.
+    pub kind: Kind,
+    /// What was expected.
+    pub expected: String,
+    /// What was found.
+    pub found: String,
+}
+
+/// What is the matter with a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// It has another content, or is no file.
+    Changed,
+    /// The manifest lists it, and it is not there.
+    Missing,
+    /// It is there, and the manifest does not list it.
+    Unexpected,
+}
+
+/// Why a folder cannot be verified.
+#[derive(Debug, thiserror::Error)]
+pub enum VerifyError {
+    /// No manifest in the folder.
+    #[error("{}: expected a report's folder with its {MANIFEST}, found {found}; name the folder that `mirrorstats report` wrote", path.display())]
+    NoManifest {
+        /// The folder.
+        path: PathBuf,
+        /// What is there.
+        found: String,
+    },
+    /// A manifest that is none of a report, or lists what cannot be a file of it.
+    #[error("{}: expected the manifest of a report, found {found}; make the report again with `mirrorstats report`", path.display())]
+    Malformed {
+        /// Where.
+        path: PathBuf,
+        /// What is the matter.
+        found: String,
+    },
+    /// A file or a folder that cannot be read.
+    #[error("{}: expected a file or folder that can be read, found {source}; check its permissions", path.display())]
+    Unreadable {
+        /// Which.
+        path: PathBuf,
+        /// The reason for the refusal.
+        source: io::Error,
+    },
+}
+
+/// Holds the files of a folder against its manifest.
+///
+/// # Errors
+/// A folder without a manifest, one that lists nothing, or paths that are not inside of the folder; what cannot be read.
+pub fn verify(folder: &Path) -> Result<Verification, VerifyError> {
+    let listed = listed(folder)?;
+    let mut there = BTreeMap::new();
+    find(folder, "", &mut there)?;
+    let mut differences = Vec::new();
+    for (path, output) in &listed {
+        differences.extend(difference(folder, path, output, there.remove(path))?);
+    }
+    there.remove(MANIFEST);
+    differences.extend(there.into_iter().map(|(path, found)| Difference {
+        path,
+        kind: Kind::Unexpected,
+        expected: "no such file".to_owned(),
+        found: kind_of(&found).to_owned(),
+    }));
+    differences.sort_by(|a, b| a.path.cmp(&b.path));
+    Ok(Verification { files: listed.len(), differences })
+}
+
+/// The files that the manifest of a folder lists, by path.
+fn listed(folder: &Path) -> Result<BTreeMap<String, Output>, VerifyError> {
+    let path = folder.join(MANIFEST);
+    let none = |found: String| VerifyError::NoManifest { path: folder.to_owned(), found };
+    let about = fs::symlink_metadata(&path).map_err(|error| none(error.to_string()))?;
+    if !about.is_file() {
+        return Err(none(kind_of(&about).to_owned()));
+    }
+    let malformed = |found: String| VerifyError::Malformed { path: path.clone(), found };
+    if about.len() > LONGEST {
+        return Err(malformed(format!("{} bytes, more than {LONGEST}", about.len())));
+    }
+    let bytes = fs::read(&path).map_err(|source| VerifyError::Unreadable { path: path.clone(), source })?;
+    let manifest: Listed = serde_json::from_slice(&bytes).map_err(|error| malformed(error.to_string()))?;
+    if manifest.outputs.is_empty() {
+        return Err(malformed("one that lists no outputs, as those of earlier versions".to_owned()));
+    }
+    let mut listed = BTreeMap::new();
+    for output in manifest.outputs {
+        if let Some(found) = fault(&output) {
+            return Err(malformed(found));
+        }
+        if let Some(twice) = listed.insert(output.path.clone(), output) {
+            return Err(malformed(format!("`{}` twice among its outputs", visible(&twice.path))));
+        }
+    }
+    Ok(listed)
+}
+
+/// The reason why an output cannot be a file of a report.
+fn fault(output: &Output) -> Option<String> {
+    let shown = visible(&output.path);
+    let is_plain = |part: &str| matches!(Path::new(part).components().collect::<Vec<_>>()[..], [Component::Normal(_)]);
+    if !output.path.split('/').all(is_plain) {
+        return Some(format!("the output `{shown}`, which is no path inside of its folder"));
+    }
+    if output.path == MANIFEST {
+        return Some(format!("`{MANIFEST}` among its outputs"));
+    }
+    let is_hash = output.sha256.len() == 64 && output.sha256.bytes().all(|digit| digit.is_ascii_hexdigit());
+    (!is_hash).then(|| format!("the output `{shown}` with `{}` in place of a SHA-256", visible(&output.sha256)))
+}
+
+/// All that lies in a folder and is no folder, by path inside of it.
+fn find(folder: &Path, inside: &str, there: &mut BTreeMap<String, Metadata>) -> Result<(), VerifyError> {
+    let unreadable = |path: &Path| {
+        let path = path.to_owned();
+        move |source| VerifyError::Unreadable { path, source }
+    };
+    for entry in fs::read_dir(folder).map_err(unreadable(folder))? {
+        let entry = entry.map_err(unreadable(folder))?;
+        let path = format!("{inside}{}", entry.file_name().to_string_lossy());
+        let about = fs::symlink_metadata(entry.path()).map_err(unreadable(&entry.path()))?;
+        if about.is_dir() {
+            find(&entry.path(), &format!("{path}/"), there)?;
+        } else {
+            there.insert(path, about);
+        }
+    }
+    Ok(())
+}
+
+fn difference(
+    folder: &Path,
+    path: &str,
+    output: &Output,
+    there: Option<Metadata>,
+) -> Result<Option<Difference>, VerifyError> {
+    let expected = format!("{} bytes with the SHA-256 {}", output.bytes, output.sha256);
+    let differs =
+        |kind, found: String| Ok(Some(Difference { path: path.to_owned(), kind, expected: expected.clone(), found }));
+    let Some(about) = there else { return differs(Kind::Missing, "no such file".to_owned()) };
+    if !about.is_file() {
+        return differs(Kind::Changed, kind_of(&about).to_owned());
+    }
+    let at = folder.join(path);
+    let found = of_file(&at).map_err(|source| VerifyError::Unreadable { path: at, source })?;
+    if found == output.sha256.to_ascii_lowercase() && about.len() == output.bytes {
+        return Ok(None);
+    }
+    differs(Kind::Changed, format!("{} bytes with the SHA-256 {found}", about.len()))
+}
+
+fn kind_of(about: &Metadata) -> &'static str {
+    match about.file_type() {
+        kind if kind.is_symlink() => "a symbolic link",
+        kind if kind.is_dir() => "a folder",
+        kind if kind.is_file() => "a file",
+        _ => "neither a file nor a folder",
+    }
+}
+
+impl Verification {
+    /// Returns true if all files are as the manifest says, and there are no others.
+    pub fn holds(&self) -> bool {
+        self.differences.is_empty()
+    }
+
+    fn count(&self, kind: Kind) -> usize {
+        self.differences.iter().filter(|difference| difference.kind == kind).count()
+    }
+}
+
+impl fmt::Display for Verification {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for Difference { path, kind, expected, found } in &self.differences {
+            let path = visible(path);
+            match kind {
+                Kind::Changed => writeln!(f, "{path}: changed; expected {expected}, found {found}")?,
+                Kind::Missing => writeln!(f, "{path}: missing; expected {expected}")?,
+                Kind::Unexpected => writeln!(f, "{path}: unexpected; the manifest does not list it")?,
+            }
+        }
+        let files = self.files;
+        if self.holds() {
+            return write!(f, "{files} files are as the manifest says");
+        }
+        let [changed, missing, unexpected] =
+            [Kind::Changed, Kind::Missing, Kind::Unexpected].map(|kind| self.count(kind));
+        write!(f, "{files} files in the manifest: {changed} changed, {missing} missing, {unexpected} unexpected")
+    }
+}

@@ -1,0 +1,67 @@
+//! All findings of traces, under the experiments that definitions know.
+
+use std::fmt::{self, Write as _};
+use std::num::NonZeroUsize;
+use std::path::Path;
+
+use crate::StudyError;
+use crate::expected::ExpectedTraces;
+use crate::experiment_findings::experiment_findings;
+use exact::escape::visible;
+use trace::checksums::Checksums;
+use trace::diagnostic::Severity;
+use trace::inputs::Input;
+use trace::validate::{Validation, validate_as};
+
+/// Findings that are printed for each file and rule.
+const SHOWN: usize = 10;
+
+/// All findings of traces, under the experiments of these definitions.
+pub fn findings(definitions: &Path, inputs: &[Input], threads: NonZeroUsize) -> Result<Validation, StudyError> {
+    let expected = ExpectedTraces::of(definitions)?;
+    let mut found = validate_as(inputs, expected.as_expected(), threads)?;
+    found.findings.extend(experiment_findings(definitions, inputs)?);
+    Ok(found)
+}
+
+/// The findings for people, some of each kind, and how many there are.
+pub fn findings_text(report: &Validation) -> String {
+    let mut text = String::new();
+    // Writing to a text does not fail.
+    let _ = write(&mut text, report);
+    text
+}
+
+fn counted(count: u64, noun: &str) -> String {
+    if count == 1 { format!("1 {noun}") } else { format!("{count} {noun}s") }
+}
+
+fn write(out: &mut String, report: &Validation) -> fmt::Result {
+    let (shown, rest) = report.abridged(SHOWN);
+    for finding in shown {
+        writeln!(out, "{finding}\n")?;
+    }
+    for rest in &rest {
+        writeln!(out, "{}: {}, and {} more of these", rest.code, visible(rest.file), rest.count)?;
+    }
+    if !rest.is_empty() {
+        writeln!(out, "`--json` prints all findings\n")?;
+    }
+    let incomplete = report.files.iter().filter(|file| !file.complete).count();
+    let unchecked = report.files.iter().filter(|file| file.complete && file.checksums == Checksums::None);
+    match unchecked.count() as u64 {
+        0 => {}
+        count => writeln!(out, "no checksums in {}: damage to their data may not be found", counted(count, "file"))?,
+    }
+    let (episodes, steps) = report
+        .files
+        .iter()
+        .fold((0_u64, 0_u64), |(episodes, steps), file| (episodes + file.episodes, steps + file.steps));
+    let files = counted(report.files.len() as u64, "file");
+    write!(out, "{files}, {}, {} checked", counted(episodes, "episode"), counted(steps, "step"))?;
+    if incomplete > 0 {
+        write!(out, " ({incomplete} of the files not to their end)")?;
+    }
+    let [errors, notes] = [Severity::Error, Severity::Note].map(|severity| report.count(severity) as u64);
+    writeln!(out, ": {}, {}", counted(errors, "error"), counted(notes, "note"))
+}

@@ -1,0 +1,116 @@
+//! Traces out of JSON lines, under the experiments that definitions know.
+
+use std::borrow::Cow;
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::StudyError;
+use crate::expected::ExpectedTraces;
+use exact::budget::Limit;
+use exact::escape::visible;
+use exact::input;
+use trace::colors::palette::Palette;
+use trace::declared::Cluster;
+use trace::import::{self, Limits, Text};
+use trace::inputs::Input;
+use trace::schema::Kind;
+
+/// A colour takes some bytes.
+const LARGEST: Limit = Limit::new("bytes of a palette", 1 << 20);
+
+/// What an import takes its steps for.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ImportRequest {
+    pub out: PathBuf,
+    /// The definitions whose experiments are known, by name or path.
+    pub definitions: PathBuf,
+    /// Names of colours with commas between them, a file of names, or `default`.
+    pub palette: Option<PathBuf>,
+    /// True if the episodes of one seed are more alike than chance.
+    pub clusters_by_seed: bool,
+    /// True if the steps are rebuilt from published numbers.
+    pub reconstruction: bool,
+}
+
+/// What was written.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct ImportAnswer {
+    /// The trace, as typed.
+    pub out: String,
+    /// How many episodes it has.
+    pub episodes: usize,
+    /// How many rows it has, one per line.
+    pub steps: usize,
+    /// Columns of the schema that it has.
+    pub columns: Vec<String>,
+    /// Columns that the schema does not know.
+    pub own_columns: Vec<OwnColumn>,
+}
+
+/// A column that the schema does not know.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct OwnColumn {
+    /// Its name, the key of the lines.
+    pub name: String,
+    /// What it holds; null where every line says null.
+    #[serde(rename = "type")]
+    pub kind: Option<Kind>,
+}
+
+/// Makes a trace of the steps in these texts, or writes nothing.
+pub fn import(mut texts: Vec<Text>, request: &ImportRequest) -> Result<ImportAnswer, StudyError> {
+    let expected = ExpectedTraces::of(&request.definitions)?;
+    let palette = request.palette.as_deref().map(palette).transpose()?;
+    let limits = Limits {
+        expected: expected.as_expected(),
+        domain: expected.domain.as_deref(),
+        palette: palette.as_ref(),
+        cluster: request.clusters_by_seed.then_some(Cluster::Seed),
+        is_reconstruction: request.reconstruction,
+    };
+    let imported = import::import(&mut texts, &request.out, limits)?;
+    let own = imported.own.into_iter().map(|own| OwnColumn { name: own.name, kind: own.kind });
+    Ok(ImportAnswer {
+        out: Input::new(&request.out).name,
+        episodes: imported.episodes,
+        steps: imported.steps,
+        columns: imported.columns.into_iter().map(str::to_owned).collect(),
+        own_columns: own.collect(),
+    })
+}
+
+/// The palette that is typed, or in the file that is named. A text with a comma is no name of a file.
+fn palette(path: &Path) -> Result<Palette, StudyError> {
+    let typed = path.to_string_lossy();
+    if typed == "default" {
+        return Ok(Palette::of_study());
+    }
+    let failed = |words: String| StudyError::Palette { typed: typed.clone().into_owned(), words };
+    let is_file = !typed.contains(',') && (typed.contains(['/', '\\', '.']) || path.is_file());
+    let names = if is_file {
+        Cow::Owned(input::text(path, LARGEST).map_err(|error| failed(format!("cannot read it: {error}")))?)
+    } else {
+        typed.clone()
+    };
+    let names = names.split([',', '\n']).map(str::trim).filter(|name| !name.is_empty());
+    let help = "name the colours with commas between them, or in a file one per line; or `default`";
+    Palette::of_names(names).map_err(|fault| failed(format!("{fault}\n  help: {help}")))
+}
+
+impl fmt::Display for ImportAnswer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let counted =
+            |count: usize, noun: &str| if count == 1 { format!("1 {noun}") } else { format!("{count} {noun}s") };
+        let (episodes, steps) = (counted(self.episodes, "episode"), counted(self.steps, "step"));
+        writeln!(f, "imported {episodes}, {steps} into {}", self.out)?;
+        if self.own_columns.is_empty() {
+            return Ok(());
+        }
+        let kind = |column: &OwnColumn| column.kind.map_or("null in every line", Kind::name);
+        let own = self.own_columns.iter().map(|column| format!("{} ({})", visible(&column.name), kind(column)));
+        writeln!(f, "columns that the schema does not know: {}", own.collect::<Vec<_>>().join(", "))
+    }
+}

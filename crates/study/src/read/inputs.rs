@@ -1,0 +1,168 @@
+//! What a study is made of: traces, or files of scores in their place. Each input is recognised and opened once.
+
+use std::ffi::OsString;
+use std::fs::Metadata;
+use std::io::{self, Read};
+use std::path::PathBuf;
+use std::time::{Duration, UNIX_EPOCH};
+
+use crate::error::StudyError;
+use engines::spark::source::is_uri;
+use score::format::{self, Format};
+use trace::inputs::{self, Input};
+use trace::open::TraceSet;
+
+/// Inputs of one kind.
+#[derive(Debug)]
+pub enum Source {
+    /// Steps of episodes; every footer is read.
+    Traces(TraceSet),
+    /// Episode tables.
+    Scores(Vec<ScoreFile>),
+}
+
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ScoreFile {
+    pub input: Input,
+    pub format: Format,
+    /// True if it says what it was computed with; text and what other engines write does not.
+    pub carries_definitions: bool,
+}
+
+/// The files that some arguments name: paths, folders, globs, or `-` for a list of them, which `list` gives.
+///
+/// # Errors
+/// An argument that names no file; a URI, which Spark alone can read; a list that cannot be read.
+pub fn resolve(arguments: &[OsString], list: impl Read) -> Result<Vec<Input>, StudyError> {
+    match arguments.iter().filter_map(|argument| argument.to_str()).find(|argument| is_uri(argument)) {
+        Some(uri) => Err(StudyError::Uri { uri: uri.to_owned() }),
+        None => Ok(inputs::resolve(arguments, list)?),
+    }
+}
+
+impl Source {
+    /// Recognises and opens files, which must all be traces or all be scores.
+    ///
+    /// # Errors
+    /// Both kinds at once; the first fault of a footer.
+    pub fn open(inputs: &[Input]) -> Result<Self, StudyError> {
+        match ScoreFile::all(inputs)? {
+            Some(scores) => Ok(Self::Scores(scores)),
+            None => Ok(Self::Traces(TraceSet::open(inputs)?)),
+        }
+    }
+
+    /// The traces, for an answer that only steps can give.
+    ///
+    /// # Errors
+    /// Scores, which have no steps.
+    pub fn traces(&self) -> Result<&TraceSet, StudyError> {
+        match self {
+            Self::Traces(traces) => Ok(traces),
+            Self::Scores(files) => Err(no_steps(files)),
+        }
+    }
+
+    /// As [`Source::traces`], by value.
+    ///
+    /// # Errors
+    /// Scores, which have no steps.
+    pub fn into_traces(self) -> Result<TraceSet, StudyError> {
+        match self {
+            Self::Traces(traces) => Ok(traces),
+            Self::Scores(files) => Err(no_steps(&files)),
+        }
+    }
+}
+
+fn no_steps(scores: &[ScoreFile]) -> StudyError {
+    StudyError::NoSteps { scores: scores.first().map_or_else(String::new, |file| file.input.name.clone()) }
+}
+
+impl ScoreFile {
+    /// The files as files of scores; `None` where none of them is one.
+    ///
+    /// # Errors
+    /// Files of scores among others.
+    pub fn all(inputs: &[Input]) -> Result<Option<Vec<Self>>, StudyError> {
+        let scores: Vec<Self> = inputs.iter().filter_map(Self::recognise).collect();
+        match scores.first() {
+            None => Ok(None),
+            Some(_) if scores.len() == inputs.len() => Ok(Some(scores)),
+            Some(first) => Err(StudyError::Mixed { scores: first.input.name.clone() }),
+        }
+    }
+
+    /// The file as one of scores; `None` for anything else, which is opened as a trace.
+    fn recognise(input: &Input) -> Option<Self> {
+        let scores = |format, carries_definitions| Some(Self { input: input.clone(), format, carries_definitions });
+        match Format::of_name(&input.name) {
+            Ok(text @ (Format::Csv | Format::JsonLines)) => scores(text, false),
+            Ok(Format::Parquet) | Err(_) => {
+                // What cannot be opened is reported as a trace that cannot.
+                let file = exact::input::open(&input.path).ok()?;
+                if !format::holds_scores(&file, &inputs::folder_values(&input.path)) {
+                    return None;
+                }
+                scores(Format::Parquet, format::holds_definitions(&file))
+            }
+        }
+    }
+}
+
+/// What tells that a file is still the one that was opened: its identity, its size, and when it was written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Stamp {
+    name: String,
+    path: PathBuf,
+    state: FileState,
+}
+
+/// Where the system gives them: device, inode, size, time of the last write and of the last change of the inode.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct FileState {
+    identity: (u64, u64),
+    bytes: u64,
+    written: Option<Duration>,
+    changed: (i64, i64),
+}
+
+impl FileState {
+    fn of(metadata: &Metadata) -> Self {
+        #[cfg(unix)]
+        let (identity, changed) = {
+            use std::os::unix::fs::MetadataExt as _;
+            ((metadata.dev(), metadata.ino()), (metadata.ctime(), metadata.ctime_nsec()))
+        };
+        #[cfg(not(unix))]
+        let (identity, changed) = ((0, 0), (0, 0));
+        let written = metadata.modified().ok().and_then(|time| time.duration_since(UNIX_EPOCH).ok());
+        Self { identity, bytes: metadata.len(), written, changed }
+    }
+}
+
+impl Stamp {
+    /// The state of a file now.
+    ///
+    /// # Errors
+    /// Whatever the operating system says.
+    pub fn of(input: &Input) -> Result<Self, StudyError> {
+        let state = state_of(&input.path).map_err(|source| StudyError::file(&input.name, source))?;
+        Ok(Self { name: input.name.clone(), path: input.path.clone(), state })
+    }
+
+    /// Refuses a file that is another one by now, or was written to.
+    ///
+    /// # Errors
+    /// [`StudyError::Changed`].
+    pub fn check(&self) -> Result<(), StudyError> {
+        match state_of(&self.path) {
+            Ok(state) if state == self.state => Ok(()),
+            _ => Err(StudyError::Changed { name: self.name.clone() }),
+        }
+    }
+}
+
+fn state_of(path: &std::path::Path) -> io::Result<FileState> {
+    std::fs::metadata(path).map(|metadata| FileState::of(&metadata))
+}

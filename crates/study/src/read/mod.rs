@@ -1,0 +1,11 @@
+//! From arguments to scored episodes: files, findings, hashes, files of scores.
+
+pub(crate) mod expected;
+pub(crate) mod experiment_findings;
+pub(crate) mod findings;
+pub(crate) mod import;
+pub(crate) mod input_hashes;
+pub(crate) mod inputs;
+pub(crate) mod results;
+pub(crate) mod scan;
+pub(crate) mod scores;

@@ -1,0 +1,101 @@
+//! What a scan is asked for, and what it gave.
+
+use std::borrow::Cow;
+use std::collections::BTreeSet;
+
+use report::bundle;
+use report::cells::group::CONDITION;
+use report::figures::e5_outcomes::Outcomes;
+use report::figures::{FigureName, gaze};
+use score::quality::QualityByCell;
+use score::table::{EpisodeKey, EpisodeTable};
+use score::timeline::Timeline;
+use trace::open::TraceSet;
+use trace::replies::REPLY_STATUS;
+
+/// What a scan gives beside the episode table.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[expect(clippy::struct_excessive_bools, reason = "each output is asked for by itself")]
+pub struct Outputs {
+    /// When each agent looked, claimed and decided: for the figure `gaze`.
+    pub timelines: bool,
+    /// How open questions ended: for the figure `e5-outcomes`.
+    pub outcomes: bool,
+    /// The episodes that the infrastructure ended.
+    pub losses: bool,
+    /// What became of the replies.
+    pub quality: bool,
+    /// The hashes of the inputs.
+    pub hashes: bool,
+}
+
+impl Outputs {
+    /// What figures of these names are drawn from.
+    pub fn of_figures(names: &[FigureName]) -> Self {
+        let (timelines, outcomes) = (names.contains(&FigureName::Gaze), names.contains(&FigureName::E5Outcomes));
+        Self { timelines, outcomes, ..Self::default() }
+    }
+
+    pub(crate) fn needs_steps(self, traces: &TraceSet) -> bool {
+        let has_losses = self.losses && traces.column(REPLY_STATUS).is_some();
+        self.timelines || self.outcomes || self.quality || has_losses
+    }
+}
+
+/// What a scan gave.
+#[derive(Clone, Debug)]
+pub struct Results {
+    /// One row per episode.
+    pub episodes: EpisodeTable,
+    /// One timeline per episode, in the order of the table. `None` where they were not asked for, for scores, for
+    /// definitions that do not name the moments, and for more episodes than `gaze` draws.
+    pub timelines: Option<Vec<Timeline>>,
+    /// How open questions ended. `None` where that was not asked for, and where there is no such question.
+    pub outcomes: Option<Outcomes>,
+    /// The ids of the episodes without `done` whose last reply was lost to the infrastructure. `None` where they were not
+    /// asked for, and where the inputs do not record it.
+    pub lost: Option<BTreeSet<String>>,
+    /// What became of the replies, by cell; the lost episodes are counted in it. `None` where it was not asked for, and for
+    /// scores.
+    pub quality: Option<QualityByCell>,
+    /// The inputs with their hashes; empty where they were not asked for.
+    pub inputs: Vec<bundle::Input>,
+}
+
+impl Results {
+    pub(crate) fn of(episodes: EpisodeTable) -> Self {
+        let (timelines, outcomes, lost, quality, inputs) = (None, None, None, None, Vec::new());
+        Self { episodes, timelines, outcomes, lost, quality, inputs }
+    }
+
+    /// The same with the name of a model under another condition than the default one as `model [condition]`.
+    pub(crate) fn with_conditions_as_models(&self) -> Cow<'_, Self> {
+        if !self.episodes.has_conditions() {
+            return Cow::Borrowed(self);
+        }
+        let (episodes, order) = self.episodes.with_labelled_models(CONDITION);
+        let timelines = self.timelines.as_ref();
+        let timelines = timelines.map(|timelines| {
+            let of = |(row, was): (usize, &usize)| {
+                let model = episodes.keys.get(row).model.to_owned();
+                let line = timelines[*was].clone();
+                Timeline { key: EpisodeKey { model, ..line.key.clone() }, ..line }
+            };
+            order.iter().enumerate().map(|(row, was)| of((row, was))).collect()
+        });
+        Cow::Owned(Self { episodes, timelines, ..self.clone() })
+    }
+
+    pub(crate) fn select(&mut self, outputs: Outputs) {
+        if outputs.outcomes && Outcomes::are_there(&self.episodes) {
+            let shown = self.with_conditions_as_models();
+            let answered =
+                shown.timelines.as_ref().map(|timelines| timelines.iter().map(|line| line.answered).collect());
+            let outcomes = answered.and_then(|answered: Vec<bool>| Outcomes::of(&shown.episodes, &answered));
+            self.outcomes = outcomes;
+        }
+        if !outputs.timelines || self.episodes.len() > gaze::MOST_EPISODES {
+            self.timelines = None;
+        }
+    }
+}

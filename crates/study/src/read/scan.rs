@@ -1,0 +1,163 @@
+//! The one pass over the inputs, and everything that it gives.
+
+use std::thread;
+
+use crate::error::StudyError;
+use crate::inputs::Source;
+use crate::question::STANDING_LABELS;
+use crate::results::{Outputs, Results};
+use crate::{Backend, Study, backend, input_hashes, losses, own_definitions, scores};
+use metric::definitions::Definitions;
+use report::cells::group::CONDITION;
+use score::quality::{QualityByCell, QualityReader};
+use score::score_traces::{self, Scored};
+use score::table::{EpisodeTable, LabelColumn};
+use statistics::losses::INFRASTRUCTURE;
+use trace::declared::Declared;
+use trace::open::TraceSet;
+use trace::replies::REPLY_STATUS;
+use trace::schema::{self, Column, Domain};
+
+impl Study {
+    /// Reads the inputs once. A file that changed since it was opened is an error.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the traces or the scores; numbers beyond 64 bits; a file that changed in between.
+    pub fn scan(&self, outputs: Outputs) -> Result<Results, StudyError> {
+        let (results, inputs) = thread::scope(|scope| {
+            // Hashes read the same pages of the files; on their own thread they cost no time of the scan.
+            let hashing = outputs.hashes.then(|| scope.spawn(|| input_hashes::hashes(&self.inputs)));
+            let results = self.scan_rows(outputs);
+            let inputs = hashing.map(|thread| thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
+            (results, inputs)
+        });
+        // A change explains whatever else went wrong.
+        self.check_unchanged()?;
+        let mut results = Results { inputs: inputs.transpose()?.unwrap_or_default(), ..results? };
+        self.declare(&mut results)?;
+        results.quality = results.quality.filter(|_| outputs.quality);
+        Ok(results)
+    }
+
+    /// Whether there is anything to say of the replies: the traces record it, or episodes were lost.
+    ///
+    /// # Errors
+    /// Scores, which have no replies; a list of lost episodes that cannot be read.
+    pub fn has_quality(&self) -> Result<bool, StudyError> {
+        let reader = QualityReader::of(self.source.traces()?);
+        Ok(!reader.columns().is_empty() || !trace::lost::beside(&self.inputs)?.is_empty())
+    }
+
+    /// What became of the replies of all episodes, lost ones counted.
+    ///
+    /// # Errors
+    /// Scores, which have no replies; whatever is wrong with the traces or the list of lost episodes.
+    pub fn quality(&self) -> Result<QualityByCell, StudyError> {
+        let traces = self.source.traces()?;
+        let reader = QualityReader::of(traces);
+        let columns = score_traces::trace_columns(traces);
+        let all = Definitions::from_toml("all", "open = true", &columns)?;
+        let nobody = all.clone().filtered("nobody", "false", &columns)?;
+        let lost = lost_episodes(traces)?;
+        let labels: Vec<String> = traces.declares(CONDITION).then(|| CONDITION.to_owned()).into_iter().collect();
+        let wanted =
+            score_traces::Outputs { labels: &labels, timelines: false, quality: Some(&reader), unchecked: &UNCHECKED };
+        let definitions = [&all, lost.as_ref().unwrap_or(&nobody)];
+        let Scored { tables: [episodes, ended], quality, .. } =
+            score_traces::score_each(traces, definitions, wanted, self.threads)?;
+        let lost = lost.map(|_| ended.keys.iter().map(|key| key.episode_id.to_owned()).collect());
+        let mut results = Results { lost, quality, ..Results::of(episodes) };
+        self.declare(&mut results)?;
+        self.check_unchanged()?;
+        Ok(results.quality.unwrap_or_default())
+    }
+
+    pub(crate) fn declare(&self, results: &mut Results) -> Result<(), StudyError> {
+        if let Source::Traces(traces) = &self.source {
+            let unrecorded = losses::unrecorded(&self.inputs, &results.episodes)?;
+            let losses_recorded = results.lost.is_some();
+            results.episodes.declared = Declared { unrecorded, losses_recorded, ..Declared::of(traces) };
+        }
+        let asked = self.question.labels();
+        results.episodes.labels.retain(|label| asked.contains(&label.name) || says_something(label));
+        losses::label(results);
+        Ok(())
+    }
+
+    fn scan_rows(&self, outputs: Outputs) -> Result<Results, StudyError> {
+        let mut results = match (&self.source, &self.backend) {
+            (Source::Scores(files), Backend::Native) => Results::of(scores::read(files, &self.question)?),
+            (Source::Traces(traces), Backend::Native) => self.scan_traces(traces, outputs)?,
+            (source, _) => {
+                let scored = Results::of(self.scored_elsewhere()?);
+                if let Source::Traces(traces) = source {
+                    own_definitions::check(&self.question.bind(traces)?, traces, &scored.episodes)?;
+                }
+                // The other engine computes scores alone; what else is asked for comes from a scan.
+                match source {
+                    Source::Traces(traces) if outputs.needs_steps(traces) => {
+                        Results { episodes: scored.episodes, ..self.scan_traces(traces, outputs)? }
+                    }
+                    _ => scored,
+                }
+            }
+        };
+        results.select(outputs);
+        Ok(results)
+    }
+
+    fn scan_traces(&self, traces: &TraceSet, outputs: Outputs) -> Result<Results, StudyError> {
+        let labels = self.question.labels_over(traces);
+        let definitions = self.question.bind(traces)?;
+        let statuses = outputs.losses.then(|| QualityReader::of_statuses(traces));
+        let statuses = statuses.filter(|reader| !reader.columns().is_empty());
+        let reader = outputs.quality.then(|| QualityReader::of(traces)).or(statuses);
+        let timelines = outputs.timelines || outputs.outcomes;
+        let quality = reader.as_ref();
+        let wanted = score_traces::Outputs { labels: &labels, timelines, quality, unchecked: &UNCHECKED };
+        let lost = if outputs.losses { lost_episodes(traces)? } else { None };
+        let Some(lost) = lost else {
+            let Scored { tables: [episodes], timelines, quality } =
+                score_traces::score_each(traces, [&definitions], wanted, self.threads)?;
+            own_definitions::check(&definitions, traces, &episodes)?;
+            return Ok(Results { timelines, quality, ..Results::of(episodes) });
+        };
+        let Scored { tables: [episodes, lost], timelines, quality } =
+            score_traces::score_each(traces, [&definitions, &lost], wanted, self.threads)?;
+        own_definitions::check(&definitions, traces, &episodes)?;
+        let lost = Some(lost.keys.iter().map(|key| key.episode_id.to_owned()).collect());
+        Ok(Results { timelines, lost, quality, ..Results::of(episodes) })
+    }
+
+    fn scored_elsewhere(&self) -> Result<EpisodeTable, StudyError> {
+        match &self.backend {
+            Backend::Spark(cluster) => backend::SparkJob::of_study(self, cluster.clone())?.score(),
+            Backend::Native | Backend::Polars => backend::polars(self.source.traces()?, &self.question, self.threads),
+        }
+    }
+}
+
+fn says_something(label: &LabelColumn) -> bool {
+    let default = schema::column(&label.name).and_then(Column::default_text);
+    !STANDING_LABELS.contains(&label.name.as_str()) || label.values.iter().any(|text| text.is_some() && text != default)
+}
+
+/// Columns that are looked at besides what the definitions ask for: a slip in them keeps no trace from being scored.
+const UNCHECKED: [&str; 1] = [REPLY_STATUS];
+
+/// What the infrastructure ended: episodes without `done`, their last reply lost. `None` where the traces do not record
+/// it.
+pub(crate) fn lost_episodes(traces: &TraceSet) -> Result<Option<Definitions>, StudyError> {
+    let status = traces.column("reply_status");
+    if traces.domain() == Domain::Own
+        || status.is_none_or(|column| column.missing_from.is_some() || column.conflict.is_some())
+    {
+        return Ok(None);
+    }
+    let columns = score_traces::trace_columns(traces);
+    let statuses: Vec<String> = INFRASTRUCTURE.iter().map(|status| format!("'{status}'")).collect();
+    let ended = format!("first(action = 'done') is null and at(reply_status, length()) in ({})", statuses.join(", "));
+    // No metric and every experiment: the filter alone is asked for.
+    let nothing = Definitions::from_toml("losses", "open = true", &columns)?;
+    Ok(Some(nothing.filtered("losses", &ended, &columns)?))
+}

@@ -1,0 +1,91 @@
+//! Files of scores: read in the place of traces, put together and filtered; and written.
+
+use std::io::Write;
+use std::num::NonZeroUsize;
+use std::path::Path;
+
+use crate::Question;
+use crate::error::StudyError;
+use crate::inputs::ScoreFile;
+use exact::input;
+use metric::definitions::Definitions;
+use score::declared_experiments::Declarations;
+use score::format::{self, Format, Partition};
+use score::score_traces;
+use score::select::select;
+use score::table::EpisodeTable;
+use trace::in_order::in_order;
+use trace::inputs;
+
+/// The episodes of some files as one table, filtered as the question asks.
+///
+/// # Errors
+/// A file that is not as it must be, scores under different definitions, an experiment that two of them declare differently,
+/// a fault of the filter.
+pub(crate) fn read(files: &[ScoreFile], question: &Question) -> Result<EpisodeTable, StudyError> {
+    let (mut whole, mut declarations) = (None::<EpisodeTable>, Declarations::default());
+    for file in files {
+        let table = read_one(file, question)?;
+        for (name, experiment) in table.catalog.declared() {
+            declarations.add(&file.input.name, &name, experiment)?;
+        }
+        whole = Some(match whole {
+            None => table,
+            Some(whole) => whole.joined(&table).map_err(|error| StudyError::file(&file.input.name, error))?,
+        });
+    }
+    let table = whole.ok_or(StudyError::NoScores)?;
+    Ok(select(table, question.metrics.as_deref(), question.filter.as_deref())?)
+}
+
+fn read_one(file: &ScoreFile, question: &Question) -> Result<EpisodeTable, StudyError> {
+    let failed = |error| StudyError::file(&file.input.name, error);
+    let bytes = input::open(&file.input.path).map_err(|error| StudyError::file(&file.input.name, error))?;
+    let named = || Definitions::load(question.definitions_name(), &score_traces::schema_columns());
+    if file.format != Format::Parquet {
+        return format::read_text(file.format, &named()?.catalog, bytes).map_err(failed);
+    }
+    let named = if file.carries_definitions { None } else { Some(named()?.catalog) };
+    let folders = inputs::folder_values(&file.input.path);
+    let partition = Partition { folders: &folders, definitions: named.as_ref() };
+    let table = format::read_parquet(bytes, &partition).map_err(failed)?;
+    match &question.definitions {
+        Some(name) => under(name, file, table),
+        None => Ok(table),
+    }
+}
+
+/// Scores keep the definitions that they were computed with: others cannot be asked of them.
+fn under(name: &Path, file: &ScoreFile, table: EpisodeTable) -> Result<EpisodeTable, StudyError> {
+    let wanted = Definitions::load(name, &score_traces::schema_columns())?.catalog;
+    if wanted.hash == table.catalog.hash {
+        return Ok(table);
+    }
+    let short = |hash: &str| hash.get(..12).unwrap_or_default().to_owned();
+    Err(StudyError::OtherDefinitions {
+        file: file.input.name.clone(),
+        wanted: name.display().to_string(),
+        wanted_hash: short(&wanted.hash),
+        found: table.catalog.name.clone(),
+        found_hash: short(&table.catalog.hash),
+    })
+}
+
+/// Writes a table; Parquet is encoded by `threads` threads.
+///
+/// # Errors
+/// Whatever writing gives.
+pub fn write(
+    table: &EpisodeTable,
+    format: Format,
+    out: impl Write + Send,
+    threads: NonZeroUsize,
+) -> Result<(), StudyError> {
+    if format != Format::Parquet {
+        return Ok(format::write(table, format, out)?);
+    }
+    let (encoder, mut writer) = format::parquet::encoder(table, out)?;
+    let jobs: Vec<_> = encoder.jobs().collect();
+    in_order(threads, &jobs, |job| encoder.encode(*job), |column| writer.append(column?))?;
+    Ok(writer.finish()?)
+}

@@ -1,0 +1,8 @@
+//! One episode: steps, hash, pictures, colours, losses, replies.
+
+pub mod episode;
+pub mod episode_hash;
+pub mod frame;
+pub mod lost;
+pub mod palette;
+pub mod replies;

@@ -1,0 +1,170 @@
+//! What footers declare of how their rows came to be, apart from the rows.
+//!
+//! Rule: what a footer does not say is not assumed. Several files declare together what each of them declares alike; what
+//! keeps episodes from being pairs or independent holds for all of them.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use crate::lost::LostEpisode;
+use crate::read::open::TraceSet;
+use crate::schema::RECORDING_KEY;
+use exact::names;
+
+/// How rows came to be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Origin {
+    /// This program recorded them.
+    Recording,
+    /// They were imported from another harness.
+    Import,
+    /// They were rebuilt from published numbers: what those leave open is arbitrary.
+    Reconstruction,
+}
+
+names!(Origin { Recording: "recording", Import: "import", Reconstruction: "reconstruction" });
+
+/// What episodes share that are more alike than chance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Cluster {
+    /// The seed.
+    Seed,
+}
+
+/// A plan that was registered before the recording.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Registration {
+    /// SHA-256 of the plan.
+    pub sha256: String,
+    /// SHA-256 of the definitions that it names.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub definitions: Option<String>,
+}
+
+/// What some files declare together.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Declared {
+    /// How the rows came to be, where all files say the same; a reconstruction where any file is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub origin: Option<Origin>,
+    /// What a cluster is, where any file says so: no test then takes episodes as independent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cluster: Option<Cluster>,
+    /// The parts of each fingerprint, by its name in the column `fingerprint`.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub fingerprints: BTreeMap<String, Value>,
+    /// The fingerprints that stand for different parts in different files.
+    #[serde(default, skip_serializing_if = "BTreeSet::is_empty")]
+    pub ambiguous: BTreeSet<String>,
+    /// What a footer says of the recording behind each fingerprint. Scores do not carry it.
+    #[serde(skip)]
+    pub recordings: BTreeMap<String, Arc<Value>>,
+    /// The plan that was registered before the recording, where all files name the same.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub registration: Option<Registration>,
+    /// Episodes that failures kept from being recorded: in no trace.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub unrecorded: Vec<LostEpisode>,
+    /// True if every file says which episodes were lost.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub losses_recorded: bool,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde gives a reference")]
+const fn is_false(value: &bool) -> bool {
+    !*value
+}
+
+impl Declared {
+    /// What the footers of some traces declare.
+    pub fn of(traces: &TraceSet) -> Self {
+        let recordings = traces.files().iter().map(|file| file.metadata_value(RECORDING_KEY));
+        recordings.map(Self::of_recording).reduce(Self::joined).unwrap_or_default()
+    }
+
+    fn of_recording(text: Option<&str>) -> Self {
+        let recording: Value = text.and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default();
+        let fingerprints = recording["fingerprints"].as_object().cloned().unwrap_or_default();
+        let shared = Arc::new(recording.clone());
+        Self {
+            recordings: fingerprints.keys().map(|name| (name.clone(), Arc::clone(&shared))).collect(),
+            origin: recording["kind"].as_str().and_then(Origin::named),
+            cluster: recording["design"]["cluster"]
+                .as_str()
+                .filter(|cluster| *cluster == "seed")
+                .map(|_| Cluster::Seed),
+            fingerprints: fingerprints.into_iter().collect(),
+            registration: serde_json::from_value(recording["registration"].clone()).unwrap_or_default(),
+            ..Self::default()
+        }
+    }
+
+    /// What these and other files declare together.
+    #[must_use]
+    pub fn joined(mut self, other: Self) -> Self {
+        let differs =
+            |(name, parts): &(&String, &Value)| other.fingerprints.get(*name).is_some_and(|own| own != *parts);
+        self.ambiguous.extend(self.fingerprints.iter().filter(differs).map(|(name, _)| name.clone()));
+        self.ambiguous.extend(other.ambiguous);
+        self.fingerprints.extend(other.fingerprints);
+        self.recordings.extend(other.recordings);
+        self.unrecorded.extend(other.unrecorded);
+        self.unrecorded.sort();
+        self.unrecorded.dedup();
+        let made_up = [self.origin, other.origin].into_iter().flatten().find(|it| *it == Origin::Reconstruction);
+        Self {
+            origin: self.origin.filter(|origin| other.origin == Some(*origin)).or(made_up),
+            cluster: self.cluster.or(other.cluster),
+            registration: self.registration.filter(|hash| other.registration.as_ref() == Some(hash)),
+            fingerprints: self.fingerprints,
+            ambiguous: self.ambiguous,
+            recordings: self.recordings,
+            unrecorded: self.unrecorded,
+            losses_recorded: self.losses_recorded && other.losses_recorded,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Cluster, Declared, Origin};
+
+    #[test]
+    fn files_declare_together_what_each_declares() {
+        let import = Declared::of_recording(Some(r#"{"kind":"import","design":{"cluster":"seed"}}"#));
+        assert_eq!((import.origin, import.cluster), (Some(Origin::Import), Some(Cluster::Seed)));
+        let recording = Declared::of_recording(Some(
+            r#"{"kind":"recording","fingerprints":{"a":{"model":"m"}},"registration":{"sha256":"r"}}"#,
+        ));
+        assert_eq!(recording.registration.as_ref().map(|plan| plan.sha256.as_str()), Some("r"));
+        let both = import.clone().joined(recording);
+        assert_eq!((both.origin, both.cluster, both.registration), (None, Some(Cluster::Seed), None));
+        assert_eq!(both.fingerprints["a"]["model"], "m");
+        let made_up = Declared::of_recording(Some(r#"{"kind":"reconstruction"}"#));
+        assert_eq!(import.clone().joined(made_up).origin, Some(Origin::Reconstruction));
+        assert_eq!(import.clone().joined(import.clone()), import);
+    }
+
+    #[test]
+    fn a_fingerprint_of_two_contents_is_ambiguous() {
+        let of = |model: &str| {
+            Declared::of_recording(Some(&format!(
+                r#"{{"kind":"recording","fingerprints":{{"a":{{"model":"{model}"}}}}}}"#
+            )))
+        };
+        assert!(of("m").joined(of("m")).ambiguous.is_empty());
+        assert!(of("m").joined(of("n")).joined(of("n")).ambiguous.contains("a"));
+    }
+
+    #[test]
+    fn what_is_not_said_is_not_declared() {
+        for text in [None, Some("no JSON"), Some("7"), Some(r#"{"kind":"other","design":7,"fingerprints":[]}"#)] {
+            assert_eq!(Declared::of_recording(text), Declared::default(), "{text:?}");
+        }
+    }
+}

@@ -1,4 +1,4 @@
-//! How fast the world is: `make bench` prints steps a second with and without frames, and where the time goes.
+//! Speed of the world: `make bench` prints steps per second with and without frames, and the time of each part.
 //!
 //! E5 with six others, seven humanoids in all, the agent walking about. One world after the other on one thread, then
 //! on as many threads as there are cores.
@@ -17,7 +17,7 @@ use world::sim::world::World;
 const EPISODES: i32 = 4;
 const STEPS: i32 = 100;
 
-/// Where the time of some steps went.
+/// Time of some steps, by part.
 #[derive(Clone, Copy, Default)]
 struct Spent {
     steps: u32,
@@ -85,7 +85,7 @@ fn switching(config: &WorldConfig) -> [Duration; 2] {
     })
 }
 
-/// How round parts were drawn before: slices, stacks, divisions of flat parts.
+/// Finer round parts, as drawn before: slices, stacks, divisions of flat parts.
 const FINER: &str = "eye.slices = 28\neye.stacks = 16\neye.quads = 4\nothers.least = 6";
 /// Levels of 255 by which a pixel is another one to the eye.
 const LEVELS: u8 = 8;

@@ -17,7 +17,7 @@ use parquet::basic::{Compression, ZstdLevel};
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
 
-/// Where the files are kept.
+/// The folder of the files.
 const FOLDER: &str = "fixtures/damaged";
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -38,7 +38,7 @@ pub struct DamagedFile {
     pub name: &'static str,
     /// The code of the finding that it must give.
     pub code: &'static str,
-    /// What is wrong with it.
+    /// The damage.
     pub damage: &'static str,
     /// Its content.
     pub bytes: Vec<u8>,
@@ -47,7 +47,7 @@ pub struct DamagedFile {
 /// All of them, in the order of the README.
 ///
 /// # Errors
-/// When Arrow or Parquet refuse the rows, which they do not.
+/// Rows that Arrow or Parquet refuse, which does not happen.
 pub fn damaged_files() -> Result<Vec<DamagedFile>, Box<dyn Error>> {
     let mut files = broken_files()?;
     files.extend(broken_schemas()?);

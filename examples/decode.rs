@@ -41,7 +41,7 @@ struct Arguments {
     folder: PathBuf,
 }
 
-/// What `score` reads for the paper's definitions.
+/// The columns that `score` reads for the paper's definitions.
 const COLUMNS: &str =
     "episode_id,model,experiment,seed,run,body_color,t,action,self_color,selected_cube,mirror_visible";
 const BATCH_ROWS: usize = 64 * 1024;

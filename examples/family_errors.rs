@@ -1,4 +1,4 @@
-//! How often `stats` claims something of models that do not differ: whole families of tests, through the command.
+//! False claims of `stats` about models that do not differ: whole families of tests, through the command.
 //!
 //! `cargo build --release && cargo run --release --example family_errors -- target/release/mirrorstats >
 //! benches/COVERAGE-FAMILIES.md`; seeded, the same bytes on every machine. Each study is a file of scores.
@@ -24,7 +24,7 @@ const MODELS: usize = 8;
 const BUDGET: i64 = 100;
 const SIZES: [usize; 6] = [3, 5, 7, 12, 21, 60];
 
-/// How the episodes of a study come about.
+/// The design of a study's episodes.
 #[derive(Clone, Copy)]
 struct Design {
     scenes: usize,
@@ -38,7 +38,7 @@ struct Design {
     differing: bool,
 }
 
-/// What an episode came to.
+/// The result of an episode.
 #[derive(Clone, Copy)]
 struct Episode {
     solved: bool,
@@ -140,7 +140,7 @@ impl Design {
     }
 }
 
-/// Whether a family claims what is true, and what is not.
+/// The true and the false claims of a family.
 #[derive(Clone, Copy, Default)]
 struct Claims {
     right: bool,

@@ -1,4 +1,4 @@
-//! How often `gate` gives a verdict that is wrong, and how often a right one: whole families of cells, through the command.
+//! Wrong and right verdicts of `gate`: whole families of cells, through the command.
 //!
 //! `cargo build && cargo run --example gate_errors -- target/debug/mirrorstats > benches/COVERAGE-GATE.md`; seeded, the same
 //! bytes on every machine. Each study is two files of scores.
@@ -17,7 +17,7 @@ const SIZES: [usize; 6] = [3, 5, 7, 12, 21, 60];
 /// The verdicts in the columns of a table.
 const VERDICTS: [GateVerdict; 3] = [GateVerdict::Improved, GateVerdict::Held, GateVerdict::Regressed];
 
-/// How the episodes of both sides come about.
+/// The design of both sides' episodes.
 #[derive(Clone, Copy)]
 struct Design {
     metric: &'static str,

@@ -1,4 +1,4 @@
-//! How often the intervals of `stats` hold the truth: simulated, seeded, the same bytes each time.
+//! The coverage of the intervals of `stats`: simulated, seeded, the same bytes each time.
 //!
 //! `cargo run --release --example interval_coverage > benches/COVERAGE-INTERVALS.md`, about two minutes.
 
@@ -24,7 +24,7 @@ const CLUSTERS: [usize; 9] = [2, 3, 4, 5, 6, 8, 10, 15, 20];
 /// The runs of a cluster.
 const RUNS: usize = 7;
 
-/// Where the steps of an episode come from.
+/// The source of an episode's steps.
 #[derive(Clone, Copy)]
 enum Steps {
     /// Any step of the budget.
@@ -47,7 +47,7 @@ struct Scenario {
     correct: f64,
 }
 
-/// How often an interval was given, and how often it held the truth.
+/// The number of given intervals, and of those that hold the truth.
 #[derive(Clone, Copy, Default)]
 struct Tally {
     samples: usize,

@@ -46,8 +46,8 @@
 //!
 //! A score is stored eight times between the page of a trace and a printed cell, always in columns:
 //!
-//! 1. a page: dictionary keys or bits, as runs and packed values (`trace::read::pages`)
-//! 2. a key per row (one byte), a value per run, or bits (`trace::read::column`)
+//! 1. a page: dictionary keys or bits, as runs and packed values (`parquet_pages`)
+//! 2. a key per row (one byte), a value per run, or bits (`parquet_pages::Column`)
 //! 3. a vector per step of the physical plan: truth values as bits (`score::physical`, `score::evaluate`)
 //! 4. a value per episode: the vector of an aggregate or of a metric
 //! 5. a column of the episode table, sorted once by a permutation (`score::builder`, `score::table`)

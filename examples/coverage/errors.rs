@@ -1,4 +1,4 @@
-//! How often tests and families of tests reject what is true.
+//! The rate at which tests and families of tests reject true hypotheses.
 
 use crate::tarone::{Attained, tarone_holm};
 use exact::ratio::Ratio;

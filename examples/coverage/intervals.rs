@@ -1,4 +1,4 @@
-//! How often intervals over several experiments hold the truth.
+//! The coverage of intervals over several experiments.
 
 use statistics::improvement::probability_of_improvement;
 use statistics::interval::Interval;
@@ -43,7 +43,7 @@ pub fn common_differences() {
     }
 }
 
-/// What a side may do in an episode: values and their probabilities.
+/// The values of a side in an episode, with their probabilities.
 type Distribution = Vec<(i64, f64)>;
 
 fn rate(of: f64) -> Distribution {

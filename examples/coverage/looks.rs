@@ -1,4 +1,4 @@
-//! What happens to methods that are looked at after every episode.
+//! The error rates of methods with a look after every episode.
 
 use exact::ratio::Ratio;
 use statistics::chance;

@@ -7,7 +7,7 @@
 //! the outcomes of another, and no proof holds; `benches/COVERAGE.md` shows the error that simulation finds.
 //! Only exact p values belong here: a mid-p value may lie below the least p value.
 
-/// How much larger a least p value may be and still count as reached: the same number may come by another way.
+/// The tolerance for a least p value that counts as reached: the same number may be computed in another way.
 const TIE: f64 = 1e-12;
 
 /// One exact test: its p value, and the least that it could have had.

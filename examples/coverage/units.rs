@@ -1,4 +1,4 @@
-//! How often tests claim something where a scene is played several times, by scene and as if episodes were independent.
+//! The error rates of tests with repeated scenes, by scene and as if episodes were independent.
 
 use exact::moments::Moments;
 use exact::ratio::Ratio;

@@ -1,4 +1,4 @@
-//! How far an input came in its target: counted over a corpus, it shows whether inputs are all refused at the door.
+//! The depth that an input reached in its target: counted over a corpus, it shows whether all inputs are refused early.
 
 use std::cell::Cell;
 
@@ -14,7 +14,7 @@ pub fn reached(stage: &'static str) {
     REACHED.set(stage);
 }
 
-/// How far the last input of this thread came; the next one starts anew.
+/// The depth of this thread's last input; the next one starts anew.
 pub fn taken() -> &'static str {
     REACHED.replace(REFUSED)
 }

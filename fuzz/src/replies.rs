@@ -1,4 +1,4 @@
-//! What providers and programs answer, and the journals that keep it.
+//! The answers of providers and programs, and the journals that keep them.
 
 use std::fs;
 

@@ -82,7 +82,7 @@ pub fn of_writing(path: &Path, fault: &io::Error) -> PyErr {
     raised("OutputError", &format!("cannot write `{}`: {fault}\n  help: {help}", path.display()), &[])
 }
 
-/// What the command line would say.
+/// The message of the command line.
 pub fn of_failure(failure: &Failure, kind: &str) -> PyErr {
     let ErrorAnswer { error, faults, .. } = ErrorAnswer::of(failure);
     raised(kind, &error, &faults)

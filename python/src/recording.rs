@@ -34,7 +34,7 @@ pub struct PythonAgent {
     listeners: Py<PyAny>,
 }
 
-/// What ends a recording before its end: Ctrl-C, or what a function raised first.
+/// The early end of a recording: Ctrl-C, or the first error of a function.
 #[derive(Clone, Debug, Default)]
 struct Ending {
     stop: Arc<AtomicBool>,

@@ -1,4 +1,4 @@
-//! What shows itself in a notebook: tables and figures.
+//! Tables and figures as a notebook shows them.
 
 use std::path::PathBuf;
 
@@ -87,10 +87,10 @@ impl Figure {
     }
 }
 
-/// What a figure is made of again: its name, and its file in each format.
+/// The parts of a pickled figure: its name, and its file in each format.
 type Files<'py> = (String, Vec<Bound<'py, PyBytes>>);
 
-/// What a table is made of again.
+/// The parts of a pickled table.
 type Parts<'t> = (&'t str, &'t str, &'t str, &'t str, &'t str, &'t str);
 
 #[pymethods]

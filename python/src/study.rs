@@ -30,7 +30,7 @@ pub struct Study {
     cells: OnceLock<RecordBatch>,
 }
 
-/// How a study is asked for, with the defaults of the command line.
+/// The question to a study, with the defaults of the command line.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 struct Asked {

@@ -26,12 +26,12 @@ use toml_spec::{Fault, Faults, Place, Source};
 const FILE: &str = "mirrorstats.toml";
 /// The variable that names another file, or none if it is empty.
 pub const FILE_VARIABLE: &str = "MIRRORSTATS_CONFIG_FILE";
-/// What variables of settings begin with.
+/// The prefix of variables for settings.
 const PREFIX: &str = "MIRRORSTATS_";
 /// The most bytes of a file.
 const LARGEST: Limit = Limit::new("bytes of a configuration file", 1 << 20);
 
-/// Where a setting comes from.
+/// The source of a setting.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Origin {
@@ -50,7 +50,7 @@ pub struct Setting {
     pub option: String,
     /// Its values.
     pub values: Vec<String>,
-    /// Where it comes from.
+    /// Its source.
     pub origin: Origin,
 }
 

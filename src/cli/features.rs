@@ -14,7 +14,7 @@ pub fn present() -> String {
     if names.is_empty() { "none".to_owned() } else { names.join(", ") }
 }
 
-/// What to build for the features that are there and another one: `polars,sim`. Those of every build are left out.
+/// The features to build for one more than these: `polars,sim`. Those of every build are left out.
 pub fn with(name: &str) -> String {
     let chosen = ALL.into_iter().filter(|(known, is_there)| (*is_there && *known != "raster") || *known == name);
     chosen.map(|(known, _)| known).collect::<Vec<_>>().join(",")

@@ -1,4 +1,4 @@
-//! What `--help` says beside the options: the commands in groups, and examples of each.
+//! The parts of `--help` beside the options: the commands in groups, and examples of each.
 //!
 //! Rule: every command has an example that runs as it is written, names of files apart; the first page fits a small terminal.
 

@@ -45,7 +45,7 @@ pub(crate) const NAME: &str = "mirrorstats";
 struct Cli {
     #[command(subcommand)]
     command: Command,
-    /// How errors are told: `text`, in words, or `json`, one object
+    /// The form of errors: `text`, in words, or `json`, one object
     #[arg(
         long,
         global = true,

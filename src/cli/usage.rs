@@ -1,4 +1,4 @@
-//! What a refused command line is told beside clap's own words.
+//! The messages for a refused command line, beside clap's own words.
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Command, Error};

@@ -31,7 +31,7 @@ fn profiles(plan: &[(Scripted, Key)], definitions: &str) -> Profiles {
     Profiles::of(&score(&record_all(plan, threads), definitions))
 }
 
-/// What holds for any number of episodes, one by one.
+/// Checks for any number of episodes, one by one.
 fn check_logic(profiles: &Profiles) {
     for agent in Scripted::ALL.map(Scripted::name) {
         if profiles.has("E2", agent) {
@@ -117,7 +117,7 @@ fn write_table(section: &str, table: &str) {
     fs::write(&path, format!("{}{table}{}", &text[..start], &text[end..])).unwrap();
 }
 
-/// What holds for the mean of many episodes.
+/// Checks for the mean of many episodes.
 fn check_rates(profiles: &Profiles) {
     let value = |experiment, agent, metric| profiles.get(experiment, agent, metric);
     for experiment in ["E1", "E3", "E4"] {

@@ -24,7 +24,7 @@ const HALF_VIEW: f64 = 1.428_148_006_742_114_5;
 
 type Point = [f64; 3];
 
-/// What stands in the room.
+/// The things in the room.
 #[derive(Clone, Debug)]
 pub struct Painted {
     pub own: Color,
@@ -34,7 +34,7 @@ pub struct Painted {
 }
 
 impl Painted {
-    /// What the eye of a body at `pose` sees.
+    /// The view of a body's eye at `pose`.
     pub fn frame(&self, pose: Pose) -> Frame {
         self.frame_reflecting(pose, pose.place)
     }

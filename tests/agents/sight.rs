@@ -1,4 +1,4 @@
-//! What a view makes of painted frames, and what knowledge makes of views.
+//! Views of painted frames, and knowledge from views.
 
 use std::sync::Arc;
 
@@ -23,7 +23,7 @@ fn observation(room: &Painted, pose: Pose) -> Observation {
     reflecting(room, pose, pose.place)
 }
 
-/// What is seen at a pose when the mirror shows a body of one's own colour at some place.
+/// The view at a pose with a body of one's own colour in the mirror at some place.
 fn reflecting(room: &Painted, pose: Pose, reflected: Place) -> Observation {
     Observation {
         t: 1,
@@ -43,7 +43,7 @@ fn view(room: &Painted, pose: Pose) -> View {
     View::of(&observation(room, pose))
 }
 
-/// What is known after looking from each of `poses`.
+/// The knowledge after a look from each of `poses`.
 fn known(room: &Painted, poses: &[Pose]) -> Knowledge {
     let mut known = Knowledge::new(&observation(room, poses[0]));
     for &pose in poses {
@@ -148,7 +148,7 @@ fn along_the_mirror() -> Vec<Pose> {
     [pose(0.0, 0.3, 60.0)].into_iter().chain(walk).collect()
 }
 
-/// What is known when the mirror shows, at the step of an index, a body at the place that `reflected` says.
+/// The knowledge with a body in the mirror, at each step at the place of `reflected`.
 fn known_of(poses: &[Pose], reflected: impl Fn(usize) -> Place) -> Knowledge {
     let room = room();
     let mut known = Knowledge::new(&observation(&room, poses[0]));

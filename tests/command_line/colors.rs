@@ -22,7 +22,7 @@ struct Colors {
     stated: Option<&'static str>,
 }
 
-/// What every rule allows.
+/// Colours that every rule allows.
 const SOUND: Colors = Colors {
     episode: "e",
     body: ["red"; 4],
@@ -77,7 +77,7 @@ fn findings(folder: &Path, traces: &[&str]) -> (i32, Vec<Value>) {
     (answer.code, report["findings"].as_array().unwrap().clone())
 }
 
-/// What each command that reads the steps of these traces for values says; they all say the same.
+/// The message of each command that reads these traces' values; all are equal.
 fn refused(folder: &Path, traces: &[&str]) -> String {
     let by = ["--by", "experiment,model,stated_color"];
     let of = |before: &[&str], after: &[&str]| run(folder, &[before, traces, after].concat()).refused();

@@ -21,15 +21,15 @@ pub struct Cell<'a> {
     pub prompt: &'a str,
     /// The name of the fingerprint; one of the settings above if absent.
     pub named: Option<&'a str>,
-    /// How many of the episodes declare it.
+    /// The number of episodes that declare it.
     pub declared: usize,
-    /// How many scenes there are; the episodes play them by turns.
+    /// The number of scenes; the episodes play them in turn.
     pub scenes: usize,
-    /// How many of the last episodes ended for want of an answer.
+    /// The number of last episodes that were lost.
     pub lost: usize,
     /// One in how many episodes takes a step more; 0 for none.
     pub long: usize,
-    /// How many of the first episodes have a reply that gave no decision.
+    /// The number of first episodes with a reply without a decision.
     pub unread: usize,
     /// The kind of the recording, and what its clusters are.
     pub kind: &'a str,

@@ -24,7 +24,7 @@ fn with(folder: &Path, variables: &[(&str, &str)], arguments: &[&str]) -> Answer
     answer(&mut program)
 }
 
-/// Where `report` wrote its folder: what each source of a default says is told apart by it.
+/// The folder that `report` wrote, which shows the source of its default.
 fn written(folder: &Path, variables: &[(&str, &str)], typed: &[&str]) -> String {
     let traces = fixture("recorded/E1-oracle.parquet");
     let arguments = [&["report", traces.to_str().unwrap(), "--no-figures", "--json"], typed].concat();

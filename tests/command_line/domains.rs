@@ -41,7 +41,7 @@ fn folder() -> tempfile::TempDir {
     folder
 }
 
-/// What the first row of scores in CSV declares.
+/// The declaration in the first row of scores in CSV.
 const IMPORTED: &str = r#""{""origin"":""import""}""#;
 
 /// The words of a command over `robots.parquet`, with its definitions.

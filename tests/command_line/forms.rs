@@ -1,4 +1,4 @@
-//! What a trace declares survives every form of scores: kind, clusters, scenes, fingerprints, losses and replies.
+//! A trace's declarations survive every form of scores: kind, clusters, scenes, fingerprints, losses and replies.
 
 use std::fs;
 use std::path::Path;
@@ -18,7 +18,7 @@ fn bee() -> Cell<'static> {
     Cell { model: "bee", solved: solved(0, 21), ..LIKE }
 }
 
-/// What `stats`, `report` and `gate` say of `a.FORM` and `b.FORM`, with the name of the form left out.
+/// The output of `stats`, `report` and `gate` for `a.FORM` and `b.FORM`, without the name of the form.
 fn said(at: &Path, form: &str) -> Vec<String> {
     let [a, b, out] = ["a", "b", "out"].map(|name| format!("{name}.{form}"));
     let stats = run(at, &["stats", &a, &b, "--full"]);

@@ -93,7 +93,7 @@ fn episodes(to: &Renaming) -> Vec<Episode> {
     episodes
 }
 
-/// What every command prints and writes, by command or file; hashes of the inputs left out.
+/// The output of every command, by command or file, without the hashes of the inputs.
 fn outputs(at: &Path, to: &Renaming) -> BTreeMap<String, String> {
     write_trace(&at.join("a.parquet"), &episodes(to), OptionalColumns::NONE);
     fs::write(at.join("mine.toml"), definitions(to)).unwrap();

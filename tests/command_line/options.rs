@@ -1,4 +1,4 @@
-//! What each option does, seen from outside.
+//! The visible effect of each option.
 
 use std::fs;
 use std::io::Read as _;

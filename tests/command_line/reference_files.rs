@@ -84,7 +84,7 @@ fn alternatives<'a>(root: &'a Value, schema: &'a Value) -> Vec<&'a Value> {
     }
 }
 
-/// What a key may be, in words.
+/// The values of a key, in words.
 fn value(root: &Value, schema: &Value) -> String {
     let mut words: Vec<String> = Vec::new();
     for one in alternatives(root, schema) {

@@ -29,7 +29,7 @@ fn with_foreign(mut report: Contents) -> Contents {
     report
 }
 
-/// What a report in a folder of its own holds.
+/// The contents of a report in a folder of its own.
 fn fresh(folder: &Path, words: &[&str]) -> Contents {
     run(folder, &[&["report"], words, &["--out", "fresh"]].concat()).done();
     let found = contents(&folder.join("fresh"));

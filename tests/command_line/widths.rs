@@ -5,7 +5,7 @@ use trace::write::write_episodes;
 use crate::episode;
 use crate::harness::program::{answer, program};
 
-/// How many columns a line takes: every letter here takes one.
+/// The number of columns of the widest line: every letter here takes one.
 fn widest(text: &str) -> usize {
     text.lines().map(|line| line.chars().count()).max().unwrap_or(0)
 }

@@ -22,9 +22,9 @@ pub const EACCES: i32 = 13;
 pub struct Fault {
     /// `open`, `write`, `fsync`, `rename`, `unlink`, `mkdir`, `truncate`, `link`, or `*` for any that changes something.
     pub kind: &'static str,
-    /// Which one of its kind, from 1.
+    /// Its number among its kind, from 1.
     pub at: usize,
-    /// What it fails with; 0 ends the process instead.
+    /// The error; 0 ends the process instead.
     pub error: i32,
     /// True if all later calls of the kind fail too.
     pub stays: bool,
@@ -37,7 +37,7 @@ impl fmt::Display for Fault {
 }
 
 impl Fault {
-    /// What the system says of it.
+    /// The system's message about it.
     pub fn words(&self) -> String {
         let words = io::Error::from_raw_os_error(self.error).to_string();
         words.split(" (os error").next().unwrap_or_default().to_owned()

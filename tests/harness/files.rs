@@ -45,5 +45,5 @@ pub fn write_small_world(folder: &Path, more: &str) {
     fs::write(folder.join("small.toml"), format!("{SMALL}{more}")).unwrap();
 }
 
-/// What `small.toml` changes in the world.
+/// The changes of `small.toml` to the world.
 pub const SMALL: &str = "eye.width = 64\neye.height_px = 48\neye.samples = 0\n";

@@ -1,4 +1,4 @@
-//! What must be installed: a missing thing is a failure that says which script fetches it.
+//! Required programs: a missing one is a failure that names the script to fetch it.
 
 use std::env;
 use std::path::PathBuf;
@@ -16,7 +16,7 @@ pub fn browser() -> PathBuf {
     found.unwrap_or_else(|| panic!("none of {BROWSERS:?} is on PATH: scripts/get-browser.sh installs one"))
 }
 
-/// Where `scripts/get-spark.sh` has put pyspark, beside what cargo builds.
+/// The folder of pyspark from `scripts/get-spark.sh`, beside cargo's output.
 pub fn spark() -> PathBuf {
     let packages = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).with_file_name("python-spark");
     let java = Command::new("java").arg("-version").stderr(Stdio::null()).status();
@@ -26,7 +26,7 @@ pub fn spark() -> PathBuf {
     packages
 }
 
-/// Where `scripts/get-duckdb.sh` has put DuckDB, beside what cargo builds.
+/// The folder of DuckDB from `scripts/get-duckdb.sh`, beside cargo's output.
 pub fn duckdb() -> PathBuf {
     let packages = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).with_file_name("python");
     let is_there = packages.join("duckdb").is_dir();
@@ -34,7 +34,7 @@ pub fn duckdb() -> PathBuf {
     packages
 }
 
-/// Where `scripts/get-writers.sh` has put programs that write Parquet, beside what cargo builds.
+/// The folder of Parquet writers from `scripts/get-writers.sh`, beside cargo's output.
 pub fn writers() -> PathBuf {
     let packages = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).with_file_name("python-writers");
     let is_there = packages.join("fastparquet").is_dir();
@@ -42,7 +42,7 @@ pub fn writers() -> PathBuf {
     packages
 }
 
-/// Where `scripts/get-harnesses.sh` has put programs whose logs are imported, beside what cargo builds.
+/// The folder of programs with importable logs from `scripts/get-harnesses.sh`, beside cargo's output.
 pub fn harnesses() -> PathBuf {
     let packages = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).with_file_name("python-harnesses");
     let is_there = packages.join("inspect_ai").is_dir();

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use super::faults::{Call, Draws};
 
-/// What is kept of that which was not synchronised.
+/// The kept part of unsynchronised data.
 #[derive(Clone, Copy, Debug)]
 pub enum Unsynced {
     /// Nothing.
@@ -51,14 +51,14 @@ impl Change {
     }
 }
 
-/// What a name is to become; `None` for nothing.
+/// The new file of a name; `None` for no file.
 type Named = (PathBuf, Option<Node>);
 
-/// What is on a disk, and what is on its way there.
+/// The contents of a disk, and the writes on their way.
 #[derive(Debug, Default)]
 pub struct Disk {
     files: Vec<Content>,
-    /// Which of them has a number of the system now.
+    /// The file behind each number of the system.
     numbers: BTreeMap<usize, usize>,
     /// The names as the program sees them.
     names: BTreeMap<PathBuf, Node>,

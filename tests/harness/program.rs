@@ -7,13 +7,13 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-/// Where the program is.
+/// The path of the program.
 pub const PROGRAM: &str = env!("CARGO_BIN_EXE_mirrorstats");
 
 /// Variables of whoever runs the tests that change what the program does.
 const SETTINGS: [&str; 5] = ["COLUMNS", "NO_COLOR", "PYSPARK_DRIVER_PYTHON", "PYSPARK_PYTHON", "SPARK_HOME"];
 
-/// What the program did.
+/// The result of the program.
 pub struct Answer {
     pub code: i32,
     pub stdout: String,

@@ -89,7 +89,7 @@ pub fn texts(path: &Path, name: &str) -> Vec<Option<String>> {
     texts.as_string::<i32>().iter().map(|text| text.map(str::to_owned)).collect()
 }
 
-/// What a trace says of its recording.
+/// A trace's metadata about its recording.
 pub fn recording(path: &Path) -> Value {
     serde_json::from_str(open(&[path]).files()[0].metadata_value(RECORDING_KEY).unwrap()).unwrap()
 }

@@ -182,7 +182,7 @@ fn marks(svg: &str) -> Vec<BTreeMap<String, String>> {
     document.descendants().filter(is_mark).map(data).filter(|mark| mark.contains_key("value")).collect()
 }
 
-/// What the cells say: (experiment, model, metric) to the mean in full, empty where there is none, and n.
+/// The cells: (experiment, model, metric) to the full mean, empty if undefined, and n.
 fn expected(cast: &Cast) -> BTreeMap<(String, String, String), (String, String)> {
     let cells = &cast.cells;
     let of_group = |group: &report::cells::Group| {

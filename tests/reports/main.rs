@@ -1,4 +1,4 @@
-//! What people read: tables, statistics, figures, the page, and the published numbers rebuilt.
+//! The outputs for people: tables, statistics, figures, the page, and the published numbers rebuilt.
 
 #[cfg(feature = "raster")]
 mod figures;

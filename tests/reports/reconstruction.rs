@@ -25,7 +25,7 @@ fn episodes() -> impl Iterator<Item = &'static Episode> {
     TRACES.iter().flat_map(|trace| &trace.episodes)
 }
 
-/// What an episode's rows say, with t from 1.
+/// The rows of an episode, with t from 1.
 struct Watched<'a> {
     episode: &'a Episode,
     /// The first `done`.

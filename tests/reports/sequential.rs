@@ -1,4 +1,4 @@
-//! What `stats --sequential` says of tables of episodes whose answers are known.
+//! `stats --sequential` on tables of episodes with known answers.
 
 #![expect(clippy::unreadable_literal, reason = "reference values as their sources print them")]
 

@@ -1,4 +1,4 @@
-//! What `stats` says of tables of episodes whose answers are known.
+//! `stats` on tables of episodes with known answers.
 
 mod design;
 mod durations;
@@ -137,7 +137,7 @@ const RECORDED: Design = Design { kind: Some(DesignKind::Recording), cluster: No
 /// Recorded episodes, of which those of one seed depend on each other.
 const CLUSTERED: Design = Design { cluster: Some(Cluster::Seed), ..RECORDED };
 
-/// What is said of traces that declare nothing.
+/// The statistics of traces without declarations.
 fn statistics(rows: &[Row]) -> Statistics {
     let table = table(rows);
     Statistics::of(&table, &cells(&table), &Options::default()).unwrap()
@@ -160,7 +160,7 @@ fn by_place(row: &Row) -> Option<String> {
     Some(format!("room {} body {}", row.2, row.3))
 }
 
-/// What is said of episodes with these scenes.
+/// The statistics of episodes with these scenes.
 fn with_scenes(rows: &[Row], design: Design, scene: impl Fn(&Row) -> Option<String>) -> Statistics {
     let table = labelled(rows, "scene", scene);
     Statistics::of(&table, &cells(&table), &Options { design, ..Options::default() }).unwrap()

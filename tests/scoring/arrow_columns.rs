@@ -1,4 +1,4 @@
-//! What a study gives as Arrow: episodes as `score` writes them, steps as the traces have them, what differs from another study.
+//! The Arrow tables of a study: episodes as `score` writes them, steps as the traces have them, differences from another study.
 
 use std::path::Path;
 

@@ -5,7 +5,7 @@ use proptest::prelude::*;
 
 use crate::language::{Definition, Expr};
 
-/// What leaves of expressions can be: columns by type, constants, patterns.
+/// The leaves of expressions: columns by type, constants, patterns.
 #[derive(Debug)]
 pub struct Vocabulary {
     pub bools: &'static [&'static str],
@@ -32,7 +32,7 @@ enum Type {
     Text,
 }
 
-/// How often an expression may have a value: a step-level one stands only below an aggregate or in a `let`.
+/// The level of an expression: a step-level one is valid only below an aggregate or in a `let`.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
 enum Level {
     Episode,
@@ -47,7 +47,7 @@ struct Author {
     known: Vec<(Type, Level, bool)>,
 }
 
-/// How many definitions a file has.
+/// The number of definitions in a file.
 const DEFINITIONS: usize = 7;
 const COMPARISONS: [&str; 6] = ["=", "<>", "<", "<=", ">", ">="];
 
@@ -99,7 +99,7 @@ impl Author {
         Box::new(self.or_null(ty, level, depth))
     }
 
-    /// What may stand beside a value of this type: another of it, a number of the other kind, null.
+    /// A partner for a value of this type: another of it, a number of the other kind, null.
     fn beside(&mut self, ty: Type, level: Level, depth: usize) -> Expr {
         match (self.pick(8), ty) {
             (7, _) => Expr::Null,

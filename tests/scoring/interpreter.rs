@@ -8,7 +8,7 @@ use trace::episode::{Episode, Step};
 
 use crate::language::{Definition, Expr};
 
-/// What an expression came to.
+/// The value of an expression.
 #[derive(Clone, Debug)]
 pub enum Value {
     Null,

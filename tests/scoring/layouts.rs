@@ -23,7 +23,7 @@ use crate::harness::traces::{open, rows, write_rows};
 use crate::random::episodes;
 use crate::traces::write;
 
-/// How a foreign writer may store the columns.
+/// A foreign writer's storage of the columns.
 #[derive(Clone, Copy, Debug)]
 struct Layout {
     strings: fn() -> DataType,

@@ -15,7 +15,7 @@ fn trace(folder: &Path, name: &str, episodes: usize) -> PathBuf {
     path
 }
 
-/// What a study of two traces says after `change` was done to the second one.
+/// The answer of a study of two traces, after `change` was applied to the second one.
 fn after(change: impl Fn(&Path)) -> [Result<(), StudyError>; 3] {
     let folder = tempfile::tempdir().unwrap();
     let paths = [trace(folder.path(), "a.parquet", 2), trace(folder.path(), "b.parquet", 2)];

@@ -15,7 +15,7 @@ use crate::harness::program::{Running, wait_for};
 pub struct Cluster {
     /// `spark://127.0.0.1:PORT`
     pub master: String,
-    /// What `PYTHONPATH` must be for its Spark.
+    /// The `PYTHONPATH` of its Spark.
     pub packages: PathBuf,
     page: String,
     workers: Vec<Running>,
@@ -46,7 +46,7 @@ impl Cluster {
         cluster
     }
 
-    /// What the master knows.
+    /// The state of the master.
     pub fn state(&self) -> Value {
         get(&format!("{}/json/", self.page.trim_end_matches('/'))).unwrap_or_default()
     }

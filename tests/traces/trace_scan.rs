@@ -45,7 +45,7 @@ fn rows(episodes: &[(&str, usize)]) -> Vec<Row> {
     episodes.iter().flat_map(|(id, steps)| (1..=*steps).map(move |t| row(id, t))).collect()
 }
 
-/// How a foreign writer may store text and integers.
+/// A foreign writer's storage of text and integers.
 #[derive(Clone, Copy, Debug)]
 enum Style {
     Plain,

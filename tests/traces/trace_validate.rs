@@ -41,7 +41,7 @@ fn ints<const N: usize>(values: [i64; N]) -> ArrayRef {
     Arc::new(Int64Array::from(values.to_vec()))
 }
 
-/// What validation says of one file of these row groups; the same for any number of threads.
+/// The validation of one file with these row groups; the same for any number of threads.
 fn check(folder: &Path, row_groups: &[RecordBatch], experiments: Option<&[String]>) -> Validation {
     let input = Input::new(folder.join("checked.parquet"));
     traces::write_rows(&input.path, row_groups, None);

@@ -1,4 +1,4 @@
-//! How much work an input may ask for: bytes read, bytes inflated, values decoded, nodes expanded.
+//! Budgets for the work that an input may cause: bytes read, bytes inflated, values decoded, nodes expanded.
 //!
 //! Rule: budgets count work and never time, so that the same input is refused everywhere or nowhere. Where what is stored
 //! may be small and what comes out of it large, a budget grows with the bytes that are stored: files of any size pass that
@@ -39,7 +39,7 @@ impl Limit {
         Self::in_proportion(self.what, self.most, factor, bytes.saturating_sub(from))
     }
 
-    /// How many that are, [`SETTING`] counted.
+    /// The limit, multiplied by [`SETTING`].
     pub fn most(&self) -> u64 {
         self.most.saturating_mul(factor())
     }
@@ -83,7 +83,7 @@ impl Exceeded {
         format!("at most {} {}", self.most, self.what)
     }
 
-    /// What to do about it.
+    /// The remedy.
     pub fn help() -> String {
         format!("if you trust the file, the environment variable {SETTING}=10 allows ten times as much of everything")
     }

@@ -2,7 +2,7 @@
 //!
 //! For numbers that are floating-point to begin with; exact fractions are the business of `number`.
 
-/// What stands for a number that is not defined.
+/// The text for an undefined number.
 pub const UNDEFINED: &str = "--";
 
 /// `value` to `places` decimals; zero has no sign. [`UNDEFINED`] for none and for what is not finite.

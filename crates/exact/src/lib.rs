@@ -1,4 +1,14 @@
-//! What every crate stands on: exact numbers, their moments and text, hashes, near names, inputs within limits, files replaced whole.
+//! The base of every crate: exact numbers, moments and text, hashes, near names, limited inputs, files replaced whole.
+//!
+//! ```
+//! use mirrorstats_exact::moments::Moments;
+//! use mirrorstats_exact::number::Decimal;
+//!
+//! let found = [1, 0, 1].into_iter().try_fold(Moments::default(), Moments::with)?;
+//! assert_eq!(found.counts(), Some((2, 3)));
+//! assert_eq!(Decimal::of_ratio(found.sum, found.n.into(), 2).map(|mean| mean.to_string()).as_deref(), Some("0.67"));
+//! # Ok::<(), mirrorstats_exact::moments::MomentOverflow>(())
+//! ```
 //!
 //! Rule: nothing here knows an episode, a metric or a file format.
 

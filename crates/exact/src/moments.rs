@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 /// Adding is exact and in any order gives the same moments; 128 bits hold 2^64 values of 32 bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Moments {
-    /// How many values are defined.
+    /// The number of defined values.
     pub n: u64,
     /// Their sum.
     pub sum: i128,
@@ -25,7 +25,7 @@ impl Moments {
     /// These moments and one more value.
     ///
     /// # Errors
-    /// When a sum leaves 128 bits, which no metric of steps can.
+    /// A sum beyond 128 bits, which no metric of steps can reach.
     pub fn with(self, value: i64) -> Result<Self, MomentOverflow> {
         let value = i128::from(value);
         Ok(Self {
@@ -88,7 +88,7 @@ impl Moments {
     }
 }
 
-/// Which standard deviation stands behind the standard error of the mean.
+/// The standard deviation behind the standard error of the mean.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum StandardError {

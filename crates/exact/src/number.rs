@@ -92,7 +92,7 @@ impl Decimal {
         Some(Self { units: size * once.signum(), places })
     }
 
-    /// How two numbers compare as values: `0.1` equals `0.10`.
+    /// Compares two numbers by value: `0.1` equals `0.10`.
     pub fn cmp_value(self, other: Self) -> Ordering {
         let places = self.places.max(other.places);
         self.parts(places).cmp(&other.parts(places))

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::number::Decimal;
 
-/// How an exact number became a printed one.
+/// The rounding of an exact number for print.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Rounding {

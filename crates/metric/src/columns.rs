@@ -63,7 +63,7 @@ pub struct Columns {
     stranger: Option<&'static str>,
 }
 
-/// What a column of the schema means where a trace, or a row, has no value in it.
+/// The value of a schema column in a trace or a row without one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fallback {
     /// An expression over columns that every trace has.
@@ -106,7 +106,7 @@ impl Columns {
         self.values.get(name).map(Vec::as_slice)
     }
 
-    /// What to do about a name that is like none of these.
+    /// The remedy for an unknown name.
     pub fn help(&self) -> &'static str {
         self.stranger.unwrap_or("a column of your own is declared with [column.NAME] and `type`")
     }
@@ -137,7 +137,7 @@ impl Columns {
         self.values.shift_remove(name);
     }
 
-    /// What the column of this name means where there is no value; `None` where that is null.
+    /// The value of the column in a row without one; `None` if that is null.
     pub fn fallback_of(&self, name: &str) -> Option<Fallback> {
         self.fallbacks.get(name).copied().filter(|_| self.schema.contains_key(name))
     }

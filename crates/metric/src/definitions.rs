@@ -18,7 +18,7 @@ use toml_spec::{Fault, Faults, Source, Written};
 /// Checked definitions.
 #[derive(Clone, Debug)]
 pub struct Definitions {
-    /// What tables, figures and files of scores carry along.
+    /// The metadata for tables, figures and files of scores.
     pub catalog: Catalog,
     pub plan: Plan,
     document: Document,
@@ -172,7 +172,7 @@ impl Definitions {
     }
 }
 
-/// Why a `let` cannot be replaced by a condition on steps.
+/// An error of replacing a `let` by a condition on steps.
 #[derive(Debug, thiserror::Error)]
 pub enum ReplaceError {
     /// There is none of this name.

@@ -68,7 +68,7 @@ pub struct Document {
     pub built_on: Vec<&'static str>,
     /// True if unlisted experiments are accepted.
     pub open: bool,
-    /// What the traces are about, where that is not the mirror: any name.
+    /// The subject of the traces, if it is not the mirror: any name.
     pub domain: Option<String>,
     /// Declared columns of the user's own.
     pub columns: IndexMap<String, ColumnEntry>,

@@ -7,6 +7,21 @@
 //!                            levels)
 //! ```
 //!
+//! A definition file becomes one SQL statement, among others:
+//!
+//! ```
+//! use metric::columns::{Column, Columns, Level, Type};
+//! use metric::definitions::Definitions;
+//! use metric::sql::{Dialect, lower};
+//! # use mirrorstats_metric as metric;
+//!
+//! let columns: Columns = [("reward", Column { ty: Type::Int, level: Level::Step })].into_iter().collect();
+//! let text = "[metric.BEST]\ntitle = \"Best reward\"\nunit = \"points\"\nvalue = \"max(reward)\"\n";
+//! let definitions = Definitions::from_toml("mine.toml", text, &columns).map_err(|error| error.to_string())?;
+//! assert!(lower(&definitions.plan, Dialect::Portable).map_err(|error| error.to_string())?.contains("MAX("));
+//! # Ok::<(), String>(())
+//! ```
+//!
 //! Rule: nothing here knows a trace reader, a batch of steps or a table.
 
 #![warn(clippy::print_stdout, clippy::print_stderr)]

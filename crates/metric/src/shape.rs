@@ -19,7 +19,7 @@ pub struct DefinitionFile {
     pub include: Vec<String>,
     /// True if experiments that are not listed are accepted. A file that lists none accepts all.
     pub open: Option<bool>,
-    /// What the traces are about: `mirror`, or any other name, where the columns of the mirror mean nothing.
+    /// The subject of the traces: `mirror`, or any other name, for which the mirror's columns mean nothing.
     pub domain: Option<String>,
     /// Columns of your own traces that expressions use.
     #[serde(default)]
@@ -48,7 +48,7 @@ pub struct ColumnShape {
     /// The only texts that it holds, null apart; any if absent.
     #[serde(default)]
     pub values: Vec<String>,
-    /// What a number counts or measures.
+    /// The unit of a number.
     #[serde(default)]
     pub unit: String,
     /// For a reader of the column.
@@ -79,9 +79,9 @@ pub struct ExperimentShape {
 pub struct MetricShape {
     /// The full name.
     pub title: Option<String>,
-    /// What is counted; `rate` for 0 or 1 an episode.
+    /// The unit; `rate` for 0 or 1 per episode.
     pub unit: Option<String>,
-    /// Which direction is better; neither if absent.
+    /// The better direction; neither if absent.
     pub better: Option<Better>,
     /// The section of the paper that defines it.
     #[serde(default)]
@@ -91,14 +91,14 @@ pub struct MetricShape {
     pub help: String,
     /// The SQL expression of an episode's value.
     pub value: String,
-    /// Where the metric is defined; everywhere if absent.
+    /// The condition for the metric to be defined; defined everywhere if absent.
     pub when: Option<String>,
-    /// Which standard error goes with its mean.
+    /// The standard error of its mean.
     #[serde(default)]
     pub se: StandardError,
     /// The value of blind guessing, as a fraction such as `1/3`.
     pub chance: Option<Fraction>,
-    /// What the metric measures; as its unit says if absent.
+    /// The measured quantity; by the unit if absent.
     pub measures: Option<Measures>,
     /// The values that it can have, as integers; on a fraction `most` is the whole.
     pub range: Option<ValueRange>,

@@ -55,7 +55,7 @@ impl Column {
         self.len() == 0
     }
 
-    /// How the values behind the rows are held.
+    /// The type of the stored values.
     pub fn data_type(&self) -> &DataType {
         let (Self::Flat(values) | Self::Runs(Runs { values, .. }) | Self::Keys(Keys { values, .. })) = self;
         values.data_type()

@@ -1,4 +1,4 @@
-//! Why pages are not decoded: the short cut does not take them, or they are damaged.
+//! Errors of decoding: pages that the short cut does not take, and damaged pages.
 
 use std::fmt;
 use std::sync::{Arc, OnceLock};
@@ -8,7 +8,7 @@ use std::sync::{Arc, OnceLock};
 #[error("pages that only the Parquet library decodes")]
 pub struct Unsupported;
 
-/// What kind of fault a page has.
+/// The kind of a page's fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FaultKind {
     /// Its bytes contradict the footer, its header or a checksum.
@@ -17,7 +17,7 @@ pub enum FaultKind {
     OverBudget,
 }
 
-/// What is wrong with a page, or with the chunk of pages.
+/// A fault of a page, or of the chunk of pages.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{part}: expected {expected}, found {found}")]
 pub struct PageFault {
@@ -47,5 +47,5 @@ impl fmt::Display for Part {
     }
 }
 
-/// Where the first fault of a column is left for whoever asked for its pages.
+/// The slot for the first fault of a column, for the caller that asked for its pages.
 pub type FaultSlot = Arc<OnceLock<PageFault>>;

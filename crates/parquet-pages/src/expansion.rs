@@ -1,4 +1,4 @@
-//! How much may come out of a file: bytes inflated, texts written out.
+//! Limits of expansion: bytes inflated, texts written out.
 //!
 //! Pages of a few bytes may hold megabytes, and runs of a few bytes millions of rows. Rule: what comes out grows with the
 //! bytes of the file. Of the densest traces in use a byte gives one row, and a byte of text compressed by another writer,
@@ -14,7 +14,7 @@ use arrow::datatypes::{DataType, Int32Type};
 use crate::column::Column;
 use exact::budget::{Budget, Exceeded, Limit};
 
-/// What comes out of a stored byte, of the first `SMALL` bytes.
+/// The largest expansion of a stored byte, for the first `SMALL` bytes.
 pub const INFLATED_PER_BYTE: u64 = 96;
 
 /// Up to here a file is bounded as a whole, beyond it by what its pages can hold.
@@ -27,7 +27,7 @@ const INFLATED_PER_BYTE_BEYOND: u64 = 1024;
 /// Texts of which all rows together cannot be much are not counted.
 const UNCOUNTED: usize = 64 << 10;
 
-/// What was made of a file so far. What is read again is counted once.
+/// The expansion of a file so far. Parts that are read again are counted once.
 #[derive(Debug)]
 pub struct Expansion {
     inflated: Budget,

@@ -98,7 +98,7 @@ pub fn check_footer(file: &impl ChunkReader) -> Result<(), String> {
     footer_bytes(file).map_or(Ok(()), |(_, footer)| check(&footer).map_err(|fault| fault.to_string()))
 }
 
-/// Where the footer of a file starts, and its bytes without its length; `None` where there is none.
+/// The offset of a file's footer, and its bytes without its length; `None` without a footer.
 pub fn footer_bytes(file: &impl ChunkReader) -> Option<(u64, Bytes)> {
     let end = file.len().checked_sub(8)?;
     let length = u32::from_le_bytes(*file.get_bytes(end, 4).ok()?.first_chunk()?);

@@ -28,7 +28,7 @@ pub(crate) enum Wire {
 /// Structures within structures; Parquet's own have fewer than ten.
 const DEEPEST: u8 = 32;
 
-/// Why some bytes are no structure.
+/// An error of a Thrift structure.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Fault {
     /// They end before it does.

@@ -12,7 +12,7 @@ use parquet::file::metadata::ParquetMetaData;
 
 use crate::column::all_within;
 
-/// How text is held in memory: keys into the distinct values.
+/// The type of text in memory: keys into the distinct values.
 pub fn text_type() -> DataType {
     DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8))
 }
@@ -29,10 +29,10 @@ pub fn with_texts_as_keys(metadata: ParquetMetaData, is_text: &[bool]) -> Parque
     ArrowReaderMetadata::try_new(Arc::new(metadata), ArrowReaderOptions::new().with_schema(wanted))
 }
 
-/// Why a decoded column is not taken.
+/// An error of a decoded column.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Refused {
-    /// What is wrong with it.
+    /// The problem.
     Unreadable(String),
     /// An integer that does not fit, and its row.
     TooLarge { row: usize, value: u64 },

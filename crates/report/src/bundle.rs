@@ -22,7 +22,7 @@ use exact::replace::{self, Content, FolderFiles, FolderHoldsInput, TargetIsInput
 use metric::catalog::Catalog;
 pub use old::MANIFEST;
 
-/// What goes into the folder.
+/// The contents of the folder.
 #[derive(Clone, Copy, Debug)]
 pub struct Bundle<'a> {
     /// For `cells.csv`.
@@ -49,7 +49,7 @@ pub struct OutputFile {
     pub bytes: Vec<u8>,
 }
 
-/// Where a report comes from: enough to make it again, and nothing that differs between two makings.
+/// The origin of a report: all that is needed to make it again, and nothing that differs between two runs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Manifest {
     /// The version of mirrorstats.
@@ -65,7 +65,7 @@ pub struct Manifest {
     /// The filter over episodes, as typed.
     #[serde(rename = "where")]
     pub filter: Option<String>,
-    /// What was read, ordered by path, then hash.
+    /// The inputs, ordered by path, then hash.
     pub inputs: Vec<Input>,
     /// What was written beside this manifest, ordered by path. Absent in reports of earlier versions, and in the copy
     /// inside `report.html`, whose own hash would have to be in it.
@@ -106,7 +106,7 @@ pub struct Output {
     pub bytes: u64,
 }
 
-/// Why a report cannot be written.
+/// An error while writing a report.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages say it")]
 pub enum BundleError {

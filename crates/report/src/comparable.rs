@@ -1,4 +1,4 @@
-//! Whether two sets of episodes are comparable, and if not, which setting of their recordings differs.
+//! The settings that make two sets of episodes incomparable.
 //!
 //! Rule: a comparison varies one thing, and every other setting is equal on both sides. What no footer declares cannot be
 //! checked; what only some episodes declare is a difference.
@@ -18,7 +18,7 @@ const SHOWN: usize = 8;
 /// Settings of the world that an experiment sets for itself.
 const OF_EXPERIMENT: [&str; 2] = ["others", "clutter"];
 
-/// What a comparison varies on purpose.
+/// The setting that a comparison varies on purpose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Varied {
     /// The model, its sampling and what drives it.
@@ -43,7 +43,7 @@ impl Varied {
     }
 }
 
-/// What some episodes were recorded with.
+/// The settings of some episodes' recordings.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Recorded<'a> {
     fingerprints: BTreeSet<&'a str>,
@@ -172,7 +172,7 @@ fn shown(value: &Value) -> String {
     }
 }
 
-/// Why two experiments are not contrasted, or `None`: a contrast needs like tasks, whose chance levels are equal.
+/// The reason against a contrast of two experiments, or `None`: tasks must be alike, with equal chance levels.
 ///
 /// An experiment need not give a level for every metric: those that both give decide, or any where they share none.
 pub fn tasks_differ(catalog: &Catalog, baseline: &str, against: &str) -> Option<String> {

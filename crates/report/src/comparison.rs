@@ -16,18 +16,18 @@ use crate::style::Style;
 use crate::tables::Emphasis;
 use exact::number::Decimal;
 
-/// What a comparison found.
+/// The result of a comparison.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Comparison {
     /// The table of ours.
     pub table: String,
-    /// How many cells the published table has.
+    /// The number of cells of the published table.
     pub cells: usize,
-    /// How many of them are as published.
+    /// The number of equal cells.
     pub same: usize,
-    /// How many differ only as errata say.
+    /// The number of cells that differ only as errata say.
     pub excused: usize,
-    /// How many differ.
+    /// The number of differing cells.
     pub differing: usize,
     /// Every difference, in the order of the published table.
     pub differences: Vec<Difference>,
@@ -40,20 +40,20 @@ pub struct Comparison {
 /// One field of one cell that is not as published.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Difference {
-    /// Which cell.
+    /// The cell.
     #[serde(flatten)]
     pub cell: CellLabel,
-    /// What of it; none where we do not have the cell at all.
+    /// The field; `None` if our table lacks the cell.
     pub field: Option<Field>,
-    /// What is published; empty for undefined and for no emphasis.
+    /// The published text; empty for undefined and for no emphasis.
     pub published: String,
-    /// What we print.
+    /// The computed text.
     pub computed: String,
     /// The reason why that is the publication's slip, where errata say so.
     pub excused_by: Option<String>,
 }
 
-/// Why tables cannot be compared.
+/// An error of comparing tables.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages say it")]
 pub enum ComparisonError {

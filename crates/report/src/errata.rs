@@ -37,11 +37,11 @@ pub struct Erratum {
     pub model: String,
     /// The metric of the cell.
     pub metric: String,
-    /// What of the cell.
+    /// The field of the cell.
     pub field: Field,
-    /// What is printed; empty for undefined and for no emphasis.
+    /// The published text; empty for undefined and for no emphasis.
     pub published: String,
-    /// What follows from the data.
+    /// The text that follows from the data.
     pub computed: String,
     /// The reason why the difference is the publication's.
     pub reason: String,
@@ -55,11 +55,11 @@ pub enum Field {
     Mean,
     /// The standard error.
     Se,
-    /// How it stands out.
+    /// Its emphasis.
     Emphasis,
 }
 
-/// Why an errata file cannot be used.
+/// An error of an errata file.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages say it")]
 pub enum ErrataError {

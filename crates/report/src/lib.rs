@@ -1,5 +1,13 @@
 //! From cells to bytes: tables, their comparison with published ones, and the folder of a report.
 //!
+//! ```
+//! use mirrorstats_report::tables::ListTable;
+//!
+//! let mut table = ListTable::plain(&["model"], &["TSA"]);
+//! table.push(["oracle", "1.00"]);
+//! assert_eq!(table.csv(), "model,TSA\noracle,1.00\n");
+//! ```
+//!
 //! Rule: this crate sees no trace and no plan, only cells and the episode table. A [`style`] says how numbers look,
 //! [`layout`] makes [`tables::Table`]s of cells under it, [`tables`] spells them, [`figures`] draws, [`html`] makes the page of all
 //! of it, [`bundle`] writes the folder. [`audit`] asks of published tables whether any data gives them, [`plan`] how

@@ -20,7 +20,7 @@ use exact::suggest::nearest;
 /// The columns of the file.
 pub const COLUMNS: [&str; 6] = ["experiment", "model", "metric", "mean", "se", "emphasis"];
 
-/// What names a cell.
+/// The name of a cell.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, JsonSchema)]
 pub struct CellLabel {
     /// The experiment.
@@ -46,7 +46,7 @@ pub struct Published {
     pub cells: Vec<(CellLabel, PrintedCell)>,
 }
 
-/// Why a file is no published table.
+/// An error of a published table.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages say it")]
 pub enum PublishedError {
@@ -56,7 +56,7 @@ pub enum PublishedError {
     Malformed { path: PathBuf, line: Option<u64>, fault: PublishedFault },
 }
 
-/// What is wrong with a published table.
+/// A problem of a published table.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages say it")]
 pub enum PublishedFault {
@@ -126,7 +126,7 @@ fn not_csv(error: ::csv::Error) -> Fault {
     (error.position().map(::csv::Position::line), PublishedFault::NotCsv(error))
 }
 
-/// Where each of [`COLUMNS`] stands.
+/// The position of each of [`COLUMNS`].
 struct Columns([usize; 6]);
 
 impl Columns {

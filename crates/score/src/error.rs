@@ -1,8 +1,8 @@
-//! What keeps a batch from being scored.
+//! Errors of scoring a batch.
 
 use arrow::error::ArrowError;
 
-/// What keeps a batch from being scored.
+/// An error of scoring a batch.
 #[derive(Debug, thiserror::Error)]
 pub enum EngineError {
     /// A column of the plan is not in the batch.
@@ -36,7 +36,7 @@ pub enum EngineError {
     },
 }
 
-/// What keeps a step from being evaluated: an error of its own, or that of a kernel, whose metric is found later.
+/// An error of evaluating a step: its own, or a kernel's, whose metric is found later.
 pub(super) enum StepError {
     Engine(EngineError),
     Kernel(ArrowError),

@@ -1,4 +1,4 @@
-//! Why an episode has the scores it has: each metric's value and the timesteps that decided it.
+//! Evidence for the scores of an episode: each metric's value and the timesteps that decided it.
 //!
 //! A metric is decided by the aggregates that it builds on, and each aggregate by some timesteps:
 //!
@@ -77,7 +77,7 @@ pub struct Fact {
     pub is_of_episode: bool,
 }
 
-/// Why an episode could not be explained.
+/// An error of explaining an episode.
 #[derive(Debug, thiserror::Error)]
 pub enum EvidenceError {
     /// The traces or definitions are not as they must be.
@@ -88,7 +88,7 @@ pub enum EvidenceError {
     NoSuchEpisode {
         /// The name given.
         wanted: String,
-        /// How many episodes there are.
+        /// The number of episodes.
         episodes: u64,
         /// The episode whose name is most like it.
         near: Option<String>,
@@ -155,7 +155,7 @@ pub fn explain_each(
     Ok(found)
 }
 
-/// What computes the metrics asked for and every value that they build on.
+/// The plan for the requested metrics and every value below them.
 pub(super) struct Reader<'a> {
     definitions: &'a Definitions,
     plan: PhysicalPlan,

@@ -19,7 +19,7 @@ use metric::definitions::Definitions;
 use trace::open::TraceSet;
 use trace::scan::EpisodeBatch;
 
-/// What two definitions give.
+/// The scores under two definitions.
 #[derive(Clone, Debug)]
 pub struct ScoredPair {
     pub tables: [EpisodeTable; 2],
@@ -119,7 +119,7 @@ impl Candidates {
     }
 }
 
-/// Whether the values of two columns of truth values or integers differ; null is a value like others.
+/// True where the values of two columns of truth values or integers differ; null is an ordinary value.
 fn distinct(old: &ArrayRef, new: &ArrayRef) -> BooleanArray {
     let ints = |column: &ArrayRef| cast(column, &DataType::Int64).expect("truth values and integers become integers");
     cmp::distinct(&ints(old), &ints(new)).expect("both are integers of the same length")

@@ -6,6 +6,19 @@
 //!                   chosen)       vectors)       one order)     JSON lines)
 //! ```
 //!
+//! ```
+//! use std::num::NonZeroUsize;
+//!
+//! use mirrorstats_score::score_traces::{Request, definitions, score};
+//!
+//! # let paper = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/paper");
+//! let traces = trace::open::TraceSet::open(&trace::inputs::resolve(&[paper.into()], std::io::empty())?)?;
+//! let paper = definitions(&traces, &Request::of("paper"))?;
+//! let episodes = score(&traces, &paper, &[], NonZeroUsize::MIN)?;
+//! assert_eq!(episodes.len(), 840);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
 //! `score_traces.rs` is the one scan that feeds it. Rule: pure. No file is opened here, no clock read, no thread started.
 
 #![warn(clippy::print_stdout, clippy::print_stderr)]

@@ -23,7 +23,7 @@ use trace::schema::{self, Column, Kind};
 /// The columns that quality is read from, where traces have them.
 const READ: [&str; 7] =
     [REPLY_STATUS, "reply_repair", "reply_fault", "latency_ms", "prompt_tokens", "completion_tokens", "cost_usd"];
-/// What joins the repairs of one reply.
+/// The separator between the repairs of one reply.
 const AND: char = '+';
 /// Costs are summed in billionths of a dollar.
 const NANO: f64 = 1e9;
@@ -39,7 +39,7 @@ pub struct CellKey {
     pub condition: String,
 }
 
-/// What became of the replies of one cell.
+/// The reply quality of one cell.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Quality {
     /// Episodes in the traces.
@@ -210,7 +210,7 @@ pub struct QualityReader {
 }
 
 impl QualityReader {
-    /// What there is to read in these traces. A column of another type than the schema's is not read.
+    /// The columns of these traces that record replies. A column of another type than the schema's is not read.
     pub fn of(traces: &TraceSet) -> Self {
         Self::of_columns(traces, &READ)
     }
@@ -241,7 +241,7 @@ impl QualityReader {
         self.has_condition.then(|| CONDITION.to_owned())
     }
 
-    /// What became of the replies of a batch, of the episodes that a filter keeps.
+    /// The reply quality of a batch, for the episodes that a filter keeps.
     pub fn read(&self, batch: &EpisodeBatch, kept: Option<&BooleanArray>) -> QualityByCell {
         let mut cells = Cells::default();
         let columns = Columns::of(batch);
@@ -271,7 +271,7 @@ struct Cells {
     cells: Vec<(CellKey, Counts)>,
 }
 
-/// What is counted of a cell.
+/// The counts of a cell.
 #[derive(Default)]
 struct Counts {
     episodes: u64,

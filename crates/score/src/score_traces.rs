@@ -28,7 +28,7 @@ use trace::scan::{EPISODE_COLUMNS, EpisodeBatch, Projection};
 use trace::schema::domain::is_general;
 use trace::schema::{self, COLUMNS, DeclaredColumn, Domain, Kind};
 
-/// What to score.
+/// The request for a scoring.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Request {
     /// A built-in definition file by name, or any other by path.
@@ -46,7 +46,7 @@ impl Request {
     }
 }
 
-/// Why traces were not scored.
+/// An error of scoring traces.
 #[derive(Debug, thiserror::Error)]
 pub enum ScoreError {
     /// The traces are not as they must be.
@@ -74,9 +74,9 @@ pub enum ScoreError {
         wanted_by: String,
         /// The column.
         column: String,
-        /// What is the matter with it, and in which file.
+        /// The problem, with its file.
         problem: String,
-        /// What to do.
+        /// The remedy.
         help: String,
     },
     /// A column to group by is not constant in an episode, or not there.
@@ -86,7 +86,7 @@ pub enum ScoreError {
         name: String,
         /// The columns that can be grouped by.
         known: Vec<String>,
-        /// What to do.
+        /// The remedy.
         help: String,
     },
     /// A number could not be computed.
@@ -94,7 +94,7 @@ pub enum ScoreError {
     Engine {
         /// The file of the batch.
         file: String,
-        /// What went wrong.
+        /// The error.
         source: EngineError,
     },
 }
@@ -213,20 +213,20 @@ fn column_problem(traces: &TraceSet, column: &str) -> Option<(String, String)> {
     found.missing_from.filter(|_| !has_default).map(|file| (format!("`{file}` has no such column"), absent()))
 }
 
-/// What a scan gives besides the metrics.
+/// The outputs of a scan besides the metrics.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Outputs<'a> {
     /// Further key columns: columns that are constant in an episode.
     pub labels: &'a [String],
     /// True if the timelines of the first definitions are wanted.
     pub timelines: bool,
-    /// What to read of the replies of the episodes that the first definitions keep.
+    /// The reader of replies, for the episodes that the first definitions keep.
     pub quality: Option<&'a QualityReader>,
     /// Columns whose values are taken as they are, unless the first definitions read them.
     pub unchecked: &'a [&'a str],
 }
 
-/// What one scan gives, with the tables as an array of known length or as a vector.
+/// The results of one scan, with the tables as an array of known length or as a vector.
 #[derive(Clone, Debug)]
 pub struct Scored<T> {
     /// A table per definitions, each with the episodes that its own filter keeps.
@@ -234,7 +234,7 @@ pub struct Scored<T> {
     /// The timelines of the first definitions, in the order of their keys; `None` where they were not asked for, or the
     /// definitions do not name their moments.
     pub timelines: Option<Vec<Timeline>>,
-    /// What became of the replies; `None` where it was not asked for.
+    /// The reply quality; `None` unless requested.
     pub quality: Option<QualityByCell>,
 }
 

@@ -1,4 +1,4 @@
-//! When an agent looked, claimed and decided: an episode as a line of time, for rasters of gaze.
+//! Times of looks, claims and decisions: an episode as a line of time, for the figure `gaze`.
 //!
 //! The moments are those of the definitions: the `let`s `visible` (a truth value per step), `sight`,
 //! `claim` and `done` (timesteps), and `answered` (whether the decision committed to a colour).

@@ -5,18 +5,18 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What the traces declare about how their episodes came about; nothing by default.
+/// The design that the traces declare; empty by default.
 ///
-/// Whether two episodes are a pair follows from their scenes, which are a column of the traces.
+/// Pairs are episodes with the same scene, which is a column of the traces.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Design {
-    /// Where the episodes come from; null where the traces do not say, or not all the same.
+    /// The origin of the episodes; null if the traces do not say it or differ.
     pub kind: Option<DesignKind>,
-    /// Which episodes depend on each other; null where none are declared to.
+    /// The unit within which episodes depend on each other; null if none is declared.
     pub cluster: Option<Cluster>,
 }
 
-/// Where episodes come from.
+/// The origin of episodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum DesignKind {
@@ -28,7 +28,7 @@ pub enum DesignKind {
     Reconstruction,
 }
 
-/// What the episodes that depend on each other share.
+/// The unit that dependent episodes share.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Cluster {
@@ -42,7 +42,7 @@ impl Design {
         self.kind != Some(DesignKind::Reconstruction)
     }
 
-    /// What groups dependent episodes; never anything in a reconstruction.
+    /// The unit of dependent episodes; never any in a reconstruction.
     pub fn clusters(self) -> Option<Cluster> {
         self.cluster.filter(|_| self.kind != Some(DesignKind::Reconstruction))
     }

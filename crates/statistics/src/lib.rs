@@ -1,5 +1,13 @@
 //! Intervals, tests, survival, power: numbers in, numbers out.
 //!
+//! ```
+//! use mirrorstats_statistics::interval::wilson;
+//!
+//! let rate = wilson(16, 21, 0.95).expect("16 of 21 at 95 %");
+//! assert!((rate.low - 0.549).abs() < 0.001 && (rate.high - 0.894).abs() < 0.001);
+//! assert_eq!(wilson(0, 0, 0.95), None, "no episode, no interval");
+//! ```
+//!
 //! Rule: integers until the last step. Nothing here knows a metric or a table, formats a number or opens a file.
 
 #![warn(clippy::print_stdout, clippy::print_stderr)]

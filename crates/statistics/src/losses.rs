@@ -53,7 +53,7 @@ pub fn bounds(episodes: impl IntoIterator<Item = (Option<i64>, Fate)>, confidenc
     })
 }
 
-/// Whether an episode counts.
+/// The fate of an episode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fate {
     /// It ran as it should.

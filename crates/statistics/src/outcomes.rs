@@ -9,7 +9,7 @@ use std::iter::successors;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How near two weights count as equal.
+/// The tolerance for equal weights.
 pub(super) const TIE: f64 = 1e-12;
 
 /// The p values of one exact two-sided test.
@@ -74,7 +74,7 @@ impl Outcomes {
         }
     }
 
-    /// How many counts have a weight.
+    /// The number of counts with a weight.
     pub fn len(&self) -> usize {
         self.weights.len()
     }

@@ -1,4 +1,4 @@
-//! What a comparison of this size could have shown at all.
+//! The least difference that a comparison of this size could have shown.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -112,7 +112,7 @@ struct Scaled {
 impl Scaled {
     const ONE: Self = Self { value: 1.0, exponent: 0 };
 
-    /// How far a value may leave 1 before its exponent takes it up.
+    /// The range around 1 that a value may leave before its exponent changes.
     const STEP: i32 = 256;
 
     fn times(self, factor: f64) -> Self {

@@ -1,4 +1,4 @@
-//! What computes the scores: the native kernels, or the SQL lowering on another engine. The results are the same.
+//! The backend of scoring: the native kernels, or the SQL lowering on another engine. The results are the same.
 
 use std::ffi::OsString;
 use std::num::NonZeroUsize;
@@ -26,7 +26,7 @@ pub enum Backend {
     Spark(Cluster),
 }
 
-/// What Spark is to compute, checked as far as it can be without Spark.
+/// A job for Spark, checked as far as possible without Spark.
 #[derive(Debug)]
 pub struct SparkJob {
     sources: Sources,
@@ -91,7 +91,7 @@ impl SparkJob {
     }
 }
 
-/// Whether arguments are URIs: all of them, or none.
+/// Returns true if arguments are URIs: all of them, or none.
 ///
 /// # Errors
 /// Files of this machine and URIs at once.

@@ -1,4 +1,4 @@
-//! Why a study gives no answer.
+//! Errors of a study.
 
 use std::error::Error;
 use std::io;
@@ -29,7 +29,7 @@ use trace::error::TraceError;
 use trace::import::ImportError;
 use trace::lost::LostListError;
 
-/// Why a study gives no answer. Each message says what, where, expected, found, and what to do.
+/// An error of a study. Each message says what, where, expected, found, and what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
     /// More than the budget allows.
@@ -81,7 +81,7 @@ pub enum StudyError {
     NoPixels {
         /// The column.
         column: &'static str,
-        /// What is the matter with it.
+        /// The problem.
         problem: String,
     },
     /// Steps that do not record what a threshold is of.
@@ -93,7 +93,7 @@ pub enum StudyError {
     PixelsMissing {
         /// The column.
         column: &'static str,
-        /// How many, and in how many episodes.
+        /// The number of steps, and of their episodes.
         steps: String,
         /// The first such episode.
         episode: String,
@@ -131,7 +131,7 @@ pub enum StudyError {
     File {
         /// The file.
         name: String,
-        /// What.
+        /// The error.
         source: Box<dyn Error + Send + Sync>,
     },
     /// No file at all.
@@ -149,11 +149,11 @@ pub enum StudyError {
         cell: String,
         /// Two episodes that differ.
         episodes: String,
-        /// How many episodes have each fingerprint.
+        /// The number of episodes with each fingerprint.
         counts: String,
         /// In which parts the fingerprints differ.
         differences: String,
-        /// What to do.
+        /// The remedy.
         help: String,
     },
     /// Scores under other definitions than those asked for.
@@ -257,7 +257,7 @@ pub enum StudyError {
     /// A filter that keeps no episode.
     #[error("{words}\n  help: give a filter that holds for some of them, or none")]
     EmptyFilter {
-        /// How many there are, and the values of the columns that the filter names.
+        /// The number of episodes, and the values of the columns that the filter names.
         words: String,
     },
     /// A report would be written over the one that it is made from.
@@ -307,7 +307,7 @@ pub enum StudyError {
     Palette {
         /// As typed.
         typed: String,
-        /// What is wrong, and a remedy.
+        /// The problem, and a remedy.
         words: String,
     },
     /// Lines of steps are not as they must be.

@@ -6,6 +6,13 @@
 //!                            score, cells, report, figures, statistics, diff, rescore, compare
 //! ```
 //!
+//! ```
+//! # let paper = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/paper");
+//! let study = mirrorstats_study::Study::open([paper])?.filter("experiment = 'E1'")?;
+//! assert_eq!(study.score()?.episodes.len(), 168);
+//! # Ok::<(), mirrorstats_study::StudyError>(())
+//! ```
+//!
 //! Rule: each input is opened once, and its content must stay the same until the answer is complete; a file that changes
 //! in between is an error. Nothing here knows a command line: text for people comes from errors and from `report`.
 
@@ -374,7 +381,7 @@ impl Study {
     /// Refuses a folder for outputs that holds an input: both would be read together from then on.
     ///
     /// # Errors
-    /// When it holds one.
+    /// An input in the folder.
     pub fn check_out(&self, out: &Path) -> Result<(), StudyError> {
         let inputs = self.inputs.iter().map(|input| &input.path);
         Ok(replace::check_folder(out, inputs).map_err(BundleError::from)?)

@@ -18,10 +18,10 @@ use trace::inputs::Input;
 use trace::lost::{self, LostEpisode};
 use trace::schema::{self, Column};
 
-/// What the label of lost episodes says.
+/// The value of the label of lost episodes.
 const YES: &str = "true";
 
-/// What lost episodes count as.
+/// The treatment of lost episodes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LostAs {
     /// Nothing: they are in no denominator.
@@ -38,7 +38,7 @@ pub(super) struct Counted {
     pub results: Results,
     /// All episodes, where some are left out or added.
     pub all: Option<EpisodeTable>,
-    /// How many are lost, counted or not.
+    /// The number of lost episodes, counted or not.
     pub lost: LostCounts,
 }
 

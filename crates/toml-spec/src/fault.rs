@@ -19,7 +19,7 @@ pub const MOST_FAULTS: usize = 100;
 /// Text that faults point into: a definition file, or an expression typed on the command line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Source {
-    /// What the reader knows it by: a file name, or `--where`.
+    /// The name for readers: a file name, or `--where`.
     pub name: String,
     pub text: String,
 }
@@ -35,12 +35,12 @@ pub struct Place {
 /// One thing that is wrong, and where.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fault {
-    /// What is wrong, lowercase, one line.
+    /// The problem, lowercase, one line.
     pub message: String,
     pub place: Place,
-    /// What to say right under the span; may be empty.
+    /// The label under the span; may be empty.
     pub label: String,
-    /// What to do about it.
+    /// The remedy.
     pub help: Option<String>,
 }
 
@@ -113,11 +113,11 @@ pub struct FaultRecord {
     pub column: usize,
     /// The text underlined.
     pub text: String,
-    /// What is wrong.
+    /// The problem.
     pub message: String,
-    /// What is the matter at that place; may be empty.
+    /// The label at that place; may be empty.
     pub label: String,
-    /// What to do about it.
+    /// The remedy.
     pub help: Option<String>,
 }
 

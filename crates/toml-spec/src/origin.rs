@@ -34,7 +34,7 @@ impl Written {
         Self { text: text.to_owned(), source, starts }
     }
 
-    /// Where some bytes of the text stand.
+    /// The location of some bytes of the text.
     pub fn place(&self, span: Range<usize>) -> Place {
         let last = self.text.len();
         let start = self.starts[span.start.min(last)];
@@ -42,7 +42,7 @@ impl Written {
         Place { source: self.source.clone(), span: start..end.max(start) }
     }
 
-    /// Where the whole text stands.
+    /// The location of the whole text.
     pub fn everywhere(&self) -> Place {
         self.place(0..self.text.len())
     }

@@ -33,7 +33,7 @@ impl Shape {
         Self { is_overlay: true, ..self }
     }
 
-    /// What can be read of a value; `what` names its kind, such as `an experiment file`.
+    /// Reads the value as far as it can be read; `what` names its kind, such as `an experiment file`.
     ///
     /// Each part with a fault is left out, so that the rest can still be checked: a key, a text of a list, or a list of
     /// anything else with all its items, whose positions would change. A text that is needed is empty then; `None` if

@@ -9,10 +9,10 @@ thread_local! {
     static CONTAINING: Cell<bool> = const { Cell::new(false) };
 }
 
-/// How many calls are under way that contain the panics of all threads.
+/// The number of running calls that contain the panics of all threads.
 static EVERYWHERE: AtomicUsize = AtomicUsize::new(0);
 
-/// What `decode` gives, or the message of the panic it ended in; nothing is printed for that panic.
+/// The result of `decode`, or the message of its panic; nothing is printed for that panic.
 ///
 /// Only for calls into a decoder whose state is thrown away afterwards.
 pub fn contained<R>(decode: impl FnOnce() -> R) -> Result<R, String> {

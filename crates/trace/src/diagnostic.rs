@@ -1,4 +1,4 @@
-//! What can be wrong with a trace, and the words for it: which rule, where, expected, found, what to do.
+//! Diagnostics of traces: rule, location, expected, found, remedy.
 //!
 //! The codes are stable: programs may depend on them. A message never says less than a user needs to find the row.
 
@@ -10,7 +10,7 @@ use serde::Serialize;
 use exact::budget::Exceeded;
 use exact::escape::visible;
 
-/// What helps where the system lets the process open no more files.
+/// The remedy for too many open files.
 pub const MORE_FILES: &str = "raise the limit of open files, as in `ulimit -n 1024`, and run the command again";
 
 /// Returns true if words of the system say that too many files are open.
@@ -22,9 +22,9 @@ pub fn is_short_of_files(words: &str) -> bool {
 /// One thing that is wrong with a trace.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Finding {
-    /// Which rule does not hold.
+    /// The broken rule.
     pub code: Code,
-    /// Whether the trace is unusable or only unusual.
+    /// The severity: unusable or only unusual.
     pub severity: Severity,
     /// The file, as it was named.
     pub file: String,
@@ -36,15 +36,15 @@ pub struct Finding {
     pub t: Option<i64>,
     /// The column.
     pub column: Option<String>,
-    /// What the rule asks for.
+    /// The expected value.
     pub expected: String,
-    /// What is there.
+    /// The value found.
     pub found: String,
-    /// What to do about it.
+    /// The remedy.
     pub help: String,
 }
 
-/// How much a finding matters.
+/// The severity of a finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
@@ -207,7 +207,7 @@ impl Code {
         self.entry().2
     }
 
-    /// What to do about it, unless the place of the finding has better advice.
+    /// The remedy, unless the location of the finding has better advice.
     pub const fn help(self) -> &'static str {
         self.entry().3
     }

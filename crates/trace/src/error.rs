@@ -1,4 +1,4 @@
-//! Why traces could not be read or written.
+//! Errors of reading and writing traces.
 
 use std::io;
 use std::path::Path;
@@ -7,7 +7,7 @@ use arrow::error::ArrowError;
 
 use super::diagnostic::Finding;
 
-/// Why traces could not be read or written.
+/// An error of reading or writing traces.
 #[derive(Debug, thiserror::Error)]
 pub enum TraceError {
     /// A rule of the schema does not hold.
@@ -15,13 +15,13 @@ pub enum TraceError {
     Finding {
         /// The earliest finding by file, row group and row.
         first: Box<Finding>,
-        /// How many others are known; `validate` shows them all.
+        /// The number of further findings; `validate` shows them all.
         more: usize,
     },
     /// The operating system refused to read something that is not yet known as a trace.
     #[error("cannot read {what}")]
     Read {
-        /// What was to be read, as the user named it.
+        /// The requested path, as the user named it.
         what: String,
         /// The reason for the refusal.
         source: io::Error,
@@ -31,11 +31,11 @@ pub enum TraceError {
     NoInput {
         /// As typed.
         argument: String,
-        /// What an argument may be.
+        /// The valid arguments.
         expected: &'static str,
-        /// What this one is.
+        /// The argument found.
         found: String,
-        /// What to do.
+        /// The remedy.
         help: &'static str,
     },
     /// A file cannot be taken over into another trace.
@@ -49,7 +49,7 @@ pub enum TraceError {
     /// Threads could not be started.
     #[error("cannot start {threads} threads; ask for fewer with --threads")]
     Threads {
-        /// How many were asked for.
+        /// The requested number.
         threads: usize,
         /// The reason for the refusal.
         source: io::Error,
@@ -59,22 +59,22 @@ pub enum TraceError {
     Column {
         /// The name asked for.
         column: String,
-        /// What would do.
+        /// The expected files.
         expected: &'static str,
-        /// What the files have.
+        /// The files found.
         found: String,
     },
     /// Columns could not be put together in memory.
     #[error("cannot hold the rows in memory; report this as a fault of mirrorstats")]
     Memory(#[source] ArrowError),
-    /// What a writer was given is not an episode of the schema.
+    /// The writer's input is not an episode of the schema.
     #[error("episode `{episode}`: expected {expected}, found {found}; nothing of it was written")]
     Refused {
         /// The id of the episode.
         episode: String,
         /// The rule.
         expected: String,
-        /// What was given.
+        /// The value found.
         found: String,
     },
     /// The trace could not be written; no file was left behind.

@@ -9,7 +9,7 @@ use std::path::{Component, Path, PathBuf};
 
 use glob::{Pattern, PatternError};
 
-/// Why a glob gives no list.
+/// An error of a glob.
 #[derive(Debug)]
 pub enum GlobError {
     /// It is none.

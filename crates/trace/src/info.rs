@@ -1,4 +1,4 @@
-//! What traces hold: episodes, steps, who and what, which cells of the grid are filled, and the files themselves.
+//! The contents of traces: episodes, steps, names, the filled cells of the grid, and the files themselves.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::io;
@@ -24,9 +24,9 @@ use parquet_pages::checksums::Checksums;
 /// A summary of some traces.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Info {
-    /// How many episodes there are.
+    /// The number of episodes.
     pub episodes: u64,
-    /// How many steps they have together.
+    /// The number of their steps.
     pub steps: u64,
     /// The models, ascending.
     pub models: Vec<String>,
@@ -38,7 +38,7 @@ pub struct Info {
     pub runs: Vec<i64>,
     /// Every experiment with every model, in that order.
     pub coverage: Vec<Cell>,
-    /// What became of the replies; null where no file has the column `reply_status`.
+    /// The reply counts; null if no file has the column `reply_status`.
     pub replies: Option<ReplyCounts>,
     /// The columns of all files.
     pub columns: Vec<ColumnInfo>,
@@ -56,7 +56,7 @@ pub struct Cell {
     pub experiment: String,
     /// The model.
     pub model: String,
-    /// How many episodes there are.
+    /// The number of episodes.
     pub episodes: u64,
     /// Seeds and runs that some other cell has and this one has not.
     pub missing: Vec<SeedRun>,
@@ -125,16 +125,16 @@ pub struct FileInfo {
     pub schema_version: Option<String>,
     /// The program that wrote it, if the file names one.
     pub writer: Option<String>,
-    /// Whether it has checksums: `present`, `none`, or `stale` where another program wrote the file again.
+    /// The state of its checksums: `present`, `none`, or `stale` if another program wrote the file again.
     pub checksums: Checksums,
-    /// How it was recorded: JSON, or the text as it is where that is no JSON.
+    /// The recording: JSON, or its text if that is no JSON.
     pub recording: Option<serde_json::Value>,
 }
 
-/// What each model has of the seeds and runs of all: a study of seven models, five experiments and 20,000 runs has 700,000.
+/// The limit for the coverage of seeds and runs by model: seven models, five experiments and 20,000 runs have 700,000.
 const MOST_COVERED: Limit = Limit::new("seeds and runs of models in experiments", 2_000_000);
 
-/// Whether episodes are listed, beside being counted.
+/// The choice between listing and counting episodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Listing {
     Episodes,
@@ -200,7 +200,7 @@ pub fn info(set: &TraceSet, listing: Listing, threads: NonZeroUsize) -> Result<I
     })
 }
 
-/// What is left when all steps are read: sorting takes as long as hashing the files, so that both are done at once.
+/// The remaining work after all steps are read: sorting takes as long as hashing the files, so both are done at once.
 enum Rest<'a> {
     Grid(Mutex<Tally>),
     File(&'a TraceFile, u64),
@@ -296,7 +296,7 @@ struct Tally {
     episodes: Vec<Vec<SeedRun>>,
 }
 
-/// How often each experiment with each model has each seed and run, ascending.
+/// The number of episodes per seed and run, ascending, for each experiment and model.
 type Cells = BTreeMap<(String, String), Vec<(SeedRun, u64)>>;
 
 /// The cells, and the seeds and runs of all of them.

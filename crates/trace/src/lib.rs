@@ -1,4 +1,4 @@
-//! What an episode is, on disk and in memory: the schema, the writer, the reader, the rules.
+//! The definition of an episode, on disk and in memory: the schema, the writer, the reader, the rules.
 //!
 //! | folder | what it knows |
 //! |---|---|
@@ -11,6 +11,18 @@
 //! | `footers` | what files declare of themselves: clusters, experiments, answering models, checksums |
 //! | `episodes` | one episode: steps, hash, pictures, colours, losses, replies |
 //! | `texts` | rules over free text: attributions, names of models |
+//!
+//! ```
+//! use trace::inputs::Input;
+//! use trace::open::TraceSet;
+//! # use mirrorstats_trace as trace;
+//!
+//! # let paper = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/paper");
+//! let files = trace::inputs::resolve(&[paper.into()], std::io::empty())?;
+//! let traces = TraceSet::open(&files)?;
+//! assert_eq!(traces.files().iter().map(|file| file.rows()).sum::<u64>(), 0);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 //!
 //! `scan` reads for scoring: `read` and `validate` in one pass. Rule: only this crate opens traces. It knows no metric.
 

@@ -33,7 +33,7 @@ pub struct Projection {
     pub unchecked: Vec<String>,
     /// Columns with one value per episode, besides [`EPISODE_COLUMNS`]; checked to be constant in each.
     pub constants: Vec<String>,
-    /// What definitions declare of columns that the schema does not know.
+    /// The definitions' declarations of columns that the schema does not know.
     pub declared: Vec<DeclaredColumn>,
     /// The experiments that are known; an episode of another one is a fault. Any if `None`.
     pub experiments: Option<Vec<String>>,
@@ -63,7 +63,7 @@ pub struct EpisodeBatch {
     pub texts: Vec<Texts>,
     /// One row per episode: [`EPISODE_COLUMNS`], then the columns of [`Projection::constants`].
     pub episodes: RecordBatch,
-    /// Where the first row is.
+    /// The location of the first row.
     pub origin: Origin,
 }
 
@@ -98,7 +98,7 @@ pub struct Origin {
     pub row: usize,
 }
 
-/// What a scan went through.
+/// The totals of a scan.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ScanSummary {
     /// Whole episodes.
@@ -173,7 +173,7 @@ impl TraceSet {
     }
 }
 
-/// Where an episode is.
+/// The location of an episode.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct EpisodePlace {
     /// The file's position in [`TraceSet::files`].
@@ -182,7 +182,7 @@ pub struct EpisodePlace {
     pub rows: Range<usize>,
 }
 
-/// Where each episode is, by its id: one pass over the columns that tell episodes apart.
+/// The location of each episode, by its id: one pass over the columns that tell episodes apart.
 pub fn episode_places(traces: &TraceSet, threads: NonZeroUsize) -> Result<HashMap<String, EpisodePlace>, TraceError> {
     let mut places = HashMap::new();
     let work = |batch: EpisodeBatch| -> Result<Vec<(String, EpisodePlace)>, TraceError> {
@@ -202,7 +202,7 @@ pub fn episode_places(traces: &TraceSet, threads: NonZeroUsize) -> Result<HashMa
     Ok(places)
 }
 
-/// What a worker found out about some episodes.
+/// A worker's results for some episodes.
 struct Checked<T, E> {
     ids: Vec<u64>,
     count: usize,
@@ -211,7 +211,7 @@ struct Checked<T, E> {
     result: Result<Result<T, E>, Box<Finding>>,
 }
 
-/// Which columns of the layout go where in a batch.
+/// The mapping from the layout's columns to a batch.
 struct Shape<'a> {
     layout: &'a Layout,
     steps: Vec<usize>,

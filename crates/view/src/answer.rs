@@ -1,4 +1,4 @@
-//! What is asked, and the answer: one function for the server and for files.
+//! Queries and answers: one function for the server and for files.
 
 use super::error::ViewError;
 use super::filter::{Query, number, required};

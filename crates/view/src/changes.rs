@@ -1,4 +1,4 @@
-//! What other definitions change: every cell and every flip.
+//! The effects of other definitions: every cell and every flip.
 
 use serde_json::{Value, json};
 

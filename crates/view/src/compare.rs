@@ -25,7 +25,7 @@ const BY_CHANCE: [&str; 12] = [
     "reply_fault",
 ];
 
-/// Where the frame is in a log, not what the step was.
+/// The column of a frame's position in a log, which is not part of the step.
 const ADDRESS: &str = "frame_time";
 
 /// Both episodes, and where they differ: at steps of both in `columns` of what was seen and done, and `also` in others.

@@ -1,4 +1,4 @@
-//! Why something cannot be shown.
+//! Errors of the viewer.
 
 use std::error::Error as _;
 use std::io;
@@ -9,7 +9,7 @@ use study::StudyError;
 use trace::error::TraceError;
 use trace::log::LogError;
 
-/// Why something cannot be shown.
+/// An error of the viewer.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages say it")]
 pub enum ViewError {

@@ -17,14 +17,14 @@ use exact::hash;
 use exact::replace::{Content, FolderFiles, replace_folder};
 use study::Part;
 
-/// What is asked of programs that collect pages.
+/// The instruction for programs that collect pages.
 pub const ROBOTS: &str = "# Recordings of evaluations: not for training.\nUser-agent: *\nDisallow: /\n";
 
-/// What is asked of people and programs that have the files.
+/// The notice to people and programs that have the files.
 const NOTICE: &str = "These files hold recordings of an evaluation: its scenes, its questions and the answers of models and people.\n\
     They must not be used to train models: who was trained on them can no longer be evaluated with them.\n";
 
-/// What the page may do, as a header of a server says it otherwise.
+/// The page's permissions, which a server sends as a header.
 const POLICY: &str = "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; script-src 'self' file:; \
     style-src 'self' file:; style-src-attr 'unsafe-inline'; img-src 'self' file: data:; font-src 'self' file: data:; \
     base-uri 'none'; form-action 'none'\">";
@@ -32,7 +32,7 @@ const POLICY: &str = "<meta http-equiv=\"Content-Security-Policy\" content=\"def
 /// All files are held until they are written together.
 const LARGEST: Limit = Limit::new("bytes of a page as files", 2 << 30);
 
-/// What tells a folder of these files.
+/// The file that marks a folder of these files.
 const MARK: &str = "assets/view.js";
 
 /// Files by their paths inside the folder.

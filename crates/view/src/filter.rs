@@ -1,4 +1,4 @@
-//! Which episodes a page shows: chosen values of columns, a condition in the language of definitions, words in a name.
+//! The filter of a page: chosen values of columns, a condition in the language of definitions, words in a name.
 //!
 //! Rule: a condition over what the episode table has is answered from memory; one that asks for steps costs a scan.
 
@@ -11,7 +11,7 @@ use score::select::{SelectError, select};
 use score::table::EpisodeTable;
 use study::{Question, Results, StudyError};
 
-/// What a request asks for: its keys and values, in order.
+/// The keys and values of a request, in order.
 pub(super) type Query = [(String, String)];
 
 pub(super) fn value<'q>(query: &'q Query, key: &str) -> Option<&'q str> {
@@ -39,7 +39,7 @@ pub(super) struct Filter {
 pub(super) const COLUMNS: [&str; 3] = ["experiment", "model", CONDITION];
 
 impl Filter {
-    /// What a request asks for.
+    /// Reads a request.
     pub fn of(query: &Query) -> Self {
         let values = |column: &str| -> Vec<String> {
             query.iter().filter(|(key, _)| key == column).map(|(_, value)| value.clone()).collect()

@@ -12,7 +12,7 @@ use study::resolve;
 use trace::inputs::Input;
 use trace::log::frames;
 
-/// Where a recording keeps whole episodes that are not in the trace yet, and what it is writing.
+/// The folder for whole episodes of a recording that are not in the trace yet, and for the one being written.
 const PARTS: &str = ".parts";
 
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -27,7 +27,7 @@ pub(super) struct Found {
     pub unfinished: Vec<PathBuf>,
 }
 
-/// What tells that a file has changed.
+/// The stamp that shows a change of a file.
 pub(super) type Stamp = (PathBuf, u64, Option<Duration>);
 
 impl Found {

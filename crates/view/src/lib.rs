@@ -40,7 +40,7 @@ use study::Question;
 pub use error::ViewError;
 use snapshot::Snapshot;
 
-/// What is looked at, and how.
+/// The inputs and options.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// Traces, logs, and folders of them.
@@ -49,9 +49,9 @@ pub struct Options {
     pub question: Question,
     /// Definitions to hold the others against, by name or path; none if absent.
     pub against: Option<PathBuf>,
-    /// How tables look.
+    /// The style of tables.
     pub style: String,
-    /// How many threads to use.
+    /// The number of threads.
     pub threads: NonZeroUsize,
 }
 
@@ -69,12 +69,12 @@ impl View {
         Ok(Self { options, newest: RwLock::new(snapshot), watch: Mutex::default() })
     }
 
-    /// How many episodes are there.
+    /// The number of episodes.
     pub fn episodes(&self) -> usize {
         self.newest().episodes()
     }
 
-    /// Whether an episode is there, whole or under way.
+    /// Returns true if the episode is present, whole or under way.
     pub fn has_episode(&self, id: &str) -> bool {
         self.newest().has(id)
     }

@@ -17,7 +17,7 @@ const PAUSE: Duration = Duration::from_millis(400);
 /// The time over which steps are counted for a rate.
 const SPAN: Duration = Duration::from_secs(10);
 
-/// When the files were looked at, and what was found.
+/// The time of the last look at the files, and its findings.
 #[derive(Debug, Default)]
 pub(super) struct Watch {
     last: Option<Instant>,

@@ -9,10 +9,10 @@ use super::error::ViewError;
 use trace::episode::Episode;
 use world::replay::frames::frames;
 
-/// How many steps are rendered together: a world is made once for them.
+/// The number of steps rendered together, for which a world is made once.
 const TOGETHER: usize = 16;
 
-/// How many such blocks are kept, some megabytes.
+/// The number of such blocks in memory, some megabytes.
 const KEPT: usize = 16;
 
 type Block = BTreeMap<i32, Vec<u8>>;

@@ -18,7 +18,7 @@ use trace::merge::{self, OwnColumn};
 use trace::scan::{EpisodePlace, episode_places};
 use trace::schema::Domain;
 
-/// How many indices of logs are kept.
+/// The number of log indices in memory.
 const KEPT_INDICES: usize = 64;
 
 /// Recordings as they were when they were read.
@@ -27,7 +27,7 @@ pub(super) struct Snapshot {
     /// Raised with each newer state.
     pub generation: u64,
     pub options: Options,
-    /// What was scored; `None` where no episode is whole yet.
+    /// The scores; `None` while no episode is whole.
     pub scored: Option<Arc<Scored>>,
     /// Episodes under way, by their logs.
     pub running: Vec<Running>,
@@ -46,7 +46,7 @@ pub(super) struct Scored {
     pub study: Study,
     /// The episode table and what goes with it.
     pub results: Results,
-    /// Where each row of the table is, by the episode's id.
+    /// The row of each episode in the table, by its id.
     pub rows: HashMap<String, usize>,
     pub inputs: Vec<Input>,
     places: HashMap<String, EpisodePlace>,
@@ -55,7 +55,7 @@ pub(super) struct Scored {
 #[derive(Clone, Debug)]
 pub(super) struct Running {
     pub log: PathBuf,
-    /// What is there of it.
+    /// Its steps so far.
     pub episode: Episode,
 }
 
@@ -135,12 +135,12 @@ impl Snapshot {
         }
     }
 
-    /// How many episodes are whole.
+    /// The number of whole episodes.
     pub fn episodes(&self) -> usize {
         self.scored.as_ref().map_or(0, |scored| scored.results.episodes.len())
     }
 
-    /// Whether an episode is there, whole or under way.
+    /// Returns true if the episode is present, whole or under way.
     pub fn has(&self, id: &str) -> bool {
         self.scored.as_ref().is_some_and(|scored| scored.rows.contains_key(id))
             || self.running.iter().any(|running| running.episode.episode_id == id)
@@ -174,7 +174,7 @@ impl Snapshot {
         Ok(Opened { episode: now, running: Some(own.log.clone()), input: None, own: None })
     }
 
-    /// What the logs have of a step.
+    /// The log's record of a step.
     pub fn moment(&self, opened: &Opened, t: usize) -> Result<Option<Moment>, ViewError> {
         let Some(time) = time_of(&opened.episode, t) else { return Ok(None) };
         if let Some(log) = &opened.running {
@@ -201,7 +201,7 @@ impl Snapshot {
         Ok(None)
     }
 
-    /// Whether frames of an episode can be rendered again: its trace says how its world was made, and this build has worlds.
+    /// Returns true if frames of an episode can be rendered again: the trace has its world, and this build has worlds.
     pub fn renders(&self, opened: &Opened) -> bool {
         let is_whole = self.scored.is_some() && opened.running.is_none();
         #[cfg(feature = "sim")]

@@ -24,7 +24,7 @@ use tokio::net::TcpListener;
 use tokio::sync::Semaphore;
 use tokio::time::timeout;
 
-/// What a page may do: show what this server has, and nothing else.
+/// The page's permissions: to show what this server has, and nothing else.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; style-src-attr 'unsafe-inline'; \
                       img-src 'self' data:; font-src 'self' data:; connect-src 'self'; base-uri 'none'; form-action 'none'; \
                       frame-ancestors 'none'";
@@ -39,7 +39,7 @@ const SLOWEST_ANSWER: Duration = Duration::from_mins(2);
 const LONGEST_CONNECTION: Duration = Duration::from_mins(10);
 const LARGEST_HEAD: usize = 64 << 10;
 
-/// What every page begins and ends with.
+/// The frame of every page.
 const PAGE: &str = include_str!("../../../assets/web/page.html");
 
 /// A page with this title, style sheet and `<body>`, all of them the program's own words.
@@ -59,7 +59,7 @@ const HEADERS: [(HeaderName, &str); 7] = [
     (HeaderName::from_static("x-robots-tag"), "noindex, noai"),
 ];
 
-/// Who may ask.
+/// The check of who may ask.
 #[derive(Clone, Debug)]
 pub struct Guard {
     address: SocketAddr,

@@ -8,6 +8,14 @@
 //! | `record` | runs episodes and writes a trace and a log (feature `sim`) |
 //! | [`replay`] | a recorded episode simulated again, as frames or a film strip |
 //!
+//! ```
+//! use mirrorstats_world::experiment::Experiment;
+//!
+//! let experiment = Experiment::parse("E1")?;
+//! assert!(experiment.asks_for_cube());
+//! # Ok::<(), mirrorstats_world::experiment::UnknownExperiment>(())
+//! ```
+//!
 //! Rule: nothing here knows a metric.
 
 #![warn(clippy::print_stdout, clippy::print_stderr)]

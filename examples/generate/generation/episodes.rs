@@ -107,7 +107,7 @@ fn slug(model: &str) -> String {
     model.to_lowercase().replace([' ', '.'], "-")
 }
 
-/// What lasts from one step to the next.
+/// The state that lasts from one step to the next.
 struct Scene {
     body_color: &'static str,
     action: Action,

@@ -18,7 +18,7 @@ pub fn fill(episode: &mut Episode, number: u64, draw: &mut Draw) {
     }
 }
 
-/// Where the agent stands: metres, degrees.
+/// The pose of the agent: metres, degrees.
 struct Pose {
     x: f32,
     y: f32,

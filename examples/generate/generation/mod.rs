@@ -42,10 +42,10 @@ pub const OPTIONAL_COLUMNS: [&str; 18] = [
     "frame_time",
 ];
 
-/// Why nothing could be generated.
+/// An error of generating.
 pub type Failure = Box<dyn Error + Send + Sync>;
 
-/// Where a study is written, and how it is divided.
+/// The files of a study, and their division.
 pub struct Files {
     /// The folder of `steps-000.parquet`, ...; made if it is not there.
     pub folder: PathBuf,

@@ -1,4 +1,4 @@
-//! What the agent says of its own colour, step by step.
+//! The agent's statements about its own colour, step by step.
 
 use super::belief::Belief;
 use super::generator::Generator;
@@ -95,7 +95,7 @@ impl Mind<'_> {
     }
 }
 
-/// What the agent says at the last step, having said `last` before.
+/// The agent's statement at the last step, after it has said `last`.
 ///
 /// In E5 this is the decision itself. Elsewhere an agent that chooses a cube names its colour, unless it has a belief
 /// of its own: so a colour can be said for the first time together with `done`.

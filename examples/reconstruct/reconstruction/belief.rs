@@ -1,4 +1,4 @@
-//! What the agents of a pair believe of themselves: the joint table behind MCR, CAAL, CR, `AR_SC` and SC.
+//! The beliefs of a pair's agents about themselves: the joint table behind MCR, CAAL, CR, `AR_SC` and SC.
 
 use std::iter;
 use std::ops::RangeInclusive;
@@ -8,7 +8,7 @@ use super::contradiction::Contradiction;
 use super::counts::Counts;
 use super::published::Pair;
 
-/// What an agent believes of itself, against what it has seen.
+/// The belief of an agent about itself, beside what it has seen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Belief {
     /// Saw the mirror first and never said the true colour.
@@ -50,7 +50,7 @@ impl Belief {
         1 + self.consulted() as usize + self.confabulated() as usize
     }
 
-    /// How many steps of such an episode of `length` steps can have the mirror in view.
+    /// The possible number of steps with the mirror in view, in such an episode of `length` steps.
     pub fn gaze(self, length: usize) -> RangeInclusive<usize> {
         match self {
             // A first sight at the very end comes too late for anything.
@@ -68,7 +68,7 @@ impl Belief {
 /// no kind of episode is pushed to its extreme.
 ///
 /// # Errors
-/// When the counts of consulted, attributed, confabulated and corrected episodes exclude each other.
+/// Counts of consulted, attributed, confabulated and corrected episodes that exclude each other.
 pub fn solve(pair: &Pair, counts: &Counts) -> Result<Vec<Belief>, Contradiction> {
     let mut solutions: Vec<[(Belief, usize); 8]> = Vec::new();
     for lucky in 0..=counts.consulted {

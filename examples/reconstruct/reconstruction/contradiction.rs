@@ -12,9 +12,9 @@ pub struct Contradiction {
     pub model: String,
     /// The metric, or the metrics, that cannot be met.
     pub metric: String,
-    /// What is printed about it.
+    /// The published text about it.
     pub published: String,
-    /// What would have to hold, and does not.
+    /// The broken condition.
     pub because: String,
 }
 

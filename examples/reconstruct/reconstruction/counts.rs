@@ -1,4 +1,4 @@
-//! How many of a pair's 21 episodes have which property: the integers behind its rates.
+//! The number of a pair's 21 episodes with each property: the integers behind its rates.
 
 use exact::moments::Moments;
 
@@ -34,7 +34,7 @@ pub struct Counts {
 /// episodes, which TSA-C gives as its denominator, can be several.
 ///
 /// # Errors
-/// When a published rate is none of k/n.
+/// A published rate that is not k/n for any k.
 pub fn solve(pair: &Pair) -> Result<Vec<Counts>, Contradiction> {
     let successes = share(pair, "TSA", EPISODES)?;
     let applicable = share(pair, "AR_SC", EPISODES)?;

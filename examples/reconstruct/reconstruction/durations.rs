@@ -9,17 +9,17 @@ use super::generator::Generator;
 use super::published::{Pair, Value};
 use super::{BUDGET, EPISODES, printing};
 
-/// How many exchanges a search makes before it gives up.
+/// The number of exchanges before a search gives up.
 const EXCHANGES: usize = 6_000;
 /// The most steps that one exchange moves.
 const STRIDE: usize = 12;
 
-/// What 21 numbers of steps must add up to.
+/// The sum of 21 numbers of steps.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Target {
     /// Their sum.
     pub sum: usize,
-    /// What the sum of their squares may be.
+    /// The range of the sum of their squares.
     pub squares: RangeInclusive<usize>,
 }
 
@@ -28,7 +28,7 @@ pub struct Target {
 /// A mean with two decimals leaves room for one sum of 21 integers at most.
 ///
 /// # Errors
-/// When no sum prints as the mean, or no sum of squares as the standard error.
+/// No sum prints as the mean, or no sum of squares as the standard error.
 pub fn target(pair: &Pair, metric: &str) -> Result<Target, Contradiction> {
     let means = |sum: usize| printing::matches_mean(pair, metric, moments(sum, 0));
     let Some(sum) = (0..=EPISODES * BUDGET).find(|&sum| means(sum)) else {

@@ -62,7 +62,7 @@ pub fn of(experiment: &str, model: &str, metric: &str) -> Option<&'static Erratu
     ERRATA.iter().find(|erratum| (erratum.experiment, erratum.model, erratum.metric) == (experiment, model, metric))
 }
 
-/// What to read for a line of a published file.
+/// The corrected value of a line of a published file.
 pub fn corrected(source: Source, row: &Row) -> Option<Value> {
     match of(&row.experiment, &row.model, &row.metric) {
         Some(erratum) if source == Source::Main => {

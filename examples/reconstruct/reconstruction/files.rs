@@ -18,7 +18,7 @@ use super::published::{self, Pair, Reading};
 pub struct Trace {
     /// `E1-ministral-3-14b.parquet`.
     pub name: String,
-    /// What its footer says of the recording.
+    /// The footer's statement about the recording.
     pub recording: Value,
     /// Ordered by seed and run.
     pub episodes: Vec<Episode>,
@@ -27,7 +27,7 @@ pub struct Trace {
 /// All 40 files, in the order of the main table.
 ///
 /// # Errors
-/// When a pair's published cells contradict each other, the known slips corrected.
+/// A pair whose published cells contradict each other, with the known slips corrected.
 pub fn traces() -> Result<Vec<Trace>, Contradiction> {
     published::pairs(Reading::Corrected).iter().map(trace).collect()
 }
@@ -72,7 +72,7 @@ pub fn write(folder: &Path, traces: &[Trace]) -> Result<(), TraceError> {
 /// The bytes that [`write`] gives a file.
 ///
 /// # Errors
-/// When the trace schema forbids an episode.
+/// An episode that the trace schema forbids.
 pub fn bytes(trace: &Trace) -> Result<Vec<u8>, TraceError> {
     let columns = OptionalColumns::used_by(&trace.episodes);
     let metadata = TraceMetadata { recording: Some(trace.recording.clone()), columns };
@@ -83,10 +83,10 @@ pub fn bytes(trace: &Trace) -> Result<Vec<u8>, TraceError> {
     encoder.finish()
 }
 
-/// How a folder differs from what [`write`] would make of it, a line each; other files than traces may lie there too.
+/// The differences between a folder and the output of [`write`], a line each; other files than traces are ignored.
 ///
 /// # Errors
-/// When the trace schema forbids an episode.
+/// An episode that the trace schema forbids.
 pub fn differences(folder: &Path, traces: &[Trace]) -> Result<Vec<String>, TraceError> {
     let mut differences = Vec::new();
     for trace in traces {

@@ -1,4 +1,4 @@
-//! When the mirror is in view.
+//! The steps with the mirror in view.
 
 use super::generator::Generator;
 use super::outline::Outline;

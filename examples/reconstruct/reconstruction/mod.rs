@@ -40,7 +40,7 @@ pub const BUDGET: usize = 100;
 /// The 21 episodes of one model in one experiment, ordered by seed and run.
 ///
 /// # Errors
-/// When the pair's published cells contradict each other.
+/// A pair whose published cells contradict each other.
 pub fn episodes(pair: &Pair) -> Result<Vec<Episode>, Contradiction> {
     let outlines = outline::solve(pair)?;
     let places = (1..=SEEDS).flat_map(|seed| (1..=RUNS).map(move |run| (seed, run)));

@@ -10,12 +10,12 @@ use super::generator::Generator;
 use super::published::Pair;
 use super::{BUDGET, EPISODES};
 
-/// How often lengths and gazes are drawn anew before more trajectories are cut short.
+/// The number of draws of lengths and gazes before more trajectories are cut short.
 const ATTEMPTS: usize = 8;
 /// The fewest steps that an episode takes; the second only where the published durations leave no choice.
 const FEWEST: [usize; 2] = [4, 1];
 
-/// How an episode ended.
+/// The outcome of an episode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// `done`, with the right decision.
@@ -29,9 +29,9 @@ pub enum Outcome {
 /// Everything about an episode that a metric can see.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Outline {
-    /// How it ended.
+    /// Its outcome.
     pub outcome: Outcome,
-    /// What the agent believed.
+    /// The agent's belief.
     pub belief: Belief,
     /// The number of steps; TTD.
     pub length: usize,
@@ -50,7 +50,7 @@ struct Part {
 /// A trajectory without `done` runs to the budget; as few as the published durations ask for are cut short.
 ///
 /// # Errors
-/// When the pair's published cells contradict each other.
+/// A pair whose published cells contradict each other.
 pub fn solve(pair: &Pair) -> Result<Vec<Outline>, Contradiction> {
     let mut generator = Generator::of(&format!("outlines of {}/{}", pair.experiment, pair.model));
     let allowed = counts::solve(pair)?;
@@ -105,7 +105,7 @@ fn cast(pair: &Pair, counts: &Counts, generator: &mut Generator) -> Result<Vec<P
     Ok(parts)
 }
 
-/// What the lengths and gazes of a pair must keep to.
+/// The constraints on a pair's lengths and gazes.
 struct Limits<'a> {
     cut: usize,
     /// The fewest steps of an episode.

@@ -1,4 +1,4 @@
-//! How the paper turns exact moments into print: its two rounding rules and its two standard errors.
+//! The paper's printing of exact moments: its two rounding rules and its two standard errors.
 
 use exact::moments::Moments;
 use metric::catalog::StandardError;

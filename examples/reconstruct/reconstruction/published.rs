@@ -8,7 +8,7 @@ use serde::Deserialize;
 
 use super::errata;
 
-/// Where a value is printed; each place rounds in its own way.
+/// The place of a printed value; each place rounds in its own way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
     /// The result table of the main text.
@@ -45,9 +45,9 @@ pub struct Value {
 /// One print of a cell; `None` where the paper prints `--`, undefined.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Print {
-    /// Where.
+    /// The source.
     pub source: Source,
-    /// What.
+    /// The value.
     pub value: Option<Value>,
 }
 
@@ -69,7 +69,7 @@ impl Pair {
     }
 }
 
-/// How to take the paper's known slips.
+/// The treatment of the paper's known slips.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reading {
     /// As printed, to show what contradicts what.

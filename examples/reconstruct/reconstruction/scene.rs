@@ -6,7 +6,7 @@ use super::generator::Generator;
 pub const PALETTE: [&str; 10] =
     ["red", "orange", "yellow", "green", "cyan", "blue", "purple", "pink", "brown", "white"];
 
-/// What the agent was put into.
+/// The setting of the agent.
 pub struct Scene {
     /// The true colour of the body.
     pub body: &'static str,

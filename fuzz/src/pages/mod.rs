@@ -27,7 +27,7 @@ use stricter::{Depth, Reason};
 /// The columns that mutants are made of.
 static BASES: LazyLock<Vec<shape::Base>> = LazyLock::new(shape::all);
 
-/// What became of a mutant.
+/// The outcome of a mutant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Outcome {
     /// Both read the same rows.
@@ -38,7 +38,7 @@ pub enum Outcome {
     Stricter(Reason),
 }
 
-/// How many columns there are to start from.
+/// The number of base columns.
 pub fn bases() -> usize {
     BASES.len()
 }
@@ -55,7 +55,7 @@ pub fn target(data: &[u8]) {
     });
 }
 
-/// What becomes of the mutant that these bytes stand for.
+/// The outcome of the mutant that these bytes encode.
 ///
 /// # Panics
 /// On a disagreement.

@@ -7,7 +7,7 @@ use parquet::file::metadata::ParquetMetaData;
 use super::codec::compress;
 use super::shape::{Base, Page};
 
-/// Where the column starts in its file: behind the magic number.
+/// The offset of the column in its file, behind the magic number.
 pub const START: u64 = 4;
 /// Bytes that stand for one change.
 pub const CHANGE: usize = 5;
@@ -24,7 +24,7 @@ pub struct Mutant {
     pub at_once: usize,
 }
 
-/// What becomes of a page when it is written.
+/// The changes of a page as it is written.
 #[derive(Clone, Default)]
 struct Changes {
     checksum: Option<u8>,

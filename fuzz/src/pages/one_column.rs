@@ -31,12 +31,12 @@ pub struct OneColumn {
     bytes: Bytes,
 }
 
-/// Why a column is not decoded.
+/// The refusal of a column.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Refusal {
-    /// What was expected of the page in which the fault is; `None` where the Parquet library found it.
+    /// The expected page; `None` if the Parquet library found the fault.
     pub expected: Option<String>,
-    /// What was found, or the library's words.
+    /// The value found, or the library's words.
     pub found: String,
 }
 
@@ -63,7 +63,7 @@ impl OneColumn {
         Store::of_memory(self.start, self.bytes.clone())
     }
 
-    /// What the short cut gives, `at_once` rows at a time: the rows until it gives up, and whether it did not.
+    /// The rows of the short cut, `at_once` at a time, until it gives up, and true if it did not.
     pub fn short_cut(&self, runs: bool, at_once: usize) -> Result<(Vec<ArrayRef>, bool), String> {
         let form = if runs { Form::Runs } else { Form::Rows };
         contained(|| {
@@ -87,7 +87,7 @@ impl OneColumn {
         })
     }
 
-    /// What the library gives of pages that are checked, from row `first` on and `at_once` rows at a time.
+    /// The library's rows of checked pages, from row `first` on, `at_once` at a time.
     pub fn checked(&self, first: usize, at_once: usize) -> Result<Vec<ArrayRef>, Refusal> {
         let slot = FaultSlot::default();
         let refused = |found: String| match slot.get() {

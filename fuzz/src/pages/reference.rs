@@ -104,7 +104,7 @@ impl RowGroups for One<'_> {
     }
 }
 
-/// What the library reads of a mutant, as the types of the file say; its refusal in words.
+/// The library's values of a mutant, in the types of the file; its refusal in words.
 pub fn read(mutant: &Mutant) -> Result<Vec<ArrayRef>, String> {
     let read = || -> Result<Vec<ArrayRef>> {
         let one = One { metadata: &mutant.metadata, bytes: &mutant.bytes };

@@ -51,7 +51,7 @@ const TYPES: [(DataType, &[Encoding]); 8] = [
     (DataType::UInt64, &[]),
 ];
 
-/// How many rows a column may have, and how many a page.
+/// The numbers of rows of a column and of a page.
 const ROWS: [(usize, usize); 4] = [(1, 64), (19, 7), (64, 64), (300, 96)];
 
 /// All columns: each type in each encoding, codec, page version, number of rows, with nulls or without.

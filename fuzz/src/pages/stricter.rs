@@ -1,4 +1,4 @@
-//! Why a page is refused that the Parquet library would read.
+//! Refusals of pages that the Parquet library would read.
 //!
 //! Rule: a refusal that the library does not share has one of these reasons, or the target fails.
 
@@ -49,7 +49,7 @@ pub enum Reason {
     LargeInteger,
 }
 
-/// How far a mutant came.
+/// The depth that a mutant reached.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Depth {
     /// Refused by its header or its checksum.
@@ -62,7 +62,7 @@ pub enum Depth {
     Values,
 }
 
-/// What the program says it expected, its numbers left out; the reason that it is; how far the mutant came.
+/// The program's expectation without its numbers, the reason for it, and the depth of the mutant.
 const EXPECTED: [(&str, Reason, Depth); 25] = [
     ("a page header", Reason::HeaderOfOneMeaning, Depth::Header),
     ("a page header that has one meaning", Reason::HeaderOfOneMeaning, Depth::Header),
@@ -91,7 +91,7 @@ const EXPECTED: [(&str, Reason, Depth); 25] = [
     ("a number up to #", Reason::LargeInteger, Depth::Values),
 ];
 
-/// What is found in values that the library has decoded, where nothing else is expected.
+/// The message about values that the library has decoded, where nothing else is expected.
 pub const SPLIT_TEXTS: &str = "texts that are not UTF-8";
 
 /// What a refusal of the program is; `None` for words that are not listed, and no reason for what the library refuses, too.

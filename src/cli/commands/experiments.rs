@@ -22,7 +22,7 @@ pub struct ExperimentsArgs {
     pub action: Action,
 }
 
-/// What to do with experiments.
+/// The action on experiments.
 #[derive(Clone, Debug, clap::Subcommand)]
 pub enum Action {
     /// Show every fault of a file of experiments, underlined, with a suggestion

@@ -18,7 +18,7 @@ pub struct StyleArgs {
     action: Action,
 }
 
-/// What to do with styles.
+/// The action on styles.
 #[derive(Clone, Debug, clap::Subcommand)]
 enum Action {
     /// Print a built-in style, to start your own from

@@ -1,4 +1,4 @@
-//! How a command ends, and the exit code for it.
+//! Endings of a command, and their exit codes.
 //!
 //! | code | meaning |
 //! |---|---|
@@ -22,7 +22,7 @@ use exact::escape::visible_lines;
 use toml_spec::{FaultRecord, Faults};
 use trace::diagnostic::{MORE_FILES, is_short_of_files};
 
-/// Which form errors have, where no option says it: decided before anything is parsed.
+/// The form of errors if no option says it: decided before anything is parsed.
 pub const ERRORS_VARIABLE: &str = "MIRRORSTATS_ERRORS";
 /// The exit code for bad usage, input or definitions.
 const BAD_INPUT: u8 = 2;
@@ -71,7 +71,7 @@ impl Failure {
     }
 }
 
-/// How errors are told: in words for people, or for programs as one object on one line.
+/// The form of errors: in words for people, or for programs as one object on one line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum ErrorFormat {
     #[default]
@@ -80,7 +80,7 @@ pub enum ErrorFormat {
 }
 
 impl ErrorFormat {
-    /// What is asked for, before anything is parsed: the arguments may be what is wrong.
+    /// The requested form, before anything is parsed: the arguments may be wrong.
     pub fn asked_for(arguments: &[OsString]) -> Self {
         let typed = arguments.windows(2).any(|pair| pair[0] == "--errors" && pair[1] == "json");
         let is_json = typed || arguments.iter().any(|argument| argument == "--errors=json");
@@ -93,7 +93,7 @@ impl ErrorFormat {
 /// An error as a program reads it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct ErrorAnswer {
-    /// What, where, expected, found, remedy; may have several lines.
+    /// Problem, location, expected, found, remedy; may have several lines.
     pub error: String,
     /// The exit code.
     pub code: u8,
@@ -103,7 +103,7 @@ pub struct ErrorAnswer {
 }
 
 impl ErrorAnswer {
-    /// What is said of a failure.
+    /// The printed form of a failure.
     pub fn of(failure: &Failure) -> Self {
         let faults = if let Failure::Faults(faults) = failure { faults.records() } else { Vec::new() };
         let text = words(failure, false);

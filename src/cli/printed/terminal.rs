@@ -1,4 +1,4 @@
-//! What standard output is: how wide, and whether it shows emphasis.
+//! Standard output: its width, and whether it shows emphasis.
 
 use std::io::{self, IsTerminal as _};
 

@@ -1,4 +1,4 @@
-//! What `record --dry-run` says: what would be recorded, and what that may take. Nothing is written or sent.
+//! The answer of `record --dry-run`: the episodes to record, and their cost. Nothing is written or sent.
 
 use std::io;
 
@@ -31,11 +31,11 @@ pub struct ForecastAnswer {
     pub episodes: Vec<String>,
     /// Their steps, if all of them use up their budget.
     pub steps_at_most: u64,
-    /// What would be sent to a provider; null for agents that send nothing.
+    /// The requests to a provider; null for agents that send nothing.
     pub requests: Option<RequestForecast>,
 }
 
-/// What would be sent to a provider, and come back.
+/// The requests to a provider, and its answers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct RequestForecast {
     /// Requests, if all episodes use up their budget; attempts after failures are not counted.
@@ -62,7 +62,7 @@ pub struct RequestForecast {
 }
 
 impl ForecastAnswer {
-    /// What recording the episodes that are still to do would come to.
+    /// The forecast for the episodes that are still to do.
     pub fn of(
         subject: &Subject,
         asked: usize,
@@ -82,7 +82,7 @@ impl ForecastAnswer {
 }
 
 impl RequestForecast {
-    /// What a model would be asked in the episodes that are still to do, by what those that are finished took.
+    /// The forecast of a model's requests for the episodes that are still to do, from the finished ones.
     pub fn of(
         player: &VlmPlayer,
         subject: &Subject,

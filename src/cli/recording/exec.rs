@@ -1,4 +1,4 @@
-//! What was typed about a program as an agent, and the player that it comes to.
+//! A program as an agent: its arguments, and the player that they make.
 
 use std::path::Path;
 use std::time::Duration;
@@ -10,11 +10,11 @@ use world::record::folder_lock::parts_of;
 /// The folder within that of a recording for what programs say on standard error.
 const STANDARD_ERROR: &str = "stderr";
 
-/// How a program of one's own is run.
+/// The arguments for a program of one's own.
 #[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "With --agent exec:'CMD'")]
 pub struct ExecArgs {
-    /// How the program gets its frames
+    /// The passing of frames to the program
     #[arg(long, value_enum, default_value_t)]
     exec_images: ExecImages,
     /// Seconds for one reply, the first one with the program's start
@@ -22,7 +22,7 @@ pub struct ExecArgs {
     exec_timeout: u64,
 }
 
-/// How frames are passed.
+/// The passing of frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 enum ExecImages {
     /// A PNG file, which is there until the episode ends

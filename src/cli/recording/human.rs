@@ -1,4 +1,4 @@
-//! What was typed about people as agents, and the player that it comes to.
+//! People as agents: their arguments, and the player that they make.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ use world::agent::human::{Human, server};
 /// Words of consent are read by people.
 const LONGEST_CONSENT: Limit = Limit::new("bytes of the words of consent", 1 << 20);
 
-/// Who plays in the browser.
+/// The people that play in the browser.
 #[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "With --agent human")]
 pub struct HumanArgs {

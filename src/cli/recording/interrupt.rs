@@ -1,4 +1,4 @@
-//! What Ctrl-C does to a recording.
+//! The effect of Ctrl-C on a recording.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use crate::cli::outcome::Failure;
 use world::agent::Player;
 
-/// Who plays now.
+/// The current player.
 pub type Playing = Arc<Mutex<Option<Arc<dyn Player>>>>;
 
 /// The first Ctrl-C ends a recording when the steps under way are done, a second one at once.

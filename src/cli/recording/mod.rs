@@ -1,4 +1,4 @@
-//! What `record` tells while it runs and when it has ended, on standard error: progress, and where the time went.
+//! Messages of `record` on standard error while it runs and when it has ended: progress, and time by part.
 
 pub mod dry_run;
 pub mod exec;
@@ -63,7 +63,7 @@ pub struct RecordAnswer {
     pub lost: Vec<LostEpisode>,
     /// Episodes under way that a limit of what may be spent has stopped; they are not lost, and go on under a higher limit.
     pub stopped_by_limit: usize,
-    /// What was spent on all that the model played into the folder, over all starts; null for agents that cost nothing.
+    /// The spending on all that the model played into the folder, over all starts; null for agents that cost nothing.
     pub spend: Option<Spend>,
     /// True if the recording was stopped before its end.
     pub stopped: bool,
@@ -73,7 +73,7 @@ pub struct RecordAnswer {
     pub logs: Vec<String>,
 }
 
-/// How often progress is told where no terminal shows it.
+/// The interval of progress lines without a terminal.
 const BETWEEN_LINES: Duration = Duration::from_secs(10);
 
 /// The progress: a bar where a terminal shows it, else a line now and then for agents that wait for a provider or a program,

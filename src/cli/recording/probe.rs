@@ -1,4 +1,4 @@
-//! What `record --probe` says of a model.
+//! The answer of `record --probe` about a model.
 
 use std::io;
 

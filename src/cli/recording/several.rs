@@ -67,7 +67,7 @@ pub fn stopped(recorded: &Result<Recorded, Failure>) -> Option<String> {
     }
 }
 
-/// How so many recordings are told from outside.
+/// The exit code of several recordings.
 pub fn outcome(all: Vec<Result<Recorded, Failure>>, asked: usize) -> Result<Outcome, Failure> {
     let stopped = all.iter().filter_map(stopped).count();
     let mut outcome = Outcome::Done;

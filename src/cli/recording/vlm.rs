@@ -1,4 +1,4 @@
-//! What was typed about a model behind a provider, and the player that it comes to.
+//! A model behind a provider: its arguments, and the player that they make.
 
 use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
@@ -33,7 +33,7 @@ pub struct VlmArgs {
     /// A file with more models, in the shape of assets/models.toml
     #[arg(long, value_name = "FILE")]
     models: Option<PathBuf>,
-    /// Who serves the model, instead of what the models' file says: openai, openrouter, google, anthropic, compatible
+    /// The provider, instead of the models' file's: openai, openrouter, google, anthropic, compatible
     #[arg(long, value_name = "NAME")]
     backend: Option<String>,
     /// The address of a server that takes OpenAI's chat completions, such as `http://localhost:8000/v1`

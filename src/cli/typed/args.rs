@@ -1,4 +1,4 @@
-//! What was typed, where several verbs share it.
+//! Arguments that several commands share.
 
 use std::ffi::OsString;
 use std::num::{NonZeroU32, NonZeroUsize};
@@ -16,7 +16,7 @@ pub struct TraceArgs {
     pub threads: ThreadArgs,
 }
 
-/// How many threads to use.
+/// The number of threads.
 #[derive(Clone, Copy, Debug, clap::Args)]
 pub struct ThreadArgs {
     /// Threads to use; results do not depend on it [default: all cores]
@@ -31,7 +31,7 @@ impl ThreadArgs {
     }
 }
 
-/// What to score, and how it is defined.
+/// The traces to score, and the definitions.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct ScoringArgs {
     /// Definitions: `paper`, `extended`, or a TOML file [default: those that the traces name, else paper]
@@ -45,7 +45,7 @@ pub struct ScoringArgs {
     pub condition: Option<String>,
 }
 
-/// How episodes are grouped into cells.
+/// The grouping of episodes into cells.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct GroupingArgs {
     /// Group episodes by these columns, separated by commas [default: experiment,model, and condition where there are some]
@@ -54,12 +54,12 @@ pub struct GroupingArgs {
     /// Let a cell hold episodes that were recorded differently: in another world, with other prompts, by another agent
     #[arg(long)]
     pub pool: bool,
-    /// What episodes count as that were lost for want of an answer
+    /// The treatment of episodes that were lost for want of an answer
     #[arg(long, value_enum, default_value_t)]
     pub lost: LostArg,
 }
 
-/// What lost episodes count as.
+/// The treatment of lost episodes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum LostArg {
     /// They are in no denominator
@@ -69,10 +69,10 @@ pub enum LostArg {
     AsFailure,
 }
 
-/// What computes the episode table.
+/// The engine of the episode table.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct EngineArgs {
-    /// What computes the scores; the result is the same
+    /// The engine of the scores; the result is the same
     #[arg(long, value_enum, default_value_t)]
     pub engine: Engine,
     #[command(flatten)]
@@ -91,7 +91,7 @@ pub enum Engine {
     Spark,
 }
 
-/// How to submit to Spark.
+/// The options for submitting to Spark.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct SparkArgs {
     /// The master of --engine spark: spark://HOST:PORT, yarn, local, ... [default: what your Spark is configured for]

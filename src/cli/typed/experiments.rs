@@ -43,7 +43,7 @@ pub fn placed(path: &Path, config: &WorldConfig) -> Result<Vec<Loaded>, Failure>
     if faults.is_empty() { Ok(loaded) } else { Err(Failure::of_faults(&Faults(faults))) }
 }
 
-/// What was asked for, in its order; each experiment once.
+/// The requested experiments, in their order, each once.
 #[cfg(feature = "sim")]
 pub fn asked(asked: &Experiments, config: &WorldConfig) -> Result<Vec<Experiment>, Failure> {
     let mut all: Vec<Experiment> = Vec::new();

@@ -44,7 +44,7 @@ impl TraceArgs {
 }
 
 impl ScoringArgs {
-    /// What is asked, with cells grouped so.
+    /// The question, with this grouping of cells.
     pub fn question(&self, grouping: &GroupingArgs) -> Question {
         Question {
             definitions: self.definitions.clone(),

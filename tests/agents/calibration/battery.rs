@@ -1,4 +1,4 @@
-//! What each scripted agent does in the battery, as its module predicts.
+//! The behaviour of each scripted agent in the battery, as its module predicts.
 
 use world::agent::scripted::Scripted;
 use world::sim::Experiment;
@@ -70,7 +70,7 @@ impl Shown<'_> {
     }
 }
 
-/// What holds for any number of episodes, one by one, of those agents that are there.
+/// Checks for any number of episodes, one by one, of the present agents.
 fn check_logic(profiles: &Profiles) {
     let shown = Shown(profiles);
     for (experiment, agent) in BATTERY.into_iter().flat_map(|one| Scripted::ALL.map(|agent| (one, agent.name()))) {

@@ -1,4 +1,4 @@
-//! What each scripted agent does where a hand is to reach a mark, as its module predicts.
+//! The behaviour of each scripted agent with a hand and a mark, as its module predicts.
 
 use world::agent::scripted::Scripted;
 use world::sim::Experiment;
@@ -22,7 +22,7 @@ impl Shown<'_> {
     }
 }
 
-/// What holds for any number of episodes.
+/// Checks for any number of episodes.
 fn check_logic(profiles: &Profiles) {
     let shown = Shown(profiles);
     for experiment in ARMS.into_iter().chain(LEVELS) {

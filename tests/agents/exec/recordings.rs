@@ -14,7 +14,7 @@ use crate::harness::{need, traces};
 /// A reply that moves forward, as the shell writes it.
 pub const FORWARD: &str = r#"{"view-description":"a wall","reasoning":"go on","action":"w","summary":"went on","selected_cube":"none","identification":"I am red"}"#;
 
-/// What a program does at each observation to be done at its third.
+/// A program's replies that end with `done` at the third observation.
 pub fn three_steps() -> String {
     format!("if [ $n -lt 3 ]; then echo '{FORWARD}'; else echo '{}'; fi", done())
 }
@@ -92,7 +92,7 @@ impl Bench {
         traces::texts(&self.path(name), column)
     }
 
-    /// What stays of a recording besides its traces and what programs said on standard error.
+    /// The files of a recording besides its traces and the standard error of programs.
     pub fn leftovers(&self) -> Vec<String> {
         let Ok(entries) = fs::read_dir(self.path("runs")) else { return Vec::new() };
         let names = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap());

@@ -112,7 +112,7 @@ pub fn task(experiment: Experiment) -> Task {
     Task { experiment, stated_color, step_budget: 100, seed: 1 }
 }
 
-/// What is observed before a step.
+/// The observation before a step.
 pub fn observation(t: i32) -> Observation {
     Observation {
         t,

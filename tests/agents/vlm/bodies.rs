@@ -1,4 +1,4 @@
-//! What is in the bodies of requests: the frame, then the words of the prompt, the schema's keys, and nothing else.
+//! The bodies of requests: the frame, then the words of the prompt, the schema's keys, and nothing else.
 
 use std::collections::BTreeSet;
 use std::num::NonZeroU32;

@@ -30,7 +30,7 @@ fn answer(at: usize, request: &Request) -> Vec<u8> {
     }
 }
 
-/// What tells requests apart: the model, the words and the frame, hashed as journals do.
+/// The identity of a request: the model, the words and the frame, hashed as journals do.
 fn question(request: &Request) -> String {
     let (before, image) = request.body.split_once("data:image/png;base64,").unwrap();
     let (_, after) = image.split_once('"').unwrap();
@@ -104,7 +104,7 @@ impl Study {
     }
 }
 
-/// How often each question is on disk as about to go out, and that none went out again after its answer came.
+/// The number of times that each question was sent; none is sent again after its answer came.
 fn journaled(journals: &BTreeMap<PathBuf, Vec<Entry>>) -> BTreeMap<String, usize> {
     let mut sent = BTreeMap::new();
     for (path, entries) in journals {

@@ -34,7 +34,7 @@ impl Provider {
         Self { process, address: address.trim().to_owned() }
     }
 
-    /// How many answers it was paid for.
+    /// The number of paid answers.
     fn paid(&self) -> u64 {
         let mut stream = TcpStream::connect(self.address.trim_start_matches("http://")).unwrap();
         stream.write_all(b"GET / HTTP/1.1\r\nhost: loopback\r\nconnection: close\r\n\r\n").unwrap();

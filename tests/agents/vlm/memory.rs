@@ -1,4 +1,4 @@
-//! What was asked and answered is on disk before it is acted on, and is never asked again.
+//! Questions and answers are on disk before they are acted on, and no question is asked again.
 
 use std::num::NonZeroU32;
 use std::sync::Arc;

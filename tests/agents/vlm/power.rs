@@ -24,7 +24,7 @@ fn server() -> Server {
     Server::start(|_, request: &Request| whole(Dialect::OpenaiCompatible, &counting(request, STEPS, 0)))
 }
 
-/// What tells requests apart: the words as journals hash them, and the frame.
+/// The identity of a question: the words as journals hash them, and the frame.
 type Question = (String, String);
 /// The file of a journal, and a step.
 type Answer = (String, i32);

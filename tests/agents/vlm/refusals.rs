@@ -1,4 +1,4 @@
-//! What a provider will not answer costs a step or an episode, and the recording only where no request can do better.
+//! A refusal by a provider costs a step or an episode, and the recording only if no request can do better.
 
 use std::fs;
 

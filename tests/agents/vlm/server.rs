@@ -16,7 +16,7 @@ pub const JSON: &str = "content-type: application/json\r\n";
 pub struct Request {
     /// The request line and the headers.
     pub head: String,
-    /// What follows.
+    /// The body.
     pub body: String,
 }
 
@@ -26,7 +26,7 @@ impl Request {
     }
 }
 
-/// What the server does with a request: bytes to send, and how long it waits before each piece of them.
+/// The server's answer to a request: bytes to send, and the wait before each piece of them.
 #[derive(Clone, Debug)]
 pub struct Conduct {
     bytes: Vec<u8>,

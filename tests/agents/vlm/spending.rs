@@ -28,7 +28,7 @@ fn limits_stop_before_the_request_over_them() {
     assert_eq!(server.count(), 2);
 }
 
-/// How a start of a recording ended: its exit code and what it said.
+/// The end of a recording's start: its exit code and its messages.
 fn started(folder: &Folder, server: &Server, words: &str) -> (Option<i32>, String) {
     let words = format!("--seeds 1 --runs 1 --threads 1 --models own.toml {words}");
     let output = folder.record(server, "own", &words).output().unwrap();

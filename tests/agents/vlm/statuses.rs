@@ -16,7 +16,7 @@ use super::server::{Conduct, JSON, Server, decision, endings, http, ok, spoken, 
 const PROVIDERS: [Dialect; 4] =
     [Dialect::OpenaiChat, Dialect::OpenaiCompatible, Dialect::Gemini, Dialect::AnthropicMessages];
 
-/// What is sent, and what the step ends in.
+/// The answer, and the end of the step.
 type Case = (&'static str, Vec<u8>, Status);
 
 /// That each case ends in its status for this provider, after the attempts that such a status is worth.

@@ -17,7 +17,7 @@ fn short() -> Folder {
     folder
 }
 
-/// What a command says of the traces in `runs`, as text and as JSON.
+/// The output of a command on the traces in `runs`, as text and as JSON.
 fn told(folder: &Folder, verb: &str) -> (String, Value) {
     (run(folder.path(), &[verb, "runs"]).done(), run(folder.path(), &[verb, "runs", "--json"]).json())
 }

@@ -22,7 +22,7 @@ use crate::harness::faults::{Call, Draws, EACCES, EIO, EMFILE, ENOSPC, Fault};
 use crate::harness::files::contents;
 use crate::harness::program::stderr;
 
-/// What may fail, and with what.
+/// The calls that may fail, and their errors.
 const ERRORS: [(&str, &[i32]); 8] = [
     ("open", &[EMFILE, EACCES, EIO]),
     ("write", &[ENOSPC, EIO]),
@@ -60,7 +60,7 @@ fn faults(calls: &[Call]) -> Vec<Fault> {
     faults
 }
 
-/// What is said of a fault: the file and the cause, or nothing where all is well.
+/// Checks the message of a fault: the file and the cause, or nothing without a fault.
 fn check_words(output: &Output, fault: Fault, is_new: bool, calls: &[Call], outputs: &[&str]) -> Result<(), String> {
     let said = stderr(output);
     if said.contains("panicked") || output.status.signal().is_some() {
@@ -90,7 +90,7 @@ fn check_words(output: &Output, fault: Fault, is_new: bool, calls: &[Call], outp
     if is_named { Ok(()) } else { Err(format!("it names none of {names:?}")) }
 }
 
-/// What a temporary name is shown as.
+/// The shown form of a temporary name.
 fn shown(name: &str) -> String {
     let target = name.strip_prefix(".mirrorstats-").and_then(|rest| rest.rsplit_once('.'));
     target.map_or(name, |(target, _)| target).to_owned()

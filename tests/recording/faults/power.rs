@@ -18,7 +18,7 @@ fn record(home: &Path) -> Command {
     command
 }
 
-/// How many episodes are on the disk after these calls: parts whose names were synchronised.
+/// The number of episodes on the disk after these calls: parts with synchronised names.
 fn kept(calls: &[Call]) -> usize {
     let (mut named, mut kept) = (0, 0);
     for call in calls {

@@ -122,7 +122,7 @@ impl Bench {
         assert_same(&contents(&home.join("runs")), &self.whole);
     }
 
-    /// What a process has done that was killed, or came to its end.
+    /// Checks the work of a process that was killed, or that ended.
     fn check(&self, home: &Path, seed: usize, at: usize, reads: bool, code: i32, said: &str) {
         let told = format!("round {seed}, process {at}: {code}: {said}");
         assert!(!said.contains("panicked"), "{told}");

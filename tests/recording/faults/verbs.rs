@@ -19,7 +19,7 @@ use crate::harness::program::{run, stderr, typed};
 /// A verb that writes.
 struct Verb {
     words: &'static str,
-    /// What makes the outputs that are to be replaced; nothing if there are none.
+    /// The command that makes the outputs to replace; empty without any.
     before: &'static str,
     /// Files, or folders whose files are replaced together.
     outputs: &'static [&'static str],
@@ -98,7 +98,7 @@ fn prepared() -> TempDir {
     folder
 }
 
-/// What an output holds: of a file the bytes, of a folder those of all its files.
+/// The contents of an output: the bytes of a file, or of all files of a folder.
 fn held(home: &Path, output: &str) -> Option<Contents> {
     let path = home.join(output);
     if path.is_file() {

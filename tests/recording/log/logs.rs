@@ -17,11 +17,11 @@ use crate::harness::program::{program, run, succeeds, typed};
 pub struct Recording {
     pub log: Vec<u8>,
     pub trace: Vec<u8>,
-    /// Where each episode's chunk begins, and where it is whole.
+    /// The start of each episode's chunk, and its end.
     pub chunks: Vec<(usize, usize)>,
 }
 
-/// What the recording of these tests changes in the small world.
+/// The changes to the small world for the recording of these tests.
 pub const SHORT: &str = "episode.steps = 40\n";
 
 /// The recording of these tests; made once.
@@ -50,7 +50,7 @@ impl Recording {
         (1..=ended).map(|run| format!("E1/random/s1/r{run}")).collect()
     }
 
-    /// Where the records of the file begin, and where the last one ends.
+    /// The starts of the file's records, and the end of the last one.
     pub fn boundaries(&self) -> Vec<usize> {
         let mut boundaries = vec![mcap::MAGIC.len()];
         let mut at = mcap::MAGIC.len();
@@ -62,13 +62,13 @@ impl Recording {
         boundaries
     }
 
-    /// Where the record with this opcode begins that comes first.
+    /// The start of the first record with this opcode.
     pub fn first(&self, opcode: u8) -> usize {
         self.boundaries().into_iter().find(|at| self.log[*at] == opcode).unwrap()
     }
 }
 
-/// What is recovered of these bytes.
+/// The recovered part of these bytes.
 pub fn recovered(bytes: &[u8]) -> Recovered {
     recover_from(Path::new("log.mcap"), Cursor::new(bytes)).unwrap()
 }

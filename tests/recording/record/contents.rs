@@ -1,4 +1,4 @@
-//! What a recording holds: rows that follow from one another, metadata, and something to report on.
+//! The contents of a recording: consistent rows, metadata, and a report.
 
 use arrow::array::{Array, AsArray, BooleanArray, RecordBatch};
 use arrow::datatypes::{Float32Type, Int32Type, Int64Type};

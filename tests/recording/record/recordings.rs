@@ -50,7 +50,7 @@ impl Bench {
         contents(&self.path(out))
     }
 
-    /// How many episodes wait as parts.
+    /// The number of episodes that wait as parts.
     pub fn parts(&self, out: &str) -> usize {
         let Ok(entries) = fs::read_dir(self.path(out).join(".parts")) else { return 0 };
         entries

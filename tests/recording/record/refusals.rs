@@ -1,4 +1,4 @@
-//! What cannot be recorded is refused with one sentence and its remedy, and leaves nothing behind.
+//! Invalid recordings are refused with one sentence and its remedy, and leave nothing behind.
 
 use std::fs;
 use std::path::Path;

@@ -31,7 +31,7 @@ fn started(bench: &Bench, out: &str, count: usize) -> Vec<Child> {
     (0..count).map(start).collect()
 }
 
-/// What a recording that ends well answers.
+/// The answer of a recording that ends well.
 fn answer(child: Child) -> Value {
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));

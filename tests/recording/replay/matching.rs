@@ -1,4 +1,4 @@
-//! What was recorded can be had again.
+//! A replay reproduces the recording.
 
 use serde_json::Value;
 

@@ -1,4 +1,4 @@
-//! What a replay writes replaces neither its trace nor other episodes, and an old log stays until the new one is whole.
+//! A replay replaces neither its trace nor other episodes, and an old log stays until the new one is whole.
 
 use std::fs;
 use std::os::unix::fs::symlink;

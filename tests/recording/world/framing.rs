@@ -1,4 +1,4 @@
-//! How large a reflection is, by the field of view.
+//! The size of a reflection, by the field of view.
 
 use world::sim::Experiment;
 use world::sim::body::{Figure, Pose};

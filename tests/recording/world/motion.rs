@@ -1,4 +1,4 @@
-//! What actions do, what is in the way, and that nothing ever goes through anything.
+//! The effects of actions, obstacles, and the impossibility of passing through things.
 
 use trace::episode::Action;
 use trace::palette::Color;

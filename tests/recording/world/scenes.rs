@@ -1,4 +1,4 @@
-//! What is drawn by seed: never overlapping, always solvable, the same on every machine.
+//! Scenes by seed: never overlapping, always solvable, the same on every machine.
 
 use std::collections::BTreeSet;
 use std::sync::LazyLock;
@@ -134,7 +134,7 @@ fn the_clutter_of_e5_hides_the_body_from_most_places_and_shows_it_from_some() {
     assert!(best.iter().all(|share| *share >= 0.6), "no place to identify oneself: {best:?}");
 }
 
-/// What share of the body's pixels is left by the clutter, place by place.
+/// The share of the body's pixels that the clutter leaves, place by place.
 fn shares_shown(world: &mut World, open: &mut World) -> Vec<f64> {
     let own = Shown::Through(0, Item::Agent(0));
     let (mirror, config) = (world.scene().mirror, world.config().clone());

@@ -160,7 +160,7 @@ impl Area {
     }
 }
 
-/// Whether something else has the colour of the own body, or a head.
+/// Returns true if something else has the colour of the own body, or a head.
 fn is_twin(world: &World, shown: Shown) -> bool {
     let own = world.scene().body_color;
     match shown {

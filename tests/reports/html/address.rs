@@ -1,4 +1,4 @@
-//! What is chosen stands in the address, and a link shows the same.
+//! The choices are in the address, and a link shows the same.
 
 use serde_json::json;
 

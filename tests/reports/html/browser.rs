@@ -256,7 +256,7 @@ impl Browser {
         self.send("Input.dispatchKeyEvent", &event);
     }
 
-    /// What the browser had to complain of so far.
+    /// The browser's complaints so far.
     pub fn complaints(&mut self) -> &[String] {
         self.settle();
         &self.faults
@@ -265,7 +265,7 @@ impl Browser {
     /// Ends the browser.
     ///
     /// # Panics
-    /// When it had anything to complain of.
+    /// Any complaint.
     pub fn close(mut self) {
         assert_eq!(self.complaints(), Vec::<String>::new());
     }

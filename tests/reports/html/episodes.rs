@@ -14,7 +14,7 @@ use crate::html::scored::{PAPER, Report};
 const ROWS: &str = "[...document.querySelectorAll('#episodes tbody tr')] \
     .map((r) => [...r.children].map((c) => c.textContent).join(','))";
 
-/// What the episode table has for a cell.
+/// The values of a cell in the episode table.
 fn expected(report: &Report, experiment: &str, model: &str, metric: &str) -> BTreeSet<String> {
     let column = report.episodes.metrics.iter().find(|column| column.name == metric).unwrap();
     let keys = report.episodes.keys.iter().zip(column.iter());

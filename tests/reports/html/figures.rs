@@ -66,7 +66,7 @@ fn a_figure_grows_and_fits_again() {
     browser.close();
 }
 
-/// How many marks of a figure are left and how many fade, of those where an expression over `mark` holds.
+/// The number of marks of a figure that are left and that fade, of those where an expression over `mark` is true.
 fn left(browser: &mut Browser, figure: &str, is_counted: &str) -> (u64, u64) {
     let marks = format!("[...document.querySelectorAll('#figure-{figure} .mark')].filter((mark) => {is_counted})");
     let off = browser.value(&format!("{marks}.filter((mark) => mark.matches('.off')).length")).as_u64().unwrap();

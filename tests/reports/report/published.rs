@@ -89,7 +89,7 @@ fn find_cells() -> Cells {
     }
 }
 
-/// What rule 5 of the published tables prints; the one mean that does not follow it is corrected.
+/// The print of published numbers by rule 5; the one mean that does not follow it is corrected.
 fn published_numbers(cell: &Published) -> (String, String) {
     let is_slip = (cell.experiment.as_str(), cell.model.as_str(), cell.metric.as_str()) == ("E3", "Gemma4 26B", "TTD");
     let mean = if is_slip { "57.91" } else { cell.mean.as_str() };

@@ -9,7 +9,7 @@ use crate::report::published;
 
 const MAIN: &str = "[table.main]\ntitle = 'T'\ncolumns = ['TSA']\n";
 
-/// What is said of a style file with this text, used with the paper's definitions.
+/// The message for a style file with this text, used with the paper's definitions.
 fn message(text: &str) -> String {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("mine.toml");

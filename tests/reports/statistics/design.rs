@@ -1,4 +1,4 @@
-//! What is compared with what follows from the declared design: pairs, clusters, conditions, strata.
+//! The comparisons that follow from the declared design: pairs, clusters, conditions, strata.
 
 use report::statistics::text::Length;
 use report::statistics::{Method, Options, OverallMethod, OverallRow, Sign, Statistics};

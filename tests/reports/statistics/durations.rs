@@ -40,7 +40,7 @@ fn chance_is_tested_among_finished_episodes_too() {
     assert!(text.contains("TSA     chance 1/3") && text.contains("TSA-C   chance 1/3"), "{text}");
 }
 
-/// Who decides in each episode, decides earlier than who never does; ties count half.
+/// An episode with a decision is earlier than one without; ties count half.
 #[test]
 fn improvement_is_counted_among_decisions_and_none() {
     let table = table(&study());

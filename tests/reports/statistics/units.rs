@@ -1,4 +1,4 @@
-//! What is said where scenes, seeds or participants have several episodes: each counts once.
+//! Scenes, seeds or participants with several episodes count once each.
 
 use report::statistics::text::Length;
 use report::statistics::{Method, Options, OverallMethod, Statistics, Verdict};

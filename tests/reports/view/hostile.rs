@@ -30,7 +30,7 @@ fn write(folder: &Path) {
     run(folder, &["import", "steps.jsonl", "-o", "hostile.parquet"]).done();
 }
 
-/// What a reader sees of a text of [`PIECE`]s.
+/// The reader's view of a text of [`PIECE`]s.
 fn shown(pieces: usize) -> String {
     let piece = PIECE.trim_end().replace('\u{202e}', "\\u{202e}");
     vec![piece; pieces].join("\n")

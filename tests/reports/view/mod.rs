@@ -23,7 +23,7 @@ const PAPER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/fixtures/paper");
 /// A server that ends with its owner.
 pub struct Server {
     process: Running,
-    /// Where it is: `http://127.0.0.1:PORT/`, with a token if it has one.
+    /// Its address: `http://127.0.0.1:PORT/`, with a token if it has one.
     pub link: String,
     pub port: u16,
 }
@@ -50,7 +50,7 @@ impl Server {
         self.process.0.id()
     }
 
-    /// What it answers to a browser of this machine.
+    /// The answer to a browser of this machine.
     pub fn get(&self, path: &str) -> Response {
         let host = format!("127.0.0.1:{}", self.port);
         self.ask("GET", path, &[("Host", &host)], "")

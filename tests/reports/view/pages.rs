@@ -1,4 +1,4 @@
-//! What a reader does with the page.
+//! The page in use.
 
 use crate::harness::program::run;
 use crate::html::browser::Browser;

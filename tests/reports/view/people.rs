@@ -69,7 +69,7 @@ impl Person {
         answer
     }
 
-    /// What the page shows once it is in one of these phases.
+    /// The page's state once it is in one of these phases.
     fn state(&mut self, phases: &[&str]) -> Value {
         loop {
             let told = self.ask("GET", "state", &Value::Null).json();
@@ -219,7 +219,7 @@ fn practise(browser: &mut Browser) {
     until(browser, "document.querySelector('h1').textContent === 'Step 1'");
 }
 
-/// What stands in the field of the claim.
+/// The content of the claim's field.
 const CLAIM: &str = "document.querySelector('input[name=identification]').value";
 
 /// Types a claim in the place of what stands there.

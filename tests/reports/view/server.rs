@@ -1,4 +1,4 @@
-//! What the server answers, and to whom.
+//! The answers of the server, and their readers.
 
 use std::io::{Read as _, Write as _};
 use std::path::Path;

@@ -20,7 +20,7 @@ use crate::differential::trace::{Sheet, open, sheets};
 use crate::differential::words::WORDS;
 use crate::language::toml;
 
-/// What an engine came to: its values, or the kind of its refusal.
+/// The answer of an engine: its values, or the kind of its refusal.
 #[derive(Debug, PartialEq)]
 enum Answer {
     Values(Vec<(EpisodeKey, Vec<Option<i64>>)>),

@@ -22,7 +22,7 @@ use trace::open::TraceSet;
 #[derive(Clone, Debug)]
 pub struct Sheet {
     pub episodes: Vec<Episode>,
-    /// Which of [`OPTIONAL`] the file has.
+    /// The present ones of [`OPTIONAL`].
     pub present: Vec<bool>,
     /// Rows of a row group.
     pub rows_of_group: usize,

@@ -63,7 +63,7 @@ pub fn rows(answers: &Answers) -> Option<Vec<Rows>> {
     answers.iter().map(|answer| answer.as_ref().ok().cloned()).collect()
 }
 
-/// What an engine answers to each case.
+/// The answer of an engine to each case.
 pub fn answers(engine: Engine, cases: &[Case]) -> Vec<Answers> {
     let folder = tempfile::tempdir().unwrap();
     let prepared: Vec<Prepared> =
@@ -71,7 +71,7 @@ pub fn answers(engine: Engine, cases: &[Case]) -> Vec<Answers> {
     answers_to(engine, folder.path(), &prepared)
 }
 
-/// What an engine answers about all traces of a folder in `folder`.
+/// The answer of an engine about all traces in `folder`.
 pub fn answers_about(
     engine: Engine,
     folder: &Path,

@@ -61,7 +61,7 @@ fn check_parts(engine: Engine, count: usize, seed: RngSeed) {
     assert!(whole * 4 > count * 3, "of {count} cases {whole} have an answer");
 }
 
-/// What does not fit together.
+/// The contradictions.
 fn faults(answers: &[Rows]) -> Vec<String> {
     let [all, filtered @ ..] = answers else { return vec!["no answer".into()] };
     let mut faults = Vec::new();

@@ -1,4 +1,4 @@
-//! What random conditions and definitions are made of.
+//! The words of random conditions and definitions.
 
 use crate::author::Vocabulary;
 use crate::differential::words::WORDS;

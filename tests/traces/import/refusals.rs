@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use super::{lines, run, step, step_with};
 
-/// What the program says of these lines, which it refuses.
+/// The refusal of these lines.
 #[track_caller]
 fn refused(text: impl Into<Vec<u8>>) -> String {
     let folder = tempfile::tempdir().unwrap();

@@ -34,7 +34,7 @@ pub(super) fn scores(path: &Path) -> Result<Vec<u8>, String> {
     Ok(bytes)
 }
 
-/// What verification says of all pages of a file.
+/// The verification of all pages of a file.
 fn verified(path: &Path) -> Result<(), Box<Finding>> {
     let traces = TraceSet::open(&[Input::new(path)]).unwrap();
     match verify_pages(&traces) {

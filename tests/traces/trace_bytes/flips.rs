@@ -15,7 +15,7 @@ use super::checksums::{draws, scores};
 use super::{encoded, episodes, trace};
 use crate::harness::files::fixture;
 
-/// What became of some flips.
+/// The outcomes of some flips.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Counts {
     flips: usize,
@@ -109,7 +109,7 @@ fn a_flipped_bit_is_refused_or_changes_nothing() {
     }
 }
 
-/// Where some bytes lie in a footer.
+/// The place of some bytes in a footer.
 fn place(whole: &[u8], bytes: &[u8]) -> usize {
     whole.windows(bytes.len()).rposition(|window| window == bytes).unwrap()
 }

@@ -8,7 +8,7 @@ use parquet::file::properties::{WriterProperties, WriterVersion};
 use crate::trace_bytes::pages::{Header, Page, pages, patched, rebuild, with_rows};
 use crate::trace_bytes::{read, stored};
 
-/// How a file is stored: the version of its pages, and whether there are dictionaries.
+/// The form of a file: the version of its pages, and whether there are dictionaries.
 #[derive(Clone, Copy, Debug)]
 struct Form {
     version: WriterVersion,
@@ -35,7 +35,7 @@ fn page(file: &[u8], column: &str) -> Page {
     pages(file).into_iter().find(|page| page.column == column && !page.dictionary).unwrap()
 }
 
-/// Where the levels of a page start: behind their length in a page of version 1.
+/// The start of a page's levels: behind their length in a page of version 1.
 fn levels(form: Form, page: &Page) -> usize {
     page.body + if form.version == WriterVersion::PARQUET_1_0 { 4 } else { 0 }
 }

@@ -37,7 +37,7 @@ fn add(values: &mut Values, name: &str, column: &ArrayRef) {
     values.entry(name.to_owned()).or_default().extend((0..wide.len()).map(text));
 }
 
-/// What the library reads; `None` where it refuses.
+/// The library's values; `None` if it refuses.
 fn library(bytes: &[u8]) -> Option<Values> {
     let bytes = Bytes::copy_from_slice(bytes);
     let read = panic::catch_unwind(AssertUnwindSafe(|| {
@@ -53,7 +53,7 @@ fn library(bytes: &[u8]) -> Option<Values> {
     Some(values)
 }
 
-/// What a scan of all columns delivers; `None` where it refuses.
+/// The values of a scan over all columns; `None` if it refuses.
 fn scan(path: &Path) -> Option<Values> {
     let set = TraceSet::open(&[Input::new(path)]).ok()?;
     let steps: Vec<String> = set.column_names().into_iter().map(str::to_owned).collect();

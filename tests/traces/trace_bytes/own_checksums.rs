@@ -100,7 +100,7 @@ fn every_way_to_read_a_column_checks_its_chunk() {
     }
 }
 
-/// What `validate` does not decode is checked all the same.
+/// Columns that `validate` does not decode are checked too.
 #[test]
 fn a_column_that_the_schema_does_not_know_is_checked() {
     let folder = tempfile::tempdir().unwrap();
@@ -206,7 +206,7 @@ fn a_file_without_checksums_is_read_as_before() {
     assert!(findings(&path).iter().all(|finding| finding.code == Code::SplitEpisode));
 }
 
-/// What is copied as it is must not get checksums of damaged bytes.
+/// Copied bytes that are damaged must not get checksums.
 #[test]
 fn a_damaged_trace_is_not_renormalized() {
     let folder = tempfile::tempdir().unwrap();

@@ -16,9 +16,9 @@ use parquet::file::serialized_reader::SerializedPageReader;
 pub struct Page {
     pub row_group: usize,
     pub column: String,
-    /// Whether it is a dictionary: the first of two pages or more.
+    /// True for a dictionary: the first of two pages or more.
     pub dictionary: bool,
-    /// Where it starts in the file, and where its bytes follow its header.
+    /// Its start in the file, and the start of its bytes after the header.
     pub offset: usize,
     pub body: usize,
     pub end: usize,
@@ -183,7 +183,7 @@ pub fn patched(file: &[u8], at: usize, byte: u8) -> Vec<u8> {
     bytes
 }
 
-/// What a child said, as text.
+/// The output of a child, as text.
 pub fn told(output: &std::process::Output) -> String {
     format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr))
 }

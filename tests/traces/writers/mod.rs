@@ -32,7 +32,7 @@ const WRITERS: [(&str, usize); 7] = [
     ("java", 80),
 ];
 
-/// What traces are asked, with the same answer of all files that have the same rows.
+/// Questions to traces with equal answers for all files that have the same rows.
 const SAME: [&[&str]; 12] = [
     &["score", "trace.parquet"],
     &["score", "trace.parquet", "--engine", "polars"],
@@ -48,7 +48,7 @@ const SAME: [&[&str]; 12] = [
     &["report", "trace.parquet", "--no-figures", "--out", "report"],
 ];
 
-/// What says something of the file itself.
+/// Questions about the file itself.
 const OF_THE_FILE: [&[&str]; 5] = [
     // It says what design the footer declares.
     &["stats", "trace.parquet"],
@@ -89,7 +89,7 @@ fn scores_by(path: &Path, definitions: &str) -> Result<Vec<Vec<String>>, Box<Stu
     Ok(score_values(&String::from_utf8(bytes).unwrap()))
 }
 
-/// What a file is refused for, or how its scores differ.
+/// The refusal of a file, or the difference of its scores.
 fn fault(path: &Path, own: &[Vec<String>]) -> Option<String> {
     match scores(path) {
         Err(error) => return Some(error.to_string()),

@@ -24,7 +24,7 @@ use trace::catch_panic::contained_on_all_threads;
 /// Rows of one batch at most.
 const BATCH: NonZeroUsize = NonZeroUsize::new(1 << 17).expect("not zero");
 
-/// Why a query has no answer.
+/// An error of a query.
 #[derive(Debug, thiserror::Error)]
 pub enum QueryError {
     /// It cannot be run as it is.
@@ -54,7 +54,7 @@ pub struct Excerpt {
     pub head: Vec<Vec<Option<String>>>,
     /// The last rows that are not among the first.
     pub tail: VecDeque<Vec<Option<String>>>,
-    /// How many rows there are.
+    /// The number of rows.
     pub rows: usize,
 }
 
@@ -131,7 +131,7 @@ fn sql_type(ty: &DataType) -> &'static str {
     }
 }
 
-/// What a subquery is by itself: the value of its only row, null if it has none, or whether it has a row.
+/// The value of a subquery: the value of its only row, null without a row, or true if it has a row.
 fn scalar(context: &mut SQLContext, query: &Query, asked: rewrite::Asked) -> Result<Value, PolarsError> {
     let found = run::collect(run::plan(context, &query.to_string())?)?;
     if asked == rewrite::Asked::Exists {

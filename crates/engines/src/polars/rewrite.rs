@@ -289,12 +289,12 @@ pub(super) fn substitute<E>(
     }
 }
 
-/// What is asked of a subquery.
+/// The form of a subquery.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Asked {
     /// The value of its only row.
     Value,
-    /// Whether it has a row.
+    /// True if the subquery has a row.
     Exists,
 }
 

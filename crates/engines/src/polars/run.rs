@@ -11,7 +11,7 @@ use metric::sql::LoweringError;
 use score::score_traces::ScoreError;
 use trace::catch_panic::contained_on_all_threads;
 
-/// What keeps Polars from answering.
+/// An error of Polars.
 #[derive(Debug, thiserror::Error)]
 pub enum PolarsError {
     /// The traces or definitions are not as they must be.
@@ -25,7 +25,7 @@ pub enum PolarsError {
     Unreadable {
         /// Its name.
         file: String,
-        /// What the operating system says.
+        /// The error of the operating system.
         source: io::Error,
     },
     /// A result beyond 64 bits.

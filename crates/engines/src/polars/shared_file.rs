@@ -9,7 +9,7 @@ use polars::prelude::LazyFrame;
 use super::answer::{Format, write};
 use super::run::PolarsError;
 
-/// Why rows are not in a file.
+/// An error while writing rows to a file.
 #[derive(Debug, thiserror::Error)]
 pub enum WriteError {
     #[error(transparent)]

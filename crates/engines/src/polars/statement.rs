@@ -55,7 +55,7 @@ pub struct Checked {
     source: Arc<Source>,
 }
 
-/// What a query asks for.
+/// The kind of query.
 #[derive(Clone, Debug)]
 pub(super) enum Asked {
     /// The rows of a SELECT.
@@ -113,7 +113,7 @@ impl Checked {
         })
     }
 
-    /// What Polars said of the query, at the place of the name that it does not know.
+    /// Polars' message, at the unknown name in the query.
     ///
     /// `columns` are those of the tables.
     pub fn fault(&self, words: &str, columns: &[String]) -> Faults {
@@ -139,7 +139,7 @@ impl Checked {
     }
 }
 
-/// What to do where Polars has no SQL for a question.
+/// The remedy where Polars has no SQL for a question.
 const OTHERWISE: &str = "ask with a JOIN or a table of WITH; or ask DuckDB, of the file that `mirrorstats score TRACES -o \
                          scores.parquet` writes, or in Python of `study.episodes`";
 
@@ -148,7 +148,7 @@ fn plain(words: &str) -> &str {
     words[..end.unwrap_or(words.len())].trim_end()
 }
 
-/// Where a word stands in a text, by itself; its start otherwise.
+/// The position of a whole word in a text; the start of the text if it is absent.
 fn word_at(text: &str, word: &str) -> usize {
     let part = |c: char| c.is_alphanumeric() || c == '_';
     let alone = |at: &usize| !text[..*at].ends_with(part) && !text[at + word.len()..].starts_with(part);

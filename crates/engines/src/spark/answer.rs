@@ -1,4 +1,4 @@
-//! What the driver answers, and the table that it brings.
+//! The driver's answer and its table.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ use score::table::{EpisodeKey, EpisodeTable, Header};
 use trace::colors;
 use trace::diagnostic::{Code, Finding};
 
-/// What happened.
+/// The answer.
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Answer {
@@ -33,7 +33,7 @@ pub(super) struct Done {
     pub(super) episodes: u64,
 }
 
-/// What is wrong with the traces.
+/// The problem in the traces.
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Refused {

@@ -49,7 +49,7 @@ pub(super) const fn domain_of(catalog: &Catalog) -> Domain {
     if catalog.domain.is_some() { Domain::Own } else { Domain::Mirror }
 }
 
-/// What was found in an episode that does not have what is asked for; null in one that has.
+/// The problem of an episode that breaks the requirement; null in every other episode.
 fn found(column: &Column, asks: Requirement<'_>) -> String {
     let x = format!("s.{}", column.name);
     let distinct = format!("SIZE(COLLECT_SET({x}))");

@@ -14,7 +14,7 @@ pub(super) struct Spark {
     pub(super) home: Option<PathBuf>,
 }
 
-/// Where `spark-submit` is below the folder of a Spark.
+/// The path of `spark-submit` below Spark's folder.
 const PROGRAM: &str = "bin/spark-submit";
 
 pub(super) fn locate() -> Result<Spark, SparkError> {

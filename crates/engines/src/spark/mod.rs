@@ -44,11 +44,11 @@ pub struct Cluster {
     pub settings: Vec<Setting>,
     /// Give up after so many seconds; never if absent.
     pub timeout_s: Option<NonZeroU32>,
-    /// Where Spark's own log goes; nowhere if absent.
+    /// The file for Spark's own log; no log if absent.
     pub log: Option<PathBuf>,
 }
 
-/// What to compute.
+/// The computation for Spark.
 #[derive(Clone, Copy, Debug)]
 pub struct Job<'a> {
     pub definitions: &'a Definitions,
@@ -64,7 +64,7 @@ pub struct Written {
     pub episodes: u64,
 }
 
-/// Why Spark gave no scores.
+/// An error of scoring with Spark.
 #[derive(Debug, thiserror::Error)]
 pub enum SparkError {
     /// There is no Spark to submit with.
@@ -85,7 +85,7 @@ pub enum SparkError {
     /// Spark runs on Java.
     #[error("Spark found no Java that it can run on; install Java 17 or newer, or set JAVA_HOME ({words})")]
     Java {
-        /// What was said.
+        /// The message.
         words: String,
     },
     /// Nobody listens at the master's address.
@@ -99,7 +99,7 @@ pub enum SparkError {
     /// Something on this machine could not be read, written or started.
     #[error("cannot {what}")]
     System {
-        /// What was tried.
+        /// The attempted action.
         what: String,
         /// The reason for the refusal.
         source: std::io::Error,
@@ -130,9 +130,9 @@ pub enum SparkError {
         file: String,
         /// The column.
         column: String,
-        /// What is needed.
+        /// The requirement.
         expected: String,
-        /// What is there.
+        /// The present state.
         found: String,
     },
     /// Spark has read other rows than the footers tell of.
@@ -149,9 +149,9 @@ pub enum SparkError {
     /// A rule of the traces does not hold.
     #[error("{finding}{}", more_episodes(*.more))]
     Rule {
-        /// What was found, in the first episode by id.
+        /// The problem of the first episode by id.
         finding: Box<Finding>,
-        /// How many more episodes break a rule.
+        /// The number of further episodes that break a rule.
         more: u64,
     },
     /// It took too long.
@@ -166,10 +166,10 @@ pub enum SparkError {
         /// The innermost cause, in one line.
         cause: String,
     },
-    /// What came back makes no sense.
+    /// The answer makes no sense.
     #[error("cannot read what the driver on Spark answered: {words}; report this as a fault of mirrorstats")]
     Answer {
-        /// What is wrong with it.
+        /// The problem.
         words: String,
     },
 }

@@ -24,7 +24,7 @@ impl Place {
         self.0.path().join("answer.json")
     }
 
-    /// Where the log of Spark goes, unless it is kept elsewhere.
+    /// The path of Spark's log, unless another one is chosen.
     pub(super) fn log(&self) -> PathBuf {
         self.0.path().join("log")
     }

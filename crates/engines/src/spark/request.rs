@@ -1,4 +1,4 @@
-//! What the driver is asked to do: everything that it needs, in one file of JSON.
+//! The driver's request: everything that it needs, in one JSON file.
 
 use serde::Serialize;
 use serde_json::{Map, Value};

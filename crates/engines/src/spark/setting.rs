@@ -10,7 +10,7 @@ pub struct Setting {
     value: String,
 }
 
-/// Why a text is no setting.
+/// An invalid setting.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SettingError {
     /// No `=`, or no key before it.
@@ -21,7 +21,7 @@ pub enum SettingError {
     Fixed {
         /// The key.
         key: String,
-        /// What depends on it.
+        /// The reason.
         why: &'static str,
     },
 }

@@ -1,4 +1,4 @@
-//! What Spark reads: files of this machine, or URIs that it alone understands.
+//! The inputs of Spark: files of this machine, or URIs that only Spark understands.
 
 use std::collections::BTreeMap;
 use std::io;

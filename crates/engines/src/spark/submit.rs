@@ -16,7 +16,7 @@ use super::request::Request;
 use super::{Cluster, SparkError, cause};
 
 const DRIVER: &str = include_str!("../../../../assets/spark/driver.py");
-/// How long a master may take to accept a connection.
+/// The time that a master has to accept a connection.
 const PATIENCE: Duration = Duration::from_secs(10);
 
 /// The child, which does not outlive its owner.

@@ -34,7 +34,7 @@ impl NewFile {
         Ok(Self { file, target: target.to_owned(), is_stream })
     }
 
-    /// Where the content is until it is committed.
+    /// The path of the content until the commit.
     pub fn temporary_path(&self) -> &Path {
         self.file.path()
     }

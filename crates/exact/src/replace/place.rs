@@ -1,4 +1,4 @@
-//! Where files go, what they are called until they are complete, and whether they can be replaced at all.
+//! Target paths, temporary names, and the check that a target can be replaced.
 
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, File};
@@ -9,9 +9,9 @@ use crate::hash;
 
 /// Every temporary name begins with this; those who look for data pass over names that begin with a dot.
 pub(super) const PREFIX: &str = ".mirrorstats-";
-/// How many random characters a temporary name has.
+/// The number of random characters in a temporary name.
 pub(super) const RANDOM: usize = 6;
-/// How many characters of a checksum end a temporary name.
+/// The number of characters of a checksum at the end of a temporary name.
 const CHECK: usize = 10;
 /// The longest part of the target's name in a temporary name, bytes: file systems allow 255 in all.
 const LONGEST_NAME: usize = 200;

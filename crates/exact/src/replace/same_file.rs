@@ -1,4 +1,4 @@
-//! Whether an output would replace one of the inputs.
+//! The check that an output does not replace an input.
 
 use std::fs;
 use std::path::Path;
@@ -11,7 +11,7 @@ use super::place::is_stream;
 pub struct TargetIsInput {
     /// The target, as typed.
     target: String,
-    /// What it is to the command.
+    /// The role of the input in the command.
     what: String,
 }
 

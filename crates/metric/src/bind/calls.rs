@@ -9,7 +9,7 @@ use crate::columns::{Level, Type};
 use exact::suggest::nearest;
 use toml_spec::Fault;
 
-/// How many steps back an expression looks; each is a join of the steps in SQL.
+/// The deepest `lag`, in steps; in SQL each step back is a join.
 const DEEPEST_LAG: u8 = 8;
 
 impl Scope<'_, '_> {

@@ -57,7 +57,7 @@ impl Binder<'_> {
         }
     }
 
-    /// What a node can be, null apart; `None` if that is any text.
+    /// The possible values of a node, apart from null; `None` for any text.
     fn possible(&self, node: NodeId) -> Option<Possible> {
         let mut possible = Possible::default();
         let (mut seen, mut todo) = (HashSet::new(), vec![node]);

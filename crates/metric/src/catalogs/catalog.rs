@@ -1,4 +1,4 @@
-//! What the later stages may know of a definition file: names, titles, directions, chance levels.
+//! A definition file as later stages know it: names, titles, directions, chance levels.
 //!
 //! A catalog travels with every score and every cell, so that a number can be traced to the
 //! sentence that defines it. It holds the definitions as text, not the plan that computes them.
@@ -20,7 +20,7 @@ pub struct Catalog {
     pub name: String,
     /// SHA-256 of the resolved definitions, 64 hexadecimal digits.
     pub hash: String,
-    /// What the traces are about; absent where that is the mirror.
+    /// The subject of the traces; absent for the mirror.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub domain: Option<String>,
     /// True if experiments that are not listed are accepted.
@@ -42,9 +42,9 @@ pub struct Metric {
     pub title: String,
     /// A rate (0/1 an episode) or a quantity (an integer an episode).
     pub kind: Kind,
-    /// What is counted: `rate`, `steps`, `permille`, ...
+    /// The unit: `rate`, `steps`, `permille`, ...
     pub unit: String,
-    /// Which direction is better.
+    /// The better direction.
     pub better: Better,
     /// The section of the paper that defines it; empty where there is none.
     pub section: String,
@@ -52,13 +52,13 @@ pub struct Metric {
     pub help: String,
     /// The expression of an episode's value, as written.
     pub value: String,
-    /// Where the metric is defined; everywhere if absent.
+    /// The condition for the metric to be defined; defined everywhere if absent.
     pub when: Option<String>,
-    /// Which standard error the definition asks for.
+    /// The standard error that the definition asks for.
     pub se: StandardError,
     /// The value of blind guessing in every experiment, unless the experiment says otherwise.
     pub chance: Option<Ratio>,
-    /// What it measures, where the definition says it.
+    /// The measured quantity, as declared in the definition.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub measures: Option<Measures>,
     /// The values that it can have, where the definition says it.
@@ -72,7 +72,7 @@ pub struct Metric {
     pub completes: Option<String>,
 }
 
-/// What an episode's integer means.
+/// The meaning of an episode's integer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
@@ -92,7 +92,7 @@ impl Kind {
     }
 }
 
-/// Which direction of a metric is the better one.
+/// The better direction of a metric.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Better {
@@ -172,7 +172,7 @@ impl Catalog {
         catalog
     }
 
-    /// Where `experiment` stands: its `order`, then unknown ones last.
+    /// The rank of `experiment`: its `order`; unknown experiments are last.
     pub fn experiment_rank(&self, experiment: &str) -> usize {
         self.experiment.get_index_of(experiment).unwrap_or(self.experiment.len())
     }

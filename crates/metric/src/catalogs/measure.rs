@@ -1,4 +1,4 @@
-//! What a metric measures, and the values that it can have: as its definition declares it, else as its unit says.
+//! The measured quantity of a metric and its possible values: as declared, else by the unit.
 
 use std::sync::LazyLock;
 
@@ -10,13 +10,13 @@ use crate::catalog::{Kind, Metric};
 use crate::file::{Document, MetricEntry};
 use toml_spec::{Fault, Place};
 
-/// What the integers of a metric measure.
+/// The quantity that a metric measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Measures {
     /// 0 or 1 an episode.
     Rate,
-    /// How long an episode took; unfinished episodes are censored.
+    /// The length of an episode; unfinished episodes are censored.
     Duration,
     /// A number of things, never negative.
     Count,
@@ -36,7 +36,7 @@ pub struct ValueRange {
     pub most: Option<i64>,
 }
 
-/// What metrics of one unit measure.
+/// The quantity that metrics of one unit measure.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Unit {
@@ -49,7 +49,7 @@ static UNITS: LazyLock<IndexMap<String, Unit>> = LazyLock::new(|| {
 });
 
 impl Metric {
-    /// What it measures: as declared, else as its unit says; `None` where neither says it.
+    /// The measured quantity: as declared, else by the unit; `None` if neither says it.
     pub fn measures(&self) -> Option<Measures> {
         match self.kind {
             Kind::Rate => Some(Measures::Rate),

@@ -1,4 +1,4 @@
-//! How metrics of a catalog belong together: durations with what finishes them, rates with the same among finished episodes.
+//! Relations between metrics of a catalog: durations with their completion, rates with the same rate among completed episodes.
 //!
 //! Rule: what a definition declares holds. Where it declares nothing its expressions may say it, whatever the metrics are
 //! called. A metric that repeats another one where some moment is not null, and that other one is 0 without that moment: so
@@ -62,7 +62,7 @@ struct Completed {
     moment: Expr,
 }
 
-/// What an expression is where a moment is null.
+/// The value of an expression where a moment is null.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Without {
     Null,
@@ -108,7 +108,7 @@ impl Reader<'_> {
         parse(text).map_or(Without::Open, |expr| self.without(moment, &expr, depth))
     }
 
-    /// What an expression is where the moment is null.
+    /// The value of an expression where the moment is null.
     fn without(&self, moment: &Expr, expr: &Expr, depth: usize) -> Without {
         let of = |part: &Expr| self.without(moment, part, depth);
         let null_if = |is_null| if is_null { Without::Null } else { Without::Open };

@@ -10,7 +10,7 @@ use crate::columns::Columns;
 use crate::definitions::Definitions;
 use crate::file::FileError;
 
-/// Why a catalog gives no definitions.
+/// An error while restoring definitions from a catalog.
 #[derive(Debug, thiserror::Error)]
 pub enum RestoreError {
     /// Its expressions have faults over the columns that there are.
@@ -18,7 +18,7 @@ pub enum RestoreError {
     Faults {
         /// The definitions.
         name: String,
-        /// What is wrong.
+        /// The problem.
         source: FileError,
     },
     /// It does not say what its hash says.

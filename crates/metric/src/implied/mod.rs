@@ -1,4 +1,4 @@
-//! What definitions say of their metrics' values before any trace is read.
+//! Facts about the metrics' values that follow from the definitions alone.
 //!
 //! Rule: everything here holds in all traces. Where a metric is defined, which other metric it restricts to those
 //! episodes, and between which integers it lies are read off the checked plan, never off names; what the plan does
@@ -12,7 +12,7 @@ use self::possible::{Possible, Traces};
 use super::catalog::Kind;
 use super::plan::{Comparison, Constant, NodeId, Op, Output, Plan};
 
-/// What is known of one metric.
+/// The known facts about one metric.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Implied {
     /// The smallest and the largest value, where the metric is defined.
@@ -46,7 +46,7 @@ pub struct Restricted {
     pub elsewhere: Option<i64>,
 }
 
-/// What is known of each metric of a plan, in episodes of 1 to `steps` steps.
+/// The known facts about each metric of a plan, in episodes of 1 to `steps` steps.
 ///
 /// `has_value` tells whether a column has a value in each row of each trace.
 pub fn implied(plan: &Plan, steps: u32, has_value: fn(&str) -> bool) -> IndexMap<String, Implied> {

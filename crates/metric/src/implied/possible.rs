@@ -1,4 +1,4 @@
-//! Which values each node of a plan can have: an interval, and whether null is among them.
+//! The possible values of each node of a plan: an interval, and null or not.
 //!
 //! Rule: never less than what some trace gives. Truth values are 0 and 1; texts and floats have no interval of
 //! their own, and what compares them is open.
@@ -90,7 +90,7 @@ pub(super) struct Traces<'p> {
 }
 
 impl Traces<'_> {
-    /// What a node can be; `assumed` nodes are what is assumed of them.
+    /// The possible values of a node, given the values of `assumed` nodes.
     ///
     /// Each first and last moment that the node needs is taken to be there, and taken not to be: so it is known that
     /// `x is not null and x > 3` is never null.

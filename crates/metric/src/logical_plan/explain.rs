@@ -11,7 +11,7 @@ use crate::definitions::Definitions;
 use crate::syntax::{self, BinaryOp, Expr, ExprKind, Literal};
 use toml_spec::Written;
 
-/// What a metric is, from its title down to the columns it reads.
+/// A metric in words, from its title down to the columns that it reads.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Explanation {
     /// The metric's name.
@@ -20,19 +20,19 @@ pub struct Explanation {
     pub title: String,
     /// Rate or quantity.
     pub kind: Kind,
-    /// What is counted.
+    /// The unit.
     pub unit: String,
-    /// Which direction is better.
+    /// The better direction.
     pub better: Better,
     /// The section of the paper; may be empty.
     pub section: String,
     /// For a reader of the table; may be empty.
     pub help: String,
-    /// Which standard error goes with its mean.
+    /// The standard error of its mean.
     pub se: StandardError,
     /// The expression as written.
     pub value: String,
-    /// Where it is defined, as written; everywhere if absent.
+    /// The condition for it to be defined, as written; defined everywhere if absent.
     pub when: Option<String>,
     /// The same in words.
     pub words: String,
@@ -56,7 +56,7 @@ pub struct NamedExpression {
 }
 
 impl Definitions {
-    /// What the metric of this name is; `None` if there is no such metric.
+    /// The explanation of the metric; `None` if there is no such metric.
     pub fn explain(&self, metric: &str) -> Option<Explanation> {
         let entry = self.catalog.metric.get(metric)?;
         let written = self.document().metrics.get(metric)?;

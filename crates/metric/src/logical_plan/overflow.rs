@@ -1,4 +1,4 @@
-//! Which integers of a plan may leave 64 bits, by the ranges of what they are made of.
+//! Integers of a plan that may exceed 64 bits, by the ranges of their operands.
 //!
 //! The native engine looks at every number. Other engines wrap in silence, so that the statement for them needs a
 //! check; most plans need none, since a count of steps or a sum of pixels cannot leave 64 bits in any trace.

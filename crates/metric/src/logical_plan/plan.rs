@@ -26,7 +26,7 @@ pub struct Node {
     pub op: Op,
     /// The type of the result.
     pub ty: Type,
-    /// How often there is a result.
+    /// The level of the result: per step or per episode.
     pub level: Level,
 }
 
@@ -51,13 +51,13 @@ pub enum Op {
     Or(NodeId, NodeId),
     /// A comparison of two values of one type.
     Compare(Comparison, NodeId, NodeId),
-    /// Whether two values differ, null being a value like others; never null.
+    /// True if two values differ, with null as an ordinary value; never null.
     Distinct(NodeId, NodeId),
-    /// Whether there is no value; never null.
+    /// True if the value is null; never null.
     IsNull(NodeId),
-    /// Whether a truth value is true; never null.
+    /// True if a truth value is true; never null.
     IsTrue(NodeId),
-    /// Whether a truth value is false; never null.
+    /// True if a truth value is false; never null.
     IsFalse(NodeId),
     /// Sum, difference, product, quotient or remainder; a result beyond 64 bits is an error.
     Arithmetic(Arithmetic, NodeId, NodeId),
@@ -71,7 +71,7 @@ pub enum Op {
     },
     /// The first value that is not null.
     Coalesce(Vec<NodeId>),
-    /// Whether a text contains a match of a regular expression (syntax of the `regex` crate).
+    /// True if a text contains a match of a regular expression (syntax of the `regex` crate).
     Matches(NodeId, String),
     /// 1 for true, 0 for false.
     IntFromBool(NodeId),
@@ -137,16 +137,16 @@ pub enum Arithmetic {
     Remainder,
 }
 
-/// What leads from steps down to an episode. A null predicate counts as not holding.
+/// A function from the steps of an episode to one value. A null predicate counts as false.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Aggregate {
     /// The t of the first step where the predicate holds, or null.
     First,
     /// The t of the last step where the predicate holds, or null.
     Last,
-    /// Whether it holds at some step; never null.
+    /// True if the predicate is true at some step; never null.
     Any,
-    /// Whether it holds at every step; never null.
+    /// True if the predicate is true at every step; never null.
     All,
     /// At how many steps it holds; never null.
     Count,
@@ -186,7 +186,7 @@ pub struct Plan {
     pub lets: Vec<(String, NodeId)>,
     /// Aggregates and lookups as they were first written, for evidence.
     pub sources: HashMap<NodeId, String>,
-    /// Which episodes count; all if absent. An episode-level truth value.
+    /// The filter, an episode-level truth value; all episodes count if absent.
     pub filter: Option<NodeId>,
 }
 

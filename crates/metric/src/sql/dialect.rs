@@ -1,4 +1,4 @@
-//! What engines write differently: names, constants, patterns, and the few functions that not all of them have.
+//! Differences between engines: names, constants, patterns, and the few functions that some of them lack.
 
 use sqlparser::keywords::ALL_KEYWORDS;
 

@@ -42,7 +42,7 @@ impl Layout<'_> {
         }
     }
 
-    /// What is written of the step before the one that is read; null where there is none.
+    /// The expression for the previous step; null at the first step.
     fn lagged(&self, written: impl FnOnce() -> String) -> String {
         let lag = self.lag.get();
         self.lag.set(lag + 1);

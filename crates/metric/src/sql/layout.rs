@@ -1,4 +1,4 @@
-//! What is computed where: in which pass over the steps, as which column, and what is written out once for all its users.
+//! The layout of the computation: the pass and column of each node, and the expressions that are written once for all users.
 
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -14,7 +14,7 @@ use exact::budget::Limit;
 /// The columns of an episode that every statement gives, in the order of the episode table, after `episode_id`.
 pub(super) const KEYS: [&str; 4] = ["model", "experiment", "seed", "run"];
 
-/// Where the nodes of a plan stand in a statement.
+/// The position of each node of a plan in a statement.
 #[derive(Clone)]
 pub(super) struct Layout<'p> {
     pub(super) plan: &'p Plan,

@@ -20,7 +20,7 @@ pub(super) struct Statement<'l, 'p> {
     passes: usize,
 }
 
-/// What an aggregate reads of the steps.
+/// The steps that an aggregate reads.
 #[derive(Default)]
 struct Reads {
     columns: BTreeSet<String>,

@@ -14,7 +14,7 @@ const SHALLOW: usize = 1024;
 /// The stack for a tree that is as deep as the longest text can make it, in bytes; only what is used of it is memory.
 const STACK: usize = 128 << 20;
 
-/// What is wrong with a text.
+/// A syntax error of a text.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SyntaxFault {
     pub message: String,
@@ -35,7 +35,7 @@ pub struct Grammar {
     pub longest: usize,
     /// The most words and signs.
     pub most_tokens: usize,
-    /// What to do about one that is too long or too deep.
+    /// The remedy for a text that is too long or too deep.
     pub help: Option<&'static str>,
 }
 

@@ -20,16 +20,16 @@ pub use write::{Held, finish, pass_on};
 /// The key of the checksums in a footer.
 pub const KEY: &str = "mirrorstats.checksums";
 
-/// What footers name as the program that wrote the file.
+/// The name of the writing program in footers.
 pub const CREATED_BY: &str = concat!("mirrorstats version ", env!("CARGO_PKG_VERSION"));
 
 /// The only algorithm so far.
 const ALGORITHM: &str = "CRC-32";
 
-/// Where the first chunk of a file may start: behind the magic number.
+/// The least offset of a file's first chunk, behind the magic number.
 const FIRST: u64 = 4;
 
-/// What stands under the key, as JSON.
+/// The JSON value under the key.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Stated {

@@ -13,10 +13,10 @@ use serde::Serialize;
 use super::{ALGORITHM, CREATED_BY, FIRST, KEY, Stated, digits, range};
 use crate::footer_shape::footer_bytes;
 
-/// How much is read at a time to be summed.
+/// The number of bytes that are read and summed at a time.
 const BLOCK: usize = 256 << 10;
 
-/// Whether a file has checksums.
+/// The state of a file's checksums.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Checksums {
@@ -36,7 +36,7 @@ pub struct ChunkChecksums {
     columns: usize,
 }
 
-/// Why the checksums of a footer are refused.
+/// An error of a footer's checksums.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Fault {
     /// They cannot be read, or are not those of the file's chunks: what is there.
@@ -119,7 +119,7 @@ fn is_nearly(found: Option<&str>, name: &str) -> bool {
     equal.count() * 2 >= name.len()
 }
 
-/// What stands under the key. There is one way to write it, so that its own digits lie at one place.
+/// Parses the value under the key. There is one way to write it, so that its own digits have a fixed position.
 fn parsed(text: &str) -> Result<Stated, Fault> {
     let stated: Stated = serde_json::from_str(text).map_err(|error| Fault::Malformed(error.to_string()))?;
     if stated.algorithm != ALGORITHM {

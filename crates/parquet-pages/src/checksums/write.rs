@@ -24,7 +24,7 @@ impl<W: Write> Held<W> {
         Self { out, bytes: Vec::new(), start: 0, end: FIRST, chunks: Vec::new() }
     }
 
-    /// How many row groups are summed.
+    /// The number of row groups summed.
     pub fn row_groups(&self) -> usize {
         self.chunks.len()
     }

@@ -1,4 +1,4 @@
-//! What the decompressed pages of a column hold, checked before the Parquet library decodes them.
+//! The check of a column's decompressed pages, before the Parquet library decodes them.
 //!
 //! The library takes any level that is not 0 for 1, and ignores what stands behind the last level. Rule: a page that is
 //! let through has a sound level for each row, as many values as its levels say, and keys within its dictionary. Bytes behind
@@ -68,7 +68,7 @@ impl Texts {
     }
 }
 
-/// What is wrong with a page: expected and found.
+/// The problem of a page: expected and found.
 type Fault = (&'static str, String);
 
 /// The rows of a data page: how many are there, and how many of them null where that is declared.

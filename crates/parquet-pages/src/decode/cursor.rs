@@ -18,7 +18,7 @@ use crate::error::{FaultSlot, Unsupported};
 use crate::stored::bytes::{Place, Store};
 use crate::stored::reader::Pages;
 
-/// How rows are to be held.
+/// The form of the rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
     /// One value per row, or one key per row.
@@ -27,7 +27,7 @@ pub enum Form {
     Runs,
 }
 
-/// Where the reading of a column is.
+/// The position in a column's pages.
 pub struct Cursor {
     pages: Pages,
     physical: Physical,

@@ -1,4 +1,4 @@
-//! How long texts are that are stored as what differs from the one before: a few bytes may stand for a long text each.
+//! The lengths of texts that are stored as differences from the previous text: a few bytes can expand to a long text each.
 //!
 //! Source: the Parquet format's "Delta Strings" and "Delta Encoding".
 

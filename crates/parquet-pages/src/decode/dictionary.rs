@@ -11,7 +11,7 @@ use arrow::datatypes::{Int32Type, Int64Type};
 use crate::column::Keys;
 use crate::error::Unsupported;
 
-/// What the keys of a column stand for.
+/// The values that the keys of a column refer to.
 pub(crate) enum Dictionary {
     Texts(ArrayRef),
     Ints(ArrayRef),

@@ -22,7 +22,7 @@ pub struct Library {
     pub checksums: ChunkChecksums,
     /// The row groups, in this order.
     pub row_groups: Vec<usize>,
-    /// Where the first fault of a page is left.
+    /// The slot for the first fault of a page.
     pub slot: FaultSlot,
     /// True if texts are asked for row by row, not as keys into a dictionary.
     pub writes_out: bool,

@@ -173,7 +173,7 @@ const GROUP: usize = 8;
 /// The Parquet library takes no longer run.
 const MOST_GROUPS: usize = i32::MAX as usize / GROUP;
 
-/// What stored numbers are made into.
+/// A number type that stored numbers decode to.
 pub(crate) trait Number: Copy + Default + From<u8> {
     const WIDTH: usize;
 

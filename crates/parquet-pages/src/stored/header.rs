@@ -9,7 +9,7 @@ use crate::thrift::{Compact, Fault, Field, Wire};
 
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Header {
-    /// How long it is itself, in bytes.
+    /// Its own length, in bytes.
     pub(crate) length: usize,
     pub(crate) stored: usize,
     pub(crate) whole: usize,
@@ -18,7 +18,7 @@ pub(crate) struct Header {
     pub(crate) kind: Kind,
     /// Values, the nulls among them; keys of a dictionary.
     pub(crate) values: usize,
-    /// What only a page of version 2 declares; the levels, in bytes, are not compressed.
+    /// The fields of a version 2 page alone; the levels, in bytes, are not compressed.
     nulls: usize,
     rows: usize,
     pub(crate) levels: usize,
@@ -34,7 +34,7 @@ pub(crate) enum Kind {
     DataV2,
 }
 
-/// What the footer says of a column of a row group.
+/// The footer's metadata of a column of a row group.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct About {
     pub(crate) codec: Compression,

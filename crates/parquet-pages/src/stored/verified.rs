@@ -20,7 +20,7 @@ use crate::error::{FaultKind, FaultSlot, PageFault, Part};
 use crate::thrift;
 use exact::budget::Exceeded;
 
-/// How much of a file is read to find a header in; most are shorter than 100 bytes.
+/// The number of bytes read to find a header; most headers are shorter than 100 bytes.
 const HEADER: usize = 1 << 10;
 /// The longest header: texts among its statistics may be long.
 const LONGEST_HEADER: usize = 16 << 20;
@@ -33,13 +33,13 @@ pub(crate) struct Verified {
     start: u64,
     end: u64,
     about: About,
-    /// Whether the column has one value per row, null or not.
+    /// True if the column has one value per row, null or not.
     flat: bool,
     progress: Mutex<Progress>,
     slot: FaultSlot,
 }
 
-/// How far the pages are read.
+/// The progress through the pages.
 #[derive(Default)]
 struct Progress {
     page: Option<(u64, Header)>,

@@ -1,4 +1,4 @@
-//! How many episodes stand behind each row of a published table.
+//! The number of episodes behind each row of a published table.
 //!
 //! Written as `21`, or `E1=21,E2=20`, or both: a number by itself holds for all other rows. A key is an experiment, or
 //! an experiment and a model as `E1/GPT 5.1`, which precedes.
@@ -16,7 +16,7 @@ pub struct Episodes {
     named: BTreeMap<String, u64>,
 }
 
-/// Why a text does not say how many episodes there are.
+/// An error of a text with numbers of episodes.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages say it")]
 pub enum EpisodesError {

@@ -1,4 +1,4 @@
-//! Why tables cannot be audited.
+//! Errors of an audit.
 
 use super::{NamedTable, Terms};
 use crate::published::CellLabel;
@@ -6,7 +6,7 @@ use exact::escape::visible;
 use exact::number::Decimal;
 use exact::suggest::hint;
 
-/// Why tables cannot be audited.
+/// An error of an audit.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages say it")]
 pub enum AuditError {

@@ -2,7 +2,7 @@
 //!
 //! Rule: a cell is called infeasible only if no integers print it, under the definitions, the number of episodes and
 //! the rounding of its table. A table has one rounding, the one that leaves the fewest of its cells infeasible.
-//! What is not printed is open, so that feasible says no more than that arithmetic has no objection.
+//! Cells that are not printed are unconstrained, so feasible means only that arithmetic does not object.
 
 mod emphasis;
 pub mod episodes;
@@ -28,13 +28,13 @@ use metric::catalog::{Catalog, Kind};
 use metric::implied::Implied;
 use statistics::feasible::attain::Search;
 
-/// What an audit goes by.
+/// The assumptions of an audit.
 #[derive(Clone, Copy, Debug)]
 pub struct Terms<'t> {
     pub catalog: &'t Catalog,
-    /// What their definitions say of their values.
+    /// The facts that their definitions imply about their values.
     pub implied: &'t IndexMap<String, Implied>,
-    /// How many episodes each row has.
+    /// The number of episodes of each row.
     pub episodes: &'t Episodes,
     /// The style whose tables say where undefined prints as zero, and what is emphasised.
     pub style: &'t Style,
@@ -50,12 +50,12 @@ pub struct NamedTable {
     pub published: Published,
 }
 
-/// What an audit found.
+/// The findings of an audit.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Audit {
-    /// How many cells the tables have.
+    /// The number of cells of the tables.
     pub cells: usize,
-    /// How many of them some data can give.
+    /// The number of feasible cells.
     pub feasible: usize,
     /// The others, in the order of the tables.
     pub infeasible: Vec<InfeasibleCell>,
@@ -78,9 +78,9 @@ pub struct Audit {
 pub struct AuditedTable {
     /// The name of its file.
     pub table: String,
-    /// How many cells it has.
+    /// The number of its cells.
     pub cells: usize,
-    /// How many of them some data can give.
+    /// The number of its feasible cells.
     pub feasible: usize,
     /// The rounding that it is taken to have.
     pub rounding: Rounding,
@@ -93,7 +93,7 @@ pub struct AuditedTable {
 pub struct RoundingCount {
     /// The rounding.
     pub rounding: Rounding,
-    /// How many cells of the table no data can give under it.
+    /// The number of the table's infeasible cells under this assumption.
     pub infeasible: usize,
 }
 
@@ -102,16 +102,16 @@ pub struct RoundingCount {
 pub struct InfeasibleCell {
     /// Its table.
     pub table: String,
-    /// Which cell.
+    /// The cell.
     #[serde(flatten)]
     pub cell: CellLabel,
-    /// What is published.
+    /// The published text.
     pub published: String,
-    /// What of the cell is infeasible.
+    /// The infeasible field of the cell.
     pub field: Field,
     /// The reason why, in a sentence.
     pub reason: String,
-    /// What some data could print in its place, the nearest below and above.
+    /// The nearest feasible prints, below and above.
     pub nearest: Vec<String>,
     /// Other roundings under which the cell by itself is feasible, and with which more cells of its table are not.
     pub feasible_rounded: Vec<Rounding>,
@@ -122,7 +122,7 @@ pub struct InfeasibleCell {
 pub struct ZeroCell {
     /// Its table.
     pub table: String,
-    /// Which cell.
+    /// The cell.
     #[serde(flatten)]
     pub cell: CellLabel,
 }

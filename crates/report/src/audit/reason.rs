@@ -1,4 +1,4 @@
-//! Why no data can give a cell, in a sentence, with what data could give in its place.
+//! The reason why no data can give a cell, in a sentence, with feasible values in its place.
 
 use std::collections::BTreeSet;
 

@@ -140,7 +140,7 @@ impl Row {
     }
 }
 
-/// Whether a metric can print as some cells say.
+/// The question whether a metric can print these cells.
 #[derive(Clone, Copy)]
 pub(super) struct Question<'q> {
     pub(super) row_n: u64,

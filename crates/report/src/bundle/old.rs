@@ -1,4 +1,4 @@
-//! Which files of a folder are those of an older report.
+//! Files of an older report in the same folder.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -28,7 +28,7 @@ pub struct Pair<T> {
     pub after: T,
 }
 
-/// What changed from one scoring to another.
+/// Changes from one scoring to another.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Changes {
     /// The definitions of each side.
@@ -41,7 +41,7 @@ pub struct Changes {
     pub episodes: Overlap<EpisodeName>,
     /// The columns that the cells are grouped by.
     pub by: Vec<String>,
-    /// How many cells were compared.
+    /// The number of compared cells.
     pub cells_compared: u64,
     /// The cells that moved, in the order of the tables.
     pub cells: Vec<CellChange>,
@@ -49,7 +49,7 @@ pub struct Changes {
     pub flips: Vec<Flip>,
 }
 
-/// Which definitions gave some scores.
+/// The definitions behind some scores.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct DefinitionsName {
     /// The file's own name; never a path.
@@ -65,22 +65,22 @@ pub struct Rewritten {
     pub name: String,
     /// `let`, `value`, `when`, or `se`.
     pub part: &'static str,
-    /// How it is written; null where the side has none.
+    /// The text of the definition; null on a side without one.
     pub text: Pair<Option<String>>,
 }
 
-/// What both sides have, and what only one has.
+/// Items of both sides, and items of one side only.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Overlap<T> {
-    /// How many both have.
+    /// The number of items of both sides.
     pub both: u64,
-    /// What only the old scoring has.
+    /// The items of the old scoring only.
     pub only_before: Vec<T>,
-    /// What only the new scoring has.
+    /// The items of the new scoring only.
     pub only_after: Vec<T>,
 }
 
-/// What names an episode.
+/// The name of an episode.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct EpisodeName {
     /// Unique in a report.
@@ -135,7 +135,7 @@ pub struct Flip {
     /// The episode.
     #[serde(flatten)]
     pub episode: EpisodeName,
-    /// What it was and what it is; null where the metric is undefined.
+    /// The old and the new value; null where the metric is undefined.
     pub value: Pair<Option<i64>>,
     /// The timesteps that decided it, ascending; null where the traces that say so were not given.
     pub timesteps: Pair<Option<Vec<i64>>>,
@@ -225,7 +225,7 @@ fn names(table: &EpisodeTable) -> Vec<String> {
 }
 
 impl Overlap<String> {
-    /// Which names both sides have, in the order given.
+    /// The names of both sides, in the order given.
     pub fn of(before: &[String], after: &[String]) -> Self {
         let without = |names: &[String], others: &[String]| -> Vec<String> {
             names.iter().filter(|name| !others.contains(name)).cloned().collect()

@@ -18,7 +18,7 @@ pub const KEY_COLUMNS: [&str; 5] = ["experiment", "model", "seed", "run", "episo
 /// The columns that cells are grouped by unless asked otherwise.
 pub const DEFAULT_BY: [&str; 2] = ["experiment", "model"];
 
-/// Why episodes cannot be grouped as asked.
+/// An error of grouping episodes.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages say it")]
 pub enum GroupError {
@@ -75,7 +75,7 @@ pub fn membership(table: &EpisodeTable, by: &[String]) -> Result<Vec<usize>, Gro
     Ok(Membership::of(table, by)?.of_row)
 }
 
-/// Which group each episode is in.
+/// The group of each episode.
 struct Membership {
     keys: Vec<Vec<KeyValue>>,
     of_row: Vec<usize>,

@@ -68,7 +68,7 @@ impl Cells {
 pub struct Group {
     /// A value for each column of `by`.
     pub key: Vec<KeyValue>,
-    /// How many episodes there are, defined or not.
+    /// The number of episodes, defined or not.
     pub episodes: u64,
     /// The moments of each metric, in the order of [`Cells::metrics`].
     pub moments: Vec<Moments>,

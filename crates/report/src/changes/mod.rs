@@ -1,4 +1,4 @@
-//! What changed from one scoring to another, as text for people: `lists` are its tables, `words` their fields.
+//! Changes from one scoring to another, as text for people: `lists` are its tables, `words` their fields.
 //!
 //! Rule: a list that is cut says how many lines it leaves out; a number stands beside the exact counts it comes from.
 
@@ -10,7 +10,7 @@ use std::fmt::Write as _;
 use crate::cells::diff::{Changes, DefinitionsName, Overlap};
 use exact::escape::visible;
 
-/// How much of each list is shown.
+/// The number of items shown of each list.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limit(pub usize);
 

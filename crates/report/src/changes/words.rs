@@ -12,7 +12,7 @@ const PLACES: u32 = 3;
 /// The most runs of timesteps that a line shows.
 const MOST_RUNS: usize = 6;
 
-/// What stands where there is no value.
+/// The text for a missing value.
 pub(super) const UNDEFINED: &str = "undefined";
 
 /// `1 cell`, `2 cells`.

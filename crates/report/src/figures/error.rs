@@ -1,4 +1,4 @@
-//! Why a figure cannot be drawn.
+//! Errors of drawing a figure.
 
 use super::{FigureName, FigureWidth};
 

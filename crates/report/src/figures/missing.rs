@@ -1,4 +1,4 @@
-//! What cannot be shown, with the reason: no episodes, or an undefined metric.
+//! Missing values, with the reason: no episodes, or an undefined metric.
 
 use super::kit::{Member, Point, Roster, Sheet, Swatch, leading, lettering, marker};
 use super::matrix::{Matrix, MetricId, Reading};
@@ -80,7 +80,7 @@ impl<'a> Strip<'a> {
     }
 }
 
-/// What hatches and crosses mean, as far as `readings` have any.
+/// The legend of hatches and crosses, if `readings` have any.
 pub fn signs(readings: impl Iterator<Item = Reading>) -> Vec<(Swatch, String)> {
     let mut has_undefined = false;
     let mut has_empty = false;
@@ -93,7 +93,7 @@ pub fn signs(readings: impl Iterator<Item = Reading>) -> Vec<(Swatch, String)> {
     undefined.into_iter().chain(empty).collect()
 }
 
-/// What the words of these strips mean; nothing where there are none.
+/// The legend of words in these strips; empty if there are none.
 pub fn strip_signs(strips: &[Strip<'_>]) -> Option<(Swatch, String)> {
     let has_any = strips.iter().any(|strip| strip.height > 0.0);
     has_any.then(|| (Swatch::None, "--: undefined".to_owned()))

@@ -36,18 +36,18 @@ use score::table::EpisodeTable;
 use score::timeline::Timeline;
 use shown::{FigureSheets, SHOWN};
 
-/// What figures are drawn from.
+/// The inputs of figures.
 #[derive(Clone, Copy, Debug)]
 pub struct Input<'a> {
     /// The cells by experiment and model.
     pub cells: &'a Cells,
     /// Models in the order to show them, a style's `row_order`; those not named follow in the palette's order, then by name.
     pub order: &'a [String],
-    /// Which metrics figures show, and their captions.
+    /// The metrics and captions of each figure.
     pub sheets: &'a FigureSheets,
     /// One row per episode: for `decision-curve`.
     pub episodes: Option<&'a EpisodeTable>,
-    /// How episodes of an open question ended: for `e5-outcomes`.
+    /// Endings of episodes of an open question, for `e5-outcomes`.
     pub outcomes: Option<&'a Outcomes>,
     /// Landmarks of each episode: for `gaze`.
     pub timelines: Option<&'a [Timeline]>,
@@ -116,7 +116,7 @@ pub fn draw(name: FigureName, input: &Input<'_>) -> Result<Figure, FigureError> 
     })
 }
 
-/// What every figure is drawn from.
+/// The inputs that all figures share.
 #[derive(Clone, Copy, Debug)]
 struct Scene<'a> {
     matrix: &'a Matrix<'a>,

@@ -25,7 +25,7 @@ pub enum FigureName {
     Slopes,
     /// The share of episodes decided by step t.
     DecisionCurve,
-    /// When the mirror was in view, episode by episode.
+    /// The mirror's time in view, per episode.
     Gaze,
 }
 
@@ -48,7 +48,7 @@ impl FigureName {
         self.texts()[0]
     }
 
-    /// What it is called, for headings and for those who do not see it.
+    /// The title, for headings and screen readers.
     pub const fn title(self) -> &'static str {
         self.texts()[1]
     }

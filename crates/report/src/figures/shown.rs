@@ -1,4 +1,4 @@
-//! Which metrics a figure shows, and the words below it: what a style says of it, as far as the cells have it.
+//! The metrics and the caption of a figure, as a style declares them and as far as the cells have them.
 
 use std::sync::LazyLock;
 
@@ -11,7 +11,7 @@ use super::{FigureError, FigureName};
 use metric::catalog::{Kind, Measures};
 use metric::relations::Relations;
 
-/// What a style says of one figure.
+/// A style's declaration of one figure.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FigureSheet {
@@ -21,10 +21,10 @@ pub struct FigureSheet {
     pub caption: Option<String>,
 }
 
-/// What a style says of its figures, by name.
+/// A style's figures, by name.
 pub type FigureSheets = IndexMap<String, FigureSheet>;
 
-/// What every figure shows unless a style says otherwise.
+/// The default metrics and captions of every figure.
 pub static SHOWN: LazyLock<FigureSheets> =
     LazyLock::new(|| toml::from_str(FIGURES).expect("the file comes with the program"));
 /// The same as TOML, for styles to lie over.

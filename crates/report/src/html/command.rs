@@ -12,7 +12,7 @@ use exact::escape::visible;
 /// The most folders or files that a command names; more are named by the folder that they are in.
 const MOST_NAMED: usize = 3;
 
-/// What other commands are told, so that they read what the page was made of.
+/// Arguments for other commands that read the page's traces.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Recordings {
     /// The traces, as the manifest names them.

@@ -1,4 +1,4 @@
-//! What the page's script reads: metrics, groups, episodes and tests as JSON inside a `<script>` element.
+//! The data of the page's script: metrics, groups, episodes and tests as JSON inside a `<script>` element.
 //!
 //! Rule: the JSON has no `<`, `>` or `&`, so nothing in it can end the element or begin a comment. Integers that
 //! JavaScript would round are strings.

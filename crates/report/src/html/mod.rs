@@ -32,7 +32,7 @@ use score::table::EpisodeTable;
 
 pub use command::{Recordings, word};
 
-/// What the page is made of.
+/// The contents of the page.
 #[derive(Clone, Copy, Debug)]
 pub struct Page<'a> {
     /// The tables, in order.
@@ -44,11 +44,11 @@ pub struct Page<'a> {
     pub manifest: &'a Manifest,
     /// The figures, in order; none leaves the section out.
     pub figures: &'a [Figure<'a>],
-    /// What can be concluded; none leaves the section out.
+    /// The statistics; without them the page has no such section.
     pub statistics: Option<&'a Statistics>,
     /// The lists below the statistics, a section each.
     pub lists: &'a [ListTable],
-    /// What the episodes are of; none where no command looks into them, as into scores.
+    /// The recordings behind the episodes; absent for files of scores.
     pub recordings: Option<&'a Recordings>,
 }
 
@@ -59,13 +59,13 @@ pub struct Figure<'a> {
     pub name: &'a str,
     /// Its heading.
     pub title: &'a str,
-    /// How to read it.
+    /// The explanation below it.
     pub caption: &'a str,
     /// An `<svg>` element, taken as it is: it must have escaped the names in it.
     pub svg: &'a str,
 }
 
-/// Why a page cannot be made.
+/// An error while making a page.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages say it")]
 pub enum HtmlError {

@@ -1,4 +1,4 @@
-//! Which cells of a column stand out: the best and the second best of those that compete.
+//! The cells of a column that stand out: the best and the second best of those that compete.
 //!
 //! Competitors are the models of one group under one metric. Undefined cells do not compete, and a metric without
 //! a better direction has no best.

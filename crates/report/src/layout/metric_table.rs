@@ -32,7 +32,7 @@ pub struct MetricTable {
     pub is_tied: bool,
     /// The key columns of a row, as the episodes were grouped.
     pub keys: Vec<String>,
-    /// What a row is: `Model`.
+    /// The heading of the rows: `Model`.
     pub row_heading: String,
     pub columns: Vec<MetricColumn>,
     /// The rows, in groups that are headed together and compete together.
@@ -81,7 +81,7 @@ pub struct MetricCell {
     pub sum: i128,
 }
 
-/// What a cell shows, rounded already.
+/// The rounded value of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Value {
     Undefined,
@@ -105,7 +105,7 @@ pub enum Value {
     },
 }
 
-/// How far the truth may lie from the mean.
+/// The uncertainty of the mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Spread {
     /// Not to be said: too few values.

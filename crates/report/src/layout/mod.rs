@@ -65,7 +65,7 @@ fn other(columns: Vec<String>) -> TableSheet {
     }
 }
 
-/// What the tables of some cells have in common.
+/// Properties that the tables of some cells share.
 struct Layout<'a> {
     cells: &'a Cells,
     style: &'a Style,

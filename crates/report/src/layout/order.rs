@@ -8,7 +8,7 @@ use crate::cells::diff::Changes;
 use crate::style::{MAIN_TABLE, Style};
 use metric::catalog::Catalog;
 
-/// What decides the order.
+/// The keys of the order.
 #[derive(Clone, Copy, Debug)]
 pub struct TableOrder<'a> {
     pub catalog: &'a Catalog,
@@ -16,7 +16,7 @@ pub struct TableOrder<'a> {
 }
 
 impl TableOrder<'_> {
-    /// Where a key of these columns stands: heading keys count before the row's own.
+    /// The rank of a key of these columns: heading keys count before the row's own.
     pub fn of_key(self, by: &[String], key: &[KeyValue]) -> Vec<(usize, KeyValue)> {
         let own = row_key(by);
         let heading = (0..key.len()).filter(|at| *at != own);
@@ -24,7 +24,7 @@ impl TableOrder<'_> {
         all.map(|at| (self.place(&by[at], &key[at]), key[at].clone())).collect()
     }
 
-    /// Where a metric stands: by the first table that shows it, then as defined.
+    /// The rank of a metric: by the first table that shows it, then as defined.
     pub fn of_metric(self, metric: &str) -> (usize, usize) {
         let sheet = &self.style.sheet;
         let mut tables: Vec<_> = sheet.table.iter().collect();

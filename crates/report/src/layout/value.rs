@@ -8,7 +8,7 @@ use exact::number::Decimal;
 use metric::catalog::{Kind, Metric, StandardError};
 use statistics::interval::Interval;
 
-/// What a cell shows in a row of `episodes` episodes.
+/// The value of a cell in a row of `episodes` episodes.
 pub fn value(cell: &Cell, episodes: u64, print: &Print) -> Value {
     let Cell { moments, metric, interval, .. } = *cell;
     let (whole, places) = scale(metric, print);
@@ -26,7 +26,7 @@ pub fn value(cell: &Cell, episodes: u64, print: &Print) -> Value {
     }
 }
 
-/// What an undefined cell shows where a style has it print as zero.
+/// The value of an undefined cell if a style prints it as zero.
 pub fn zero(metric: &Metric, print: &Print) -> Value {
     let zero = Decimal::zero(scale(metric, print).1);
     Value::MeanSe { mean: zero, se: Some(zero) }

@@ -22,7 +22,7 @@ impl TestName {
     }
 }
 
-/// How the episodes are analysed: once, at a number fixed beforehand, or at every look.
+/// The number of looks: one at a fixed number of episodes, or any.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Looks {
     Once,
@@ -38,7 +38,7 @@ impl Looks {
     }
 }
 
-/// What differs between a plan and the analysis of these episodes; empty where nothing does.
+/// Differences between a plan and the analysis of these episodes; empty without any.
 pub fn departures(plan: &RegisteredPlan, table: &EpisodeTable, options: &Options, looks: Looks) -> Vec<String> {
     let request = &plan.plan.request;
     let mut found = Vec::new();

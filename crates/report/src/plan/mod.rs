@@ -1,7 +1,7 @@
 //! A study planned: the episodes for a wanted difference, or the difference that given episodes can show.
 //!
 //! Rule: every test is planned twice, by itself and at the level that Holm's procedure holds its smallest p value to.
-//! What had to be assumed stands beside the answer, in sentences.
+//! Assumptions are part of the answer, in sentences.
 
 pub mod departures;
 pub mod register;
@@ -19,10 +19,10 @@ use statistics::sample_size::{
     smallest,
 };
 
-/// What a plan is asked.
+/// The question to the power analysis.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PlanRequest {
-    /// What is given; the other is answered.
+    /// The given quantity; the other one is the answer.
     pub given: Given,
     /// The lower of the two rates; null puts both around 1/2, where a difference is hardest to show.
     pub baseline: Option<f64>,
@@ -30,7 +30,7 @@ pub struct PlanRequest {
     pub power: f64,
     /// The confidence of the tests; their level is one minus it.
     pub confidence: f64,
-    /// How many models are compared, each with each.
+    /// The number of models; each is compared with each.
     pub models: u64,
     /// Seeds, each with as many runs; and how far the episodes of one seed resemble each other.
     pub clusters: Clusters,
@@ -43,7 +43,7 @@ pub struct PlanRequest {
     pub sequential: bool,
 }
 
-/// What of a plan is given.
+/// The given quantity of a plan.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Given {
@@ -56,13 +56,13 @@ pub enum Given {
 /// A plan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Plan {
-    /// What was asked.
+    /// The question.
     pub request: PlanRequest,
     /// The answer in one line.
     pub answer: String,
     /// An answer per test and level; the first is the one that the line tells.
     pub tests: Vec<PlannedTest>,
-    /// What was assumed, in sentences.
+    /// The assumptions, in sentences.
     pub assumptions: Vec<String>,
 }
 
@@ -71,7 +71,7 @@ pub struct Plan {
 pub struct PlannedTest {
     /// The test.
     pub test: TestName,
-    /// How many tests share the level under Holm's procedure; 1 for a test by itself.
+    /// The number of tests that share the level under Holm's procedure; 1 for a single test.
     pub family: u64,
     /// The level that p must not exceed.
     pub level: f64,
@@ -114,7 +114,7 @@ pub enum TestName {
 }
 
 impl TestName {
-    /// What it compares, and how.
+    /// The title of the comparison.
     pub const fn title(self) -> &'static str {
         match self {
             Self::Paired => "two models, pairs (exact McNemar)",
@@ -128,7 +128,7 @@ impl TestName {
     }
 }
 
-/// Why there is no such plan.
+/// An error of a power analysis.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages say it")]
 pub enum PlanError {

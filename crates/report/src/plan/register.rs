@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::Plan;
 use exact::hash;
 
-/// What the document calls itself.
+/// The value of the key `format`.
 const FORMAT: &str = "mirrorstats-plan";
 
 /// The version of its shape.

@@ -11,15 +11,15 @@ use super::{Level, Reference};
 use crate::statistics::{ChanceRow, Contrast, Family, Role, Sign, Statistics, Verdict};
 use metric::catalog::{Better, Catalog};
 
-/// What a conclusion answers.
+/// The question behind a conclusion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Question {
-    /// Whether a rate is above or below a level of chance, or a reference.
+    /// A rate is above or below a level of chance, or a reference.
     Chance,
-    /// Which of two models is ahead in one experiment.
+    /// One of two models is ahead in one experiment.
     Models,
-    /// Which of two models is ahead over all experiments.
+    /// One of two models is ahead over all experiments.
     Overall,
     /// In which of two experiments a model's mean is higher.
     Experiments,
@@ -28,26 +28,26 @@ pub enum Question {
 /// A conclusion that some threshold changes.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Change {
-    /// What it answers.
+    /// The question.
     pub question: Question,
     /// The metric.
     pub metric: String,
-    /// What is compared with what.
+    /// The two sides of the comparison.
     pub about: String,
-    /// What the definitions as they are say.
+    /// The answer under the recorded definitions.
     pub recorded: String,
-    /// What the thresholds say, ascending.
+    /// The answers under the thresholds, ascending.
     pub thresholds: Vec<Says>,
     /// All of it, in one sentence.
     pub sentence: String,
 }
 
-/// What one threshold says.
+/// The answer under one threshold.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Says {
     /// The threshold, px.
     pub px: u32,
-    /// What it says.
+    /// The answer.
     pub says: String,
 }
 

@@ -1,4 +1,4 @@
-//! How cells move with the threshold of mirror evidence, and where a conclusion changes.
+//! Cells as functions of the threshold of mirror evidence, and thresholds that change a conclusion.
 //!
 //! Rule: no episode is scored and nothing is tested here. What each threshold gave comes as cells and statistics
 //! ([`Level`]); this module lines them up, for people and for programs.
@@ -21,17 +21,17 @@ use metric::catalog::Kind;
 
 pub use changes::{Change, Question, Says};
 
-/// What one threshold gives, or the definitions as they are.
+/// The results under one threshold, or under the recorded definitions.
 #[derive(Clone, Debug)]
 pub struct Level {
     /// The least number of pixels that counts as evidence; `None` for the definitions as they are.
     pub px: Option<u32>,
     pub cells: Cells,
-    /// What can be concluded from the same episodes.
+    /// The conclusions from the same episodes.
     pub statistics: Statistics,
 }
 
-/// What the row of the definitions as they are stands for.
+/// The meaning of the row of the recorded definitions.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Reference {
     /// True if the evidence is what was recorded as such; definitions may say otherwise.
@@ -57,14 +57,14 @@ impl Reference {
     }
 }
 
-/// How cells move with the threshold.
+/// Cells as functions of the threshold.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Sensitivity {
     /// The definition file's own name.
     pub definitions: String,
     /// SHA-256 of the definitions as they are.
     pub definitions_hash: String,
-    /// What a threshold of null stands for: `recorded (60 px)`.
+    /// The meaning of a null threshold: `recorded (60 px)`.
     pub reference: String,
     /// The thresholds that the recordings' footers declare, ascending, px.
     pub recorded_px: Vec<u64>,
@@ -78,7 +78,7 @@ pub struct Sensitivity {
     pub independent: Vec<String>,
     /// Every cell under every threshold.
     pub cells: Vec<ThresholdCell>,
-    /// Where a conclusion is another one than under the definitions as they are.
+    /// The thresholds with another conclusion than under the recorded definitions.
     pub changes: Vec<Change>,
     /// The cells as one table.
     #[serde(skip)]

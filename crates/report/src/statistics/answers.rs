@@ -31,12 +31,12 @@ pub struct Answer {
     /// True if it is the declared primary one.
     #[serde(default)]
     pub role: AnswerRole,
-    /// What the episodes were chosen by, pooled over or short of, a phrase each.
+    /// Filters, pooling and losses behind the answer, a phrase each.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub caveats: Vec<String>,
 }
 
-/// How much weight an answer has.
+/// The weight of an answer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum AnswerRole {

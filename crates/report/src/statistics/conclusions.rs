@@ -1,4 +1,4 @@
-//! What a reader may conclude, in sentences made from the numbers.
+//! Conclusions in sentences, made from the numbers.
 
 use indexmap::IndexMap;
 

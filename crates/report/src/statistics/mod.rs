@@ -1,4 +1,4 @@
-//! What `stats` shows: everything that can be said about cells at this n, and what cannot.
+//! The answer of `stats`: all that these cells can show at this n, and all that they cannot.
 //!
 //! Rule: no statistic is computed here. This module asks `cells` about each cell, pair and block, keeps the
 //! answers as plain data for programs ([`Statistics`] as JSON) and states them for people ([`text`]).
@@ -51,24 +51,24 @@ use score::table::EpisodeTable;
 use statistics::design::Design;
 use study::Study;
 
-/// What may be chosen about statistics.
+/// The options of statistics.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
     /// The confidence of every interval, and one minus the level of every test; between 0 and 1.
     pub confidence: f64,
     /// The horizon of restricted means in steps, instead of the last step known for every model.
     pub horizon: Option<i64>,
-    /// How many episodes were lost beside those given; `None` where the traces do not say.
+    /// The number of episodes lost beside those given; `None` if the traces do not record it.
     pub lost: Option<LostCounts>,
-    /// What the traces declare about their design; nothing by default.
+    /// The declared design; empty by default.
     pub design: Design,
-    /// Which episodes were chosen; all by default.
+    /// The selection of episodes; all by default.
     pub selection: Option<Selection>,
-    /// What cells mix though it was recorded differently, a sentence each; `None` unless such settings do not matter.
+    /// The settings that cells pool, a sentence each; `None` without pooling.
     pub pooled: Option<Vec<String>>,
-    /// How many replies gave no decision; `None` where that is not recorded.
+    /// The number of replies without a decision; `None` if it is not recorded.
     pub replies: Option<Replies>,
-    /// What else stands beside every answer, such as lost episodes that count as failures.
+    /// Further caveats of every answer, such as lost episodes that count as failures.
     pub caveats: Vec<String>,
     /// The metric of the primary question, as a registered plan names it; the first headline metric by default.
     pub primary: Option<String>,
@@ -115,18 +115,18 @@ pub struct Statistics {
     /// Settings that differ within a cell or between cells that are compared, and were declared not to matter.
     #[serde(default)]
     pub pooled: Vec<String>,
-    /// What the traces declare about their design.
+    /// The declared design.
     pub design: Design,
-    /// What follows from the design, in a sentence.
+    /// The consequence of the design, in a sentence.
     pub design_note: String,
     /// The number of families of tests behind the answers; Holm's adjustment holds within each.
     #[serde(default)]
     pub families: usize,
     /// The answers to the questions of the study, a line each; the primary one first.
     pub answers: Vec<Answer>,
-    /// What a reader may conclude, a sentence each.
+    /// The conclusions, a sentence each.
     pub conclusions: Vec<String>,
-    /// What a reader must not conclude, and why, a sentence each.
+    /// The warnings against conclusions, with reasons, a sentence each.
     pub warnings: Vec<String>,
     /// The metrics that the conclusions are about.
     pub headline: Vec<String>,
@@ -141,7 +141,7 @@ pub struct Statistics {
     /// The ranks that the tests leave open, in each experiment and over all of them.
     #[serde(default)]
     pub ranks: Vec<RankRow>,
-    /// How often one model decides earlier than another; none unless asked for.
+    /// The probability that one model decides earlier than another; empty unless asked for.
     pub improvements: Vec<ImprovementRow>,
     /// Scenes that keep episodes out of pairs, where models are compared by pairs.
     pub gaps: Vec<Gap>,
@@ -159,7 +159,7 @@ pub struct Statistics {
     /// Replies that gave no decision; null where no status of a reply is recorded.
     #[serde(default)]
     pub replies: Option<Replies>,
-    /// Which metrics belong together, for the text.
+    /// Relations between metrics, for the text.
     #[serde(skip)]
     relations: Relations,
 }

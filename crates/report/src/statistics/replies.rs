@@ -10,7 +10,7 @@ use super::study::named;
 use exact::escape::visible;
 use score::table::{CONDITION, EpisodeTable, UNUSABLE_REPLIES};
 
-/// How many cells a sentence names before it counts the rest.
+/// The number of cells that a sentence names before it counts the rest.
 const NAMED_CELLS: usize = 3;
 
 /// The replies of all episodes.
@@ -68,7 +68,7 @@ impl Replies {
         (replies > 0).then_some(Self { replies, unusable, cells })
     }
 
-    /// How many gave no decision, and in which cells most; `None` where each gave one.
+    /// The number of replies without a decision, and the cells with most of them; `None` without any.
     pub fn sentence(&self) -> Option<String> {
         let mut cells: Vec<&UnusableReplies> = self.cells.iter().collect();
         // Compared as fractions: the larger share first.

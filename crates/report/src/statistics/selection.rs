@@ -1,4 +1,4 @@
-//! Which episodes the numbers are of, where a filter chose some.
+//! The filter that chose the episodes.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -13,7 +13,7 @@ use score::table::{CONDITION, EpisodeTable, MetricColumn, TextColumn};
 use statistics::design::{Cluster, Design};
 use statistics::interval::Interval;
 
-/// What stands for no condition.
+/// The name of the default condition.
 const DEFAULT_CONDITION: &str = "default";
 
 /// The label of the scene: room, body, cubes, start.
@@ -22,7 +22,7 @@ const SCENE: &str = "scene";
 /// The label of the person who played.
 const PARTICIPANT: &str = "participant";
 
-/// What episodes share that depend on each other; the unit of analysis.
+/// The unit of analysis: episodes within it depend on each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Unit {
     Seed(i32),
@@ -36,7 +36,7 @@ pub(super) struct Study<'a> {
     pub table: &'a EpisodeTable,
     pub design: Design,
     pub experiments: Vec<Experiment<'a>>,
-    /// Which metrics belong together.
+    /// Relations between metrics.
     pub relations: Relations,
     /// True if settings that differ do not matter.
     pub pool: bool,
@@ -122,7 +122,7 @@ impl<'a> Study<'a> {
         self.table.label(SCENE).filter(|_| self.design.has_pairs())
     }
 
-    /// Whether episodes may share a unit: clusters, participants or scenes are declared.
+    /// Returns true if episodes may share a unit: clusters, participants or scenes are declared.
     pub fn has_units(&self) -> bool {
         let labelled = || [SCENE, PARTICIPANT].iter().any(|label| self.table.label(label).is_some());
         self.design.has_pairs() && (self.design.clusters().is_some() || labelled())
@@ -164,7 +164,7 @@ impl<'a> Study<'a> {
         units.len() < block.rows().count()
     }
 
-    /// What the units of a block are called, in the plural.
+    /// The name of a block's units, in the plural.
     pub fn unit_name(&self, block: &Block) -> &'static str {
         match block.rows().next().map(|row| self.unit(row)) {
             Some(Unit::Seed(_)) => "seeds",
@@ -183,7 +183,7 @@ impl<'a> Study<'a> {
         self.table.metrics.iter().filter(|column| self.kind(&column.name) == Kind::Rate)
     }
 
-    /// What a metric's integers mean; a metric that the catalog does not describe is no rate.
+    /// The kind of a metric; a metric that the catalog does not describe is no rate.
     pub fn kind(&self, metric: &str) -> Kind {
         self.metric(metric).map_or(Kind::Quantity, |metric| metric.kind)
     }

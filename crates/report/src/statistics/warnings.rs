@@ -1,4 +1,4 @@
-//! What a reader must not conclude, and what the design allows, in sentences made from the numbers.
+//! Warnings against conclusions, and the limits of the design, in sentences made from the numbers.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,10 +9,10 @@ use statistics::clustered::fewest_clusters;
 use statistics::design::{Cluster, DesignKind};
 use statistics::holm::level;
 
-/// How many gaps a warning names before it counts the rest.
+/// The number of gaps that a warning names before it counts the rest.
 const NAMED_GAPS: usize = 5;
 
-/// How much of a scene's name is shown: a fingerprint is long.
+/// The number of characters shown of a scene's name, since fingerprints are long.
 const SCENE_SHOWN: usize = 16;
 
 pub(super) fn design_note(statistics: &Statistics) -> String {

@@ -44,11 +44,11 @@ pub struct Sheet {
     pub include: Vec<String>,
     /// The models in the order of their rows; others come after them, by name.
     pub row_order: Vec<String>,
-    /// What stands where a value is undefined.
+    /// The text for an undefined value.
     pub undefined: String,
     /// The sentence that explains emphasis, under tables where something is emphasised.
     pub emphasis_note: String,
-    /// How cells print in every table, unless the table says otherwise.
+    /// The defaults for cells of every table.
     pub print: PrintSheet,
     /// Headers and arrows, by metric.
     pub column: IndexMap<String, ColumnSheet>,
@@ -70,7 +70,7 @@ pub struct TableSheet {
     pub label: Option<String>,
     /// The metrics, in the order of the columns. Those that the scores have not are left out.
     pub columns: Vec<String>,
-    /// What prints otherwise than in the other tables.
+    /// The settings of this table's cells that differ from the defaults.
     pub print: PrintSheet,
     /// The metrics whose undefined cells print as zero and compete as zero (a quirk of the published main table).
     pub undefined_as_zero: Vec<String>,
@@ -91,7 +91,7 @@ impl Default for Sheet {
     }
 }
 
-/// How a metric's column is headed.
+/// The heading of a metric's column.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ColumnSheet {
@@ -101,17 +101,17 @@ pub struct ColumnSheet {
     pub better: Option<Better>,
 }
 
-/// How cells print; what is absent is as one level up.
+/// The settings of printed cells; an absent one is inherited.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PrintSheet {
-    /// What a cell shows.
+    /// The form of a cell.
     pub cell: Option<CellForm>,
-    /// How its numbers are rounded.
+    /// The rounding of its numbers.
     pub rounding: Option<Rounding>,
     /// Digits behind the point.
     pub decimals: Option<Decimals>,
-    /// Which cells stand out.
+    /// The cells that stand out.
     pub emphasis: Option<EmphasisRule>,
     /// The standard error of a single value, where the sample form has none.
     pub single_se: Option<SingleSe>,
@@ -119,7 +119,7 @@ pub struct PrintSheet {
     pub mark_n_below: Option<u64>,
 }
 
-/// How cells print, every question answered.
+/// The settings of printed cells, complete.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[expect(missing_docs, reason = "each field is that of `PrintSheet`")]
 pub struct Print {
@@ -131,7 +131,7 @@ pub struct Print {
     pub mark_n_below: u64,
 }
 
-/// What a cell shows.
+/// The form of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum CellForm {
@@ -141,7 +141,7 @@ pub enum CellForm {
     CountInterval,
 }
 
-/// How numbers are rounded.
+/// The rounding of numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Rounding {
@@ -190,7 +190,7 @@ pub enum SingleSe {
     Zero,
 }
 
-/// Why a style cannot be used.
+/// An error of a style.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages say it")]
 pub enum StyleError {
@@ -244,7 +244,7 @@ impl Style {
 }
 
 impl Sheet {
-    /// How the cells of `table` print.
+    /// The print settings of `table`'s cells.
     pub fn print_of(&self, table: &TableSheet) -> Print {
         let (own, all) = (&table.print, &self.print);
         Print {

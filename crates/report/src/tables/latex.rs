@@ -6,7 +6,7 @@ use super::{Align, Column, DAGGER, Emphasis, Look, RowGroup, Table, TableCell};
 use exact::escape::visible;
 use metric::catalog::Better;
 
-/// What has to stand in the preamble, as a comment before a sheet.
+/// The packages for the preamble, as a comment before a sheet.
 const PACKAGES: &str =
     "% Needs in the preamble: \\usepackage{booktabs}, \\usepackage{graphicx}, \\usepackage[table]{xcolor}\n";
 

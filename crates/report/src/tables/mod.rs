@@ -29,7 +29,7 @@ pub struct Table {
     pub label: Option<String>,
     pub look: Look,
     pub columns: Vec<Column>,
-    /// How many of the first columns name a row.
+    /// The number of leading columns that name a row.
     pub names: usize,
     /// True if bold marks all that are tied for the best.
     pub is_tied: bool,
@@ -56,7 +56,7 @@ pub struct Column {
     pub heading: String,
     /// The heading as LaTeX, where the escaped text will not do.
     pub latex: Option<String>,
-    /// Which way the arrow beside the heading points.
+    /// The direction of the arrow beside the heading.
     pub better: Better,
     pub align: Align,
 }
@@ -77,7 +77,7 @@ pub struct RowGroup {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct TableCell {
     pub text: String,
-    /// How sure the text is: `± 0.11`, `[0.22, 0.47]`.
+    /// The uncertainty of the text: `± 0.11`, `[0.22, 0.47]`.
     pub detail: Option<String>,
     /// True if emphasis covers the detail too.
     pub is_whole: bool,
@@ -88,7 +88,7 @@ pub struct TableCell {
     pub is_marked: bool,
 }
 
-/// How a cell stands out in its group.
+/// The emphasis of a cell within its group.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Emphasis {
     #[default]

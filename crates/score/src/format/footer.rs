@@ -1,9 +1,9 @@
-//! What the footer of a Parquet file says beside its columns, whoever wrote it.
+//! The metadata in the footer of a Parquet file, by any writer.
 
 use parquet::file::metadata::FileMetaData;
 use serde_json::Value;
 
-/// Where Spark keeps the metadata of columns: it writes no other keys.
+/// Spark's key for metadata of columns; it writes no other keys.
 const SPARK_COLUMNS: &str = "org.apache.spark.sql.parquet.row.metadata";
 
 /// The value of a key: of the file itself, or of one of its columns where Spark wrote them.

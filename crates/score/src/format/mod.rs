@@ -49,7 +49,7 @@ impl Format {
     }
 }
 
-/// What keeps an episode table from being written or read.
+/// An error of writing or reading an episode table.
 #[derive(Debug, thiserror::Error)]
 pub enum FormatError {
     /// A file name that asks for no known format.
@@ -69,9 +69,9 @@ pub enum FormatError {
     Column {
         /// Its name.
         column: String,
-        /// What it must be.
+        /// The expected type.
         expected: &'static str,
-        /// What it is.
+        /// The type found.
         found: String,
     },
     /// A value that is not what its column holds.
@@ -81,9 +81,9 @@ pub enum FormatError {
         line: usize,
         /// Its name.
         column: String,
-        /// What it must be.
+        /// The expected value.
         expected: &'static str,
-        /// What it is.
+        /// The value found.
         found: String,
     },
     /// An episode that no scoring can have given.
@@ -93,9 +93,9 @@ pub enum FormatError {
         episode: String,
         /// The column.
         column: String,
-        /// What it must hold.
+        /// The expected columns.
         expected: String,
-        /// What it holds.
+        /// The columns found.
         found: String,
     },
     /// Steps where scores are read.
@@ -109,10 +109,10 @@ pub enum FormatError {
     Line {
         /// 1-based.
         line: usize,
-        /// What is wrong with it.
+        /// The problem.
         reason: String,
     },
-    /// What the footer says of the recording.
+    /// The footer's statement about the recording.
     #[error("`{DECLARED_KEY}` is not readable: {0}; score the traces again")]
     Declared(String),
     /// The definitions in the footer.
@@ -121,7 +121,7 @@ pub enum FormatError {
 }
 
 impl FormatError {
-    /// What the system said, if it is what failed: mostly for want of space or of a reader.
+    /// The system's error, if there is one: mostly a full disk or a closed pipe.
     pub fn into_io(self) -> Result<io::Error, Self> {
         match self {
             Self::Io(error) => Ok(error),
@@ -162,7 +162,7 @@ pub fn read_parquet(input: TableFile, partition: &Partition<'_>) -> Result<Episo
     checked(parquet::read(input, partition)?)
 }
 
-/// What the traces declare, as one JSON text; the definitions in Parquet have the experiments already.
+/// The declarations of the traces, as one JSON text; the definitions in Parquet have the experiments already.
 #[derive(Default, PartialEq, Serialize, Deserialize)]
 struct DeclaredText {
     #[serde(flatten)]

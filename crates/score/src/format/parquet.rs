@@ -43,7 +43,7 @@ pub const HASH_KEY: &str = "mirrorstats.definitions_hash";
 /// The footer key of what the traces declare of how they were recorded, as JSON (a `Declared`).
 pub const DECLARED_KEY: &str = "mirrorstats.declared";
 
-/// Whether a file is Parquet with scores: its footer says so, or it has their key columns and no timestep.
+/// Returns true if a file is Parquet with scores: its footer says so, or it has their key columns and no timestep.
 ///
 /// `folders` are columns that stand in the names of the file's folders.
 pub fn holds_scores(file: &impl ChunkReader, folders: &[(String, Option<String>)]) -> bool {
@@ -100,7 +100,7 @@ pub struct Writer<W: Write + Send> {
     group: Vec<ArrowColumnChunk>,
 }
 
-/// What encodes a table, and what takes it.
+/// The encoder of a table, with its writer.
 pub fn encoder<W: Write + Send>(table: &EpisodeTable, out: W) -> Result<(Encoder<'_>, Writer<W>), FormatError> {
     let header = table.header();
     let schema = Arc::new(columns::schema(&header));

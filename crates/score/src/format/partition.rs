@@ -11,7 +11,7 @@ use super::csv::KEYS;
 use metric::catalog::Catalog;
 use metric::sql::Dialect;
 
-/// What completes a file of scores.
+/// The parts of a file of scores that are stored elsewhere.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Partition<'a> {
     /// Columns that stand in the names of its folders, as Spark divides a table; `None` for null. The file's own win.

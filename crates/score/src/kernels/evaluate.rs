@@ -22,7 +22,7 @@ use trace::scan::Texts;
 /// Whole episodes in columns: one batch with a row per timestep, one with a row per episode.
 #[derive(Clone, Copy, Debug)]
 pub struct Batch<'a> {
-    /// Where episodes begin and end among the timesteps.
+    /// The boundaries of the episodes among the timesteps.
     pub segments: Segments<'a>,
     /// Columns per timestep, by name: booleans, 64-bit integers, doubles, dictionaries of text with 32-bit keys.
     pub steps: &'a RecordBatch,
@@ -35,7 +35,7 @@ pub struct Batch<'a> {
 /// The scores of a batch.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BatchScores {
-    /// Which episodes the filter keeps; all if absent.
+    /// The episodes that the filter keeps; all if absent.
     pub kept: Option<BooleanArray>,
     /// A column per metric, truth values or 64-bit integers, with a value for each episode kept; null where the metric
     /// is undefined.

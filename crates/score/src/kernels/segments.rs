@@ -14,7 +14,7 @@ use arrow::error::ArrowError;
 use metric::plan::{Aggregate, Comparison};
 use parquet_pages::bits::{self, Bits};
 
-/// Where episodes begin and end among the rows of a batch.
+/// The boundaries of the episodes among the rows of a batch.
 #[derive(Clone, Copy, Debug)]
 pub struct Segments<'a> {
     offsets: &'a [usize],
@@ -58,7 +58,7 @@ impl<'a> Segments<'a> {
         times.into()
     }
 
-    /// Which rows are the first of their episode; never null.
+    /// The first row of each episode; never null.
     pub(crate) fn first_rows(self) -> BooleanArray {
         let mut rows = Bits::with_capacity(self.rows());
         for (_, length) in self.each() {
@@ -93,7 +93,7 @@ impl<'a> Segments<'a> {
         nulls.map(|nulls| NullBuffer::new(self.spread_bits(nulls.inner())))
     }
 
-    /// Which timesteps compare with an episode's moment as asked: a window of each episode. Null where the moment is.
+    /// The timesteps that compare with an episode's moment as asked: one window per episode. Null where the moment is null.
     ///
     /// The timesteps are never written out: a window is a run of set bits.
     pub(crate) fn window(self, comparison: Comparison, moments: &Int64Array) -> BooleanArray {

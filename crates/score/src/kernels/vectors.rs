@@ -17,7 +17,7 @@ use metric::plan::Constant;
 use parquet_pages::bits;
 use trace::scan::Texts;
 
-/// What one step gives. The physical plan knows which form it is.
+/// The result of one step. The physical plan knows its form.
 #[derive(Clone, Debug)]
 pub(crate) enum Vector {
     /// Truth values, integers, floats, or the symbols of texts ([`Symbols`]): one per timestep, per episode, or one
@@ -139,7 +139,7 @@ impl Keyed {
         UInt32Array::new(keys.values().iter().map(symbol).collect(), keys.nulls().cloned())
     }
 
-    /// Where the texts are equal to that of their episode, or where they are not; null where one of them is.
+    /// True where the texts equal their episode's text, or where they differ; null where one of them is null.
     pub(crate) fn compare(&self, segments: Segments<'_>, texts: &UInt32Array, equal: bool) -> BooleanArray {
         let mut keys_of = vec![None; self.symbols.iter().max().map_or(0, |last| *last as usize + 1)];
         self.symbols.iter().enumerate().for_each(|(key, symbol)| keys_of[*symbol as usize] = Some(key));
@@ -156,7 +156,7 @@ impl Keyed {
         )
     }
 
-    /// Where the texts are equal to one text, or where they are not; null where one of them is.
+    /// True where the texts equal one text, or where they differ; null where the text is null.
     pub(crate) fn compare_with(&self, text: &UInt32Array, equal: bool) -> BooleanArray {
         if text.is_null(0) {
             return BooleanArray::new_null(self.keys.array().len());

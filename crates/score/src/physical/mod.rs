@@ -27,7 +27,7 @@ impl StepId {
     }
 }
 
-/// How many values a step gives.
+/// The number of values of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Shape {
     /// One value that stands for all.
@@ -72,27 +72,27 @@ pub enum Kernel {
     Compare(Comparison, StepId, StepId),
     /// A comparison of symbols by the order of their texts.
     CompareTexts(Comparison, StepId, StepId),
-    /// Whether keys stand for a constant text, or whether they do not.
+    /// True where keys refer to a constant text, or where they do not.
     KeysEqualText {
         keys: StepId,
         text: StepId,
         equal: bool,
     },
-    /// Whether the keys of each timestep stand for the text of their episode, or whether they do not.
+    /// True where the keys of a timestep refer to the text of their episode, or where they do not.
     KeysEqualEpisode {
         keys: StepId,
         texts: StepId,
         equal: bool,
     },
-    /// Whether the timestep compares with a moment of its episode; timesteps are not written out.
+    /// True where the timestep compares with a moment of its episode; timesteps are not written out.
     Window(Comparison, StepId),
-    /// Whether two values differ, null being a value like others; never null.
+    /// True where two values differ, with null as an ordinary value; never null.
     Distinct(StepId, StepId),
-    /// Whether there is no value; never null. Takes keys.
+    /// True where the value is null; never null. Takes keys.
     IsNull(StepId),
-    /// Whether a truth value is true; never null.
+    /// True where a truth value is true; never null.
     IsTrue(StepId),
-    /// Whether a truth value is false; never null.
+    /// True where a truth value is false; never null.
     IsFalse(StepId),
     /// Sum, difference or product; an error beyond 64 bits.
     Arithmetic(Arithmetic, StepId, StepId),
@@ -108,9 +108,9 @@ pub enum Kernel {
     },
     /// The first value that is not null; no operand is a constant.
     Coalesce(Vec<StepId>),
-    /// Whether the text of a key contains a match of a pattern.
+    /// True where the text of a key contains a match of a pattern.
     KeysMatch(StepId, String),
-    /// Whether the text of a symbol contains a match of a pattern.
+    /// True where the text of a symbol contains a match of a pattern.
     SymbolsMatch(StepId, String),
     /// 1 for true, 0 for false.
     IntFromBool(StepId),
@@ -193,12 +193,12 @@ pub struct Metric {
     pub step: StepId,
 }
 
-/// What one set of definitions asks of the plan.
+/// The outputs of one set of definitions.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Scores {
     /// The metrics, in the order of the definitions.
     pub metrics: Vec<Metric>,
-    /// Which episodes count, a truth value per episode; all if absent.
+    /// The filter, a truth value per episode; all episodes count if absent.
     pub filter: Option<StepId>,
 }
 
@@ -241,7 +241,7 @@ impl PhysicalPlan {
         nodes.into_iter().map(|node| lowering.values(node)).collect()
     }
 
-    /// What the definitions asked for, in the order in which they were added.
+    /// The outputs of each set of definitions, in the order in which they were added.
     pub fn scores(&self) -> &[Scores] {
         &self.scores
     }

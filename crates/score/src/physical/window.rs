@@ -1,4 +1,4 @@
-//! What the shape of a condition tells: windows of timesteps, texts beside those of their episode, lookups.
+//! The shape of a condition: windows of timesteps, comparisons with the episode's text, lookups.
 
 use std::collections::BTreeSet;
 

@@ -19,11 +19,11 @@ use trace::open::TraceSet;
 pub struct DeclarationError {
     /// The file.
     pub file: String,
-    /// What would do, and of which experiment.
+    /// The expected declaration, and its experiment.
     pub expected: String,
-    /// What the file declares.
+    /// The declaration in the file.
     pub found: String,
-    /// What to do.
+    /// The remedy.
     pub help: &'static str,
 }
 

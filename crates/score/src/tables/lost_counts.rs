@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::quality::CellKey;
 
-/// How many episodes of each experiment, model and condition were lost.
+/// The number of lost episodes by experiment, model and condition.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LostCounts(BTreeMap<CellKey, u64>);
 

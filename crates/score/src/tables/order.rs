@@ -18,7 +18,7 @@ pub(crate) fn order(keys: &EpisodeKeys) -> Option<Vec<u32>> {
     (!order.is_sorted()).then_some(order)
 }
 
-/// What the keys of a row are put into.
+/// The integer type that the keys of a row are packed into.
 trait Number:
     Ord
     + Copy
@@ -66,7 +66,7 @@ fn by_id(keys: &EpisodeKeys, a: u32, b: u32) -> Ordering {
     keys.episode_id.get(a as usize).cmp(&keys.episode_id.get(b as usize))
 }
 
-/// How the keys of rows are made into numbers: experiment, model, seed, run, row, each in as many bits as it takes.
+/// The packing of rows' keys into numbers: experiment, model, seed, run, row, each in as few bits as it needs.
 struct Rows<'a> {
     keys: &'a EpisodeKeys,
     /// The place of each text in the order of all, by code.

@@ -20,7 +20,7 @@ use metric::definitions::{Definitions, UnknownMetric};
 use metric::file::FileError;
 use toml_spec::Faults;
 
-/// Why a part of a table cannot be had.
+/// An error of selecting a part of a table.
 #[derive(Debug, thiserror::Error)]
 pub enum SelectError {
     /// A metric that the table does not have.

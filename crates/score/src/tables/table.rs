@@ -23,7 +23,7 @@ pub struct EpisodeTable {
     pub labels: Vec<LabelColumn>,
     /// The metrics in the order of the catalog, or of the selection made.
     pub metrics: Vec<MetricColumn>,
-    /// What the traces declare of how they were recorded.
+    /// The declarations of the traces about their recording.
     pub declared: Declared,
 }
 
@@ -46,7 +46,7 @@ pub const LOST: &str = "lost";
 /// The label of an episode's replies: those that gave no decision, of all, such as `3/20`.
 pub const UNUSABLE_REPLIES: &str = "unusable_replies";
 
-/// What names an episode. The derived order is the order of the table.
+/// The key of an episode. The derived order is the order of the table.
 #[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct EpisodeKey {
     /// `E1`..`E5` in the paper.
@@ -114,7 +114,7 @@ pub struct Header {
     pub metrics: Vec<String>,
 }
 
-/// Why two tables are not one.
+/// An error of joining two tables.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum JoinError {
     /// They were computed under different definitions.
@@ -380,7 +380,7 @@ impl MetricColumn {
         }
     }
 
-    /// How many values of these rows are 0, and how many are 1, where all of them are truth values.
+    /// The numbers of zeros and ones in these rows; `None` unless every value is one of them.
     ///
     /// # Panics
     /// For rows that are not there.
@@ -393,7 +393,7 @@ impl MetricColumn {
     /// The defined values of some rows, added to `moments`.
     ///
     /// # Errors
-    /// When a sum leaves 128 bits.
+    /// A sum beyond 128 bits.
     ///
     /// # Panics
     /// If a row is out of range.

@@ -13,7 +13,7 @@ const MOST_ENUMERATED: usize = 6000;
 const NUISANCE: u32 = 100;
 /// The power that a number of units is planned for.
 const POWER: f64 = 0.8;
-/// What two equal statistics may differ by.
+/// The tolerance for equal statistics.
 const TIE: f64 = 1e-9;
 
 /// The units of two sides: those of both, with the means of both, and those of one alone.
@@ -107,7 +107,7 @@ impl Units {
     }
 }
 
-/// How far a difference may vary: what a number of units is planned from.
+/// The variance of a difference, from which a number of units is planned.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spread {
     /// The difference; better is up.

@@ -111,7 +111,7 @@ impl Pairs {
     }
 }
 
-/// How far the Wilson bounds of a rate reach down and up from it.
+/// The distances from a rate to its Wilson bounds.
 struct Arms {
     down: f64,
     up: f64,

@@ -9,7 +9,7 @@ pub use crate::endings::{Ending, Outcome};
 use crate::endings::{RiskSet, risk_sets};
 use crate::survival::RestrictedMean;
 
-/// How near a share must come to one half to count as having reached it: rounding only.
+/// The tolerance around one half, for rounding only.
 const HALF: f64 = 0.5 - 1e-12;
 
 /// The Aalen-Johansen curve (Aalen and Johansen 1978): the share of episodes decided correctly by each step.
@@ -32,7 +32,7 @@ struct Point {
     is_wrong: f64,
 }
 
-/// What each kind of episode adds to a restricted mean: its derivative by the episode's weight.
+/// The contribution of each kind of episode to a restricted mean: its derivative by the episode's weight.
 ///
 /// The sum of squares over the episodes is the variance by the infinitesimal jackknife (Jaeckel 1972; Efron 1982,
 /// chapter 6), which for one cause is Greenwood's.
@@ -108,7 +108,7 @@ impl Incidence {
         self.points.iter().map(of_point).sum()
     }
 
-    /// What every episode of this curve adds to the restricted mean.
+    /// The contributions of this curve's episodes to the restricted mean.
     pub fn influence(&self, horizon: i64) -> Influence {
         // What a larger share of decisions at a step takes away from the gains of all later steps.
         let mut later = 0.0;
@@ -143,7 +143,7 @@ impl Point {
 }
 
 impl Influence {
-    /// What one episode of the curve adds.
+    /// The contribution of one episode.
     ///
     /// # Panics
     /// For an episode that is not of the curve.

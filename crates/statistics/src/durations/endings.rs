@@ -10,7 +10,7 @@ pub struct Ending {
     pub outcome: Outcome,
 }
 
-/// How an episode ended.
+/// The outcome of an episode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// With the decision that is waited for.

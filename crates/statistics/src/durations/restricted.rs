@@ -1,4 +1,4 @@
-//! How much two restricted means differ, episodes being independent or paired.
+//! The difference of two restricted means, of independent or paired episodes.
 //!
 //! Rule: both sides up to the same horizon. The variance of a side is that of the infinitesimal jackknife; a pair's
 //! two episodes vary together, so of pairs it is the differences that are squared. Variances divide by n - 1.

@@ -10,7 +10,7 @@ use crate::endings::{Ending, Outcome, RiskSet, risk_sets};
 use crate::interval::{Interval, student_t_of};
 use crate::quantile;
 
-/// How near the curve must come to one half to count as having reached it: rounding only.
+/// The tolerance around one half, for rounding only.
 const HALF: f64 = 0.5 + 1e-12;
 
 /// A Kaplan-Meier curve (Kaplan and Meier 1958): the share of episodes undecided after each step.

@@ -1,4 +1,4 @@
-//! Which sums of squares integers of a given count, range and sum can have.
+//! Possible sums of squares of integers with a given count, range and sum.
 //!
 //! Rule: exact, by search. For n integers from 0 to h with the sum t, the sum of squares has the parity of t, is
 //! smallest where the integers differ by at most one, and largest where all but one are 0 or h. Between the two not

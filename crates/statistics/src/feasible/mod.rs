@@ -1,4 +1,4 @@
-//! Whether some integers can have a printed mean and standard error.
+//! The question whether some integers have a printed mean and standard error.
 //!
 //! Rule: exact. A mean of n integers is a sum over n (GRIM: Brown and Heathers 2017), and with the sum the standard
 //! error fixes the sum of squares up to its rounding (SPRITE: Heathers et al. 2018). Both prints are monotone in what
@@ -15,14 +15,14 @@ use exact::moments::StandardError;
 use exact::number::Decimal;
 use exact::rounding::Rounding;
 
-/// What is known of the values behind a cell before its numbers are read.
+/// The known facts about a cell's values, apart from its printed numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sample {
-    /// How many values there are; at least one.
+    /// The number of values; at least one.
     pub n: u64,
     /// The smallest and the largest value possible.
     pub range: (i64, i64),
-    /// Which standard error is printed.
+    /// The printed standard error.
     pub form: StandardError,
 }
 

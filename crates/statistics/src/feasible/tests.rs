@@ -16,7 +16,7 @@ fn witness(n: u64, range: (i64, i64), form: StandardError, print: Print) -> Opti
     Sample { n, range, form }.witness(&[print], &mut Search::default())
 }
 
-/// What moments print, as `mean ± se` with two digits.
+/// The print of moments, as `mean ± se` with two digits.
 fn printed(moments: &Moments, form: StandardError, rounding: Rounding) -> Option<(String, String)> {
     let mean = rounding.ratio(moments.sum, moments.n.into(), 2)?;
     let (above, below) = moments.se_squared(form)?;
@@ -90,7 +90,7 @@ fn draws(seed: u64) -> impl FnMut(u64) -> u64 {
     }
 }
 
-/// What no data gave is called so; what data gave never is.
+/// Infeasible cells are reported, feasible ones never are.
 #[test]
 fn data_is_feasible_and_most_forgeries_are_not() {
     let mut draw = draws(20);

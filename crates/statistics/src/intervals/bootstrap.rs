@@ -47,7 +47,7 @@ fn resampled_sums(values: &[i64]) -> Vec<i128> {
     sums
 }
 
-/// How the levels of a percentile interval are moved.
+/// The correction of a percentile interval's levels.
 struct Correction {
     bias: f64,
     acceleration: f64,

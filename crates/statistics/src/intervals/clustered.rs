@@ -21,7 +21,7 @@ pub fn fewest_clusters(level: f64) -> usize {
     (1..1100).find(reach).unwrap_or(usize::MAX)
 }
 
-/// What the division of a cell into clusters says about its mean.
+/// The mean of a cell as its clusters estimate it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Clustered {
     /// The number of clusters with a value, C.

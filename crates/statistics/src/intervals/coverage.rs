@@ -25,13 +25,13 @@ pub const WELCH: u64 = 8;
 /// A mean by clusters, with t(clusters - 1).
 pub const CLUSTERS: u64 = 2;
 
-/// Why there is no interval.
+/// The reason for a withheld interval.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "reason", rename_all = "snake_case")]
 pub enum Withheld {
     /// Fewer values, pairs or clusters than the coverage needs.
     TooFew {
-        /// How many it needs.
+        /// The number that it needs.
         fewest: u64,
     },
     /// All values are equal: they say nothing about those of other episodes.

@@ -1,4 +1,4 @@
-//! How many episodes a comparison needs, and what a number of episodes can show: exact power by enumeration.
+//! Sample sizes of comparisons, and their exact power by enumeration.
 //!
 //! Rule: the tests are those of a report, at a fixed level, and their power is a sum over every outcome; that of pairs
 //! by seed is simulated, seeded. Power of an exact test rises in a sawtooth, so a size is tried one by one from below.
@@ -20,7 +20,7 @@ pub use self::one_rate::OneRate;
 pub use self::seeds::{BySeed, SEED, STUDIES, Seeds};
 pub use super::quantile::settled;
 
-/// How near a p value may exceed the level and count as equal to it: rounding of sums, nothing more.
+/// The tolerance between a p value and the level, for rounding of sums only.
 const TIE: f64 = 1e-12;
 
 /// The most episodes per arm that a search goes to.
@@ -73,7 +73,7 @@ impl Rates {
     }
 }
 
-/// How far episodes of one seed resemble each other.
+/// The resemblance of episodes with one seed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Clusters {
     /// The number of seeds, each a cluster of as many episodes.
@@ -88,7 +88,7 @@ impl Clusters {
         self.icc > 0.0
     }
 
-    /// What tests count: the seeds, or the episodes.
+    /// The number of units in a test: seeds or episodes.
     pub fn units(self, runs: u64) -> u64 {
         if self.are_units() { self.seeds } else { self.seeds * runs }
     }

@@ -11,7 +11,7 @@ pub const STUDIES: u32 = 2_000;
 /// The first state of their random numbers.
 pub const SEED: u64 = 20_260_203;
 
-/// What is tested of each seed.
+/// The tested quantity of each seed.
 #[derive(Clone, Copy, Debug)]
 pub enum BySeed {
     /// The difference of two models, which share their seeds; and the share of discordant pairs.

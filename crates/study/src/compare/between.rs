@@ -1,4 +1,4 @@
-//! What differs between two studies that are open.
+//! Differences between two open studies.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! What footers declare, as statistics follow it.
+//! The declared design, in the form that statistics use.
 
 use statistics::design::{Cluster, Design, DesignKind};
 use trace::declared::{self, Declared, Origin};

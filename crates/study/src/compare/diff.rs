@@ -25,7 +25,7 @@ use score::table::EpisodeTable;
 use trace::inputs::{self, Input};
 use trace::open::TraceSet;
 
-/// What stands on one side.
+/// One side of a comparison.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Side {
     /// Definitions by name or path.
@@ -34,7 +34,7 @@ pub enum Side {
     Scores(Vec<ScoreFile>),
 }
 
-/// What to compare.
+/// The request for a comparison.
 #[derive(Clone, Debug)]
 pub struct DiffRequest {
     /// The metrics; all if absent.
@@ -45,7 +45,7 @@ pub struct DiffRequest {
     pub by: Vec<String>,
     /// The definitions of scores that do not carry them; the default ones if absent.
     pub definitions_of_scores: Option<PathBuf>,
-    /// How many threads to use.
+    /// The number of threads.
     pub threads: NonZeroUsize,
 }
 
@@ -61,12 +61,12 @@ impl Default for DiffRequest {
     }
 }
 
-/// What differs between two sides.
+/// The differences between two sides.
 #[derive(Clone, Debug)]
 pub struct Diff {
     /// Cells and episodes that changed, in the order of tables.
     pub changes: Changes,
-    /// What there is to say about flips whose timesteps are not known, one sentence each.
+    /// Notes about flips without known timesteps, one sentence each.
     pub notes: Vec<String>,
 }
 
@@ -75,7 +75,7 @@ pub struct Diff {
 pub(crate) struct Pair {
     pub before: Scored,
     pub after: Scored,
-    /// What decided each difference, where one scan scored both sides.
+    /// The evidence for each difference, if one scan scored both sides.
     pub evidence: Option<[BTreeMap<String, Evidence>; 2]>,
 }
 
@@ -86,14 +86,14 @@ pub(crate) struct Scored {
     pub table: EpisodeTable,
     /// All its metrics among those asked for.
     pub metrics: Vec<String>,
-    /// What scored it; `None` for scores that were read, which carry their definitions as text.
+    /// The definitions; `None` for scores that were read, which carry their definitions as text.
     pub definitions: Option<Definitions>,
 }
 
 /// Compares two sides; `traces` score definitions, and tell which timesteps decided where both sides are scores.
 ///
 /// # Errors
-/// What is wrong with definitions, scores or traces; a metric that neither side has; definitions without traces.
+/// Faults in definitions, scores or traces; a metric that neither side has; definitions without traces.
 pub fn diff(old: &Side, new: &Side, traces: &[Input], request: &DiffRequest) -> Result<Diff, StudyError> {
     let inputs = traces;
     let style = Style::load("default")?;
@@ -118,7 +118,7 @@ pub fn diff(old: &Side, new: &Side, traces: &[Input], request: &DiffRequest) -> 
 }
 
 impl Side {
-    /// What an argument names.
+    /// The side that an argument names.
     ///
     /// # Errors
     /// A folder or a Parquet file that holds no scores.
@@ -228,7 +228,7 @@ impl Pair {
         })
     }
 
-    /// What changed between the sides, its metrics those asked for.
+    /// The changes between the sides, for the requested metrics.
     ///
     /// # Errors
     /// Columns to group by that a side does not have; sums that leave 128 bits.
@@ -241,7 +241,7 @@ impl Pair {
     /// Adds the timesteps that decided each flip; returns what there is to say about those that are not known.
     ///
     /// # Errors
-    /// What is wrong with the rows of the traces.
+    /// Faults in the rows of the traces.
     pub(crate) fn explain(
         &self,
         changes: &mut Changes,

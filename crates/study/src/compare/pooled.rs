@@ -1,4 +1,4 @@
-//! Whether a cell mixes episodes that were recorded differently: in another world, with other prompts, by another agent.
+//! The check for cells that mix recordings: other worlds, other prompts, other agents.
 //!
 //! Rule: within a cell, the episodes of one experiment and model have one fingerprint. A mean over two is refused, with
 //! what differs. Where no episode of a cell declares one, nothing can be compared, and nothing is refused.
@@ -38,7 +38,7 @@ pub(crate) fn check(table: &EpisodeTable, by: &[String]) -> Result<(), StudyErro
     }
 }
 
-/// What cells mix that are taken all the same, a sentence each; nothing where none mixes anything.
+/// The mixtures that pooled cells contain, a sentence each; empty without any.
 ///
 /// # Errors
 /// Columns that the episodes do not have.

@@ -73,7 +73,7 @@ pub struct SensitivityReport {
     /// Cells and conclusions under each threshold.
     pub found: Sensitivity,
     pub figure: Figure,
-    /// What a reader must know of the data, one sentence each.
+    /// Notes for readers of the data, one sentence each.
     pub notes: Vec<String>,
 }
 
@@ -237,7 +237,7 @@ fn under(question: &Question, px: u32, columns: &Columns) -> Result<Definitions,
     Ok(definitions)
 }
 
-/// What differs between two definitions that differ in the evidence alone: what depends on it.
+/// The metrics and columns that depend on the evidence, between two definitions that differ in it alone.
 struct Dependent {
     metrics: BTreeSet<String>,
     filter: bool,

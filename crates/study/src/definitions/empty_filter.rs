@@ -31,10 +31,10 @@ impl Study {
         }
     }
 
-    /// What there is to say about a filter that keeps none of the episodes; `None` where it keeps some, or there is none.
+    /// The explanation of a filter that keeps no episode; `None` if it keeps some, or without a filter.
     ///
     /// # Errors
-    /// What is wrong with the inputs without the filter.
+    /// Faults of the inputs without the filter.
     pub fn empty_filter(&self, episodes: usize) -> Result<Option<String>, StudyError> {
         let Some(filter) = self.question.filter.as_deref().filter(|_| episodes == 0) else { return Ok(None) };
         let names = mentioned(filter);

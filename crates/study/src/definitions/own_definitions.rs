@@ -1,4 +1,4 @@
-//! Which definitions score which experiment: a footer names them, or the built-in experiment of the same name does.
+//! The definitions of each experiment: named by the footer, or those of the built-in experiment with its name.
 //!
 //! Rule: without definitions asked for, each experiment is scored by its own. Definitions that include all others score a
 //! mixture; any other mixture is refused, with the questions that would do. Definitions asked for must score what they keep.

@@ -1,4 +1,4 @@
-//! What is asked of the inputs: definitions, a filter, metrics, groups.
+//! The question to the inputs: definitions, a filter, metrics, groups.
 
 use std::path::{Path, PathBuf};
 
@@ -14,13 +14,13 @@ use crate::StudyError;
 use crate::losses::LostAs;
 use crate::scored_alike::ScoredAlike;
 
-/// What scores say of each episode's recording, where the traces do.
+/// Labels of each episode's recording that scores carry if the traces have them.
 pub(crate) const STANDING_LABELS: [&str; 4] = [CONDITION, "scene", "fingerprint", "participant"];
 
 /// The definitions that are used where none are named.
 pub const DEFAULT_DEFINITIONS: &str = "paper";
 
-/// What is asked of the inputs.
+/// The question to the inputs.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Question {
     /// Definitions by name or path; those that scores carry, or that the experiments of the traces name, if absent.
@@ -38,7 +38,7 @@ pub struct Question {
     pub by: Option<Vec<String>>,
     /// True if a cell may hold episodes that were recorded differently.
     pub pool: bool,
-    /// What lost episodes count as.
+    /// The treatment of lost episodes.
     pub lost: LostAs,
 }
 

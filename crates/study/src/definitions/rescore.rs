@@ -18,7 +18,7 @@ use score::format::{self, Partition};
 use score::table::EpisodeTable;
 use trace::inputs::Input;
 
-/// What to make again, and what to change.
+/// The report to make again, and the changes.
 #[derive(Clone, Debug)]
 pub struct RescoreRequest {
     /// The folder of the report.
@@ -33,7 +33,7 @@ pub struct RescoreRequest {
     pub style: Option<PathBuf>,
     /// Other metrics than the report's.
     pub metrics: Option<Vec<String>>,
-    /// How many threads to use.
+    /// The number of threads.
     pub threads: NonZeroUsize,
 }
 
@@ -51,7 +51,7 @@ pub fn traces_of(report: &Path, places: &[PathBuf]) -> Result<Vec<Input>, StudyE
 pub struct Rescored {
     /// The new report.
     pub report: Report,
-    /// What changed from the old one, or why that is not known.
+    /// The changes from the old report, or the reason why they are unknown.
     pub changes: Result<Diff, String>,
 }
 

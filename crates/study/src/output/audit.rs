@@ -12,7 +12,7 @@ use report::published;
 use report::style::Style;
 use score::score_traces::{has_value, schema_columns};
 
-/// What an audit takes published tables for.
+/// The assumptions of an audit about published tables.
 #[derive(Clone, Debug)]
 pub struct AuditRequest {
     /// Episodes per row.

@@ -1,4 +1,4 @@
-//! What figures are drawn from, and the figures of a report.
+//! The inputs of figures, and the figures of a report.
 
 use std::borrow::Cow;
 use std::path::PathBuf;
@@ -11,7 +11,7 @@ use report::cells::group::{DEFAULT_BY, group};
 use report::figures::{self, Figure, FigureError, FigureFormat, FigureName, FigureWidth, Input};
 use report::style::Style;
 
-/// How a figure looks.
+/// The options of a figure.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FigureOptions {
     /// `default`, `paper`, or the path of a style file, for the order of models, metrics and captions.
@@ -30,7 +30,7 @@ impl Default for FigureOptions {
     }
 }
 
-/// What figures are drawn from.
+/// The inputs of figures.
 #[derive(Debug)]
 pub struct FigureInputs<'a> {
     cells: Cells,
@@ -66,7 +66,7 @@ impl<'a> FigureInputs<'a> {
     /// One figure.
     ///
     /// # Errors
-    /// When the inputs lack what the figure needs.
+    /// Inputs that lack what the figure needs.
     pub fn draw(&self, name: FigureName) -> Result<Figure, FigureError> {
         figures::draw(name, &self.input())
     }
@@ -101,7 +101,7 @@ impl Drawings {
     /// The figures in every format, as files of a report.
     ///
     /// # Errors
-    /// When a picture has no room in memory.
+    /// A picture too large for memory.
     pub fn files(&self) -> Result<Vec<OutputFile>, StudyError> {
         let mut files = Vec::new();
         for (name, figure) in &self.drawn {

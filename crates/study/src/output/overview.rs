@@ -15,14 +15,14 @@ use report::statistics::Options;
 use report::style::Style;
 use trace::schema::SCHEMA_VERSION;
 
-/// Which sections.
+/// The sections.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
     /// Tables, data quality, definitions.
     Tables,
     /// Every figure that can be drawn.
     Figures,
-    /// What can be concluded, and every interval and test.
+    /// The conclusions, and every interval and test.
     Statistics,
 }
 

@@ -16,13 +16,13 @@ use report::bundle::{self, Manifest};
 use trace::inputs::Input;
 use trace::schema::SCHEMA_VERSION;
 
-/// Why a report cannot be made again.
+/// An error of making a report again.
 #[derive(Debug, thiserror::Error)]
 pub enum ProvenanceError {
     /// No manifest in the folder.
     #[error("{}: expected a report's folder with its manifest.json; name the folder that `mirrorstats report` wrote", path.display())]
     NoManifest {
-        /// Where it was looked for.
+        /// The expected path.
         path: PathBuf,
         /// The reason why it is not readable.
         source: io::Error,
@@ -30,22 +30,22 @@ pub enum ProvenanceError {
     /// A manifest that does not say what a report was made of.
     #[error("{}: expected the manifest of a report, found {found}; make the report again with `mirrorstats report`", path.display())]
     Malformed {
-        /// Where.
+        /// The path.
         path: PathBuf,
-        /// What is the matter.
+        /// The problem.
         found: String,
     },
     /// Traces that are not what they were.
     #[error("{} of {all} traces of the report are not what they were:\n{}\n{REMEDY}", faults.len(), lines(faults))]
     Traces {
-        /// How many there are.
+        /// The number of all inputs.
         all: usize,
-        /// What is the matter with which.
+        /// The inputs with their problems.
         faults: Vec<TraceFault>,
     },
 }
 
-/// What to do about traces that are not found.
+/// The remedy for traces that are not found.
 const REMEDY: &str = "  help: restore them, say where they are with --traces, or make a new report of what there is with `mirrorstats report`";
 
 /// A trace of the manifest that is not there as it was.
@@ -55,11 +55,11 @@ pub struct TraceFault {
     pub path: String,
     /// Its hash in the manifest.
     pub expected: String,
-    /// What is in its place, and where that is; `None` where there is no such file.
+    /// The file in its place, with its path; `None` if there is no such file.
     pub found: Option<(Found, PathBuf)>,
 }
 
-/// What is in the place of a trace.
+/// The file in the place of a trace.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Found {
     /// A file of this hash.

@@ -70,7 +70,7 @@ pub struct CellAnswer {
     /// Whose they are.
     #[serde(flatten)]
     pub key: CellKey,
-    /// What became of them.
+    /// Their reply quality.
     #[serde(flatten)]
     pub quality: Quality,
     /// Milliseconds within which half of the replies came.

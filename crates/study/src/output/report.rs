@@ -30,7 +30,7 @@ use trace::schema::SCHEMA_VERSION;
 /// The most episodes that a page lists.
 pub const MOST_LISTED: usize = 20_000;
 
-/// How a report looks.
+/// The options of a report.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ReportOptions {
     /// `default`, `paper`, or the path of a style file.
@@ -48,7 +48,7 @@ impl Default for ReportOptions {
 /// A report, in memory.
 #[derive(Debug)]
 pub struct Report {
-    /// What the scan gave: one row per episode, and more.
+    /// The results of the scan: one row per episode, and more.
     pub results: Results,
     /// All episodes, where some were lost: those in `results` are the ones that count.
     all: Option<EpisodeTable>,
@@ -58,11 +58,11 @@ pub struct Report {
     pub tables: Vec<MetricTable>,
     /// Ranks, if the style marks ties, and what became of the replies, if the inputs are traces.
     pub lists: Vec<ListTable>,
-    /// Where everything comes from.
+    /// The manifest.
     pub manifest: Manifest,
-    /// How many replies gave no decision; `None` where each gave one, and where that is not recorded.
+    /// The number of replies without a decision; `None` without any, and if it is not recorded.
     pub replies: Option<String>,
-    /// What the folder lacks and why, one sentence each.
+    /// The missing parts of the folder with their reasons, one sentence each.
     pub notes: Vec<String>,
     pub(crate) style: Style,
     threads: NonZeroUsize,
@@ -85,7 +85,7 @@ impl Study {
     /// Refuses a folder whose report has a file that this study reads, before anything is read.
     ///
     /// # Errors
-    /// When it has one.
+    /// An input in the folder.
     pub fn check_folder(&self, out: &Path, options: &ReportOptions) -> Result<(), StudyError> {
         bundle::check_old(out, &self.files_read(Some(&options.style)))?;
         self.check_out(out)
@@ -211,7 +211,7 @@ impl Report {
     /// The table of this name.
     ///
     /// # Errors
-    /// Where the style has none: which there are.
+    /// A table that the style lacks; the error lists its tables.
     pub fn table(&self, name: &str) -> Result<&MetricTable, StudyError> {
         self.tables.iter().find(|table| table.name == name).ok_or_else(|| {
             let known = || self.tables.iter().map(|table| table.name.as_str());

@@ -74,7 +74,7 @@ impl Study {
         Ok(statistics)
     }
 
-    /// What may be said while the study still runs: confidence sequences and e-values.
+    /// Statistics for a study in progress: confidence sequences and e-values.
     ///
     /// # Errors
     /// As [`Study::statistics`].

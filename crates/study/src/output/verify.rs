@@ -1,4 +1,4 @@
-//! Whether the files of a report's folder are those that its manifest lists.
+//! The check of a report's files against its manifest.
 //!
 //! Rule: nothing outside of the folder is looked at, whatever the manifest says, and no link is followed.
 
@@ -28,10 +28,10 @@ struct Listed {
     _schema_version: u32,
 }
 
-/// What was found in the folder of a report.
+/// The result of verifying a report's folder.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Verification {
-    /// How many files the manifest lists.
+    /// The number of files in the manifest.
     pub files: usize,
     /// Files that are not as the manifest says, by path.
     pub differences: Vec<Difference>,
@@ -42,15 +42,15 @@ pub struct Verification {
 pub struct Difference {
     /// The path inside the folder, `/` between its parts.
     pub path: String,
-    /// What is the matter with it.
+    /// The kind of problem.
     pub kind: Kind,
-    /// What was expected.
+    /// The expected value.
     pub expected: String,
-    /// What was found.
+    /// The value found.
     pub found: String,
 }
 
-/// What is the matter with a file.
+/// The kind of a file's problem.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
@@ -62,7 +62,7 @@ pub enum Kind {
     Unexpected,
 }
 
-/// Why a folder cannot be verified.
+/// An error of verifying a folder.
 #[derive(Debug, thiserror::Error)]
 pub enum VerifyError {
     /// No manifest in the folder.
@@ -70,21 +70,21 @@ pub enum VerifyError {
     NoManifest {
         /// The folder.
         path: PathBuf,
-        /// What is there.
+        /// The value found.
         found: String,
     },
     /// A manifest that is none of a report, or lists what cannot be a file of it.
     #[error("{}: expected the manifest of a report, found {found}; make the report again with `mirrorstats report`", path.display())]
     Malformed {
-        /// Where.
+        /// The path.
         path: PathBuf,
-        /// What is the matter.
+        /// The problem.
         found: String,
     },
     /// A file or a folder that cannot be read.
     #[error("{}: expected a file or folder that can be read, found {source}; check its permissions", path.display())]
     Unreadable {
-        /// Which.
+        /// The path.
         path: PathBuf,
         /// The reason for the refusal.
         source: io::Error,

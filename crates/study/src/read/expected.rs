@@ -1,4 +1,4 @@
-//! What definitions expect of the traces that they score.
+//! Expectations of definitions about the traces that they score.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use score::score_traces::{declared_columns, schema_columns};
 use trace::schema::{DeclaredColumn, Domain};
 use trace::validate::Expected;
 
-/// What definitions expect of traces.
+/// Expectations of definitions about traces.
 #[derive(Clone, Debug)]
 pub(crate) struct ExpectedTraces {
     /// The experiments that they know; any if `None`.

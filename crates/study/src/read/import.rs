@@ -21,7 +21,7 @@ use trace::schema::Kind;
 /// A colour takes some bytes.
 const LARGEST: Limit = Limit::new("bytes of a palette", 1 << 20);
 
-/// What an import takes its steps for.
+/// The options of an import.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ImportRequest {
     pub out: PathBuf,
@@ -35,14 +35,14 @@ pub struct ImportRequest {
     pub reconstruction: bool,
 }
 
-/// What was written.
+/// The written trace.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct ImportAnswer {
     /// The trace, as typed.
     pub out: String,
-    /// How many episodes it has.
+    /// The number of its episodes.
     pub episodes: usize,
-    /// How many rows it has, one per line.
+    /// The number of its rows, one per line.
     pub steps: usize,
     /// Columns of the schema that it has.
     pub columns: Vec<String>,
@@ -55,7 +55,7 @@ pub struct ImportAnswer {
 pub struct OwnColumn {
     /// Its name, the key of the lines.
     pub name: String,
-    /// What it holds; null where every line says null.
+    /// The type of its values; null if every value is null.
     #[serde(rename = "type")]
     pub kind: Option<Kind>,
 }

@@ -1,4 +1,4 @@
-//! What a report was made from: the inputs with their hashes, computed beside the scan.
+//! The inputs of a report with their hashes, computed beside the scan.
 
 use std::io;
 use std::path::Path;
@@ -11,7 +11,7 @@ use trace::inputs::Input;
 /// The inputs as a manifest names them.
 ///
 /// # Errors
-/// When a file cannot be read.
+/// An unreadable file.
 pub(crate) fn hashes(inputs: &[Input]) -> Result<Vec<bundle::Input>, StudyError> {
     inputs.iter().map(hash_of).collect()
 }

@@ -1,4 +1,4 @@
-//! What a study is made of: traces, or files of scores in their place. Each input is recognised and opened once.
+//! The inputs of a study: traces, or files of scores. Each input is recognised and opened once.
 
 use std::ffi::OsString;
 use std::fs::Metadata;
@@ -110,7 +110,7 @@ impl ScoreFile {
     }
 }
 
-/// What tells that a file is still the one that was opened: its identity, its size, and when it was written.
+/// The identity of an open file: its inode, its size, its time of writing.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Stamp {
     name: String,
@@ -118,7 +118,7 @@ pub(crate) struct Stamp {
     state: FileState,
 }
 
-/// Where the system gives them: device, inode, size, time of the last write and of the last change of the inode.
+/// The state of a file on systems that report it: device, inode, size, times of the last write and of the last inode change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct FileState {
     identity: (u64, u64),

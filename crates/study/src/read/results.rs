@@ -1,4 +1,4 @@
-//! What a scan is asked for, and what it gave.
+//! The requested and the actual results of a scan.
 
 use std::borrow::Cow;
 use std::collections::BTreeSet;
@@ -13,24 +13,24 @@ use score::timeline::Timeline;
 use trace::open::TraceSet;
 use trace::replies::REPLY_STATUS;
 
-/// What a scan gives beside the episode table.
+/// The requested results beside the episode table.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[expect(clippy::struct_excessive_bools, reason = "each output is asked for by itself")]
 pub struct Outputs {
-    /// When each agent looked, claimed and decided: for the figure `gaze`.
+    /// Times of looks, claims and decisions, for the figure `gaze`.
     pub timelines: bool,
-    /// How open questions ended: for the figure `e5-outcomes`.
+    /// Endings of open questions, for the figure `e5-outcomes`.
     pub outcomes: bool,
     /// The episodes that the infrastructure ended.
     pub losses: bool,
-    /// What became of the replies.
+    /// The reply quality.
     pub quality: bool,
     /// The hashes of the inputs.
     pub hashes: bool,
 }
 
 impl Outputs {
-    /// What figures of these names are drawn from.
+    /// The inputs of the figures with these names.
     pub fn of_figures(names: &[FigureName]) -> Self {
         let (timelines, outcomes) = (names.contains(&FigureName::Gaze), names.contains(&FigureName::E5Outcomes));
         Self { timelines, outcomes, ..Self::default() }
@@ -42,7 +42,7 @@ impl Outputs {
     }
 }
 
-/// What a scan gave.
+/// The results of a scan.
 #[derive(Clone, Debug)]
 pub struct Results {
     /// One row per episode.
@@ -50,7 +50,7 @@ pub struct Results {
     /// One timeline per episode, in the order of the table. `None` where they were not asked for, for scores, for
     /// definitions that do not name the moments, and for more episodes than `gaze` draws.
     pub timelines: Option<Vec<Timeline>>,
-    /// How open questions ended. `None` where that was not asked for, and where there is no such question.
+    /// The endings of open questions. `None` unless requested, and if there is no such question.
     pub outcomes: Option<Outcomes>,
     /// The ids of the episodes without `done` whose last reply was lost to the infrastructure. `None` where they were not
     /// asked for, and where the inputs do not record it.

@@ -39,7 +39,7 @@ impl Study {
         Ok(results)
     }
 
-    /// Whether there is anything to say of the replies: the traces record it, or episodes were lost.
+    /// Returns true if the traces record replies, or episodes were lost.
     ///
     /// # Errors
     /// Scores, which have no replies; a list of lost episodes that cannot be read.
@@ -48,7 +48,7 @@ impl Study {
         Ok(!reader.columns().is_empty() || !trace::lost::beside(&self.inputs)?.is_empty())
     }
 
-    /// What became of the replies of all episodes, lost ones counted.
+    /// The reply quality of all episodes, lost ones included.
     ///
     /// # Errors
     /// Scores, which have no replies; whatever is wrong with the traces or the list of lost episodes.

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What happened in one episode. Its JSON holds the constants alone, as logs do.
+/// The steps of one episode. Its JSON holds the constants alone, as logs do.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(rename = "Head", description = "The constants of an episode; the columns of the same names.")]
 #[expect(missing_docs, reason = "each field is the column of its name, documented in `schema`")]
@@ -42,7 +42,7 @@ pub struct Episode {
 /// One timestep.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Step {
-    /// What was done; `None` where the reply gave none.
+    /// The action; `None` if the reply gave none.
     pub action: Option<Action>,
     /// The self-attribution: a colour, `unknown`, or `None` where the reply gave none.
     pub self_color: Option<String>,
@@ -54,7 +54,7 @@ pub struct Step {
     pub extra: Extra,
 }
 
-/// What an agent can do: the five actions of the study, and the six of a hand.
+/// An agent's action: the five actions of the study, and the six of a hand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Action {
     /// One step forward.

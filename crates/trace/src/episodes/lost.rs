@@ -33,9 +33,9 @@ pub struct LostEpisode {
     pub run: i32,
     /// The step that got no reply; null if the episode did not come to its first.
     pub step: Option<i32>,
-    /// What the failure counts as, by the names of the trace's column `reply_status`; null where none of them fits.
+    /// The failure's value in the trace's column `reply_status`; null if none of them fits.
     pub status: Option<String>,
-    /// What failed, without any key.
+    /// The failure, without any key.
     pub reason: String,
 }
 
@@ -47,7 +47,7 @@ pub enum LostListError {
     Io {
         /// The list.
         path: PathBuf,
-        /// What it says.
+        /// The error of the system.
         source: io::Error,
     },
     /// A line that is no lost episode.
@@ -61,7 +61,7 @@ pub enum LostListError {
         path: PathBuf,
         /// From 1.
         line: usize,
-        /// What is wrong.
+        /// The problem.
         found: String,
     },
 }
@@ -71,7 +71,7 @@ pub fn list_of(folder: &Path) -> PathBuf {
     folder.join("lost.jsonl")
 }
 
-/// What a list says; nothing where there is none.
+/// The contents of a list; empty if there is no such file.
 pub fn read(path: &Path) -> Result<Vec<LostEpisode>, LostListError> {
     let failed = |source| LostListError::Io { path: path.to_owned(), source };
     let lines = match input::lines(path, LONGEST_LINE) {

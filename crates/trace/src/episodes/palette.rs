@@ -36,7 +36,7 @@ names!(Color {
 });
 
 impl Color {
-    /// What paint of this colour is: red, green and blue. In a picture it is darker by the light that falls on it.
+    /// The paint of this colour: red, green and blue. In a picture it is darker, by the light that falls on it.
     pub const fn rgb(self) -> [u8; 3] {
         match self {
             Self::Blue => [25, 60, 225],

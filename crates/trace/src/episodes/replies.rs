@@ -1,4 +1,4 @@
-//! What became of replies: counts of the column `reply_status`.
+//! Reply quality: counts of the column `reply_status`.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -17,7 +17,7 @@ pub const REPLY_STATUS: &str = "reply_status";
 /// The statuses of replies that gave a decision.
 const READ: [&str; 2] = ["ok", "repaired"];
 
-/// How many replies there are, and how many of them gave no decision.
+/// The number of replies, and of replies without a decision.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct ReplyCounts {
     /// Replies with a status.

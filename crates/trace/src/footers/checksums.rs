@@ -1,4 +1,4 @@
-//! What a program says of traces whose checksums are missing or another file's.
+//! Notes about traces whose checksums are missing or another file's.
 
 pub use parquet_pages::checksums::Checksums;
 

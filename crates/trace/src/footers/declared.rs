@@ -1,4 +1,4 @@
-//! What footers declare of how their rows came to be, apart from the rows.
+//! The footers' declarations about the origin of the rows.
 //!
 //! Rule: what a footer does not say is not assumed. Several files declare together what each of them declares alike; what
 //! keeps episodes from being pairs or independent holds for all of them.
@@ -14,7 +14,7 @@ use crate::read::open::TraceSet;
 use crate::schema::RECORDING_KEY;
 use exact::names;
 
-/// How rows came to be.
+/// The origin of rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Origin {
@@ -28,7 +28,7 @@ pub enum Origin {
 
 names!(Origin { Recording: "recording", Import: "import", Reconstruction: "reconstruction" });
 
-/// What episodes share that are more alike than chance.
+/// The unit that similar episodes share.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Cluster {
@@ -46,13 +46,13 @@ pub struct Registration {
     pub definitions: Option<String>,
 }
 
-/// What some files declare together.
+/// The common declarations of some files.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Declared {
-    /// How the rows came to be, where all files say the same; a reconstruction where any file is one.
+    /// The origin of the rows, if all files declare the same; a reconstruction if any file is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub origin: Option<Origin>,
-    /// What a cluster is, where any file says so: no test then takes episodes as independent.
+    /// The declared cluster, if any file declares one: then no test takes episodes as independent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cluster: Option<Cluster>,
     /// The parts of each fingerprint, by its name in the column `fingerprint`.
@@ -61,7 +61,7 @@ pub struct Declared {
     /// The fingerprints that stand for different parts in different files.
     #[serde(default, skip_serializing_if = "BTreeSet::is_empty")]
     pub ambiguous: BTreeSet<String>,
-    /// What a footer says of the recording behind each fingerprint. Scores do not carry it.
+    /// The footer's recording behind each fingerprint. Scores do not carry it.
     #[serde(skip)]
     pub recordings: BTreeMap<String, Arc<Value>>,
     /// The plan that was registered before the recording, where all files name the same.
@@ -81,7 +81,7 @@ const fn is_false(value: &bool) -> bool {
 }
 
 impl Declared {
-    /// What the footers of some traces declare.
+    /// The declarations of some traces' footers.
     pub fn of(traces: &TraceSet) -> Self {
         let recordings = traces.files().iter().map(|file| file.metadata_value(RECORDING_KEY));
         recordings.map(Self::of_recording).reduce(Self::joined).unwrap_or_default()
@@ -104,7 +104,7 @@ impl Declared {
         }
     }
 
-    /// What these and other files declare together.
+    /// The common declarations of these and other files.
     #[must_use]
     pub fn joined(mut self, other: Self) -> Self {
         let differs =

@@ -32,10 +32,10 @@ pub struct DeclaredExperiment {
     pub absent: Vec<&'static str>,
 }
 
-/// What to do about a declaration that is not as it must be.
+/// The remedy for an invalid declaration.
 const HELP: &str = "write it as a definition file has it under `[experiment.NAME]`, or remove the key from the footer";
 
-/// What is wrong with a declaration: where in the recording, what would do, what is there.
+/// The problem of a declaration: its place in the recording, expected, found.
 struct Fault {
     key: String,
     expected: &'static str,

@@ -17,7 +17,7 @@ use exact::suggest::nearest;
 pub struct Own {
     /// Its name, the key of the lines.
     pub name: String,
-    /// What it holds; `None` where every line says null.
+    /// The type of its values; `None` if every line says null.
     pub kind: Option<Kind>,
 }
 
@@ -28,11 +28,11 @@ pub(super) struct Columns {
     own: IndexMap<String, Inferred>,
 }
 
-/// What is known of an own column's type.
+/// The inferred type of an own column.
 #[derive(Debug, Default)]
 struct Inferred {
     kind: Option<Kind>,
-    /// Where the first value was that is not null.
+    /// The place of the first value that is not null.
     first: Option<Place>,
     wide: Option<(Place, i64)>,
 }

@@ -1,4 +1,4 @@
-//! Why lines of steps did not become a trace: the faults in them, gathered until a pass is over, or what else failed.
+//! Errors of importing lines of steps: faults, gathered until a pass is over, and other failures.
 
 use std::io;
 
@@ -36,7 +36,7 @@ impl Faults {
     }
 }
 
-/// Why lines of steps did not become a trace.
+/// An error of importing lines of steps.
 #[derive(Debug, thiserror::Error)]
 pub enum ImportError {
     /// Lines that are no steps, or steps that are no episodes.
@@ -44,7 +44,7 @@ pub enum ImportError {
     Faults {
         /// The first of them; never empty.
         told: Vec<Fault>,
-        /// How many more there are.
+        /// The number of further faults.
         more: usize,
     },
     /// A text cannot be read.

@@ -1,4 +1,4 @@
-//! What can be wrong with lines of steps: which line, which key, expected, found, what to do.
+//! Faults in lines of steps: line, key, expected, found, remedy.
 
 use std::fmt;
 use std::sync::Arc;
@@ -32,9 +32,9 @@ pub struct Fault {
     pub key: Option<String>,
     pub expected: String,
     pub found: String,
-    /// What to do about it.
+    /// The remedy.
     pub help: String,
-    /// How many lines after it have the same fault.
+    /// The number of later lines with the same fault.
     pub further_lines: u64,
 }
 

@@ -1,4 +1,4 @@
-//! Where each step lies, and whether the steps of an episode are whole: t = 1, 2, ... each once, the same names in all.
+//! The index of steps, and the check that episodes are whole: t = 1, 2, ... each once, the same names in all.
 
 use std::collections::HashMap;
 
@@ -17,7 +17,7 @@ pub(super) struct Step {
     line: u64,
 }
 
-/// What the first line of an episode says of it.
+/// The first line of an episode.
 #[derive(Debug)]
 struct Head {
     id: String,

@@ -1,4 +1,4 @@
-//! What the values of steps are held against besides the schema, and what the trace declares of them.
+//! Limits on the values of steps besides the schema, and the trace's declarations about them.
 
 use serde_json::{Value, json};
 
@@ -9,7 +9,7 @@ use crate::declared::{Cluster, Origin};
 use crate::schema::colors::palette::Palette;
 use crate::validate::Expected;
 
-/// What there is of experiments and colours.
+/// The known experiments and colours.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Limits<'a> {
     /// The experiments that there are, the domain, and the columns of its own.
@@ -18,7 +18,7 @@ pub struct Limits<'a> {
     pub domain: Option<&'a str>,
     /// The colours that there are, which the trace then declares; any if `None`.
     pub palette: Option<&'a Palette>,
-    /// What episodes share that are more alike than chance; nothing if `None`.
+    /// The unit that similar episodes share; no cluster if `None`.
     pub cluster: Option<Cluster>,
     /// True if the steps were rebuilt from published numbers, which leave the rest of them open.
     pub is_reconstruction: bool,

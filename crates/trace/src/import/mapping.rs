@@ -8,7 +8,7 @@ use crate::schema::domain::is_general;
 use crate::schema::{Kind, column};
 use exact::escape::visible;
 
-/// What becomes of the keys of foreign lines, and what was left out of them so far.
+/// The mapping of foreign keys, and the keys left out so far.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mapping {
     columns: Vec<(String, Path)>,
@@ -20,7 +20,7 @@ pub struct Mapping {
 /// A row of any format: keys and values, nested ones too.
 pub(super) type Row<'a> = [(&'a str, &'a Value)];
 
-/// Where a value is in a line: keys and positions with dots between them, and what is added to an integer there.
+/// The path to a value in a line: keys and positions with dots between them, and an integer that is added to the value.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Path {
     keys: String,

@@ -9,7 +9,7 @@
 //! where a step belongs, and episodes come in the order of their first lines.
 //!
 //! Rule: all or nothing. A line that cannot be taken as it is fails the import, and nothing is filled in or left out.
-//! What is kept in memory is where each step lies, not the steps.
+//! Memory holds the position of each step, not the steps.
 
 mod columns;
 mod error;
@@ -45,12 +45,12 @@ use error::Faults;
 use exact::replace::NewFile;
 use index::Index;
 
-/// What became of the lines.
+/// The imported episodes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Imported {
-    /// How many episodes the trace has.
+    /// The number of episodes in the trace.
     pub episodes: usize,
-    /// How many rows it has, one a line.
+    /// The number of its rows, one per line.
     pub steps: usize,
     /// Columns of the schema that it has, in the schema's order.
     pub columns: Vec<&'static str>,

@@ -7,7 +7,7 @@ use crate::schema::colors;
 use crate::schema::colors::spelling::WORDS;
 use crate::schema::{COLUMNS, Column, Kind};
 
-/// What one line may hold: `schemas/step.schema.json`.
+/// The JSON Schema of one line: `schemas/step.schema.json`.
 pub fn document() -> Value {
     let properties: Map<String, Value> =
         COLUMNS.iter().map(|column| (column.name.to_owned(), property(column))).collect();

@@ -27,7 +27,7 @@ pub struct Text {
     name: Arc<str>,
     noun: &'static str,
     reader: BufReader<File>,
-    /// Where the reader is, in bytes from the start.
+    /// The position of the reader, in bytes from the start.
     offset: u64,
     /// Lines that were read since the start.
     lines: u64,
@@ -57,7 +57,7 @@ pub(super) struct Line {
 /// A step with all that was replied; the longest reply of a model has some hundred thousand bytes.
 const LONGEST_LINE: Limit = Limit::new("bytes in a line of steps", 16 << 20);
 
-/// What is piped in is kept on the disk meanwhile.
+/// The limit for piped input, which is kept on the disk meanwhile.
 const LARGEST_STREAM: Limit = Limit::new("bytes of steps that are piped in", 64 << 30);
 
 impl Text {

@@ -18,10 +18,10 @@ use super::{METADATA, METADATA_KEY, topic};
 use crate::episode::Episode;
 use exact::replace::NewFile;
 
-/// What orders the episodes of a log: seed, run and repetition.
+/// The order of a log's episodes: seed, run and repetition.
 pub type Place = (i32, i32, i32);
 
-/// Where an episode is in its log.
+/// The place of an episode in its log.
 pub fn place(head: &Episode) -> Place {
     (head.seed, head.run, head.repetition.unwrap_or(1))
 }

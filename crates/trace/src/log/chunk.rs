@@ -1,4 +1,4 @@
-//! What is in a chunk, unpacked within a budget.
+//! The contents of a chunk, unpacked within a budget.
 //!
 //! Rule: a chunk says how large it is when unpacked, and is never unpacked beyond that; what it says is held against its
 //! own bytes and counted for the whole log before anything is unpacked.
@@ -11,7 +11,7 @@ use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use super::parse::{FRAME, LONGEST, parsed};
 use exact::budget::{Budget, Exceeded, Limit};
 
-/// What is unpacked of a log, and how much of it is looked at for chunks behind damage.
+/// The budgets for unpacking a log and for searching it for chunks behind damage.
 ///
 /// Frames are compressed already, and rows as text take some twenty times less in a chunk: a log is far below the limit,
 /// which a chunk of zeros is not.

@@ -1,9 +1,9 @@
-//! Why a log cannot be used.
+//! Errors of a log.
 
 use std::io;
 use std::path::Path;
 
-/// Why a log cannot be used.
+/// An error of a log.
 #[derive(Debug, thiserror::Error)]
 pub enum LogError {
     /// The operating system refuses.
@@ -11,7 +11,7 @@ pub enum LogError {
         "cannot {doing} the log `{file}`: {source}\n  help: is the folder there and writable, and the disk not full?"
     )]
     Io {
-        /// What was being done.
+        /// The operation.
         doing: &'static str,
         /// The log.
         file: String,
@@ -25,7 +25,7 @@ pub enum LogError {
     Damaged {
         /// The log.
         file: String,
-        /// What was found.
+        /// The fault.
         fault: String,
     },
     /// The bytes are those of a log, but not of a recording.
@@ -33,7 +33,7 @@ pub enum LogError {
     Foreign {
         /// The log.
         file: String,
-        /// What is missing.
+        /// The missing part.
         fault: String,
     },
 }

@@ -20,7 +20,7 @@ use super::topic;
 use crate::episode::{Episode, Step};
 use exact::input;
 
-/// Where the steps of a log are.
+/// The positions of a log's steps.
 #[derive(Debug)]
 pub struct LogIndex {
     path: PathBuf,
@@ -28,7 +28,7 @@ pub struct LogIndex {
     chunks: Vec<Chunk>,
 }
 
-/// Where a chunk begins, and the times of its first and its last message, ns.
+/// The start of a chunk, and the times of its first and its last message, ns.
 #[derive(Clone, Copy, Debug)]
 struct Chunk {
     at: u64,
@@ -36,7 +36,7 @@ struct Chunk {
     last: u64,
 }
 
-/// What a log has of a step.
+/// A log's record of a step.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Moment {
     /// The frame, PNG; `None` where none was drawn.
@@ -56,7 +56,7 @@ pub struct Shape {
     pub radius: Option<f64>,
     /// Red, green, blue and opacity, from 0 to 1.
     pub rgba: [f64; 4],
-    /// How high its centre is, m.
+    /// The height of its centre, m.
     pub height: f64,
 }
 
@@ -88,7 +88,7 @@ impl LogIndex {
         Ok((!chunks.is_empty()).then(|| Self { path: path.to_owned(), topics, chunks }))
     }
 
-    /// What the log has of the step of an episode at this time, ns; `None` where it has nothing of it.
+    /// The log's record of an episode's step at this time, ns; `None` without one.
     pub fn step(&self, episode_id: &str, time: u64) -> Result<Option<Moment>, LogError> {
         let mut records = records(&self.path)?;
         for chunk in self.chunks.iter().filter(|chunk| (chunk.first..=chunk.last).contains(&time)) {
@@ -169,7 +169,7 @@ pub fn unfinished(path: &Path) -> Result<Option<Unfinished>, LogError> {
     Ok(head.map(|head| Unfinished { episode: Episode { steps, ..head } }))
 }
 
-/// What a log that is still being written has of the step at this time, ns.
+/// The record of the step at this time, ns, in a log that is still being written.
 pub fn unfinished_step(path: &Path, time: u64) -> Result<Option<Moment>, LogError> {
     let mut found: Option<Moment> = None;
     each_message(path, |topic, at, data| {

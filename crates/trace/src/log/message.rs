@@ -19,7 +19,7 @@ pub enum EpisodeMessage {
         episode_id: String,
         /// Its steps.
         steps: usize,
-        /// What it was recorded with, which is not known before the first answer; the column of that name.
+        /// Its fingerprint, which is unknown before the first answer; the column of that name.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         fingerprint: Option<String>,
         /// The hash of its rows; the column of that name. Logs of earlier versions have none.

@@ -12,14 +12,14 @@ use super::message::{Decision, EpisodeMessage};
 use super::messages::Messages;
 use super::topic;
 
-/// What a message says.
+/// The content of a message.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
     /// An episode begins or has ended.
     Episode(EpisodeMessage),
     /// The frame of a step: the bytes of a `foxglove.CompressedImage`.
     Frame(Vec<u8>),
-    /// What the eye could see.
+    /// Visibility.
     Census(Value),
     /// The row of a step.
     Decision(Box<Decision>),
@@ -35,7 +35,7 @@ pub struct Timed {
     pub event: Event,
 }
 
-/// What a log says, message by message.
+/// The messages of a log, one by one.
 pub struct LogReader(Messages<BufReader<File>>);
 
 impl LogReader {

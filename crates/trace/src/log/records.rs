@@ -14,7 +14,7 @@ use super::parse::{FRAME, LONGEST, parsed};
 /// The header of a chunk without the name of its compression.
 const CHUNK_HEADER: usize = 8 + 8 + 8 + 4 + 4 + 8;
 
-/// What lies at a place of the file.
+/// The content at an offset of the file.
 #[derive(Debug)]
 pub(super) enum Piece {
     /// A record other than a chunk.

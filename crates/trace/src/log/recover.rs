@@ -1,4 +1,4 @@
-//! What can be saved of a log that was cut off or damaged.
+//! Recovery of a log that was cut off or damaged.
 //!
 //! Rule: an episode is saved if its `begin`, its `end` and every row between are there, and their hash is that of the `end`;
 //! anything else that was begun is lost, and named. What is behind damage is still looked at. What is saved is what was written: of a chunk whose
@@ -24,17 +24,17 @@ use crate::episode_hash;
 use exact::budget::{Budget, Limit, SETTING};
 use exact::input;
 
-/// What was saved of a log, and what was not.
+/// The recovered and the lost parts of a log.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Recovered {
     /// The episodes that are whole, in the order of the log.
     pub episodes: Vec<Episode>,
-    /// How the recording was made, if the log still says so.
+    /// The metadata of the recording, if the log still has it.
     pub recording: Option<Value>,
     pub losses: Losses,
 }
 
-/// What is lost of a log.
+/// The losses of a log.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Losses {
     /// Episodes that were begun and are not whole.
@@ -43,7 +43,7 @@ pub struct Losses {
     pub stray_rows: usize,
     /// Chunks that cannot be read.
     pub damaged_chunks: usize,
-    /// What is damaged beside chunks: records that cannot be read, checksums that do not hold.
+    /// Damage beside chunks: unreadable records, bad checksums.
     pub damage: Vec<String>,
     /// The reason why the log does not say any more how it was recorded, if it does not.
     pub recording: Option<String>,
@@ -58,7 +58,7 @@ pub struct LostEpisode {
     pub episode_id: String,
     /// The rows that are there.
     pub rows: usize,
-    /// What is missing.
+    /// The missing part.
     pub reason: String,
 }
 

@@ -59,7 +59,7 @@ pub enum Form {
     },
 }
 
-/// What is seen before a step.
+/// The perception before a step.
 #[derive(Clone, Debug)]
 pub struct View<'a, C> {
     /// The frame, PNG; `None` where none was drawn.
@@ -67,7 +67,7 @@ pub struct View<'a, C> {
     pub placed: &'a [Placed],
     /// Everything, as shapes.
     pub solids: &'a [Solid],
-    /// What the eye could see.
+    /// Visibility.
     pub census: &'a C,
 }
 

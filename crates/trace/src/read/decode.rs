@@ -78,7 +78,7 @@ pub(crate) struct RowGroup<'a> {
     over: bool,
 }
 
-/// Where the values of a column come from.
+/// The source of a column's values.
 enum Source {
     /// The file does not have the column.
     Absent,

@@ -21,7 +21,7 @@ pub(crate) struct Ahead<'a> {
     groups: Vec<Vec<OnceLock<Option<Group>>>>,
 }
 
-/// What is known of a row group.
+/// The known facts about a row group.
 struct Group {
     first: String,
     last: String,

@@ -57,7 +57,7 @@ pub struct TraceFile {
     episodes: EpisodeBudget,
 }
 
-/// What a reader of a file needs.
+/// The parts of a file that a reader needs.
 #[derive(Debug)]
 pub(crate) struct Readable {
     pub(crate) footer: ArrowReaderMetadata,
@@ -72,7 +72,7 @@ pub struct FileColumn {
     pub kind: Option<Kind>,
 }
 
-/// What a column is over all files of a set.
+/// The type and presence of a column over all files of a set.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ColumnUse {
     /// The logical type, the same in all files that have the column; [`Kind::Unsupported`] where they differ.
@@ -110,12 +110,12 @@ impl TraceSet {
         if !self.files.is_empty() && self.files.iter().all(is_own) { Domain::Own } else { Domain::Mirror }
     }
 
-    /// What keeps files of another domain from being traces of the mirror's.
+    /// Findings about files of another domain among traces of the mirror's.
     pub fn strangers(&self) -> Vec<Finding> {
         self.files.iter().flat_map(TraceFile::strangeness).collect()
     }
 
-    /// What the schema says of the column of this name in these files; `None` for a column of their own.
+    /// The schema's column of this name in these files; `None` for a column of their own.
     pub fn schema_column(&self, name: &str) -> Option<&'static Column> {
         let is_known = |known: &&'static Column| match self.domain() {
             Domain::Mirror => known.since == 1 || self.declares(name),
@@ -124,7 +124,7 @@ impl TraceSet {
         schema::column(name).filter(is_known)
     }
 
-    /// Whether the schema's column keeps its meaning in these files, present or not.
+    /// Returns true if the schema's column keeps its meaning in these files, present or not.
     pub fn knows(&self, known: &Column) -> bool {
         let is_free = self.domain() == Domain::Mirror && known.since == 1;
         self.domain().has(known) && (is_free || self.column(known.name).is_none() || self.declares(known.name))
@@ -140,7 +140,7 @@ impl TraceSet {
         &self.files
     }
 
-    /// What the column of this name is over all files; `None` if no file has it.
+    /// The column of this name over all files; `None` if no file has it.
     pub fn column(&self, name: &str) -> Option<ColumnUse> {
         let mut seen: Option<(&TraceFile, Kind)> = None;
         let (mut present, mut missing_from, mut conflict) = (false, None, None);
@@ -248,7 +248,7 @@ impl TraceFile {
         &self.episodes
     }
 
-    /// Where it is, for an engine that reads files by itself.
+    /// Its path, for an engine that reads files itself.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -257,7 +257,7 @@ impl TraceFile {
         self.bytes
     }
 
-    /// What its episodes are about.
+    /// The domain of its episodes.
     pub const fn domain(&self) -> Domain {
         self.domain
     }
@@ -340,7 +340,7 @@ impl TraceFile {
         value(&self.pairs, key)
     }
 
-    /// What a reader needs; strings are read as dictionaries. Read again unless somebody holds it.
+    /// The parts that a reader needs; strings are read as dictionaries. Read again unless somebody holds it.
     pub(crate) fn footer(&self) -> Result<Arc<Readable>, Box<Finding>> {
         let mut held = self.footer.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(footer) = held.upgrade() {

@@ -72,7 +72,7 @@ pub(crate) enum Event<T> {
     Fault(Box<Finding>),
 }
 
-/// What a worker makes of a row group, in this order: at most one head, wholes, a tail or a fault.
+/// The parts of a row group, in this order: at most one head, wholes, a tail or a fault.
 enum Part<T> {
     /// The first episode's rows, which the row group before may have begun.
     Head(Vec<Rows>),

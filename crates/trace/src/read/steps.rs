@@ -43,7 +43,7 @@ pub struct Steps {
     threads: NonZeroUsize,
 }
 
-/// What rows become.
+/// The types of the output rows.
 #[derive(Clone)]
 struct Shape {
     schema: SchemaRef,

@@ -1,4 +1,4 @@
-//! What is known of a column: its name, its type, what it means, and the field behind it.
+//! A column: its name, its type, its meaning, and the field behind it.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -20,7 +20,7 @@ pub struct Column {
     pub nullable: bool,
     /// True if the value is the same in all rows of an episode.
     pub constant: bool,
-    /// What a number counts or measures.
+    /// The unit of a number.
     pub unit: Option<&'static str>,
     pub doc: &'static str,
     /// The only values that the column takes, where they are fixed.
@@ -166,7 +166,7 @@ impl Column {
         matches!(self.unit, Some("px" | "ms" | "tokens" | "USD" | "agents" | "mm"))
     }
 
-    /// What no value means, where that is a text or a number and not an expression over other columns.
+    /// The meaning of no value, if that is a text or a number and not an expression over other columns.
     pub fn default_text(&self) -> Option<&'static str> {
         let text = self.default?;
         let quoted = text.strip_prefix('\'').and_then(|text| text.strip_suffix('\''));

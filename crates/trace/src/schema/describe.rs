@@ -9,7 +9,7 @@ use crate::schema::{COLUMNS, Column, METADATA, MetadataKey, SCHEMA_VERSION};
 #[derive(Clone, Debug, Serialize)]
 pub struct SchemaDocument {
     pub title: &'static str,
-    /// What the format is, in a few sentences.
+    /// The format, in a few sentences.
     pub description: &'static str,
     /// The version of the schema.
     pub version: u32,
@@ -28,7 +28,7 @@ pub struct Rule {
     /// True if breaking it makes a trace unusable.
     pub severity: Severity,
     pub rule: &'static str,
-    /// What to do where it does not.
+    /// The remedy.
     pub help: &'static str,
 }
 

@@ -7,7 +7,7 @@ use serde_json::Value;
 use super::{Column, Kind, column};
 use crate::read::open::FileColumn;
 
-/// What the episodes of a trace are about.
+/// The subject of a trace's episodes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Domain {
     /// Embodied agents before a mirror: the whole schema holds.
@@ -62,7 +62,7 @@ impl Domain {
         self == Self::Mirror || is_general(column.name)
     }
 
-    /// What the schema says of the column of this name, in this domain.
+    /// The schema's column of this name, in this domain.
     pub fn column(self, name: &str) -> Option<&'static Column> {
         column(name).filter(|column| self.has(column))
     }

@@ -15,7 +15,7 @@ pub struct Rule<'a> {
     pub asks: Requirement<'a>,
 }
 
-/// What a rule asks for. Only [`Present`](Self::Present) and [`Constant`](Self::Constant) are about nulls.
+/// A rule's requirement. Only [`Present`](Self::Present) and [`Constant`](Self::Constant) are about nulls.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Requirement<'a> {
     /// No null.
@@ -44,7 +44,7 @@ pub enum Requirement<'a> {
     WithoutGap,
 }
 
-/// What the values are held against besides the schema.
+/// The limits on values besides the schema.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Known<'a> {
     /// The palette of the footer.
@@ -104,7 +104,7 @@ pub fn rules_of<'a>(column: &Column, known: Known<'a>) -> Vec<Rule<'a>> {
 }
 
 impl Rule<'_> {
-    /// What would do, for a message. Whoever sees single rows may say more of a constant, and of the steps.
+    /// The expected values, for a message. Callers that see single rows may say more of a constant, and of the steps.
     pub fn expected(&self) -> String {
         match self.asks {
             Requirement::Present => "a value".to_owned(),

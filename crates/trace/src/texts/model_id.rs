@@ -1,4 +1,4 @@
-//! Whether the model that answered is the one that was asked for, by their ids.
+//! Comparison of the answering model with the requested one, by their ids.
 //!
 //! The same model has several ids. OpenAI answers for an alias with its dated snapshot (`gpt-5.1-2025-11-13`), Anthropic
 //! likewise (`claude-sonnet-4-6-20260101`), Google puts `models/` in front and numbers versions (`gemini-2.5-flash-001`,
@@ -10,7 +10,7 @@ use glob::{MatchOptions, Pattern};
 /// The backend of servers of one's own.
 pub const OWN_SERVER: &str = "compatible";
 
-/// Whether `returned` is `asked`, a snapshot of it or its alias, or fits one of these patterns, where `*` is any text.
+/// Returns true if `returned` is `asked`, a snapshot of it or its alias, or fits one of these patterns, where `*` is any text.
 pub fn answers_for(asked: &str, returned: &str, patterns: &[String]) -> bool {
     let options = MatchOptions { case_sensitive: false, ..MatchOptions::new() };
     let fits = |text: &String| Pattern::new(text).is_ok_and(|pattern| pattern.matches_with(returned, options));

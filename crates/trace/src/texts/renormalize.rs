@@ -28,7 +28,7 @@ const TARGET: &str = "self_color";
 /// The key of a recording that tells the version of the rule.
 const VERSION_KEY: &str = "identification_version";
 
-/// What changes.
+/// The changes.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct RenormalizeAnswer {
     /// The version of the rule of this program.
@@ -50,11 +50,11 @@ pub struct RenormalizedFile {
     pub out: Option<String>,
     /// The version of the rule that the old trace tells; null where it tells none.
     pub version_before: Option<String>,
-    /// How many steps it has.
+    /// The number of its steps.
     pub steps: u64,
-    /// How many of them have a text.
+    /// The number of steps with a text.
     pub texts: u64,
-    /// How many of them change.
+    /// The number of steps that change.
     pub flips: usize,
 }
 
@@ -75,7 +75,7 @@ pub struct Flip {
     pub identification: String,
 }
 
-/// Why no trace was written.
+/// An error of renormalizing traces.
 #[derive(Debug, thiserror::Error)]
 pub enum RenormalizeError {
     #[error(transparent)]

@@ -1,4 +1,4 @@
-//! Whether each episode has an id of its own.
+//! The check that episode ids are unique.
 //!
 //! Rule: exact. Eight bytes are kept per episode: the hash of its id. Where two hashes are equal, the traces are read
 //! again and the ids themselves compared.

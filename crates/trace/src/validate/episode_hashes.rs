@@ -1,4 +1,4 @@
-//! Whether the hash that an episode carries is that of its rows.
+//! The check of each episode's hash against its rows.
 
 use arrow::array::{Array as _, ArrayRef, AsArray as _};
 use arrow::datatypes::{DataType, Float64Type, Int32Type, Int64Type};
@@ -11,7 +11,7 @@ use crate::read::parallel_scan::Episodes;
 use crate::read::projection::Layout;
 use crate::schema::Value;
 
-/// What to do about rows that were changed.
+/// The remedy for changed rows.
 const HELP: &str =
     "the rows were changed: restore the file from its source; where the change is meant, leave the column out";
 

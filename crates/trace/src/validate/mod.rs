@@ -28,7 +28,7 @@ use duplicate_ids::{Ids, Start, starts};
 use parquet_pages::checksums::Checksums;
 use rules::{Located, Rules};
 
-/// What was checked and what was found.
+/// The checks and their findings.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Validation {
     /// The files, in their order.
@@ -61,7 +61,7 @@ pub struct Rest<'a> {
 }
 
 impl Validation {
-    /// How many findings have this severity.
+    /// The number of findings with this severity.
     pub fn count(&self, severity: Severity) -> usize {
         self.findings.iter().filter(|finding| finding.severity == severity).count()
     }
@@ -86,7 +86,7 @@ impl Validation {
     }
 }
 
-/// What definitions expect of traces.
+/// Expectations of definitions about traces.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Expected<'a> {
     /// The experiments that there are, besides those that the files declare; any if `None`.
@@ -195,7 +195,7 @@ fn unreadable(file: &str, replies: &ReplyCounts) -> Option<Finding> {
     (bad > 0).then(finding)
 }
 
-/// What there is to say of some whole episodes.
+/// Findings about some whole episodes.
 struct Checked {
     findings: Vec<Finding>,
     episodes: u64,

@@ -135,7 +135,7 @@ fn counts_from_one(t: &Held, offsets: &[usize]) -> bool {
     }
 }
 
-/// What a rule is searched in: one column of some episodes.
+/// One column of some episodes, in which a rule is checked.
 struct Look<'a> {
     file: &'a str,
     episodes: &'a Episodes,

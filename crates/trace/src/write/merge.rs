@@ -43,7 +43,7 @@ pub struct EpisodeRows {
     pub seed: i64,
     /// The run within its seed.
     pub run: i64,
-    /// Which time its scene is played, from 1.
+    /// The repetition of its scene, from 1.
     pub repetition: i64,
     rows: RecordBatch,
 }
@@ -57,7 +57,7 @@ impl EpisodeRows {
         decode_episode::episode(&self.rows)
     }
 
-    /// Who played and when, of an episode of any domain; its steps have no value.
+    /// The identity of an episode of any domain; its steps have no value.
     pub fn identity(&self) -> Result<Episode, NotAnEpisode> {
         decode_episode::identity(&self.rows)
     }

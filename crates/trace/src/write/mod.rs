@@ -28,10 +28,10 @@ use super::schema::{COLUMNS, Column, OF_SOME_TASKS, Value};
 use exact::escape::visible;
 use exact::replace::NewFile;
 
-/// What a trace file is created with, besides its episodes.
+/// The metadata of a new trace file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TraceMetadata {
-    /// How the recording was made, a JSON object (scene and prompt hashes, view size, ...); left out if `None`.
+    /// The recording as a JSON object (scene and prompt hashes, view size, ...); left out if `None`.
     pub recording: Option<serde_json::Value>,
     /// The optional columns that the file has.
     pub columns: OptionalColumns,
@@ -109,7 +109,7 @@ impl OptionalColumns {
     }
 }
 
-/// What starts the file of a trace.
+/// A constructor for the start of a trace file.
 type Make<W> = fn(W, &SchemaRef, Option<&serde_json::Value>) -> parquet::errors::Result<RowGroups<W>>;
 
 /// Encodes episodes as a trace into anything that bytes can be written to.

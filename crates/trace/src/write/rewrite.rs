@@ -27,7 +27,7 @@ use crate::read::verify::verify_pages;
 use crate::schema::RECORDING_KEY;
 use parquet_pages::checksums::{self, CREATED_BY, Held};
 
-/// What a text is made anew from: the episode's id, the timestep, the text to look at, and the text as it is.
+/// The sources of a new text: the episode's id, the timestep, the text to look at, and the present text.
 pub(crate) type Before<'a> = (&'a str, i64, Option<&'a str>, Option<&'a str>);
 
 /// Writes the trace of a set's only file to `out`, with the column `target`, which it has, as `change` makes it from the

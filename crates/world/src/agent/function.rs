@@ -33,7 +33,7 @@ const GLANCE: Duration = Duration::from_millis(20);
 /// Makes the function of each episode; an error is why there is none.
 pub type Listeners = dyn Fn() -> Result<Listener, String> + Send + Sync;
 
-/// What plays, and how it is dealt with.
+/// The player, and its settings.
 pub struct Function {
     pub model: String,
     /// The text of the function, if it has one: recordings carry its hash.

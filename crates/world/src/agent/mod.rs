@@ -1,4 +1,4 @@
-//! Who decides the next action.
+//! Agents: they decide the next action.
 //!
 //! An agent gets what a vision-language model gets, the frame and the words around it, and nothing else: no pose of
 //! another body, no label, no ground truth. It answers with a [`Reply`], which the recorder writes down as it is.
@@ -30,10 +30,10 @@ use reply::Repair;
 use trace::episode::Action;
 use trace::frame::Frame;
 
-/// What an agent is told once, before the first step.
+/// The task that an agent gets once, before the first step.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Task {
-    /// What is asked, and how: its prompt and the keys of a reply.
+    /// The experiment: its prompt and the keys of a reply.
     pub experiment: Experiment,
     /// The false colour of the first line of the prompt in E3.
     pub stated_color: Option<String>,
@@ -43,18 +43,18 @@ pub struct Task {
     pub seed: u64,
 }
 
-/// What an agent perceives before it acts.
+/// The perception of an agent before it acts.
 #[derive(Clone, Debug)]
 pub struct Observation {
     /// The timestep, from 1.
     pub t: i32,
     /// Steps left, this one included.
     pub remaining: i32,
-    /// Where the body stands, m, in the coordinates of the room.
+    /// The position of the body, m, in the coordinates of the room.
     pub x: f32,
     /// See `x`.
     pub y: f32,
-    /// Where the body faces: degrees, counter-clockwise from +x, a multiple of 30.
+    /// The direction of the body: degrees, counter-clockwise from +x, a multiple of 30.
     pub yaw: f32,
     /// The last move was blocked.
     pub bumped: bool,
@@ -71,19 +71,19 @@ pub struct Observation {
 /// A step that is over.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Past {
-    /// What was decided; `None` where the reply gave no decision.
+    /// The decided action; `None` if the reply gave no decision.
     pub action: Option<Action>,
     pub bumped: bool,
     /// The summary of its reply.
     pub thought: Option<String>,
 }
 
-/// What an agent answered, and how that was got.
+/// An agent's answer, and how it was obtained.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reply {
     /// The outcome of getting and reading it.
     pub status: Status,
-    /// What had to be repaired to read it, in order.
+    /// The repairs that were needed to read it, in order.
     pub repairs: Vec<Repair>,
     /// The reason why it gave no decision, for people; `None` where it gave one, or the status says all.
     pub fault: Option<String>,
@@ -170,9 +170,9 @@ names!(Status {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{cause}")]
 pub struct Lost {
-    /// What the failure counts as, where it is one of a reply.
+    /// The status of the reply, if the failure is one of a reply.
     pub status: Option<Status>,
-    /// What failed, without any key.
+    /// The failure, without any key.
     pub cause: String,
     /// The step that went wrong, where it is an earlier one than that at which it was noticed.
     pub step: Option<i32>,
@@ -200,7 +200,7 @@ impl Lost {
 /// A decision that may take its time: scripted agents are ready at once, others wait for a network or a program.
 pub type Decision<'a> = Pin<Box<dyn Future<Output = Result<Reply, Lost>> + 'a>>;
 
-/// What an agent does when its episode is over.
+/// The agent's work after its episode.
 pub type Farewell<'a> = Pin<Box<dyn Future<Output = ()> + 'a>>;
 
 /// One agent in one episode.
@@ -223,7 +223,7 @@ pub trait Agent {
     }
 }
 
-/// How an episode ended.
+/// The ending of an episode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Ended {
@@ -235,7 +235,7 @@ pub enum Ended {
     Stopped,
 }
 
-/// Who plays: makes the agent of each episode.
+/// A player: makes the agent of each episode.
 pub trait Player: Send + Sync {
     fn model(&self) -> &str;
 

@@ -17,7 +17,7 @@ pub struct Prompt {
     hash: String,
 }
 
-/// What a model is sent beside the frame.
+/// The messages to a model beside the frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Rendered {
     pub system: String,
@@ -115,7 +115,7 @@ pub fn action(letter_of_action: &str) -> Option<Action> {
     Action::ALL.into_iter().find(|action| letter(*action) == letter_of_action)
 }
 
-/// What an agent of an experiment can do.
+/// The actions of an agent in an experiment.
 pub const fn actions(of: Actions) -> &'static [Action] {
     match of {
         Actions::Walk => &Action::WALK,

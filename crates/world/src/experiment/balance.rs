@@ -21,10 +21,10 @@ const SQUARES: [&str; 9] = [
 /// The least colours that can be balanced; one is always itself.
 const LEAST: usize = 2;
 
-/// Which of `count` colours the episode of a seed and a run has: 0 to `count` - 1.
+/// The colour of an episode among `count` colours, by its seed and run: 0 to `count` - 1.
 ///
 /// # Panics
-/// When `count` is 0 or over 10, which no palette is.
+/// A `count` of 0 or over 10, which no palette has.
 pub fn index(count: usize, seed: i32, run: i32) -> usize {
     if count < LEAST {
         return 0;

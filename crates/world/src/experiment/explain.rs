@@ -9,7 +9,7 @@ use super::spec::{
 };
 use exact::escape::visible;
 
-/// What an experiment shows, asks and decides, in lines.
+/// The lines of `explain`: what an experiment shows, asks and decides.
 pub fn explained(experiment: Experiment) -> String {
     let mut text = format!("{}: {}\n", experiment.name(), visible(&experiment.title));
     let mut line = |name: &str, words: String| {

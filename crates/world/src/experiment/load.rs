@@ -32,7 +32,7 @@ pub enum FileError {
 #[derive(Clone, Debug)]
 pub struct Loaded {
     pub experiment: Experiment,
-    /// Where its cubes stand, or its name where it says nothing of them.
+    /// The places of its cubes, or its name if it says nothing of them.
     pub cubes: Place,
     pub name: Place,
 }

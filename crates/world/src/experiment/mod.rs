@@ -42,7 +42,7 @@ const MOST: usize = 4096;
 #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Experiment(u16);
 
-/// What is known of an experiment.
+/// A known experiment.
 #[derive(Debug)]
 pub struct Known {
     pub spec: Spec,

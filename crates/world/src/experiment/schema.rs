@@ -37,13 +37,13 @@ pub struct ExperimentTable {
     /// Chance levels by metric: a fraction such as `1/3`, a number, or `none`.
     #[serde(default)]
     pub chance: IndexMap<String, Level>,
-    /// What blind strategies would reach, by metric, where no chance level applies.
+    /// The rates of blind strategies, by metric, where no chance level applies.
     #[serde(default)]
     pub reference: IndexMap<String, Vec<Fraction>>,
     /// A built-in experiment, or one above in the file, whose scenes it has: episodes of equal seed and run are pairs. Its
     /// own if absent. `colors`, `palette`, `cubes`, `others` and `start` are then those of that experiment.
     pub scenes: Option<String>,
-    /// How the body's colour is drawn; `balanced` if absent.
+    /// The draw of the body's colour; `balanced` if absent.
     pub colors: Option<Colors>,
     /// The colours of bodies and cubes, at least two; all ten if absent.
     #[schemars(length(min = 2), extend("uniqueItems" = true))]
@@ -52,7 +52,7 @@ pub struct ExperimentTable {
     pub cubes: Option<Cubes>,
     /// The other agents; none if absent.
     pub others: Option<Others>,
-    /// How the agent stands at the start; `facing_away` if absent.
+    /// The agent's pose at the start; `facing_away` if absent.
     pub start: Option<Start>,
     /// The column that holds the decision; `selected_cube` if absent, `self_color` where there are no candidates,
     /// `target_distance` where there is a hand.
@@ -67,7 +67,7 @@ pub struct ExperimentTable {
     /// the reply fills has one.
     #[schemars(extend("uniqueItems" = true))]
     pub absent: Option<Vec<AbsentColumn>>,
-    /// What the prompt states of the body's colour; `none` if absent.
+    /// The body's colour in the prompt; `none` if absent.
     pub stated_color: Option<Stated>,
     /// The keys of a reply, in the order of the prompt; those that the decision needs if absent.
     #[schemars(extend("uniqueItems" = true))]
@@ -75,9 +75,9 @@ pub struct ExperimentTable {
     /// A built-in prompt (`cube-selection`, `exploration`, `mark`, `reach-scheme`, `reach-mirror`, `reach-hand`, `reach-bare`), or a folder beside the file or below it with
     /// `system.txt` and `user.txt`.
     pub prompt: String,
-    /// What the agent can do; `hand` if absent where there is one, else `walk`.
+    /// The agent's actions; `hand` if absent and it has one, else `walk`.
     pub actions: Option<Actions>,
-    /// What the agent sees with; `eye` if absent.
+    /// The agent's camera; `eye` if absent.
     pub camera: Option<Camera>,
     /// Steps after which an episode ends by itself; the world's if absent.
     #[schemars(range(min = 1, max = 100_000))]
@@ -124,7 +124,7 @@ pub struct HandTable {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MirrorTable {
-    /// What it shows; `mirror` if absent.
+    /// Its kind; `mirror` if absent.
     pub kind: Option<PaneKind>,
     /// Steps by which it is late. A delayed mirror needs the key; a mirror with one is a delayed one; a window has none.
     #[schemars(range(max = 1000))]
@@ -134,7 +134,7 @@ pub struct MirrorTable {
     pub color: Option<Paint>,
     /// Whose motion the body has that a decoy shows; `own` if absent.
     pub body: Option<BodyShown>,
-    /// Where it hangs; `random` if absent. The first one's wall is part of the scene.
+    /// Its wall; `random` if absent. The first one's wall is part of the scene.
     pub wall: Option<Wall>,
     /// Along the wall, m; the world's if absent.
     #[schemars(range(min = 0.5, max = 10.0))]

@@ -1,4 +1,4 @@
-//! What an experiment is, checked: every value is in its range and fits the others.
+//! A checked experiment: every value is in its range and fits the others.
 
 mod marks;
 mod panes;
@@ -35,12 +35,12 @@ pub struct Spec {
     /// Chance levels by metric: a fraction such as `1/3`, or `none`.
     #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
     pub chance: IndexMap<String, String>,
-    /// What blind strategies would reach, by metric, where no chance level applies.
+    /// The rates of blind strategies, by metric, where no chance level applies.
     #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
     pub reference: IndexMap<String, Vec<String>>,
     /// The experiment whose scenes it has: its own name, or that of the one with which it makes pairs.
     pub scenes: String,
-    /// What is drawn, shared by all experiments with these scenes.
+    /// The layout, shared by all experiments with these scenes.
     pub layout: Layout,
     /// The folder of its prompt: built in, or beside its file.
     pub prompt: String,
@@ -58,11 +58,11 @@ pub struct Spec {
     pub decision: Decision,
     /// The column that holds what the decision should name.
     pub truth: Truth,
-    /// What the prompt states of the body's colour.
+    /// The body's colour in the prompt.
     pub stated_color: Stated,
-    /// What the agent can do.
+    /// The agent's actions.
     pub actions: Actions,
-    /// What the agent sees with.
+    /// The agent's camera.
     pub camera: Camera,
     /// Steps after which an episode ends by itself; the world's if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -146,11 +146,11 @@ impl Default for Picture {
     }
 }
 
-/// What is drawn from seed and run, the same for all experiments that share scenes.
+/// The draws from seed and run, the same for all experiments that share scenes.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Layout {
-    /// How the body's colour is drawn.
+    /// The draw of the body's colour.
     pub colors: Colors,
     /// The colours of bodies and cubes.
     pub palette: Vec<Color>,
@@ -158,13 +158,13 @@ pub struct Layout {
     pub cubes: Cubes,
     /// The other agents.
     pub others: Others,
-    /// How the agent stands at the start.
+    /// The agent's pose at the start.
     pub start: Start,
     /// The wall of the first pane.
     pub wall: Wall,
 }
 
-/// How the body's colour is drawn.
+/// The draw of the body's colour.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Colors {
@@ -185,18 +185,18 @@ pub enum Cubes {
     None,
     /// Cubes of different colours, one of them the body's.
     Candidates {
-        /// How many, at most as many as the palette has colours; three if absent, or all colours of a palette of two.
+        /// The number of colours, at most the palette's; three if absent, or all colours of a palette of two.
         #[serde(default = "three")]
         #[schemars(range(min = 2, max = 10))]
         count: u32,
     },
     /// Cubes of any colours, some of them before the first pane.
     Clutter {
-        /// How many at least; the world's if absent.
+        /// The least number; the world's if absent.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schemars(range(max = 12))]
         least: Option<u32>,
-        /// How many at most; the world's if absent.
+        /// The largest number; the world's if absent.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schemars(range(max = 12))]
         most: Option<u32>,
@@ -216,15 +216,15 @@ const fn three() -> u32 {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Others {
-    /// How many at least; the world's if absent.
+    /// The least number; the world's if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(max = 6))]
     pub least: Option<u32>,
-    /// How many at most; the world's if absent.
+    /// The largest number; the world's if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(max = 6))]
     pub most: Option<u32>,
-    /// What they do.
+    /// Their behaviour.
     #[serde(default)]
     pub behavior: Behavior,
     /// Of a hundred episodes, those where one of them has the colour of the agent's own body; the world's if absent.
@@ -233,7 +233,7 @@ pub struct Others {
     pub twin_percent: Option<u32>,
 }
 
-/// What other agents do.
+/// The behaviour of other agents.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Behavior {
@@ -246,7 +246,7 @@ pub enum Behavior {
 
 names!(Behavior { Walk: "walk", Stand: "stand" });
 
-/// How the agent stands at the start.
+/// The agent's pose at the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Start {
@@ -298,16 +298,16 @@ impl Wall {
 /// A key of a reply; its value is a text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 pub enum ReplyKey {
-    /// What the image shows.
+    /// The description of the image.
     #[serde(rename = "view-description")]
     ViewDescription,
-    /// Why this action.
+    /// The reason for this action.
     #[serde(rename = "reasoning")]
     Reasoning,
-    /// What to do.
+    /// The action.
     #[serde(rename = "action")]
     Action,
-    /// What comes back as the history of the next step.
+    /// The summary, which the next step gets as its history.
     #[serde(rename = "summary")]
     Summary,
     /// The cube: a colour, or `none`.
@@ -341,7 +341,7 @@ pub enum Decision {
     SelfColor,
     /// The mark that the reply reports on the own body.
     MarkReport,
-    /// Where the hand is: no reply names it.
+    /// The distance of the hand from the mark: no reply names it.
     TargetDistance,
 }
 
@@ -372,13 +372,13 @@ pub enum Truth {
     BodyColor,
     /// The colour of the mark on the own body, `none` where there is none.
     MarkColor,
-    /// Where the hand starts: the way that it should leave behind.
+    /// The distance from the hand's start to the mark.
     StartDistance,
 }
 
 names!(Truth { BodyColor: "body_color", MarkColor: "mark_color", StartDistance: "start_distance" });
 
-/// What the prompt states of the body's colour.
+/// The body's colour in the prompt.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Stated {
@@ -393,7 +393,7 @@ pub enum Stated {
 
 names!(Stated { None: "none", Candidate: "candidate", Random: "random" });
 
-/// What the agent can do.
+/// The agent's actions.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Actions {
@@ -406,7 +406,7 @@ pub enum Actions {
 
 names!(Actions { Walk: "walk", Hand: "hand" });
 
-/// What the agent sees with.
+/// The agent's camera.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Camera {

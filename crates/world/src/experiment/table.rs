@@ -28,11 +28,11 @@ const LONGEST_NAME: usize = 40;
 pub struct Entry {
     pub known: Known,
     pub name: Place,
-    /// Where its cubes stand; its name where it says nothing of them.
+    /// The places of its cubes, or its name if it says nothing of them.
     pub cubes: Place,
 }
 
-/// What an experiment is read beside.
+/// The context for reading an experiment.
 pub(super) struct Beside<'a> {
     /// The folder of its file; `None` for a built-in one.
     pub folder: Option<&'a Path>,

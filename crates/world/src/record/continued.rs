@@ -1,4 +1,4 @@
-//! Whether the log that is there belongs to the recording that goes on.
+//! The check that an existing log belongs to the continued recording.
 //!
 //! Rule: the log of an experiment holds episodes of its trace, all of them or some, recorded as the trace says. A log that
 //! holds anything else is neither added to nor removed.

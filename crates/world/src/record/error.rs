@@ -1,4 +1,4 @@
-//! Why the folder of a recording cannot be used, and why an episode did not come to its end.
+//! Errors of a recording's folder, and of episodes that did not come to their end.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -8,7 +8,7 @@ use crate::agent::Lost;
 use trace::error::TraceError;
 use trace::log::LogError;
 
-/// Why the folder cannot be used.
+/// An error of the folder.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages say it")]
 pub enum StoreError {
@@ -64,7 +64,7 @@ impl StoreError {
     }
 }
 
-/// Why an episode did not come to its end.
+/// An error that ended an episode.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
     /// The recording is being stopped.
@@ -75,7 +75,7 @@ pub enum RecordError {
     Lost {
         /// The step that got no reply; `None` before the first.
         step: Option<i32>,
-        /// What failed.
+        /// The failure.
         lost: Lost,
     },
     /// The world, the camera or the disk failed, as they would for any episode.

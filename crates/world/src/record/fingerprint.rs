@@ -1,4 +1,4 @@
-//! What an episode was recorded with, in a few hashes: episodes with another fingerprint are not of one sample.
+//! The fingerprint of an episode's recording, in a few hashes: episodes with different fingerprints are not of one sample.
 //!
 //! Rule: equal recordings have equal fingerprints, and whatever can change what an agent does is in one of the parts.
 
@@ -8,7 +8,7 @@ use exact::hash;
 
 /// Digits of a fingerprint's name: enough for all recordings of a study, and short in a table.
 const DIGITS: usize = 16;
-/// What an experiment is called, scored by and held against, which changes no episode.
+/// The names, definitions and levels of an experiment, which change no episode.
 const WORDS: [&str; 6] = ["title", "order", "chance", "reference", "definitions", "definitions_hash"];
 /// The keys of an agent's description that are parts of their own.
 const SAMPLING: [&str; 4] = ["temperature", "max_output_tokens", "reasoning_effort", "extra_body"];

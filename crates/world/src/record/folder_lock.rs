@@ -1,4 +1,4 @@
-//! Who else is recording into a folder.
+//! Other recordings into the same folder.
 //!
 //! ```text
 //! OUT/.lock                          held while a trace is put together, and while a process comes or goes

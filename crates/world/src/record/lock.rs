@@ -13,7 +13,7 @@ pub struct EpisodeLock {
     path: PathBuf,
 }
 
-/// What came of asking for an episode.
+/// The result of asking for an episode.
 #[derive(Debug)]
 pub enum Attempt {
     /// This process has it now.

@@ -1,4 +1,4 @@
-//! What a trace says of how it was recorded: all that replay needs, and nothing that two recordings of the same differ in.
+//! A trace's metadata about its recording: all that replay needs, and nothing that differs between two equal recordings.
 
 use std::collections::BTreeMap;
 
@@ -23,7 +23,7 @@ pub(super) const VERSION_KEY: &str = "version";
 /// experiment. A recording of another version is not continued, since its episodes were not held against the same rules.
 const VERSION: u32 = 3;
 
-/// What the traces of several experiments say of how they were recorded.
+/// The metadata of several experiments' traces about their recordings.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Recordings(BTreeMap<Experiment, Value>);
 
@@ -84,7 +84,7 @@ pub(super) struct Difference {
     /// The key of the metadata.
     pub what: String,
     pub expected: String,
-    /// What the other one has.
+    /// The value of the other one.
     pub found: String,
 }
 

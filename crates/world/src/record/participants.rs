@@ -14,7 +14,7 @@ use crate::agent::human::journal;
 use trace::log::assemble;
 use trace::merge::{self, EpisodeRows};
 
-/// What was removed.
+/// The removed episodes.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Removed {
     /// The episodes, by id.
@@ -25,7 +25,7 @@ pub struct Removed {
     pub journal_lines: usize,
 }
 
-/// Why a person cannot be removed.
+/// An error of removing a person.
 pub type RemovalError = Box<dyn Error + Send + Sync>;
 
 /// Removes all that a folder has of the person of this code. Nobody may record into it meanwhile: what they write is waited

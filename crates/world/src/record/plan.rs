@@ -1,4 +1,4 @@
-//! Which episodes a recording has.
+//! The episodes of a recording.
 
 use std::collections::BTreeSet;
 use std::ffi::OsStr;
@@ -19,19 +19,19 @@ pub struct Plan {
     pub seeds: i32,
     /// Runs 1 to this for each seed (7 in the paper).
     pub runs: i32,
-    /// How often each scene is played.
+    /// The number of times that each scene is played.
     pub repeats: i32,
     /// The share that this process records.
     pub shard: Shard,
 }
 
-/// What tells an episode from the others of a model.
+/// The key of an episode among those of a model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Key {
     pub experiment: Experiment,
     pub seed: i32,
     pub run: i32,
-    /// Which time its scene is played, from 1.
+    /// The repetition of its scene, from 1.
     pub repetition: i32,
 }
 
@@ -40,7 +40,7 @@ pub struct Key {
 pub struct Subject {
     /// The name shown in tables.
     pub model: String,
-    /// What the study varies besides the model; the default one if absent.
+    /// The condition that the study varies besides the model; the default one if absent.
     pub condition: Option<String>,
 }
 

@@ -30,7 +30,7 @@ struct Waiting {
     complete: Vec<Complete>,
 }
 
-/// What became of the episodes of an experiment so far.
+/// The outcomes of an experiment's episodes so far.
 #[derive(Debug, Default)]
 struct Outcomes {
     left: usize,
@@ -63,7 +63,7 @@ impl Waiting {
     }
 }
 
-/// What a thread does next.
+/// The next work of a thread.
 #[derive(Debug)]
 pub enum Next {
     Play(Key, EpisodeLock),

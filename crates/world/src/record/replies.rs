@@ -26,7 +26,7 @@ struct Found {
 /// The replies of one start of a recording.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct RepliesAnswer {
-    /// How many there are; replies of episodes that did not come to their end are among them.
+    /// The number of replies, including those of episodes that did not come to their end.
     #[serde(flatten)]
     pub counts: ReplyCounts,
     /// The first one that gave no decision, by experiment, seed, run and step; null if all gave one.
@@ -64,12 +64,12 @@ impl Replies {
         is_first_in_time.then_some(reply)
     }
 
-    /// How many there are so far.
+    /// The counts so far.
     pub fn counts(&self) -> ReplyCounts {
         self.found().counts.clone()
     }
 
-    /// What there is to say of them.
+    /// The answer about them.
     pub fn answer(&self) -> RepliesAnswer {
         let found = self.found();
         RepliesAnswer {
@@ -90,7 +90,7 @@ impl UnreadableReply {
         Self { episode_id: key.episode_id(subject), step, status: status.to_owned(), text, fault }
     }
 
-    /// What it says, where it is and why it gave no decision, in words.
+    /// The reply, its place, and the reason why it gave no decision, in words.
     pub fn words(&self) -> String {
         let text = self.text.as_ref().map_or_else(|| "no text".to_owned(), |text| format!("`{text}`"));
         let fault = self.fault.as_ref().map_or_else(String::new, |fault| format!(": {fault}"));

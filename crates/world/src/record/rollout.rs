@@ -23,7 +23,7 @@ use trace::episode::{Episode, Extra, Step};
 use trace::frame::Frame;
 use trace::palette::Color;
 
-/// Who looks on while an episode is played: writes a log, counts steps.
+/// An observer of an episode: writes a log, counts steps.
 pub trait Observer {
     fn seen(&mut self, seen: &Seen<'_>) -> Result<(), RecordError>;
 
@@ -44,7 +44,7 @@ impl Observer for Nobody {
     }
 }
 
-/// What an episode is played with, besides its key.
+/// The setting of an episode, besides its key.
 #[derive(Debug)]
 pub struct Stage<'a> {
     pub config: &'a WorldConfig,
@@ -55,7 +55,7 @@ pub struct Stage<'a> {
     pub shares: &'a Shares,
 }
 
-/// What the agent of a scene is told.
+/// The task for the agent of a scene.
 pub fn task(config: &WorldConfig, scene: &Scene, key: Key) -> Task {
     Task {
         experiment: scene.experiment,

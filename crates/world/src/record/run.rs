@@ -32,7 +32,7 @@ use trace::diagnostic::MORE_FILES;
 use trace::episode::{Action, Episode, Step};
 use trace::episode_hash;
 
-/// What happens while a recording runs; called from its threads.
+/// Events of a running recording, reported by its threads.
 pub trait Progress: Sync {
     /// A step of an episode was played: its number, from 1, and its row.
     fn step(&self, episode: Key, t: i32, row: &Step);
@@ -49,7 +49,7 @@ const PRACTICE_SEED: i32 = 9_000;
 /// The time between two looks at episodes that other processes have.
 const AGAIN: Duration = Duration::from_millis(50);
 
-/// How a recording is run.
+/// The settings of a recording.
 #[derive(Clone, Copy, Debug)]
 pub struct Settings {
     /// Threads, each with an eye of its own.
@@ -64,7 +64,7 @@ pub struct Settings {
     pub max_unusable: Option<NonZeroU32>,
 }
 
-/// What became of the episodes.
+/// The outcomes of the episodes.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
     /// Episodes that were recorded now.

@@ -1,9 +1,9 @@
-//! Where the time of a recording goes.
+//! The time of a recording, by part.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-/// Where the time of a recording goes, over all threads.
+/// The time of a recording by part, over all threads.
 #[derive(Debug, Default)]
 pub struct Shares {
     rendering: AtomicU64,
@@ -12,7 +12,7 @@ pub struct Shares {
     all: AtomicU64,
 }
 
-/// How a share of the time is told.
+/// The form of a share of the time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Spent {
     /// Drawing frames.
@@ -21,7 +21,7 @@ pub struct Spent {
     pub visibility: Duration,
     /// Writing logs and parts.
     pub writing: Duration,
-    /// What is left of the threads' time: agents that decide, and waiting for those that decide elsewhere.
+    /// The rest of the threads' time: agents that decide, and waiting for those that decide elsewhere.
     pub agent: Duration,
 }
 
@@ -43,7 +43,7 @@ impl Shares {
         add(&self.all, start);
     }
 
-    /// What was spent so far.
+    /// The time so far.
     pub fn spent(&self) -> Spent {
         let read = |share: &AtomicU64| Duration::from_nanos(share.load(Ordering::Relaxed));
         let [rendering, visibility, writing] = [&self.rendering, &self.visibility, &self.writing].map(read);

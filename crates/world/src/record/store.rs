@@ -76,7 +76,7 @@ impl Store {
         self.parts().join(format!("{}.parquet", key.file_stem(self.index.subject())))
     }
 
-    /// Where the log of an episode is committed.
+    /// The path of a committed log of an episode.
     pub fn log_part(&self, key: Key) -> PathBuf {
         self.part(key).with_extension("mcap")
     }
@@ -129,12 +129,12 @@ impl Store {
         Ok(still)
     }
 
-    /// Where lost episodes are listed.
+    /// The path of the list of lost episodes.
     pub fn lost_list(&self) -> PathBuf {
         failures::list_of(self.folder_lock.folder())
     }
 
-    /// What an episode was recorded with, given the id of the model as the provider returned it.
+    /// The fingerprint of an episode, given the id of the model as the provider returned it.
     pub fn fingerprint(&self, key: Key, model: Option<&str>) -> Fingerprint {
         Fingerprint::of(self.index.recording(key.experiment), model)
     }

@@ -14,12 +14,12 @@ use exact::escape::visible;
 use trace::episode::Step;
 use trace::replies::ReplyCounts;
 
-/// Why a recording was given up: so many replies in a row were unusable.
+/// A recording that was given up because of consecutive unusable replies.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct GivenUp {
     /// The model's name as shown in tables.
     pub model: String,
-    /// How many replies in a row gave no decision.
+    /// The number of consecutive replies without a decision.
     pub in_a_row: u32,
     pub last: UnreadableReply,
 }

@@ -15,7 +15,7 @@ use trace::palette::Color;
 /// The most rays in a row and in a column of the grid that pixels are counted with.
 pub const MOST_RAYS: u32 = 4096;
 
-/// What a trace says of how it was recorded, as far as a replay needs it.
+/// A trace's metadata that a replay needs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recipe {
     /// The experiment, as the trace has it.

@@ -1,6 +1,6 @@
-//! Where a replay and its trace part ways.
+//! The first difference between a replay and its trace.
 
-/// Where a replay and its trace part ways.
+/// The first difference between a replay and its trace.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, schemars::JsonSchema)]
 pub struct Divergence {
     /// The episode.
@@ -9,8 +9,8 @@ pub struct Divergence {
     pub t: i32,
     /// The column.
     pub column: String,
-    /// What the trace has.
+    /// The value in the trace.
     pub expected: String,
-    /// What the replay gives.
+    /// The value of the replay.
     pub found: String,
 }

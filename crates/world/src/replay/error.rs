@@ -1,4 +1,4 @@
-//! Why an episode cannot be replayed.
+//! Errors of a replay.
 
 use std::path::{Path, PathBuf};
 
@@ -6,7 +6,7 @@ use super::divergence::Divergence;
 use crate::sim::scene::SCENE_VERSION;
 use exact::budget::Exceeded;
 
-/// Why a trace cannot be replayed.
+/// An error of a replay.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages say it")]
 pub enum ReplayError {
@@ -65,7 +65,7 @@ impl ReplayError {
         Self::Apart { episode, trace, traced, log: log.to_owned(), logged }
     }
 
-    /// What a trace, a log, the world or the disk says.
+    /// An error of a trace, a log, the world or the disk.
     pub fn other(error: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Self {
         Self::Other(error.into())
     }

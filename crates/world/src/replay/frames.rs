@@ -14,7 +14,7 @@ use trace::episode::Episode;
 /// time goes to.
 const RAYS: u32 = 24;
 
-/// Why a replay goes no further.
+/// The end of a replay before its last step.
 enum Halt {
     /// All wanted frames are there.
     Done,

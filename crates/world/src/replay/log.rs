@@ -1,4 +1,4 @@
-//! What an episode's log is told, by a recording or a replay: the world as shapes, the frame, the counts, the row.
+//! The content of an episode's log, from a recording or a replay: the world as shapes, the frame, the counts, the row.
 
 use std::path::Path;
 use std::sync::{Arc, LazyLock};
@@ -28,7 +28,7 @@ pub struct Seen<'a> {
     pub visibility: &'a Visibility,
 }
 
-/// Why a log cannot be written.
+/// An error of writing a log.
 pub type LogFault = Box<dyn std::error::Error + Send + Sync>;
 
 /// The log of an episode under way.

@@ -1,8 +1,8 @@
-//! Which steps of an episode tell its story.
+//! The steps of an episode that tell its story.
 
 use trace::episode::{Action, Episode};
 
-/// What a step is in the story.
+/// The role of a step in the story.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Moment {
     /// Mirror evidence is in view for the first time.

@@ -21,7 +21,7 @@ use trace::schema::RECORDING_KEY;
 use trace::write::merge::{self, NotAnEpisode};
 use trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
 
-/// What another reading of the same replies changes.
+/// The changes by another reading of the same replies.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct ReparseAnswer {
     /// The new traces.
@@ -62,7 +62,7 @@ pub struct Diverged {
     pub parsed: Option<&'static str>,
 }
 
-/// Why no trace was written.
+/// An error of parsing again.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages say it")]
 pub enum ReparseError {

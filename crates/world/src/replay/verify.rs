@@ -32,7 +32,7 @@ pub struct Recorded {
     recipe: Recipe,
 }
 
-/// What a replay writes.
+/// The outputs of a replay.
 #[derive(Clone, Debug, Default)]
 pub struct Outputs {
     /// The folder for the frame of every step.
@@ -43,7 +43,7 @@ pub struct Outputs {
     pub recount: Option<Recount>,
 }
 
-/// How visibility is decided anew.
+/// The new decision about visibility.
 #[derive(Clone, Debug)]
 pub struct Recount {
     pub out: PathBuf,
@@ -53,7 +53,7 @@ pub struct Recount {
     pub grid: Option<(u32, u32)>,
 }
 
-/// What came of it.
+/// The result.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct ReplayAnswer {
     /// Episodes that were replayed.
@@ -137,7 +137,7 @@ impl Recount {
     }
 }
 
-/// What the episodes of a trace are replayed with.
+/// The player of a trace's episodes.
 struct Player<'a> {
     trace: &'a Recorded,
     outputs: &'a Outputs,
@@ -178,7 +178,7 @@ impl Player<'_> {
     }
 }
 
-/// What was counted anew, a value per step.
+/// The new counts, a value per step.
 #[derive(Default)]
 struct Counts {
     px: [Vec<i32>; 4],
@@ -215,7 +215,7 @@ fn recounted(recording: Option<&Value>, eye: &WorldConfig) -> Value {
     recording
 }
 
-/// Where the frame of a step goes.
+/// The path of a step's frame.
 pub fn frame_path(folder: &Path, episode_id: &str, t: impl Display) -> PathBuf {
     folder.join(episode_id.replace('/', "-")).join(format!("t{t:0>3}.png"))
 }

@@ -4,7 +4,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Where an upright body faces: multiples of 30 degrees counter-clockwise from +x, 0 to 11.
+/// The direction of an upright body: multiples of 30 degrees counter-clockwise from +x, 0 to 11.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(transparent)]
 pub struct Heading(#[schemars(range(max = 11))] u8);

@@ -10,7 +10,7 @@ use super::angle::{Heading, Quaternion};
 use super::config::BodyConfig;
 use exact::names;
 
-/// Where a body stands and faces.
+/// The position and direction of a body.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Pose {
@@ -23,12 +23,12 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// Where the axis of the body is.
+    /// The position of the body's axis.
     pub const fn spot(self) -> [f64; 2] {
         [self.x, self.y]
     }
 
-    /// Where it would be `length` ahead, or back where negative.
+    /// Its position `length` ahead, or back if negative.
     #[must_use]
     pub fn ahead(self, length: f64) -> Self {
         let [x, y] = self.heading.direction();
@@ -36,7 +36,7 @@ impl Pose {
     }
 }
 
-/// Where the limbs are: in the picture after a step the body is in the middle of a stride.
+/// The position of the limbs: in the picture after a step the body is in the middle of a stride.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Stride {
@@ -52,9 +52,9 @@ pub enum Stride {
 /// A body as it is at one moment.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Figure {
-    /// Where it stands and faces.
+    /// Its position and direction.
     pub pose: Pose,
-    /// Where its limbs are.
+    /// The position of its limbs.
     pub stride: Stride,
     /// Steps that it has taken, of which the next stride follows.
     pub steps: u32,
@@ -120,7 +120,7 @@ impl Piece {
         }
     }
 
-    /// Where it is in the room: its origin, which in the body's own frame is `joint`, and its rotation.
+    /// Its place in the room: its origin, which in the body's own frame is `joint`, and its rotation.
     pub fn place(self, figure: &Figure, joint: [f64; 3], config: &BodyConfig) -> ([f64; 3], Quaternion) {
         let Pose { x, y, heading } = figure.pose;
         let [cosine, sine] = heading.direction();

@@ -22,7 +22,7 @@ use super::visibility::{self, Shown};
 use super::world::World;
 use trace::frame::Frame;
 
-/// Why nothing can be drawn.
+/// An error of drawing.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages say it")]
 pub enum CameraError {
@@ -79,7 +79,7 @@ impl Camera {
         self.draws_all = all;
     }
 
-    /// What the agent sees now: the room, and over each pane what is seen through it.
+    /// Draws the agent's view: the room, and the image of each pane over it.
     pub fn frame(&mut self, world: &World) -> Result<Frame, CameraError> {
         let size = [self.width, self.height];
         let whole = Rectangle { left: 0, right: self.width, top: 0, bottom: self.height };
@@ -170,7 +170,7 @@ impl LabelCamera {
         Ok(Self { eye: Camera::painted(config, Paint::Labels, width, height)?, painted: None })
     }
 
-    /// What every pixel shows, as drawn; a colour that names nothing counts as the room.
+    /// The label of every pixel, as drawn; a colour without a label counts as the room.
     pub fn labels(&mut self, world: &World) -> Result<LabelImage, CameraError> {
         let mut stages = match self.painted.take() {
             Some((scene, stages)) if scene == *world.scene() => stages,

@@ -26,7 +26,7 @@ const CAPTION: usize = 22;
 
 const GAP: usize = 6;
 
-/// Why there is no sheet.
+/// An error of a contact sheet.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "each is the error that it carries")]
 pub enum ContactSheetError {

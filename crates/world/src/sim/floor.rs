@@ -66,10 +66,10 @@ pub fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
     (dx * dx + dy * dy).sqrt()
 }
 
-/// What does not move: walls and cubes.
+/// The fixed things: walls and cubes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FloorPlan {
-    /// How far from the centre, along each axis, a body's axis may be, m.
+    /// The largest distance of a body's axis from the centre along each axis, m.
     pub reach: f64,
     /// Of a body's cylinder, m.
     pub radius: f64,

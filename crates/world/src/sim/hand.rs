@@ -12,7 +12,7 @@ use trace::episode::Action;
 /// Half of the body as a box, ahead and to the side, and its height, m.
 const BODY: [f64; 3] = [0.12, 0.3, 1.62];
 
-/// What a hand's steps are counted in and held against.
+/// The units and limits of a hand's steps.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place<'a> {
     pub task: Hand,

@@ -1,6 +1,6 @@
 //! A picture of labels: what each pixel of a view shows, as a code.
 
-/// What every pixel shows, row by row from the top.
+/// The label of every pixel, row by row from the top.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LabelImage {
     /// Pixels in a row.

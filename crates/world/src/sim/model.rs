@@ -53,7 +53,7 @@ pub mod group {
     pub const EGO: i32 = 2;
     /// The ceiling, through which the view from above looks.
     pub const CEILING: i32 = 3;
-    /// What a scene has not; by MuJoCo's default not drawn.
+    /// The geom group of things that a scene lacks; not drawn by MuJoCo's default.
     pub const HIDDEN: i32 = 5;
 }
 
@@ -63,7 +63,7 @@ const LABELLED_PARTS: [u32; 3] = [40, 24, 2];
 const ROOM: &str = include_str!("../../../../assets/world/room.xml");
 const HUMANOID: &str = include_str!("../../../../assets/world/humanoid.xml");
 
-/// How a model is painted.
+/// The paint of a model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Paint {
     /// As the agent sees it: lit.
@@ -72,7 +72,7 @@ pub enum Paint {
     Labels,
 }
 
-/// What a geom is part of.
+/// The owner of a geom.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Item {
     /// The surface of a mirror or window of the scene.
@@ -91,7 +91,7 @@ pub enum Item {
     Hand,
 }
 
-/// What a stage is seen by.
+/// The viewer of a stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Look {
     /// By the eye: panes are blank.
@@ -100,20 +100,20 @@ pub enum Look {
     Through(usize),
 }
 
-/// What moves, at one moment.
+/// The moving things at one moment.
 #[derive(Clone, Copy, Debug)]
 pub struct Moment {
     /// The step that comes next, from 1: which marks there are.
     pub t: u32,
     /// The humanoids by their number; `None` for those that are not there.
     pub bodies: [Option<Figure>; BODIES],
-    /// Where the camera beyond a pane is and faces.
+    /// The pose of the camera behind a pane.
     pub beyond: Option<Pose>,
-    /// Where the hand is, m, where there is one.
+    /// The position of the hand, m; `None` without one.
     pub hand: Option<[f64; 3]>,
 }
 
-/// Why MuJoCo could not build the world.
+/// MuJoCo's error while building the world.
 #[derive(Debug, thiserror::Error)]
 #[error("mujoco cannot build the world: {0}; the configuration or the library is at fault")]
 pub struct ModelError(#[from] MjEditError);
@@ -180,12 +180,12 @@ impl Stage {
         self.marks_at = t;
     }
 
-    /// What it is seen by.
+    /// Its viewer.
     pub const fn look(&self) -> Look {
         self.look
     }
 
-    /// What each geom is part of.
+    /// The owner of each geom.
     pub fn items(&self) -> &[Item] {
         &self.items
     }
@@ -235,7 +235,7 @@ impl Stage {
         self.data.forward();
     }
 
-    /// Where every shown geom is: its number, centre and rotation.
+    /// The placement of every shown geom: its number, centre and rotation.
     pub fn placed(&self) -> Vec<(usize, [f64; 3], [f64; 9])> {
         let shown = (0..self.items.len()).filter(|geom| self.is_shown(*geom));
         shown.map(|geom| (geom, self.data.geom_xpos()[geom], self.data.geom_xmat()[geom])).collect()

@@ -42,7 +42,7 @@ fn moved(config: &WorldConfig, hung: &HungPane, eye: Pose) -> Pose {
     Pose { x: eye.x - length * out_x, y: eye.y - length * out_y, heading: eye.heading }
 }
 
-/// How far the second room is from the first, m: from the face of a pane to that of one on the wall across.
+/// The distance of the second room from the first, m: from the face of a pane to that of one on the wall across.
 pub fn shift(config: &WorldConfig) -> f64 {
     config.room.size - 2.0 * config.mirror.gap
 }

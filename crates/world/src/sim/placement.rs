@@ -65,7 +65,7 @@ impl Scene {
     }
 }
 
-/// Why an experiment does not fit into a room.
+/// The reason why an experiment does not fit into a room.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DoesNotFit {
     pub what: String,

@@ -55,7 +55,7 @@ impl Rng {
     /// One of `choices`.
     ///
     /// # Panics
-    /// When there are none.
+    /// An empty list.
     pub fn one_of<T: Copy>(&mut self, choices: &[T]) -> T {
         choices[self.below(u32::try_from(choices.len()).unwrap_or(u32::MAX)) as usize]
     }

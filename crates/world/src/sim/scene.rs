@@ -1,4 +1,4 @@
-//! What an episode's world is at its start, as plain data.
+//! An episode's world at its start, as plain data.
 //!
 //! Rule: a scene is drawn from its configuration, experiment, seed and run alone. Experiments that share scenes draw the
 //! same layout from the same seed and run, as E1, E2 and E3 do: E2 leaves the mirror out, E3 adds a false statement, so
@@ -26,7 +26,7 @@ pub const SCENE_VERSION: u32 = 2;
 /// Digits of the fingerprint of a scene: enough for any study.
 const FINGERPRINT_DIGITS: usize = 16;
 
-/// How far from the mirror one stands who starts before it, m.
+/// The distance from the mirror of an agent that starts before it, m.
 pub(super) const BEFORE_MIRROR: f64 = 2.0;
 
 /// The most other agents that a world holds.
@@ -35,7 +35,7 @@ pub const MOST_OTHERS: usize = 6;
 /// The most cubes that a world holds.
 pub const MOST_CUBES: usize = 12;
 
-/// What an episode's world is at its start.
+/// An episode's world at its start.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Scene {
     /// By its name.
@@ -49,13 +49,13 @@ pub struct Scene {
     pub body_color: Color,
     /// The false colour that the prompt states, as in E3.
     pub stated_color: Option<Color>,
-    /// Where the layout has its mirror; in E2 where it would be.
+    /// The place of the layout's mirror; in E2 the place where it would be.
     pub mirror: MirrorPlace,
     /// Mirrors and windows, the first of them at `mirror`.
     pub panes: Vec<HungPane>,
     /// Marks on bodies.
     pub marks: Vec<WornMark>,
-    /// Where the agent starts.
+    /// The pose of the agent at the start.
     pub start: Pose,
     /// The candidates, or the clutter, as in E5.
     pub cubes: Vec<Cube>,
@@ -69,9 +69,9 @@ pub struct Scene {
 /// A mirror or window on a wall.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct HungPane {
-    /// What it shows.
+    /// Its kind.
     pub kind: PaneKind,
-    /// Where it hangs.
+    /// Its place.
     pub place: MirrorPlace,
     /// Along the wall, m.
     pub width: f64,
@@ -90,7 +90,7 @@ pub struct HungPane {
 /// A mark on a body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct WornMark {
-    /// Where on the body.
+    /// The part of the body.
     pub part: Part,
     /// Of its paint; never that of the body.
     pub color: Color,
@@ -98,7 +98,7 @@ pub struct WornMark {
     pub from_t: u32,
     /// Whose body: 0 is the agent's own, 1 the first of the others.
     pub wearer: usize,
-    /// Where on the front, where it is a patch there.
+    /// The patch of the front, if it is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub patch: Option<Patch>,
 }
@@ -114,7 +114,7 @@ pub struct Patch {
     pub edge_mm: i32,
 }
 
-/// How a hand looks.
+/// The shape of a hand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[expect(missing_docs, reason = "the names say it")]
@@ -130,7 +130,7 @@ names!(HandShape { Ball: "ball", Block: "block" });
 pub struct HandStart {
     /// Of its paint.
     pub color: Color,
-    /// How it looks.
+    /// Its shape.
     pub shape: HandShape,
     /// Half of its width, mm.
     pub half_mm: i32,
@@ -138,7 +138,7 @@ pub struct HandStart {
     pub from_mark: [i32; 3],
 }
 
-/// Where the mirror hangs.
+/// The place of the mirror.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MirrorPlace {
@@ -171,9 +171,9 @@ pub struct Cube {
 pub struct Other {
     /// Of its body.
     pub color: Color,
-    /// Where it starts.
+    /// The pose at the start.
     pub start: Pose,
-    /// What its walk is drawn from.
+    /// The seed of its walk.
     pub habit: u32,
 }
 
@@ -190,20 +190,20 @@ impl MirrorPlace {
         [depth * out_x - self.offset * out_y, depth * out_y + self.offset * out_x]
     }
 
-    /// How far a point is from its face, m.
+    /// The distance of a point from its face, m.
     pub fn distance(self, spot: [f64; 2], config: &WorldConfig) -> f64 {
         let [out_x, out_y] = self.heading().direction();
         config.room.size / 2.0 - config.mirror.gap - (spot[0] * out_x + spot[1] * out_y)
     }
 
-    /// How far a point is, along the wall, from its centre, m; signed as `offset`.
+    /// The distance of a point from its centre along the wall, m; signed as `offset`.
     pub fn aside(self, spot: [f64; 2]) -> f64 {
         let [out_x, out_y] = self.heading().direction();
         spot[1] * out_x - spot[0] * out_y - self.offset
     }
 }
 
-/// How far before the axis of a body the middle of a patch is, mm.
+/// The distance from a body's axis to the middle of a patch, mm.
 const FRONT_MM: i32 = 125;
 
 impl Patch {
@@ -231,7 +231,7 @@ impl HandStart {
 }
 
 impl Cube {
-    /// What it covers of the floor.
+    /// The square of the floor that it covers.
     pub fn square(&self) -> Square {
         Square { center: [self.x, self.y], half: self.edge / 2.0 }
     }
@@ -292,7 +292,7 @@ impl Scene {
         }
     }
 
-    /// What does not move, as a plan.
+    /// The fixed things, as a plan.
     pub fn floor_plan(&self, config: &WorldConfig) -> FloorPlan {
         floor_plan(config, &self.cubes)
     }

@@ -32,7 +32,7 @@ pub struct Placed {
 pub struct Solid {
     /// Unique among the shapes, such as `pane0`, `cube0` or `agent0_head`.
     pub name: String,
-    /// What it is part of.
+    /// The item that it is part of.
     pub item: Item,
     pub shape: Shape,
     /// Of its centre, m.

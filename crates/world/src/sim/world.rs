@@ -18,7 +18,7 @@ use crate::experiment::spec::{Behavior, PaneKind};
 use trace::episode::Action;
 use trace::palette::Color;
 
-/// What an action came to.
+/// The result of an action.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Moved {
     /// A wall, a cube or a body was in the way: the agent stays where it was.
@@ -67,22 +67,22 @@ impl World {
         Ok(world)
     }
 
-    /// What the world was drawn as.
+    /// The scene that the world was made of.
     pub const fn scene(&self) -> &Scene {
         &self.scene
     }
 
-    /// What it was made by.
+    /// The configuration that it was made with.
     pub const fn config(&self) -> &WorldConfig {
         &self.config
     }
 
-    /// What does not move, as a plan.
+    /// The fixed things, as a plan.
     pub const fn floor_plan(&self) -> &FloorPlan {
         &self.plan
     }
 
-    /// Where the agent stands and faces.
+    /// The position and direction of the agent.
     pub const fn pose(&self) -> Pose {
         self.ego.pose
     }
@@ -114,22 +114,22 @@ impl World {
         self.t
     }
 
-    /// What the eye sees directly: the model and its state.
+    /// The eye's direct view: the model and its state.
     pub const fn stage(&self) -> &Stage {
         &self.stage
     }
 
-    /// What the eye sees through each pane.
+    /// The eye's view through each pane.
     pub fn beyond(&self) -> &[Stage] {
         &self.beyond
     }
 
-    /// Where the eye of the look through a pane is and faces.
+    /// The position and direction of the eye behind a pane.
     pub fn eye_beyond(&self, pane: usize) -> Pose {
         passage::eye(&self.config, &self.scene.panes[pane], self.ego.pose)
     }
 
-    /// What every pixel of the eye's view shows: kept until somebody moves, since counts and pictures both need it.
+    /// The label of every pixel of the eye's view: kept until somebody moves, since counts and pictures both need it.
     pub(super) fn labels_or(&self, cast: impl FnOnce() -> LabelImage) -> &LabelImage {
         self.labels.get_or_init(cast)
     }
@@ -147,7 +147,7 @@ impl World {
             .is_some_and(|(place, from_mark)| place.is_reached(*from_mark))
     }
 
-    /// Where the hand is, m; `None` where there is none.
+    /// The position of the hand, m; `None` without one.
     pub fn hand(&self) -> Option<[f64; 3]> {
         self.hand_back(0)
     }

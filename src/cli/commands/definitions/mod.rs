@@ -29,7 +29,7 @@ pub struct DefinitionsArgs {
     pub action: Action,
 }
 
-/// What to do with definitions.
+/// The action on definitions.
 #[derive(Clone, Debug, clap::Subcommand)]
 pub enum Action {
     /// Show every fault of a definition file, underlined, with a suggestion

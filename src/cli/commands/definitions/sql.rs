@@ -25,7 +25,7 @@ pub struct SqlArgs {
 /// The dialects by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum DialectArg {
-    /// What all engines share
+    /// The common subset of all engines
     Portable,
     /// Spark SQL
     Spark,

@@ -25,7 +25,7 @@ pub struct ConfigArgs {
     json: bool,
 }
 
-/// What `config --json` prints.
+/// The answer of `config --json`.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct ConfigAnswer {
     /// The configuration file that was read, if there is one.

@@ -33,7 +33,7 @@ pub struct DiffArgs {
     /// Group episodes by these columns, separated by commas [default: experiment,model]
     #[arg(long, value_name = "COLUMNS", value_delimiter = ',', default_values = DEFAULT_BY, hide_default_value = true)]
     pub by: Vec<String>,
-    /// What scores that do not say it were computed with: CSV, JSON lines, other engines' Parquet [default: paper]
+    /// Definitions of scores that do not carry their own: CSV, JSON lines, other engines' Parquet [default: paper]
     #[arg(long, value_name = "NAME|FILE")]
     pub definitions: Option<PathBuf>,
     /// The most lines of each list on the terminal; --json has all

@@ -15,7 +15,7 @@ use study::FigureOptions;
 /// Draw one figure.
 #[derive(Clone, Debug, clap::Args)]
 pub struct FigureArgs {
-    /// Which: spider, heatmap, scatter, completion-gap, e5-outcomes, intervals, slopes, decision-curve, gaze
+    /// The figure: spider, heatmap, scatter, completion-gap, e5-outcomes, intervals, slopes, decision-curve, gaze
     #[arg(value_name = "NAME")]
     pub name: FigureName,
     #[command(flatten)]
@@ -39,7 +39,7 @@ pub struct FigureArgs {
     /// The file format [default: by the ending of FILE; svg on standard output]
     #[arg(long, value_enum)]
     pub format: Option<Format>,
-    /// Where to write it [default: standard output]
+    /// The file to write [default: standard output]
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
     /// Let a cell hold episodes that were recorded differently

@@ -19,10 +19,10 @@ pub struct QueryArgs {
     pub traces: TraceArgs,
     #[command(flatten)]
     pub scoring: ScoringArgs,
-    /// How to write the answer [default: by the ending of FILE; table on standard output]
+    /// The format of the answer [default: by the ending of FILE; table on standard output]
     #[arg(long, value_enum)]
     pub format: Option<AnswerFormat>,
-    /// Where to write it [default: standard output]
+    /// The file to write [default: standard output]
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
     /// The most rows of a table, the first and the last ones; 0 for all
@@ -76,7 +76,7 @@ mod rows {
     use report::tables::Table as Printed;
     use study::StudyError;
 
-    /// What stands for null in a table.
+    /// The text for null in a table.
     const NULL: &str = "NULL";
 
     pub(super) fn answer(args: &QueryArgs) -> Result<Outcome, Failure> {

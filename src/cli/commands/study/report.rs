@@ -26,7 +26,7 @@ pub struct ReportArgs {
     /// The folder to write
     #[arg(short, long, value_name = "DIR", default_value = "reports/latest")]
     pub out: PathBuf,
-    /// How tables look: `default`, `paper`, or a TOML file
+    /// The style of tables: `default`, `paper`, or a TOML file
     #[arg(long, value_name = "STYLE", default_value = "default")]
     pub style: PathBuf,
     #[command(flatten)]
@@ -49,11 +49,11 @@ pub struct ReportAnswer {
     pub out: String,
     /// The files in it that were written, by path inside the folder.
     pub files: Vec<String>,
-    /// How many episodes were counted.
+    /// The number of counted episodes.
     pub episodes: usize,
-    /// What a reader of the tables must know of the data.
+    /// Warnings for readers of the tables.
     pub warnings: Vec<String>,
-    /// Where everything comes from; the same as `manifest.json`.
+    /// The origin of everything; the same as `manifest.json`.
     pub manifest: Manifest,
 }
 

@@ -34,7 +34,7 @@ pub struct ViewArgs {
     /// Other definitions, to show what they change: a name or a TOML file
     #[arg(long, value_name = "NAME|FILE")]
     against: Option<PathBuf>,
-    /// How tables look: `default`, `paper`, or a TOML file
+    /// The style of tables: `default`, `paper`, or a TOML file
     #[arg(long, value_name = "STYLE", default_value = "default")]
     style: String,
     /// The port; 0 for any that is free

@@ -39,10 +39,10 @@ pub struct RescoreArgs {
     /// The folder to write [default: REPORT_DIR-rescored]
     #[arg(short, long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Where the traces are: folders or files
+    /// The traces: folders or files
     #[arg(long, value_name = "PLACE", num_args = 1..)]
     pub traces: Vec<PathBuf>,
-    /// How tables look; needed where the report's style was a file [default: the report's]
+    /// The style of tables; required if the report's style was a file [default: the report's]
     #[arg(long, value_name = "STYLE")]
     pub style: Option<PathBuf>,
     /// Other metrics than the report's, separated by commas
@@ -65,13 +65,13 @@ pub struct RescoreAnswer {
     pub out: String,
     /// The files in it that were written, by path inside the folder.
     pub files: Vec<String>,
-    /// How many episodes were counted.
+    /// The number of counted episodes.
     pub episodes: usize,
-    /// Where everything comes from; the same as the new `manifest.json`.
+    /// The origin of everything; the same as the new `manifest.json`.
     pub manifest: Manifest,
-    /// What another reading of the replies changes; null without --reparse.
+    /// The changes by another reading of the replies; null without --reparse.
     pub reparsed: Option<ReparseAnswer>,
-    /// What changed from the old report; null where its scores are not readable.
+    /// The changes from the old report; null if its scores are not readable.
     pub changes: Option<Changes>,
 }
 

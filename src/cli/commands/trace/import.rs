@@ -21,7 +21,7 @@ pub struct ImportArgs {
     /// Files of steps, `-` for standard input
     #[arg(value_name = "FILE", required = true)]
     steps: Vec<PathBuf>,
-    /// How the files are written; by default their names and first bytes say it
+    /// The format of the files; by default their names and first bytes tell it
     #[arg(long, value_name = "FORMAT", value_parser = formats())]
     from: Option<Format>,
     /// The trace to write
@@ -54,7 +54,7 @@ pub struct ImportArgs {
     json: bool,
 }
 
-/// What a cluster is.
+/// The cluster's unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum ClusterArg {
     /// The episodes of one seed

@@ -36,10 +36,10 @@ pub struct InfoCommand {
 /// The answer for a program.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct InfoAnswer {
-    /// What the traces hold.
+    /// The contents of the traces.
     #[serde(flatten)]
     pub info: Info,
-    /// What became of the replies, by cell; empty where the traces do not record it.
+    /// The reply quality by cell; empty if the traces do not record it.
     pub quality: Vec<CellAnswer>,
 }
 

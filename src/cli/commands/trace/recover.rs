@@ -39,7 +39,7 @@ pub struct RecoverArgs {
     json: bool,
 }
 
-/// What came of it.
+/// The result.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct RecoverAnswer {
     /// Episodes in the trace.
@@ -48,7 +48,7 @@ pub struct RecoverAnswer {
     pub steps: usize,
     /// True if a trace was written; not so without an episode.
     pub written: bool,
-    /// What is lost.
+    /// The losses.
     pub losses: Losses,
 }
 

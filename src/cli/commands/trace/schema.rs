@@ -19,7 +19,7 @@ use world::experiment::{Experiment, Spec};
 /// Print what a trace is: columns, footer metadata, rules; or a JSON Schema by its name
 #[derive(Clone, Copy, Debug, clap::Args)]
 pub struct SchemaCommand {
-    /// What to describe; all but `trace` are printed as JSON Schema
+    /// The schema to describe; all but `trace` are printed as JSON Schema
     #[arg(value_enum, value_name = "NAME", default_value_t)]
     name: Name,
     /// Print JSON
@@ -27,7 +27,7 @@ pub struct SchemaCommand {
     json: bool,
 }
 
-/// What there is a schema of, for those who write it.
+/// A schema that is printed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum Name {
     /// A trace: its columns, footer and rules

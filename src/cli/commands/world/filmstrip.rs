@@ -24,7 +24,7 @@ pub struct FilmstripArgs {
     /// The picture to write: .png, .svg or .pdf
     #[arg(short, long, value_name = "FILE")]
     out: PathBuf,
-    /// How many frames
+    /// The number of frames
     #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u16).range(1..=20))]
     count: u16,
     /// These steps instead of chosen ones

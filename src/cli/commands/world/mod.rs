@@ -24,7 +24,7 @@ pub struct WorldArgs {
     verb: WorldVerb,
 }
 
-/// What to show.
+/// The picture to make.
 #[derive(Clone, Debug, clap::Subcommand)]
 enum WorldVerb {
     Replay(replay::ReplayArgs),
@@ -38,10 +38,10 @@ enum WorldVerb {
     Sheet(SheetArgs),
 }
 
-/// Which scene.
+/// The scene.
 #[derive(Clone, Debug, clap::Args)]
 struct SceneArgs {
-    /// Which experiments: E1, E1..E5, E1,E3, or a file such as mine.toml
+    /// The experiments: E1, E1..E5, E1,E3, or a file such as mine.toml
     #[arg(value_name = "LIST", value_parser = experiments::parser())]
     experiments: Experiments,
     /// The seed of the block of runs
@@ -55,14 +55,14 @@ struct SceneArgs {
     config: Option<PathBuf>,
 }
 
-/// Where the sheet goes.
+/// The path of the sheet.
 #[cfg(feature = "raster")]
 #[derive(Clone, Debug, clap::Args)]
 struct SheetArgs {
     /// The folder for `sheet.png`
     #[arg(short, long, value_name = "DIR", default_value = "reports/world")]
     out: PathBuf,
-    /// Which experiments, a row each: E1, E1..E5, E1,E3, or a file such as mine.toml
+    /// The experiments, one row each: E1, E1..E5, E1,E3, or a file such as mine.toml
     #[arg(long, value_name = "LIST", default_value = "E1..E5", value_parser = experiments::parser())]
     experiment: Experiments,
     /// The seed of the scenes

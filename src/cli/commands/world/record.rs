@@ -51,7 +51,7 @@ pub struct RecordArgs {
     /// --dry-run, --probe and --json alone may stand beside it
     #[arg(value_name = "STUDY")]
     study: Option<PathBuf>,
-    /// Who plays: oracle, random, guesser, gullible, confabulator, frozen, mimic; vlm, a model behind a provider; human, people
+    /// The agent: oracle, random, guesser, gullible, confabulator, frozen, mimic; vlm, a model behind a provider; human, people
     /// in a browser; or exec:'CMD', a program of your own that takes and gives JSON lines
     #[arg(long, value_name = "AGENT", default_value = "vlm")]
     agent: String,
@@ -75,7 +75,7 @@ pub struct RecordArgs {
     /// The folder for traces and logs
     #[arg(short, long, value_name = "DIR", default_value = "runs")]
     out: PathBuf,
-    /// What the study varies besides the model, by name: a column of traces and tables, and part of each episode's id
+    /// The name of the condition that the study varies besides the model: a column of traces and tables, and part of each episode's id
     #[arg(long, value_name = "NAME", value_parser = condition)]
     condition: Option<String>,
     /// A plan that `mirrorstats plan --register` wrote: traces carry its hash, and reports say whether what was analysed is
@@ -110,7 +110,7 @@ pub struct RecordArgs {
     /// Print what became of the episodes as JSON
     #[arg(long)]
     json: bool,
-    /// How many threads to use.
+    /// The number of threads.
     #[command(flatten)]
     threads: ThreadArgs,
     /// A model behind a provider.
@@ -236,7 +236,7 @@ impl RecordArgs {
         files.collect()
     }
 
-    /// Who plays, as `--agent` names it.
+    /// The player that `--agent` names.
     pub fn player(&self) -> Result<Arc<dyn Player>, Failure> {
         if let Some(command) = self.agent.strip_prefix("exec:") {
             return Ok(Arc::new(self.exec.player(command, self.vlm.name(), &self.out)?));
@@ -372,7 +372,7 @@ impl RecordArgs {
 /// A recording that ran to its end, or was stopped.
 #[derive(Debug)]
 pub struct Recorded {
-    /// What became of the episodes.
+    /// The outcomes of the episodes.
     pub answer: RecordAnswer,
     /// The reason why the agent could not go on, if it could not.
     pub gave_up: Option<String>,

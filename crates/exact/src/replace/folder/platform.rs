@@ -1,4 +1,4 @@
-//! What only some systems can do with folders. The others answer that they cannot.
+//! Folder operations that only some systems have. On other systems they return an error.
 
 use std::fs::Metadata;
 use std::io;
@@ -17,7 +17,7 @@ pub(super) fn exchange(_: &Path, _: &Path) -> io::Result<()> {
     Err(io::ErrorKind::Unsupported.into())
 }
 
-/// Whether another file system, or another part of one, begins at the folder. Names on the two sides of it cannot be
+/// Returns true if another file system, or another part of one, begins at the folder. Names on the two sides of it cannot be
 /// linked, and what lies behind it must never be removed with the folder.
 #[cfg(target_os = "linux")]
 pub(super) fn is_mount_point(folder: &Path) -> io::Result<bool> {

@@ -26,7 +26,7 @@ pub struct FolderFiles<'a> {
     pub new: &'a [(&'a Path, Content<'a>)],
     /// One of the new files, if readers rely on the others where they find it.
     pub index: Option<&'a Path>,
-    /// What of the folder at this path is to be replaced or removed. Everything else in it stays.
+    /// Returns the files of the folder that will be replaced or removed. Everything else stays.
     pub old: &'a dyn Fn(&Path) -> Vec<PathBuf>,
 }
 
@@ -35,11 +35,11 @@ pub fn is_unfinished(folder: &Path) -> bool {
     folder.join(NOTE).is_file()
 }
 
-/// Why the files of a folder cannot be replaced.
+/// An error while replacing the files of a folder.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot write {}", path.display())]
 pub struct FolderError {
-    /// Where.
+    /// The path.
     pub path: PathBuf,
     /// The reason.
     pub source: io::Error,

@@ -37,7 +37,7 @@ const OLD: [(&str, &str); 4] = [
 const NEW: [(&str, &str); 3] = [("a.txt", "new a"), ("tables/u.csv", "new u"), (INDEX, "a.txt\ntables/u.csv")];
 const FOREIGN: [(&str, &str); 3] = [("notes.txt", "mine"), ("mine/deep/b.txt", "mine"), ("tables/own.csv", "mine")];
 
-/// What the index of a folder lists.
+/// The files that a folder's index lists.
 fn listed(folder: &Path) -> Vec<PathBuf> {
     let index = fs::read_to_string(folder.join(INDEX)).unwrap_or_default();
     index.lines().chain([INDEX]).map(PathBuf::from).collect()
@@ -86,7 +86,7 @@ fn contents(root: &Path) -> Contents {
     found
 }
 
-/// What a folder with these and the foreign files holds.
+/// The contents of a folder with these files and the foreign ones.
 fn with_foreign(files: &[(&str, &str)]) -> Contents {
     let files = files.iter().chain(&FOREIGN).map(|(path, text)| (PathBuf::from(path), Some((*text).to_owned())));
     files.chain([(PathBuf::from("empty"), None)]).collect()

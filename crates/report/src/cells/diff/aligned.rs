@@ -1,4 +1,4 @@
-//! Which rows of two tables are of the same episode.
+//! Rows of two tables for the same episode.
 
 use std::cmp::Ordering;
 

@@ -53,7 +53,7 @@ fn signs() -> Vec<(Swatch, String)> {
     vec![(Swatch::Tick(tick), "episodes that end undecided, censored".to_owned())]
 }
 
-/// How the episodes of each experiment and model ended, by step.
+/// The endings of the episodes of each experiment and model, by step.
 ///
 /// The first metric is the duration; the second one is defined where an episode is decided.
 fn endings<'e>(

@@ -14,7 +14,7 @@ const BAR: f64 = 15.0;
 const LEAST_WIDTH: f64 = 420.0;
 const PLOT_WIDTH: f64 = 260.0;
 
-/// How the episodes of one experiment ended, by model.
+/// The endings of the episodes of one experiment, by model.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Outcomes {
     /// The experiment.
@@ -23,7 +23,7 @@ pub struct Outcomes {
     pub rows: Vec<OutcomeRow>,
 }
 
-/// How the episodes of one model ended.
+/// The endings of one model's episodes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct OutcomeRow {
     pub model: String,

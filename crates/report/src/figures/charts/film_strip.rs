@@ -12,9 +12,9 @@ pub struct Still {
     pub png: Vec<u8>,
     /// See `png`.
     pub size: (u32, u32),
-    /// What was done, in words.
+    /// The action, in words.
     pub action: String,
-    /// What was claimed, in words.
+    /// The claim, in words.
     pub claim: String,
     /// True if mirror evidence was in view.
     pub visible: bool,

@@ -9,7 +9,7 @@ use exact::moments::Moments;
 use exact::number::Decimal;
 use metric::catalog::{Better, Catalog, Kind, Metric};
 
-/// What a cell says.
+/// The content of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reading {
     /// There is no episode of this model in this experiment.
@@ -26,7 +26,7 @@ impl Reading {
         self.moments().and_then(Moments::mean)
     }
 
-    /// How many values there are.
+    /// The number of values.
     pub fn n(self) -> u64 {
         self.moments().map_or(0, |moments| moments.n)
     }
@@ -134,7 +134,7 @@ impl<'a> Matrix<'a> {
         Some(MetricId { name, at, metric: self.cells.catalog.metric.get(name)? })
     }
 
-    /// What the cell of `model` in `experiment` says of `metric`.
+    /// The reading of `metric` for `model` in `experiment`.
     pub fn reading(&self, experiment: &str, model: &str, metric: MetricId<'_>) -> Reading {
         let Some(group) = self.groups.get(&(experiment, model)) else { return Reading::Empty };
         match group.moments.get(metric.at) {
@@ -176,7 +176,7 @@ impl<'a> Matrix<'a> {
         self.cells.catalog.chance(experiment, metric.name).map(exact::ratio::Ratio::value)
     }
 
-    /// What some blind strategies would reach where there is no chance level, as text and value.
+    /// The rates of some blind strategies where there is no chance level, as text and value.
     pub fn references(&self, experiment: &str, metric: MetricId<'_>) -> Vec<(String, f64)> {
         let known = self.cells.catalog.experiment.get(experiment).and_then(|e| e.reference.get(metric.name));
         known.into_iter().flatten().map(|level| (level.to_string(), level.value())).collect()

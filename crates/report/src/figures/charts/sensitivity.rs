@@ -26,12 +26,12 @@ const GAP: f64 = 12.0;
 const APART: f64 = 4.5;
 /// The share of a column that markers side by side may take.
 const COLUMN_ROOM: f64 = 0.66;
-/// How far the last number may stand out of its plot, px.
+/// The overhang of the last number beyond its plot, px.
 const OVERHANG: f64 = 4.0;
 /// Between two numbers below a plot, px.
 const NUMBER_GAP: f64 = 3.0;
 
-/// What one threshold gave.
+/// The results under one threshold.
 #[derive(Clone, Copy, Debug)]
 pub struct Stage<'a> {
     /// The threshold, px; `None` for the definitions as they are.
@@ -40,7 +40,7 @@ pub struct Stage<'a> {
     pub cells: &'a Cells,
 }
 
-/// What the figure is drawn from.
+/// The inputs of the figure.
 #[derive(Clone, Copy, Debug)]
 pub struct Input<'a> {
     /// The definitions as they are, then the thresholds, ascending.
@@ -48,7 +48,7 @@ pub struct Input<'a> {
     pub metrics: &'a [String],
     /// Models in the order to show them; those not named follow in the palette's order, then by name.
     pub order: &'a [String],
-    /// What the definitions as they are stand for: `recorded (60 px)`.
+    /// The meaning of a null threshold: `recorded (60 px)`.
     pub reference: &'a str,
 }
 

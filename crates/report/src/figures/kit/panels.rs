@@ -8,7 +8,7 @@ use super::sheet::Sheet;
 /// Panels in rows under headings of equal height.
 #[derive(Clone, Debug)]
 pub struct Panels {
-    /// What is below each heading.
+    /// The frame below each heading.
     pub bodies: Vec<Frame>,
     headings: Vec<(Point, String, Vec<String>)>,
     /// The edge below the last row.
@@ -17,7 +17,7 @@ pub struct Panels {
     pub rest: Option<Frame>,
 }
 
-/// How panels are laid out.
+/// The arrangement of panels.
 #[derive(Clone, Copy, Debug)]
 pub struct Arrangement {
     /// The left edge of the first column, px.

@@ -67,13 +67,13 @@ impl Plot {
         }
     }
 
-    /// What the axis below says.
+    /// Draws the title of the x axis.
     pub fn x_title(&self, sheet: &mut Sheet, text: &str) {
         let at = (self.frame.center().0, self.frame.bottom() + 20.0);
         sheet.text(at, text, lettering::label().aligned(Align::Middle));
     }
 
-    /// What the axis at the left says, `away` px from the plot.
+    /// Draws the title of the y axis, `away` px from the plot.
     pub fn y_title(&self, sheet: &mut Sheet, text: &str, away: f64) {
         let at = (self.frame.left - away, self.frame.center().1);
         sheet.text(at, text, lettering::label().aligned(Align::Middle).upwards());

@@ -90,14 +90,14 @@ impl Sheet {
         );
     }
 
-    /// What `draw` draws, as one group that carries the mark's title and values.
+    /// Puts everything that `draw` draws into one group with the mark's title and values.
     pub fn mark(&mut self, mark: &Mark, draw: impl FnOnce(&mut Self)) {
         self.ink.borrow_mut().body.push_str(&mark.opening());
         draw(self);
         self.ink.borrow_mut().body.push_str("</g>\n");
     }
 
-    /// What is on it down to `height` px, under a heading; gives the height of both, px.
+    /// Returns the content down to `height` px, under a heading, and the height of both, px.
     pub fn under(self, title: &str, height: f64) -> (Self, f64) {
         let heading = lettering::heading();
         let mut sheet = Self::new(self.width);

@@ -26,7 +26,7 @@ use statistics::restricted::{Difference, by_units, fewest, independent, paired, 
 use statistics::units;
 use statistics::unpaired::fisher;
 
-/// How a difference was tested, and what its interval is.
+/// The test of a difference, and the method of its interval.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
@@ -91,7 +91,7 @@ pub struct Comparison {
     pub incomparable: Option<String>,
 }
 
-/// What two blocks are compared by.
+/// Two blocks and their comparison.
 pub(in crate::statistics) struct Compared<'s, 'a> {
     pub study: &'s Study<'a>,
     pub first: &'s Block<'a>,
@@ -416,7 +416,7 @@ impl Comparison {
         hopeless.or_else(|| LossCases::unsettled(self.losses.as_ref()))
     }
 
-    /// Whether the first is shown to be above or below the second; none where neither is.
+    /// The sign of a shown difference; `None` if no difference is shown.
     pub fn sign(&self) -> Option<Sign> {
         let difference = self.difference.filter(|_| self.separated)?;
         Some(if difference > 0.0 { Sign::Higher } else { Sign::Lower })
@@ -428,7 +428,7 @@ fn fewest_of(confidence: f64) -> u64 {
     level(confidence).map_or(u64::MAX, |level| fewest(level) as u64)
 }
 
-/// Where the first of two stands.
+/// The position of the first of two models.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sign {
     /// Above the second.

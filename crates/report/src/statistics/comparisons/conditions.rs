@@ -9,7 +9,7 @@ use crate::statistics::matching::{Matched, Matching, Scenes};
 use crate::statistics::study::{Block, Experiment, Study};
 use score::table::MetricColumn;
 
-/// How much a model's mean differs between two experiments, by pairs where their scenes agree.
+/// The difference of a model's mean between two experiments, by pairs if their scenes agree.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Contrast {
     /// The model.
@@ -23,7 +23,7 @@ pub struct Contrast {
     pub baseline: String,
     /// The experiment subtracted from it.
     pub against: String,
-    /// How the episodes of the two experiments fit together.
+    /// The matching of the episodes of the two experiments.
     pub matching: Matching,
     /// The baseline minus the other, adjusted over all models under the same metric and experiments.
     #[serde(flatten)]

@@ -9,7 +9,7 @@ use exact::moments::Moments;
 use statistics::holm::{holm, level};
 use statistics::losses::{Fate, Lossy, bounds};
 
-/// What lost episodes are called where they decide.
+/// The name of lost episodes that decide.
 pub(in crate::statistics) const LOST: &str = "lost episodes";
 
 /// Losses, or that nothing is known of them.
@@ -67,7 +67,7 @@ pub struct LossCase {
     pub p: Option<f64>,
 }
 
-/// Which way lost episodes are taken.
+/// The assumed result of lost episodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::statistics) enum Toward {
     Lowest,

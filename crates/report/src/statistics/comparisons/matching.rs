@@ -1,4 +1,4 @@
-//! Which episodes of two blocks are pairs: those with the same scene.
+//! Pairs of episodes of two blocks: those with the same scene.
 //!
 //! Rule: a pair is one episode of each side with one scene, where each side has exactly one with it. Whether two blocks
 //! are compared by their pairs is decided by the scenes alone, before any outcome is looked at.
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::statistics::study::{Block, Study};
 
-/// How the episodes of two blocks fit together.
+/// The matching of the episodes of two blocks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Matching {
     /// The pairs: scenes that each side has exactly once.

@@ -29,7 +29,7 @@ pub struct Family {
     pub tied: Vec<Vec<String>>,
     /// Every pair of models, in the order of `models`.
     pub tests: Vec<PairTest>,
-    /// What this many episodes could have shown of a rate; none for a duration.
+    /// The least difference of a rate that this many episodes could have shown; `None` for a duration.
     pub detectable: Option<Reach>,
 }
 
@@ -55,7 +55,7 @@ pub struct PairTest {
     pub first: String,
     /// The other one.
     pub second: String,
-    /// How their episodes fit together.
+    /// The matching of their episodes.
     pub matching: Matching,
     /// The first minus the second, adjusted over all pairs of models in the experiment.
     #[serde(flatten)]
@@ -74,7 +74,7 @@ pub struct Gap {
     pub condition: Option<String>,
     /// The scene, as the traces name it.
     pub scene: String,
-    /// How many episodes there are instead of one.
+    /// The number of episodes instead of one.
     pub episodes: usize,
 }
 
@@ -143,7 +143,7 @@ impl<'s, 'a> Field<'s, 'a> {
     }
 }
 
-/// What was asked of every comparison.
+/// The options that all comparisons share.
 #[derive(Clone, Copy)]
 struct Asked {
     horizon: Option<i64>,

@@ -33,10 +33,10 @@ pub struct RetestRow {
     /// The chance that two times of a scene, both taken at random, give different verdicts: the mean over scenes of
     /// 2 k (m - k) / (m (m - 1)) for k successes in m times (Fleiss 1971, one minus the agreement of a subject).
     pub flipped: f64,
-    /// How much the rate varies from scene to scene, by analysis of variance; none where that is not estimable.
+    /// The variance of the rate between scenes, by analysis of variance; `None` if it cannot be estimated.
     #[serde(default)]
     pub between_scenes: Option<f64>,
-    /// How much it varies from one time of a scene to the next.
+    /// The variance of the rate between repeats of a scene.
     #[serde(default)]
     pub within_scenes: Option<f64>,
 }

@@ -16,7 +16,7 @@ use statistics::units::{self, UnitTest, difference_test};
 /// Scenes, seeds or participants with several episodes.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Units {
-    /// How many there are.
+    /// The number of units.
     pub n: u64,
     /// Their name, in the plural.
     pub name: String,

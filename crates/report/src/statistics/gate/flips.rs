@@ -28,7 +28,7 @@ pub struct Played {
     pub value: i64,
     /// The timesteps that decided it, ascending; null where the side is scores.
     pub timesteps: Option<Vec<i64>>,
-    /// Where its frames are, in a page that `view --export` wrote next to the trace; null without one.
+    /// The link to its frames in a page that `view --export` wrote next to the trace; null without one.
     pub frames: Option<String>,
 }
 

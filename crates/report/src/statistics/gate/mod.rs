@@ -29,7 +29,7 @@ use statistics::holm::{holm, level};
 use statistics::interval::Interval;
 use statistics::margin;
 
-/// What is asked of two sets of episodes.
+/// The options of the gate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GateOptions {
     /// The metric, which both sides have and which has a better direction.
@@ -90,7 +90,7 @@ pub struct GateCell {
     pub condition: Option<String>,
     /// The verdict.
     pub verdict: GateVerdict,
-    /// What it rests on, or what is in its way.
+    /// The reason for the verdict, or the obstacle.
     pub why: String,
     /// The earlier episodes.
     pub base: GateSide,

@@ -8,14 +8,14 @@ use metric::catalog::Better;
 use score::builder::TableBuilder;
 use score::table::{EpisodeTable, Header, KeyRef, LOST};
 
-/// What stands before the condition and the id of an episode of each side.
+/// The prefixes of the condition and the episode id of each side.
 const MARKS: [&str; 2] = ["0/", "1/"];
 /// The labels that say what episodes share, and what they were recorded with.
 const LABELS: [&str; 4] = [CONDITION, "scene", FINGERPRINT, "participant"];
-/// What stands for no condition.
+/// The name of the default condition.
 const DEFAULT: &str = "default";
 
-/// What the lost episodes count as.
+/// The assumed result of lost episodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Fill {
     /// They do not count.
@@ -43,7 +43,7 @@ impl<'a> Sides<'a> {
         Self { tables: [base, new], renamed }
     }
 
-    /// What keeps all cells from being compared: other definitions, or episodes that came about in another way.
+    /// The obstacle to comparing any cell: other definitions, or episodes that were made in another way.
     pub fn barrier(&self) -> Option<String> {
         let [base, new] = self.tables;
         let hash = |table: &EpisodeTable| table.catalog.hash.chars().take(8).collect::<String>();

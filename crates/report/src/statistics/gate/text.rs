@@ -8,7 +8,7 @@ use crate::tables::{Table, push_wrapped};
 use exact::escape::visible;
 use exact::format::{UNDEFINED, fixed};
 
-/// How verdicts are printed.
+/// The output format of verdicts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GateFormat {
     /// A table for a terminal of this width, and the flipped episodes.

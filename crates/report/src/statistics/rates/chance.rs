@@ -29,7 +29,7 @@ pub struct ChanceRow {
     pub condition: Option<String>,
     /// The metric.
     pub metric: String,
-    /// What the level is.
+    /// The role of the level.
     pub role: Role,
     /// The level.
     pub level: Ratio,
@@ -43,7 +43,7 @@ pub struct ChanceRow {
     pub mid_p: f64,
     /// `p` adjusted by Holm's method over the models of the experiment, against this level.
     pub p_adjusted: f64,
-    /// What the value adjusted by Holm says at the level of significance.
+    /// The verdict of the Holm-adjusted value at the level of significance.
     pub verdict: Verdict,
     /// The units of analysis where some have several episodes: the test counts each once.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -53,17 +53,17 @@ pub struct ChanceRow {
     pub losses: Option<LossCases>,
 }
 
-/// What a level stands for.
+/// The role of a level.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Role {
     /// The rate of blind guessing.
     Chance,
-    /// What some blind strategy would reach, where no chance level applies.
+    /// The result of some blind strategy, where no chance level applies.
     Reference,
 }
 
-/// Where a rate stands against a level.
+/// The position of a rate relative to a level.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {

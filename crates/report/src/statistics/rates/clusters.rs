@@ -31,7 +31,7 @@ pub struct ClusterRow {
     pub mean: Option<f64>,
     /// The sample standard error that takes episodes as independent.
     pub se: Option<f64>,
-    /// What takes seeds as independent instead; none for fewer than two seeds.
+    /// The interval with seeds as independent units; `None` for fewer than two seeds.
     pub by_seed: Option<Clustered>,
     /// The reason why it has no interval.
     pub withheld: Option<Withheld>,

@@ -25,7 +25,7 @@ use statistics::outcomes::ExactTest;
 use statistics::paired::Pairs;
 use statistics::stratified::{Stratum, common_difference, exact, pooled};
 
-/// How two rates were compared over several experiments.
+/// The comparison of two rates over several experiments.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum OverallMethod {
@@ -67,7 +67,7 @@ pub struct OverallRow {
     pub losses: Option<LossCases>,
 }
 
-/// How often an episode of one model decides earlier than one of another, averaged over the experiments that both have.
+/// The probability that one model decides earlier than another, averaged over the experiments that both have.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ImprovementRow {
     /// The metric, a duration: earlier is better, and an episode that never decides is later than all that do.

@@ -1,4 +1,4 @@
-//! What may be said while a study still runs: confidence sequences and e-values.
+//! Statistics for a study in progress: confidence sequences and e-values.
 //!
 //! Rule: nothing here is a fixed-n statistic, so that a reader may look after every episode and stop at any look.
 //! Families are those of the fixed-n page: models of an experiment against a level, pairs of models of an experiment.
@@ -86,7 +86,7 @@ pub struct SequentialChance {
     pub condition: Option<String>,
     /// The metric.
     pub metric: String,
-    /// What the level is.
+    /// The role of the level.
     pub role: Role,
     /// The level.
     pub level: Ratio,
@@ -100,7 +100,7 @@ pub struct SequentialChance {
     pub p: f64,
     /// The same adjusted by Holm's method over the models of the experiment, against this level.
     pub p_adjusted: f64,
-    /// What the adjusted value says at the level of significance.
+    /// The verdict of the adjusted value at the level of significance.
     pub verdict: Verdict,
 }
 
@@ -129,7 +129,7 @@ pub struct SequentialPair {
     pub p: f64,
     /// The same adjusted by Holm's method over all pairs of models in the experiment.
     pub p_adjusted: f64,
-    /// Where the first one's rate stands against the second one's.
+    /// The position of the first model's rate relative to the second's.
     pub verdict: Verdict,
 }
 

@@ -11,7 +11,7 @@ use crate::tables::{Table, push_wrapped};
 use exact::escape::visible;
 use exact::format::fixed;
 
-/// How much is printed.
+/// The amount of printed detail.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Length {
     /// The answers, and the numbers that they rest on.

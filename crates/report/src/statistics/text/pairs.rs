@@ -11,7 +11,7 @@ use statistics::interval::Interval;
 /// Decimals of a difference of rates.
 const RATE_PLACES: usize = 3;
 
-/// What a test says, in the order of a page's columns.
+/// The result of a test, in the order of a page's columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
     /// The first is better, after adjustment.
@@ -30,7 +30,7 @@ pub struct PairText<'a> {
     pub second: &'a str,
     /// The name of the test.
     pub test: &'static str,
-    /// What each side has: `11/21`, or `n = 21` of a duration.
+    /// The counts of each side: `11/21`, or `n = 21` of a duration.
     pub counts: [String; 2],
     /// The pairs that differ, `2 : 6 of 21`: in favour of this side, of the other one, all of them.
     pub differing: [String; 2],

@@ -64,7 +64,7 @@ impl Sequential {
     }
 }
 
-/// When to read this page, and when the other.
+/// The purpose of this page and of the other one.
 const PURPOSE: [&str; 2] = [
     "A running study: look as often as you like, stop when you like; these intervals and verdicts keep their confidence.",
     "The price is width. Where the number of episodes was fixed beforehand, `stats` without --sequential shows more.",

@@ -91,7 +91,7 @@ const CANNOT_SAY: &str = "cannot say";
 /// The heading of the p values with all lost episodes taken both ways.
 const WITH_LOST: &str = "p with lost episodes";
 
-/// Which p values a table has.
+/// The p values of a table.
 #[derive(Clone, Copy)]
 struct Columns {
     is_full: bool,

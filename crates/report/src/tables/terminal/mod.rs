@@ -14,7 +14,7 @@ pub struct Terminal {
     pub emphasis: Marks,
 }
 
-/// How emphasis is shown.
+/// The marks of emphasis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Marks {
     /// By `*` and `_` around it.

@@ -67,14 +67,14 @@ fn chunked(archive: &mut EvalArchive, folder: &str) -> Result<Map<String, Value>
     Ok(sample)
 }
 
-/// What the samples of a log share.
+/// Values that the samples of a log share.
 pub(super) struct Log {
     eval: Value,
     /// The number of each sample in the data set, from 1, by its id as JSON.
     numbers: HashMap<String, usize>,
 }
 
-/// Why a sample gave no rows.
+/// An error of a sample without rows.
 pub(super) enum SampleFault {
     Shape(&'static str),
     Import(ImportError),

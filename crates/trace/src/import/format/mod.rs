@@ -24,7 +24,7 @@ use super::mapping::{Mapping, Row};
 use exact::input;
 use json::WithoutNan;
 
-/// How the steps of a file are written.
+/// The format of a file of steps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
     /// One object per line.
@@ -50,7 +50,7 @@ exact::names!(Format {
     LeRobot: "lerobot",
 });
 
-/// How much of a JSON file says whose it is.
+/// The number of bytes that tell the kind of a JSON file.
 const HEAD: u64 = 64 << 10;
 
 impl Format {
@@ -98,7 +98,7 @@ impl Format {
     }
 }
 
-/// Where rows go: through a mapping into a temporary file of lines.
+/// The sink of rows: a mapping, then a temporary file of lines.
 pub(super) struct Rows<'m> {
     pub(super) file: String,
     /// The first digits of its hash: of files that number their episodes from 0, they keep the ids apart.

@@ -23,7 +23,7 @@ const ENCRYPTED_MAGIC: [u8; 4] = *b"PARE";
 /// A magic number at each end, and the footer's length.
 const SMALLEST: u64 = 12;
 
-/// How much of a footer is decoded.
+/// The decoded extent of a footer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Extent {
     Pages,

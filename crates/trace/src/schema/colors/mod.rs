@@ -63,7 +63,7 @@ impl ColorColumn {
         format!("{colors}{word}{null}")
     }
 
-    /// What to do about a text that the column may not hold.
+    /// The remedy for a text that the column may not hold.
     pub fn help(self, text: &str, palette: Option<&Palette>) -> String {
         let likely = normal(text);
         if likely.is_empty() || WORDS.contains(&likely.as_str()) && self.word != Some(likely.as_str()) {

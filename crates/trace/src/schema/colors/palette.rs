@@ -15,7 +15,7 @@ use exact::escape::visible;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Palette(Vec<String>);
 
-/// Why names are no palette.
+/// An error of a palette.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages say it")]
 pub enum NoPalette {
@@ -38,7 +38,7 @@ pub(crate) struct Declared {
     is_of_world: bool,
 }
 
-/// What a recording says of colours; its other keys are not looked at.
+/// The recording's keys about colours; its other keys are not looked at.
 #[derive(Deserialize)]
 struct Recording {
     palette: Option<Value>,

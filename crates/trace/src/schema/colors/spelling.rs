@@ -1,4 +1,4 @@
-//! How a colour is spelled: in lower case, with single spaces between words and no character that does not show.
+//! The spelling of colours: in lower case, with single spaces between words and no invisible character.
 
 use std::sync::LazyLock;
 
@@ -11,10 +11,10 @@ use exact::suggest::nearest;
 /// Words that some columns hold in place of a colour.
 pub const WORDS: [&str; 2] = ["none", "unknown"];
 
-/// What a name in normal form has no match of, for engines that match patterns; letters in upper case apart.
+/// A pattern that matches no name in normal form, for engines that match patterns; letters in upper case apart.
 pub const STRAY: &str = r"^ | $|  |[\s&&[^ ]]|[\p{Cc}\u{ad}\u{61c}\u{200b}-\u{200f}\u{2028}-\u{202e}\u{2060}-\u{206f}\u{feff}\u{e0000}-\u{e007f}]";
 
-/// What a name has a match of that mixes Latin letters with those of other scripts, many of which look alike.
+/// A pattern for names that mix Latin letters with those of other scripts, many of which look alike.
 pub const MIXED: &str =
     r"\p{Latin}.*[\p{L}&&[^\p{Latin}\p{Common}\p{Inherited}]]|[\p{L}&&[^\p{Latin}\p{Common}\p{Inherited}]].*\p{Latin}";
 

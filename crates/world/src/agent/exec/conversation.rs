@@ -1,4 +1,4 @@
-//! What is said to a program or a function in one episode: the words and the frame that a model gets, as messages.
+//! The messages to a program or a function in one episode: the words and the frame that a model gets.
 
 use std::fmt;
 use std::path::Path;
@@ -13,7 +13,7 @@ use crate::agent::reply::{self, Ending};
 use crate::agent::{Lost, Observation, Reply, Task, Usage};
 use exact::replace::TemporaryFolder;
 
-/// What the temporary folder of an episode's frames is named after.
+/// The prefix of the temporary folder for an episode's frames.
 const FRAMES: &str = "frames";
 
 /// One episode's messages, and how its replies are read.

@@ -10,7 +10,7 @@ use std::path::Path;
 
 use exact::hash;
 
-/// What ends a command of a line, so that the next word is a command again.
+/// The operators that end a command, so that the next word is a command again.
 const OPERATORS: [&str; 6] = [";", "&", "&&", "|", "||", "("];
 
 /// A file that the command names cannot be read.

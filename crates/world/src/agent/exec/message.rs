@@ -1,4 +1,4 @@
-//! What a program is told: one JSON object per line on its standard input.
+//! The messages to a program: one JSON object per line on its standard input.
 //!
 //! ```text
 //! mirrorstats            program
@@ -28,13 +28,13 @@ pub const PROTOCOL: u32 = 1;
 pub enum Message {
     /// The first line: what the episode is about. It asks for no reply.
     Task(TaskMessage),
-    /// What is perceived before a step. It asks for one line: the reply.
+    /// The perception before a step. It asks for one line: the reply.
     Observation(ObservationMessage),
     /// The last line: nothing more is asked. It asks for no reply.
     End(EndMessage),
 }
 
-/// What an episode is about.
+/// The task of an episode.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct TaskMessage {
     /// The version of this protocol.
@@ -43,7 +43,7 @@ pub struct TaskMessage {
     pub episode_id: String,
     /// The experiment, for the program's own records.
     pub experiment: String,
-    /// Which prompt is in force: `cube_selection` or `exploration` for the paper's two, the name of its folder for another.
+    /// The prompt: `cube_selection` or `exploration` for the paper's two, the name of its folder for another.
     pub family: String,
     /// The false colour that the prompt states in E3; null elsewhere.
     pub stated_color: Option<String>,
@@ -57,26 +57,26 @@ pub struct TaskMessage {
     pub reply_schema: Value,
 }
 
-/// What is perceived before a step.
+/// The perception before a step.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct ObservationMessage {
     /// The step, from 1.
     pub t: i32,
     /// Steps left, this one included.
     pub remaining_steps: i32,
-    /// Where the body stands, m, in the coordinates of the room.
+    /// The position of the body, m, in the coordinates of the room.
     pub position: Position,
-    /// Where the body faces: degrees, counter-clockwise from +x.
+    /// The direction of the body: degrees, counter-clockwise from +x.
     pub orientation: f32,
     /// True if the last move was blocked.
     pub wall_warning: bool,
-    /// What was done in the step before: w, s, a, d; null at t = 1 and after a reply that could not be used.
+    /// The action of the step before: w, s, a, d; null at t = 1 and after a reply that could not be used.
     pub last_action: Option<String>,
     /// The `summary` of the last reply that could be used; null where there was none.
     pub last_thought: Option<String>,
     /// The user prompt that a model gets: task, history, position, warning.
     pub user_prompt: String,
-    /// What the eye sees.
+    /// The view of the eye.
     pub image: Image,
 }
 
@@ -102,7 +102,7 @@ pub enum Image {
 /// That nothing more is asked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct EndMessage {
-    /// How the episode ended.
+    /// The ending of the episode.
     pub reason: Ended,
     /// The steps that were asked for.
     pub steps: i32,

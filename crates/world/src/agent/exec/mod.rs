@@ -37,10 +37,10 @@ use super::vlm::secrets::{Secret, from_every_key_variable};
 use super::{Agent, Decision, Ended, Farewell, Lost, Observation, Player, Reply, Status, Task, Usage};
 use exact::hash;
 
-/// What the shell's exit code says of a command that there is not, or that cannot be run.
+/// The shell's exit codes for a missing command, and for one that cannot be run.
 const NO_COMMAND: [i32; 2] = [126, 127];
 
-/// How a program gets its frames.
+/// The passing of frames to a program.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Images {
     /// As files, which are there until the episode ends.
@@ -66,7 +66,7 @@ pub struct Settings {
     /// The command, for the shell.
     pub command: String,
     pub images: Images,
-    /// How long a reply may take; the first one includes the program's start.
+    /// The time for a reply; for the first one it includes the program's start.
     pub timeout: Duration,
     /// The folder in which each episode gets one for its frames.
     pub scratch: PathBuf,

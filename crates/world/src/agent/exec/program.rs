@@ -22,16 +22,16 @@ use super::said::Said;
 
 /// Bytes of one reply.
 pub const LONGEST_REPLY: u64 = 1 << 20;
-/// How long a program may take to leave after its standard input was closed.
+/// The time that a program has to leave after its standard input was closed.
 const FAREWELL: Duration = Duration::from_secs(5);
-/// How long the end of a process may come after the end of its output.
+/// The time between the end of a process's output and its own end.
 const CLOSING: Duration = Duration::from_secs(1);
-/// How often it is looked whether the program has read its task.
+/// The interval of checks that the program has read its task.
 const GLANCE: Duration = Duration::from_millis(2);
 /// Bytes of a line that are shown.
 const SHOWN: usize = 100;
 
-/// Why there is no reply.
+/// The reason for a missing reply.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages say it")]
 pub enum Failure {

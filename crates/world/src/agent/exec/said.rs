@@ -1,4 +1,4 @@
-//! What a program says on standard error: its end is kept, for messages and in a file of the episode.
+//! The standard error of a program: its end is kept, for messages and in a file of the episode.
 //!
 //! Rule: no value of a variable that holds a key is in what leaves this file, not even a part of one that was cut off at the
 //! beginning. In the file all else is as the program wrote it, characters that act on a terminal included.
@@ -17,7 +17,7 @@ const IN_MESSAGE: usize = 2_000;
 /// Bytes that are kept before those of the file: longer than any key, which may be cut off among them.
 const MARGIN: usize = 4_096;
 
-/// What was said, while more may come.
+/// The text so far.
 #[derive(Debug, Default)]
 pub struct Said(Mutex<Tail>);
 
@@ -83,7 +83,7 @@ pub struct Kept {
 }
 
 impl Kept {
-    /// What the program of an episode is going to say, for a file in this folder.
+    /// The future standard error of an episode's program, for a file in this folder.
     pub fn new(folder: &Path, episode_id: &str, secrets: Arc<[Secret]>) -> Self {
         let path = folder.join(format!("{}.log", episode_id.replace('/', "-")));
         Self { said: Arc::default(), path, secrets }

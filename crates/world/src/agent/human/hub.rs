@@ -1,4 +1,4 @@
-//! Which person is asked what. Episodes wait here for people, and people for episodes.
+//! The queue between episodes and people.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -12,7 +12,7 @@ use super::journal::{Entry, Journal};
 use trace::frame::Frame;
 use trace::palette::Color;
 
-/// What a person is asked at a step: what a model is sent.
+/// The question to a person at a step: the same that a model gets.
 #[derive(Clone, Debug)]
 pub struct Question {
     pub frame: Arc<Frame>,
@@ -28,7 +28,7 @@ pub struct Question {
     pub actions: Vec<&'static str>,
 }
 
-/// What a person answered.
+/// A person's answer.
 #[derive(Debug)]
 pub struct Given {
     /// The JSON object of a reply.
@@ -96,12 +96,12 @@ impl Hub {
         Self { consent, seats, answers, journal: Mutex::new(journal), tokens, codes }
     }
 
-    /// What people agree to, if anything.
+    /// The consent text, if there is one.
     pub fn consent(&self) -> Option<&str> {
         self.consent.as_deref()
     }
 
-    /// How many people there are.
+    /// The number of people.
     pub fn seats(&self) -> usize {
         self.seats.len()
     }

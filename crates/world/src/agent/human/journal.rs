@@ -1,4 +1,4 @@
-//! What people answered, a line each, as it came: a recording that was ended goes on where they were.
+//! The answers of people, one per line as they came: a recording that ended goes on where they were.
 //!
 //! Rule: a code, a time and an answer, and nothing else of a person. An answer is on the disk before its step is done.
 

@@ -1,4 +1,4 @@
-//! Where a pixel looks, and where a point of the room is drawn: an ideal pinhole, upright and level.
+//! The projection of pixels and points: an ideal pinhole, upright and level.
 //!
 //! Rule: only what the protocol publishes (the vertical field of view) and what whoever lives in a body knows of it: how
 //! high its eye is, and how far before its axis.
@@ -34,7 +34,7 @@ impl Place {
     }
 }
 
-/// Where a body faces: twelfths of a turn, counter-clockwise from +x.
+/// The direction of a body: twelfths of a turn, counter-clockwise from +x.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Heading(u8);
 
@@ -88,7 +88,7 @@ impl Heading {
     }
 }
 
-/// Where a body stands and where it faces.
+/// The position and direction of a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
     pub place: Place,
@@ -134,7 +134,7 @@ impl Camera {
         Self { eye, heading: pose.heading, half_width, half_height, focal: half_height / (sine / cosine) }
     }
 
-    /// How many headings to either side of its own a picture shows, 0 to 2.
+    /// The number of headings to either side of its own that a picture shows, 0 to 2.
     pub fn headings_aside(&self) -> i32 {
         let (next, second) = (Heading(1).direction(), Heading(2).direction());
         let shows = |(cosine, sine): (f64, f64)| self.focal * sine <= self.half_width * cosine;
@@ -167,7 +167,7 @@ impl Camera {
         self.half_height + self.focal * (EYE_HEIGHT - height) / ahead
     }
 
-    /// How many metres ahead the floor is in a row; `None` at and above the horizon.
+    /// The distance of the floor in a row, m; `None` at and above the horizon.
     pub fn floor_ahead(&self, row: f64) -> Option<f64> {
         let below = row - self.half_height;
         (below > 0.5).then(|| self.focal * EYE_HEIGHT / below)

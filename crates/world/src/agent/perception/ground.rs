@@ -1,4 +1,4 @@
-//! Where the walls meet the floor, and which columns show a floor that goes on behind a wall.
+//! The edges between walls and floor, and the columns that show a floor behind a wall.
 //!
 //! At the height of the eye a column shows a wall, or something that stands before it. A wall is flat and evenly lit: it
 //! has one shade, down to the floor. So the first change of shade below the horizon is the wall's foot, and its row says
@@ -12,7 +12,7 @@ use trace::frame::Frame;
 use super::camera::{Camera, Place};
 use super::paint;
 
-/// How much a channel may differ within one shade. The light is even, and a floor may be nearly as grey as a wall.
+/// The tolerance of a channel within one shade. The light is even, and a floor may be nearly as grey as a wall.
 const SAME_SHADE: i16 = 1;
 /// Columns from one foot to the next that is looked for.
 const STRIDE: usize = 4;
@@ -20,9 +20,9 @@ const STRIDE: usize = 4;
 /// The foot of the wall that one column shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Foot {
-    /// Where it seems to be: beyond the room if it was seen by way of a mirror.
+    /// Its apparent place: beyond the room if it was seen by way of a mirror.
     pub place: Place,
-    /// How far one row more or less would move it, m.
+    /// The change of its place by one row, m.
     pub error: f64,
 }
 

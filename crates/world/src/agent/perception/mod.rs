@@ -1,4 +1,4 @@
-//! What a scripted agent makes of a picture: how the room of the study looks, to somebody who knows how rooms look.
+//! The perception of scripted agents: how the room of the study looks, to somebody who knows how rooms look.
 //!
 //! ```text
 //! frame ──► paint (colour of a pixel) ──► patches ──► things (cubes, bodies)

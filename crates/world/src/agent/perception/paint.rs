@@ -1,4 +1,4 @@
-//! What colour a pixel shows.
+//! The colour of a pixel.
 //!
 //! Light scales a paint: it keeps the ratio of red, green and blue and takes brightness away. So a pixel has the colour of
 //! the palette that some light turns into it most nearly; what grey light on grey explains better has none. White paint
@@ -15,9 +15,9 @@ use trace::palette::Color;
 const LIGHT: (f64, f64) = (0.50, 1.05);
 /// From this brightness on, of 255, what has no tint is white.
 const WHITE: u8 = 128;
-/// How much the channels of white paint differ at most.
+/// The largest difference between the channels of white paint.
 const TINT: u8 = 3;
-/// How much nearer a colour must be than grey, so that a tinted wall is not taken for paint.
+/// The margin by which a colour must be nearer than grey, so that a tinted wall is not taken for paint.
 const FAVOR_OF_GREY: f64 = 14.0;
 /// Bits of a channel that decide.
 const BITS: u32 = 6;

@@ -31,9 +31,9 @@ const LEAST_OF_BODY: usize = 30;
 const EDGES: (f64, f64) = (0.28, 0.95);
 /// Widths of a cube by its edge: turned by 45 degrees and seen from aside it is wider than its edge.
 const WIDTHS: (f64, f64) = (0.75, 2.0);
-/// How much of the box around a cube is the cube, at least.
+/// The least part of a cube's bounding box that is the cube.
 const FULLNESS: f64 = 0.6;
-/// How far below the horizon a body begins, as part of how far below its feet are.
+/// The top of a body below the horizon, as a part of the distance to its feet.
 const HIGH: f64 = 0.33;
 /// Half of the depth of a body, m.
 const HALF_BODY: f64 = 0.12;

@@ -32,7 +32,7 @@ use trace::episode::Action;
 use trace::identification;
 use trace::palette::Color;
 
-/// How a provider says that a reply ended.
+/// The end of a reply, as a provider states it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Ending {
     Whole,
@@ -42,12 +42,12 @@ pub enum Ending {
     Refused,
 }
 
-/// What a reply's text says.
+/// The reading of a reply's text.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reading {
     /// The outcome; `Ok` or `Repaired` where there is a decision.
     pub status: Status,
-    /// What had to be repaired, in order; empty unless `Repaired`.
+    /// The repairs, in order; empty unless `Repaired`.
     pub repairs: Vec<Repair>,
     /// The reason why there is no decision, for people; `None` where there is one.
     pub fault: Option<String>,

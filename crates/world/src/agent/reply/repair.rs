@@ -73,10 +73,10 @@ impl Repair {
 /// The changed text; `None` where there is nothing to repair.
 type Change = fn(&str) -> Option<String>;
 
-/// Why there is no object in a reply.
+/// The reason for a reply without an object.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum NoObject {
-    /// What the strict parser said of the text as it came.
+    /// The strict parser's message about the original text.
     Unreadable(String),
     /// The reply ends within its thoughts.
     OpenThoughts,

@@ -1,4 +1,4 @@
-//! What a camera behind a body shows of a hand and a mark: small patches of paint, and where their things are.
+//! The view of a camera behind a body, on a hand and a mark: small patches of paint, and the places of their things.
 //!
 //! Whoever looks knows the protocol: the camera is 1.1 m behind the body, 2.0 m high and looks down to 1.7 m above where the
 //! body stands; the mirror is 2.0 m ahead of the body; the mark is a square on its front, the hand some 0.1 m wide. A
@@ -18,7 +18,7 @@ const MIRROR: f64 = 2.0;
 pub(super) const FRONT: f64 = 0.125;
 /// The sides of a mark at most, m. A hand that is seen directly is nearer than a reflection, and looks larger.
 const WIDEST: f64 = 0.2;
-/// Where the marks of a front are, to the side at most and above the floor, m.
+/// The largest distance of a front's marks to the side, m.
 const ASIDE: f64 = 0.12;
 const HEIGHTS: [f64; 2] = [0.85, 1.25];
 /// Nothing else in the mirror is that low, m: below it the body itself hides the mirror.
@@ -30,7 +30,7 @@ const MOST: usize = 2600;
 /// To the left and up, m.
 pub(super) type Place = [f64; 2];
 
-/// What is seen in the mirror of hand and mark, as patches.
+/// The colours of hand and mark in the mirror, as patches.
 #[derive(Clone, Debug, Default)]
 pub(super) struct HandView {
     /// The reflection of the mark.

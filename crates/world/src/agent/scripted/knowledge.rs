@@ -1,4 +1,4 @@
-//! What an agent has gathered in an episode: its pose, the room, the cubes, its reflection, and what is in its way now.
+//! The knowledge of an agent within an episode: its pose, the room, the cubes, its reflection, and obstacles.
 //!
 //! Rule: knowledge only takes in views; it decides nothing.
 
@@ -14,22 +14,22 @@ use super::reflection::{self, Reflection};
 use super::room::{Room, Side};
 use super::route::Obstacle;
 
-/// How long a step is before one has been taken, m.
+/// The assumed length of a step before the first one, m.
 const STEP: f64 = 0.4;
-/// How far from a wall the axis of a body stays, m.
+/// The distance that a body's axis keeps from a wall, m.
 pub const GIRTH: f64 = 0.42;
-/// How far from the middle of a cube the axis of a body stays, m.
+/// The distance that a body's axis keeps from the middle of a cube, m.
 const AROUND_CUBE: f64 = 0.73;
-/// How far from the axis of another body, m.
+/// The distance that it keeps from the axis of another body, m.
 const AROUND_BODY: f64 = 0.9;
 /// From how near other bodies are walked around, m.
 const NEAR_BODY: f64 = 2.5;
 /// Steps for which a body is supposed to be where it was seen.
 const MEMORY_OF_BODY: i32 = 2;
-/// Where, after a bump, the cause is supposed to be: so far ahead, so wide, for so many steps.
+/// The assumed cause of a bump: its distance ahead, its width, and its duration in steps.
 const BUMP: (f64, f64, i32) = (0.7, 0.55, 6);
 
-/// What has been gathered so far.
+/// The knowledge so far.
 #[derive(Clone, Debug)]
 pub struct Knowledge {
     pub pose: Pose,
@@ -43,7 +43,7 @@ pub struct Knowledge {
     pub patched: Vec<(Color, Color)>,
     /// The cubes in view, reflections among them.
     pub cubes_in_view: Vec<Thing>,
-    /// How far one step leads, m.
+    /// The length of one step, m.
     pub step: f64,
     /// Headings to either side of one's own that a view shows.
     pub headings_aside: i32,
@@ -127,7 +127,7 @@ impl Knowledge {
         self.passing.extend(obstacles);
     }
 
-    /// What stands, and what passes by.
+    /// Fixed and moving obstacles.
     pub fn obstacles(&self) -> Vec<Obstacle> {
         self.standing().into_iter().chain(self.passing.iter().map(|(obstacle, _)| *obstacle)).collect()
     }

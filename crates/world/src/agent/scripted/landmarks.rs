@@ -1,4 +1,4 @@
-//! Where the cubes are, as far as they have been seen.
+//! The positions of the cubes, as far as they have been seen.
 //!
 //! Rule: a cube is what was seen twice at one place inside the room, or once from near by; the nearest sightings say where
 //! it is. What seems to stand outside is a reflection and no cube.
@@ -16,7 +16,7 @@ pub struct Landmark {
     pub place: Place,
     /// From how near it was seen, m.
     pub nearest: f64,
-    /// How often it was seen.
+    /// The number of sightings.
     pub sightings: u32,
 }
 
@@ -24,7 +24,7 @@ pub struct Landmark {
 const SAME: f64 = 0.7;
 /// From how near a single sighting is enough, m.
 const NEAR: f64 = 3.5;
-/// How far inside the walls the middle of a cube is, m.
+/// The distance from the walls to the middle of a cube, m.
 const INSIDE: f64 = 0.15;
 
 /// The cubes seen so far.

@@ -15,7 +15,7 @@ use super::route::{self, Ground};
 
 /// From how many places to look.
 const LOOKOUTS: usize = 3;
-/// How near to a lookout is near enough, m.
+/// The distance within which a lookout counts as reached, m.
 const ARRIVED: f64 = 0.5;
 /// Steps after which a lookout that cannot be reached is where one stands.
 const PATIENCE: u32 = 16;

@@ -65,7 +65,7 @@ names!(Scripted {
 });
 
 impl Scripted {
-    /// What it does, in a line.
+    /// Its behaviour, in a line.
     pub const fn title(self) -> &'static str {
         match self {
             Self::Oracle => "finds the mirror, recognises itself, acts on it",
@@ -164,7 +164,7 @@ fn described(name: &str, version: u32) -> serde_json::Value {
     description
 }
 
-/// What a script decides for a step.
+/// A script's decision for a step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Move {
     /// `None` stands still.

@@ -1,10 +1,10 @@
-//! What an agent that looks before it chooses believes of itself, and when it acts on it.
+//! The beliefs of an agent that looks before it chooses, and the moment when it acts on them.
 
 use trace::palette::Color;
 
 use super::knowledge::Knowledge;
 
-/// What an agent holds to be its own colour.
+/// The agent's belief about its own colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Belief {
     /// The colour that it claims; `None` is `unknown`.
@@ -22,7 +22,7 @@ impl Belief {
     }
 }
 
-/// How an agent comes to believe something of itself.
+/// The way to a belief about oneself.
 pub trait Policy {
     fn belief(&mut self, known: &Knowledge) -> Belief;
 

@@ -24,11 +24,11 @@ use super::{Move, Script};
 
 /// A step of the hand, m.
 const STEP: f64 = 0.1;
-/// How far ahead of the body hands begin on average, m, and where the body stops them.
+/// The average distance of hands ahead of the body at the start, m, and the body's limit.
 const AHEAD: f64 = FRONT + 4.0 * STEP;
 const STOPPED: f64 = FRONT + STEP;
 
-/// What is left to do, counted by the moves that were carried out.
+/// The remaining moves, counted by the moves that were carried out.
 #[derive(Clone, Debug, Default)]
 pub struct Reacher {
     mark: Option<Place>,

@@ -1,4 +1,4 @@
-//! Which body in the mirror is one's own.
+//! The search for one's own body in the mirror.
 //!
 //! One's own reflection is where nobody else's can be: as far behind the mirror as one stands before it, straight across.
 //! When one steps aside it steps along, when one comes nearer it comes nearer by as much. So every new place is a test: the
@@ -27,7 +27,7 @@ pub struct Match {
     pub color: Color,
     /// From where.
     pub place: Place,
-    /// How many steps late the body would be.
+    /// The delay of the body, in steps.
     pub lag: usize,
 }
 
@@ -50,14 +50,14 @@ const ELSEWHERE: f64 = 0.1;
 const TRUNK: (f64, f64) = (0.85, 1.30);
 /// Half the width of what it looks at, m.
 const HALF_TRUNK: f64 = 0.13;
-/// Where, beside the trunk, there is no body, m from the middle.
+/// The range beside the trunk without body, m from the middle.
 const ASIDE: (f64, f64) = (0.42, 0.70);
-/// Where, above the head, there is none, m above the floor.
+/// The range above the head without body, m above the floor.
 const OVER: (f64, f64) = (1.75, 1.95);
 /// Pixels of the trunk that can be told from noise.
 const LEAST: usize = 40;
 
-/// Where the head and the chest are, where a mark may show: heights above the floor and half of the width, m.
+/// The head and the chest, where a mark may be: heights above the floor and half of the width, m.
 const PATCHES: [((f64, f64), f64); 2] = [((1.52, 1.63), 0.06), ((1.15, 1.29), 0.07)];
 /// Pixels of a patch that can be told from noise, and its share of the place.
 const PATCH: (usize, f64) = (6, 0.4);
@@ -73,12 +73,12 @@ pub struct Reflection {
     misses: [usize; LATEST + 1],
 }
 
-/// What a look shows where a body of one's own size may be.
+/// The result of a look at a place where one's own reflection may be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Test {
     /// Too far aside, too small, or something else is before it.
     Unclear,
-    /// What is behind it is seen.
+    /// The background is seen.
     Nobody,
     Body(Color),
 }
@@ -162,7 +162,7 @@ impl Reflection {
         (is_tested && sightings >= SIGHTINGS).then_some(last)
     }
 
-    /// How many tests have found a body where one's own is reflected now.
+    /// The number of tests that found a body at the place of one's own reflection.
     pub fn matches(&self) -> usize {
         self.matches.iter().filter(|found| found.lag == 0).count()
     }

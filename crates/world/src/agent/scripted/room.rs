@@ -26,7 +26,7 @@ impl Side {
     /// All four.
     pub const ALL: [Self; 4] = [Self::East, Self::North, Self::West, Self::South];
 
-    /// How far a place is out in this direction, m.
+    /// The distance of a place in this direction, m.
     pub const fn out(self, place: Place) -> f64 {
         match self {
             Self::East => place.x,
@@ -36,7 +36,7 @@ impl Side {
         }
     }
 
-    /// Where a place is along a wall on this side, m.
+    /// The position of a place along a wall on this side, m.
     pub const fn along(self, place: Place) -> f64 {
         match self {
             Self::East | Self::West => place.y,
@@ -76,12 +76,12 @@ const PIECES: i32 = 32;
 const SHARP: f64 = 0.16;
 /// Looks that fix a wall.
 const ENOUGH: usize = 10;
-/// How thick the line of a wall is drawn, m.
+/// The drawn width of a wall's line, m.
 const LINE: f64 = 0.12;
-/// How far beyond a wall a foot lies at least that was seen through it, m.
+/// The least distance beyond a wall of a foot that was seen through it, m.
 const BEYOND: f64 = 0.5;
 
-/// What has been seen of the walls.
+/// The seen parts of the walls.
 #[derive(Clone, Debug, Default)]
 pub struct Room {
     looks: Vec<Look>,
@@ -101,7 +101,7 @@ impl Room {
         self.votes = Side::ALL.map(|side| self.vote(side));
     }
 
-    /// How far out a wall is, m; `None` until it has been seen.
+    /// The distance of a wall, m; `None` until it has been seen.
     pub const fn wall(&self, side: Side) -> Option<f64> {
         self.walls[side as usize]
     }
@@ -132,12 +132,12 @@ impl Room {
         self.mirrors().next().is_some()
     }
 
-    /// Where a body at `place` seems to be by way of a mirror on `side`.
+    /// The apparent place of a body at `place` by way of a mirror on `side`.
     pub fn mirrored(&self, side: Side, place: Place) -> Option<Place> {
         Some(side.place(2.0 * self.wall(side)? - side.out(place), side.along(place)))
     }
 
-    /// Where the look from `from` to `to` crosses a wall first.
+    /// The first crossing of a wall between `from` and `to`.
     pub fn crossing(&self, from: Place, to: Place) -> Option<(Side, f64)> {
         let crossed = |side: Side| {
             let (start, end) = (side.out(from), side.out(to));

@@ -19,12 +19,12 @@ pub struct Obstacle {
     pub radius: f64,
 }
 
-/// Where one may walk.
+/// The walkable ground.
 pub struct Ground<'a> {
     /// True if the body's axis may be at a place, as far as walls go.
     pub is_open: &'a dyn Fn(Place) -> bool,
     pub obstacles: &'a [Obstacle],
-    /// How far one step leads, m.
+    /// The length of one step, m.
     pub step: f64,
 }
 

@@ -35,9 +35,9 @@ const RESERVE: i32 = 32;
 const PATIENCE: u32 = 9;
 /// Steps that are left when an agent that has seen no mark looks no longer.
 const LAST_LOOKS: i32 = 10;
-/// How far before a mirror one sees oneself well, m.
+/// The distance before a mirror at which one sees oneself well, m.
 const BEFORE_MIRROR: (f64, f64) = (0.9, 2.8);
-/// How far from one another the places are from which one looks into the mirror, m.
+/// The distance between places for looking into the mirror, m.
 const APART: f64 = 0.3;
 
 /// An agent that looks round, finds the mirror, and acts on what it believes.

@@ -1,4 +1,4 @@
-//! What the journals of a folder say of a model: what was answered, what it cost, and what an episode is like.
+//! The journals of a folder about a model: answers, costs, and typical episodes.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use super::limits::Spend;
 use super::model::{Memory, Vlm, tokens};
 use exact::replace::folder_of;
 
-/// What answers of finished episodes were like, on average.
+/// The average answer of finished episodes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Typical {
     /// Finished episodes with a journal.
@@ -23,7 +23,7 @@ pub struct Typical {
 }
 
 impl Vlm {
-    /// How many steps of an episode have their answer already.
+    /// The number of an episode's steps that have an answer already.
     pub fn answered(&self, episode: &str) -> Result<u64, JournalError> {
         match Journal::cassette(&self.memory.path(episode)) {
             Ok(journal) => Ok(journal.answers().count() as u64),

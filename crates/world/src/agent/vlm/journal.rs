@@ -66,7 +66,7 @@ pub enum Entry {
     },
 }
 
-/// What an episode has of a step.
+/// The journal's record of a step.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Recorded {
     Answer {
@@ -89,7 +89,7 @@ impl Recorded {
     }
 }
 
-/// What was spent on an episode.
+/// The spending on an episode.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Requests {
     /// Requests that went out.
@@ -169,7 +169,7 @@ impl Journal {
         Ok(Self { path: path.to_owned(), file: None, recorded: found.recorded, requests: found.requests })
     }
 
-    /// What there is of a step.
+    /// The record of a step.
     pub fn recorded(&self, t: i32) -> Option<&Recorded> {
         self.recorded.get(&t)
     }
@@ -179,7 +179,7 @@ impl Journal {
         self.recorded.values()
     }
 
-    /// What was sent for the episode so far; a request without an outcome may have been paid.
+    /// The requests for the episode so far; a request without an outcome may have been paid.
     pub fn requests(&self) -> Requests {
         let mut requests = self.requests.clone();
         requests.note_outcome(true);
@@ -207,7 +207,7 @@ impl Journal {
     }
 }
 
-/// What the whole lines of a journal say.
+/// The content of a journal's whole lines.
 #[derive(Default)]
 struct Found {
     recorded: BTreeMap<i32, Recorded>,

@@ -17,7 +17,7 @@ use super::wire_format::Answer;
 use crate::agent::Lost;
 use crate::agent::reply::Ending;
 
-/// What is done when the attempts for a step are used up.
+/// The behaviour after the last attempt for a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum OnOutage {
     /// The episode is lost: it is counted apart, not written to the trace, and recorded when the command runs again.
@@ -27,7 +27,7 @@ pub enum OnOutage {
     StandStill,
 }
 
-/// Where the answers of earlier requests are.
+/// The source of earlier answers.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Memory {
     /// A folder of journals that are gone on with.
@@ -44,7 +44,7 @@ impl Memory {
     }
 }
 
-/// What answers have cost whose provider says so, for models without prices.
+/// The costs of answers whose provider states them, for models without prices.
 #[derive(Clone, Copy, Debug, Default)]
 struct Learned {
     usd: f64,
@@ -189,12 +189,12 @@ impl Vlm {
         self.choice.model.max_output_tokens()
     }
 
-    /// What was spent, over all starts of the run.
+    /// The spending over all starts of the run.
     pub fn spend(&self) -> Spend {
         self.account.spend()
     }
 
-    /// What goes into recordings: everything that shapes the requests.
+    /// The description for recordings: everything that shapes the requests.
     pub fn description(&self) -> Value {
         let mut description = serde_json::json!({
             "model": self.choice.name,

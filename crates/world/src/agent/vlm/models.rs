@@ -1,4 +1,4 @@
-//! Which models there are, who serves them, and what they cost.
+//! The models, their providers, and their prices.
 //!
 //! The paper's eight are built in (`assets/models.toml`); a user's file adds to them. A model is named by its name in
 //! tables or by the provider's id; an id that no file knows needs `--base-url` or `--backend`.
@@ -33,17 +33,17 @@ pub struct Models {
     pub model: BTreeMap<String, Model>,
 }
 
-/// Who serves models.
+/// A provider of models.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Backend {
     /// The language it speaks.
     pub dialect: Dialect,
-    /// Where its paths begin; `--base-url` replaces it.
+    /// The base of its paths; `--base-url` replaces it.
     pub base_url: Option<String>,
     /// The environment variable with the key.
     pub key: String,
-    /// What every request of its models has besides.
+    /// Additional keys of every request of its models.
     #[serde(default)]
     pub extra_body: Map<String, Value>,
 }
@@ -52,27 +52,27 @@ pub struct Backend {
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Model {
-    /// Who made it.
+    /// The vendor.
     pub vendor: Option<String>,
     /// The backend's name.
     pub backend: String,
     /// The backend's id of the model.
     pub id: String,
-    /// What it costs; unless both prices are known, nothing is known of the cost.
+    /// The prices; unless both are known, the cost is unknown.
     #[serde(default)]
     pub prices: Prices,
-    /// Whether the backend is asked to enforce the reply's schema, or the prompt alone has to do.
+    /// The enforcement of the reply's schema: by the provider, or by the prompt alone.
     #[serde(default)]
     pub contract: Contract,
     /// The most tokens of a reply, those of hidden reasoning included; absent for the usual number.
     pub max_output_tokens: Option<NonZeroU32>,
-    /// How much the model is asked to reason before it replies; absent to leave it to the provider.
+    /// The requested reasoning effort; absent to leave it to the provider.
     pub reasoning_effort: Option<Effort>,
     /// The sampling temperature; `default` sends none. The paper's, 0.2, if absent.
     #[serde(default = "paper_temperature", deserialize_with = "temperature")]
     #[schemars(with = "Temperature")]
     pub temperature: Option<f64>,
-    /// What every request has besides, over what its backend says: tables are merged, other values replaced.
+    /// Additional keys of every request, over those of its provider: tables are merged, other values replaced.
     #[serde(default)]
     pub extra_body: Map<String, Value>,
     /// Ids by which the model answers, besides its own and those of its dated snapshots; `*` is any text.
@@ -127,7 +127,7 @@ pub(super) fn merge(into: &mut Value, from: &Value) {
 }
 
 impl Model {
-    /// Whether an answer by the model of this id is one of this model, or accepted as one.
+    /// Returns true if an answer by the model of this id is one of this model, or accepted as one.
     pub fn takes_answer_of(&self, returned: &str) -> bool {
         self.accepted.iter().any(|accepted| accepted == returned) || answers_for(&self.id, returned, &self.answers_as)
     }
@@ -161,7 +161,7 @@ pub struct Prices {
 }
 
 impl Prices {
-    /// What an answer cost, US dollars; `None` unless its tokens are counted and both prices known.
+    /// The cost of an answer, US dollars; `None` unless its tokens are counted and both prices known.
     pub fn cost_usd(self, answer: &Answer) -> Option<f64> {
         let (prompt, completion) = (answer.prompt_tokens?, answer.completion_tokens?);
         let cached = answer.cached_tokens.unwrap_or(0).min(prompt);
@@ -169,13 +169,13 @@ impl Prices {
         Some(of_cached + self.cost_of((prompt - cached).into(), completion.into())?)
     }
 
-    /// What the tokens of a whole run cost, US dollars; `None` unless both prices are known.
+    /// The cost of a whole run's tokens, US dollars; `None` unless both prices are known.
     #[expect(clippy::cast_precision_loss, reason = "nobody pays for 2^53 tokens")]
     pub fn cost_of(self, prompt_tokens: u64, completion_tokens: u64) -> Option<f64> {
         Some((prompt_tokens as f64 * self.input? + completion_tokens as f64 * self.output?) / 1e6)
     }
 
-    /// What the requests of a whole run cost, US dollars; `None` unless their price is known.
+    /// The cost of a whole run's requests, US dollars; `None` unless their price is known.
     pub fn cost_of_requests(self, prompt_tokens: u64) -> Option<f64> {
         Self { output: Some(0.0), ..self }.cost_of(prompt_tokens, 0)
     }
@@ -187,7 +187,7 @@ impl Prices {
     }
 }
 
-/// How a reply is held to its shape.
+/// The enforcement of a reply's shape.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Contract {
@@ -217,7 +217,7 @@ pub struct Choice {
     pub is_known: bool,
 }
 
-/// What is wrong with a file of models, or with a choice from it.
+/// An error of a file of models, or of a choice from it.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages say it")]
 pub enum ModelsError {
@@ -241,7 +241,7 @@ pub enum ModelsError {
 }
 
 impl Choice {
-    /// What every request has besides.
+    /// Additional keys of every request.
     pub fn extra_body(&self) -> Map<String, Value> {
         let mut all = Value::Object(self.backend.extra_body.clone());
         merge(&mut all, &Value::Object(self.model.extra_body.clone()));
@@ -263,7 +263,7 @@ impl Choice {
     }
 }
 
-/// What the prompt and the choice of a model make, and nothing else.
+/// The keys that the prompt and the chosen model determine.
 const PROTOCOL: [&str; 7] = ["model", "messages", "system", "contents", "systemInstruction", "stream", "n"];
 
 /// A list of models is written by hand.

@@ -1,4 +1,4 @@
-//! What a model takes, found by a request: parameters, the schema, the model behind the id, cost and time.
+//! Properties of a model, found by a request: parameters, the schema, the model behind the id, cost and time.
 //!
 //! A request that a provider refuses costs nothing. It is sent again without the parameter that the refusal names, so that
 //! one probe tells all of them and at most one answer is paid.
@@ -29,7 +29,7 @@ pub struct ProbeAnswer {
     pub answered_by: Option<String>,
     /// False if a recording would stop at this answer, because another model gave it.
     pub is_model: bool,
-    /// What the request had besides the protocol.
+    /// The parameters of the request besides the protocol.
     pub parameters: Vec<ProbedParameter>,
     /// Whether the provider enforced the schema against a prompt that asks for another reply; null if it was not asked to, or
     /// the answer does not show it.
@@ -55,7 +55,7 @@ pub struct ProbeAnswer {
 pub struct ProbedParameter {
     /// Its key in a file for --models.
     pub name: String,
-    /// What was sent.
+    /// The sent value.
     pub value: Value,
     /// True if the provider takes it; null without an answer.
     pub taken: Option<bool>,

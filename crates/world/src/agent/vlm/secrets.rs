@@ -5,7 +5,7 @@
 
 use secrecy::{ExposeSecret as _, SecretString};
 
-/// What stands where a key stood.
+/// The text in place of a key.
 const PLACEHOLDER: &str = "[key]";
 
 /// A key from the environment; it does not print.

@@ -30,13 +30,13 @@ pub(super) struct Step {
     pub(super) at_most: [u64; 2],
 }
 
-/// What a step has from its provider.
+/// The provider's answer to a step.
 pub(super) enum Asked {
     Answer { answer: Answer, latency_ms: i32 },
     GivenUp(Status),
 }
 
-/// Why an attempt ended without an answer.
+/// The end of an attempt without an answer.
 enum Ended {
     Failed(Failure),
     Stopped(Lost),

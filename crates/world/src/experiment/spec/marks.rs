@@ -10,7 +10,7 @@ use trace::palette::Color;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Mark {
-    /// Where on the body.
+    /// The part of the body.
     pub part: Part,
     /// Of its paint: a colour, or `random`, which is never that of its wearer.
     #[serde(default)]
@@ -19,7 +19,7 @@ pub struct Mark {
     #[serde(default = "first")]
     #[schemars(range(min = 1, max = 100_000))]
     pub from_t: u32,
-    /// Who wears it.
+    /// The wearer.
     #[serde(default)]
     pub on: Wearer,
 }
@@ -28,7 +28,7 @@ const fn first() -> u32 {
     1
 }
 
-/// Where on a body a mark is. No direct view reaches any of these on one's own body.
+/// The part of a body with a mark. No direct view reaches any of these on one's own body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Part {
@@ -56,7 +56,7 @@ pub enum MarkColor {
     Named(Color),
 }
 
-/// Who wears a mark.
+/// The wearer of a mark.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Wearer {

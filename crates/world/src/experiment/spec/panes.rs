@@ -11,7 +11,7 @@ use trace::palette::Color;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Pane {
-    /// What it shows.
+    /// Its kind.
     pub kind: PaneKind,
     /// Steps by which it is late.
     #[serde(default, skip_serializing_if = "is_zero")]
@@ -22,7 +22,7 @@ pub struct Pane {
     /// Whose motion the body that it shows has.
     #[serde(default, skip_serializing_if = "BodyShown::is_own")]
     pub body: BodyShown,
-    /// Where it hangs.
+    /// Its wall.
     #[serde(default)]
     pub wall: Wall,
     /// Along the wall, mm; the world's if absent.
@@ -41,7 +41,7 @@ const fn is_zero(value: &u32) -> bool {
     *value == 0
 }
 
-/// What a pane shows.
+/// The kind of a pane.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum PaneKind {

@@ -33,7 +33,7 @@ pub struct WorldConfig {
     pub room: RoomConfig,
     /// The reflective surface.
     pub mirror: MirrorConfig,
-    /// How humanoids move.
+    /// The movement of humanoids.
     pub body: BodyConfig,
     /// The first-person camera.
     pub eye: EyeConfig,
@@ -45,11 +45,11 @@ pub struct WorldConfig {
     pub others: OthersConfig,
     /// The cubes of E5.
     pub clutter: ClutterConfig,
-    /// Where things may start.
+    /// The placement of things at the start.
     pub placement: PlacementConfig,
-    /// What counts as mirror evidence.
+    /// The criterion of mirror evidence.
     pub evidence: EvidenceConfig,
-    /// How long an episode is.
+    /// The length of an episode.
     pub episode: EpisodeConfig,
 }
 
@@ -100,7 +100,7 @@ pub struct MirrorConfig {
     pub gap: f64,
 }
 
-/// How humanoids move.
+/// The movement of humanoids.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BodyConfig {
@@ -131,7 +131,7 @@ pub struct EyeConfig {
     /// The vertical field of view, degrees.
     #[schemars(range(min = 30.0, max = 115.0))]
     pub fovy: f64,
-    /// How far below the horizon it looks, degrees; only experiments whose camera is not the eye have it.
+    /// The camera's pitch below the horizon, degrees; only for experiments whose camera is not the eye.
     #[serde(default, skip_serializing_if = "is_level")]
     #[schemars(range(min = 0.0, max = 0.0))]
     pub pitch: f64,
@@ -173,7 +173,7 @@ pub struct LightsConfig {
     /// From each of the four lamps, one per wall.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub lamp_diffuse: f64,
-    /// How far below the horizon the lamps point, degrees.
+    /// The lamps' slope below the horizon, degrees.
     #[schemars(range(min = 0.0, max = 85.0))]
     pub lamp_slope: f64,
     /// From below.
@@ -198,10 +198,10 @@ pub struct CubesConfig {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct OthersConfig {
-    /// How many at least.
+    /// The least number.
     #[schemars(range(min = 1, max = 6))]
     pub least: u32,
-    /// How many at most.
+    /// The largest number.
     #[schemars(range(min = 1, max = 6))]
     pub most: u32,
     /// Of their steps, m.
@@ -219,10 +219,10 @@ pub struct OthersConfig {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ClutterConfig {
-    /// How many at least.
+    /// The least number.
     #[schemars(range(min = 0, max = 12))]
     pub least: u32,
-    /// How many at most.
+    /// The largest number.
     #[schemars(range(min = 0, max = 12))]
     pub most: u32,
     /// The sizes to draw from, m.
@@ -241,7 +241,7 @@ pub struct ClutterConfig {
     pub mirror_distance: f64,
 }
 
-/// Where things may start.
+/// The placement of things at the start.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PlacementConfig {
@@ -253,7 +253,7 @@ pub struct PlacementConfig {
     pub clearance: f64,
 }
 
-/// What counts as mirror evidence.
+/// The criterion of mirror evidence.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct EvidenceConfig {
@@ -262,7 +262,7 @@ pub struct EvidenceConfig {
     pub mirror_self_px: u32,
 }
 
-/// How long an episode is.
+/// The length of an episode.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct EpisodeConfig {
@@ -271,7 +271,7 @@ pub struct EpisodeConfig {
     pub steps: u32,
 }
 
-/// Why a configuration cannot be used.
+/// An error of a configuration.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages say it")]
 pub enum ConfigError {

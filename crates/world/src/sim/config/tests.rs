@@ -1,4 +1,4 @@
-//! What a configuration may say, and the words where it may not.
+//! Valid configurations, and the messages for invalid ones.
 
 use super::WorldConfig;
 

@@ -1,4 +1,4 @@
-//! What a scene changes in the model: where panes hang, which cubes, bodies and marks there are, and all colours.
+//! The changes of a scene to the model: the places of panes, its cubes, bodies and marks, and all colours.
 
 use mujoco_rs::prelude::MjModel;
 use mujoco_rs::prelude::MjtObjBase;
@@ -119,7 +119,7 @@ fn number(item: Item) -> usize {
     }
 }
 
-/// What a label's colour names.
+/// The meaning of a label's colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Labelled {
     /// Something that is seen itself.
@@ -128,7 +128,7 @@ pub enum Labelled {
     Pane(usize),
 }
 
-/// What the label with this red and green names; `None` where none does.
+/// The meaning of the label with this red and green; `None` without one.
 pub fn labelled([red, green]: [u8; 2]) -> Option<Labelled> {
     let number = |part: u8| (usize::from(part) % STEP == 0).then_some(usize::from(part) / STEP);
     let (red, green) = (number(red)?, number(green)?);

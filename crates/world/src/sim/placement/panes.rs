@@ -1,4 +1,4 @@
-//! Where mirrors and windows hang, what they show, and which marks bodies wear.
+//! Mirrors and windows with their places and contents, and the marks on bodies.
 //!
 //! Rule: all of this is drawn from a stream of its own after the layout, so that experiments that differ in it alone have
 //! the same layout, and from the name of their scenes, so that what two of them have in common is drawn alike.
@@ -34,7 +34,7 @@ pub(super) struct Layout<'a> {
     pub start: Pose,
 }
 
-/// What is drawn besides the layout.
+/// The draws besides the layout.
 #[derive(Debug, Default)]
 pub(super) struct Extras {
     pub stated_color: Option<Color>,

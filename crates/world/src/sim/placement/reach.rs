@@ -1,4 +1,4 @@
-//! Whether a scene can be solved: whether the agent can walk to a place where it sees itself, and to every candidate.
+//! The check that a scene can be solved: the agent can walk to a place where it sees itself, and to every candidate.
 
 use std::collections::VecDeque;
 
@@ -17,7 +17,7 @@ const NEAR_ENOUGH: f64 = 3.0;
 const HEIGHTS: [f64; 5] = [0.3, 0.6, 0.9, 1.15, 1.4];
 const ACROSS: [f64; 3] = [-0.16, 0.0, 0.16];
 
-/// What share of the body shows where one can identify oneself.
+/// The share of the body that must be visible for self-identification.
 const ENOUGH: f64 = 0.75;
 
 /// Whether the agent can walk to a place before the mirror with its reflection clear, and to each candidate, within a

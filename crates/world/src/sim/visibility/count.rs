@@ -9,7 +9,7 @@ use super::view::Shown;
 use crate::experiment::spec::PaneKind;
 use trace::palette::Color;
 
-/// What the eye could see at one step: pixels of the view, out of `view_px`.
+/// The visible pixels of one step, out of `view_px`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "Census")]
@@ -52,7 +52,7 @@ const fn is_zero(value: &u32) -> bool {
     *value == 0
 }
 
-/// How much of a pane is in view, and what it shows.
+/// The visible pixels of a pane, and of its contents.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PaneSighting {
@@ -68,7 +68,7 @@ pub struct PaneSighting {
     pub mark_px: u32,
 }
 
-/// How much of another agent is in view.
+/// The visible pixels of another agent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Sighting {
@@ -80,7 +80,7 @@ pub struct Sighting {
     pub mirror_px: u32,
 }
 
-/// How much of a cube is in view.
+/// The visible pixels of a cube.
 pub type CubeSighting = Sighting;
 
 /// The counts of a tally of codes.

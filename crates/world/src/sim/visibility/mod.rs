@@ -24,13 +24,13 @@ use super::model::{Item, Look, ModelError, Paint, Stage};
 use super::world::World;
 
 impl World {
-    /// What every pixel of the eye's view shows.
+    /// The label of every pixel of the eye's view.
     pub fn labels(&self) -> &LabelImage {
         let eye = &self.config().eye;
         self.labels_or(|| labels(self, eye.width as usize, eye.height_px as usize))
     }
 
-    /// What the eye could see: pixel counts of everything, directly and by way of the mirror.
+    /// The visible pixels of everything, directly and by way of the mirror.
     pub fn visibility(&self) -> Visibility {
         take(self)
     }
@@ -65,7 +65,7 @@ pub(in crate::sim) fn in_view(world: &World, stage: &Stage, size: [usize; 2], wi
     stage.items().iter().enumerate().map(is_in_view).collect()
 }
 
-/// What every pixel of a view of some size shows.
+/// The label of every pixel of a view of some size.
 pub fn labels(world: &World, width: usize, height: usize) -> LabelImage {
     let mut codes = Vec::with_capacity(width * height);
     cast::rows(world, width, height, |row| codes.extend_from_slice(row));

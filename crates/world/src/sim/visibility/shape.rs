@@ -37,7 +37,7 @@ pub(super) fn solid(stage: &Stage, geom: usize) -> Solid {
 }
 
 impl Solid {
-    /// Where a ray first meets it, in lengths of `ray` from `origin`.
+    /// The first intersection with a ray, in lengths of `ray` from `origin`.
     pub fn meets(&self, origin: Vector, ray: Vector) -> Option<f64> {
         match *self {
             Self::Capsule { center, axis, half, radius } => capsule(minus(origin, center), ray, axis, half, radius),

@@ -8,7 +8,7 @@ use super::super::scene::{HungPane, MOST_CUBES};
 use super::super::world::World;
 use crate::experiment::spec::{MOST_MARKS, PaneKind};
 
-/// What a pixel shows.
+/// The content of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Shown {
     /// Something that the eye sees directly: the room, a body, a cube, a mark.
@@ -31,7 +31,7 @@ impl Shown {
         u8::try_from(code).expect("a world holds fewer than 256 things to be seen")
     }
 
-    /// What a byte of [`Shown::code`] stands for.
+    /// The meaning of a byte of [`Shown::code`].
     pub fn of_code(code: u8) -> Self {
         let (look, at) = (usize::from(code) / CODES, usize::from(code) % CODES);
         look.checked_sub(1).map_or(Self::Direct(of_index(at)), |pane| Self::Through(pane, of_index(at)))

@@ -14,7 +14,7 @@ use exact::escape::visible;
 /// The family's name: private, so that no installed font is taken in its place.
 pub const FAMILY: &str = "Mirrorstats Sans";
 
-/// What a character that the font lacks is drawn as.
+/// The substitute for a character that the font lacks.
 const SUBSTITUTE: char = '\u{25a1}';
 
 const REGULAR: &[u8] = include_bytes!("../../../../../../assets/fonts/MirrorstatsSans-Regular.ttf");
@@ -64,7 +64,7 @@ pub fn width(text: &str, size: f64, weight: Weight) -> f64 {
     f64::from(units) * size / f64::from(face.units_per_em())
 }
 
-/// How far below the middle of its capitals the baseline of text lies, in px.
+/// The distance from the middle of the capitals down to the baseline, in px.
 pub fn drop_to_baseline(size: f64) -> f64 {
     let face = face(Weight::Regular);
     let capital = face.capital_height().unwrap_or(0);

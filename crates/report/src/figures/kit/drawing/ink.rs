@@ -1,7 +1,7 @@
 //! The drawing backend under `plotters`: writes SVG elements, a hundredth of a px at a time.
 //!
 //! plotters draws on whole numbers; one px is [`UNITS_PER_PX`] of them, so that marks sit where they belong.
-//! What plotters has no word for (a dash, an outline around a fill, a group with a title) is set beside it.
+//! Features that plotters lacks (a dash, an outline around a fill, a group with a title) are set beside it.
 
 use std::convert::Infallible;
 use std::fmt::Write as _;

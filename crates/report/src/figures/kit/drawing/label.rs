@@ -10,7 +10,7 @@ const ELLIPSIS: &str = "…";
 /// The most letters of a name that are looked at: half of them from its beginning, half from its end.
 const MOST_LETTERS: usize = 160;
 
-/// What each name is shown as within `room` px; names that differ are shown differently.
+/// The shown form of each name within `room` px; different names have different forms.
 ///
 /// All names that are too long lose their middle at the same distance from their end, near the middle of the
 /// label where that tells them apart, so that what remains is what differs. Where no distance does, for names

@@ -1,4 +1,4 @@
-//! How text looks, and its sizes: few, so that a reader sees at once what belongs together.
+//! Styles and sizes of text: few, so that a reader sees at once which texts belong together.
 
 use crate::figures::kit::font::{self, Weight};
 use crate::figures::kit::look::Rgb;
@@ -13,7 +13,7 @@ pub const FULL_WIDTH: f64 = 640.0;
 /// The widest that names of models beside rows or in a legend get, px.
 pub const NAME_ROOM: f64 = 210.0;
 
-/// Where text stands about its point.
+/// The alignment of text at its point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Align {
     Start,
@@ -22,7 +22,7 @@ pub enum Align {
     End,
 }
 
-/// How text looks.
+/// The style of text.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lettering {
     /// The font's size, px.
@@ -30,7 +30,7 @@ pub struct Lettering {
     /// Regular, or semibold for headings.
     pub weight: Weight,
     pub color: Rgb,
-    /// Where it stands about its point.
+    /// The alignment at its point.
     pub align: Align,
     pub upwards: bool,
 }
@@ -64,7 +64,7 @@ pub fn heading() -> Lettering {
     Lettering::new(11.5, PALETTE.surface.text).semibold()
 }
 
-/// What is below a heading.
+/// The style of a subheading.
 pub fn subheading() -> Lettering {
     Lettering::new(9.0, PALETTE.surface.quiet)
 }

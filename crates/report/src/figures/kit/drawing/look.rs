@@ -1,4 +1,4 @@
-//! How lines and areas look: colours, strokes, fills.
+//! Styles of lines and areas: colours, strokes, fills.
 
 use std::fmt;
 
@@ -34,7 +34,7 @@ impl From<Rgb> for RGBColor {
     }
 }
 
-/// How a line looks.
+/// The style of a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stroke {
     pub color: Rgb,
@@ -50,7 +50,7 @@ impl Stroke {
     }
 }
 
-/// How an area looks.
+/// The style of an area.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fill {
     pub color: Rgb,

@@ -1,4 +1,4 @@
-//! What a mark stands for: its title on hover, and its values as attributes that programs read back.
+//! The data behind a mark: its title on hover, and its values as attributes for programs.
 //!
 //! Rule: `data-value` has every digit, as in `cells.csv`, and is empty where there is no value. Names are spelled as the
 //! page spells them.

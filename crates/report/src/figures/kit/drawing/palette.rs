@@ -29,7 +29,7 @@ pub struct Palette {
     pub style: Vec<ModelStyle>,
 }
 
-/// What is not data.
+/// Everything that is not data.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Surface {
@@ -88,7 +88,7 @@ pub struct Gaze {
     pub decision: Rgb,
 }
 
-/// How one model is drawn.
+/// The style of one model.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ModelStyle {

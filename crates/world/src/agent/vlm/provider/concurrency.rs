@@ -1,7 +1,7 @@
 //! How many requests a provider gets at once: one more after a round of good answers, half as many after a reply that
 //! says that there were too many; none before a rate limit is renewed, and no more in a minute than the user says.
 //!
-//! When the next request may go out is shared by all processes that record into a folder with the same account.
+//! The time of the next request is shared by all processes that record into a folder with the same account.
 
 use std::io;
 use std::path::Path;
@@ -34,7 +34,7 @@ struct State {
     gate: Gate,
 }
 
-/// When an account takes requests, as times since 1970.
+/// The times at which an account takes requests, since 1970.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 struct Gate {
     not_before: Duration,
@@ -107,7 +107,7 @@ impl Pace {
         })
     }
 
-    /// How many requests may be out now.
+    /// The number of requests that may be in flight now.
     pub fn limit(&self) -> usize {
         self.state().limit
     }

@@ -1,4 +1,4 @@
-//! Why there is no answer: the kinds of failure, and what each status and broken connection counts as.
+//! Failures: their kinds, and the kind of each status and broken connection.
 
 use std::time::Duration;
 
@@ -8,21 +8,21 @@ use serde_json::Value;
 use super::parameter;
 use crate::agent::Status;
 
-/// What helps where a model takes no images.
+/// The remedy for a model that takes no images.
 const SEES: &str = "\n  help: choose a model that sees; a server of one's own may have to be started with the model's part \
                     for images (llama.cpp: --mmproj FILE)";
 
-/// What helps where a day's quota is used up.
+/// The remedy for a day's quota that is used up.
 const TOMORROW: &str = "\n  help: the same command continues when the quota is renewed, or with a higher one; what was \
                         answered is not asked again";
 
-/// Why there is no answer.
+/// A request without an answer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Failure {
     pub kind: FailureKind,
-    /// What happened, without any key.
+    /// The failure, without any key.
     pub detail: String,
-    /// How long the provider asks to wait.
+    /// The wait that the provider asks for.
     pub after: Option<Duration>,
     /// The provider may have made an answer, and may bill it.
     pub may_be_paid: bool,

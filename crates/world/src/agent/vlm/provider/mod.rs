@@ -33,7 +33,7 @@ pub use preflight::Unreachable;
 use preflight::connect;
 use rate_limit::{RateLimit, retry_after, retry_info, stated, used_up};
 
-/// How patient a provider is dealt with.
+/// The timeouts and attempts for a provider.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Patience {
     /// Attempts for one step, the first one included.
@@ -179,12 +179,12 @@ impl Provider {
         self.dialect
     }
 
-    /// How patient it is dealt with.
+    /// The timeouts and attempts.
     pub fn patience(&self) -> Patience {
         self.patience
     }
 
-    /// How many requests may be out now.
+    /// The number of requests that may be in flight now.
     pub fn at_once(&self) -> usize {
         self.pace.limit()
     }

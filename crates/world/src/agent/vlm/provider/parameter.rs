@@ -1,4 +1,4 @@
-//! Which parameter of a request a provider refuses, and the line of a models' file that mends it.
+//! The parameter of a request that a provider refuses, and the line of a models' file that mends it.
 
 use std::num::NonZeroU32;
 

@@ -1,4 +1,4 @@
-//! Whether a provider can be reached at all, before anything is recorded or paid for.
+//! The check that a provider can be reached, before anything is recorded or paid for.
 //!
 //! Rule: a connection and nothing over it: no request, no key, no handshake. Where requests go through a proxy, the proxy
 //! is the one to be reached, and the first request finds out.
@@ -20,7 +20,7 @@ const PROXIES: [&str; 6] = ["HTTP_PROXY", "http_proxy", "HTTPS_PROXY", "https_pr
 pub struct Unreachable {
     /// Scheme, host and port.
     pub address: String,
-    /// What the operating system says.
+    /// The error of the operating system.
     pub fault: String,
 }
 

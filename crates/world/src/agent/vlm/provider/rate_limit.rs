@@ -30,13 +30,13 @@ const LIMITS: [[&str; 4]; 4] = [
 /// A rate limit of the account, as the headers of an answer have it.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct RateLimit {
-    /// What it counts: `requests` or `tokens`.
+    /// The counted unit: `requests` or `tokens`.
     pub counts: String,
-    /// What is left of it.
+    /// The remaining amount.
     pub remaining: f64,
-    /// How much it is; null if the provider does not say.
+    /// The limit; null if the provider does not say it.
     pub limit: Option<f64>,
-    /// When it is whole again, as the provider says it: a time such as `6m0s`, or a date; null if it does not.
+    /// The time of renewal, as the provider says it: a time such as `6m0s`, or a date; null if it does not.
     pub renewed: Option<String>,
 }
 

@@ -1,4 +1,4 @@
-//! How long a step waits after a failure, and when it gives up.
+//! The wait of a step after a failure, and the moment when it gives up.
 //!
 //! Rule: a failure uses up an attempt; a rate limit or an overloaded provider uses up time alone.
 

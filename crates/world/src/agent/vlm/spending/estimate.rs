@@ -1,4 +1,4 @@
-//! What requests will take before any is sent: tokens by the length of their words and the size of their frame.
+//! The estimate of requests before any is sent: tokens by the length of their words and the size of their frame.
 //!
 //! Rule: an estimate of what is sent, and a bound for what comes back. Words are counted as four characters a token, as
 //! providers advise for English; a frame as the provider of its language documents it. Prices that nobody knows give no

@@ -1,4 +1,4 @@
-//! What all processes spend that record one model into one folder at the same time.
+//! The spending of all processes that record one model into one folder at the same time.
 //!
 //! Rule: one small file, read and written under its lock, with an entry per process. Who comes first counts what the journals
 //! say; who comes later adds to it. A process that was killed keeps its entry until nobody records into the folder: what it had

@@ -1,4 +1,4 @@
-//! What a whole run may spend, over all its episodes and all the times it was started.
+//! The limits of a whole run, over all its episodes and all its starts.
 //!
 //! Rule: before a request goes out, what it may cost at most is reserved, so that a run never ends above its limit of money.
 //! A request that may have been paid without an answer keeps its reservation. A limit of tokens is looked at before every
@@ -35,7 +35,7 @@ pub struct Reached {
     what: &'static str,
     spent: String,
     limit: String,
-    /// What the next request may take.
+    /// The estimate for the next request.
     next: String,
 }
 
@@ -75,7 +75,7 @@ pub struct Begun {
     left: u64,
 }
 
-/// How often it is looked whether other processes have spent less than they had reserved.
+/// The interval of checks whether other processes have spent less than they had reserved.
 const AGAIN: Duration = Duration::from_millis(200);
 
 impl Account {
@@ -108,7 +108,7 @@ impl Account {
         Ok(())
     }
 
-    /// What was spent so far, by all processes as far as known.
+    /// The spending so far, by all processes as far as known.
     pub fn spend(&self) -> Spend {
         self.post(|state| state.spend())
     }

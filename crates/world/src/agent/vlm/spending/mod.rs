@@ -1,4 +1,4 @@
-//! What a recording may spend, over all its processes, and what it will.
+//! The limits of a recording's spending over all its processes, and its forecast.
 
 pub mod estimate;
 mod ledger;

@@ -1,9 +1,9 @@
-//! What was spent, by one process or by others.
+//! The spending of one process or of others.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What was spent.
+/// The spending.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Spend {
     /// US dollars of the replies whose cost is known.
@@ -50,7 +50,7 @@ impl Spend {
     }
 }
 
-/// What one process has spent, and has in flight.
+/// The spending of one process, and its requests in flight.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Entry {
     pub(super) spend: Spend,
@@ -60,7 +60,7 @@ pub(super) struct Entry {
     pub(super) until: u64,
 }
 
-/// What others have spent and reserved.
+/// The spending and the reservations of others.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Others {
     pub(super) spend: Spend,

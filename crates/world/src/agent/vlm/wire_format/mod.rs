@@ -30,7 +30,7 @@ pub enum Dialect {
     AnthropicMessages,
 }
 
-/// What one request asks.
+/// The content of one request.
 #[derive(Clone, Copy, Debug)]
 pub struct Question<'a> {
     /// The provider's id of the model.
@@ -45,11 +45,11 @@ pub struct Question<'a> {
     pub temperature: Option<f64>,
     /// The most tokens that a reply may have, those of hidden reasoning included.
     pub max_output_tokens: u32,
-    /// How much the model is asked to reason; `None` leaves it to the provider.
+    /// The requested reasoning effort; `None` leaves it to the provider.
     pub reasoning_effort: Option<Effort>,
 }
 
-/// How much a model is asked to reason before it replies. Not every model takes every effort.
+/// The effort of a model's reasoning before it replies. Not every model takes every effort.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Effort {
@@ -79,7 +79,7 @@ names!(Effort {
     Max: "max"
 });
 
-/// What an answer says.
+/// The content of an answer.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Answer {
     /// The text of the reply; empty where there is none.
@@ -94,14 +94,14 @@ pub struct Answer {
     pub cached_tokens: Option<u32>,
     /// Tokens of the reply, where counted; those of hidden reasoning included.
     pub completion_tokens: Option<u32>,
-    /// What it cost in US dollars, where the provider says so.
+    /// The cost in US dollars, if the provider says it.
     pub cost_usd: Option<f64>,
     /// The model that answered, as the provider names it.
     pub model: Option<String>,
 }
 
 impl Dialect {
-    /// Where a request goes, after the base address.
+    /// The path of a request, after the base address.
     pub fn path(self, model: &str) -> String {
         match self {
             Self::OpenaiChat | Self::OpenaiCompatible => "chat/completions".to_owned(),

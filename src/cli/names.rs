@@ -68,7 +68,7 @@ mod tests {
     }
 
     #[test]
-    fn old_names_are_replaced_where_the_command_is_named() {
+    fn old_command_names_are_replaced_in_messages() {
         assert_eq!(shown("mirrorstats check runs"), "mirrorstats trace check runs");
         assert_eq!(shown("mirrorstats --errors json check runs"), "mirrorstats --errors json trace check runs");
         assert_eq!(shown("mirrorstats help check"), "mirrorstats help trace check");

@@ -51,7 +51,7 @@ fn walking(heard: &Arc<Mutex<Vec<Value>>>) -> Listener {
 }
 
 #[test]
-fn a_function_hears_what_a_program_hears_and_its_replies_are_recorded() {
+fn a_function_gets_the_messages_of_a_program_and_its_replies_are_recorded() {
     let (folder, heard) = (tempfile::tempdir().unwrap(), Arc::default());
     let kept = Arc::clone(&heard);
     let recorded = record(folder.path(), Images::Base64, move || walking(&kept));

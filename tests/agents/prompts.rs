@@ -76,7 +76,7 @@ fn each_of_the_five_asks_in_the_papers_words() {
 
 /// The paper's template of E5 has no place for the warning. It is said there as in the others, before the last lines.
 #[test]
-fn a_stopped_move_is_told_in_every_experiment() {
+fn every_experiment_reports_a_stopped_move() {
     for experiment in Experiment::PAPER {
         let [_, mut user] = verbatim(experiment, None);
         let image = "Use the current RGB image";

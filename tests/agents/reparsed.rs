@@ -58,7 +58,7 @@ fn recorded(folder: &Path) {
 }
 
 #[test]
-fn what_another_parser_changes_is_listed_and_recorded_actions_stay() {
+fn changes_by_another_parser_are_listed_and_recorded_actions_stay() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     recorded(at);

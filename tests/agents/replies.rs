@@ -98,7 +98,7 @@ fn repairs_are_named_and_change_no_word() {
 }
 
 #[test]
-fn a_lone_surrogate_is_a_repair_and_a_pair_is_none() {
+fn a_lone_surrogate_is_repaired_and_a_pair_is_kept() {
     use Repair::{CodeFence, SingleQuotes, Surrogate, SurroundingText};
     let with = |escape: &str| GOOD.replace("a wall", &format!("a wall {escape}!"));
     let seen = |raw: &str| {
@@ -253,7 +253,7 @@ fn thoughts_without_an_answer_are_no_decision() {
 }
 
 #[test]
-fn what_is_not_valid_is_no_decision() {
+fn an_invalid_reply_is_no_decision() {
     let nested = format!("{}{}", "[".repeat(100_000), "]".repeat(100_000));
     let cases = [
         ("I turn left.", Status::ParseFailed),

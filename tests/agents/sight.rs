@@ -58,7 +58,7 @@ fn before_the_mirror() -> [Pose; 4] {
 }
 
 #[test]
-fn every_color_of_cube_is_seen_where_it_stands() {
+fn cubes_of_every_colour_are_seen_at_their_place() {
     for color in Color::ALL {
         let place = at(-1.5, 0.7);
         let room = Painted { cubes: vec![(color, place)], ..room() };
@@ -69,13 +69,13 @@ fn every_color_of_cube_is_seen_where_it_stands() {
 }
 
 #[test]
-fn a_cube_that_is_cut_off_is_none() {
+fn a_cut_off_cube_is_ignored() {
     let room = Painted { cubes: vec![(Color::Red, at(-0.9, 0.0))], ..room() };
     assert_eq!(view(&room, pose(0.0, 0.0, 180.0)).cubes, Vec::new());
 }
 
 #[test]
-fn a_body_is_no_cube_and_is_seen_where_it_stands() {
+fn a_body_is_not_taken_for_a_cube_and_seen_at_its_place() {
     for color in Color::ALL {
         let room = Painted { others: vec![(color, at(-2.0, -0.5))], ..room() };
         let view = view(&room, pose(0.5, 0.0, 180.0));
@@ -95,7 +95,7 @@ fn feet_lie_on_walls_and_through_the_mirror_beyond_them() {
 }
 
 #[test]
-fn a_mirror_is_found_where_it_hangs() {
+fn a_mirror_is_found_at_its_place() {
     let known = known(&room(), &before_the_mirror());
     let wall = known.room.wall(Side::East).unwrap();
     assert!((wall - 4.0).abs() < 0.15, "{wall}");
@@ -105,7 +105,7 @@ fn a_mirror_is_found_where_it_hangs() {
 }
 
 #[test]
-fn a_room_without_mirror_has_none() {
+fn no_mirror_is_found_in_a_room_without_one() {
     let room = Painted { has_mirror: false, ..room() };
     let poses: Vec<Pose> = (0..12).map(|twelfth| pose(0.7, -0.4, 30.0 * f64::from(twelfth))).collect();
     let known = known(&room, &poses);
@@ -133,7 +133,7 @@ fn a_body_before_the_mirror_is_not_oneself_and_neither_is_its_reflection() {
 }
 
 #[test]
-fn among_others_ones_own_body_is_told_by_its_place() {
+fn the_own_body_is_recognised_among_others_by_its_place() {
     let others = vec![(Color::Purple, at(0.2, 1.6)), (Color::Orange, at(3.2, -1.2)), (Color::Red, at(-2.0, 1.2))];
     let room = Painted { others, ..room() };
     let known = known(&room, &before_the_mirror());

@@ -123,7 +123,7 @@ fn the_battery_is_the_same_by_sql() {
 }
 
 #[test]
-fn traces_of_the_paper_alone_have_none_of_the_battery() {
+fn reports_of_the_paper_have_no_battery() {
     let expected: String = EXPECTED
         .lines()
         .filter(|line| line.contains(",E1,") || line.starts_with("ep"))

@@ -30,7 +30,7 @@ fn over_budget(answer: Answer, limit: &str) {
 }
 
 #[test]
-fn what_is_no_file_is_refused_without_being_opened() {
+fn devices_are_refused_without_being_opened() {
     let folder = two_files();
     let at = folder.path();
     succeeds(Command::new("mkfifo").arg(at.join("pipe.parquet")));
@@ -57,7 +57,7 @@ fn what_is_no_file_is_refused_without_being_opened() {
 }
 
 #[test]
-fn what_is_piped_in_on_purpose_is_read_within_the_limit() {
+fn piped_input_is_read_within_the_limit() {
     let folder = two_files();
     let at = folder.path();
     let arguments = ["definitions", "check", "/dev/stdin"];

@@ -99,7 +99,7 @@ fn repeats_of_few_scenes_give_no_verdict() {
 }
 
 #[test]
-fn a_verdict_that_lost_episodes_could_turn_is_none() {
+fn lost_episodes_that_could_turn_a_verdict_withhold_it() {
     let folder = two(&of(21, 21), &Cell { lost: 10, ..of(10, 21) });
     let (_, without) = cell_of(folder.path(), &["--where", "run <= 10"]);
     assert_eq!(without["new"]["lost"], 0);

@@ -73,7 +73,7 @@ fn a_headline_and_the_losses_count_the_same_episodes() {
 }
 
 #[test]
-fn episodes_that_were_never_recorded_are_told_and_can_count_as_failures() {
+fn unrecorded_episodes_are_reported_and_can_count_as_failures() {
     let folder = folder();
     let at = folder.path();
     let line = |id: &str, run: u32, model: &str| {
@@ -135,7 +135,7 @@ fn quality_is_in_reports_in_info_and_in_check() {
 }
 
 #[test]
-fn what_is_not_recorded_passes_no_check_and_is_not_zero() {
+fn unrecorded_quality_passes_no_check_and_is_not_zero() {
     let folder = tempfile::tempdir().unwrap();
     let episodes = [episode("e1", vec![Step { action: Some(Action::Done), ..Step::default() }])];
     write_trace(&folder.path().join("a.parquet"), &episodes, OptionalColumns::NONE);

@@ -151,7 +151,7 @@ fn lasting(output: &str) -> String {
 }
 
 #[test]
-fn every_documented_command_line_does_what_it_did() {
+fn documented_command_lines_still_work() {
     need::drawing();
     let folder = bench();
     let mut met = Vec::new();
@@ -178,7 +178,7 @@ fn every_documented_command_line_does_what_it_did() {
 }
 
 #[test]
-fn documented_outputs_are_what_the_program_prints() {
+fn documented_outputs_are_current() {
     let folder = bench();
     let shown = blocks("text").into_iter().filter(|text| text.starts_with("$ mirrorstats"));
     let mut count = 0;

@@ -77,7 +77,7 @@ fn check(folder: &Path, cases: &[Case]) {
 }
 
 #[test]
-fn bad_usage_says_what_is_wrong_and_what_to_do() {
+fn bad_usage_has_a_problem_and_a_remedy() {
     let folder = two_files();
     let at = folder.path();
     fs::create_dir(at.join("empty")).unwrap();

@@ -51,7 +51,7 @@ fn check_outputs(report: &Contents) {
 }
 
 #[test]
-fn a_manifest_lists_what_was_written() {
+fn a_manifest_lists_the_written_files() {
     let folder = two_files();
     for words in [&LARGE[..], &SMALL] {
         check_outputs(&fresh(folder.path(), words));
@@ -64,7 +64,7 @@ fn a_manifest_lists_what_was_written() {
 }
 
 #[test]
-fn nothing_of_an_older_report_stays_and_all_else_does() {
+fn an_older_report_is_removed_and_other_files_are_kept() {
     let folder = two_files();
     let (large, small) = (fresh(folder.path(), &LARGE), fresh(folder.path(), &SMALL));
     assert!(large.contains_key("report.html") && large.contains_key("figures/spider.svg"));

@@ -50,7 +50,7 @@ fn write(folder: &Path) {
 }
 
 #[test]
-fn a_threshold_that_matters_is_told_in_sentences() {
+fn a_threshold_that_changes_a_conclusion_is_named_in_sentences() {
     let folder = tempfile::tempdir().unwrap();
     write(folder.path());
     let arguments =
@@ -144,7 +144,7 @@ proptest! {
 }
 
 #[test]
-fn what_a_threshold_cannot_be_asked_of_is_refused() {
+fn definitions_without_a_threshold_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     write(folder.path());
     let text = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();

@@ -8,7 +8,7 @@ const OWN: &str =
     "include = ['paper']\n[metric.GLANCES]\ntitle = 'Glances'\nvalue = 'count(mirror_visible)'\nbetter = 'higher'\n";
 
 #[test]
-fn a_metric_of_ones_own_stands_in_the_main_table() {
+fn an_own_metric_is_in_the_main_table() {
     let folder = two_files();
     let at = folder.path();
     fs::write(at.join("own.toml"), OWN).unwrap();
@@ -25,7 +25,7 @@ fn a_metric_of_ones_own_stands_in_the_main_table() {
 }
 
 #[test]
-fn what_a_style_of_ones_own_names_nowhere_comes_after_its_main_table() {
+fn metrics_that_a_style_does_not_name_follow_its_main_table() {
     let folder = two_files();
     let at = folder.path();
     fs::write(at.join("own.toml"), OWN).unwrap();

@@ -6,7 +6,7 @@ use std::fs;
 use world::record::folder_lock::FolderLock;
 
 #[test]
-fn the_last_to_leave_takes_away_what_nobody_needs() {
+fn the_last_process_removes_the_shared_files() {
     let outer = tempfile::tempdir().unwrap();
     let folder = outer.path().join("runs");
     let (first, second) = (FolderLock::stake(&folder).unwrap(), FolderLock::stake(&folder).unwrap());
@@ -22,7 +22,7 @@ fn the_last_to_leave_takes_away_what_nobody_needs() {
 }
 
 #[test]
-fn what_a_killed_process_left_is_cleared_away_when_nobody_else_is_there() {
+fn files_of_a_killed_process_are_removed_by_the_next_one_alone() {
     let folder = tempfile::tempdir().unwrap();
     let first = FolderLock::stake(folder.path()).unwrap();
     let parts = first.parts();

@@ -77,7 +77,7 @@ fn current() -> Vec<(&'static str, Value)> {
 }
 
 #[test]
-fn the_files_are_what_the_types_say() {
+fn the_schema_files_are_current() {
     for (name, value) in current() {
         let path = folder().join(format!("{name}.schema.json"));
         let text = format!("{value:#}\n");

@@ -146,7 +146,7 @@ fn text_is_legible_and_in_the_frame_at_every_width() {
 }
 
 #[test]
-fn a_width_that_is_none_or_too_small_is_refused_with_the_least_one() {
+fn an_invalid_or_small_width_is_refused_with_the_least_one() {
     for wrong in ["8", "8.5 inches", "0cm", "-9cm", "7.9cm", "2m", "nancm", "51cm"] {
         let fault = wrong.parse::<FigureWidth>().unwrap_err().to_string();
         assert_eq!(
@@ -430,7 +430,7 @@ fn the_order_of_groups_does_not_matter() {
 }
 
 #[test]
-fn what_cannot_be_drawn_is_said() {
+fn figures_that_cannot_be_drawn_have_a_reason() {
     let check = |found: Result<_, FigureError>, expected: &str| {
         assert_eq!(found.map(|_: report::figures::Figure| ()).unwrap_err().to_string(), expected);
     };

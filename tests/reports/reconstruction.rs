@@ -218,7 +218,7 @@ fn the_solver_finds_exactly_the_known_contradictions() {
 }
 
 #[test]
-fn the_committed_traces_are_what_the_generator_makes() {
+fn the_committed_traces_equal_the_generators() {
     let differences = files::differences(&fixture("paper"), &TRACES).unwrap();
     assert!(
         differences.is_empty(),

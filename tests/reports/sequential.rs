@@ -96,7 +96,7 @@ fn with_scenes(blocks: &[Block], repeats: i32, scene: impl Fn(&str, i32) -> Opti
 
 // The e-values and bounds are those of the tests of `stats::sequential`, where their sources are named.
 #[test]
-fn rates_stand_against_chance_by_e_values() {
+fn rates_are_compared_with_chance_by_e_values() {
     let found = sequential(&STUDY);
     assert_eq!(found.headline, ["TSA"]);
     let of = |model: &str| found.chance.iter().find(|row| row.model == model).unwrap();
@@ -112,7 +112,7 @@ fn rates_stand_against_chance_by_e_values() {
 
 // 8 and 8 discordant pairs, all in one direction: 2^8 B(8.5, 0.5) / B(0.5, 0.5) = 50.27 by scipy 1.17.1; 16 give 9171.76.
 #[test]
-fn models_are_told_apart_by_their_discordant_pairs() {
+fn models_are_compared_by_their_discordant_pairs() {
     let found = sequential(&STUDY);
     let pairs: Vec<_> = found.models.iter().filter(|pair| pair.metric == "TSA").collect();
     let named: Vec<_> = pairs.iter().map(|pair| (pair.first.as_str(), pair.second.as_str(), pair.verdict)).collect();
@@ -128,7 +128,7 @@ fn models_are_told_apart_by_their_discordant_pairs() {
 
 // The i-th episodes of two models are a pair where no scenes are shared, and a scene counts once: the same evidence.
 #[test]
-fn models_without_equal_scenes_are_told_apart_and_repeats_count_once() {
+fn models_without_equal_scenes_are_compared_and_repeats_count_once() {
     let by_scene = sequential(&STUDY);
     let alone = with_scenes(&STUDY, 1, |model, at| Some(format!("{model} {at}")));
     let repeated = with_scenes(&STUDY, 3, |_, at| Some(format!("room {at}")));
@@ -138,7 +138,7 @@ fn models_without_equal_scenes_are_told_apart_and_repeats_count_once() {
 }
 
 #[test]
-fn the_text_says_what_it_is_for() {
+fn the_text_states_its_purpose() {
     let found = sequential(&STUDY);
     let blocks = STUDY.map(|(experiment, model, solved)| format!("{experiment} {model} {solved}/21"));
     assert_shown!(blocks.join("\n"), found.render(&found.headline, None));

@@ -239,7 +239,7 @@ fn a_conditional_metric_of_few_episodes_is_marked_and_an_undefined_one_has_no_in
 }
 
 #[test]
-fn chance_comes_from_the_definitions_and_references_where_there_is_none() {
+fn chance_levels_and_references_come_from_the_definitions() {
     let found = statistics(&study());
     let row = |experiment: &str, model: &str| {
         let of_model = found.chance.iter().filter(|row| row.experiment == experiment && row.model == model);
@@ -271,7 +271,7 @@ fn lost_episodes_are_bounded_and_unknown_losses_are_said_to_be_unknown() {
 }
 
 #[test]
-fn nothing_at_all_is_no_fault() {
+fn no_episodes_are_no_fault() {
     let found = statistics(&[]);
     assert_eq!((found.episodes, found.cells.len(), found.models.len()), (0, 0, 0));
     assert!(found.render(&found.headline, Length::Short, None).starts_with("0 episodes"));

@@ -118,7 +118,7 @@ fn studies_of_other_traces_differ_without_timesteps() {
 }
 
 #[test]
-fn a_table_that_a_style_does_not_have_is_told_with_those_that_it_has() {
+fn an_unknown_table_is_refused_with_the_styles_tables() {
     let options = mirrorstats::ReportOptions { figures: false, ..Default::default() };
     let report = Study::open(["fixtures/paper"]).unwrap().report(&options).unwrap();
     assert_eq!(report.table("main").unwrap().name, "main");

@@ -97,7 +97,7 @@ fn a_query_reads_the_named_traces_alone() {
 }
 
 #[test]
-fn a_bad_query_is_told_with_its_place_and_the_nearest_name() {
+fn a_bad_query_is_refused_with_its_location_and_the_nearest_name() {
     assert!(refusal("SELECT modell FROM steps").contains("did you mean `model`?"));
     assert!(refusal("SELECT s.modell FROM steps s").contains("did you mean `model`?"));
     assert!(refusal("SELECT model FROM step").contains("did you mean `steps`?"));

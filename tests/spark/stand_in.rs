@@ -32,7 +32,7 @@ fn answering(json: &str) -> String {
 }
 
 #[test]
-fn what_the_driver_answers_is_said_in_words() {
+fn the_drivers_answers_become_messages() {
     for (json, words) in [
         (r#"{"refused": {"rows": {"expected": 4, "found": 0}}}"#, "tell of 4 rows, Spark read 0"),
         (r#"{"refused": {"empty": "s3a://k:s@b/x"}}"#, "`s3a://b/x`: expected Parquet files"),
@@ -81,7 +81,7 @@ fn a_spark_that_never_gets_to_the_driver_is_explained() {
 }
 
 #[test]
-fn a_table_that_is_none_is_not_believed() {
+fn an_invalid_table_is_refused() {
     let done = answering(r#"{"done": {"episodes": 1}}"#);
     for line in ["[1]", r#"["a", "m", "E1", 1, 1]"#, r#"["a", "m", null, 1, 1, 0, 1]"#, "no json"] {
         let folder = folder(&format!("{done}\necho '{line}' >\"$place/table.jsonl\""));
@@ -94,7 +94,7 @@ fn a_table_that_is_none_is_not_believed() {
 }
 
 #[test]
-fn secrets_stand_on_no_command_line_and_in_no_message() {
+fn secrets_are_on_no_command_line_and_in_no_message() {
     let folder =
         folder("printf '%s\\n' \"$@\" >told; ls -ld \"$place\" >>told; cat \"$last\" >request; echo refused hush >&2");
     let settings = ["--spark-conf", "spark.hadoop.fs.s3a.secret.key=hush", "--spark-conf", "spark.a=b c"];
@@ -148,7 +148,7 @@ fn bad_usage_is_refused_before_anything_is_submitted() {
 }
 
 #[test]
-fn a_missing_spark_is_said_with_the_remedy() {
+fn a_missing_spark_is_reported_with_the_remedy() {
     let folder = folder("");
     let mut command = program(folder.path());
     command.env("PATH", "").args(["score", "--engine", "spark", "a.parquet"]);

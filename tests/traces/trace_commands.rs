@@ -93,7 +93,7 @@ fn run(folder: &Path, arguments: &[&str], input: &str) -> (i32, String, String) 
 }
 
 #[test]
-fn what_the_writer_makes_is_valid() {
+fn written_traces_are_valid() {
     let folder = folder();
     for threads in ["1", "8"] {
         let (code, out, err) = run(folder.path(), &["trace", "validate", "runs", "--threads", threads], "");
@@ -162,7 +162,7 @@ fn findings_are_bounded_for_people_and_whole_for_programs() {
 }
 
 #[test]
-fn what_cannot_be_read_is_bad_usage() {
+fn unreadable_files_are_bad_usage() {
     let folder = folder();
     for (arguments, why) in [
         (&["validate", "no.parquet"][..], "`no.parquet`: expected a trace file"),

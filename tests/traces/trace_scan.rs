@@ -283,7 +283,7 @@ fn a_fault_in_a_late_batch_is_refused_where_it_is() {
 }
 
 #[test]
-fn a_column_that_a_file_has_not_is_null_there() {
+fn a_column_that_a_file_lacks_is_null_there() {
     let folder = tempfile::tempdir().unwrap();
     let with = batch(&rows(&[("a", 4)]), Style::Plain);
     let mut columns: Vec<usize> = (0..with.num_columns()).collect();

@@ -67,7 +67,7 @@ fn only_declared_optional_columns_are_there() {
 }
 
 #[test]
-fn what_the_schema_forbids_is_refused() {
+fn forbidden_values_are_refused() {
     let nameless = Episode { model: String::new(), ..episode("a", 1) };
     let negative = with_extra(episode("a", 1), Extra { prompt_tokens: Some(-1), ..Extra::default() });
     let costless = with_extra(episode("a", 1), Extra { cost_usd: Some(f64::NAN), ..Extra::default() });
@@ -117,7 +117,7 @@ fn repairs_have_a_column_where_replies_are_read() {
 }
 
 #[test]
-fn a_palette_in_the_recording_holds_for_what_is_written() {
+fn a_palette_in_the_recording_applies_to_written_rows() {
     let metadata = |palette: serde_json::Value| TraceMetadata {
         recording: Some(serde_json::json!({ "palette": palette })),
         ..TraceMetadata::default()

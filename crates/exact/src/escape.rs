@@ -60,7 +60,7 @@ mod tests {
     use super::{visible, visible_lines};
 
     #[test]
-    fn nothing_acts_and_letters_stay() {
+    fn active_characters_are_escaped_and_letters_are_kept() {
         for (text, expected) in [
             ("Gemma4 26B", "Gemma4 26B"),
             ("\x1b[31mred", "\\u{1b}[31mred"),
@@ -74,7 +74,7 @@ mod tests {
     }
 
     #[test]
-    fn what_acts_or_hides_is_spelled_out_wherever_it_stands() {
+    fn active_and_hidden_characters_are_spelled_out() {
         let hidden = "\u{0}\u{1b}\u{7f}\u{85}\u{ad}\u{34f}\u{61c}\u{115f}\u{17b4}\u{180b}\u{180e}\u{200b}\u{200c}\u{200d}\u{200e}\
             \u{200f}\u{2028}\u{2029}\u{202a}\u{202e}\u{2060}\u{2065}\u{2066}\u{2069}\u{206a}\u{3164}\u{e000}\u{fdd0}\u{fe00}\
             \u{fe0f}\u{feff}\u{ffa0}\u{fff9}\u{fffb}\u{ffff}\u{1d173}\u{e0001}\u{e0020}\u{e007f}\u{e0100}\u{e01ef}\u{f0000}\

@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_made_up_for_no_value_or_one() {
+    fn zero_or_one_values_have_no_standard_error() {
         assert_eq!((of(&[]).mean(), of(&[]).se(Sample), of(&[]).se(Population)), (None, None, None));
         assert_eq!((of(&[7]).mean(), of(&[7]).se(Sample), of(&[7]).se(Population)), (Some(7.0), None, Some(0.0)));
     }

@@ -108,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_fraction_is_refused() {
+    fn invalid_fractions_are_refused() {
         for text in ["", "a", "1/0", "1/-3", ".5", "1.", "-0.5", "1e-1", "1/2/3"] {
             assert!(text.parse::<Ratio>().is_err(), "{text}");
         }

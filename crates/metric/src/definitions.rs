@@ -355,7 +355,7 @@ mod tests {
     use crate::schema_columns::schema_columns;
 
     #[test]
-    fn a_replaced_condition_is_what_an_edited_file_says() {
+    fn a_replaced_condition_equals_an_edited_file() {
         let columns = schema_columns();
         let paper = Definitions::load("paper", &columns).unwrap();
         let replaced = paper.with_condition_let("visible", "test", "mirror_self_px >= 7", &columns).unwrap();

@@ -161,7 +161,7 @@ mod tests {
         }
 
         #[test]
-        fn searches_find_what_a_look_at_each_bit_finds(data in vec(prop_oneof![4 => Just(0_u8), 1 => any::<u8>()], 1..60), cut in any::<(prop::sample::Index, prop::sample::Index)>()) {
+        fn searches_agree_with_a_look_at_each_bit(data in vec(prop_oneof![4 => Just(0_u8), 1 => any::<u8>()], 1..60), cut in any::<(prop::sample::Index, prop::sample::Index)>()) {
             let start = cut.0.index(data.len() * 8);
             let length = cut.1.index(data.len() * 8 - start + 1);
             let set: Vec<usize> =

@@ -383,7 +383,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn runs_say_what_rows_say(runs in vec((0..3_i64, 1..5_u32), 1..9), cut in any::<(prop::sample::Index, prop::sample::Index)>()) {
+        fn runs_and_rows_have_equal_values(runs in vec((0..3_i64, 1..5_u32), 1..9), cut in any::<(prop::sample::Index, prop::sample::Index)>()) {
             let (flat, coded) = both(&runs);
             let from = cut.0.index(flat.len());
             let length = 1 + cut.1.index(flat.len() - from);

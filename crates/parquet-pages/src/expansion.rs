@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_read_again_counts_once() {
+    fn repeated_reads_count_once() {
         let expansion = Expansion::new(0);
         let half = (64 << 20) / 2;
         assert!(expansion.page((0, 0), 4, half).is_ok() && expansion.page((0, 0), 4, half).is_ok());

@@ -212,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_text_is_refused() {
+    fn a_published_table_that_is_not_text_is_refused() {
         let bytes = [HEADER.as_bytes(), b"E1,a\xff,TSA,0.10,0.07,\n"].concat();
         let (line, fault) = parse(&bytes).unwrap_err();
         assert!(matches!((line, fault), (Some(2), super::PublishedFault::NotCsv(_))));

@@ -133,7 +133,7 @@ mod tests {
     use trace::inputs;
 
     #[test]
-    fn one_scan_gives_both_tables_and_what_decided_each_difference() {
+    fn one_scan_gives_both_tables_and_the_evidence_of_differences() {
         let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
         let inputs = inputs::resolve(&[format!("{root}/fixtures/paper").into()], std::io::empty()).unwrap();
         let traces = TraceSet::open(&inputs).unwrap();

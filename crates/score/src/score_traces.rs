@@ -473,7 +473,7 @@ mod tests {
     use trace::inputs;
 
     #[test]
-    fn one_scan_gives_what_several_give() {
+    fn one_scan_equals_several() {
         let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/paper").to_owned();
         let traces = TraceSet::open(&inputs::resolve(&[folder.into()], std::io::empty()).unwrap()).unwrap();
         let condition = Some("seed = 1".to_owned());

@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_test_has_no_p_value() {
+    fn an_impossible_test_has_no_p_value() {
         for (k, n, level) in [(0, 0, level(1, 3)), (2, 1, level(1, 3)), (1, 2, level(4, 3)), (1, 2, level(-1, 3))] {
             assert_eq!(two_sided(k, n, level), None);
         }

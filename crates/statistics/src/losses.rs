@@ -85,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    fn everything_lost_says_nothing() {
+    fn all_episodes_lost_gives_no_verdict() {
         let found = bounds([(Some(1), Fate::Lost)], 0.95).unwrap();
         assert_eq!((found.bounds.low, found.bounds.high), (0.0, 1.0));
     }

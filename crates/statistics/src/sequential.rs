@@ -209,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_test_has_no_e_value_and_nothing_overflows() {
+    fn an_impossible_test_has_no_e_value_and_nothing_overflows() {
         for (k, n, (a, b)) in [(0, 0, (1, 3)), (2, 1, (1, 3)), (1, 2, (4, 3)), (1, 2, (-1, 3))] {
             assert_eq!(against_level(k, n, level(a, b)), None);
         }

@@ -313,7 +313,7 @@ mod tests {
     }
 
     #[test]
-    fn a_message_says_what_where_expected_found_and_what_to_do() {
+    fn a_message_has_problem_location_expected_found_and_remedy() {
         let finding = Finding::new(Code::TGap, "a.parquet", "t = 3", "t = 4")
             .in_row_group(0)
             .in_episode("e1")

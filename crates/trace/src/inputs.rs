@@ -250,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn what_other_programs_leave_in_a_folder_is_passed_over() {
+    fn other_programs_files_in_a_folder_are_passed_over() {
         let (_keep, at) = folder();
         fs::create_dir_all(format!("{at}/_temporary/0")).unwrap();
         for name in ["_temporary/0/part.parquet", "_notes.parquet", ".a.parquet", "_SUCCESS"] {
@@ -283,7 +283,7 @@ mod tests {
     }
 
     #[test]
-    fn what_gives_nothing_is_said() {
+    fn an_argument_without_files_is_reported() {
         let (_keep, at) = folder();
         fs::create_dir(format!("{at}/none")).unwrap();
         for (argument, list, why) in [

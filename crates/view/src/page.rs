@@ -75,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn no_name_stands_at_the_top_of_two_modules() {
+    fn top_level_names_are_unique_across_modules() {
         let mut names = std::collections::BTreeSet::new();
         for line in classic().lines() {
             let words: Vec<&str> = line.trim_end().split([' ', '(', '=']).filter(|word| *word != "async").collect();

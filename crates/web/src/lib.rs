@@ -324,7 +324,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_changed_from_outside() {
+    fn requests_from_other_sites_change_nothing() {
         let guard = Guard::new("[::1]:7000".parse().unwrap(), None, None);
         let mut headers = HeaderMap::new();
         headers.insert("host", HeaderValue::from_static("[::1]:7000"));

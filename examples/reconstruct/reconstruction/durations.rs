@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_bounds_exclude_is_not_found() {
+    fn searches_stay_within_bounds() {
         let bounds = vec![1..=3; 4];
         for (sum, squares) in [(3, 0..=100), (13, 0..=100), (8, 0..=15), (8, 21..=100)] {
             let target = Target { sum, squares };

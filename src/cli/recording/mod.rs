@@ -338,7 +338,7 @@ mod tests {
     use world::sim::config::WorldConfig;
 
     #[test]
-    fn who_is_waited_for_is_said() {
+    fn waiting_for_people_is_printed() {
         let key = Key::first(Experiment::E1, 1, 3);
         let one = Held { key, process: Some(4711), count: 1 };
         let expected = "waiting for E1/a/s1/r3: process 4711 records it into the same folder; Ctrl-C ends the waiting";
@@ -385,7 +385,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_known_of_a_cost_is_said() {
+    fn unknown_costs_are_printed_as_unknown() {
         let spend = Spend { cost_usd: 1.5, tokens: 2_000, requests: 3, ..Spend::default() };
         assert_eq!(spent(&spend), "1.50 US dollars for 3 requests and 2000 tokens");
         let partly = Spend { uncosted: 2, ..spend };

@@ -14,7 +14,7 @@ use crate::harness::files::repository;
 use crate::harness::need;
 
 #[test]
-fn a_program_is_told_its_task_each_observation_and_the_end() {
+fn a_program_gets_its_task_each_observation_and_the_end() {
     let bench = Bench::new();
     bench.program(&format!("echo '{FORWARD}'"));
     let output = bench.record(&["--experiment", "E3", "--model", "My Agent"]).output().unwrap();
@@ -50,7 +50,7 @@ fn a_program_is_told_its_task_each_observation_and_the_end() {
 }
 
 #[test]
-fn nothing_of_the_truth_is_told() {
+fn no_message_reveals_the_truth() {
     let bench = Bench::new();
     bench.program(&three_steps());
     outcome(&bench.record(&["--runs", "2", "--threads", "1"]).output().unwrap());
@@ -163,7 +163,7 @@ fn the_example_in_python_plays() {
 }
 
 #[test]
-fn replies_of_a_program_that_cannot_be_read_are_told() {
+fn unreadable_replies_of_a_program_are_reported() {
     let bench = Bench::new();
     bench.program("printf 'I go \\033[31mon.\\n'");
     let output = bench.record(&["--keep-going"]).output().unwrap();

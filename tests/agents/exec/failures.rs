@@ -33,7 +33,7 @@ fn loses(answer: &str, words: &[&str], expected: &[&str]) {
 }
 
 #[test]
-fn a_program_that_ends_is_told_with_its_code_and_last_words() {
+fn the_end_of_a_program_is_reported_with_its_code_and_last_output() {
     loses("echo 'no such layer: 12' >&2; exit 3", &[], &["ended (exit status: 3)", "no such layer: 12"]);
     loses("kill -9 $$", &[], &["the program ended ("]);
     loses("exit 0", &[], &["ended (exit status: 0)"]);
@@ -80,7 +80,7 @@ fn a_program_that_talks_out_of_turn() {
 }
 
 #[test]
-fn a_line_that_came_where_the_reply_belongs_is_what_is_blamed() {
+fn a_line_in_place_of_the_reply_is_named() {
     // The observation is read, the banner comes before the reply: at the second observation both are told apart.
     let bench = Bench::new();
     bench.program(&format!("[ $n = 1 ] && echo 'loading the model'; echo '{FORWARD}'"));
@@ -111,7 +111,7 @@ fn a_traceback_keeps_its_lines() {
 }
 
 #[test]
-fn a_line_before_the_first_question_is_named_as_such() {
+fn a_line_before_the_first_question_is_named() {
     let early = "the program wrote a line before it was asked for its first reply: `loading the model`";
     // Before it reads anything, at once and later; and between its task and the first observation, which it never reads.
     let before = "sleep 0.2; echo 'loading the model'";
@@ -139,7 +139,7 @@ fn a_line_before_the_first_question_is_named_as_such() {
 }
 
 #[test]
-fn a_slow_line_out_of_turn_is_told_from_the_reply_to_the_next_question() {
+fn a_late_line_is_not_taken_as_the_next_reply() {
     // The second line comes when the next question is on its way.
     let bench = Bench::new();
     bench.program(&format!("echo '{FORWARD}'; [ $n = 1 ] && {{ sleep 0.3; echo 'all well'; sleep 600; }}"));
@@ -150,7 +150,7 @@ fn a_slow_line_out_of_turn_is_told_from_the_reply_to_the_next_question() {
 }
 
 #[test]
-fn what_is_said_on_standard_error_is_kept_for_recorded_and_for_lost_episodes() {
+fn standard_error_is_kept_for_recorded_and_lost_episodes() {
     let bench = Bench::new();
     let speak = "printf '\\033[1mstep %s of %s\\033[0m\\r\\n' $n $MY_API_KEY >&2";
     let fails = "grep -c 'kind\":\"task' heard.jsonl | grep -q 2 && [ $n = 2 ] && exit 3";
@@ -168,7 +168,7 @@ fn what_is_said_on_standard_error_is_kept_for_recorded_and_for_lost_episodes() {
 }
 
 #[test]
-fn a_command_that_is_none_ends_the_recording_at_once() {
+fn a_missing_command_ends_the_recording_at_once() {
     let bench = Bench::new();
     let command = bench.record_of("exec:no-such-program --fast", &["--runs", "9", "--threads", "1"]).output().unwrap();
     let (code, _, said) = outcome(&command);
@@ -218,7 +218,7 @@ fn an_edited_program_is_another_agent() {
 }
 
 #[test]
-fn no_key_of_the_environment_is_kept_of_what_a_program_says() {
+fn keys_of_the_environment_are_removed_from_program_output() {
     let bench = Bench::new();
     let key = "sk-loopback-0123456789";
     let said_back = |reply: &str| reply.replace("went on", "'\"$MY_API_KEY\"'");

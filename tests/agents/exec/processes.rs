@@ -56,7 +56,7 @@ fn in_flight_is_how_many_run_at_once() {
 }
 
 #[test]
-fn what_a_program_starts_ends_with_it() {
+fn children_of_a_program_end_with_it() {
     let bench = Bench::new();
     // It leaves at the end, and a child of it would stay and hold its streams.
     bench.program(&format!("[ $n = 1 ] && {{ sleep 600 & echo $! >> ids; }}; {}", three_steps()));
@@ -67,7 +67,7 @@ fn what_a_program_starts_ends_with_it() {
 
 #[test]
 #[cfg(target_os = "linux")]
-fn what_leaves_the_group_of_a_program_ends_with_it() {
+fn children_in_another_process_group_end_too() {
     let bench = Bench::new();
     // A session of its own, and a parent that is gone.
     let daemon = "(setsid sh -c 'echo $$ >> ids; sleep 600' </dev/null >/dev/null 2>&1 &)";

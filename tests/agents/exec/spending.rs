@@ -13,7 +13,7 @@ fn answer(status: &str, reply: &str) -> Vec<u8> {
 }
 
 #[test]
-fn what_was_spent_is_told_over_all_starts() {
+fn spending_is_printed_over_all_starts() {
     let bench = Bench::new();
     let model = "[model.Loop]\nbackend = \"compatible\"\nid = \"m\"\nanswers_as = [\"model-1-0601\"]\nprices = { input = 1.0, output = 10.0 }\n";
     std::fs::write(bench.path("models.toml"), model).unwrap();

@@ -14,7 +14,7 @@ use super::server::{JSON, Server, decision, http, whole};
 use crate::harness::program::stderr;
 
 #[test]
-fn no_key_is_in_anything_that_is_kept_or_told() {
+fn keys_are_in_no_file_and_no_message() {
     let echo = format!("{{\"error\": \"your key {KEY} is wrong\"}}");
     let server = Server::start(move |at, _| match at {
         0 => http("500 Internal Server Error", JSON, echo.as_bytes()),
@@ -90,7 +90,7 @@ fn a_server_that_says_everything_back_learns_the_key_and_nobody_else_does() {
 }
 
 #[test]
-fn a_key_where_it_does_not_belong_is_not_repeated() {
+fn a_misplaced_key_is_not_printed() {
     let server = Server::start(|_, _| whole(Dialect::OpenaiCompatible, &decision("a")));
     let told = check(&server, KEY, &format!("--base-url http://127.0.0.1/v1?key={KEY}"));
     assert!(told.contains("query"), "{told}");

@@ -102,7 +102,7 @@ fn strings(value: &Value) -> BTreeSet<String> {
 }
 
 #[test]
-fn a_schema_says_nothing_that_the_prompt_does_not_say() {
+fn the_schema_adds_nothing_to_the_prompt() {
     const KEYWORDS: [&str; 6] = ["type", "properties", "required", "additionalProperties", "object", "string"];
     for (backend, dialect) in BACKENDS {
         let requests = of_all_experiments(backend, dialect);

@@ -174,7 +174,7 @@ fn a_study_file_is_recorded_in_one_command_and_goes_on_after_a_kill() {
 }
 
 #[test]
-fn a_probe_tells_what_each_model_takes() {
+fn a_probe_reports_each_models_parameters() {
     let folder = Folder::new();
     let servers = prepare(&folder, "experiment = \"E1\"\nseeds = 1\nruns = 1");
     let models = folder.path().join("models.toml");

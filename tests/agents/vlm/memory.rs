@@ -13,7 +13,7 @@ use super::bench::{Bench, choice};
 use super::server::{Server, decision, http, whole};
 
 #[test]
-fn what_was_answered_is_never_asked_again_and_plays_without_a_network() {
+fn answers_are_reused_and_play_without_a_network() {
     let server = Server::start(|at, _| match at {
         1 => http("500 Internal Server Error", "", b""),
         _ => whole(Dialect::OpenaiChat, &decision(if at % 2 == 0 { "a" } else { "w" })),

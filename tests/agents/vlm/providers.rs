@@ -72,7 +72,7 @@ fn a_rate_limit_with_a_delay_is_waited_for_and_uses_up_no_attempts() {
 }
 
 #[test]
-fn the_quota_of_a_day_stops_the_recording_with_what_to_do() {
+fn a_daily_quota_stops_the_recording_with_a_remedy() {
     let router = br#"{"error": {"code": 429, "message": "Rate limit exceeded: free-models-per-day"}}"#;
     let answers = [exhausted(A_DAY, "34s"), http("429 Too Many Requests", JSON, router)];
     for answer in answers {
@@ -86,7 +86,7 @@ fn the_quota_of_a_day_stops_the_recording_with_what_to_do() {
 }
 
 #[test]
-fn a_wait_of_hours_stops_the_recording_with_what_to_do() {
+fn a_wait_of_hours_stops_the_recording_with_a_remedy() {
     for (wait, seconds) in [("7200", "7200 s"), ("999999999999999999999", "s: HTTP 429")] {
         let answer = http("429 Too Many Requests", &format!("retry-after: {wait}\r\n"), b"slow down");
         let server = Server::start(move |_, _| answer.clone());
@@ -276,7 +276,7 @@ fn a_refused_parameter_is_named_with_the_line_that_mends_it() {
 }
 
 #[test]
-fn no_temperature_and_what_a_model_has_besides_are_sent_and_part_of_the_fingerprint() {
+fn extra_body_is_sent_and_fingerprinted_and_the_default_temperature_is_not_sent() {
     let asked = |dialect: Dialect, temperature: Option<f64>, extra: Value| {
         let server = Server::start(move |_, _| ok(&spoken(dialect, &decision("w"), endings(dialect).0)));
         let bench = Bench::new(Limits::default());

@@ -64,7 +64,7 @@ fn a_server_that_takes_no_images_ends_the_recording_with_its_first_answer() {
 }
 
 #[test]
-fn images_that_are_not_taken_are_no_outage_to_stand_still_for() {
+fn a_model_without_images_is_no_outage() {
     let server = Server::start(|at, _| match at {
         0 => whole(Dialect::OpenaiChat, &decision("w")),
         _ => http("500 Internal Server Error", JSON, br#"{"error":"this model does not support images"}"#),

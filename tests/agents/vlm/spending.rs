@@ -36,7 +36,7 @@ fn started(folder: &Folder, server: &Server, words: &str) -> (Option<i32>, Strin
 }
 
 #[test]
-fn limits_count_what_earlier_starts_spent() {
+fn limits_include_the_spending_of_earlier_starts() {
     let own = "[model.own]\nbackend = \"compatible\"\nid = \"own-1\"\nanswers_as = [\"model-1-*\"]\nprices = { input = 1.0, output = 10.0 }\n";
     // An answer takes 1100 tokens and 0.002 dollars.
     let cases = [
@@ -213,7 +213,7 @@ fn processes_that_record_into_a_folder_have_one_ledger() {
 }
 
 #[test]
-fn requests_that_timed_out_or_were_killed_count_with_what_they_may_cost() {
+fn timed_out_and_killed_requests_count_with_their_largest_cost() {
     let server = Server::start(|at, request| match at {
         0 => Conduct::dripping(vec![b' '], 1, Duration::from_secs(5)),
         _ => whole(Dialect::OpenaiCompatible, &counting(request, 4, at)).into(),
@@ -253,7 +253,7 @@ fn with_cost(text: &str, cost: f64) -> Vec<u8> {
 }
 
 #[test]
-fn a_limit_of_cost_is_held_by_what_answers_say_that_they_cost() {
+fn a_cost_limit_uses_the_costs_that_answers_state() {
     let server = Server::start(|at, request| {
         std::thread::sleep(Duration::from_millis(20));
         with_cost(&counting(request, 6, at), 0.002)

@@ -183,7 +183,7 @@ fn refusals_and_empty_answers_have_each_providers_own_form() {
 }
 
 #[test]
-fn what_the_provider_will_not_change_its_mind_about_ends_the_run_at_once() {
+fn permanent_refusals_end_the_run_at_once() {
     let credit = br#"{"error": {"type": "insufficient_quota", "message": "no credit"}}"#;
     let cases: [(&str, &[u8]); 6] = [
         ("401 Unauthorized", b"who are you"),

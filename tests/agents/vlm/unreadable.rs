@@ -23,7 +23,7 @@ fn told(folder: &Folder, verb: &str) -> (String, Value) {
 }
 
 #[test]
-fn a_recording_of_which_nothing_could_be_read_says_so_everywhere() {
+fn a_recording_without_readable_replies_says_so_everywhere() {
     let reply = format!("I go on.\n\u{1b}[31m{KEY} {}", "on and ".repeat(100));
     let server = Server::start(move |_, _| whole(Dialect::OpenaiCompatible, &reply));
     let folder = short();

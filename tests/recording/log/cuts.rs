@@ -54,7 +54,7 @@ fn at_fifty_bytes_here_and_there_by_the_program() {
 }
 
 #[test]
-fn what_is_lost_is_named() {
+fn losses_are_named() {
     let desk = Desk::new();
     let said = |bytes: &[u8]| String::from_utf8(desk.recover(bytes, &[]).stdout).unwrap();
     let (_, second) = RECORDING.chunks[1];
@@ -67,7 +67,7 @@ fn what_is_lost_is_named() {
 }
 
 #[test]
-fn an_episode_of_which_the_beginning_is_there_is_named_with_its_rows() {
+fn an_episode_cut_after_its_beginning_is_named_with_its_rows() {
     let mut log = mcap::WriteOptions::new().compression(None).create(Cursor::new(Vec::new())).unwrap();
     let mut channel = |topic: &str| log.add_channel(0, topic, "json", &BTreeMap::new()).unwrap();
     let (episodes, decisions) = (channel("/episode"), channel("/decision"));

@@ -82,7 +82,7 @@ fn bytes_that_are_missing_or_too_many_in_the_middle() {
 }
 
 #[test]
-fn without_its_metadata_the_trace_is_there_and_the_loss_is_told() {
+fn a_log_without_metadata_gives_a_trace_and_names_the_loss() {
     const METADATA: u8 = 0x0c;
     let place = RECORDING.first(METADATA);
     // Behind the frame and the length of the name stands the name.
@@ -93,7 +93,7 @@ fn without_its_metadata_the_trace_is_there_and_the_loss_is_told() {
 }
 
 #[test]
-fn a_value_that_changed_in_the_metadata_is_told() {
+fn a_changed_value_in_the_metadata_is_named() {
     let text = RECORDING.log.windows(12).position(|window| window == b"\"world_hash\"").unwrap();
     let found = recovered(&with_byte(text + 15, |byte| if byte == b'0' { b'1' } else { b'0' }));
     assert_eq!(ids(&found).len(), 3);
@@ -101,7 +101,7 @@ fn a_value_that_changed_in_the_metadata_is_told() {
 }
 
 #[test]
-fn the_episode_of_a_damaged_chunk_is_named_and_none_of_its_rows_is_believed() {
+fn the_episode_of_a_damaged_chunk_is_named_and_its_rows_are_dropped() {
     let mut bytes = std::fs::read(fixture("recorded/E1-guesser.mcap")).unwrap();
     let before = ids(&recovered(&bytes));
     let index = mcap::Summary::read(&bytes).unwrap().unwrap().chunk_indexes;

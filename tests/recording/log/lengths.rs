@@ -199,7 +199,7 @@ fn check_recover(stride: usize) {
 
 #[cfg(unix)]
 #[test]
-fn recover_names_what_a_length_has_cost() {
+fn recover_names_the_losses_by_a_bad_length() {
     // A prime, so that every kind of value is among them.
     check_recover(7);
 }
@@ -207,7 +207,7 @@ fn recover_names_what_a_length_has_cost() {
 #[cfg(unix)]
 #[test]
 #[ignore = "soak: all lengths, each with up to six values"]
-fn soak_recover_names_what_a_length_has_cost() {
+fn soak_recover_names_the_losses_by_a_bad_length() {
     check_recover(1);
 }
 

@@ -27,7 +27,7 @@ fn the_bundled_log_with_frames_gives_the_bundled_trace() {
 }
 
 #[test]
-fn what_is_no_log_is_refused_and_nothing_is_written() {
+fn other_files_than_logs_are_refused_and_nothing_is_written() {
     let desk = Desk::new();
     let mut foreign = mcap::Writer::new(std::io::Cursor::new(Vec::new())).unwrap();
     foreign.add_channel(0, "/odometry", "json", &std::collections::BTreeMap::new()).unwrap();

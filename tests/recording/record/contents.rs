@@ -66,7 +66,7 @@ fn rows_follow_from_one_another() {
 }
 
 #[test]
-fn ground_truth_is_what_the_counts_say() {
+fn ground_truth_follows_from_the_counts() {
     let bench = Bench::new();
     write_small_world(bench.folder.path(), "evidence.mirror_self_px = 2\n");
     let words = "--agent random --experiment E1..E3 --seeds 1 --runs 4 --no-log";
@@ -116,7 +116,7 @@ fn the_color_that_a_pane_shows_is_another_candidate_and_is_in_the_trace() {
 }
 
 #[test]
-fn the_footer_says_what_replay_must_know_and_nothing_of_the_machine() {
+fn the_footer_has_all_that_replay_needs_and_nothing_of_the_machine() {
     let bench = Bench::new();
     bench.recorded("runs", "--agent random --experiment E1 --seeds 2 --runs 1");
     let (_, recording) = read(&bench, "runs/E1-random.parquet");

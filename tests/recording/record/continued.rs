@@ -107,7 +107,7 @@ fn a_log_with_other_rows_of_an_episode() {
 }
 
 #[test]
-fn a_trace_whose_log_was_removed_gets_one_of_what_is_recorded_from_then_on() {
+fn a_removed_log_starts_again_with_new_episodes() {
     let bench = Bench::new();
     let whole = bench.recorded("whole", &words(4));
     bench.recorded("runs", &words(2));

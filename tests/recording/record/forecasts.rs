@@ -21,7 +21,7 @@ fn forecast(bench: &Bench, words: &str) -> Value {
 }
 
 #[test]
-fn what_is_there_is_not_recorded_again() {
+fn existing_episodes_are_not_recorded_again() {
     let bench = Bench::new();
     let words = "--agent random --experiment E1,E5 --seeds 2 --runs 2";
     let all = forecast(&bench, words);

@@ -68,7 +68,7 @@ fn ctrl_c_ends_it_at_whole_episodes_and_says_how_to_go_on() {
 
 #[cfg(unix)]
 #[test]
-fn a_full_disk_is_told_and_loses_no_episode_that_was_there() {
+fn a_full_disk_is_reported_and_loses_no_recorded_episode() {
     let bench = Bench::new();
     let before = bench.recorded("runs", "--agent random --experiment E1 --seeds 1 --runs 1");
     // A limit of the size of files stands in for a full disk: writes begin to fail in the middle of a file.
@@ -91,7 +91,7 @@ fn a_full_disk_is_told_and_loses_no_episode_that_was_there() {
 }
 
 #[test]
-fn what_a_killed_recording_left_behind_is_cleared_away() {
+fn files_of_a_killed_recording_are_removed() {
     let bench = Bench::new();
     let whole = bench.recorded("runs", "--agent random --experiment E1 --seeds 1 --runs 1");
     let parts = bench.path("runs").join(".parts");

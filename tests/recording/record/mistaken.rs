@@ -44,7 +44,7 @@ fn refused_in(bench: &Bench, line: usize, text: &str, expected: &[&str]) {
 }
 
 #[test]
-fn numbers_that_are_none_or_out_of_range() {
+fn invalid_numbers_and_numbers_out_of_range() {
     let bench = Bench::new();
     for (line, more, expected) in [
         (5, "step_length = nan", "`step_length` may be 0.1 to 1, but is NaN"),

@@ -89,7 +89,7 @@ fn frames_have_the_size_that_the_file_says() {
 
 /// Levels and arms of two agents without pictures: what a researcher sees of them.
 #[test]
-fn levels_and_arms_are_pairs_and_stand_in_one_report() {
+fn levels_and_arms_are_pairs_in_one_report() {
     let bench = Bench::new();
     let at = bench.folder.path();
     let words = "--experiment reach-scheme,reach-bare,reach-no-mirror --seeds 2 --runs 3 --no-log";

@@ -97,13 +97,13 @@ fn check_killed(rounds: usize, stay: usize, least: usize) {
 }
 
 #[test]
-fn one_that_stays_records_what_killed_ones_had_begun() {
+fn a_survivor_records_the_episodes_of_killed_processes() {
     check_killed(3, 1, 1);
 }
 
 #[test]
 #[ignore = "soak: 10 rounds of 2 or 3 processes"]
-fn soak_one_that_stays_records_what_killed_ones_had_begun() {
+fn soak_a_survivor_records_the_episodes_of_killed_processes() {
     check_killed(10, 1, 4);
 }
 

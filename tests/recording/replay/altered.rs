@@ -94,7 +94,7 @@ fn an_action_shows_at_the_step_behind_it() {
 }
 
 #[test]
-fn what_holds_for_the_episode_is_step_0() {
+fn constants_of_the_episode_are_step_0() {
     let other = |color: &str| if color == "red" { "blue".to_owned() } else { "red".to_owned() };
     check("E1", |episode| episode.body_color = other(&episode.body_color), 0, "body_color");
     check("E3", |episode| episode.stated_color = None, 0, "stated_color");
@@ -103,7 +103,7 @@ fn what_holds_for_the_episode_is_step_0() {
 }
 
 #[test]
-fn the_first_of_each_episode_is_told() {
+fn the_first_difference_of_each_episode_is_printed() {
     let (_folder, path) = copy("E1", |episodes, _| {
         for episode in episodes.iter_mut().take(2) {
             for step in &mut episode.steps {

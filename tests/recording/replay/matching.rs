@@ -40,7 +40,7 @@ fn the_bundled_recordings_match() {
 }
 
 #[test]
-fn what_does_not_say_its_world_is_refused() {
+fn a_trace_without_its_world_is_refused() {
     let output = replay(&fixture("paper/E1-claude-sonnet-4-6.parquet"), &[]);
     assert_eq!(output.status.code(), Some(2));
     assert!(stderr(&output).contains("does not say how its world was made"), "{}", stderr(&output));

@@ -21,7 +21,7 @@ fn recounted(words: &[&str]) -> (tempfile::TempDir, std::path::PathBuf) {
 }
 
 #[test]
-fn another_threshold_gives_what_the_recorded_counts_say() {
+fn another_threshold_agrees_with_the_recorded_counts() {
     let before = episodes(&WITH_SIGHT);
     let mut seen = std::collections::BTreeSet::new();
     for threshold in [1, 2, 6, 19, 20, 100_000] {
@@ -45,7 +45,7 @@ fn another_threshold_gives_what_the_recorded_counts_say() {
 }
 
 #[test]
-fn the_steps_that_are_another_are_counted() {
+fn changed_steps_are_counted() {
     let (folder, out) = recounted(&["--threshold", "100000"]);
     let was_visible = episodes(&WITH_SIGHT).iter().flat_map(|e| &e.steps).filter(|s| s.mirror_visible).count();
     assert!(was_visible > 0);
@@ -78,7 +78,7 @@ fn another_grid_counts_anew_and_scales_the_threshold() {
 }
 
 #[test]
-fn what_was_counted_anew_can_be_replayed_as_it_is() {
+fn recounted_traces_can_be_replayed() {
     let (_folder, out) = recounted(&["--grid", "128x96", "--threshold", "5"]);
     let output = replay(&out, &[]);
     assert_eq!(output.status.code(), Some(0), "{}", stdout(&output));
@@ -89,7 +89,7 @@ fn what_was_counted_anew_can_be_replayed_as_it_is() {
 }
 
 #[test]
-fn what_makes_no_sense_is_refused_and_writes_nothing() {
+fn invalid_options_are_refused_and_nothing_is_written() {
     let (_folder, path) = copy("E1", |_, _| ());
     let before = std::fs::read(&path).unwrap();
     for (words, expected) in [

@@ -45,7 +45,7 @@ fn nearest(pixel: [f64; 3]) -> Option<Color> {
 }
 
 #[test]
-fn the_ten_colours_are_told_apart_directly_and_in_the_mirror() {
+fn the_ten_colours_differ_directly_and_in_the_mirror() {
     let config = WorldConfig::default();
     need::drawing();
     let mut eye = Camera::new(&config).unwrap();

@@ -157,7 +157,7 @@ fn windows_hold_against_pictures() {
 }
 
 #[test]
-fn the_census_through_panes_is_what_the_rays_of_mujoco_meet() {
+fn visibility_through_panes_agrees_with_mujocos_rays() {
     let mut chance = Rng::of(78, 1, 2);
     let (mut differ, mut through) = (0_usize, 0_usize);
     for name in ["mirrors", "late", "painted", "stranger", "window"] {

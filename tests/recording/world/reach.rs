@@ -76,7 +76,7 @@ fn no_body_has_the_colour_of_the_mark_or_of_the_hand() {
 }
 
 #[test]
-fn the_census_is_what_is_drawn_and_what_mujocos_rays_meet() {
+fn visibility_of_hands_agrees_with_pictures_and_mujocos_rays() {
     need::drawing();
     let config = WorldConfig::default().of(named("reach-mirror"));
     let mut eye = LabelCamera::new(&config, 640, 480).unwrap();

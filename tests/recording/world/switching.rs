@@ -40,7 +40,7 @@ fn the_picture_is_of_now() {
 }
 
 #[test]
-fn what_is_out_of_view_changes_no_picture() {
+fn things_out_of_view_change_no_picture() {
     need::drawing();
     let config = WorldConfig::default();
     let mut eyes = [Camera::new(&config).unwrap(), Camera::new(&config).unwrap()];

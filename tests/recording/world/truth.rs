@@ -45,7 +45,7 @@ fn mean(values: &[f64]) -> f64 {
 }
 
 #[test]
-fn the_census_is_what_a_picture_of_labels_shows() {
+fn visibility_agrees_with_a_picture_of_labels() {
     let config = WorldConfig::default();
     need::drawing();
     let mut eye = LabelCamera::new(&config, 640, 480).unwrap();
@@ -74,7 +74,7 @@ fn the_census_is_what_a_picture_of_labels_shows() {
 }
 
 #[test]
-fn the_census_is_what_the_rays_of_mujoco_meet() {
+fn visibility_agrees_with_mujocos_rays() {
     let (mut differ, mut all) = (0_usize, 0_usize);
     for_scattered(&WITH_MIRROR, 60, |world| {
         let cast = labels(world, 160, 120);
@@ -172,7 +172,7 @@ fn is_twin(world: &World, shown: Shown) -> bool {
 }
 
 #[test]
-fn the_census_is_what_colours_in_the_picture_show() {
+fn visibility_agrees_with_the_colours_of_the_picture() {
     let config = WorldConfig::default();
     need::drawing();
     let mut eye = Camera::new(&config).unwrap();

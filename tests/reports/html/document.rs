@@ -101,7 +101,7 @@ fn rows(report: &Report) -> usize {
 }
 
 #[test]
-fn a_cell_is_quiet_where_it_shows_no_value_and_not_where_a_style_prints_zero() {
+fn a_cell_without_a_value_is_dimmed_and_a_printed_zero_is_not() {
     let page = Report::of(PAPER.clone(), &["experiment", "model"], "paper").render().unwrap();
     let tables = &page[page.find("<table class=\"results\"").unwrap()..];
     let undefined: Vec<&str> = tables.split("<td ").skip(1).filter(|cell| cell.contains(" data-mean=\"\"")).collect();

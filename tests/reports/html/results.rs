@@ -86,7 +86,7 @@ fn split(means: &[String]) -> (Vec<f64>, usize) {
 }
 
 #[test]
-fn filters_show_what_is_chosen_and_nothing_else() {
+fn filters_show_only_the_chosen_rows() {
     let report = Report::bare();
     let mut browser = Browser::open(&report.render().unwrap());
     let status = "document.getElementById('shown').textContent";

@@ -67,7 +67,7 @@ fn a_second_report_replaces_its_files_and_no_others() {
 }
 
 #[test]
-fn what_cannot_be_written_changes_nothing() {
+fn a_failed_write_changes_nothing() {
     let home = tempfile::tempdir().unwrap();
     let taken = home.path().join("taken");
     fs::write(&taken, "a file").unwrap();

@@ -81,7 +81,7 @@ fn an_erratum_excuses_exactly_what_it_states() {
 }
 
 #[test]
-fn cells_that_one_side_lacks_are_told() {
+fn cells_of_one_side_are_listed() {
     let found = changed(|text| text.replace("E1,Gemma4 26B,TSA,0.57,0.11,\n", ""));
     assert!(found.holds());
     assert_eq!((found.cells, found.unpublished.len()), (239, 1));

@@ -60,7 +60,7 @@ fn fault_of(style: &std::path::Path) -> String {
 }
 
 #[test]
-fn an_include_comes_first_and_what_differs_is_said() {
+fn an_include_comes_first_and_the_file_overrides_it() {
     let mine = "include = ['paper', 'more/base.toml']\nundefined = 'n/a'\n[table.main]\ncolumns = ['TSA']\n\
                 print = { decimals = { rate = 3, quantity = 0 } }\n[column.TSA]\nlatex = 'T'\n";
     let base = "[table.extra]\ntitle = 'Extra'\ncolumns = ['CR']\n[column.TSA]\nbetter = 'lower'\n";
@@ -101,7 +101,7 @@ fn includes_do_not_run_in_circles_or_without_end() {
 }
 
 #[test]
-fn nothing_of_what_an_include_says_is_shown() {
+fn contents_of_an_include_are_not_shown() {
     for secret in ["root:$6$hunter2:19000::\n", "password = 'hunter2'\n", "[table.hunter2]\ncolumns = 3\n"] {
         let (_folder, path) = files(&[("in/mine.toml", "include = ['../secret']\n"), ("secret", secret)]);
         let said = fault_of(&path);

@@ -145,7 +145,7 @@ fn hostile_names_stay_names() {
 }
 
 #[test]
-fn marks_are_where_the_caption_says() {
+fn marks_agree_with_the_caption() {
     let table = layout::tables(&hostile(), &Style::load("default").unwrap()).unwrap().remove(0);
     let cells: Vec<_> = table.groups.iter().flat_map(|group| &group.rows).flat_map(|row| &row.cells).collect();
     for cell in &cells {

@@ -76,7 +76,7 @@ fn no_link_is_followed() {
 }
 
 #[test]
-fn a_manifest_that_lists_what_cannot_be_is_refused() {
+fn a_manifest_with_impossible_entries_is_refused() {
     let folder = reported();
     let at = folder.path();
     let sound: Value = serde_json::from_slice(&fs::read(at.join("mine/manifest.json")).unwrap()).unwrap();

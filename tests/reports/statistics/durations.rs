@@ -42,7 +42,7 @@ fn chance_is_tested_among_finished_episodes_too() {
 
 /// An episode with a decision is earlier than one without; ties count half.
 #[test]
-fn improvement_is_counted_among_decisions_and_none() {
+fn improvement_counts_decided_and_undecided_episodes() {
     let table = table(&study());
     let options = Options { improvements: true, ..Options::default() };
     let found = Statistics::of(&table, &cells(&table), &options).unwrap();
@@ -54,7 +54,7 @@ fn improvement_is_counted_among_decisions_and_none() {
 }
 
 #[test]
-fn a_difference_that_nothing_could_show_is_said_to_be_none() {
+fn a_difference_that_no_outcome_could_show_is_reported_as_untestable() {
     let rows: Vec<Row> = (0..3).flat_map(|run| [("E1", "a", 0, run, true, 9), ("E1", "b", 0, run, false, 9)]).collect();
     let said =
         |found: &Statistics| found.conclusions.iter().find(|line| line.contains("cannot show any difference")).cloned();
@@ -64,7 +64,7 @@ fn a_difference_that_nothing_could_show_is_said_to_be_none() {
 
 /// Intervals whose coverage was not found to be 90 % are not given, and none is a point or leaves the budget.
 #[test]
-fn intervals_hold_what_they_promise_or_give_the_reason() {
+fn intervals_cover_as_promised_or_give_a_reason() {
     let two = statistics(&[("E1", "a", 0, 0, true, 10), ("E1", "a", 0, 1, true, 20)]);
     let Intervals::Quantity { student_t: None, student_t_withheld, bootstrap: None, bootstrap_withheld } =
         two.cells[1].intervals
@@ -129,7 +129,7 @@ fn points(value: &serde_json::Value) -> Vec<String> {
 }
 
 #[test]
-fn the_dagger_is_explained_where_it_stands_and_only_there() {
+fn the_dagger_is_explained_only_where_it_is_used() {
     let found = statistics(&[block("E1", "a", 4, 9), block("E1", "b", 0, 9)].concat());
     let with = found.render(&["MTATO".to_owned()], Length::Short, None);
     assert!(with.contains('†') && with.contains("† fewer than 5 defined episodes"), "{with}");

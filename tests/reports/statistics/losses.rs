@@ -31,7 +31,7 @@ fn answer<'s>(found: &'s Statistics, question: &str, metric: &str) -> &'s str {
 // scipy 1.17.1: fisher_exact([[18, 3], [2, 9]]).pvalue, the same with 2 of 21 and with 12 of 21;
 // binomtest(2, 21, 1/3).pvalue, binomtest(12, 21, 1/3).pvalue
 #[test]
-fn a_verdict_that_lost_episodes_could_turn_is_none() {
+fn lost_episodes_that_could_turn_a_verdict_withhold_it() {
     let table = table(&of("a", 18, 21).chain(of("b", 2, 11)).collect::<Vec<_>>());
     let known = Statistics::of(&table, &cells(&table), &lost_of_b(0)).unwrap();
     assert!(test(&known, "TSA").separated && test(&known, "TSA").losses.is_none());
@@ -70,7 +70,7 @@ fn a_lost_episode_counts_as_a_pair_against_a_known_outcome() {
 
 /// Nine steps against sixty is a difference, however fast a few lost episodes were; not if they were half of all.
 #[test]
-fn a_difference_of_durations_stands_if_lost_episodes_could_not_turn_it() {
+fn a_difference_of_durations_is_kept_if_losses_cannot_turn_it() {
     let table = table(&of("a", 21, 21).chain(of("b", 1, 21)).collect::<Vec<_>>());
     let of_lost = |count| Statistics::of(&table, &cells(&table), &lost_of_b(count)).unwrap();
     let (few, many) = (of_lost(1), of_lost(200));
@@ -79,7 +79,7 @@ fn a_difference_of_durations_stands_if_lost_episodes_could_not_turn_it() {
 }
 
 #[test]
-fn a_filter_by_results_and_pooling_stand_beside_each_answer() {
+fn each_answer_names_a_filter_by_results_and_pooling() {
     let table = table(&of("a", 21, 21).collect::<Vec<_>>());
     let selection = Some(Selection { condition: "TSA = 1".into(), by_results: true });
     let caveats = vec!["recordings are pooled".to_owned()];

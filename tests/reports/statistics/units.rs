@@ -25,7 +25,7 @@ fn is_silent(found: &Statistics, units: &str) -> bool {
 }
 
 #[test]
-fn three_scenes_say_nothing_however_often_they_are_repeated() {
+fn three_scenes_give_no_verdict_at_any_number_of_repeats() {
     for repeats in [3, 7] {
         let found = with_scenes(&opposed(3, repeats), RECORDED, by_scene);
         assert!(is_silent(&found, "3 scenes"), "{:?}", found.answers);
@@ -79,7 +79,7 @@ fn a_scene_of_four_experiments_counts_once() {
 
 // Six pairs: the least p of McNemar's test is 1/32, above 0.05 / 10. Five models against 1/3: 1/3^6 is below 0.05 / 5.
 #[test]
-fn a_family_without_any_possible_verdict_is_told_from_one_without_a_difference() {
+fn an_untestable_family_differs_from_one_without_a_difference() {
     let rows: Vec<Row> = ["a", "b", "c", "d", "e"]
         .into_iter()
         .flat_map(|model| (0..6).map(move |scene| ("E1", model, scene, 0, model < "c", 9)))
@@ -113,7 +113,7 @@ fn half_of_the_episodes_in_pairs_do_not_hide_the_other_half() {
 
 // Two pairs: the least p of McNemar's test is 1/2. Two episodes against 1/3: the least p of the binomial test is 1/9.
 #[test]
-fn episodes_too_few_for_any_verdict_are_told_from_those_that_show_nothing() {
+fn too_few_episodes_differ_from_no_difference() {
     let rows = |n: i32| {
         let of = |model, solved| (0..n).map(move |at| ("E1", model, at, 0, solved, 9));
         of("a", true).chain(of("b", true)).collect::<Vec<Row>>()
@@ -130,7 +130,7 @@ fn episodes_too_few_for_any_verdict_are_told_from_those_that_show_nothing() {
 
 // 6 episodes against 1/3: the least p is 1/729, above 0.05 / 37.
 #[test]
-fn episodes_too_few_for_so_many_models_are_told_too() {
+fn too_few_episodes_for_many_models_are_reported() {
     let models: Vec<String> = (0..37).map(|at| format!("m{at}")).collect();
     let rows: Vec<Row> =
         models.iter().flat_map(|model| (0..6).map(move |at| ("E1", model.as_str(), at, 0, true, 9))).collect();
@@ -141,7 +141,7 @@ fn episodes_too_few_for_so_many_models_are_told_too() {
 
 // 2 of 2 against 1/10: p is 1/100, and two episodes are as few as elsewhere.
 #[test]
-fn two_episodes_say_nothing_however_low_the_level_is() {
+fn two_episodes_give_no_verdict_at_any_level() {
     let rows: Vec<Row> = (0..2).map(|at| ("E5", "a", at, 0, true, 9)).collect();
     let found = with_scenes(&rows, RECORDED, by_scene);
     let row = found.chance.iter().find(|row| row.metric == "TSA").unwrap();
@@ -198,7 +198,7 @@ fn interrupted_repeats_leave_durations_untested() {
 // Python: mean squares within scenes, 3.5 / 7 over 14 episodes and 2.5 / 6 over 13
 // episodes: (0.5 / 14 + 2.5 / 6 / 13) ** 0.5; no rate varies.
 #[test]
-fn the_noise_of_repeats_stands_beside_a_difference() {
+fn a_difference_has_the_noise_of_repeats_beside_it() {
     let mut rows = timed(7);
     rows.pop();
     let found = with_scenes(&rows, RECORDED, by_scene);

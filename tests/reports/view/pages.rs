@@ -41,7 +41,7 @@ fn from_the_report_to_the_step_that_decided() {
 }
 
 #[test]
-fn filters_are_in_the_address_and_faults_are_told() {
+fn filters_are_in_the_address_and_faults_are_shown() {
     let folder = tempfile::tempdir().unwrap();
     let server = Server::start(folder.path(), &[PAPER]);
     let mut browser =
@@ -58,7 +58,7 @@ fn filters_are_in_the_address_and_faults_are_told() {
 }
 
 #[test]
-fn two_episodes_stand_beside_each_other_at_their_first_difference() {
+fn two_episodes_are_compared_at_their_first_difference() {
     let folder = tempfile::tempdir().unwrap();
     let server = Server::start(folder.path(), &[PAPER]);
     let ids = ["E1/gpt-5-1/s1/r1", "E1/qwen-3-6-plus/s1/r1"];

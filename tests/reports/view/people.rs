@@ -99,7 +99,7 @@ impl Person {
 }
 
 #[test]
-fn a_person_plays_and_nothing_tells_them_the_truth() {
+fn a_person_plays_without_seeing_the_truth() {
     need::drawing();
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("consent.txt"), "You may stop at any time.").unwrap();
@@ -329,7 +329,7 @@ fn no_step_counts_before_the_person_has_begun() {
 }
 
 #[test]
-fn a_reply_that_fails_is_told_and_sent_again() {
+fn a_failed_reply_is_reported_and_sent_again() {
     need::drawing();
     let folder = tempfile::tempdir().unwrap();
     let people = People::start(folder.path(), "P1", &["--runs", "1"]);

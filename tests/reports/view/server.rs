@@ -31,7 +31,7 @@ fn only_this_machine_and_its_own_page_are_answered() {
 }
 
 #[test]
-fn every_answer_says_what_a_page_may_do() {
+fn every_answer_has_the_pages_permissions() {
     let folder = tempfile::tempdir().unwrap();
     let server = Server::start(folder.path(), &[RECORDED]);
     for path in ["/", "/assets/main.js", "/assets/view.css", "/api/study", "/api/nothing", "/nowhere", "/robots.txt"] {
@@ -172,7 +172,7 @@ fn begun(folder: &Path) {
 }
 
 #[test]
-fn a_name_that_is_nothing_is_told_beside_a_recording_that_has_begun() {
+fn an_unknown_name_is_reported_beside_a_recording_in_progress() {
     let folder = tempfile::tempdir().unwrap();
     begun(folder.path());
     let server = Server::start(folder.path(), &["runs"]);
@@ -183,7 +183,7 @@ fn a_name_that_is_nothing_is_told_beside_a_recording_that_has_begun() {
 }
 
 #[test]
-fn a_folder_that_is_gone_is_told_and_the_page_stays() {
+fn a_removed_folder_is_reported_and_the_page_stays() {
     let folder = tempfile::tempdir().unwrap();
     let runs = folder.path().join("runs");
     std::fs::create_dir(&runs).unwrap();

@@ -69,7 +69,7 @@ fn a_folder_of_scores_is_one_table() {
 }
 
 #[test]
-fn nothing_changed_is_said_and_is_no_failure() {
+fn no_change_is_printed_and_is_no_failure() {
     let folder = folder();
     let answer = run(folder.path(), &["diff", "all.toml", "all.toml", "a.parquet", "--fail-on-change"]).ends(0);
     assert!(answer.stdout.contains("Nothing changed: 2 episodes in both, 1 metric in both"), "{}", answer.stdout);
@@ -87,7 +87,7 @@ fn a_change_fails_where_it_must_not_be() {
 }
 
 #[test]
-fn what_only_one_side_has_is_told_and_fails() {
+fn items_of_one_side_are_listed_and_fail() {
     let folder = folder();
     let at = folder.path();
     run(at, &["score", "a.parquet", "--definitions", "all.toml", "-o", "a.scores.parquet"]).ends(0);
@@ -140,7 +140,7 @@ fn long_lists_are_cut_and_say_so() {
 }
 
 #[test]
-fn what_cannot_be_compared_is_refused() {
+fn incomparable_sides_are_refused() {
     let folder = folder();
     let at = folder.path();
     for (arguments, expected) in [

@@ -64,7 +64,7 @@ fn a_choice_of_metrics_is_kept() {
 }
 
 #[test]
-fn traces_are_found_from_anywhere_by_what_they_are() {
+fn traces_are_found_anywhere_by_their_hash() {
     let folder = reported();
     let at = folder.path();
     let elsewhere = secluded();
@@ -85,7 +85,7 @@ fn traces_are_found_from_anywhere_by_what_they_are() {
 }
 
 #[test]
-fn every_trace_that_changed_is_told_and_nothing_is_written() {
+fn every_changed_trace_is_named_and_nothing_is_written() {
     let folder = reported();
     let at = folder.path();
     fs::copy(at.join("b.parquet"), at.join("a.parquet")).unwrap();

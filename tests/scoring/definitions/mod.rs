@@ -24,7 +24,7 @@ fn with_expression(text: &str) -> Result<Definitions, FileError> {
 }
 
 #[test]
-fn every_fault_is_told_in_its_place() {
+fn every_fault_is_reported_at_its_location() {
     let folder = "tests/scoring/definitions/faults";
     let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
     let mut files: Vec<_> = entries.filter(|path| path.extension().is_some_and(|ending| ending == "toml")).collect();
@@ -45,7 +45,7 @@ fn every_fault_is_told_in_its_place() {
 }
 
 #[test]
-fn what_says_nothing_has_no_fault() {
+fn an_empty_file_has_no_fault() {
     for text in ["", "\n\n", "# words\n", "[let]\n", "open = true\n", "include = []\n", "[let]\nunused = \"t\"\n"] {
         let definitions = check(text).unwrap_or_else(|error| panic!("{text:?}: {error}"));
         assert!(definitions.catalog.metric.is_empty());

@@ -137,7 +137,7 @@ fn random_definitions_are_the_same_on_duckdb() {
 }
 
 #[test]
-fn what_does_not_fit_together_is_a_fault() {
+fn contradictory_answers_are_faults() {
     let names = ["all", "t", "f", "n"]
         .map(|part| ["count", "any", "first", "last", "min", "max", "sum"].map(|name| format!("{part}_{name}")));
     let mut names = names.concat();

@@ -63,7 +63,7 @@ fn a_value_of_another_type_or_out_of_range() {
 }
 
 #[test]
-fn a_name_that_is_none() {
+fn an_invalid_name() {
     check(json!({ "action": "Done" }), ACTIONS, "the text `Done`", "did you mean `done`?");
     check(json!({ "action": "TURN_LEFT" }), ACTIONS, "the text `TURN_LEFT`", "did you mean `turn_left`?");
     check(json!({ "action": "" }), ACTIONS, "the text ``", SEE);
@@ -87,7 +87,7 @@ fn a_name_that_is_none() {
 }
 
 #[test]
-fn a_color_that_is_none() {
+fn an_invalid_color() {
     let [body, claim, cube] = [
         "the lower-case name of a colour",
         "the lower-case name of a colour, `unknown`, or null",

@@ -128,7 +128,7 @@ fn a_second_time_changes_nothing_and_gives_the_same_bytes() {
 }
 
 #[test]
-fn flips_are_told_to_programs_and_a_dry_run_writes_nothing() {
+fn flips_are_in_json_and_a_dry_run_writes_nothing() {
     let folder = tempfile::tempdir().unwrap();
     old(folder.path(), "x.parquet");
     let answer = run(folder.path(), &["x.parquet", "--dry-run", "--json"]);
@@ -214,7 +214,7 @@ fn recorded_traces_of_scripted_agents_stay() {
 }
 
 #[test]
-fn what_cannot_be_done_is_refused_and_nothing_is_written() {
+fn impossible_requests_are_refused_and_nothing_is_written() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     fs::create_dir(here.join("sub")).unwrap();

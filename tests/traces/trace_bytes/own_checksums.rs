@@ -229,7 +229,7 @@ fn a_damaged_trace_is_not_renormalized() {
 }
 
 #[test]
-fn checksums_that_are_none_are_refused() {
+fn invalid_checksums_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let [own, other] = ["own.parquet", "other.parquet"].map(|name| folder.path().join(name));
     fs::write(&own, trace()).unwrap();

@@ -313,7 +313,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_else_can_be_read_or_changed() {
+    fn queries_read_only_their_tables_and_change_nothing() {
         for text in [
             "",
             ";",

@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn expressions_of_any_name_say_what_finishes_and_what_is_completed() {
+    fn completion_follows_from_expressions_whatever_their_names() {
         for name in ["paper", "extended", "battery"] {
             let found = Relations::of(&Definitions::load(name, &schema_columns()).unwrap().catalog);
             assert_eq!(pairs(&found.durations), [("TTD", "TSA-C")], "{name}");
@@ -199,7 +199,7 @@ mod tests {
     const RATES: &str = "[metric.V]\nvalue = \"any(mirror_visible)\"\n[metric.D]\nvalue = \"length()\"\n";
 
     #[test]
-    fn a_failure_that_does_not_follow_is_declared_or_nothing() {
+    fn a_failure_is_declared_or_unknown() {
         let among = "[metric.C]\nvalue = \"V\"\nwhen = \"last(action = 'done') is not null\"\n";
         assert_eq!(of(&format!("{RATES}{among}")), Relations::default());
         let found = of(&format!("{RATES}finished = \"C\"\n{among}completes = \"V\"\n"));
@@ -207,14 +207,14 @@ mod tests {
     }
 
     #[test]
-    fn a_count_of_steps_that_is_declared_as_such_is_no_duration() {
+    fn a_declared_count_of_steps_is_no_duration() {
         let text =
             built_in("paper").unwrap().replace("value   = \"finish\"", "value = \"finish\"\nmeasures = \"count\"");
         assert!(of(&text).durations.is_empty());
     }
 
     #[test]
-    fn what_does_not_fit_a_metric_is_refused_where_it_is_written() {
+    fn a_declaration_that_does_not_fit_its_metric_is_refused_at_its_location() {
         let refused = |keys: &str| {
             let text =
                 format!("[metric.R]\nvalue = \"any(mirror_visible)\"\n[metric.Q]\nvalue = \"length()\"\n{keys}\n");

@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_traces_declared_comes_back_and_is_none_of_the_definitions() {
+    fn restored_definitions_leave_out_experiments_of_the_traces() {
         let paper = Definitions::load("paper", &columns()).unwrap().catalog;
         let mut catalog = paper.clone();
         let titled =

@@ -194,14 +194,14 @@ mod tests {
     }
 
     #[test]
-    fn what_may_be_null_is_not_always_defined() {
+    fn nullable_metrics_are_not_always_defined() {
         check("[metric.M]\nvalue = \"first(mirror_visible)\"", (1, 100), Defined::Sometimes, None);
         check("[metric.M]\nvalue = \"coalesce(first(mirror_visible), 0)\"", (0, 100), Defined::Always, None);
         check("[metric.M]\nvalue = \"case when any(mirror_visible) then 3 end\"", (3, 3), Defined::Sometimes, None);
     }
 
     #[test]
-    fn a_value_outside_is_known_only_where_it_follows() {
+    fn values_outside_the_range_are_reported_only_if_they_follow() {
         let metrics = |value: &str, when: &str| {
             format!(
                 "[let]\ndone = \"first(action = 'done')\"\n[metric.V]\nvalue = \"{value}\"\n[metric.M]\nvalue = \"V\"\nwhen = \"{when}\""

@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn each_aggregate_stands_in_the_first_pass_that_knows_what_it_reads() {
+    fn each_aggregate_is_in_the_first_pass_that_has_its_operands() {
         let plan = plan(
             r#"
             [let]
@@ -189,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_dialect_cannot_say_is_refused_by_name() {
+    fn unsupported_functions_of_a_dialect_are_refused_by_name() {
         let pattern = metric("any(regexp_like(action, 'd.n[e]'))");
         assert_eq!(lower(&pattern, Dialect::Portable), Err(LoweringError::Regexp { metric: "M".into() }));
         assert!(lower(&pattern, Dialect::Duckdb).unwrap().contains("regexp_matches(s.action, 'd.n[e]')"));
@@ -214,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn an_expression_looks_back_by_so_many_steps() {
+    fn lag_looks_back_by_its_number_of_steps() {
         let nested = |depth: usize| format!("max({}t{})", "lag(".repeat(depth), ")".repeat(depth));
         assert_eq!(lower(&metric(&nested(8)), Dialect::Duckdb).unwrap().matches("LEFT JOIN").count(), 8);
         let text =

@@ -136,7 +136,7 @@ mod tests {
     use super::java;
 
     #[test]
-    fn what_the_two_mean_differently_is_spelled_out() {
+    fn patterns_with_two_meanings_are_rewritten() {
         for (pattern, expected) in [
             ("d.n[e]$", r"d[^\x{A}]ne\z"),
             ("(?i)maybe|so", r"(?:[Mm][Aa][Yy][Bb][Ee]|[Ss\x{17F}][Oo])"),

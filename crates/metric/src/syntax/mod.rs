@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn quantifier_names_are_functions_wherever_they_stand() {
+    fn quantifier_names_are_functions_at_any_position() {
         for (text, expected) in [
             ("any(p)", "any(p)"),
             ("any(all(p))", "any(all(p))"),
@@ -200,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn every_refusal_names_what_and_where() {
+    fn every_refusal_names_its_problem_and_location() {
         let mut told = String::new();
         for text in [
             "",

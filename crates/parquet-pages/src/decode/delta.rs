@@ -108,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_length_is_refused() {
+    fn invalid_lengths_are_refused() {
         // Below zero; no small blocks; more of them than there are.
         for data in [&[0x80, 1, 4, 1, 13][..], &[0x80, 1, 0, 1, 14], &[0x80, 0x80, 0x80, 1, 0x80, 0x80, 8, 1, 14]] {
             assert!(sum(data).is_err(), "{data:?}");

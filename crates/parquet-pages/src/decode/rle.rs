@@ -310,7 +310,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_was_packed_comes_back(width in 1..=32_u8, words in vec(any::<u32>(), 1..80), same in any::<u32>(), most in 1..40_usize) {
+        fn packed_values_round_trip(width in 1..=32_u8, words in vec(any::<u32>(), 1..80), same in any::<u32>(), most in 1..40_usize) {
             let mask = u32::MAX >> (32 - width);
             let mut values: Vec<u32> = words.iter().map(|word| word & mask).collect();
             let mut data = packed(&values, width);

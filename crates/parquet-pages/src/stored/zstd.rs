@@ -42,7 +42,7 @@ mod tests {
     use super::inflated;
 
     #[test]
-    fn a_page_is_its_levels_and_what_its_frame_holds_and_nothing_else() {
+    fn a_page_is_its_levels_and_its_frame_and_nothing_else() {
         let frame = zstd::bulk::compress(b"values of a page", 1).unwrap();
         let stored = [b"levels", &frame[..]].concat();
         assert_eq!(inflated(&stored, 6, 22).as_deref(), Ok(&b"levelsvalues of a page"[..]));

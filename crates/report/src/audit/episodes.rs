@@ -84,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_number_of_episodes_is_refused() {
+    fn invalid_numbers_of_episodes_are_refused() {
         let message = |text: &str| text.parse::<Episodes>().unwrap_err().to_string();
         for text in ["", "0", "-1", "2001", "2.5", "E1=", "21,"] {
             assert!(message(text).starts_with("expected a number of episodes from 1 to 2000, found `"), "{text}");

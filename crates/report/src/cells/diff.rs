@@ -405,7 +405,7 @@ mod tests {
     }
 
     #[test]
-    fn episodes_of_one_side_alone_are_told_and_flip_nothing() {
+    fn episodes_of_one_side_are_listed_and_flip_nothing() {
         let changes = changes(&table(RATE, 0, &[Some(1), Some(1)]), &table(RATE, 1, &[Some(1), Some(1)]));
         let ids = |names: &[super::EpisodeName]| names.iter().map(|n| n.episode_id.clone()).collect::<Vec<_>>();
         assert_eq!(ids(&changes.episodes.only_before), ["e0"]);
@@ -421,7 +421,7 @@ mod tests {
     }
 
     #[test]
-    fn metrics_of_one_side_alone_are_told() {
+    fn metrics_of_one_side_are_listed() {
         let mut other = table(RATE, 0, &[Some(1)]);
         other.metrics[0].name = "S".into();
         let changes = changes(&table(RATE, 0, &[Some(1)]), &other);

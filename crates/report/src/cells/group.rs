@@ -303,7 +303,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_grouped_by_is_named() {
+    fn an_unknown_group_column_is_named() {
         let table = table(&[("E1", "a", 1, None, None)]);
         let message = |names: &[&str]| group(&table, &by(names)).unwrap_err().to_string();
         insta::assert_snapshot!(message(&["modle"]), @"cannot group by `modle`: expected one of experiment, model, seed, run, episode_id, distractors; did you mean `model`?");

@@ -98,7 +98,7 @@ mod tests {
     use crate::changes::Limit;
 
     #[test]
-    fn long_lists_say_what_they_leave_out() {
+    fn long_lists_count_their_omissions() {
         assert_eq!(left_out(5, Limit(5)), None);
         assert_eq!(left_out(7, Limit(5)).unwrap(), "2 more: --limit shows more, --json all");
         let odd: Vec<i64> = (0..10).map(|at| 2 * at + 1).collect();

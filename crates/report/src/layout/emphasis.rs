@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_stands_out_where_nothing_is_better() {
+    fn no_cell_stands_out_without_a_better_direction() {
         check(&[(1, 2), (1, 3)], Neither, PrintedMean, "..");
         check(&[(1, 2), (1, 3)], Higher, EmphasisRule::None, "..");
         check(&[(0, 0), (0, 0)], Higher, PrintedMean, "..");

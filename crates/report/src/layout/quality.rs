@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_recorded_is_not_zero() {
+    fn unrecorded_quality_is_not_zero() {
         let table = of_cells(&cells("default")).unwrap().printed;
         let rows: Vec<Vec<&str>> =
             table.rows().map(|row| row.iter().map(|cell| cell.text.as_str()).collect()).collect();

@@ -49,7 +49,7 @@ fn the_papers_episodes_show_what_the_reference_says() {
 }
 
 #[test]
-fn what_cannot_be_is_refused() {
+fn impossible_plans_are_refused() {
     let message = |request: PlanRequest| plan(request).unwrap_err().to_string();
     let told = [
         message(PlanRequest { given: Given::Difference(0.6), baseline: Some(0.5), ..PAPER }),

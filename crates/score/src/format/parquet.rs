@@ -368,7 +368,7 @@ mod tests {
     }
 
     #[test]
-    fn a_full_disk_is_told_wherever_it_is_full() {
+    fn a_full_disk_is_reported_at_any_write() {
         let table = table();
         let mut bytes = Vec::new();
         format::write(&table, Format::Parquet, &mut bytes).unwrap();

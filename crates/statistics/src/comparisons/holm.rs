@@ -41,7 +41,7 @@ mod tests {
     }
 
     #[test]
-    fn the_level_is_what_the_confidence_leaves() {
+    fn the_level_is_one_minus_the_confidence() {
         assert_eq!((level(0.95), level(0.99), level(1.0)), (Some(0.05), Some(0.01), None));
     }
 

@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_spread_has_no_interval_and_what_lacks_a_side_no_answer() {
+    fn no_spread_gives_no_interval_and_a_missing_side_no_answer() {
         let (high, low) = ([2, 3].repeat(30), [0, 1].repeat(30));
         assert_eq!(of(&[(&high, &low)]), Some(Improvement { probability: 1.0, interval: None }));
         let many = vec![7; 3000];

@@ -267,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn what_says_nothing_has_no_answer_and_no_interval_without_a_width() {
+    fn empty_strata_have_no_answer_and_no_width_gives_no_interval() {
         let lone = strata(&[((1, 2), (0, 0)), ((0, 0), (3, 4))]);
         assert_eq!((common_difference(&lone, 0.95), cochran_mantel_haenszel(&lone), exact(&lone)), (None, None, None));
         let wrong = strata(&[((3, 2), (1, 2))]);

@@ -82,7 +82,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_differ_is_no_evidence_and_what_is_no_table_has_no_test() {
+    fn equal_sides_are_no_evidence_and_an_invalid_table_has_no_test() {
         for (first, second) in [((0, 5), (0, 7)), ((5, 5), (7, 7))] {
             let found = fisher(first, second).unwrap();
             assert_eq!((found.p, found.mid_p, fisher_least_p(first, second)), (1.0, 1.0, Some(1.0)));

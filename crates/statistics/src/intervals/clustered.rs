@@ -208,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_said_where_nothing_can_be() {
+    fn too_few_clusters_have_no_interval() {
         assert_eq!(clustered(&[], 0.95), None);
         assert_eq!(clustered(&[of(&[1, 0, 1]), of(&[])], 0.95), None);
         let alike = clustered(&[of(&[1, 1]), of(&[1, 1])], 0.95).unwrap();

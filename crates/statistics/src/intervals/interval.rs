@@ -134,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_undefined_has_no_interval() {
+    fn undefined_rates_have_no_interval() {
         assert_eq!(wilson(0, 0, 0.95), None);
         assert_eq!(wilson(3, 2, 0.95), None);
         for confidence in [0.0, 1.0, -0.5, f64::NAN] {

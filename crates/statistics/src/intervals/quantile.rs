@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tail_is_half_of_what_a_confidence_leaves() {
+    fn a_tail_is_half_of_one_minus_the_confidence() {
         assert_eq!(tail(0.95), Some(0.025));
         assert_eq!([tail(0.0), tail(1.0), tail(1.5), tail(f64::NAN)], [None; 4]);
     }

@@ -209,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn a_place_that_was_told_is_the_only_one() {
+    fn a_given_folder_is_the_only_one_searched() {
         assert_eq!(places(Path::new("r"), &[PathBuf::from("there")]), [PathBuf::from("there")]);
     }
 

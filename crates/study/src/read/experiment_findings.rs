@@ -89,7 +89,7 @@ mod tests {
     use metric::definitions::Definitions;
 
     #[test]
-    fn what_differs_is_told_and_what_only_one_gives_is_not() {
+    fn differing_declarations_are_reported_and_missing_ones_are_not() {
         let catalog = Definitions::load("paper", &schema_columns()).unwrap().catalog;
         let known = &catalog.experiment["E5"];
         let mut declared = DeclaredExperiment {

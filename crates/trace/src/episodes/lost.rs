@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_that_is_none_is_named() {
+    fn an_invalid_line_is_named() {
         let folder = tempfile::tempdir().unwrap();
         let list = list_of(folder.path());
         std::fs::write(&list, format!("{LINE}\n\n{{\"model\":7}}\n")).unwrap();

@@ -135,7 +135,7 @@ mod tests {
     use super::{Cluster, Declared, Origin};
 
     #[test]
-    fn files_declare_together_what_each_declares() {
+    fn files_declare_together_their_common_declarations() {
         let import = Declared::of_recording(Some(r#"{"kind":"import","design":{"cluster":"seed"}}"#));
         assert_eq!((import.origin, import.cluster), (Some(Origin::Import), Some(Cluster::Seed)));
         let recording = Declared::of_recording(Some(
@@ -162,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_said_is_not_declared() {
+    fn an_absent_key_declares_nothing() {
         for text in [None, Some("no JSON"), Some("7"), Some(r#"{"kind":"other","design":7,"fingerprints":[]}"#)] {
             assert_eq!(Declared::of_recording(text), Declared::default(), "{text:?}");
         }

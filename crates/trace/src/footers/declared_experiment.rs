@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn what_declares_nothing_is_no_fault() {
+    fn an_empty_declaration_is_no_fault() {
         for text in [
             None,
             Some("no JSON"),

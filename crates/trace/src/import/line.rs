@@ -181,7 +181,7 @@ mod tests {
     use super::{Value, members};
 
     #[test]
-    fn numbers_stay_what_they_are_written_as() {
+    fn numbers_keep_their_spelling() {
         let line = r#"{"a":1,"b":1.0,"c":-9223372036854775808,"d":18446744073709551615,"e":1e3,"f":null}"#;
         let values: Vec<_> = members(line.as_bytes(), true).unwrap().into_iter().map(|(_, value)| value).collect();
         let (int, float) = (Value::Int, Value::Float);
@@ -190,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_flat_object_is_told() {
+    fn nested_objects_are_reported() {
         let deep = format!("{}{}", "[".repeat(100_000), "]".repeat(100_000));
         for (line, expected, found) in [
             ("[1]", "a JSON object, one step", "a list"),
@@ -208,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn help_knows_what_python_writes_and_what_a_crash_leaves() {
+    fn the_remedy_names_pythons_nan_and_cut_lines() {
         let help = |line: &str, ended| members(line.as_bytes(), ended).unwrap_err().help;
         for line in [r#"{"a": NaN}"#, r#"{"a": Infinity}"#, r#"{"a": -Infinity}"#] {
             assert!(help(line, true).contains("no NaN"), "{line}: {}", help(line, true));

@@ -332,7 +332,7 @@ mod tests {
     }
 
     #[test]
-    fn every_column_gives_what_was_put_into_its_field() {
+    fn every_column_returns_its_fields_value() {
         for column in COLUMNS {
             let mut episode = Episode { steps: vec![Step::default(); 2], ..Episode::default() };
             let value = match column.stored.kind() {

@@ -273,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn a_recording_that_tells_none_is_told_it() {
+    fn a_recording_without_a_version_gets_one() {
         let mut recording = json!({ "kind": "import" });
         assert_eq!(put_version(&mut recording), None);
         assert_eq!(recording, json!({ "kind": "import", "identification_version": VERSION }));

@@ -9,7 +9,7 @@ fn faults(text: &str) -> Vec<String> {
 }
 
 #[test]
-fn the_five_of_the_paper_come_first_and_are_what_the_paper_says() {
+fn the_papers_five_experiments_come_first_and_match_the_paper() {
     assert_eq!(Experiment::PAPER.map(Experiment::name), ["E1", "E2", "E3", "E4", "E5"]);
     assert_eq!(built_in_names()[..5], ["E1", "E2", "E3", "E4", "E5"]);
     let [e1, e2, e3, e4, e5] = Experiment::PAPER;
@@ -29,7 +29,7 @@ fn the_five_of_the_paper_come_first_and_are_what_the_paper_says() {
 }
 
 #[test]
-fn the_definitions_of_the_battery_say_of_its_experiments_what_their_files_say() {
+fn the_batterys_definitions_agree_with_its_experiment_files() {
     let document = metric::file::read("battery").unwrap();
     let all = built_in_names().into_iter().flat_map(Experiment::parse);
     for experiment in all.filter(|experiment| experiment.hand.is_none()) {
@@ -54,7 +54,7 @@ fn an_experiment_comes_back_from_a_footer() {
 }
 
 #[test]
-fn every_fault_is_told_at_once_with_its_line() {
+fn every_fault_is_reported_at_once_with_its_line() {
     let text = r#"
 [experiment.E1]
 title = "Mine"
@@ -83,7 +83,7 @@ on = "other"
 }
 
 #[test]
-fn what_fits_only_together_is_held_against_each_other() {
+fn keys_that_depend_on_each_other_are_checked_together() {
     let head = "[experiment.X]\ntitle = \"X\"\nprompt = \"cube-selection\"\n";
     let of = |rest: &str| faults(&format!("{head}{rest}"));
     insta::assert_snapshot!(

@@ -83,7 +83,7 @@ mod tests {
     }
 
     #[test]
-    fn a_list_holds_what_is_in_no_trace() {
+    fn the_list_of_losses_has_only_episodes_without_rows() {
         let folder = tempfile::tempdir().unwrap();
         let list = list_of(folder.path());
         let ids =

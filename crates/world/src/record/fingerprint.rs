@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn the_order_of_keys_is_nothing() {
+    fn the_order_of_keys_does_not_matter() {
         let [one, other] = [r#"{"agent":{"a":1,"b":2}}"#, r#"{"agent":{"b":2,"a":1}}"#];
         let of = |text: &str| Fingerprint::of(&serde_json::from_str(text).unwrap(), None);
         assert_eq!(of(one), of(other));

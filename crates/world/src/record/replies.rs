@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_is_so_by_its_place_and_told_once() {
+    fn the_first_unusable_reply_is_the_first_by_place_and_printed_once() {
         let replies = Replies::default();
         let key = |run| Key::first(Experiment::E1, 1, run);
         assert_eq!(replies.add(&Subject::of("m"), key(2), 1, &row("ok", None)), None);

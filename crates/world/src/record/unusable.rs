@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn so_many_in_a_row_of_an_episode_or_of_all_end_it() {
+    fn consecutive_unusable_replies_stop_the_recording() {
         let bad = |run| (run, "parse_failed");
         let good = |run| (run, "ok");
         for (replies, expected) in [
@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn the_sentence_says_who_how_many_and_what_was_replied() {
+    fn the_message_has_agent_count_and_reply() {
         let (_, unusable) = stops_after(2, &[(1, "parse_failed"), (2, "refusal")]);
         let words = unusable.given_up().unwrap().to_string();
         let expected = "the agent `m` gave 2 replies in a row without a decision; the last: refusal: `I go \\u{1b}on.` \

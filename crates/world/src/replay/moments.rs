@@ -85,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    fn moments_are_told_in_order() {
+    fn moments_are_listed_in_order() {
         let found = moments(&episode(30, 12, 7));
         assert_eq!(found, [(7, Moment::FirstClaim), (12, Moment::FirstSight), (30, Moment::Decision)]);
     }

@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn twelve_turns_are_none() {
+    fn twelve_turns_return_to_the_start() {
         let step = Heading::new(1).rotation();
         let turned = (0..24).fold(Quaternion([1.0, 0.0, 0.0, 0.0]), |sum, _| step.after(sum));
         assert!((turned.0[0] - 1.0).abs() < 1e-12, "{turned:?}");

@@ -142,7 +142,7 @@ mod tests {
     use super::confidence;
 
     #[test]
-    fn a_confidence_lies_strictly_between_zero_and_one() {
+    fn a_confidence_is_strictly_between_zero_and_one() {
         assert_eq!(confidence("0.99"), Ok(0.99));
         for text in ["0", "1", "95", "-0.5", "NaN", "", "95%"] {
             assert!(confidence(text).unwrap_err().contains("between 0 and 1"), "{text}");

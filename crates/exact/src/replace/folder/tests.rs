@@ -197,7 +197,7 @@ fn links_and_permissions_stay_and_folders_of_old_files_go() {
 }
 
 #[test]
-fn what_has_no_room_changes_nothing() {
+fn a_full_disk_changes_nothing() {
     let home = tempfile::tempdir().unwrap();
     let out = home.path().join("out");
     old_folder(&out);

@@ -64,7 +64,7 @@ mod tests {
     use crate::figures::kit::palette::PALETTE;
 
     #[test]
-    fn a_pinned_model_keeps_its_style_whoever_else_is_there() {
+    fn a_pinned_model_keeps_its_style_beside_any_others() {
         let style = |models: &[&str]| {
             let roster = Roster::new(models, &[]);
             roster.0.iter().find(|member| member.model == "GPT 5.1").map(|m| (m.style.color, m.style.marker))

@@ -83,7 +83,7 @@ mod tests {
     use super::from_slice;
 
     #[test]
-    fn only_numbers_that_are_none_become_null() {
+    fn only_nan_becomes_null() {
         let text = r#"{"a":NaN,"b":[-Infinity,Infinity,-1.5],"c":"NaN \" Infinity \\","d":"-","e":NaN}"#;
         let expected = json!({"a": null, "b": [null, null, -1.5], "c": "NaN \" Infinity \\", "d": "-", "e": null});
         assert_eq!(from_slice::<Value>(text.as_bytes()).unwrap(), expected);

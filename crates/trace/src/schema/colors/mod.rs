@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn a_name_that_differs_by_case_or_white_space_is_none() {
+    fn a_colour_with_other_case_or_white_space_is_invalid() {
         for column in COLOR_COLUMNS {
             for (text, meant) in MISSPELLED {
                 assert!(!column.may_hold(text, None), "{} {text:?}", column.name);

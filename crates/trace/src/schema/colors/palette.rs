@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn names_are_a_palette_or_it_is_said_why_not() {
+    fn invalid_palettes_have_a_reason() {
         let palette = |names: &[&'static str]| Palette::of_names(names.iter().copied());
         assert_eq!(palette(&["teal", "dark red"]).unwrap().names(), ["teal", "dark red"]);
         assert_eq!(Palette::of_study(), palette(&Color::ALL.map(Color::name)).unwrap());

@@ -90,7 +90,7 @@ mod tests {
     use super::{STRAY, normal};
 
     #[test]
-    fn the_pattern_says_what_the_normal_form_says() {
+    fn the_pattern_agrees_with_the_normal_form() {
         let stray = Regex::new(STRAY).unwrap();
         for c in ('\0'..='\u{ffff}').chain('\u{e0000}'..='\u{e00ff}') {
             let lower = c.to_lowercase().collect::<String>();

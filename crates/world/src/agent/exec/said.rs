@@ -112,7 +112,7 @@ mod tests {
     use super::{IN_FILE, IN_MESSAGE, Kept, MARGIN, Said, Secret};
 
     #[test]
-    fn the_end_of_what_was_said_is_kept() {
+    fn the_end_of_standard_error_is_kept() {
         let said = Said::default();
         assert_eq!((said.bytes(&[]), said.last_words(&[])), (Vec::new(), None));
         said.add(b" \n");
@@ -154,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_is_of_the_last_time_and_none_if_nothing_was_said() {
+    fn the_file_has_the_last_output_and_is_absent_without_one() {
         let folder = tempfile::tempdir().unwrap();
         let of = |words: &[u8]| {
             let kept = Kept::new(&folder.path().join("stderr"), "E1/own/s1/r2", [].into());

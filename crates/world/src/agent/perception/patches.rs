@@ -142,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cup_is_one_patch_and_what_is_in_it_another() {
+    fn a_cup_and_its_content_are_two_patches() {
         let expected = vec![(Color::Red, 11, [0, 4, 0, 3]), (Color::Green, 1, [2, 2, 1, 1])];
         assert_eq!(found(&["R...R", "R.G.R", "R...R", "RRRRR"]), expected);
     }

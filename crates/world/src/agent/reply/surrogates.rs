@@ -76,7 +76,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_escape_is_left() {
+    fn other_text_than_escapes_is_kept() {
         for text in ["", "\\", "\\u", "\\ud8", "\\ud80g", "\\\\ud800", "\\u00e9", "\\n", "\\é", "ud800", "\\u+123"] {
             assert_eq!(without_lone_surrogates(text), None, "{text}");
         }

@@ -165,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn whoever_stands_too_near_may_leave() {
+    fn a_body_too_near_an_obstacle_may_leave() {
         let obstacle = Obstacle { place: Place { x: -0.3, y: 0.0 }, radius: 0.8 };
         assert_eq!(walk(Place { x: 2.0, y: 0.0 }, &[obstacle]).len(), 5);
     }

@@ -285,7 +285,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_loss_of_power_leaves_of_the_last_line_is_dropped() {
+    fn a_last_line_cut_by_a_loss_of_power_is_dropped() {
         let folder = tempfile::tempdir().unwrap();
         let path = with_lines(folder.path(), 2);
         let whole = fs::read(&path).unwrap();
@@ -329,7 +329,7 @@ mod tests {
     }
 
     #[test]
-    fn a_damaged_line_is_told() {
+    fn a_damaged_line_is_reported() {
         let folder = tempfile::tempdir().unwrap();
         let path = with_lines(folder.path(), 3);
         let text = fs::read_to_string(&path).unwrap();

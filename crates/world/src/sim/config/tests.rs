@@ -13,13 +13,13 @@ fn check_fault(text: &str, expected: &str) {
 }
 
 #[test]
-fn the_default_is_what_an_empty_file_gives() {
+fn an_empty_file_gives_the_default() {
     assert_eq!(WorldConfig::from_toml("").unwrap(), WorldConfig::default());
     assert_eq!(WorldConfig::from_toml(WorldConfig::default_text()).unwrap(), WorldConfig::default());
 }
 
 #[test]
-fn a_file_says_what_differs_and_whole_numbers_are_numbers() {
+fn a_file_overrides_defaults_and_takes_whole_numbers() {
     let config = WorldConfig::from_toml("[room]\nsize = 7\n[evidence]\nmirror_self_px = 80").unwrap();
     assert!((config.room.size - 7.0).abs() < f64::EPSILON);
     assert_eq!(config.evidence.mirror_self_px, 80);
@@ -34,14 +34,14 @@ fn the_hash_is_of_the_values() {
 }
 
 #[test]
-fn what_is_stored_as_json_comes_back() {
+fn json_round_trips() {
     let config = WorldConfig::from_toml("eye.forward = 0.149\nroom.size = 7.77").unwrap();
     let stored = serde_json::to_string(&config).unwrap();
     assert_eq!(serde_json::from_str::<WorldConfig>(&stored).unwrap(), config);
 }
 
 #[test]
-fn faults_name_line_key_and_what_may_be() {
+fn faults_name_line_key_and_valid_values() {
     check_fault("\n[room]\nsise = 8.0", "3: unknown key `sise` did you mean `size`?");
     check_fault("[room]\nsize = \"8\"", "2: expected a number, found string");
     check_fault("[room]\n\nsize = 80.0", "3: `size` may be 5 to 12, but is 80");

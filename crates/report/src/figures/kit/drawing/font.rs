@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_drawn_stays_one_character_and_blanks_collapse() {
+    fn unknown_characters_are_drawn_as_one_box_and_blanks_collapse() {
         assert_eq!(drawable("a\u{4e2d}\u{6587}b"), "a□□b");
         assert_eq!(drawable("  a\t\n b\u{0}"), "a b");
         assert_eq!(drawable("Ωμέγα Ж é"), "Ωμέγα Ж é");

@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn what_differs_is_what_remains() {
+    fn shortened_names_keep_their_differences() {
         let names = ["vendor/model-of-many-sizes-07b-instruct", "vendor/model-of-many-sizes-70b-instruct"];
         let shown = fitted(&names, 120.0, LETTERING);
         assert!(shown[0].contains("07b") && shown[1].contains("70b"), "{shown:?}");

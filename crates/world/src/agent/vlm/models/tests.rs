@@ -27,7 +27,7 @@ fn cached_tokens_have_a_price_of_their_own() {
 }
 
 #[test]
-fn a_temperature_and_what_a_body_has_besides_are_of_the_model() {
+fn temperature_and_extra_body_are_per_model() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("own.toml");
     let own = |keys: &str| {
@@ -54,7 +54,7 @@ fn a_temperature_and_what_a_body_has_besides_are_of_the_model() {
 }
 
 #[test]
-fn an_id_that_no_file_knows_goes_where_ids_of_its_form_go() {
+fn an_unknown_id_goes_to_the_provider_of_its_form() {
     let models = Models::load(None).unwrap();
     for (id, backend) in
         [("gpt-9-x", "openai"), ("claude-x-1", "anthropic"), ("gemini-9", "google"), ("a/b:free", "openrouter")]

@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn other_errors_are_none() {
+    fn other_errors_are_no_refusals() {
         let long = "This model's maximum context length is 8192 tokens";
         for body in [
             Value::Null,

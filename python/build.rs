@@ -1,4 +1,4 @@
-//! Tells the native library that MuJoCo's library lies beside it.
+//! Tells the native library that MuJoCo's library is beside it.
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");

@@ -44,7 +44,7 @@ class Shapes:
             taken = self.known.get(name)
             names[name] = name if taken in (None, (shape, names)) or taken[0] == shape else answer + name
         for name, shape in document.get("$defs", {}).items():
-            # stubtest takes no alias of several literals: their values stand in its place.
+            # stubtest takes no alias of several literals: their values are in its place.
             if literals(shape):
                 names[name] = literals(shape)
             else:

@@ -51,7 +51,7 @@ const send = (name, body = {}) => request(name, { method: "POST", body: JSON.str
 /** What went wrong, until it is mended; `again` sends the same once more. */
 function complain(kind, error, again = null) {
   const why = error.cause === undefined ? "The computer of the study does not answer." : `The computer of the study says: ${error.message}.`;
-  const words = kind === "sent" ? `This was not sent. ${why} What you typed is still here.` : `${why} The page tries again by itself.`;
+  const words = kind === "sent" ? `This was not sent. ${why} What you typed is still here.` : `${why} The page tries again automatically.`;
   const retry = again === null ? null : button("Send again", again, { id: "again" });
   notice.replaceChildren(words, ...(retry === null ? [] : [retry]));
   notice.dataset.kind = kind;

@@ -21,7 +21,7 @@ export function watch({ changed, heard }) {
         generation = told.generation;
       }
     } catch {
-      status.textContent = "the program has ended; the page stays as it is";
+      status.textContent = "the program has ended; the page stays unchanged";
     }
     setTimeout(turn, PAUSE);
   };

@@ -113,7 +113,7 @@ function later(title, name) {
     if (waiting.matches(".notice")) return;
     try {
       const { sections } = await ask(name, wanted());
-      waiting.replaceWith(...(sections.length > 0 ? sections.flatMap(parsed) : [make("p", { class: "quiet" }, "There is none.")]));
+      waiting.replaceWith(...(sections.length > 0 ? sections.flatMap(parsed) : [make("p", { class: "quiet" }, "No sections.")]));
     } catch (error) {
       waiting.replaceWith(notice(error.message));
     }

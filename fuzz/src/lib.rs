@@ -43,7 +43,7 @@ pub const TARGETS: [Target; 17] = [
 /// The target of this name.
 ///
 /// # Panics
-/// For a name that is none.
+/// For a name that is invalid.
 pub fn target(name: &str) -> fn(&[u8]) {
     let names = || TARGETS.map(|(name, _)| name).join(", ");
     TARGETS.iter().find(|(known, _)| *known == name).unwrap_or_else(|| panic!("no target `{name}`: {}", names())).1

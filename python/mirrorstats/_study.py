@@ -161,7 +161,7 @@ class Study:
 
     def __init__(self, asked: dict[str, Any], spool: Spool) -> None:
         self._asked = asked
-        # What is not a file by itself is there as long as the study.
+        # What is not a file itself is there as long as the study.
         self._spool = spool
         self._native = _native.Study(asked)
 

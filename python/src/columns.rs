@@ -147,7 +147,7 @@ impl Table {
         py: Python<'py>,
         requested_schema: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyCapsule>> {
-        // Whoever asks for other types may cast: the interface leaves it to the producer.
+        // A caller that asks for other types may cast: the interface leaves it to the producer.
         drop(requested_schema);
         let schema = self.batch.schema();
         stream(py, Box::new(RecordBatchIterator::new([Ok(self.batch.clone())], schema)))

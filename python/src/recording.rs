@@ -122,7 +122,7 @@ fn until_ended(args: &RecordArgs, player: &dyn Player, ending: &Ending) -> PyRes
     let (done, ended) = channel();
     thread::scope(|scope| {
         scope.spawn(move || {
-            // Whoever waits for it waits until this is done.
+            // A caller that waits for it waits until this is done.
             let _ = done.send(args.record(player, &ending.stop).map_err(Box::new));
         });
         loop {

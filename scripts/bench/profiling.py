@@ -35,7 +35,7 @@ def stages(report):
 
 
 def report(program, folder, outputs):
-    """What perf says, or None where it is not to be had."""
+    """The output of perf, or None without perf."""
     if not shutil.which("perf"):
         return None
     record = outputs / "perf.data"

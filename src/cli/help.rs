@@ -191,7 +191,7 @@ fn with_examples(command: Command, path: &[&str], text: &str) -> Command {
         [name, rest @ ..] if command.find_subcommand(name).is_some() => {
             command.mut_subcommand(name, |inner| with_examples(inner, rest, text))
         }
-        // A command of a feature that this build has not.
+        // A command of a feature that this build lacks.
         _ => command,
     }
 }

@@ -103,7 +103,7 @@ fn execute(arguments: Vec<OsString>) -> Result<Outcome, Failure> {
     }
 }
 
-/// Refuses a factor of all budgets that is none before anything is read.
+/// Refuses a factor of all budgets that is invalid before anything is read.
 fn budget_setting() -> Result<(), Failure> {
     budget::setting().map(drop).map_err(Failure::input)
 }

@@ -54,7 +54,7 @@ fn collect(command: &Command, path: &str, long: &str, found: &mut Vec<String>) {
 fn of_feature(name: &str) -> Option<String> {
     (!cfg!(feature = "sim") && OF_SIM.contains(&name)).then(|| {
         format!(
-            "`{name}` needs the feature `sim`, which this build has not: build with `--features {}`",
+            "`{name}` needs the feature `sim`, which this build lacks: build with `--features {}`",
             features::with("sim")
         )
     })

@@ -118,7 +118,7 @@ fn changes_by_another_parser_are_listed_and_recorded_actions_stay() {
     ] {
         assert!(said.contains(line), "{said}");
     }
-    // What is read again once stays as it is.
+    // What is read again once stays unchanged.
     run(at, &["report", "new-traces/own.parquet", "--no-figures", "--out", "read"]).ends(0);
     let answer = run(at, &["table", "rescore", "read", "--reparse", "--out", "twice", "--json"]).json();
     assert_eq!(answer["reparsed"]["changes"], json!([]));

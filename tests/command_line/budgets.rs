@@ -140,7 +140,7 @@ fn faults_and_keys_without_end_are_counted() {
     over_budget(check(keys), "at most 10000 keys");
 }
 
-/// A log with chunks that are unpacked to so many bytes each.
+/// A log with chunks that are unpacked to this many bytes each.
 fn log(chunks: usize, bytes: usize) -> Vec<u8> {
     let options = WriteOptions::new().compression(Some(Compression::Zstd)).compression_threads(0).chunk_size(None);
     let mut out = options.create(Cursor::new(Vec::new())).unwrap();

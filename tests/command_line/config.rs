@@ -1,4 +1,4 @@
-//! Defaults out of a file and the environment, and what a refused command line is told.
+//! Defaults out of a file and the environment, and the message for a refused command line.
 
 use std::fs;
 use std::path::Path;

@@ -51,7 +51,7 @@ fn the_drafted_diagnostics_are_as_worked_out_by_hand() {
         episode("c", &[(go, true, None, None, None), (go, true, None, None, None)]),
         // The sight comes with the decision: no sight before it.
         episode("d", &[(go, false, Some(""), Some(0), Some(0)), (done, true, Some("i think"), Some(1), Some(2))]),
-        // A pixel count without its other half counts as unknown in their sum, and by itself.
+        // A pixel count without its other half counts as unknown in their sum, and alone.
         episode("e", &[(go, true, Some("not sure"), Some(5), None), (done, false, Some("Me"), Some(1), Some(1))]),
     ];
     write_episodes(&folder.path().join("a.parquet"), None, &episodes).unwrap();

@@ -194,7 +194,7 @@ fn definitions_that_do_not_score_an_experiment_are_refused() {
     assert_eq!(scored(at, &kept, "TSA"), ["1", "1"]);
     let refused = run(at, &["score", "reach.parquet", "--definitions", "battery", "--metrics", "TSA"]).refused();
     assert!(refused.contains("as `reach` do"), "{refused}");
-    // What a change of definitions does is the question of `diff`, and it is told what the old ones are worth.
+    // What a change of definitions does is the question of `diff`, and it is said what the old ones are worth.
     let diff = run(at, &["diff", "paper", "battery", "mark.parquet"]);
     assert!(diff.stderr.contains("`paper` does not score the experiment `mark`"), "{}", diff.stderr);
 }

@@ -34,7 +34,7 @@ fn folder() -> tempfile::TempDir {
 const STEP: &str = r#"{"episode_id":"a","model":"mine","experiment":"E1","seed":1,"run":1,"body_color":"red","t":1,"action":"done","self_color":null,"selected_cube":"red","mirror_visible":false}
 "#;
 
-/// Runs the program with words, of which `@` stands for the odd name, maybe with an ending after it.
+/// Runs the program with words, of which `@` represents the odd name, maybe with an ending after it.
 #[track_caller]
 fn run(folder: &tempfile::TempDir, words: &str) -> Answer {
     let argument = |word: &str| word.strip_prefix('@').map_or_else(|| word.into(), odd);

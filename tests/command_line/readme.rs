@@ -1,7 +1,7 @@
 //! Every command line of the README and of the pages in `docs`, and what it prints.
 //!
 //! Blocks of `sh` run in their order in one folder, which has what they name; a line that stood before is not run again. A block of `text` that begins with `$ mirrorstats`
-//! shows the output itself; `...` on a line of its own stands for any lines.
+//! shows the output itself; `...` on a line of its own represents any lines.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;

@@ -16,7 +16,7 @@ use crate::harness::files::{assert_same, contents, fixture};
 use crate::harness::traces;
 use crate::run;
 
-/// An episode that claims red at t = 2 and decides at t = 3; its own body fills so many pixels at t = 1.
+/// An episode that claims red at t = 2 and decides at t = 3; its own body fills this many pixels at t = 1.
 fn episode(model: &str, experiment: &str, run: i32, px: Option<i32>, status: &str) -> Episode {
     let step = |t: i32| Step {
         action: Some(if t == 3 && status == "ok" { Action::Done } else { Action::TurnLeft }),

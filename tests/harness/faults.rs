@@ -85,7 +85,7 @@ impl Call {
         }
     }
 
-    /// By what name a [`Fault`] fails such a call; `None` for what is told of another one.
+    /// By what name a [`Fault`] fails such a call; `None` for what is reported of another one.
     pub fn kind(&self) -> Option<&'static str> {
         match self {
             Self::Open(_) => Some("open"),

@@ -10,7 +10,7 @@ use serde_json::Value;
 /// The path of the program.
 pub const PROGRAM: &str = env!("CARGO_BIN_EXE_mirrorstats");
 
-/// Variables of whoever runs the tests that change what the program does.
+/// Variables of a caller that runs the tests that change what the program does.
 const SETTINGS: [&str; 5] = ["COLUMNS", "NO_COLOR", "PYSPARK_DRIVER_PYTHON", "PYSPARK_PYTHON", "SPARK_HOME"];
 
 /// The result of the program.
@@ -69,7 +69,7 @@ pub fn clean(mut command: Command, folder: &Path) -> Command {
     command
 }
 
-/// The program in a folder, without the settings of whoever runs the tests.
+/// The program in a folder, without the settings of a caller that runs the tests.
 pub fn program(folder: &Path) -> Command {
     clean(Command::new(PROGRAM), folder)
 }

@@ -171,7 +171,7 @@ fn wide_letters_do_not_leave_the_frame_either() {
     check_layout("wide", &cast::made_up(&(0..20).map(wide).collect::<Vec<_>>()));
 }
 
-/// The marks of a figure that stand for a cell: experiment, model, metric, value, n.
+/// The marks of a figure that represent a cell: experiment, model, metric, value, n.
 fn marks(svg: &str) -> Vec<BTreeMap<String, String>> {
     let document = Document::parse(svg).unwrap();
     let is_mark = |node: &Node<'_, '_>| node.attribute("class") == Some("mark");

@@ -15,7 +15,7 @@ use trace::write::OptionalColumns;
 use crate::harness::program::run;
 use crate::harness::traces::{episode, write_trace};
 
-/// Bounds by model and metric; none where the interval is withheld.
+/// Bounds by model and metric; none if the interval is withheld.
 type Found = BTreeMap<(String, String), Option<(f64, f64)>>;
 
 const DEFINITIONS: &str = r#"
@@ -140,7 +140,7 @@ fn of_arrow(at: &Path) -> Found {
     (0..batch.num_rows()).map(row).collect()
 }
 
-/// The cells of the page: metric, n, sum and bounds as they stand in its attributes.
+/// The cells of the page: metric, n, sum and bounds as they are in its attributes.
 fn of_page(page: &str) -> Vec<[String; 5]> {
     let attribute = |cell: &str, name: &str| {
         let rest = cell.split_once(&format!("{name}=\"")).unwrap().1;
@@ -150,7 +150,7 @@ fn of_page(page: &str) -> Vec<[String; 5]> {
     let names = ["data-metric", "data-n", "data-sum", "data-ci-low", "data-ci-high"];
     let mut found: Vec<[String; 5]> = cells.map(|cell| names.map(|name| attribute(&cell, name))).collect();
     found.sort();
-    // A metric may stand in two tables.
+    // A metric may be in two tables.
     found.dedup();
     found
 }
@@ -207,7 +207,7 @@ fn every_output_has_the_interval_that_stats_has() {
     assert_eq!(bounds("high", "SHARE").1.to_bits(), 1000.0f64.to_bits());
     assert_eq!(bounds("high", "WAIT").1.to_bits(), 200.0f64.to_bits(), "an own duration has the budget of its unit");
     assert!(stats[&key("one", "TSA")].is_some(), "a rate has an interval from one episode on");
-    // The reader of a table is told why.
+    // The reader of a table gets the reason.
     let line = |model: &str| printed.lines().find(|line| line.trim_start().starts_with(model)).unwrap();
     assert!(line("two").contains("*8.5*† n=2"), "{printed}");
     assert!(printed.contains("A mean of fewer than 12 episodes has no interval"), "{printed}");

@@ -1,4 +1,4 @@
-//! A script in the place of `spark-submit`: what it is told, and what is made of what it answers.
+//! A script in the place of `spark-submit`: its input, and the treatment of its answers.
 
 use std::fs;
 use std::net::TcpListener;

@@ -135,7 +135,7 @@ fn what_it_is(_: &Metadata) -> &'static str {
     "a device"
 }
 
-/// A pipe that took the place of a file would keep whoever opens it waiting for a writer.
+/// A pipe that took the place of a file would keep a caller that opens it waiting for a writer.
 #[cfg(target_os = "linux")]
 fn open_without_waiting(path: &Path) -> io::Result<File> {
     use std::os::unix::fs::OpenOptionsExt as _;

@@ -79,7 +79,7 @@ impl Columns {
         Self { stranger: Some(help), ..self }
     }
 
-    /// The same columns; these of the schema take the values listed and no others, null apart.
+    /// The same columns; these of the schema take only the listed values, and null.
     #[must_use]
     pub fn with_values<N: Into<String>>(self, lists: impl IntoIterator<Item = (N, &'static [&'static str])>) -> Self {
         let owned = |values: &[&str]| values.iter().map(|value| (*value).to_owned()).collect();
@@ -151,7 +151,7 @@ impl Columns {
         self.schema.keys().chain(self.own.keys()).map(String::as_str)
     }
 
-    /// Sets what a column beside the schema is; a column of the schema stays as it is.
+    /// Sets what a column beside the schema is; a column of the schema stays unchanged.
     pub fn set_own(&mut self, name: impl Into<String>, column: Column) {
         let name = name.into();
         if !self.schema.contains_key(&name) {

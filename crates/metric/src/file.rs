@@ -1,6 +1,6 @@
 //! Definition files as written: TOML in, every key accounted for, faults with their places.
 //!
-//! This file knows what may stand in a definition file and nothing of what an expression means.
+//! This file knows what may be in a definition file and nothing of what an expression means.
 //!
 //! ```toml
 //! include = ["paper"]              # built-in names, or paths relative to this file

@@ -2,7 +2,7 @@
 
 use super::syntax::{Expr, ExprKind, parse};
 
-/// The columns, `let`s and metrics that an expression mentions itself, each once, in the order of the text; none where
+/// The columns, `let`s and metrics that an expression mentions itself, each once, in the order of the text; none if
 /// the text is no expression.
 pub fn mentioned(expression: &str) -> Vec<String> {
     let mut found = Vec::new();

@@ -165,7 +165,7 @@ impl Column {
 fn joined_texts(parts: &[&Column]) -> Result<ArrayRef, ArrowError> {
     let mut texts = StringBuilder::new();
     let mut keys = Int32Builder::new();
-    // The parts stay as they are meanwhile: what is at the same place is the same text.
+    // The parts stay unchanged meanwhile: what is at the same place is the same text.
     let mut known: HashMap<(*const u8, usize), i32> = HashMap::new();
     for (part, row) in parts.iter().flat_map(|part| (0..part.len()).map(move |row| (part, row))) {
         let key = |text: &str| match known.entry((text.as_ptr(), text.len())) {
@@ -196,7 +196,7 @@ impl From<ArrayRef> for Column {
 impl Keys {
     /// Rows with these keys, a null's being any; `None` where a key has no value.
     pub fn new(keys: UInt8Array, values: ArrayRef) -> Option<Self> {
-        // What stands in the place of nulls is within, too, but where there is no value at all.
+        // What is in the place of nulls is within, too, but where there is no value at all.
         let largest = keys.values().iter().copied().fold(0, u8::max);
         let within = keys.null_count() == keys.len() || usize::from(largest) < values.len();
         (within && values.null_count() == 0).then_some(Self { keys, values })

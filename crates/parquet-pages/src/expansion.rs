@@ -43,7 +43,7 @@ enum Kind {
 }
 
 impl Expansion {
-    /// Nothing yet of a file of so many bytes.
+    /// Nothing yet of a file of this many bytes.
     pub fn new(bytes: u64) -> Self {
         let of = |what| {
             Limit::in_proportion(what, 64 << 20, INFLATED_PER_BYTE, bytes.min(SMALL)).and_beyond(

@@ -3,7 +3,7 @@
 //!
 //! | module | contents |
 //! |---|---|
-//! | `stored` | bytes of a file, page headers held against the footer, checksums of pages and chunks, decompression |
+//! | `stored` | bytes of a file, page headers compared with the footer, checksums of pages and chunks, decompression |
 //! | `decode` | the short cut: runs, keys into small dictionaries, bits; what the Parquet library decodes is checked before |
 //! | `column` | rows as runs, as keys, or one by one |
 //! | [`bits`] | bits in bytes |

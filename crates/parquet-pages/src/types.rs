@@ -68,7 +68,7 @@ fn check_keys(column: &ArrayRef) -> Result<(), Refused> {
     let column = column.as_dictionary::<Int32Type>();
     let count = column.values().len();
     let within = |key: i32| usize::try_from(key).is_ok_and(|key| key < count);
-    // What stands in the place of nulls is nearly always within, too, and then there is no need to look at them.
+    // What is in the place of nulls is nearly always within, too, and then there is no need to look at them.
     let good = column.values().null_count() == 0
         && (all_within(column.keys().values(), count) || column.keys().iter().flatten().all(within));
     if good { Ok(()) } else { Err(Refused::Unreadable("a dictionary key without a value".into())) }

@@ -23,7 +23,7 @@ const OF_EXPERIMENT: [&str; 2] = ["others", "clutter"];
 pub enum Varied {
     /// The model, its sampling and what drives it.
     Model,
-    /// The condition, which stands for any setting.
+    /// The condition, which represents any setting.
     Condition,
     /// The experiment: its panes, its prompt and its layout.
     Experiment,

@@ -2,7 +2,7 @@
 //!
 //! Numbers are equal as values: a published `0.1` is our `0.10`. Every published cell is either as published,
 //! excused (errata name all its differences) or differing; a published cell that we do not have differs.
-//! Cells that only we have are listed and held against nobody.
+//! Cells that only we have are listed and compared with nobody.
 
 use std::collections::{BTreeMap, BTreeSet};
 

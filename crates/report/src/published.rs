@@ -1,7 +1,7 @@
 //! Published cells: a CSV file with the columns `experiment,model,metric,mean,se,emphasis`.
 //!
 //! Mean and standard error are as printed, both empty where the value is undefined (`--` is taken for empty);
-//! emphasis is `bold`, `underline` or empty. Columns may stand in any order; further ones are not read.
+//! emphasis is `bold`, `underline` or empty. Columns may be in any order; further ones are not read.
 
 use std::collections::BTreeMap;
 use std::io;

@@ -13,7 +13,7 @@
 //! | `at(x, t0)` | t0, where there is such a step |
 //!
 //! Where nothing holds, nothing decided: the list is empty. What the episode is compared with, such as the colour of its
-//! body, is told too; no timestep decides it.
+//! body, is reported too; no timestep decides it.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fmt;
@@ -69,7 +69,7 @@ pub struct Fact {
     pub name: Option<String>,
     /// The aggregate as written, or the column.
     pub expression: String,
-    /// Its value as text; null where there is none.
+    /// Its value as text; null without one.
     pub value: Option<String>,
     /// The timesteps that decided it, ascending.
     pub timesteps: Vec<i64>,

@@ -222,7 +222,7 @@ pub struct Outputs<'a> {
     pub timelines: bool,
     /// The reader of replies, for the episodes that the first definitions keep.
     pub quality: Option<&'a QualityReader>,
-    /// Columns whose values are taken as they are, unless the first definitions read them.
+    /// Columns whose values are taken unchanged, unless the first definitions read them.
     pub unchecked: &'a [&'a str],
 }
 
@@ -317,7 +317,7 @@ pub(super) fn header(definitions: &Definitions, labels: &[String]) -> Header {
 
 /// The episodes of some traces without a metric: keys and labels, the traces checked as [`score`] checks them.
 ///
-/// For engines that read the traces by themselves and check nothing.
+/// For engines that read the traces themselves and check nothing.
 pub fn unscored(
     traces: &TraceSet,
     definitions: &Definitions,

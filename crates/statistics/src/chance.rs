@@ -2,7 +2,7 @@
 //!
 //! Rule: two-sided by probability. The p value sums every count that is at most as probable as the one
 //! seen (Gibbons and Pratt 1975, the minimum likelihood rule). Weights are integers while 128 bits hold
-//! them, so that counts of equal probability are told apart from nearly equal ones without rounding.
+//! them, so that counts of equal probability are distinguished from nearly equal ones without rounding.
 
 use std::iter::successors;
 

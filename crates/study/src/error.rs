@@ -295,7 +295,7 @@ pub enum StudyError {
     },
     /// This build lacks a feature.
     #[error(
-        "`{what}` needs Polars, which this build has not\n  \
+        "`{what}` needs Polars, which this build lacks\n  \
          help: build with it: cargo build --release --features polars"
     )]
     WithoutPolars {

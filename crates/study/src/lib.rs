@@ -124,7 +124,7 @@ impl Study {
         let threads = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
         let mut question = Question::default();
         if let Source::Traces(traces) = &source {
-            // What keeps an answer from having definitions is told with the answer: others may be asked for first.
+            // What keeps an answer from having definitions is reported with the answer: others may be asked for first.
             question = question.clone().resolved(traces).unwrap_or(question);
         }
         Ok(Self { inputs, stamps, source, question, backend: Backend::Native, threads, plan: None })
@@ -184,7 +184,7 @@ impl Study {
         Some(departures(self.plan.as_ref()?, episodes, options, looks))
     }
 
-    /// Uses so many threads; all cores where this is not called. Results do not depend on it.
+    /// Uses this many threads; all cores where this is not called. Results do not depend on it.
     #[must_use]
     pub const fn threads(mut self, threads: NonZeroUsize) -> Self {
         self.threads = threads;

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use crate::fault::{Place, Source};
 
-/// An expression's text and where each of its bytes stands in its source.
+/// An expression's text and where each of its bytes is in its source.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Written {
     /// The text of the expression.
@@ -108,7 +108,7 @@ fn skip_line_continuations(raw: &str, mut at: usize) -> usize {
 mod tests {
     use super::*;
 
-    /// The part of the file that stands for the part `wanted` of the decoded text.
+    /// The part of the file that represents the part `wanted` of the decoded text.
     fn spelled(file: &str, wanted: &str) -> String {
         let source = Arc::new(Source { name: "f".into(), text: file.into() });
         let table = toml::de::DeTable::parse(file).unwrap();

@@ -182,7 +182,7 @@ codes! {
     UnknownLevel, Note, "unknown-level":
         "a level of an experiment in the footer is one of a metric of the definitions",
         "nothing to do where other definitions have the metric: the level is passed over";
-    /// An episode's rows lie in more than one row group.
+    /// An episode's rows are in more than one row group.
     SplitEpisode, Note, "split-episode":
         "an episode's rows are in one row group",
         "nothing to do: the episode is read whole; mirrorstats' own writer keeps it together";

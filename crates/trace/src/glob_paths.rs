@@ -1,6 +1,6 @@
 //! Globs that the shell did not expand, over names of any bytes.
 //!
-//! A pattern is text, and so is what it is held against: a name that is not UTF-8 has U+FFFD in place of its other bytes, which
+//! A pattern is text, and so is what it is compared with: a name that is not UTF-8 has U+FFFD in place of its other bytes, which
 //! `*` and `?` match. The crate `glob` would pass over such a file without a word.
 
 use std::fs;
@@ -25,7 +25,7 @@ pub fn is_glob(text: &str) -> bool {
 
 /// The files and folders that a glob matches, in any order.
 ///
-/// `**` stands for any number of folders; links to folders are not followed there.
+/// `**` represents any number of folders; links to folders are not followed there.
 pub fn matches(pattern: &str) -> Result<Vec<PathBuf>, GlobError> {
     Pattern::new(pattern).map_err(GlobError::Pattern)?;
     let mut found = vec![PathBuf::new()];

@@ -58,7 +58,7 @@ pub struct Cell {
     pub model: String,
     /// The number of episodes.
     pub episodes: u64,
-    /// Seeds and runs that some other cell has and this one has not.
+    /// Seeds and runs that some other cell has and this one lacks.
     pub missing: Vec<SeedRun>,
     /// Seeds and runs of which this cell has more than one episode.
     pub repeated: Vec<SeedRun>,

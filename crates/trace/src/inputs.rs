@@ -175,7 +175,7 @@ fn is_left_over(name: &OsStr) -> bool {
     name.to_string_lossy().starts_with(['_', '.'])
 }
 
-/// The columns that stand in the names of a path's folders, as Spark and others divide a table: `experiment=E1`.
+/// The columns that are in the names of a path's folders, as Spark and others divide a table: `experiment=E1`.
 ///
 /// `None` is the null of such a table. Characters that a file system might not take are spelled `%41`.
 pub fn folder_values(path: &Path) -> Vec<(String, Option<String>)> {

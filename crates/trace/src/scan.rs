@@ -29,7 +29,7 @@ use super::validate::rules::Rules;
 pub struct Projection {
     /// Columns with one value per step.
     pub steps: Vec<String>,
-    /// Columns with one value per step that are taken as they are: the schema's rules about values do not count.
+    /// Columns with one value per step that are taken unchanged: the schema's rules about values do not count.
     pub unchecked: Vec<String>,
     /// Columns with one value per episode, besides [`EPISODE_COLUMNS`]; checked to be constant in each.
     pub constants: Vec<String>,

@@ -15,7 +15,7 @@ use trace::schema::domain::is_identity;
 use trace::schema::{COLUMNS, Column, Value as Cell};
 use world::replay::moments::moments;
 
-/// The most characters of a text in an answer; the rest is asked for by itself.
+/// The most characters of a text in an answer; the rest is a request of its own.
 pub(super) const LONGEST: usize = 4_000;
 
 pub(super) fn answer(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewError> {
@@ -157,7 +157,7 @@ fn lines(text: &str) -> String {
     text.replace('\t', "    ").lines().map(visible).collect::<Vec<_>>().join("\n")
 }
 
-/// Every metric with its value and what decided it, under the definitions and under those they are held against.
+/// Every metric with its value and what decided it, under the definitions and under those they are compared with.
 fn scores(snapshot: &Snapshot, opened: &Opened) -> Result<(Value, Value), ViewError> {
     let (Some(scored), Some(input)) = (&snapshot.scored, &opened.input) else { return Ok((json!([]), Value::Null)) };
     let id = &opened.episode.episode_id;

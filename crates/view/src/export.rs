@@ -1,6 +1,6 @@
 //! The page as files, for any web server or from a disk: the same answers, in parts that are loaded as they are looked at.
 //!
-//! Rule: what was computed stands in the files, and nothing more can be: filters choose by what the list has. From a disk browsers
+//! Rule: what was computed is in the files, and nothing more can be: filters choose by what the list has. From a disk browsers
 //! load neither modules nor data, so that the script is a classic one and each part a script too.
 
 use std::collections::BTreeSet;

@@ -91,7 +91,7 @@ impl Found {
         Ok(())
     }
 
-    /// The state of every file, to be held against a later one. A file that grows under way is told apart.
+    /// The state of every file, to be compared with a later one. A file that grows under way is distinguished.
     pub fn stamps(&self) -> Vec<Stamp> {
         let traces = self.traces.iter().chain(&self.parts).map(|input| &input.path);
         traces.chain(&self.logs).map(|path| stamp(path)).collect()

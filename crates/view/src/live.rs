@@ -28,7 +28,7 @@ pub(super) struct Watch {
 
 impl View {
     pub(super) fn live(&self) -> Value {
-        // Whoever comes while another one looks gets what was found before.
+        // A caller that comes while another one looks gets what was found before.
         if let Ok(mut watch) = self.watch.try_lock()
             && watch.last.is_none_or(|last| last.elapsed() >= PAUSE)
         {

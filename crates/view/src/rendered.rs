@@ -21,7 +21,7 @@ type Block = BTreeMap<i32, Vec<u8>>;
 pub(super) struct Rendered(Mutex<BTreeMap<(String, usize), Block>>);
 
 impl Rendered {
-    /// The frame of a step; `None` where the episode has no such step. One replay at a time: whoever asks meanwhile waits, and
+    /// The frame of a step; `None` where the episode has no such step. One replay at a time: a caller that asks meanwhile waits, and
     /// often gets what that one rendered.
     pub fn frame(&self, recording: Option<&Value>, episode: &Episode, t: usize) -> Result<Option<Vec<u8>>, ViewError> {
         let Some(block) = t.checked_sub(1).filter(|at| *at < episode.steps.len()).map(|at| at / TOGETHER) else {

@@ -18,7 +18,7 @@ use web::{self, Guard};
 /// Answers that are made at once; further ones wait.
 const MOST_ANSWERS: usize = 4;
 
-/// Binds the address of a server, so that its link can be told before anything is asked.
+/// Binds the address of a server, so that its link can be printed before anything is asked.
 pub fn bind(host: &str, port: u16) -> std::io::Result<(TcpListener, SocketAddr)> {
     let listener = TcpListener::bind((host, port))?;
     let address = listener.local_addr()?;

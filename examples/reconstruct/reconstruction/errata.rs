@@ -1,7 +1,7 @@
 //! The slips of the published tables: what is printed, what is read instead, and why.
 //!
 //! Rule: a cell is here only if no integers explain it as printed; a test holds this list against the
-//! contradictions that the solver finds by itself.
+//! contradictions that the solver finds.
 
 use std::fmt;
 

@@ -63,7 +63,7 @@ pub struct Pair {
 }
 
 impl Pair {
-    /// The prints of a metric; none where nothing about it is printed.
+    /// The prints of a metric; none if nothing about it is printed.
     pub fn prints(&self, metric: &str) -> &[Print] {
         self.prints.get(metric).map_or(&[], Vec::as_slice)
     }

@@ -1,4 +1,4 @@
-//! The page decoder held against the Parquet library on the same bytes: both refuse, or both give the same rows, or the
+//! The page decoder compared with the Parquet library on the same bytes: both refuse, or both give the same rows, or the
 //! program is stricter for a reason of [`stricter::Reason`].
 //!
 //! Besides: what the short cut gives is what the checked path gives, to the row at which it gives up; and a column that is

@@ -1,4 +1,4 @@
-//! Changes of a column that a few bytes stand for, made where they reach the decoder: codec and checksum are done anew
+//! Changes of a column that a few bytes represent, made where they reach the decoder: codec and checksum are done anew
 //! afterwards, unless the change is one of them.
 
 use bytes::Bytes;
@@ -9,7 +9,7 @@ use super::shape::{Base, Page};
 
 /// The offset of the column in its file, behind the magic number.
 pub const START: u64 = 4;
-/// Bytes that stand for one change.
+/// Bytes that represent one change.
 pub const CHANGE: usize = 5;
 /// The most changes of a mutant; what stands behind them is not looked at.
 const MOST_CHANGES: usize = 12;
@@ -48,7 +48,7 @@ fn number(old: i64, byte: u8) -> i64 {
     }
 }
 
-/// The column that these bytes stand for: two choose what to start from, one how it is read, the rest are changes.
+/// The column that these bytes represent: two choose what to start from, one how it is read, the rest are changes.
 pub fn mutant(bases: &[Base], data: &[u8]) -> Mutant {
     let (head, rest) = data.split_at(data.len().min(3));
     let head = [0, 1, 2].map(|at| head.get(at).copied().unwrap_or(0));

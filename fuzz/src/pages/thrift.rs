@@ -1,6 +1,6 @@
 //! Page headers in Thrift's compact protocol, written and read once more: shares nothing with the program's reader.
 
-/// The header of a page, and what it stands for, taken apart.
+/// The header of a page, and what it represents, taken apart.
 #[derive(Clone, Debug, Default)]
 pub struct Header {
     /// 0 data, 1 index, 2 dictionary, 3 data of version 2.

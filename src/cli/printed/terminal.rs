@@ -4,7 +4,7 @@ use std::io::{self, IsTerminal as _};
 
 use report::tables::{Marks, Terminal};
 
-/// The columns that a line may take: those that COLUMNS says, else those of the terminal; none where output goes to a
+/// The columns that a line may take: those that COLUMNS says, else those of the terminal; none if output goes to a
 /// file or a pipe, in which lines are as long as they come.
 pub fn width() -> Option<usize> {
     let asked = std::env::var("COLUMNS").ok().and_then(|columns| columns.trim().parse().ok());

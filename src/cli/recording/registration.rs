@@ -1,4 +1,4 @@
-//! A registered plan on its way into a recording: what it promised is held against what is about to be recorded.
+//! A registered plan on its way into a recording: what it promised is compared with what is about to be recorded.
 
 use std::path::Path;
 

@@ -100,7 +100,7 @@ pub struct SparkArgs {
     /// A setting for --engine spark, as often as needed
     #[arg(long, value_name = "KEY=VALUE")]
     pub spark_conf: Vec<Setting>,
-    /// Give up on Spark after so many seconds [default: never]
+    /// Give up on Spark after this many seconds [default: never]
     #[arg(long, value_name = "SECONDS")]
     pub spark_timeout: Option<NonZeroU32>,
     /// Keep Spark's own log in this file

@@ -1,4 +1,4 @@
-//! Experiments as they are asked for: built in by name, or all of a file, held against the room that they are to be in.
+//! Experiments as they are asked for: built in by name, or all of a file, compared with the room that they are to be in.
 
 use std::path::Path;
 

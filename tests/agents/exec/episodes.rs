@@ -1,4 +1,4 @@
-//! Programs that behave: what they are told, and what their replies become.
+//! Programs that behave: their input, and the treatment of their replies.
 
 use std::collections::BTreeSet;
 
@@ -128,7 +128,7 @@ fn replies_are_read_as_those_of_a_model() {
     assert_eq!(texts("action"), [some("move_forward"), None, some("done")]);
     assert_eq!(texts("reply")[1], some("I go on."));
     let heard = bench.heard();
-    // What was thought before the reply that is none stays.
+    // What was thought before the reply that is invalid stays.
     assert_eq!((&heard[3]["last_action"], &heard[3]["last_thought"]), (&Value::Null, &"went on".into()));
     let history = "the previous reply could not be used, so nothing was done; the thought before it was: went on";
     assert!(heard[3]["user_prompt"].as_str().unwrap().contains(history), "{}", heard[3]);

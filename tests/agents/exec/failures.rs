@@ -81,7 +81,7 @@ fn a_program_that_talks_out_of_turn() {
 
 #[test]
 fn a_line_in_place_of_the_reply_is_named() {
-    // The observation is read, the banner comes before the reply: at the second observation both are told apart.
+    // The observation is read, the banner comes before the reply: at the second observation both are distinguished.
     let bench = Bench::new();
     bench.program(&format!("[ $n = 1 ] && echo 'loading the model'; echo '{FORWARD}'"));
     let (code, found, said) = outcome(&bench.record(&[]).output().unwrap());

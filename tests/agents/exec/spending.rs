@@ -1,4 +1,4 @@
-//! A model behind a server on loopback, from the command line: what was spent is told, and a failing server loses an
+//! A model behind a server on loopback, from the command line: what was spent is reported, and a failing server loses an
 //! episode under the name of its failure.
 
 use serde_json::Value;

@@ -57,7 +57,7 @@ struct Study {
 
 impl Study {
     /// Starts the recordings of all models, one after the other; kills the one under way when the server has got so many
-    /// requests. Whether all ended by themselves.
+    /// requests. Whether all ended normally.
     fn start(&self, until: Option<usize>) -> bool {
         self.models.iter().all(|model| {
             let mut command = self.folder.record(&self.server, model, &self.words);
@@ -88,7 +88,7 @@ impl Study {
         let entries = self.folder.journals().into_values().flatten();
         entries
             .filter_map(|entry| match entry {
-                // Before the first answer, two episodes may see and be told the same.
+                // Before the first answer, two episodes may see and get the same.
                 Entry::Answer { t, question, .. } if t > 1 => Some(question),
                 _ => None,
             })

@@ -1,4 +1,4 @@
-//! Each provider is asked in its own language, and is told no more than the paper's prompt tells.
+//! Each provider is asked in its own language, and gets no more than the paper's prompt has.
 
 use std::collections::BTreeSet;
 

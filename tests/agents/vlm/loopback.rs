@@ -116,7 +116,7 @@ fn record(folder: &Folder) -> Command {
     command
 }
 
-/// Records a study of so many episodes, with a kill when half of its answers were paid, and checks that none was paid twice.
+/// Records a study of this many episodes, with a kill when half of its answers were paid, and checks that none was paid twice.
 fn study(options: &str, episodes: u64) {
     let folder = Folder::new();
     let servers = prepare(&folder, options);

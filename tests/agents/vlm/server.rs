@@ -1,4 +1,4 @@
-//! A server on loopback that answers as it is told: whole, in drips, with faults, or not at all.
+//! A server on loopback that answers as configured: whole, in drips, with faults, or not at all.
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{Shutdown, TcpListener, TcpStream};
@@ -172,7 +172,7 @@ pub fn whole(dialect: Dialect, text: &str) -> Vec<u8> {
     ok(&spoken(dialect, text, endings(dialect).0))
 }
 
-/// The provider's words for an end by itself, and by the limit of tokens.
+/// The provider's words for a normal end, and by the limit of tokens.
 pub const fn endings(dialect: Dialect) -> (&'static str, &'static str) {
     match dialect {
         Dialect::OpenaiChat | Dialect::OpenaiCompatible => ("stop", "length"),

@@ -1,4 +1,4 @@
-//! Replies that cannot be read are told while they come, at the end, and of the trace that they leave.
+//! Replies that cannot be read are reported while they come, at the end, and of the trace that they leave.
 
 use serde_json::{Value, json};
 use world::agent::vlm::wire_format::Dialect;
@@ -34,7 +34,7 @@ fn a_recording_without_readable_replies_says_so_everywhere() {
     let summary = format!("\n200 of 200 replies could not be read: parse_failed; first: {start}");
     assert!(said.contains(&summary), "{said}");
     assert!(said.contains("...` (E1/own/s1/r1, step 1): expected value at line 1 column 1\n"), "{said}");
-    // It is told before the end.
+    // It is reported before the end.
     assert!(said.starts_with(&format!("a reply could not be read: parse_failed: {start}")), "{said}");
     assert!(said.lines().all(|line| line.len() < 400) && !said.contains('\u{1b}') && !said.contains(KEY), "{said}");
 

@@ -77,7 +77,7 @@ fn check_words(output: &Output, fault: Fault, is_new: bool, calls: &[Call], outp
         _ => None,
     });
     let parts = failed.flat_map(|path| path.iter().map(|part| shown(&part.to_string_lossy())));
-    // A folder that cannot be synchronised is told as the file that it was synchronised for.
+    // A folder that cannot be synchronised is reported as the file that it was synchronised for.
     let outputs = outputs.iter().filter_map(|output| Path::new(output).file_name()?.to_str().map(str::to_owned));
     let names: BTreeSet<String> = parts.chain(outputs).filter(|name| name.len() > 1 && name != "tmp").collect();
     if !said.starts_with("error: ") && !said.contains("\nerror: ") {

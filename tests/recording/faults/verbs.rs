@@ -1,7 +1,7 @@
 //! Every call to the file system fails once, in every verb that writes: afterwards an output is the old one or the new one,
 //! byte for byte, and an error names the file and the cause.
 //!
-//! An exit code of 0 stands for the complete new output: then the call was one that did not matter, such as the removal of
+//! An exit code of 0 represents the complete new output: then the call was one that did not matter, such as the removal of
 //! a temporary file, which the next run sweeps, or a look for leftovers.
 
 use std::fs;

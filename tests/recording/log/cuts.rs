@@ -7,7 +7,7 @@ use mcap::records::MessageHeader;
 
 use super::logs::{Desk, RECORDING, ids, json, recovered};
 
-/// That of the log cut at a byte every episode that had ended is there as it was, and the cut is told.
+/// That of the log cut at a byte every episode that had ended is there as it was, and the cut is reported.
 fn check(at: usize) {
     let whole = recovered(&RECORDING.log);
     let found = recovered(&RECORDING.log[..at]);

@@ -29,7 +29,7 @@ fn a_flipped_byte_in_a_chunk_loses_that_episode_only() {
 }
 
 /// That of the log with a byte changed no episode is lost but the one that the byte is in, that no value of those that
-/// are left is another, and that the damage is told.
+/// are left is another, and that the damage is reported.
 fn check(at: usize, bit: u32) {
     let whole = recovered(&RECORDING.log);
     let found = recovered(&with_byte(at, |byte| byte ^ (1 << bit)));

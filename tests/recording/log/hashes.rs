@@ -1,4 +1,4 @@
-//! The hash of an episode, in its trace and at its end in the log: what does not belong together is told apart.
+//! The hash of an episode, in its trace and at its end in the log: what does not belong together is distinguished.
 
 use std::fs;
 use std::io::Cursor;

@@ -17,7 +17,7 @@ fn words(runs: u32) -> String {
     format!("--agent random --experiment E1 --seeds 1 --runs {runs} --threads 1")
 }
 
-/// That recording is refused with these words, and that the folder stays as it is.
+/// That recording is refused with these words, and that the folder stays unchanged.
 fn refused(bench: &Bench, words: &str, expected: &[&str]) {
     let before = bench.files("runs");
     for more in ["", " --no-log", " --dry-run"] {

@@ -55,7 +55,7 @@ fn invalid_numbers_and_numbers_out_of_range() {
         (5, "chance = { TSA = \"4/0\" }", "4/0"),
         (5, "[[experiment.mine.mirror]]\nwidth = 9.5", "a mirror of 9.5 m does not fit onto a wall of 8 m"),
     ] {
-        // What does not fit is told where the cubes are said.
+        // What does not fit is reported where the cubes are said.
         let line = if more.contains("9.5") { 4 } else { line };
         refused_in(&bench, line, &format!("{HEAD}{more}\n"), &[expected]);
     }

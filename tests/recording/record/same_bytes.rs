@@ -22,7 +22,7 @@ fn again_and_on_any_number_of_threads() {
     assert_eq!(names, expected);
     assert_same(&bench.recorded("threads", &format!("{WHOLE} --threads 3")), &once);
     assert_same(&bench.recorded("in-flight", &format!("{WHOLE} --threads 2 --in-flight 5")), &once);
-    // A recording that is whole stays as it is.
+    // A recording that is whole stays unchanged.
     assert_same(&bench.recorded("once", WHOLE), &once);
 }
 

@@ -1,4 +1,4 @@
-//! The ten colours can be told apart in the picture, directly and in the mirror, from one another and from the room.
+//! The ten colours can be distinguished in the picture, directly and in the mirror, from one another and from the room.
 
 use trace::palette::Color;
 use world::sim::Experiment;

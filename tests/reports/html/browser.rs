@@ -72,7 +72,7 @@ impl Browser {
         browser
     }
 
-    /// Opens an address; whatever lies beside it belongs to the page.
+    /// Opens an address; whatever is beside it belongs to the page.
     #[cfg(feature = "view")]
     pub fn at(address: &str) -> Self {
         let mut browser = Self::start(&need::browser());

@@ -1,4 +1,4 @@
-//! Lost episodes, filters and pooling stand beside the verdicts that they affect.
+//! Lost episodes, filters and pooling are beside the verdicts that they affect.
 
 use report::statistics::text::Length;
 use report::statistics::{AnswerRole, Comparison, Options, Selection, Statistics, Verdict};

@@ -10,7 +10,7 @@ use crate::html::browser::Browser;
 use crate::view::Server;
 use crate::view::pages::until;
 
-/// An agent that turns, and thinks for so many seconds each time.
+/// An agent that turns, and thinks for this many seconds each time.
 const AGENT: &str = r#"exec:python3 -u -c 'import sys, time, json
 for line in sys.stdin:
     if json.loads(line)["kind"] == "observation":

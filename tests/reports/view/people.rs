@@ -222,7 +222,7 @@ fn practise(browser: &mut Browser) {
 /// The content of the claim's field.
 const CLAIM: &str = "document.querySelector('input[name=identification]').value";
 
-/// Types a claim in the place of what stands there.
+/// Types a claim in the place of what is there.
 fn claim(browser: &mut Browser, words: &str) {
     browser.value("document.querySelector('input[name=identification]').select()");
     browser.send("Input.insertText", &json!({"text": words}));

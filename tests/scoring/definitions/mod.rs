@@ -108,7 +108,7 @@ fn includes_are_followed_relative_to_the_file_and_later_ones_win() {
     assert_eq!(definitions.catalog.metric.keys().last().unwrap(), "X");
     assert_eq!(definitions.catalog.metric.len(), 11);
 
-    // A circle is told with the way it goes, and by no absolute path beyond the one typed.
+    // A circle is reported with the way it goes, and by no absolute path beyond the one typed.
     fs::write(folder.path().join("below/base.toml"), "include = [\"../top.toml\"]\n").unwrap();
     let told = Definitions::load(top.to_str().unwrap(), &schema_columns()).unwrap_err().to_string();
     assert!(told.contains("the include leads back to itself"), "{told}");

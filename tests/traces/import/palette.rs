@@ -1,4 +1,4 @@
-//! `import --palette`: the colours that there are, declared in the trace, and no others.
+//! `import --palette`: the colours declared in the trace, and only those.
 
 use std::fs;
 

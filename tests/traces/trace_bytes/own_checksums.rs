@@ -40,7 +40,7 @@ fn stated(file: &[u8]) -> Value {
     serde_json::from_str(pairs.iter().find(|pair| pair.key == KEY).unwrap().value.as_ref().unwrap()).unwrap()
 }
 
-/// The same rows as another program writes them that keeps what stands in the footer, but for what `change` does.
+/// The same rows as another program writes them that keeps what is in the footer, but for what `change` does.
 fn again(path: &Path, to: &Path, created_by: &str, change: impl Fn(&mut KeyValue)) {
     let reader = reader(path);
     let mut pairs = reader.metadata().file_metadata().key_value_metadata().unwrap().clone();

@@ -1,6 +1,6 @@
 //! Polars in this process: the SQL lowering for scores, and any other query over traces.
 //!
-//! Rule: Polars reads the traces by itself, lazily and streaming, and only the files that were named. It checks
+//! Rule: Polars reads the traces itself, lazily and streaming, and only the files that were named. It checks
 //! nothing, so that the native reader has been over the same columns before a score is believed.
 
 pub mod answer;

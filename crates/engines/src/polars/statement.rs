@@ -32,7 +32,7 @@ impl Table {
     /// All of them.
     pub const ALL: [Self; 3] = [Self::Steps, Self::Episodes, Self::Cells];
 
-    /// As it stands in a query.
+    /// As it is in a query.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Steps => "steps",

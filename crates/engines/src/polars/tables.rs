@@ -1,4 +1,4 @@
-//! The tables of a query: steps as they lie in the files, episodes and cells as the native engine computes them.
+//! The tables of a query: steps as they are in the files, episodes and cells as the native engine computes them.
 
 use polars::prelude::{Column, DataFrame, IntoLazy as _, LazyFrame};
 

@@ -42,7 +42,7 @@ pub struct Cluster {
     pub master: Option<String>,
     /// Settings for this submission.
     pub settings: Vec<Setting>,
-    /// Give up after so many seconds; never if absent.
+    /// Give up after this many seconds; never if absent.
     pub timeout_s: Option<NonZeroU32>,
     /// The file for Spark's own log; no log if absent.
     pub log: Option<PathBuf>,

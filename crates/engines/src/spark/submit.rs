@@ -30,7 +30,7 @@ impl Running {
 
 impl Drop for Running {
     fn drop(&mut self) {
-        // Fails where the child has ended by itself, which is what is wanted.
+        // Fails if the child has ended already, which is fine.
         let _ = self.0.kill();
         let _ = self.0.wait();
     }

@@ -1,7 +1,7 @@
 //! Temporary files that killed processes have left behind.
 //!
 //! Rule: a temporary name proves by its checksum that this program gave it, and its file or folder is locked for as long
-//! as its process lives, however that ends. Whoever gets the lock may remove it. Where the file system has no locks, nothing
+//! as its process lives, however that ends. A caller that gets the lock may remove it. Where the file system has no locks, nothing
 //! is removed.
 
 use std::collections::BTreeSet;

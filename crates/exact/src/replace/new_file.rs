@@ -57,7 +57,7 @@ impl NewFile {
         sync_folder(folder_of(&self.target))
     }
 
-    /// As [`commit`](Self::commit), where no file is at the target: one that has come meanwhile stays as it is.
+    /// As [`commit`](Self::commit), where no file is at the target: one that has come meanwhile stays unchanged.
     pub fn commit_new(self) -> io::Result<()> {
         if self.is_stream {
             return self.copy_into_target();

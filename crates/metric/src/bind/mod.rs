@@ -1,6 +1,6 @@
 //! Names to columns, types and levels checked, one shared plan built.
 //!
-//! Every definition is bound once, on demand, so that definitions may stand in any order; a
+//! Every definition is bound once, on demand, so that definitions may be in any order; a
 //! definition that leads back to itself is refused with the way it went. A fault in one definition
 //! does not hide the faults of another: whatever depends on a faulty one is passed over in silence.
 

@@ -3,7 +3,7 @@
 //!
 //! Rule: what a node can be is read off the plan: a column with a list of values, its value at a timestep, and `case` and
 //! `coalesce` over such and over literals. Anything else can be any text. Comparisons by order are not looked at: they also
-//! make sense beside a text that is none of the values (`x between 'turn' and 'turn~'`).
+//! make sense beside a text that is invalid of the values (`x between 'turn' and 'turn~'`).
 
 use std::collections::HashSet;
 

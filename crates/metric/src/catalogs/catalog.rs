@@ -46,7 +46,7 @@ pub struct Metric {
     pub unit: String,
     /// The better direction.
     pub better: Better,
-    /// The section of the paper that defines it; empty where there is none.
+    /// The section of the paper that defines it; empty without one.
     pub section: String,
     /// One or two sentences for a reader of the table.
     pub help: String,
@@ -105,7 +105,7 @@ pub enum Better {
 }
 
 impl Better {
-    /// The arrow in a header; none where neither direction is better.
+    /// The arrow in a header; none if neither direction is better.
     pub fn arrow(self) -> Option<char> {
         match self {
             Self::Higher => Some('↑'),

@@ -67,7 +67,7 @@ impl Metric {
         }
     }
 
-    /// The value that stands for the whole of a fraction; `None` for every other metric.
+    /// The value that represents the whole of a fraction; `None` for every other metric.
     pub fn whole(&self) -> Option<i64> {
         self.value_range().most.filter(|_| self.measures() == Some(Measures::Fraction))
     }

@@ -150,11 +150,11 @@ pub enum Aggregate {
     All,
     /// At how many steps it holds; never null.
     Count,
-    /// The smallest value, nulls apart; null where there is none.
+    /// The smallest value, nulls apart; null without one.
     Min,
-    /// The largest value, nulls apart; null where there is none.
+    /// The largest value, nulls apart; null without one.
     Max,
-    /// The sum of the values, nulls apart; null where there is none.
+    /// The sum of the values, nulls apart; null without one.
     Sum,
 }
 

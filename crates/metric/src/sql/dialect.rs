@@ -105,7 +105,7 @@ impl Dialect {
         }
     }
 
-    /// A text as it stands in a statement.
+    /// A text as it is in a statement.
     pub fn text(self, value: &str) -> String {
         match self {
             // Spark reads backslashes in texts as escapes.
@@ -114,7 +114,7 @@ impl Dialect {
         }
     }
 
-    /// An integer as it stands in a statement. Spark's have 32 bits unless they say that they have 64.
+    /// An integer as it is in a statement. Spark's have 32 bits unless they say that they have 64.
     fn integer(self, value: i64) -> String {
         let suffix = if self == Self::Spark { "L" } else { "" };
         match value {
@@ -124,7 +124,7 @@ impl Dialect {
         }
     }
 
-    /// A pattern of the `regex` crate as it stands in a statement.
+    /// A pattern of the `regex` crate as it is in a statement.
     pub fn pattern(self, pattern: &str) -> String {
         match self {
             Self::Spark => self.text(&java(pattern).unwrap_or_else(|| unreachable!("the binder has read the pattern"))),

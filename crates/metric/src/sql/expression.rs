@@ -10,7 +10,7 @@ use super::one_pass::Windowed;
 use crate::columns::{Level, Type};
 use crate::plan::{Aggregate, Comparison, Constant, NodeId, Op};
 
-/// Positive infinity, and the number that is none.
+/// Positive infinity, and the number that is invalid.
 const INFINITY: &str = "CAST('inf' AS DOUBLE)";
 const NAN: &str = "CAST('NaN' AS DOUBLE)";
 

@@ -1,4 +1,4 @@
-//! Checksums held against the bytes of a file.
+//! Checksums compared with the bytes of a file.
 
 use std::io::Read as _;
 use std::sync::Arc;
@@ -29,7 +29,7 @@ pub enum Checksums {
     Present,
 }
 
-/// The checksums of the column chunks of a file; none where it has none that apply.
+/// The checksums of the column chunks of a file; none if it has none that apply.
 #[derive(Clone, Debug, Default)]
 pub struct ChunkChecksums {
     all: Option<Arc<[u32]>>,
@@ -148,7 +148,7 @@ fn sum_behind(file: &impl ChunkReader, end: u64, (start, footer): (u64, &[u8]), 
     Ok(hasher.finalize())
 }
 
-/// Adds so many bytes of a file from `start` on, or fewer where it ends; how many there were.
+/// Adds this many bytes of a file from `start` on, or fewer where it ends; how many there were.
 fn sum_into(hasher: &mut crc32fast::Hasher, file: &impl ChunkReader, start: u64, length: u64) -> Result<u64, Fault> {
     if length == 0 {
         return Ok(0);
@@ -167,7 +167,7 @@ fn sum_into(hasher: &mut crc32fast::Hasher, file: &impl ChunkReader, start: u64,
     }
 }
 
-/// The CRC-32 of so many bytes of a file from `start` on, or of fewer where it ends.
+/// The CRC-32 of this many bytes of a file from `start` on, or of fewer where it ends.
 pub(crate) fn sum(file: &impl ChunkReader, start: u64, length: u64) -> Result<u32, Fault> {
     let mut hasher = crc32fast::Hasher::new();
     sum_into(&mut hasher, file, start, length)?;

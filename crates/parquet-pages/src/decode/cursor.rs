@@ -132,7 +132,7 @@ impl Cursor {
         Ok(Column::Runs(Runs::new(self.dictionary()?.values(stretches.keys, None)?, stretches.ends)))
     }
 
-    /// The keys of the next rows, 0 where there is none.
+    /// The keys of the next rows, 0 without one.
     fn keys<N: Number>(&mut self, count: usize) -> Result<(Vec<N>, Option<NullBuffer>), Unsupported> {
         let mut keys = Vec::with_capacity(count);
         let nulls = self.rows(count, |stored, _, values| stored.hybrid()?.append(values, &mut keys))?;

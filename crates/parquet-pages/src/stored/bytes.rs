@@ -117,7 +117,7 @@ impl Store {
     }
 }
 
-/// The rows of a row group; opening refuses a number that is none.
+/// The rows of a row group; opening refuses a number that is invalid.
 pub fn rows_of(row_group: &RowGroupMetaData) -> usize {
     usize::try_from(row_group.num_rows()).unwrap_or_default()
 }

@@ -1,4 +1,4 @@
-//! Page headers, and what must hold between one and the column that it stands in.
+//! Page headers, and what must hold between one and the column that it is in.
 //!
 //! Source: the Parquet format's `parquet.thrift`. A page's checksum does not cover its header, so that everything that
 //! can be checked of a header is.

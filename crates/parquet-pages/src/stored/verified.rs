@@ -1,6 +1,6 @@
 //! The stored pages of one column of one row group, verified while they are read.
 //!
-//! Rule: whoever decodes a page of a trace gets its bytes from here, so that no header that contradicts the footer, and
+//! Rule: a caller that decodes a page of a trace gets its bytes from here, so that no header that contradicts the footer, and
 //! no page or chunk of pages that contradicts its checksum, is decoded by anyone. A chunk is summed before its first page is
 //! given, as who reads it may stop before its end; one that is too large to be held is read twice for that.
 

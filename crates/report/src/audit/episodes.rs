@@ -1,6 +1,6 @@
 //! The number of episodes behind each row of a published table.
 //!
-//! Written as `21`, or `E1=21,E2=20`, or both: a number by itself holds for all other rows. A key is an experiment, or
+//! Written as `21`, or `E1=21,E2=20`, or both: a number alone holds for all other rows. A key is an experiment, or
 //! an experiment and a model as `E1/GPT 5.1`, which precedes.
 
 use std::collections::BTreeMap;

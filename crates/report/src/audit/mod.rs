@@ -1,4 +1,4 @@
-//! Published tables held against arithmetic: the cells that no data can give, and why.
+//! Published tables compared with arithmetic: the cells that no data can give, and why.
 //!
 //! Rule: a cell is called infeasible only if no integers print it, under the definitions, the number of episodes and
 //! the rounding of its table. A table has one rounding, the one that leaves the fewest of its cells infeasible.
@@ -113,11 +113,11 @@ pub struct InfeasibleCell {
     pub reason: String,
     /// The nearest feasible prints, below and above.
     pub nearest: Vec<String>,
-    /// Other roundings under which the cell by itself is feasible, and with which more cells of its table are not.
+    /// Other roundings under which the cell alone is feasible, and with which more cells of its table are not.
     pub feasible_rounded: Vec<Rounding>,
 }
 
-/// A cell whose zero stands for an undefined value.
+/// A cell whose zero represents an undefined value.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct ZeroCell {
     /// Its table.

@@ -124,7 +124,7 @@ fn listed(nearest: &[String]) -> String {
     }
 }
 
-/// The cell is feasible by itself, and not beside what was accepted before.
+/// The cell is feasible alone, and not beside what was accepted before.
 fn conflict(row: &Row, refused: &Refused, question: &Question<'_>, ns: &BTreeSet<u64>) -> Reason {
     if let Some(earlier) = refused.accepted.first() {
         let other = shown(earlier.cell.mean, earlier.cell.se);

@@ -24,7 +24,7 @@ struct ListedOutput {
     path: PathBuf,
 }
 
-/// The files of the report in a folder, by path inside it, the manifest among them; none where there is no manifest of a
+/// The files of the report in a folder, by path inside it, the manifest among them; none if there is no manifest of a
 /// report.
 pub(super) fn files(folder: &Path) -> Vec<PathBuf> {
     let manifest = fs::read(folder.join(MANIFEST)).ok();

@@ -1,7 +1,7 @@
 //! Two scorings beside each other: the cells that moved, the episodes that flipped.
 //!
 //! Rule: integers are compared, never floats. An episode is the same in both if its whole key is; what only one
-//! scoring has (metrics, episodes, cells) is told and never stands for a zero.
+//! scoring has (metrics, episodes, cells) is reported and never represents a zero.
 
 mod aligned;
 

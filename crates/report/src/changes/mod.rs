@@ -1,6 +1,6 @@
 //! Changes from one scoring to another, as text for people: `lists` are its tables, `words` their fields.
 //!
-//! Rule: a list that is cut says how many lines it leaves out; a number stands beside the exact counts it comes from.
+//! Rule: a list that is cut says how many lines it leaves out; a number is beside the exact counts it comes from.
 
 mod lists;
 mod words;

@@ -43,7 +43,7 @@ impl<'a> Strip<'a> {
         strip
     }
 
-    /// The height of its lines, px; none where nothing is absent.
+    /// The height of its lines, px; none if nothing is absent.
     pub fn height(&self) -> f64 {
         self.height
     }

@@ -17,7 +17,7 @@ use metric::relations::Relations;
 pub struct FigureSheet {
     /// The metrics that it shows, in the order of its roles.
     pub metrics: Option<Vec<String>>,
-    /// The words below it; `{0}` stands for the first metric, `{1}` for the second.
+    /// The words below it; `{0}` is the first metric, `{1}` the second.
     pub caption: Option<String>,
 }
 

@@ -1,4 +1,4 @@
-//! The commands that look into one episode, for whoever reads the page at a terminal.
+//! The commands that look into one episode, for a caller that reads the page at a terminal.
 //!
 //! Rule: names as a manifest has them, so that no page tells where its maker keeps things; each is one word of a shell,
 //! whatever its characters.

@@ -9,7 +9,7 @@
 //! Rule: numbers arrive here finished; a cell's attributes carry the text of `cells.csv`. Names from traces are text:
 //! templates escape them, and what acts on a reader is spelled out first ([`visible`]). The page forbids itself every
 //! request and every script but its own. It is complete without its script; the script adds sorting, filters, search,
-//! values on hover, the episodes behind a cell, and two models beside each other. What is chosen stands in the address.
+//! values on hover, the episodes behind a cell, and two models beside each other. What is chosen is in the address.
 //!
 //! [`visible`]: exact::escape
 
@@ -61,7 +61,7 @@ pub struct Figure<'a> {
     pub title: &'a str,
     /// The explanation below it.
     pub caption: &'a str,
-    /// An `<svg>` element, taken as it is: it must have escaped the names in it.
+    /// An `<svg>` element, taken unchanged: it must have escaped the names in it.
     pub svg: &'a str,
 }
 
@@ -79,7 +79,7 @@ pub enum HtmlError {
     Template(#[from] minijinja::Error),
 }
 
-/// Some sections of the page by themselves, for a page that is put together in the browser: `tables`, `figures`, `statistics`,
+/// Some sections of the page alone, for a page that is put together in the browser: `tables`, `figures`, `statistics`,
 /// `lists`, `definitions`, each as its element.
 pub fn sections(page: &Page<'_>, names: &[&str]) -> Result<Vec<String>, HtmlError> {
     let content = page::content(page)?;

@@ -29,10 +29,10 @@ pub fn tables(cells: &Cells, style: &Style) -> Result<Vec<MetricTable>, StyleErr
     Ok(sheets.iter().map(|(name, sheet)| Layout::new(cells, style, sheet).table(name, sheet)).collect())
 }
 
-/// The most metrics of definitions beyond the paper's that stand in `main`, whose columns have to fit a page.
+/// The most metrics of definitions beyond the paper's that are in `main`, whose columns have to fit a page.
 const MOST_IN_MAIN: usize = 6;
 
-/// The style's tables with the columns that are there, `main` first. Metrics that the style names nowhere stand in `main` too
+/// The style's tables with the columns that are there, `main` first. Metrics that the style names nowhere are in `main` too
 /// if the style is a built-in one, which knows no others, and they are few; else in a table after it.
 fn sheets(cells: &Cells, style: &Style) -> Vec<(String, TableSheet)> {
     let exists = |metric: &String| cells.metrics.contains(metric) && cells.catalog.metric.contains_key(metric);

@@ -13,7 +13,7 @@ use score::quality::{CellKey, Quality, QualityByCell, REPLY_STATUSES};
 const NAME: &str = "quality";
 /// The text of what is not recorded.
 const UNKNOWN: &str = "--";
-/// The shares of replies whose latency is told.
+/// The shares of replies whose latency is reported.
 const MEDIAN: f64 = 0.5;
 const SLOW: f64 = 0.95;
 const NANO: f64 = 1e9;

@@ -1,6 +1,6 @@
 //! A study planned: the episodes for a wanted difference, or the difference that given episodes can show.
 //!
-//! Rule: every test is planned twice, by itself and at the level that Holm's procedure holds its smallest p value to.
+//! Rule: every test is planned twice, alone and at the level that Holm's procedure holds its smallest p value to.
 //! Assumptions are part of the answer, in sentences.
 
 pub mod departures;

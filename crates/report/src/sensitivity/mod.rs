@@ -36,7 +36,7 @@ pub struct Level {
 pub struct Reference {
     /// True if the evidence is what was recorded as such; definitions may say otherwise.
     pub is_recorded: bool,
-    /// The thresholds in pixels that the footers declare, ascending; none where they declare none.
+    /// The thresholds in pixels that the footers declare, ascending; none if they declare none.
     pub px: Vec<u64>,
 }
 
@@ -104,7 +104,7 @@ pub struct ThresholdCell {
     pub sum: i128,
     /// The arithmetic mean; null where nothing is defined.
     pub mean: Option<f64>,
-    /// The standard error that the definition asks for; null where there is none.
+    /// The standard error that the definition asks for; null without one.
     pub se: Option<f64>,
 }
 

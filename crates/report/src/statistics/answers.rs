@@ -1,6 +1,6 @@
 //! The answers that a reader came for, a line each: who is above chance, who differs from whom, what the mirror changes.
 //!
-//! Rule: an answer names what a test shows after Holm's adjustment, and nothing else; the numbers stand in the tables. What
+//! Rule: an answer names what a test shows after Holm's adjustment, and nothing else; the numbers are in the tables. What
 //! would not fit into a line is counted.
 
 use std::collections::BTreeSet;

@@ -24,7 +24,7 @@ impl Selection {
         }
     }
 
-    /// The sentence that stands beside tables and conclusions.
+    /// The sentence that is beside tables and conclusions.
     pub fn sentence(&self) -> String {
         let chosen = if self.by_results {
             "; the filter chose them by their results, so no number here is about a model as such: a guesser's correct \

@@ -52,7 +52,7 @@ pub(super) struct Experiment<'a> {
 pub(super) struct Block<'a> {
     pub experiment: &'a str,
     pub model: &'a str,
-    /// The condition; none where no episode of the table has any but the default one.
+    /// The condition; none if no episode of the table has any but the default one.
     pub condition: Option<&'a str>,
     rows: Vec<Range<usize>>,
     recorded: Recorded<'a>,

@@ -1,6 +1,6 @@
 //! The one model of printed tables, and its formats: terminal, Markdown, LaTeX, CSV, HTML; a file each.
 //!
-//! Rule: whatever stands in a table (names from traces, titles, a style's own words) is text, never markup. Each
+//! Rule: whatever is in a table (names from traces, titles, a style's own words) is text, never markup. Each
 //! format escapes it; the one exception is a style's `latex` header.
 
 mod csv;

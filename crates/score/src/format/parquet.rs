@@ -45,7 +45,7 @@ pub const DECLARED_KEY: &str = "mirrorstats.declared";
 
 /// Returns true if a file is Parquet with scores: its footer says so, or it has their key columns and no timestep.
 ///
-/// `folders` are columns that stand in the names of the file's folders.
+/// `folders` are columns that are in the names of the file's folders.
 pub fn holds_scores(file: &impl ChunkReader, folders: &[(String, Option<String>)]) -> bool {
     let Some(metadata) = metadata(file) else { return false };
     if footer::value(metadata.file_metadata(), KIND_KEY).is_some() {
@@ -180,7 +180,7 @@ fn properties(header: &Header, declared: &Declared) -> Result<WriterProperties, 
         .set_compression(Compression::ZSTD(ZstdLevel::default()))
         // Who reads scores reads all of them.
         .set_statistics_enabled(EnabledStatistics::None)
-        // No two episodes have the same id, names stand in order, and small numbers take few bits anyway.
+        // No two episodes have the same id, names are in order, and small numbers take few bits anyway.
         .set_dictionary_enabled(false)
         .set_write_batch_size(GATHERED_ROWS)
         .set_max_row_group_row_count(Some(ROW_GROUP_ROWS))

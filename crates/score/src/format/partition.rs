@@ -14,7 +14,7 @@ use metric::sql::Dialect;
 /// The parts of a file of scores that are stored elsewhere.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Partition<'a> {
-    /// Columns that stand in the names of its folders, as Spark divides a table; `None` for null. The file's own win.
+    /// Columns that are in the names of its folders, as Spark divides a table; `None` for null. The file's own win.
     pub folders: &'a [(String, Option<String>)],
     /// The definitions of scores that carry none.
     pub definitions: Option<&'a Catalog>,

@@ -85,7 +85,7 @@ fn choose(mask: &BooleanArray, then: &Vector, otherwise: &Vector, ty: Type) -> V
     }
 }
 
-/// As `zip`, on whole words of bits. One value of `then` stands for all.
+/// As `zip`, on whole words of bits. One value of `then` represents all.
 fn choose_bools(mask: &BooleanBuffer, then: &BooleanArray, otherwise: &BooleanArray) -> BooleanArray {
     let then = if then.len() == 1 { repeat_bool(then, mask.len()) } else { then.clone() };
     let others = !mask;
@@ -100,7 +100,7 @@ fn choose_bools(mask: &BooleanBuffer, then: &BooleanArray, otherwise: &BooleanAr
     BooleanArray::new(chosen(then.values(), otherwise.values()), nulls)
 }
 
-/// As `zip`, which copies run by run; here the mask changes from row to row. One value of `then` stands for all.
+/// As `zip`, which copies run by run; here the mask changes from row to row. One value of `then` represents all.
 fn choose_numbers<T: ArrowPrimitiveType>(
     mask: &BooleanArray,
     then: &PrimitiveArray<T>,

@@ -112,8 +112,8 @@ impl<'a> Segments<'a> {
         self.each().map(|(start, length)| (start, 0..length))
     }
 
-    /// The rows of each episode that lie in all these windows, which compare the timestep with a moment of the
-    /// episode by anything but `NotEqual`; none where a moment is null.
+    /// The rows of each episode that are in all these windows, which compare the timestep with a moment of the
+    /// episode by anything but `NotEqual`; none if a moment is null.
     pub(crate) fn within(self, windows: &[(Comparison, &Int64Array)]) -> Vec<Stretch> {
         let mut stretches: Vec<Stretch> = self.whole().collect();
         for (comparison, moments) in windows {
@@ -171,7 +171,7 @@ impl<'a> Segments<'a> {
         self.rows_at(moments).map(|row| row.is_some()).collect()
     }
 
-    /// The values of each episode that are not null, folded; null where there is none.
+    /// The values of each episode that are not null, folded; null without one.
     pub(crate) fn fold<T: ArrowPrimitiveType>(
         self,
         values: &PrimitiveArray<T>,
@@ -185,7 +185,7 @@ impl<'a> Segments<'a> {
         folded.collect()
     }
 
-    /// The sums of each episode's values that are not null; null where there is none. What counts is the sum as a
+    /// The sums of each episode's values that are not null; null without one. What counts is the sum as a
     /// whole: on the way to it no order of the steps can overflow.
     pub(crate) fn sums(self, values: &Int64Array) -> Result<Int64Array, ArrowError> {
         let sum = |(start, length)| {

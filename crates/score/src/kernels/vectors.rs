@@ -21,7 +21,7 @@ use trace::scan::Texts;
 #[derive(Clone, Debug)]
 pub(crate) enum Vector {
     /// Truth values, integers, floats, or the symbols of texts ([`Symbols`]): one per timestep, per episode, or one
-    /// that stands for all.
+    /// that represents all.
     Array(ArrayRef),
     /// A column of texts as the trace holds it.
     Keyed(Arc<Keyed>),
@@ -95,7 +95,7 @@ impl Vector {
     }
 }
 
-/// A column of texts: a key per row, and what each key stands for.
+/// A column of texts: a key per row, and what each key represents.
 #[derive(Debug)]
 pub(crate) struct Keyed {
     keys: Keys,

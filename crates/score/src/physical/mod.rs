@@ -30,7 +30,7 @@ impl StepId {
 /// The number of values of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Shape {
-    /// One value that stands for all.
+    /// One value that represents all.
     One,
     /// One value per episode.
     Episodes,
@@ -48,7 +48,7 @@ pub struct Step {
 }
 
 /// The kernels. Unless said otherwise a null operand gives null, and operands have the shape of the result or
-/// [`Shape::One`]. Texts are symbols (integers that stand for texts), except where a kernel takes keys.
+/// [`Shape::One`]. Texts are symbols (integers that represent texts), except where a kernel takes keys.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Kernel {
     /// A column of the batch; a column of text gives keys into its dictionary.
@@ -116,7 +116,7 @@ pub enum Kernel {
     IntFromBool(StepId),
     /// The same number as a float.
     FloatFromInt(StepId),
-    /// The rows of each episode that lie in all these windows, comparisons of the timestep with moments; none where a
+    /// The rows of each episode that are in all these windows, comparisons of the timestep with moments; none if a
     /// moment is null. Gives ranges of rows, no values.
     Within(Vec<(Comparison, StepId)>),
     /// `first`, `last`, `any` or `count` of a condition, over all rows or over those of a `Within`.

@@ -153,7 +153,7 @@ impl TextBuilder {
         self.codes.append_option(code);
     }
 
-    /// Adds the values of a column of any type, as text, and `null` where there is none.
+    /// Adds the values of a column of any type, as text, and `null` without one.
     fn extend(&mut self, column: &ArrayRef, null: Option<&str>) {
         match column.as_dictionary_opt::<Int32Type>() {
             Some(texts) => self.extend_coded(texts, null),

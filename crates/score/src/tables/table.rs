@@ -317,7 +317,7 @@ impl TextColumn {
         self.codes.is_valid(row).then(|| self.texts.value(self.codes.value(row) as usize))
     }
 
-    /// A number that stands for the text of a row; `None` for null. Equal texts have one number, but for episode ids, of
+    /// A number that represents the text of a row; `None` for null. Equal texts have one number, but for episode ids, of
     /// which each row has its own.
     ///
     /// # Panics
@@ -326,7 +326,7 @@ impl TextColumn {
         self.codes.is_valid(row).then(|| self.codes.value(row) as usize)
     }
 
-    /// The bytes of the longest text; 0 where there is none.
+    /// The bytes of the longest text; 0 without one.
     pub(crate) fn longest(&self) -> usize {
         let offsets = self.texts.value_offsets().windows(2);
         let longest = offsets.map(|ends| ends[1] - ends[0]).max().unwrap_or_default();

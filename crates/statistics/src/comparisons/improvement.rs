@@ -29,7 +29,7 @@ pub struct Improvement {
 /// (Agarwal et al. 2021, Deep RL at the edge of the statistical precipice; per stratum Mann and Whitney 1947).
 ///
 /// A stratum is the values of the first and of the second side. Where less is better, exchange the sides. The interval is
-/// the percentile interval of [`RESAMPLES`] resamples, each stratum and side drawn by itself; the same values give the
+/// the percentile interval of [`RESAMPLES`] resamples, each stratum and side drawn separately; the same values give the
 /// same interval in any order. `None` without a stratum, where a stratum lacks values of a side, and for a confidence
 /// outside (0, 1).
 pub fn probability_of_improvement(strata: &[(&[i64], &[i64])], confidence: f64) -> Option<Improvement> {

@@ -126,7 +126,7 @@ impl Spread {
         Self { gain, variance: units as f64 * se * se, units }
     }
 
-    /// The number of units on each side with which one verdict would be likely, if the difference stays as it is.
+    /// The number of units on each side with which one verdict would be likely, if the difference stays unchanged.
     ///
     /// `level` is two-sided for a difference and one-sided for the margin; the power is 0.8. `None` where no verdict comes
     /// nearer with more units.

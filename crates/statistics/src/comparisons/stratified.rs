@@ -118,7 +118,7 @@ pub fn pooled(strata: &[Pairs]) -> Pairs {
     })
 }
 
-/// The strata with episodes of both sides; `None` where there is none, or one has more successes than episodes.
+/// The strata with episodes of both sides; `None` without one, or one has more successes than episodes.
 fn terms(strata: &[Stratum]) -> Option<Vec<Term>> {
     if strata.iter().any(|stratum| stratum.first.0 > stratum.first.1 || stratum.second.0 > stratum.second.1) {
         return None;

@@ -51,7 +51,7 @@ pub struct RestrictedMean {
 pub struct MedianInterval {
     /// The first step that it may be.
     pub low: i64,
-    /// The last step that it may be; none where the episodes set no upper bound.
+    /// The last step that it may be; none if the episodes set no upper bound.
     pub high: Option<i64>,
 }
 

@@ -35,7 +35,7 @@ pub struct Print {
     pub rounding: Rounding,
 }
 
-/// Integers from the first to the second; none where the first is larger.
+/// Integers from the first to the second; none if the first is larger.
 type Span = (i128, i128);
 
 impl Sample {

@@ -1,7 +1,7 @@
 //! From how many episodes on an interval may be shown as one of 95 %.
 //!
 //! Rule: an interval is given where it held the truth in at least nine of ten simulated studies, from that number of
-//! episodes on, in every scenario of `benches/COVERAGE-INTERVALS.md`; elsewhere the reason stands in its place.
+//! episodes on, in every scenario of `benches/COVERAGE-INTERVALS.md`; elsewhere the reason is in its place.
 //! No number of episodes protects against an outcome that none of them had: with none among n, three of n may (the rule
 //! of three, Hanley and Lippman-Hand 1983).
 

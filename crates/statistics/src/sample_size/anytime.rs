@@ -7,7 +7,7 @@ use exact::ratio::Ratio;
 /// The most episodes of a plan with looks; the outcomes grow with the third power.
 pub const MOST_AT_LOOKS: u64 = 600;
 
-/// An anytime-valid test with a look after every so many episodes.
+/// An anytime-valid test with a look after every this many episodes.
 ///
 /// An outcome is a loss, nothing, or a win: of pairs, which model alone succeeds; of one model, failure and success.
 #[derive(Clone, Debug)]

@@ -90,7 +90,7 @@ impl Study {
         match &self.source {
             _ if ids.is_empty() => Ok(Shown::default()),
             Source::Traces(traces) => self.shown_by(traces, ids, metric),
-            // What lies beside scores may be of other episodes, and is no fault of theirs.
+            // What is beside scores may be of other episodes, and is no fault of theirs.
             Source::Scores(_) => {
                 Ok(self.traces_beside().and_then(|traces| self.shown_by(&traces, ids, metric).ok()).unwrap_or_default())
             }

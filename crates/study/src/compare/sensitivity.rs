@@ -219,7 +219,7 @@ fn metrics(definitions: &Definitions) -> impl Iterator<Item = String> + '_ {
     definitions.plan.outputs.iter().map(|output| output.name.clone())
 }
 
-/// The definitions asked for, with evidence from so many pixels on.
+/// The definitions asked for, with evidence from this many pixels on.
 fn under(question: &Question, px: u32, columns: &Columns) -> Result<Definitions, StudyError> {
     let as_is = question.load(columns)?;
     let shown = format!("the threshold of {px} px");

@@ -119,7 +119,7 @@ impl Question {
     }
 }
 
-/// Refuses definitions of the mirror for traces of another domain. What cannot be read is told where it is loaded.
+/// Refuses definitions of the mirror for traces of another domain. What cannot be read is reported where it is loaded.
 fn check_domain(definitions: &Path, traces: &TraceSet) -> Result<(), StudyError> {
     let is_mirror = file::read(definitions).is_ok_and(|document| document.domain.is_none());
     let first = traces.files().first().filter(|_| is_mirror);

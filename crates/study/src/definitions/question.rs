@@ -47,7 +47,7 @@ impl Question {
         self.definitions.as_deref().unwrap_or(Path::new(DEFAULT_DEFINITIONS))
     }
 
-    /// The columns among those to group by that a score does not have by itself.
+    /// The columns among those to group by that a score lacks on its own.
     pub(crate) fn labels(&self) -> Vec<String> {
         self.by.iter().flatten().filter(|name| !KEY_COLUMNS.contains(&name.as_str())).cloned().collect()
     }

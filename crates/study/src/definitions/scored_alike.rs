@@ -13,7 +13,7 @@ pub struct ScoredAlike {
     pub hash: Option<String>,
     /// The experiments by name; those that no footer names are not among them.
     pub experiments: BTreeSet<String>,
-    /// A condition that keeps their episodes and no others.
+    /// A condition that keeps only their episodes.
     pub condition: String,
 }
 

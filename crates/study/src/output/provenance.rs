@@ -1,7 +1,7 @@
 //! The traces that a report was made of, found again by its manifest.
 //!
-//! Rule: a file is the trace that the manifest names if it has its hash, whatever the folder it lies in; every trace
-//! that changed or is missing is told at once, and no report is made without them.
+//! Rule: a file is the trace that the manifest names if it has its hash, whatever the folder it is in; every trace
+//! that changed or is missing is reported at once, and no report is made without them.
 
 use std::ffi::OsStr;
 use std::fmt;
@@ -182,7 +182,7 @@ fn shown_as(folder: &Path, path: &Path) -> Vec<PathBuf> {
     })
 }
 
-/// Where the traces of a report are looked for: where one is told, else the current folder, the report's folder and
+/// Where the traces of a report are looked for: where one is given, else the current folder, the report's folder and
 /// the folders above it.
 pub fn places(report: &Path, told: &[PathBuf]) -> Vec<PathBuf> {
     if !told.is_empty() {

@@ -73,7 +73,7 @@ pub enum VerifyError {
         /// The value found.
         found: String,
     },
-    /// A manifest that is none of a report, or lists what cannot be a file of it.
+    /// A manifest that is invalid of a report, or lists what cannot be a file of it.
     #[error("{}: expected the manifest of a report, found {found}; make the report again with `mirrorstats report`", path.display())]
     Malformed {
         /// The path.
@@ -91,7 +91,7 @@ pub enum VerifyError {
     },
 }
 
-/// Holds the files of a folder against its manifest.
+/// Compares the files of a folder with its manifest.
 ///
 /// # Errors
 /// A folder without a manifest, one that lists nothing, or paths that are not inside of the folder; what cannot be read.
@@ -157,7 +157,7 @@ fn fault(output: &Output) -> Option<String> {
     (!is_hash).then(|| format!("the output `{shown}` with `{}` in place of a SHA-256", visible(&output.sha256)))
 }
 
-/// All that lies in a folder and is no folder, by path inside of it.
+/// All that is in a folder and is no folder, by path inside of it.
 fn find(folder: &Path, inside: &str, there: &mut BTreeMap<String, Metadata>) -> Result<(), VerifyError> {
     let unreadable = |path: &Path| {
         let path = path.to_owned();

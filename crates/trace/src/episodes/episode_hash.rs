@@ -1,4 +1,4 @@
-//! The hash of an episode's rows: the same in its trace and in its log, so that what does not belong together is told apart.
+//! The hash of an episode's rows: the same in its trace and in its log, so that what does not belong together is distinguished.
 //!
 //! The rows are hashed in a form of their own, which does not depend on how a file stores them; the schema's text of the
 //! column says which.

@@ -58,7 +58,7 @@ pub struct Declared {
     /// The parts of each fingerprint, by its name in the column `fingerprint`.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub fingerprints: BTreeMap<String, Value>,
-    /// The fingerprints that stand for different parts in different files.
+    /// The fingerprints that represent different parts in different files.
     #[serde(default, skip_serializing_if = "BTreeSet::is_empty")]
     pub ambiguous: BTreeSet<String>,
     /// The footer's recording behind each fingerprint. Scores do not carry it.

@@ -51,7 +51,7 @@ pub(crate) fn of_recording(file: &str, recording: Option<&str>) -> Result<Vec<De
 }
 
 pub(crate) fn absent(file: &str, recording: Option<&str>) -> Vec<&'static str> {
-    // A recording that is not as it must be is told apart from its columns.
+    // A recording that is not as it must be is distinguished from its columns.
     let declared = of_recording(file, recording).unwrap_or_default();
     let say_so = |name: &str| declared.iter().all(|experiment| experiment.absent.contains(&name));
     OF_SOME_TASKS.into_iter().filter(|name| !declared.is_empty() && say_so(name)).collect()

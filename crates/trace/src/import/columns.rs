@@ -1,7 +1,7 @@
 //! What the keys of steps become: columns of the schema, checked against it, and columns of their own, whose types come
 //! from the values of all lines.
 //!
-//! Rule: a value is taken as it is or refused; no text becomes a number, no number becomes another.
+//! Rule: a value is taken unchanged or refused; no text becomes a number, no number becomes another.
 
 use indexmap::IndexMap;
 

@@ -54,7 +54,7 @@ impl Mapping {
         })
     }
 
-    /// Returns true if lines stay as they are.
+    /// Returns true if lines stay unchanged.
     pub fn is_empty(&self) -> bool {
         self.columns.is_empty() && self.constants.is_empty()
     }
@@ -113,7 +113,7 @@ impl Path {
         self.keys.strip_prefix(key).is_some_and(|rest| rest.starts_with('.'))
     }
 
-    /// The value in a row; null where there is none. A number becomes a text where every domain has a text.
+    /// The value in a row; null without one. A number becomes a text where every domain has a text.
     fn value(&self, name: &str, row: &Row<'_>) -> Value {
         let member = |key: &str| row.iter().find(|(name, _)| *name == key).map(|(_, value)| *value);
         let found = within(member, &self.keys).cloned().unwrap_or_default();

@@ -8,7 +8,7 @@
 //! become columns of their own. Lines of an episode need not be together, nor in one file: `episode_id` and `t` say
 //! where a step belongs, and episodes come in the order of their first lines.
 //!
-//! Rule: all or nothing. A line that cannot be taken as it is fails the import, and nothing is filled in or left out.
+//! Rule: all or nothing. A line that cannot be taken unchanged fails the import, and nothing is filled in or left out.
 //! Memory holds the position of each step, not the steps.
 
 mod columns;
@@ -58,7 +58,7 @@ pub struct Imported {
     pub own: Vec<Own>,
 }
 
-/// Makes the trace at `out` of the steps in these texts, whose values are held against `limits`.
+/// Makes the trace at `out` of the steps in these texts, whose values are compared with `limits`.
 pub fn import(texts: &mut [Text], out: &Path, limits: Limits<'_>) -> Result<Imported, ImportError> {
     let mut columns = Columns::default();
     let mut index = Index::default();
@@ -141,7 +141,7 @@ fn write(
     Ok(rows.finish().map_err(failed)?)
 }
 
-/// Holds what was written against every rule of the schema.
+/// Compares what was written with every rule of the schema.
 fn check(file: &NewFile, out: &Path, expected: Expected<'_>) -> Result<(), ImportError> {
     let input = Input { name: Input::new(out).name, path: file.temporary_path().to_owned() };
     let report = validate_as(&[input], expected, NonZeroUsize::MIN)?;

@@ -1,6 +1,6 @@
 //! The contents of a chunk, unpacked within a budget.
 //!
-//! Rule: a chunk says how large it is when unpacked, and is never unpacked beyond that; what it says is held against its
+//! Rule: a chunk says how large it is when unpacked, and is never unpacked beyond that; what it says is compared with its
 //! own bytes and counted for the whole log before anything is unpacked.
 
 use std::sync::Arc;
@@ -131,7 +131,7 @@ fn unpacked(
 /// The library subtracts such a length from what is left and does not compare them before, which panics in builds that
 /// check for overflow. A chunk that is cut off is left to the library.
 fn before_overrun(chunk: &[u8]) -> Option<&[u8]> {
-    // Behind the frame stand two times, a size and a checksum; then the name of the compression, empty where there is none.
+    // Behind the frame stand two times, a size and a checksum; then the name of the compression, empty without one.
     let (length, records) = chunk.get(FRAME + 28..)?.strip_prefix(&[0; 4])?.split_first_chunk::<8>()?;
     let (mut left, mut at) = (u64::from_le_bytes(*length), 0_usize);
     while left > 0 {

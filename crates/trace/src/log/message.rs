@@ -56,7 +56,7 @@ fn without_strangers(schema: &mut Schema) {
     schema.insert("required".to_owned(), required.unwrap_or_default());
 }
 
-/// An action that is none.
+/// An action that is invalid.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("step {t}: expected an action such as `move_forward`, found `{found}`")]
 pub struct NoAction {

@@ -1,6 +1,6 @@
 //! The messages of a log that must be whole, one after the other, in memory that does not grow with it.
 //!
-//! Rule: the first damage ends it, as an error that names its place. Every length was held against what is left of the
+//! Rule: the first damage ends it, as an error that names its place. Every length was compared with what is left of the
 //! file before anything was made of that size.
 
 use std::fs::File;

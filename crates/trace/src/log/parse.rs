@@ -1,6 +1,6 @@
 //! A record out of its bytes.
 //!
-//! Rule: every length is held against what is left of the record first. The library makes room for a text before it knows
+//! Rule: every length is compared with what is left of the record first. The library makes room for a text before it knows
 //! that the text is there.
 
 use mcap::records::{Record, op};

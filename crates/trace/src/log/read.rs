@@ -44,7 +44,7 @@ impl LogReader {
     }
 }
 
-/// An episode of a log that is not the one of this id; `None` if there is none.
+/// An episode of a log that is not the one of this id; `None` without one.
 pub fn other_episode(path: &Path, id: &str) -> Result<Option<String>, LogError> {
     for message in LogReader::open(path)? {
         if let Event::Episode(EpisodeMessage::Begin(head)) = message?.event
@@ -92,7 +92,7 @@ pub(super) fn event(name: &str, data: &[u8]) -> serde_json::Result<Event> {
     })
 }
 
-/// The PNG in a `foxglove.CompressedImage`; `None` if there is none.
+/// The PNG in a `foxglove.CompressedImage`; `None` without one.
 pub fn png(image: &[u8]) -> Option<Vec<u8>> {
     /// As much of the message as is needed.
     #[derive(Clone, PartialEq, prost::Message)]

@@ -1,4 +1,4 @@
-//! The records of a log as they lie in the file, past damage.
+//! The records of a log as they are in the file, past damage.
 //!
 //! Rule: a length that cannot be right ends nothing: the next chunk behind it, or the end of the data, is looked for and
 //! read on from. Checksums are taken along the way, so that damage which still reads as records is known too.
@@ -31,7 +31,7 @@ pub(super) struct Records<R> {
     bytes: R,
     at: u64,
     end: u64,
-    /// Of the record before, to be told next.
+    /// Of the record before, to be reported next.
     damage: Option<String>,
     running: crc32fast::Hasher,
     /// Of the section that has ended.

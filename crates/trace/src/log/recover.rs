@@ -67,7 +67,7 @@ impl Losses {
         *self != Self::default()
     }
 
-    /// One of them in words; `None` if there is none.
+    /// One of them in words; `None` without one.
     pub fn first(&self) -> Option<String> {
         let episode = self.episodes.first().map(|lost| format!("the episode `{}`: {}", lost.episode_id, lost.reason));
         let told = self.damage.first().or(self.cut.as_ref()).or(self.recording.as_ref()).cloned();
@@ -180,7 +180,7 @@ impl Salvage {
         Ok(())
     }
 
-    /// Holds a checksum against the one that was written; 0 stands for none.
+    /// Compares a checksum with the one that was written; 0 represents none.
     fn compare(&mut self, what: &str, written: u32, found: u32) {
         let losses = &mut self.result.losses;
         if written != 0 && written != found && losses.damaged_chunks == 0 && losses.damage.is_empty() {

@@ -102,7 +102,7 @@ impl EpisodeLog {
         let channels = channels(&mut out, census).map_err(LogError::writing(path))?;
         let mut log = Self { path: path.to_owned(), out, channels, sequence: 0, is_read_meanwhile: true };
         let channel = log.channels.episode;
-        // What its rows hash to is not known before its end, and stands there.
+        // What its rows hash to is not known before its end, and is there.
         let head = Episode { episode_hash: None, ..head.clone() };
         log.json(channel, time, &EpisodeMessage::Begin(Box::new(head)))?;
         log.flush()?;

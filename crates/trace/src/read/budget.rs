@@ -9,7 +9,7 @@ use arrow::array::{Array as _, AsArray as _};
 use exact::budget::{Budget, Exceeded, Limit};
 use parquet_pages::Column;
 
-/// The longest name of an episode, a model, a condition, a colour: they stand in every row of what is made of a trace.
+/// The longest name of an episode, a model, a condition, a colour: they are in every row of what is made of a trace.
 pub(crate) const LONGEST_NAME: Limit = Limit::new("bytes in a name", 1024);
 
 /// The steps of an episode, which is held in memory whole.

@@ -91,7 +91,7 @@ enum Source {
     Library(Box<Library>),
 }
 
-/// A column as the Parquet library decodes it, so many rows at a time.
+/// A column as the Parquet library decodes it, this many rows at a time.
 struct Library {
     reader: ParquetRecordBatchReader,
     held: Vec<ArrayRef>,
@@ -193,7 +193,7 @@ impl<'a> RowGroup<'a> {
         checked.map(|()| column).map_err(|exceeded| Box::new(over(exceeded)))
     }
 
-    /// The next `count` rows of a column. At the end, where that is none, there must be none.
+    /// The next `count` rows of a column. At the end, where that is invalid, there must be none.
     fn column(&mut self, at: usize, count: usize) -> Result<Column, Box<Finding>> {
         let kind = self.layout.columns[at].kind;
         if let Source::Pages { root, cursor } = &mut self.sources[at] {

@@ -43,7 +43,7 @@ impl FlatRows {
         }
         let (row_groups, slot) = ((0..metadata.num_row_groups()).collect(), FaultSlot::default());
         let store = Store::new(file, Arc::new(Expansion::new(bytes)));
-        // Whoever reads such a file verifies its checksums before, all of them.
+        // A caller that reads such a file verifies its checksums before, all of them.
         let checksums = ChunkChecksums::default();
         let library = Library { store, metadata, checksums, row_groups, slot: Arc::clone(&slot), writes_out: true };
         let reader = library.reader(ProjectionMask::all(), None, BATCH_ROWS, None);

@@ -308,7 +308,7 @@ impl TraceFile {
     /// The number of rows in a row group.
     ///
     /// # Panics
-    /// For a row group that the file has not.
+    /// For a row group that the file lacks.
     pub fn row_group_rows(&self, row_group: usize) -> usize {
         self.rows[row_group]
     }

@@ -27,7 +27,7 @@ use exact::input;
 use parquet_pages::{Expansion, FaultSlot, Library, Store};
 
 const BATCH_ROWS: usize = 8 * 1024;
-/// The column by which episodes are told apart.
+/// The column by which episodes are distinguished.
 const EPISODE_ID: &str = "episode_id";
 
 /// The batches that a thread is ahead of the reader, at most.

@@ -1,4 +1,4 @@
-//! Checks the stored pages of traces for engines that read files by themselves.
+//! Checks the stored pages of traces for engines that read files themselves.
 
 use std::io;
 

@@ -54,14 +54,14 @@ pub struct Known<'a> {
 }
 
 impl Column {
-    // Beside the rules, since a column by itself does not know which columns hold colours.
+    // Beside the rules, since a column alone does not know which columns hold colours.
     /// Returns true if the column's text names something, so that an empty one is a fault.
     pub fn names(&self) -> bool {
         self.stored == Stored::String && (self.required || self.constant || colors::column(self.name).is_some())
     }
 }
 
-/// The rules of a column of the schema, in the order in which they are told.
+/// The rules of a column of the schema, in the order in which they are reported.
 pub fn rules_of<'a>(column: &Column, known: Known<'a>) -> Vec<Rule<'a>> {
     let mut rules = Vec::new();
     let mut rule = |code, asks| rules.push(Rule { code, asks });

@@ -5,7 +5,7 @@
 //! 1. Nothing but blanks is no attribution.
 //! 2. A clause that speaks in the first person ("I am red", "my body is red", "self: red") and names one colour that it
 //!    does not deny, nor has from hearsay, decides; clauses end at `. ; ! ? ,` and at "but", "while", "whereas", "although", "though".
-//! 3. Words of not knowing ("unknown", "not sure", "cannot tell", ...) are `unknown`, whatever colours stand beside.
+//! 3. Words of not knowing ("unknown", "not sure", "cannot tell", ...) are `unknown`, whatever colours are beside.
 //! 4. One colour that is not denied is that colour, "probably" or not; two or more are `unknown`: nothing is chosen.
 //! 5. Colours that are all denied ("not red") are `unknown`.
 //! 6. No word about a colour, or about one outside of the palette alone, is no attribution.

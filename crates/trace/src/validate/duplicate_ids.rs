@@ -59,7 +59,7 @@ impl Prints {
 }
 
 fn repeated_numbers(numbers: &[u64]) -> HashSet<u64> {
-    // A bit stands for all numbers with the same beginning. With 32 times as many bits as numbers, few share theirs with
+    // A bit represents all numbers with the same beginning. With 32 times as many bits as numbers, few share theirs with
     // another one, and only those need to be sorted.
     let bits = (numbers.len() * 32).next_power_of_two().max(64);
     let place = |number: u64| {

@@ -92,7 +92,7 @@ fn may_break(rule: &Rule<'_>, held: &Held, offsets: &[usize]) -> bool {
     }
 }
 
-/// Returns true if one of some values, what stands in the place of nulls included, is none that the rule allows. Counted
+/// Returns true if one of some values, what is in the place of nulls included, is none that the rule allows. Counted
 /// without an early end, which the compiler turns into few instructions.
 fn has_odd(rule: &Rule<'_>, values: &ArrayRef) -> bool {
     if let Some(texts) = values.as_string_opt::<i32>() {

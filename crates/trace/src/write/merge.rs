@@ -119,7 +119,7 @@ pub fn read(path: &Path) -> Result<Vec<EpisodeRows>, TraceError> {
     let file = input::open(path).map_err(|error| unreadable(&name, error.into()))?;
     let footer = footer(&Input::new(path), Extent::Pages).map_err(|finding| damaged(*finding))?;
     match bounds::fault(&name, footer.bytes, &footer.metadata) {
-        // Whoever puts traces together takes one without rows as it is.
+        // A caller that puts traces together takes one without rows as it is.
         Some(fault) if fault.code != Code::NoEpisodes => Err(damaged(fault)),
         _ => decode(&name, Store::new(file, Arc::new(Expansion::new(footer.bytes))), footer),
     }

@@ -41,7 +41,7 @@ pub(crate) fn rewrite<W: Write + Send>(
 ) -> Result<W, TraceError> {
     let layout = Layout::new(set, [source, target], [])?;
     let [file] = set.files() else { return Err(unwritable("the trace", "there is not exactly one".into())) };
-    // What is copied gets new checksums, which must not stand for damaged bytes.
+    // What is copied gets new checksums, which must not represent damaged bytes.
     verify_pages(set)?;
     let failed = |error: ParquetError| unwritable(file.name(), error.into());
     let metadata = file.footer_again(Extent::Whole).map_err(|finding| TraceError::from(*finding))?.metadata;

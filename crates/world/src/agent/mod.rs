@@ -37,7 +37,7 @@ pub struct Task {
     pub experiment: Experiment,
     /// The false colour of the first line of the prompt in E3.
     pub stated_color: Option<String>,
-    /// Steps after which the episode ends by itself (100 in the paper).
+    /// Steps after which the episode ends automatically (100 in the paper).
     pub step_budget: i32,
     /// The only source of chance for an agent; differs from episode to episode, equal from recording to recording.
     pub seed: u64,
@@ -191,7 +191,7 @@ impl Lost {
         Self { status: Some(status), cause: cause.into(), step: None, by_limit: false }
     }
 
-    /// Stopped by a limit that whoever records has set.
+    /// Stopped by a limit that a caller that records has set.
     pub fn by_limit(cause: impl Into<String>) -> Self {
         Self { status: None, cause: cause.into(), step: None, by_limit: true }
     }

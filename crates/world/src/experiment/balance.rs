@@ -2,7 +2,7 @@
 //!
 //! A square of `n` by `n` numbers, in which each row and each column has each number once, and in which every rectangle at
 //! its first corner has each number equally often, or one more. Seeds are its rows and runs its columns, again and again,
-//! so that the colours of a study are balanced without knowing how large it is, and stay as they are when it grows.
+//! so that the colours of a study are balanced without knowing how large it is, and stay unchanged when it grows.
 //! The squares were found by a search that fills row after row and turns back where a rectangle would be out of balance.
 
 /// The squares of 2 to 10 colours, a row after the other, a digit per place.

@@ -28,7 +28,7 @@ pub enum FileError {
     TooMany(#[from] TooMany),
 }
 
-/// An experiment that is known now, and where it stands in its file.
+/// An experiment that is known now, and where it is in its file.
 #[derive(Clone, Debug)]
 pub struct Loaded {
     pub experiment: Experiment,

@@ -144,7 +144,7 @@ fn built_in_specs() -> Vec<&'static Spec> {
     names.filter_map(|name| Experiment::parse(name).ok()).map(|experiment| &experiment.known().spec).collect()
 }
 
-/// A number that a name stands for: the beginning of its SHA-256.
+/// A number that a name represents: the beginning of its SHA-256.
 pub fn number_of(name: &str) -> u64 {
     let hash = exact::hash::of_bytes(name.as_bytes());
     u64::from_str_radix(&hash[..16], 16).unwrap_or_default()

@@ -15,7 +15,7 @@
 //! context are ours, since the paper says what they hold but not how they read.
 //!
 //! The paper's user prompt of E5 has no `<warning_if_bumped_wall>`, that of E1 to E4 has it. Ours has it in both: a body
-//! that was stopped is told so by one rule, and where nothing was hit the words of E5 are the paper's.
+//! that was stopped is named so by one rule, and where nothing was hit the words of E5 are the paper's.
 
 use std::fs;
 use std::path::{Component, Path};

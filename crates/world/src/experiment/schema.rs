@@ -79,7 +79,7 @@ pub struct ExperimentTable {
     pub actions: Option<Actions>,
     /// The agent's camera; `eye` if absent.
     pub camera: Option<Camera>,
-    /// Steps after which an episode ends by itself; the world's if absent.
+    /// Steps after which an episode ends automatically; the world's if absent.
     #[schemars(range(min = 1, max = 100_000))]
     pub steps: Option<u32>,
     /// The length of the agent's own steps, m; the world's if absent.

@@ -64,7 +64,7 @@ pub struct Spec {
     pub actions: Actions,
     /// The agent's camera.
     pub camera: Camera,
-    /// Steps after which an episode ends by itself; the world's if absent.
+    /// Steps after which an episode ends automatically; the world's if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub steps: Option<u32>,
     /// The length of the agent's own steps, mm; the world's if absent.
@@ -171,7 +171,7 @@ pub enum Colors {
     /// Each colour equally often over the seeds and runs of a study, or once more.
     #[default]
     Balanced,
-    /// Each by itself.
+    /// Each alone.
     Random,
 }
 

@@ -13,7 +13,7 @@ const WORDS: [&str; 6] = ["title", "order", "chance", "reference", "definitions"
 /// The keys of an agent's description that are parts of their own.
 const SAMPLING: [&str; 4] = ["temperature", "max_output_tokens", "reasoning_effort", "extra_body"];
 
-/// A name, and what it stands for.
+/// A name, and what it represents.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fingerprint {
     /// The value of the column `fingerprint`: the beginning of the hash of the parts.

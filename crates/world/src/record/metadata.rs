@@ -20,7 +20,7 @@ pub(super) const FINGERPRINTS: &str = "fingerprints";
 pub(super) const VERSION_KEY: &str = "version";
 
 /// The version of this object's shape: 2 since it declares a palette, a design and fingerprints, 3 since it has the whole
-/// experiment. A recording of another version is not continued, since its episodes were not held against the same rules.
+/// experiment. A recording of another version is not continued, since its episodes were not compared with the same rules.
 const VERSION: u32 = 3;
 
 /// The metadata of several experiments' traces about their recordings.

@@ -16,7 +16,7 @@ use trace::log::write::{EpisodeLog, Form, Placed, Solid, View};
 
 static CENSUS: LazyLock<Value> = LazyLock::new(|| schema_for!(Visibility).to_value());
 
-/// A step as whoever looks on sees it.
+/// A step as a caller that looks on sees it.
 #[derive(Debug)]
 pub struct Seen<'a> {
     /// The timestep, from 1.

@@ -2,11 +2,11 @@
 //!
 //! | file | what it knows |
 //! |---|---|
-//! | `verify` | traces held against a replay; their frames, log and counts anew (feature `sim`, as the next four) |
+//! | `verify` | traces compared with a replay; their frames, log and counts anew (feature `sim`, as the next four) |
 //! | `film_strip` | an episode as a row of frames |
 //! | `frames` | frames of an episode rendered again, some steps at a time |
-//! | `again` | a trace's worlds built anew, its actions repeated, every row held against what comes of it |
-//! | `log` | what an episode's log is told, step by step, by a recording or a replay |
+//! | `again` | a trace's worlds built anew, its actions repeated, every row compared with what comes of it |
+//! | `log` | what an episode's log gets, step by step, by a recording or a replay |
 //! | [`reparse`] | recorded replies read again by the parser of this program |
 //! | [`moments`] | which steps of an episode tell its story |
 //!

@@ -1,7 +1,7 @@
 //! Recorded replies read again by the parser of this program.
 //!
 //! Rule: recorded actions stay, since the world has answered them. An episode whose action would have been another one has
-//! diverged from the first such step on, and is named. A reply that the provider declined or cut off stays as it is.
+//! diverged from the first such step on, and is named. A reply that the provider declined or cut off stays unchanged.
 
 use std::path::Path;
 
@@ -43,9 +43,9 @@ pub struct Change {
     pub t: usize,
     /// The column: `self_color`, `selected_cube`, `mark_report` or `reply_status`.
     pub column: &'static str,
-    /// The recorded value; null where there is none.
+    /// The recorded value; null without one.
     pub before: Option<String>,
-    /// The value by this program; null where there is none.
+    /// The value by this program; null without one.
     pub after: Option<String>,
 }
 

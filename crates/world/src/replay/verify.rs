@@ -1,4 +1,4 @@
-//! Traces replayed and held against what was recorded; frames, logs and counts anew on the way.
+//! Traces replayed and compared with what was recorded; frames, logs and counts anew on the way.
 
 use std::fmt::Display;
 use std::path::{Path, PathBuf};

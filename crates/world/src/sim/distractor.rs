@@ -1,4 +1,4 @@
-//! Another agent: walks about by itself, turns away from walls and cubes, and lets bodies pass.
+//! Another agent: walks about, turns away from walls and cubes, and lets bodies pass.
 //!
 //! Rule: what it does depends on its habit and on what is in its way, never on a clock; it never goes through anything.
 

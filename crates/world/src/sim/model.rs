@@ -345,7 +345,7 @@ fn build_boxes(spec: &mut MjSpec, name: &str, count: usize, largest: f64, paint:
         geom.set_type(MjtGeomBase::mjGEOM_BOX);
         *geom.size_mut() = [largest / 2.0; 3];
         *geom.pos_mut() = [0.0, 0.0, -50.0];
-        // MuJoCo ignores what a scene says of a rotation that is none when compiled.
+        // MuJoCo ignores what a scene says of a rotation that is invalid when compiled.
         let quarter = std::f64::consts::FRAC_1_SQRT_2;
         *geom.quat_mut() = [quarter, 0.0, -quarter, 0.0];
         geom.set_contype(1);
@@ -382,7 +382,7 @@ fn set_picture(spec: &mut MjSpec, config: &WorldConfig, paint: Paint, size: [usi
     let samples = if paint == Paint::Lit { config.eye.samples } else { 0 };
     visual.quality.offsamples = i32::try_from(samples).unwrap_or(0);
     // Drawing takes its time by the triangles of round parts; a body is some hundred pixels high at most. Labels are what
-    // the rays are held against, and are as round as it gets.
+    // the rays are compared with, and are as round as it gets.
     let parts = match paint {
         Paint::Lit => [config.eye.slices, config.eye.stacks, config.eye.quads],
         Paint::Labels => LABELLED_PARTS,

@@ -212,7 +212,7 @@ impl Patch {
         [FRONT_MM, self.aside_mm, self.height_mm].map(|length| f64::from(length) / 1000.0)
     }
 
-    /// Its middle in the room, on the front of a body that stands there, m.
+    /// Its middle in the room, on the front of a body that is there, m.
     pub fn center(self, body: Pose) -> [f64; 3] {
         in_room(body, self.place())
     }
@@ -253,7 +253,7 @@ impl Scene {
     }
 
     /// The colour in which a mirror or window shows a body that is not the own body's: a decoy's paint, or that of a body
-    /// that it alone shows; of the first such pane. `None` where there is none.
+    /// that it alone shows; of the first such pane. `None` without one.
     pub fn shown_color(&self) -> Option<Color> {
         let shown = |pane: &HungPane| pane.paint.or_else(|| pane.double.map(|double| double.color));
         self.panes.iter().filter_map(shown).find(|color| *color != self.body_color)
@@ -265,7 +265,7 @@ impl Scene {
         let Self { body_color, start, cubes, others, .. } = self;
         let mut parts = json!([SCENE_VERSION, config.room, body_color, start, cubes, others]);
         if let (Some(hand), Some(parts)) = (self.hand, parts.as_array_mut()) {
-            // The mark to be reached is what the hand's place is told from.
+            // The mark to be reached is what the hand's place is derived from.
             parts.extend([json!(hand), json!(self.marks)]);
         }
         let mut hash = hash::of_bytes(parts.to_string().as_bytes());
@@ -280,7 +280,7 @@ impl Scene {
         i32::try_from(steps * task.step_mm).ok()
     }
 
-    /// Steps after which an episode ends by itself: those of the way to the mark and some more, at most as many as the
+    /// Steps after which an episode ends automatically: those of the way to the mark and some more, at most as many as the
     /// experiment says, where there is a hand; else the configuration's.
     pub fn budget(&self, config: &WorldConfig) -> u32 {
         match (self.experiment.hand, self.hand) {

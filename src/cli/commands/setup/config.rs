@@ -14,7 +14,7 @@ use report::tables::Table;
 
 /// Show the defaults that hold here, and where they come from
 ///
-/// A default of any option may stand in `mirrorstats.toml`, in this folder or above it: `threads = 2` holds for every command
+/// Any option can have a default in `mirrorstats.toml`, in this folder or above it: `threads = 2` holds for every command
 /// that has `--threads`, `out = "runs"` below `[record]` for `record` alone. `MIRRORSTATS_CONFIG_FILE` names another file, or none
 /// where it is empty. In the environment the same are `MIRRORSTATS_THREADS` and `MIRRORSTATS_RECORD_OUT`. What is typed comes
 /// first, then the environment, then the file. `MIRRORSTATS_ERRORS=json` is `--errors json`.

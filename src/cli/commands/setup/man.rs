@@ -11,7 +11,7 @@ use exact::replace::Content;
 /// Write manual pages into a folder, one per command
 #[derive(Clone, Debug, clap::Args)]
 pub struct ManArgs {
-    /// The folder, which is made where there is none
+    /// The folder; it is created if it does not exist
     folder: PathBuf,
 }
 

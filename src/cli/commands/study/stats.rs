@@ -11,7 +11,7 @@ use exact::suggest::hint;
 use report::statistics::text::Length;
 use report::statistics::{Options, Sequential, Statistics};
 
-/// The word that stands for every metric.
+/// The word that represents every metric.
 const ALL: &str = "all";
 
 /// Intervals, tests and comparisons that hold at small n

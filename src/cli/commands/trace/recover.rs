@@ -112,7 +112,7 @@ impl RecoverArgs {
         Input { name: self.out.display().to_string(), path: self.out.clone() }
     }
 
-    /// Holds the trace that was written against every rule of the schema.
+    /// Compares the trace that was written with every rule of the schema.
     fn check(&self) -> Result<(), Failure> {
         let report = validate(&[self.target()], None, NonZeroUsize::MIN).map_err(Failure::input)?;
         match report.findings.iter().find(|finding| finding.severity == Severity::Error) {

@@ -15,7 +15,7 @@ use trace::renormalize::{RenormalizeAnswer, RenormalizeError, RenormalizedFile, 
 ///
 /// Writes each trace again under its name into another folder, with `self_color` as this program reads the texts, and
 /// prints every step whose attribution changes. Steps without a text, all other columns and the rest of the recording's
-/// metadata stay as they are. All traces are written, or none.
+/// metadata stay unchanged. All traces are written, or none.
 #[derive(Clone, Debug, clap::Args)]
 pub struct RenormalizeArgs {
     #[command(flatten)]

@@ -48,7 +48,7 @@ use world::sim::config::WorldConfig;
 #[expect(clippy::struct_excessive_bools, reason = "a flag each on the command line")]
 pub struct RecordArgs {
     /// A study file: options of this command for all models, [model."NAME"] for one and [condition.NAME] for a condition;
-    /// --dry-run, --probe and --json alone may stand beside it
+    /// only --dry-run, --probe and --json may be given with it
     #[arg(value_name = "STUDY")]
     study: Option<PathBuf>,
     /// The agent: oracle, random, guesser, gullible, confabulator, frozen, mimic; vlm, a model behind a provider; human, people
@@ -107,7 +107,7 @@ pub struct RecordArgs {
     /// write nothing
     #[arg(long, conflicts_with = "dry_run")]
     probe: bool,
-    /// Print what became of the episodes as JSON
+    /// Print the outcomes of the episodes as JSON
     #[arg(long)]
     json: bool,
     /// The number of threads.
@@ -296,7 +296,7 @@ impl RecordArgs {
         Ok(ForecastAnswer::of(&subject, planned.len(), &todo, config, requests))
     }
 
-    /// Records with this player, whatever `--agent` names, until all is done or `stop` is set. Only progress is told.
+    /// Records with this player, whatever `--agent` names, until all is done or `stop` is set. Only progress is reported.
     pub fn record(&self, player: &dyn Player, stop: &AtomicBool) -> Result<Recorded, Failure> {
         let config = &configured(self.config.as_ref())?;
         let plan = &self.planned(config)?;

@@ -1,4 +1,4 @@
-//! `mirrorstats world replay`: a trace's episodes again, held against what was recorded.
+//! `mirrorstats world replay`: a trace's episodes again, compared with what was recorded.
 
 use std::ffi::OsString;
 use std::fmt;

@@ -37,7 +37,7 @@ pub struct OutcomeRow {
 
 impl Outcomes {
     /// The outcomes of the first experiment with episodes that has reference levels for a rate instead of a chance level: the
-    /// one whose question is open. `None` where there is none.
+    /// one whose question is open. `None` without one.
     ///
     /// An episode is correct where the rate is 1, else wrong where its decision committed to a colour: where `answered`,
     /// which has a value per episode of the table, is true.

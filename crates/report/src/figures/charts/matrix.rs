@@ -145,7 +145,7 @@ impl<'a> Matrix<'a> {
 
     /// The mean on a scale from 0, the worst, to 1, the best; `None` where there is no mean.
     ///
-    /// A rate is taken as it is, or from 1 where less is better. A quantity is set between the least and the
+    /// A rate is taken unchanged, or from 1 where less is better. A quantity is set between the least and the
     /// greatest mean of its experiment; where all are equal nothing ranks them, and each stands at a half.
     pub fn goodness(&self, experiment: &str, model: &str, metric: MetricId<'_>) -> Option<f64> {
         let mean = self.reading(experiment, model, metric).mean()?;

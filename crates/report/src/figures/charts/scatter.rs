@@ -12,7 +12,7 @@ const MOST_COLUMNS: usize = 3;
 const LEAST_PANEL: f64 = 120.0;
 /// The radius of the slowest model's marker, px; area goes by relative duration.
 const LARGEST: f64 = 5.6;
-/// The radius below which a shape cannot be told, px.
+/// The radius below which a shape cannot be seen, px.
 const SMALLEST: f64 = 2.0;
 /// Room for the numbers and the title of the axis at the left, px.
 const AXIS_ROOM: f64 = 34.0;

@@ -56,7 +56,7 @@ pub struct Comparison {
     pub n: [u64; 2],
     /// The successes among them; none for quantities.
     pub successes: Option<[u64; 2]>,
-    /// The 2x2 table; none where the samples are independent.
+    /// The 2x2 table; none if the samples are independent.
     pub pairs: Option<Pairs>,
     /// Pairs left out because the metric is undefined in one episode or both.
     pub undefined: u64,
@@ -83,7 +83,7 @@ pub struct Comparison {
     /// The units of analysis of both sides where the test counts each once, however many episodes it has.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub units: Option<Units>,
-    /// The test with the lost episodes of both sides; none where none was lost.
+    /// The test with the lost episodes of both sides; none if none was lost.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub losses: Option<LossCases>,
     /// The setting in which the two sides were recorded differently, so that nothing is compared.

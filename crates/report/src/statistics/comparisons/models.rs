@@ -33,7 +33,7 @@ pub struct Family {
     pub detectable: Option<Reach>,
 }
 
-/// The smallest differences that could have been shown; none where no outcome would have been enough.
+/// The smallest differences that could have been shown; none if no outcome would have been enough.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Reach {
     /// The test that this is said of.

@@ -107,7 +107,7 @@ pub struct GateCell {
     /// The units of analysis where some have several episodes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub units: Option<Units>,
-    /// The units on each side with which a verdict would be likely, if the rates stay as they are; null with a verdict.
+    /// The units on each side with which a verdict would be likely, if the rates stay unchanged; null with a verdict.
     pub settled_by: Option<u64>,
     /// The scenes in which the value changed.
     pub flips: Vec<FlippedPair>,

@@ -1,6 +1,6 @@
 //! Rates against the levels of blind guessing, by the exact binomial test.
 //!
-//! Rule: a rate that counts unfinished episodes as failures stands beside the same rate among finished episodes
+//! Rule: a rate that counts unfinished episodes as failures is beside the same rate among finished episodes
 //! ([`Relations`](metric::relations::Relations)): who does not finish is below chance under the first and need not guess.
 
 use schemars::JsonSchema;
@@ -48,7 +48,7 @@ pub struct ChanceRow {
     /// The units of analysis where some have several episodes: the test counts each once.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub units: Option<Units>,
-    /// The test with the lost episodes of the model; none where it lost none.
+    /// The test with the lost episodes of the model; none if it lost none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub losses: Option<LossCases>,
 }

@@ -28,7 +28,7 @@ pub struct DurationRow {
     pub finished: u64,
     /// The arithmetic mean, which takes censored durations as if they were whole.
     pub mean: Option<f64>,
-    /// The first step by which half of the episodes are decided (Kaplan-Meier); none where that is never seen.
+    /// The first step by which half of the episodes are decided (Kaplan-Meier); none if that is never seen.
     pub median: Option<i64>,
     /// The steps that this may be (Brookmeyer and Crowley).
     pub median_interval: Option<MedianInterval>,
@@ -47,7 +47,7 @@ pub struct CorrectRow {
     pub correct: f64,
     /// The share decided wrongly by then; the rest is undecided.
     pub wrong: f64,
-    /// The first step by which half of all episodes are decided correctly; none where that is never seen.
+    /// The first step by which half of all episodes are decided correctly; none if that is never seen.
     pub median: Option<i64>,
     /// The mean of the steps to a correct decision, where a wrong decision and none both count as the horizon.
     pub restricted: RestrictedMean,

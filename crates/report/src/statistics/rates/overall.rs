@@ -54,7 +54,7 @@ pub struct OverallRow {
     pub difference: Option<f64>,
     /// Its interval, not adjusted.
     pub interval: Option<Interval>,
-    /// The exact p value, two-sided by minimum likelihood; none where there are too many episodes to enumerate.
+    /// The exact p value, two-sided by minimum likelihood; none if there are too many episodes to enumerate.
     pub p: Option<f64>,
     /// The mid-p value, which is not guaranteed to keep the level.
     pub mid_p: Option<f64>,
@@ -62,7 +62,7 @@ pub struct OverallRow {
     pub p_adjusted: Option<f64>,
     /// True if the adjusted value reaches the level of significance.
     pub separated: bool,
-    /// The test with the lost episodes of both sides; none where none was lost.
+    /// The test with the lost episodes of both sides; none if none was lost.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub losses: Option<LossCases>,
 }

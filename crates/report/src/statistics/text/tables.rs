@@ -192,7 +192,7 @@ pub(super) const fn method(method: Method) -> (&'static str, usize) {
     }
 }
 
-/// Two models over all experiments: all of them where `is_full`, else those that are told apart.
+/// Two models over all experiments: all of them where `is_full`, else those that are distinguished.
 pub(super) fn overall(statistics: &Statistics, shown: Shown, is_full: bool) -> Table {
     let rows = statistics.overall.iter().filter(|row| shown(&row.metric) && (is_full || row.separated));
     let columns = Columns { is_full, has_losses: rows.clone().any(|row| row.losses.is_some()), has_repeats: false };

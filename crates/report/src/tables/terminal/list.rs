@@ -42,7 +42,7 @@ pub fn render(table: &Table, width: Option<usize>) -> String {
     text
 }
 
-/// The lines, of any width if that is none.
+/// The lines, of any width if that is invalid.
 pub fn lines(table: &Table, width: Option<usize>) -> String {
     fitted(&laid_out(table), table.names, width) + "\n"
 }
@@ -77,7 +77,7 @@ fn style(look: Look) -> TableStyle {
     }
 }
 
-/// The text of a table, its lines at most `width` columns wide, of any width if that is none. The first `names` columns
+/// The text of a table, its lines at most `width` columns wide, of any width if that is invalid. The first `names` columns
 /// name the rows.
 fn fitted(table: &Lines, names: usize, width: Option<usize>) -> String {
     let text = |table: &Lines| table.trim_fmt();

@@ -2,7 +2,7 @@
 
 use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
 
-/// Adds `text` in lines of at most `width` columns, of any width if that is none; lines after the first begin with `indent`
+/// Adds `text` in lines of at most `width` columns, of any width if that is invalid; lines after the first begin with `indent`
 /// spaces.
 pub fn push_wrapped(text: &mut String, words: &str, width: Option<usize>, indent: usize) {
     for line in wrapped(words, width.unwrap_or(usize::MAX), indent) {
@@ -15,7 +15,7 @@ pub fn push_wrapped(text: &mut String, words: &str, width: Option<usize>, indent
 pub fn wrapped(text: &str, width: usize, indent: usize) -> Vec<String> {
     let words = text.trim_start_matches(' ');
     let mut lines = vec![" ".repeat(text.len() - words.len())];
-    // The columns of the last line, and whether a word stands in it.
+    // The columns of the last line, and whether a word is in it.
     let (mut taken, mut begun) = (text.len() - words.len(), false);
     for word in words.split(' ') {
         let columns = word.width();

@@ -1,4 +1,4 @@
-//! JSON as Python writes it: `NaN` and infinities stand for no number, and become null.
+//! JSON as Python writes it: `NaN` and infinities represent no number, and become null.
 
 use std::io::{self, BufReader, Read};
 

@@ -1,4 +1,4 @@
-//! Reads footers: where a file's columns lie, and what stands in its key-value metadata.
+//! Reads footers: where a file's columns lie, and what is in its key-value metadata.
 
 pub(crate) mod bounds;
 

@@ -6,7 +6,7 @@
 //! |---|---|
 //! | `spelling` | how a colour is spelled |
 //! | `palette` | the palette in a footer |
-//! | `mod` | what a column may hold, one value by itself |
+//! | `mod` | what a column may hold, one value alone |
 //! | `validate::color_set` | what the values of all inputs say together |
 //!
 //! Rule: the scan, `validate`, `import`, the writer and the check on Spark all ask this module.

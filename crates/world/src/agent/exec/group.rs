@@ -73,7 +73,7 @@ impl Drop for Group {
 fn kill(id: i32, mark: &str) {
     use nix::sys::signal::{Signal, kill, killpg};
     use nix::unistd::Pid;
-    // Fails where all of it has ended by itself, which is what is wanted.
+    // Fails where all of it has ended already, which is fine.
     let _ = killpg(Pid::from_raw(id), Signal::SIGKILL);
     // What is killed may have started something in the meantime.
     for _ in 0..10 {
@@ -87,7 +87,7 @@ fn kill(id: i32, mark: &str) {
     }
 }
 
-/// The processes with this mark in their environment; none where there is no `/proc`.
+/// The processes with this mark in their environment; none if there is no `/proc`.
 #[cfg(unix)]
 fn marked(mark: &str) -> Vec<i32> {
     let wanted = format!("{MARK}={mark}");

@@ -47,7 +47,7 @@ pub struct TaskMessage {
     pub family: String,
     /// The false colour that the prompt states in E3; null elsewhere.
     pub stated_color: Option<String>,
-    /// Steps after which the episode ends by itself.
+    /// Steps after which the episode ends automatically.
     pub max_steps: i32,
     /// A number to draw chances from: differs between episodes, is the same in every recording of an episode.
     pub seed: u64,

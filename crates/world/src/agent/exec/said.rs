@@ -102,7 +102,7 @@ impl Kept {
 
 impl Drop for Kept {
     fn drop(&mut self) {
-        // A convenience: the episode does not depend on it, and a full disk is told by what does.
+        // A convenience: the episode does not depend on it, and a full disk is reported by what does.
         let _ = self.write();
     }
 }

@@ -62,7 +62,7 @@ struct Seat {
     end: Option<End>,
 }
 
-/// The end of a recording, as a page is told.
+/// The end of a recording, as a page gets it.
 #[derive(Clone, Copy, Debug)]
 struct End {
     is_complete: bool,
@@ -143,7 +143,7 @@ impl Hub {
         self.locked(seat).has_practised
     }
 
-    /// The practice is over: the person is told, and no step counts before they begin.
+    /// The practice is over: the person is informed, and no step counts before they begin.
     pub(super) fn practised(&self, seat: usize) {
         self.locked(seat).is_ready = true;
     }

@@ -1,6 +1,6 @@
 //! The pages that people play on.
 //!
-//! Rule: it answers what a model is told, to whoever has the link of a person, and has no other route: nothing here opens a
+//! Rule: it answers what a model gets, to a caller that has the link of a person, and has no other route: nothing here opens a
 //! trace or knows what is true.
 
 use std::net::TcpListener;

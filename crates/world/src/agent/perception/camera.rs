@@ -1,6 +1,6 @@
 //! The projection of pixels and points: an ideal pinhole, upright and level.
 //!
-//! Rule: only what the protocol publishes (the vertical field of view) and what whoever lives in a body knows of it: how
+//! Rule: only what the protocol publishes (the vertical field of view) and what a caller that lives in a body knows of it: how
 //! high its eye is, and how far before its axis.
 
 use crate::agent::Observation;

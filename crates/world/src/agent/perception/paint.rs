@@ -11,7 +11,7 @@ use std::sync::LazyLock;
 
 use trace::palette::Color;
 
-/// The least and the most light that falls on what stands in a lit room.
+/// The least and the most light that falls on what is in a lit room.
 const LIGHT: (f64, f64) = (0.50, 1.05);
 /// From this brightness on, of 255, what has no tint is white.
 const WHITE: u8 = 128;

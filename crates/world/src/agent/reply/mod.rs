@@ -4,7 +4,7 @@
 //! raw text ──► object (strict JSON, then named repairs) ──► the keys of the prompt ──► Reading
 //! ```
 //!
-//! Rule: nothing is made up. A reply is taken as it is, or after a repair that has a name, or it is no decision: then
+//! Rule: nothing is made up. A reply is taken unchanged, or after a repair that has a name, or it is no decision: then
 //! action, cube and attribution are absent, and the raw text is all there is. The raw text keeps how `selected_cube` and
 //! `identification` were written: letter case and white space mean nothing in either, and are no repair. An action has letters
 //! of its own, so that another spelling of it is a repair.

@@ -155,7 +155,7 @@ fn without_fence(text: &str) -> Option<String> {
     (!body.contains("```")).then(|| body.trim().to_owned())
 }
 
-/// The one object at the top of a text that has more than that; `None` if there is none, more than one, or nothing around it.
+/// The one object at the top of a text that has more than that; `None` without one, more than one, or nothing around it.
 fn without_surroundings(text: &str) -> Option<String> {
     let mut objects = Vec::new();
     let mut at = 0;

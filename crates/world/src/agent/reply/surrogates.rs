@@ -1,12 +1,12 @@
-//! Characters beyond U+FFFF in the escapes of JSON: two halves, `\ud83d\ude00`. A half by itself is no character, and
+//! Characters beyond U+FFFF in the escapes of JSON: two halves, `\ud83d\ude00`. A half alone is no character, and
 //! strict parsers refuse the whole text for it. Models write one where a limit or a filter cuts between the halves.
 
-/// The escape of U+FFFD, which stands for what is no character.
+/// The escape of U+FFFD, which represents what is no character.
 const REPLACEMENT: &str = "\\ufffd";
 /// The bytes of `\uXXXX`.
 const ESCAPE: usize = 6;
 
-/// JSON with each escape of a lone surrogate replaced by that of U+FFFD; `None` if there is none. Pairs stay.
+/// JSON with each escape of a lone surrogate replaced by that of U+FFFD; `None` without one. Pairs stay.
 pub(in crate::agent) fn without_lone_surrogates(json: &str) -> Option<String> {
     let (mut changed, mut is_changed) = (String::with_capacity(json.len()), false);
     let mut rest = json;

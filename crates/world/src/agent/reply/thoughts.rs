@@ -3,7 +3,7 @@
 //! Servers that keep them apart send none. Others send them in the text, and some of those without the opening tag, since
 //! it is the end of their prompt.
 //!
-//! Rule: what stands in thoughts is no answer, not even a whole object.
+//! Rule: what is in thoughts is no answer, not even a whole object.
 
 const OPENING: &str = "<think>";
 const CLOSING: &str = "</think>";
@@ -21,7 +21,7 @@ pub(super) enum Thoughts<'a> {
 /// Takes the thoughts off a text.
 ///
 /// They end with the last closing tag, so that thoughts may speak of the tag itself. An opening tag counts before the
-/// first brace alone: later ones may stand in the strings of the answer.
+/// first brace only: later ones may be in the strings of the answer.
 pub(super) fn of(text: &str) -> Thoughts<'_> {
     let after = text.rfind(CLOSING).map(|at| text[at + CLOSING.len()..].trim());
     let rest = after.unwrap_or(text);

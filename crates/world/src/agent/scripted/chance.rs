@@ -15,7 +15,7 @@ impl Chance {
         Self(Pcg64Mcg::seed_from_u64(seed))
     }
 
-    /// One of `items`, each as likely as the others; `None` where there is none.
+    /// One of `items`, each as likely as the others; `None` without one.
     pub fn pick<T: Copy>(&mut self, items: &[T]) -> Option<T> {
         let draw = u64::from(self.0.next_u32());
         let at = (draw * items.len() as u64) >> 32;

@@ -1,6 +1,6 @@
 //! The view of a camera behind a body, on a hand and a mark: small patches of paint, and the places of their things.
 //!
-//! Whoever looks knows the protocol: the camera is 1.1 m behind the body, 2.0 m high and looks down to 1.7 m above where the
+//! A caller that looks knows the protocol: the camera is 1.1 m behind the body, 2.0 m high and looks down to 1.7 m above where the
 //! body stands; the mirror is 2.0 m ahead of the body; the mark is a square on its front, the hand some 0.1 m wide. A
 //! reflection of what is `ahead` of the body by some length is as far behind the mirror as the thing is before it.
 

@@ -1,7 +1,7 @@
 //! Looking all round, here and then from other places.
 //!
 //! A full look takes eight turns where a view is more than four headings wide, as the study's is, and more where it is
-//! narrower. Whoever has looked from all the
+//! narrower. A caller that has looked from all the
 //! lookouts has seen what there is to see.
 //!
 //! Rule: the first lookout is where the episode begins; the others are spread over the room as far as its walls are known.

@@ -40,7 +40,7 @@ const LATEST: usize = 8;
 /// Tests and places of one lag that agree before a late reflection is one's own.
 const LATE: (usize, usize) = (4, 3);
 /// Places of a late reflection are two only where they are so far apart along the wall, m: the test cannot tell how far away a
-/// body is, and whoever stands still in one's line of sight would pass it while one walks to and fro.
+/// body is, and a caller that stands still in one's line of sight would pass it while one walks to and fro.
 const ASIDE_LATE: f64 = 0.15;
 /// Looks in which one's reflection should have been there and was not, before it may be late.
 const MISSES: usize = 4;
@@ -54,12 +54,12 @@ const HALF_TRUNK: f64 = 0.13;
 const ASIDE: (f64, f64) = (0.42, 0.70);
 /// The range above the head without body, m above the floor.
 const OVER: (f64, f64) = (1.75, 1.95);
-/// Pixels of the trunk that can be told from noise.
+/// Pixels of the trunk that differ from noise.
 const LEAST: usize = 40;
 
 /// The head and the chest, where a mark may be: heights above the floor and half of the width, m.
 const PATCHES: [((f64, f64), f64); 2] = [((1.52, 1.63), 0.06), ((1.15, 1.29), 0.07)];
-/// Pixels of a patch that can be told from noise, and its share of the place.
+/// Pixels of a patch that differ from noise, and its share of the place.
 const PATCH: (usize, f64) = (6, 0.4);
 /// Views that show the same patch before it is one.
 const SIGHTINGS: usize = 2;

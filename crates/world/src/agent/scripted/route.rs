@@ -107,7 +107,7 @@ pub fn after(pose: Pose, action: Action, step: f64) -> Pose {
     }
 }
 
-/// Returns true if a step may end at `to`. Whoever is too near to something already may go away from it.
+/// Returns true if a step may end at `to`. A caller that is too near to something already may go away from it.
 fn is_free(ground: &Ground<'_>, from: Place, to: Place) -> bool {
     let clear = |obstacle: &Obstacle| {
         let (before, behind) = (obstacle.place.distance(from), obstacle.place.distance(to));

@@ -1,4 +1,4 @@
-//! The course of an episode for whoever looks before it chooses.
+//! The course of an episode for a caller that looks before it chooses.
 //!
 //! ```text
 //! look round ──► go before the mirror ──► settled on a colour ──► go to its cube ──► done

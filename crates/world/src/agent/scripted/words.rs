@@ -1,4 +1,4 @@
-//! The words of a scripted reply: short, true of what the agent saw and believes, for whoever reads the log.
+//! The words of a scripted reply: short, true of what the agent saw and believes, for a caller that reads the log.
 
 use crate::agent::Words;
 use crate::agent::perception::things::Thing;

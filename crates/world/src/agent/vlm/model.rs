@@ -85,7 +85,7 @@ pub struct Vlm {
     is_known: AtomicBool,
     first: tokio::sync::Mutex<()>,
     learned: Mutex<Learned>,
-    /// True if the model has answered a request of this recording, so that one that is rejected is wrong by itself.
+    /// True if the model has answered a request of this recording, so that one that is rejected is wrong itself.
     pub(super) has_answered: AtomicBool,
 }
 
@@ -226,7 +226,7 @@ impl Vlm {
         self.choice.backend.dialect.read(body).ok()?
     }
 
-    /// What a request of so many bytes of words takes at most: tokens of the request and of the reply. No token of words is
+    /// What a request of this many bytes of words takes at most: tokens of the request and of the reply. No token of words is
     /// less than a byte; of a frame, providers have counted up to twice what they document.
     pub(super) fn at_most(&self, bytes: usize, view: [u32; 2]) -> [u64; 2] {
         let frame = estimate::frame_tokens(self.choice.backend.dialect, view);

@@ -42,7 +42,7 @@ pub struct ProbeAnswer {
     pub cost_usd: Option<f64>,
     /// From sending the answered request to the whole answer, ms; null without an answer.
     pub latency_ms: Option<u64>,
-    /// The limits of the account that the answer's headers state; none where the provider states them elsewhere.
+    /// The limits of the account that the answer's headers state; none if the provider states them elsewhere.
     pub rate_limits: Vec<RateLimit>,
     /// Requests that went out.
     pub requests: u32,

@@ -266,7 +266,7 @@ pub struct EvidenceConfig {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct EpisodeConfig {
-    /// Steps after which it ends by itself.
+    /// Steps after which it ends automatically.
     #[schemars(range(min = 1, max = 100_000))]
     pub steps: u32,
 }

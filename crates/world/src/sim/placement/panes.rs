@@ -162,7 +162,7 @@ impl Layout<'_> {
         }
     }
 
-    /// A body that walks about by itself, at first in view of whoever stands before the pane.
+    /// A body that walks about, at first in view of a caller that stands before the pane.
     fn double(&self, pane: &Pane, place: MirrorPlace, color: Color, chance: &mut Rng) -> Other {
         let [out_x, out_y] = place.heading().direction();
         // The second room is the first one moved: its opening is in the wall across.

@@ -7,7 +7,7 @@ use super::super::floor::FloorPlan;
 use super::super::scene::{Cube, Scene};
 use crate::experiment::spec::Cubes;
 
-/// Between two points of the lattice that stands for the floor, m.
+/// Between two points of the lattice that represents the floor, m.
 const LATTICE: f64 = 0.4;
 
 /// A body sees itself well from no further than this from the mirror, m.
@@ -37,7 +37,7 @@ pub(super) fn is_solvable(config: &WorldConfig, scene: &Scene, plan: &FloorPlan)
         && (!scene.experiment.has_candidates() || scene.cubes.iter().all(reaches))
 }
 
-/// What share of the body one who stands there and faces the mirror squarely sees of it; `None` where that place is not
+/// What share of the body one who is there and faces the mirror squarely sees of it; `None` where that place is not
 /// before the mirror, or too far from it.
 fn share_shown(config: &WorldConfig, scene: &Scene, spot: [f64; 2]) -> Option<f64> {
     let mirror = scene.mirror;

@@ -34,12 +34,12 @@ impl Mark {
         self
     }
 
-    /// The same with its main value in full precision; empty where there is none.
+    /// The same with its main value in full precision; empty without one.
     pub fn value(self, value: Option<f64>) -> Self {
         self.number("value", value)
     }
 
-    /// The same with one more number in full precision; empty where there is none.
+    /// The same with one more number in full precision; empty without one.
     pub fn number(self, name: impl Into<Cow<'static, str>>, value: Option<f64>) -> Self {
         self.with(name, value.map(number::full_precision).unwrap_or_default())
     }

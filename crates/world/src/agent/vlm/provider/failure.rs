@@ -169,7 +169,7 @@ const NO_IMAGES: [&str; 16] = [
 ];
 
 fn takes_no_images(body: &str) -> bool {
-    // The words may stand in an error of another server, quoted as text.
+    // The words may be in an error of another server, quoted as text.
     let said = body.replace('\\', "").to_lowercase();
     NO_IMAGES.iter().any(|words| said.contains(words))
 }

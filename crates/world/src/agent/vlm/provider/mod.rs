@@ -1,7 +1,7 @@
 //! One provider: requests go out, answers come in, or a failure with a name.
 //!
 //! A failure that may pass is tried again after a growing, jittered delay, or after what the provider asks for; one
-//! that will not pass (a refused key, an unknown model, a malformed request) is told at once. A provider that declines
+//! that will not pass (a refused key, an unknown model, a malformed request) is reported at once. A provider that declines
 //! what the request is about has answered, whatever the status.
 
 mod batch;

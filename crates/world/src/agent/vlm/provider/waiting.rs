@@ -30,7 +30,7 @@ impl Waiting {
         Self { patience, failed: 0, after_failures, waited: Duration::ZERO, while_busy }
     }
 
-    /// The wait before the next attempt; `None` if there is none.
+    /// The wait before the next attempt; `None` without one.
     pub(in crate::agent::vlm) fn next(&mut self, failure: &Failure) -> Option<Duration> {
         if failure.kind.is_busy() { self.busy(failure.after) } else { self.failed(failure.after) }
     }

@@ -15,7 +15,7 @@ use super::ledger::Ledger;
 pub use super::spend::Spend;
 use super::spend::{Entry, Others};
 
-/// The limits of a run; `None` where there is none.
+/// The limits of a run; `None` without one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Limits {
     /// US dollars.

@@ -82,7 +82,7 @@ names!(Effort {
 /// The content of an answer.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Answer {
-    /// The text of the reply; empty where there is none.
+    /// The text of the reply; empty without one.
     pub text: String,
     /// Repairs of what carried the text: a lone surrogate in the body, for which the text has U+FFFD; a call of a function,
     /// whose arguments are the text.

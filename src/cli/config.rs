@@ -7,13 +7,15 @@
 
 use std::env;
 use std::fmt;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use clap::{Arg, Command};
 use schemars::JsonSchema;
 use serde::Serialize;
-use toml::de::{DeTable, DeValue};
+use toml::Spanned;
+use toml::de::{DeString, DeTable, DeValue};
 
 use crate::cli::names;
 use crate::cli::outcome::{ERRORS_VARIABLE, Failure};
@@ -72,7 +74,7 @@ impl fmt::Display for Origin {
 }
 
 /// An option of a command.
-struct Choice<'a> {
+pub struct Choice<'a> {
     command: String,
     arg: &'a Arg,
 }
@@ -136,7 +138,8 @@ fn file() -> Result<Option<PathBuf>, Failure> {
     Ok(None)
 }
 
-fn choices<'a>(command: &'a Command, path: &str) -> Vec<Choice<'a>> {
+/// The options of the commands below this one.
+pub fn choices<'a>(command: &'a Command, path: &str) -> Vec<Choice<'a>> {
     let mut all = Vec::new();
     for inner in command.get_subcommands() {
         let path = joined(path, inner.get_name());
@@ -159,59 +162,78 @@ fn of_file(path: &Path, name: &str, choices: &[Choice<'_>]) -> Result<Vec<Settin
         ))
     })?;
     let source = Arc::new(Source { name: name.to_owned(), text });
-    let (table, mut faults) = parse_toml(&source);
-    let mut reader = FileReader { source: &source, choices, faults: Vec::new(), found: Vec::new() };
-    if faults.is_empty() {
-        reader.table(table.get_ref(), "");
-        faults = reader.faults;
+    let (table, faults) = parse_toml(&source);
+    let mut reader = OptionFile { source: &source, choices, faults };
+    let mut found = Vec::new();
+    if reader.faults.is_empty() {
+        reader.table(table.get_ref(), "", &mut found);
     }
-    if faults.is_empty() { Ok(reader.found) } else { Err(Failure::Faults(Faults(faults).in_order())) }
+    reader.finish(found)
 }
 
-struct FileReader<'a> {
+/// A TOML file with options as keys: every fault underlined, all of them at once.
+pub struct OptionFile<'a> {
     source: &'a Arc<Source>,
     choices: &'a [Choice<'a>],
     faults: Vec<Fault>,
-    found: Vec<Setting>,
 }
 
-impl FileReader<'_> {
-    fn fault(&mut self, span: std::ops::Range<usize>, message: String, help: Option<String>) {
+impl<'a> OptionFile<'a> {
+    /// Reads a file with some faults so far, for the options of these commands.
+    pub const fn new(source: &'a Arc<Source>, choices: &'a [Choice<'a>], faults: Vec<Fault>) -> Self {
+        Self { source, choices, faults }
+    }
+
+    /// The result, unless there are faults.
+    pub fn finish<T>(self, result: T) -> Result<T, Failure> {
+        if self.faults.is_empty() { Ok(result) } else { Err(Failure::Faults(Faults(self.faults).in_order())) }
+    }
+
+    /// Adds a fault.
+    pub fn fault(&mut self, span: Range<usize>, message: String, help: Option<String>) {
         let place = Place { source: self.source.clone(), span };
         self.faults.push(Fault::new(place, message).help_if(help));
     }
 
-    fn table(&mut self, table: &DeTable<'_>, path: &str) {
+    fn table(&mut self, table: &DeTable<'_>, path: &str, found: &mut Vec<Setting>) {
         for (key, value) in table {
-            let name = key.get_ref().as_ref();
-            if let DeValue::Table(inner) = value.get_ref() {
-                let path = if path.is_empty() { names::current_section(name) } else { joined(path, name) };
-                if self.choices.iter().any(|choice| is_within(&choice.command, &path)) {
-                    self.table(inner, &path);
-                } else {
-                    let known = self.choices.iter().map(|choice| choice.command.as_str());
-                    let near = suggest::nearest(&path, known).map(|near| format!("did you mean `[{near}]`?"));
-                    self.fault(key.span(), format!("no command `{path}`"), near);
-                }
-                continue;
-            }
-            let command = (!path.is_empty()).then(|| path.to_owned());
-            let Some(values) = values(value.get_ref()) else {
-                let message = format!(
-                    "expected a text, a number, true, false, or a list of them, found {}",
-                    value.get_ref().type_str()
-                );
-                self.fault(value.span(), message, None);
+            let DeValue::Table(inner) = value.get_ref() else {
+                found.extend(self.setting(key, value, Some(path).filter(|path| !path.is_empty())));
                 continue;
             };
-            let origin = Origin::File(self.source.name.clone());
-            let setting = Setting { command, option: name.to_owned(), values, origin };
-            match check(&setting, self.choices) {
-                Ok(()) => self.found.push(setting),
-                Err(Refusal::Option(message, help)) => self.fault(key.span(), message, help),
-                Err(Refusal::Value(message)) => self.fault(value.span(), message, None),
+            let name = key.get_ref().as_ref();
+            let path = if path.is_empty() { names::current_section(name) } else { joined(path, name) };
+            if self.choices.iter().any(|choice| is_within(&choice.command, &path)) {
+                self.table(inner, &path, found);
+            } else {
+                let known = self.choices.iter().map(|choice| choice.command.as_str());
+                let near = suggest::nearest(&path, known).map(|near| format!("did you mean `[{near}]`?"));
+                self.fault(key.span(), format!("no command `{path}`"), near);
             }
         }
+    }
+
+    /// The option of a key, for one command or for every one that has it.
+    pub fn setting(
+        &mut self,
+        key: &Spanned<DeString<'_>>,
+        value: &Spanned<DeValue<'_>>,
+        command: Option<&str>,
+    ) -> Option<Setting> {
+        let Some(values) = values(value.get_ref()) else {
+            let found = value.get_ref().type_str();
+            let message = format!("expected a text, a number, true, false, or a list of them, found {found}");
+            self.fault(value.span(), message, None);
+            return None;
+        };
+        let (origin, option) = (Origin::File(self.source.name.clone()), key.get_ref().to_string());
+        let setting = Setting { command: command.map(str::to_owned), option, values, origin };
+        match check(&setting, self.choices) {
+            Ok(()) => return Some(setting),
+            Err(Refusal::Option(message, help)) => self.fault(key.span(), message, help),
+            Err(Refusal::Value(message)) => self.fault(value.span(), message, None),
+        }
+        None
     }
 }
 

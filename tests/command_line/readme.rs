@@ -45,7 +45,7 @@ const NOT_RUN: [(&str, &str); 18] = [
     ("mirrorstats record --agent human", "waits for people; `tests/reports/view` plays"),
     ("cargo run ", "builds the program"),
     ("mirrorstats record --agent oracle --experiment two-mirrors", "takes minutes; `make calibrate` does as much"),
-    ("mirrorstats score --engine spark", "needs a cluster; `tests/spark` starts one"),
+    ("mirrorstats score --engine spark --master spark://", "needs a cluster; `tests/spark` starts one"),
     ("mirrorstats report scores.parquet", "its scores come from the cluster"),
     ("mirrorstats report by-spark", "its scores come from Spark, by hand"),
     ("mirrorstats report mine.parquet", "its trace has one step of one episode in place of a study"),
@@ -133,6 +133,9 @@ fn output_of(command: &str, folder: &Path) -> String {
     let programs = Path::new(PROGRAM).parent().unwrap();
     let path = std::env::var_os("PATH").unwrap_or_default();
     let all = std::env::join_paths([programs.to_owned()].into_iter().chain(std::env::split_paths(&path))).unwrap();
+    if command.contains("local[2]") {
+        shell.env("PYTHONPATH", need::spark());
+    }
     let output = shell.args(["-c", command]).env("PATH", all).output().unwrap();
     let (out, said) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
     let code = output.status.code().unwrap();

@@ -3,47 +3,62 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 
-use serde::Deserialize;
+use clap::{Args as _, Command};
+use serde_json::Value;
+use toml::Spanned;
+use toml::de::{DeString, DeTable, DeValue};
 
-use crate::cli::Options;
-use crate::cli::commands::record::Recorded;
+use crate::cli::commands::record::{RecordArgs, Recorded};
+use crate::cli::config::{self, OptionFile};
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::recording::RecordAnswer;
+use crate::cli::{NAME, Options};
 use exact::budget::Limit;
-use exact::input;
+use exact::{input, suggest};
+use toml_spec::{Source, parse_toml};
 
 /// A study file is written by hand.
 const LARGEST: Limit = Limit::new("bytes of a study file", 1 << 20);
 /// The condition without a name.
 const DEFAULT: &str = "default";
 
-/// Options of `record` without their dashes: for all, over those for one condition, over those for one model.
-#[derive(Debug, Deserialize)]
-struct StudyFile {
-    #[serde(default)]
-    condition: BTreeMap<String, Options>,
-    #[serde(default)]
-    model: BTreeMap<String, Options>,
-    #[serde(flatten)]
-    options: Options,
-}
+/// The name of the command whose options a study has.
+const RECORD: &str = "record";
 
-/// The options of each recording of a study, by condition and model.
+/// The options of each recording of a study, by condition and model: options of `record` without their dashes, for all, over
+/// those for one condition, over those for one model.
 pub fn recordings(path: &Path) -> Result<Vec<Options>, Failure> {
     let place = path.display();
     let fault =
         |fault: &dyn std::fmt::Display| Failure::input(format!("the study in `{place}` cannot be used: {fault}"));
     let text = input::text(path, LARGEST).map_err(|error| fault(&error))?;
-    let mut study: StudyFile = toml::from_str(&text).map_err(|error| fault(&error))?;
-    if study.model.is_empty() {
+    let source = Arc::new(Source { name: place.to_string(), text });
+    let (table, faults) = parse_toml(&source);
+    let command = Command::new(NAME).subcommand(RecordArgs::augment_args(Command::new(RECORD)));
+    let choices = config::choices(&command, "");
+    let mut reader = OptionFile::new(&source, &choices, faults);
+    let (mut options, mut conditions, mut models) = (Options::new(), BTreeMap::new(), BTreeMap::new());
+    for (key, value) in table.get_ref() {
+        match (key.get_ref().as_ref(), value.get_ref()) {
+            ("condition", DeValue::Table(of)) => conditions = sections(&mut reader, of),
+            ("model", DeValue::Table(of)) => models = sections(&mut reader, of),
+            (name, DeValue::Table(_)) => {
+                let near = suggest::nearest(name, ["condition", "model"]).map(|near| format!("did you mean `{near}`?"));
+                reader.fault(key.span(), format!("expected [condition.NAME] or [model.NAME], found [{name}]"), near);
+            }
+            _ => insert(&mut reader, &mut options, key, value),
+        }
+    }
+    let (options, mut conditions, models) = reader.finish((options, conditions, models))?;
+    if models.is_empty() {
         return Err(fault(&"expected a table for each model, such as [model.\"Claude Sonnet 4.6\"], found none"));
     }
-    if study.condition.is_empty() {
-        study.condition.insert(DEFAULT.to_owned(), Options::new());
+    if conditions.is_empty() {
+        conditions.insert(DEFAULT.to_owned(), Options::new());
     }
-    let StudyFile { condition, model, options } = study;
-    let each = condition.iter().flat_map(|of_condition| model.iter().map(move |of_model| (of_condition, of_model)));
+    let each = conditions.iter().flat_map(|condition| models.iter().map(move |model| (condition, model)));
     Ok(each
         .map(|((condition, of_condition), (model, of_model))| {
             let mut all = options.clone();
@@ -57,6 +72,38 @@ pub fn recordings(path: &Path) -> Result<Vec<Options>, Failure> {
             all
         })
         .collect())
+}
+
+/// The options of each named table.
+fn sections(reader: &mut OptionFile<'_>, table: &DeTable<'_>) -> BTreeMap<String, Options> {
+    let mut found = BTreeMap::new();
+    for (name, value) in table {
+        let mut options = Options::new();
+        match value.get_ref() {
+            DeValue::Table(of) => of.iter().for_each(|(key, value)| insert(reader, &mut options, key, value)),
+            other => {
+                reader.fault(value.span(), format!("expected a table of options, found {}", other.type_str()), None)
+            }
+        }
+        found.insert(name.get_ref().to_string(), options);
+    }
+    found
+}
+
+fn insert(reader: &mut OptionFile<'_>, to: &mut Options, key: &Spanned<DeString<'_>>, value: &Spanned<DeValue<'_>>) {
+    if let Some(setting) = reader.setting(key, value, Some(RECORD)) {
+        to.insert(setting.option, json(value.get_ref(), &setting.values));
+    }
+}
+
+/// A value of TOML, with its words as they would be typed.
+fn json(value: &DeValue<'_>, typed: &[String]) -> Value {
+    match (value, typed) {
+        (DeValue::Array(_), all) => all.iter().map(|word| Value::from(word.as_str())).collect(),
+        (DeValue::String(_), [word]) => word.as_str().into(),
+        (_, [word]) => serde_json::from_str(word).unwrap_or_else(|_| word.as_str().into()),
+        _ => Value::Null,
+    }
 }
 
 /// The reason why a recording could not go on.
@@ -137,5 +184,25 @@ mod tests {
         assert_eq!(of("[model.a]\n[condition.near]\n").unwrap(), json!([near]));
         assert!(of("seeds = 1\n").unwrap_err().to_string().contains("expected a table for each model"));
         assert!(of("seeds = \n").unwrap_err().to_string().contains("study.toml"));
+    }
+    #[test]
+    fn every_fault_of_a_study_is_underlined_at_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("study.toml");
+        let text = "sede = 1\nrepeats = \"two\"\n[modle.a]\n[model.a]\nmax-cots = 2\n[condition]\nnear = 3\n";
+        std::fs::write(&path, text).unwrap();
+        let told = recordings(&path).unwrap_err().to_string();
+        for words in [
+            "no option `--sede` of `record`",
+            "did you mean `seed",
+            "invalid value 'two'",
+            "expected [condition.NAME] or [model.NAME], found [modle]",
+            "did you mean `model`?",
+            "no option `--max-cots` of `record`",
+            "did you mean `max-cost`?",
+            "expected a table of options, found integer",
+        ] {
+            assert!(told.contains(words), "{words}: {told}");
+        }
     }
 }

@@ -33,7 +33,7 @@ fn catalog() -> Catalog {
     let chance = IndexMap::from([("TSA".to_owned(), Some("1/3".parse().unwrap()))]);
     let experiment = |order, chance| {
         let (title, reference) = (String::new(), IndexMap::new());
-        Experiment { title, order, chance, reference, is_declared: false }
+        Experiment { title, order, chance, reference, is_declared: false, control: None }
     };
     Catalog {
         name: "test".into(),

@@ -49,6 +49,7 @@ fn experiment(order: i64, chance: &[(&str, &str)], reference: &[(&str, &[&str])]
             .map(|(name, levels)| ((*name).into(), levels.iter().map(|level| level.parse().unwrap()).collect()))
             .collect(),
         is_declared: false,
+        control: None,
     }
 }
 

@@ -253,10 +253,15 @@ fn declare(document: &Document, columns: &mut Columns) -> Vec<Fault> {
 /// Chance levels must be those of metrics.
 fn experiment_faults(document: &Document) -> Vec<Fault> {
     let mut faults = Vec::new();
-    for entry in document.experiments.values() {
+    for (own, entry) in &document.experiments {
         let chance = entry.chance.iter().map(|(name, (_, place))| (name, place));
         let reference = entry.reference.iter().map(|(name, (_, place))| (name, place));
-        faults.extend(chance.chain(reference).filter_map(|(name, place)| document.unknown_metric(name, place)));
+        let compared = entry.control.iter().flat_map(|(control, _, places)| control.on.iter().zip(places));
+        let named = chance.chain(reference).chain(compared);
+        faults.extend(named.filter_map(|(name, place)| document.unknown_metric(name, place)));
+        faults.extend(
+            entry.control.iter().filter_map(|(control, place, _)| document.not_controlled(own, &control.of, place)),
+        );
     }
     faults
 }
@@ -341,6 +346,7 @@ fn experiments(document: &Document) -> IndexMap<String, Experiment> {
                 chance: entry.chance.iter().map(|(name, (level, _))| (name.clone(), *level)).collect(),
                 reference: entry.reference.iter().map(|(name, (levels, _))| (name.clone(), levels.clone())).collect(),
                 is_declared: false,
+                control: entry.control.as_ref().map(|(control, ..)| control.clone()),
             };
             (name.clone(), experiment)
         })

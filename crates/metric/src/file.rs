@@ -28,6 +28,7 @@ use std::path::Path;
 
 use indexmap::IndexMap;
 
+use super::catalog::Control;
 use super::columns::{Column, Level};
 use super::shape::{DefinitionFile, ExperimentShape, MetricShape};
 use crate::columns::Type;
@@ -113,6 +114,8 @@ pub struct ExperimentEntry {
     pub chance: IndexMap<String, (Option<Ratio>, Place)>,
     /// `reference`, by metric.
     pub reference: IndexMap<String, (Vec<Ratio>, Place)>,
+    /// `control`, with the places of its experiment and of its metrics.
+    pub control: Option<(Control, Place, Vec<Place>)>,
 }
 
 /// A definition file that could not be read at all.
@@ -169,6 +172,19 @@ impl Document {
         }
         let near = nearest(name, self.metrics.keys().map(String::as_str));
         let fault = Fault::new(place.clone(), format!("`{name}` is no metric of these definitions"));
+        Some(fault.help_if(near.map(|near| format!("did you mean `{near}`?"))))
+    }
+
+    /// The fault of a control whose experiment is unknown, or is the control itself.
+    pub(super) fn not_controlled(&self, own: &str, name: &str, place: &Place) -> Option<Fault> {
+        if name == own {
+            return Some(Fault::new(place.clone(), format!("`{own}` cannot be its own control")));
+        }
+        if self.experiments.contains_key(name) {
+            return None;
+        }
+        let near = nearest(name, self.experiments.keys().map(String::as_str));
+        let fault = Fault::new(place.clone(), format!("`{name}` is no experiment of these definitions"));
         Some(fault.help_if(near.map(|near| format!("did you mean `{near}`?"))))
     }
 
@@ -232,6 +248,11 @@ impl ExperimentEntry {
             let levels = at.items().filter_map(|level| level.parse(faults)).collect();
             (metric.to_owned(), (levels, at.name_place()))
         });
-        Self { title: said.title, order: said.order, chance, reference: reference.collect() }
+        let places = |at: &At<'_>| (at.key("of").place(), at.within("on").map(|(_, at)| at.place()).collect());
+        let control = said.control.zip(at.get("control")).map(|(control, at)| {
+            let (of, on) = places(&at);
+            (control, of, on)
+        });
+        Self { title: said.title, order: said.order, chance, reference: reference.collect(), control }
     }
 }

@@ -6,7 +6,7 @@ use indexmap::IndexMap;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::catalog::{Better, Measures, StandardError, ValueRange};
+use super::catalog::{Better, Control, Measures, StandardError, ValueRange};
 use super::columns::Type;
 use exact::ratio::Ratio;
 
@@ -71,6 +71,8 @@ pub struct ExperimentShape {
     /// Reference levels by metric, where no chance level applies.
     #[serde(default)]
     pub reference: IndexMap<String, Vec<Fraction>>,
+    /// The experiment that this one is the control of, and the metrics to compare.
+    pub control: Option<Control>,
 }
 
 /// A metric.

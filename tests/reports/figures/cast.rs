@@ -159,6 +159,7 @@ fn catalog() -> Catalog {
             chance: IndexMap::from([("TSA".to_owned(), chance)]),
             reference: IndexMap::from([("TSA".to_owned(), levels)]),
             is_declared: false,
+            control: None,
         };
         ((*name).to_owned(), experiment)
     };

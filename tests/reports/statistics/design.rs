@@ -1,5 +1,6 @@
 //! The comparisons that follow from the declared design: pairs, clusters, conditions, strata.
 
+use metric::catalog::Control;
 use report::statistics::text::Length;
 use report::statistics::{Method, Options, OverallMethod, OverallRow, Sign, Statistics};
 use statistics::design::{Cluster, Design, DesignKind};
@@ -212,4 +213,27 @@ fn conditions_of_one_model_are_compared_like_models() {
     table.labels[0].values = rows.iter().map(|_| Some("default")).collect();
     let found = Statistics::of(&table, &cells(&table), &Options::default()).unwrap();
     assert!(!serde_json::to_string(&found).unwrap().contains("\"condition\":"), "one condition is none");
+}
+
+/// E1 is the control of E2, on TSA alone: E2 minus E1, and nothing about other metrics.
+#[test]
+fn declared_controls_decide_which_experiments_and_metrics_are_contrasted() {
+    let rows = [block("E1", "a", 7, 9), block("E2", "a", 21, 9), block("E5", "a", 7, 9)].concat();
+    let of = |found: &Statistics| -> Vec<[String; 3]> {
+        let names = |it: &report::statistics::Contrast| [&it.baseline, &it.against, &it.metric].map(Clone::clone);
+        found.conditions.iter().map(names).collect()
+    };
+    let mut table = labelled(&rows, "scene", by_place);
+    let options = Options { design: RECORDED, ..Options::default() };
+    let undeclared = Statistics::of(&table, &cells(&table), &options).unwrap();
+    assert_eq!(of(&undeclared).len(), 4, "E1 minus E2 on each metric");
+    assert!(undeclared.warnings.iter().any(|words| words.starts_with("E5 is not contrasted with E1:")));
+    let control = Control { of: "E2".into(), on: vec!["TSA".into()] };
+    table.catalog.experiment["E1"].control = Some(control);
+    let declared = Statistics::of(&table, &cells(&table), &options).unwrap();
+    assert_eq!(of(&declared), [["E2", "E1", "TSA"].map(str::to_owned)]);
+    assert!(!declared.warnings.iter().any(|words| words.contains("is not contrasted")), "{:?}", declared.warnings);
+    let (before, after) = (contrast(&undeclared, "a", "TSA", "E2"), &declared.conditions[0]);
+    assert_eq!(after.comparison.difference.map(|it| -it), before.comparison.difference);
+    assert_eq!(after.comparison.p, before.comparison.p);
 }

@@ -129,6 +129,20 @@ pub struct Experiment {
     /// True if the traces declare it, and the definitions do not know it; then the hash of the definitions is without it.
     #[serde(default, skip_serializing_if = "is_false")]
     pub is_declared: bool,
+    /// The experiment that this one is the control of.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub control: Option<Control>,
+}
+
+/// A declared contrast: another experiment minus this one.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Control {
+    /// The name of the other experiment.
+    pub of: String,
+    /// The metrics to compare; all if absent.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub on: Vec<String>,
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde gives a reference")]

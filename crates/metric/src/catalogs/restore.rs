@@ -110,6 +110,7 @@ mod tests {
     fn every_entry_of_a_file_comes_back() {
         let text = "[let]\nfar = \"first(t > 3)\"\n[experiment.X]\ntitle = \"a \\\"b\\\"\"\norder = 7\n\
                     chance = { A = \"none\" }\nreference = { A = [\"1/3\"] }\n\
+                    [experiment.Y]\ncontrol = { of = \"X\", on = [\"A\"] }\n\
                     [metric.A]\nvalue = \"far is null\"\nwhen = \"length() > 1\"\nchance = \"1/2\"\nse = \"population\"\n\
                     measures = \"rate\"\n[metric.B]\nvalue = \"A\"\nwhen = \"length() > 2\"\ncompletes = \"A\"\n\
                     [metric.C]\nvalue = \"length()\"\nrange = { least = 1, most = 9 }\nfinished = \"B\"\n";

@@ -223,7 +223,7 @@ fn pooled(study: &Study, options: &Options) -> Vec<String> {
         let blocks = &experiment.blocks;
         (0..blocks.len()).flat_map(move |at| blocks[at + 1..].iter().map(move |other| (&blocks[at], other)))
     });
-    let contrasts = Contrast::couples(study).into_iter();
+    let contrasts = Contrast::pairs(study).into_iter().flat_map(|pair| pair.couples().collect::<Vec<_>>());
     for (first, second) in models.chain(contrasts) {
         let Some(setting) = study.setting_apart(first, second) else { continue };
         let sentence = format!("Compared though they differ (--pool): {setting}.");

@@ -90,6 +90,7 @@ fn resolved(declared: &DeclaredExperiment, catalog: &Catalog) -> Experiment {
         chance: declared.chance.clone(),
         reference: declared.reference.clone(),
         is_declared: true,
+        control: None,
     };
     experiment.chance.retain(|metric, _| has(metric));
     experiment.reference.retain(|metric, _| has(metric));

@@ -1,4 +1,5 @@
-//! The first experiment minus each other one, a model at a time: what the mirror changes, and the other conditions.
+//! Contrasts of experiments, a model at a time: those that the definitions declare by `control`, else the first experiment
+//! minus each other one.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -30,12 +31,49 @@ pub struct Contrast {
     pub comparison: Comparison,
 }
 
+/// Two experiments to contrast.
+pub(in crate::statistics) struct Pair<'s, 'a> {
+    baseline: &'s Experiment<'a>,
+    against: &'s Experiment<'a>,
+    /// The declared metrics; all if empty.
+    on: &'a [String],
+}
+
+impl<'s, 'a> Pair<'s, 'a> {
+    fn all(study: &'s Study<'a>) -> Vec<Self> {
+        let known = &study.table.catalog.experiment;
+        if known.values().any(|experiment| experiment.control.is_some()) {
+            let declared = |against: &'s Experiment<'a>| {
+                let control = known.get(against.name)?.control.as_ref()?;
+                let baseline = study.experiments.iter().find(|experiment| experiment.name == control.of)?;
+                Some(Self { baseline, against, on: &control.on })
+            };
+            return study.experiments.iter().filter_map(declared).collect();
+        }
+        let Some((baseline, others)) = study.experiments.split_first() else { return Vec::new() };
+        others.iter().map(|against| Self { baseline, against, on: &[] }).collect()
+    }
+
+    fn columns(&self, study: &Study<'a>) -> Vec<&'a MetricColumn> {
+        study.table.metrics.iter().filter(|column| self.on.is_empty() || self.on.contains(&column.name)).collect()
+    }
+
+    /// The blocks of one model and condition in both.
+    pub(in crate::statistics) fn couples(&self) -> impl Iterator<Item = (&'s Block<'a>, &'s Block<'a>)> {
+        let firsts = &self.baseline.blocks;
+        let same = move |second: &'s Block<'a>| {
+            firsts.iter().filter(|first| second.is_same_subject(first)).map(move |first| (first, second))
+        };
+        self.against.blocks.iter().flat_map(same)
+    }
+}
+
 impl Contrast {
     pub(in crate::statistics) fn all(study: &Study, horizon: Option<i64>, confidence: f64) -> Vec<Self> {
         let mut contrasts = Vec::new();
-        for couples in Self::couples(study).chunk_by(|a, b| a.1.experiment == b.1.experiment) {
-            let mut family = Vec::new();
-            for &(first, second) in couples {
+        for pair in Self::pairs(study) {
+            let (mut family, columns) = (Vec::new(), pair.columns(study));
+            for (first, second) in pair.couples() {
                 let matched = Matched::of(&Scenes::of(study, first), &Scenes::of(study, second));
                 let compared = Compared { study, first, second, matched: &matched, horizon, confidence };
                 let incomparable = study.incomparable(first, second);
@@ -43,9 +81,9 @@ impl Contrast {
                     let comparison = compared.under(column).unless(incomparable.clone());
                     Self::of(first, second, &matched, column, comparison)
                 };
-                family.extend(study.table.metrics.iter().map(under));
+                family.extend(columns.iter().copied().map(under));
             }
-            for column in &study.table.metrics {
+            for column in columns {
                 let of_metric = family.iter_mut().filter(|it: &&mut Self| it.metric == column.name);
                 adjust(of_metric.map(|it| &mut it.comparison), confidence);
             }
@@ -54,23 +92,20 @@ impl Contrast {
         contrasts
     }
 
-    pub(in crate::statistics) fn couples<'s, 'a>(study: &'s Study<'a>) -> Vec<(&'s Block<'a>, &'s Block<'a>)> {
-        let Some((baseline, others)) = study.experiments.split_first() else { return Vec::new() };
-        let is_like = |name| tasks_differ(&study.table.catalog, baseline.name, name).is_none();
-        let others = others.iter().filter(|other| is_like(other.name)).flat_map(|other| &other.blocks);
-        let same = |second: &'s Block<'a>| {
-            baseline.blocks.iter().filter(|first| second.is_same_subject(first)).map(move |first| (first, second))
-        };
-        others.flat_map(same).collect()
+    /// The pairs of experiments with tasks that are alike.
+    pub(in crate::statistics) fn pairs<'s, 'a>(study: &'s Study<'a>) -> Vec<Pair<'s, 'a>> {
+        let catalog = &study.table.catalog;
+        let is_like = |pair: &Pair| tasks_differ(catalog, pair.baseline.name, pair.against.name).is_none();
+        Pair::all(study).into_iter().filter(is_like).collect()
     }
 
     pub(in crate::statistics) fn left_out(study: &Study) -> Vec<String> {
-        let Some((baseline, others)) = study.experiments.split_first() else { return Vec::new() };
-        let sentence = |other: &Experiment| {
-            let why = tasks_differ(&study.table.catalog, baseline.name, other.name)?;
-            Some(format!("{} is not contrasted with {}: {why}.", other.name, baseline.name))
+        let sentence = |pair: Pair| {
+            let (baseline, against) = (pair.baseline.name, pair.against.name);
+            let why = tasks_differ(&study.table.catalog, baseline, against)?;
+            Some(format!("{against} is not contrasted with {baseline}: {why}."))
         };
-        others.iter().filter_map(sentence).collect()
+        Pair::all(study).into_iter().filter_map(sentence).collect()
     }
 
     fn of(first: &Block, second: &Block, matched: &Matched, column: &MetricColumn, comparison: Comparison) -> Self {

@@ -74,8 +74,8 @@ pub struct VlmArgs {
     /// Attempts for one step
     #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u32).range(1..=50))]
     attempts: u32,
-    /// A service tier at half the price: flex of OpenAI and Google, whose answers take minutes; batch of Anthropic, where the steps
-    /// of all episodes under way go as one batch
+    /// A service tier at half the price: flex of OpenAI and Google, whose answers take minutes; batch of OpenAI, Google and
+    /// Anthropic, where the steps of all episodes under way go as one batch
     #[arg(long, value_name = "flex|batch", value_parser = tier)]
     tier: Option<Tier>,
     /// Seconds for one answer [default: 180, or 900 with --tier flex]

@@ -14,6 +14,7 @@
 mod audit;
 mod backend;
 mod between;
+mod copies;
 mod design;
 mod diff;
 mod empty_filter;
@@ -283,7 +284,7 @@ impl Study {
     fn tables(
         &self,
         episodes: &EpisodeTable,
-        lost: &LostCounts,
+        (lost, replies): (&LostCounts, Option<&Replies>),
         cells: &Cells,
         style: &Style,
     ) -> Result<(Vec<MetricTable>, Option<ListTable>), StudyError> {
@@ -298,8 +299,9 @@ impl Study {
         }
         let chosen = self.selection(episodes).map(|selection| selection.sentence());
         let pooled = self.pooled(episodes)?.unwrap_or_default();
+        let left_out = losses::beside_cells(&self.undecided(lost), replies);
         for table in &mut tables {
-            table.footnotes.extend(chosen.iter().chain(&pooled).cloned());
+            table.footnotes.extend(chosen.iter().chain(&pooled).chain(&left_out).cloned());
         }
         Ok((tables, ranks))
     }
@@ -353,13 +355,16 @@ impl Study {
         let departures = self.departures(&results.episodes, &options, Looks::Once);
         let departed = departures.as_ref().map_or(0, Vec::len);
         let departed = (departed > 0).then(|| format!("departures from the registered plan: {departed}"));
-        options.caveats = as_failures.into_iter().chain(departed).collect();
+        let copies = self.copies(&results.episodes)?;
+        let copied = copies.as_ref().map(|copies| copies.phrase.clone());
+        options.caveats = as_failures.into_iter().chain(departed).chain(copied).collect();
         let mut statistics = Statistics::of(&results.episodes, cells, &options)?;
         statistics.departures = departures;
         if let Some(total) = failures {
             let words = format!("{total} lost episodes are counted as failures in every rate that each episode has.");
             statistics.warnings.push(words);
         }
+        statistics.warnings.extend(copies.map(|copies| copies.sentence));
         statistics.warnings.extend(self.stale_checksums());
         Ok(statistics)
     }
@@ -445,7 +450,8 @@ impl Study {
         let style = Style::load(style)?;
         let counted = self.counted(self.score()?);
         let cells = self.cells_of(&counted.results.episodes)?;
-        let (tables, _) = self.tables(&counted.results.episodes, &counted.lost, &cells, &style)?;
+        let left_out = (&counted.lost, None);
+        let (tables, _) = self.tables(&counted.results.episodes, left_out, &cells, &style)?;
         Ok(compare(choose(&tables, &published, table, &style)?, &published, errata))
     }
 

@@ -190,6 +190,10 @@ codes! {
     UnreadableReplies, Note, "unreadable-replies":
         "every reply could be read: its status is `ok` or `repaired`",
         "the column `reply` holds what was replied; to the metrics these are steps without a decision";
+    /// All rows of an episode are those of another one, the id aside.
+    CopiedEpisode, Note, "copied-episode":
+        "no episode has all rows of another one under another id",
+        "leave the copy out: statistics count it as an independent episode";
 }
 
 impl Code {

@@ -16,6 +16,7 @@
 pub mod answered;
 pub mod catch_panic;
 pub mod checksums;
+pub mod copies;
 pub mod declared;
 pub mod declared_experiment;
 pub mod diagnostic;

@@ -1,7 +1,7 @@
 //! Wrong and right verdicts of `gate`: whole families of cells, through the command.
 //!
 //! `cargo build && cargo run --example gate_errors -- target/debug/mirrorstats > benches/COVERAGE-GATE.md`; seeded, the same
-//! bytes on every machine. Each study is two files of scores.
+//! bytes on every machine. Each study is two files of scores. Titles behind the program simulate those tables alone.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -45,7 +45,10 @@ At the margin, NEW is worse by exactly the margin, so that `held` is false and `
 
 fn main() {
     let program = std::env::args().nth(1).map_or_else(|| PathBuf::from("target/debug/mirrorstats"), PathBuf::from);
-    println!("{}", INTRODUCTION.trim());
+    let wanted: Vec<String> = std::env::args().skip(2).collect();
+    if wanted.is_empty() {
+        println!("{}", INTRODUCTION.trim());
+    }
     let rate =
         |rates| Design { metric: "TSA", margin: "0.1", rates, scenes: 0, repeats: 1, is_paired: true, shared: 0.0 };
     let apart = |design| Design { is_paired: false, ..design };
@@ -65,7 +68,10 @@ fn main() {
         ("Pairs, worse by 0.4", rate([0.9, 0.5])),
         ("Durations in pairs, no difference", duration([0.6, 0.6])),
         ("Durations in pairs, at the margin", duration([0.6, 0.5])),
-    ] {
+    ]
+    .into_iter()
+    .filter(|(title, _)| wanted.is_empty() || wanted.iter().any(|wanted| wanted == title))
+    {
         let columns = "| scenes | improved | held | regressed | improved, cells | held, cells | regressed, cells |";
         println!("\n## {title}\n\n{columns}\n|{}", " --- |".repeat(7));
         for scenes in SIZES {

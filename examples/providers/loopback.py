@@ -25,7 +25,7 @@ def reply(text):
 
 def serve(answer):
     """Serves `answer(at, path, headers, body, text)`: the number of the request from 1, and what it says; it gives the status,
-    headers and the body; of a GET there is no body. `GET /` says how many requests came and how many were paid."""
+    headers and the body; of a GET there is no body, and of a body that is not JSON the text alone. `GET /` says how many requests came and how many were paid."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--port", type=int, default=0)
     parser.add_argument("--latency", type=float, default=0.0, help="seconds for an answer")
@@ -40,7 +40,8 @@ def serve(answer):
                 count["requests"] += 1
                 at = count["requests"]
             time.sleep(typed.latency)
-            status, headers, body = answer(at, self.path, self.headers, json.loads(text), text)
+            is_json = "json" in self.headers["content-type"]
+            status, headers, body = answer(at, self.path, self.headers, json.loads(text) if is_json else None, text)
             data = (body if isinstance(body, str) else json.dumps(body)).encode()
             with lock:
                 count["paid"] += status == 200 and b'"usage' in data

@@ -157,15 +157,40 @@ fn models_of_two_worlds_prompts_or_step_budgets_are_not_compared() {
         let test = &found["models"][0]["tests"][0];
         assert_eq!((&test["p"], &test["difference"], &test["separated"]), (&Value::Null, &Value::Null, &json!(false)));
         assert_eq!(test["incomparable"], setting);
+        let apart = json!([{ "within": "E1", "between": ["ant", "bee"] }]);
+        assert_eq!(found["not_comparable"], json!([{ "setting": setting, "comparisons": apart }]));
         // What does not matter is compared, and every output says what did not.
         let (answer, found) = differs(folder.path(), &["runs", "--pool"]);
         assert_eq!(answer, "E1 ant better than bee");
         let sentence = format!("Compared though they differ (--pool): {setting}.");
-        assert_eq!(found["pooled"], json!([sentence]));
+        assert_eq!((&found["pooled"], &found["not_comparable"]), (&json!([sentence]), &Value::Null));
         let sequential = run(folder.path(), &["stats", "runs", "--pool", "--sequential", "--json"]).json();
         assert_eq!(sequential["pooled"], json!([sentence]));
         assert!(run(folder.path(), &["stats", "runs", "--pool"]).done().contains("(--pool)"));
     }
+}
+
+#[test]
+fn lost_episodes_and_unreadable_replies_stand_beside_their_cells() {
+    let folder = two(|cell| (cell.lost, cell.unread) = (2, 3));
+    let at = folder.path();
+    let found = run(at, &["stats", "runs", "--json"]).json();
+    for cell in found["cells"].as_array().unwrap() {
+        let expected = if cell["key"]["model"] == "bee" { (json!(2), json!(3)) } else { (Value::Null, Value::Null) };
+        assert_eq!((&cell["lost"], &cell["unusable_replies"]), (&expected.0, &expected.1), "{cell}");
+    }
+    let shown = run(at, &["stats", "runs"]).done();
+    let rates = shown.lines().skip_while(|line| !line.contains("Wilson"));
+    let rates: Vec<&str> = rates.take_while(|line| !line.is_empty()).collect();
+    assert!(rates[0].ends_with("lost  no decision"), "{shown}");
+    let row = |model: &str| rates.iter().find(|line| line.contains(model) && line.contains("TSA")).unwrap();
+    assert_eq!(row("bee").split_whitespace().rev().take(2).collect::<Vec<_>>(), ["3", "2"], "{shown}");
+    run(at, &["report", "runs", "--no-figures", "--out", "out"]).done();
+    let table = std::fs::read_to_string(at.join("out/tables/main.md")).unwrap();
+    assert!(table.contains("Beside the numbers: E1 bee 2 lost, 3 of 42 replies without a decision."), "{table}");
+    // Where nothing was left out, no column says so.
+    let like = two(|_| ());
+    assert!(!run(like.path(), &["stats", "runs"]).done().contains("no decision"));
 }
 
 #[test]

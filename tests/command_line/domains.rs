@@ -162,6 +162,39 @@ fn reports_statistics_figures_and_differences_know_any_domain() {
 }
 
 #[test]
+fn definitions_may_name_the_domain_of_the_mirror() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let paper = fixture("paper").display().to_string();
+    let outputs = |domain: &str| {
+        let text = format!("{domain}include = [\"paper\"]\n[metric.TURNS]\nvalue = \"count(action = 'turn_left')\"\n");
+        fs::write(at.join("mine.toml"), text).unwrap();
+        let scores = run(at, &["score", &paper, "--definitions", "mine.toml"]).done();
+        (scores, run(at, &["definitions", "show", "mine.toml"]).done(), run(at, &["sql", "--definitions", "mine.toml"]).done())
+    };
+    let named = outputs("domain = \"mirror\"\n");
+    assert_eq!((&named.0, &named.2), (&outputs("").0, &outputs("").2));
+    assert!(named.0.lines().count() > 800);
+}
+
+#[test]
+fn the_file_of_the_domain_declares_what_the_program_knows_of_its_columns() {
+    let text = fs::read_to_string(repository().join("assets/domains/mirror.toml")).unwrap();
+    let file: toml::Value = toml::from_str(&text).unwrap();
+    let declared = file["column"].as_table().unwrap();
+    let schema: Value = run(&repository(), &["trace", "schema", "--json"]).json();
+    let columns = schema["columns"].as_array().unwrap();
+    let names = |names: Vec<&str>| names.into_iter().map(str::to_owned).collect::<Vec<_>>();
+    let known = names(columns.iter().map(|column| column["name"].as_str().unwrap()).collect());
+    assert_eq!(known, names(declared.keys().map(String::as_str).collect()));
+    for column in columns {
+        let of = &declared[column["name"].as_str().unwrap()];
+        assert_eq!(column["doc"], of["help"].as_str().unwrap());
+        assert_eq!(column["unit"].as_str(), of.get("unit").map(|unit| unit.as_str().unwrap()));
+    }
+}
+
+#[test]
 fn rules_of_the_mirror_hold_for_the_mirror_alone() {
     let folder = folder();
     let at = folder.path();

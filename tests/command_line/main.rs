@@ -7,6 +7,7 @@ mod budgets;
 mod colors;
 mod comparable;
 mod config;
+mod copies;
 mod declared;
 mod domains;
 mod extended;

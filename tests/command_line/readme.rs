@@ -18,7 +18,7 @@ use crate::harness::need;
 use crate::harness::program::{PROGRAM, clean};
 
 /// Command lines that are not run, by how they begin, and why.
-const NOT_RUN: [(&str, &str); 18] = [
+const NOT_RUN: [(&str, &str); 21] = [
     ("make demo", "builds the program"),
     ("make test", "runs this test"),
     ("scripts/get-mujoco.sh", "downloads a library; `make test` runs it before"),
@@ -40,6 +40,15 @@ const NOT_RUN: [(&str, &str); 18] = [
     ),
     (
         "mirrorstats record --agent vlm --model \"GPT 5.1\" --experiment E1 --max-cost",
+        "needs a provider; `tests/agents` has servers in its place",
+    ),
+    (
+        "mirrorstats record --agent vlm --model \"Gemma4 31B\" --backend openrouter",
+        "needs a provider; `tests/agents` has servers in its place",
+    ),
+    ("llama-server ", "a server of other people"),
+    (
+        "mirrorstats record --agent vlm --model gemma-3-4b-it --base-url",
         "needs a provider; `tests/agents` has servers in its place",
     ),
     ("mirrorstats record --agent human", "waits for people; `tests/reports/view` plays"),

@@ -7,6 +7,8 @@ mod changes;
 mod definitions;
 #[cfg(feature = "polars")]
 mod differential;
+#[cfg(feature = "polars")]
+mod domains;
 mod expressions;
 #[path = "../harness/mod.rs"]
 mod harness;

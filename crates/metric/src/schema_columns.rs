@@ -12,7 +12,7 @@ pub(crate) fn schema_columns() -> Columns {
     let columns: Columns = COLUMNS.iter().filter(|column| column.name != "t").filter_map(column).collect();
     let lists = COLUMNS.iter().filter(|column| !column.values.is_empty()).map(|column| (column.name, column.values));
     let mut columns = columns.with_values(lists);
-    for column in COLUMNS {
+    for column in COLUMNS.iter() {
         if let Some(expression) = column.default {
             columns.set_fallback(column.name, Fallback { expression, is_read: column.required });
         }

@@ -17,7 +17,7 @@ use super::table::CONDITION;
 use trace::open::TraceSet;
 use trace::replies::{REPLY_STATUS, ReplyCounts};
 use trace::scan::EpisodeBatch;
-pub use trace::schema::REPLY_STATUSES;
+pub use trace::replies::statuses;
 use trace::schema::{self, Column, Kind};
 
 /// The columns that quality is read from, where traces have them.

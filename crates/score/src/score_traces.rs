@@ -125,7 +125,7 @@ pub fn unknown_columns() -> Columns {
 
 /// Says what columns mean where there is no value; `is_read` says which of them some trace has.
 fn set_fallbacks(columns: &mut Columns, is_read: impl Fn(&str) -> bool) {
-    for column in COLUMNS {
+    for column in COLUMNS.iter() {
         if let Some(expression) = column.default {
             columns.set_fallback(column.name, Fallback { expression, is_read: is_read(column.name) });
         }

@@ -3,13 +3,15 @@
 //! Rule: a lost episode is neither a success nor a failure. It is in no denominator, or in all of them as a failure where
 //! that is asked for; either is said. A file of scores keeps its row, marked by the label `lost`.
 
-use std::collections::{BTreeSet, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 
 use super::Study;
 use super::error::StudyError;
 use super::results::Results;
 use metric::catalog::{Better, Catalog, Kind};
+use exact::escape::visible;
 use report::cells::group::CONDITION;
+use report::statistics::Replies;
 use score::builder::TableBuilder;
 use score::lost_counts::LostCounts;
 use score::quality::{CellKey, QualityByCell};
@@ -96,6 +98,29 @@ fn counts(table: &EpisodeTable) -> LostCounts {
 fn cell(experiment: &str, model: &str, condition: Option<&str>) -> CellKey {
     let condition = condition.or_else(|| schema::column(CONDITION).and_then(Column::default_text)).unwrap_or_default();
     CellKey { experiment: experiment.to_owned(), model: model.to_owned(), condition: condition.to_owned() }
+}
+
+/// What is not in the numbers of cells, and what was no decision: a line that names the cells; `None` if there is nothing.
+pub(super) fn beside_cells(lost: &LostCounts, replies: Option<&Replies>) -> Option<String> {
+    const NAMED: usize = 8;
+    let mut cells: BTreeMap<[&str; 2], [u64; 3]> = BTreeMap::new();
+    for (key, count) in lost.iter() {
+        cells.entry([&key.experiment, &key.model]).or_default()[0] += count;
+    }
+    for it in replies.into_iter().flat_map(|replies| &replies.cells) {
+        let counts = cells.entry([&it.experiment, &it.model]).or_default();
+        (counts[1], counts[2]) = (counts[1] + it.unusable, counts[2] + it.replies);
+    }
+    let told = |([experiment, model], [lost, unusable, replies]): (&[&str; 2], &[u64; 3])| {
+        let lost = (*lost > 0).then(|| format!("{lost} lost"));
+        let unusable = (*unusable > 0).then(|| format!("{unusable} of {replies} replies without a decision"));
+        let what: Vec<String> = lost.into_iter().chain(unusable).collect();
+        format!("{} {} {}", visible(experiment), visible(model), what.join(", "))
+    };
+    let named: Vec<String> = cells.iter().take(NAMED).map(told).collect();
+    let rest = cells.len().saturating_sub(NAMED);
+    let rest = if rest > 0 { format!("; and {rest} more") } else { String::new() };
+    (!named.is_empty()).then(|| format!("Beside the numbers: {}{rest}.", named.join("; ")))
 }
 
 fn is_lost(table: &EpisodeTable, row: usize) -> bool {

@@ -5,7 +5,7 @@
 use std::fmt;
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use exact::budget::Exceeded;
 use exact::escape::visible;
@@ -58,7 +58,7 @@ pub enum Severity {
 macro_rules! codes {
     ($(#[$doc:meta] $code:ident, $severity:ident, $name:literal: $rule:literal, $help:literal;)+) => {
         /// A rule of the schema; the name in kebab case is stable.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, JsonSchema)]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
         #[serde(rename_all = "kebab-case")]
         pub enum Code {
             $(#[$doc] $code,)+
@@ -190,6 +190,10 @@ codes! {
     UnreadableReplies, Note, "unreadable-replies":
         "every reply could be read: its status is `ok` or `repaired`",
         "the column `reply` holds what was replied; to the metrics these are steps without a decision";
+    /// All rows of an episode are those of another one, the id aside.
+    CopiedEpisode, Note, "copied-episode":
+        "no episode has all rows of another one under another id",
+        "leave the copy out: statistics count it as an independent episode";
 }
 
 impl Code {

@@ -143,7 +143,7 @@ fn name_of(bytes: &[u8]) -> Result<OsString, TraceError> {
     text.map(Into::into).map_err(|source| TraceError::Read { what: "the list on standard input".into(), source })
 }
 
-fn traces_at(path: &Path) -> Result<Vec<PathBuf>, TraceError> {
+pub(crate) fn traces_at(path: &Path) -> Result<Vec<PathBuf>, TraceError> {
     if !path.is_dir() {
         return Ok(vec![path.to_owned()]);
     }

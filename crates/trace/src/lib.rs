@@ -29,6 +29,10 @@
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
 pub mod catch_panic;
+pub mod checksums;
+pub mod copies;
+pub mod declared;
+pub mod declared_experiment;
 pub mod diagnostic;
 mod episodes;
 pub mod error;

@@ -2,7 +2,7 @@
 
 use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 use tokio::runtime::Runtime;
@@ -74,8 +74,8 @@ pub struct VlmArgs {
     /// Attempts for one step
     #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u32).range(1..=50))]
     attempts: u32,
-    /// A service tier at half the price: flex of OpenAI and Google, whose answers take minutes; batch of Anthropic, where the steps
-    /// of all episodes under way go as one batch
+    /// A service tier at half the price: flex of OpenAI and Google, whose answers take minutes; batch of OpenAI, Google and
+    /// Anthropic, where the steps of all episodes under way go as one batch
     #[arg(long, value_name = "flex|batch", value_parser = tier)]
     tier: Option<Tier>,
     /// Seconds for one answer [default: 180, or 900 with --tier flex]
@@ -113,7 +113,7 @@ impl VlmArgs {
         let choice = self.choice()?;
         if let Some(folder) = &self.cassette {
             let vlm = Arc::new(Vlm::cassette(choice, folder.clone()));
-            return Ok(VlmPlayer { vlm, at_once: 1, network: None, ledger: None, slug: String::new() });
+            return Ok(VlmPlayer::of_journals(vlm, 1));
         }
         // A router says what an answer cost; of others nobody knows it without prices.
         let may_say = choice.backend.dialect == Dialect::OpenaiCompatible && choice.model.backend != OWN_SERVER;
@@ -138,14 +138,14 @@ impl VlmArgs {
             Arc::new(Account::new(limits, Spend::default())),
             on_outage,
         );
-        vlm.count_spent(&slug).map_err(Failure::input)?;
-        Ok(VlmPlayer { vlm: Arc::new(vlm), at_once: self.at_once.max(1), network: Some(network), ledger, slug })
+        let (vlm, at_once, network) = (Arc::new(vlm), self.at_once.max(1), Some(network));
+        Ok(VlmPlayer { vlm, at_once, network, ledger, slug, has_counted: OnceLock::new() })
     }
 
     /// The player of a forecast: knows the journals in the folder of the recording, has no key and sends nothing.
     pub fn forecaster(&self, out: &Path) -> Result<VlmPlayer, Failure> {
         let vlm = Arc::new(Vlm::cassette(self.choice()?, out.join(JOURNALS)));
-        Ok(VlmPlayer { vlm, at_once: self.at_once.max(1), network: None, ledger: None, slug: String::new() })
+        Ok(VlmPlayer::of_journals(vlm, self.at_once.max(1)))
     }
 
     /// Asks the model what it takes, with the schema of an experiment and a frame of this size.
@@ -248,9 +248,15 @@ pub struct VlmPlayer {
     network: Option<Runtime>,
     ledger: Option<PathBuf>,
     slug: String,
+    /// The journals were read, which happens once.
+    has_counted: OnceLock<()>,
 }
 
 impl VlmPlayer {
+    fn of_journals(vlm: Arc<Vlm>, at_once: usize) -> Self {
+        Self { vlm, at_once, network: None, ledger: None, slug: String::new(), has_counted: OnceLock::new() }
+    }
+
     pub fn vlm(&self) -> &Vlm {
         &self.vlm
     }
@@ -283,11 +289,16 @@ impl Player for VlmPlayer {
     }
 
     fn spend(&self) -> Option<Spend> {
-        self.network.is_some().then(|| self.vlm.spend())
+        self.network.as_ref()?;
+        if self.has_counted.set(()).is_ok() {
+            self.vlm.count_spent(&self.slug).ok()?;
+        }
+        Some(self.vlm.spend())
     }
 
     fn check(&self) -> Result<(), String> {
         self.vlm.connect().map_err(|fault| fault.to_string())?;
+        let _ = self.has_counted.set(());
         let share = |path| self.vlm.share_account(path, &self.slug).map_err(|fault| fault.to_string());
         self.ledger.as_deref().map_or(Ok(()), share)
     }

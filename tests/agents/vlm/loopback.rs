@@ -300,12 +300,12 @@ fn one(folder: &Folder, model: &str, words: &str) -> Command {
     command
 }
 
-#[test]
-fn steps_of_many_episodes_go_as_batches_and_none_is_paid_twice_after_a_kill() {
+/// Records six episodes of a model in batches, with a kill after the second batch, and checks that no answer is paid twice.
+fn in_batches(server: usize, model: &str) {
     let folder = Folder::new();
     let servers = prepare(&folder, "");
-    let paid = || servers[1].paid();
-    let record = || one(&folder, "Sonnet", "--runs 6 --tier batch");
+    let paid = || servers[server].paid();
+    let record = || one(&folder, model, "--runs 6 --tier batch");
     let batches = || {
         let mut files = std::fs::read_dir(folder.path().join("runs/ledger")).into_iter().flatten().flatten();
         let notes = files.find(|file| file.path().to_string_lossy().ends_with(".batches.jsonl"));
@@ -325,9 +325,33 @@ fn steps_of_many_episodes_go_as_batches_and_none_is_paid_twice_after_a_kill() {
     assert_eq!(answer["recorded"], 6);
     // 24 answers; without batches each of them is a request.
     assert_eq!(paid(), 24, "an answer was paid twice");
-    assert!((6..=14).contains(&batches()), "{} batches", batches());
+    assert!((6..=20).contains(&batches()), "{} batches", batches());
     let cost = answer["spend"]["cost_usd"].as_f64().unwrap();
     assert!((cost - 24.0 * 0.001_64 / 2.0).abs() < 1e-9, "{cost}");
+}
+
+#[test]
+fn steps_of_many_episodes_go_as_message_batches_of_anthropic_and_none_is_paid_twice_after_a_kill() {
+    in_batches(1, "Sonnet");
+}
+
+#[test]
+fn steps_of_many_episodes_go_as_files_of_openai_and_none_is_paid_twice_after_a_kill() {
+    in_batches(0, "GPT 5.1");
+}
+
+#[test]
+fn steps_of_many_episodes_go_as_batches_of_google_and_none_is_paid_twice_after_a_kill() {
+    in_batches(2, "Flash");
+}
+
+#[test]
+fn a_server_of_ones_own_takes_no_batches() {
+    let folder = Folder::new();
+    let _servers = prepare(&folder, "");
+    let refused = one(&folder, "Own", "--runs 1 --tier batch").output().unwrap();
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(stderr(&refused).contains("the backend `local` has no such tier"), "{}", stderr(&refused));
 }
 
 #[test]

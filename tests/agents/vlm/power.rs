@@ -1,7 +1,7 @@
 //! The power fails while a model is asked: no answer that was journaled is paid for twice, and the recording ends as one
 //! that nothing has interrupted.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::process::Stdio;
 
@@ -132,6 +132,33 @@ fn check(most: usize) {
 #[test]
 fn no_answer_is_paid_for_twice_after_a_loss_of_power() {
     check(12);
+}
+
+/// How often each of the journals was opened.
+fn journal_opens(folder: &Folder, words: &str, server: &Server) -> Vec<usize> {
+    let log = tempfile::tempdir().unwrap();
+    let log = log.path().join("log");
+    succeeds(watched(&mut folder.record(server, "own", words), folder.path(), &log));
+    let mut opens = BTreeMap::new();
+    for call in calls(&log) {
+        if let Call::Open(path) = call
+            && path.extension().is_some_and(|ending| ending == "jsonl")
+            && path.parent().is_some_and(|folder| folder.ends_with("journal"))
+        {
+            *opens.entry(path).or_default() += 1;
+        }
+    }
+    opens.into_values().collect()
+}
+
+#[test]
+fn a_start_reads_each_journal_once() {
+    let (folder, server) = (Folder::new(), server());
+    journal_opens(&folder, WORDS, &server);
+    assert_eq!(journal_opens(&folder, WORDS, &server), [1, 1], "nothing is left to record");
+    // Those of the third and fourth episode are new; each is opened to be written and read.
+    let opens = journal_opens(&folder, &WORDS.replace("--runs 2", "--runs 4"), &server);
+    assert_eq!(opens, [1, 1, 2, 2]);
 }
 
 #[test]

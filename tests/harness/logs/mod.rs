@@ -42,8 +42,9 @@ pub fn lerobot_evaluation(path: &Path, successes: &[bool]) {
     fs::write(path, info.to_string().replace("null", "NaN")).unwrap();
 }
 
-/// A data set of LeRobot, version 3: `data/chunk-000/file-000.parquet` with the frames of all episodes. Episode `i` is
-/// solved at frame `solved[i]`, or never; its actions are smooth, or jump at each frame.
+/// A data set of LeRobot, version 3, in this folder: `meta` as its `lerobot.datasets.utils` and pandas write it, and
+/// `data/chunk-000/file-000.parquet` with the frames of all episodes. Episode `i` is solved at frame `solved[i]`, or never; its
+/// actions are smooth, or jump at each frame.
 pub fn lerobot_data_set(folder: &Path, solved: &[Option<u32>], is_smooth: bool) {
     const FRAMES: u32 = 8;
     let frame = |episode: usize, solved: Option<u32>, at: u32| {
@@ -79,6 +80,40 @@ pub fn lerobot_data_set(folder: &Path, solved: &[Option<u32>], is_smooth: bool) 
     let path = folder.join("data/chunk-000/file-000.parquet");
     fs::create_dir_all(path.parent().unwrap()).unwrap();
     write_rows(&path, &[batch(schema, &frames)], None);
+    lerobot_meta(folder, solved.len(), FRAMES);
+}
+
+fn lerobot_meta(folder: &Path, episodes: usize, frames: u32) {
+    const TASK: &str = "Push the block";
+    let meta = folder.join("meta");
+    fs::create_dir_all(meta.join("episodes/chunk-000")).unwrap();
+    let info = json!({
+        "codebase_version": "v3.0", "robot_type": "so100", "total_episodes": episodes, "fps": 10, "total_tasks": 1,
+        "data_path": "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet", "features": {},
+    });
+    fs::write(meta.join("info.json"), info.to_string()).unwrap();
+    let fields = |fields: &[(&str, DataType)]| {
+        Schema::new(fields.iter().map(|(name, kind)| Field::new(*name, kind.clone(), true)).collect::<Vec<_>>())
+    };
+    let tasks = fields(&[("task_index", DataType::Int64), ("__index_level_0__", DataType::Utf8)]);
+    let task = json!({ "task_index": 0, "__index_level_0__": TASK });
+    write_rows(&meta.join("tasks.parquet"), &[batch(tasks, &[task])], None);
+    let texts = DataType::new_list(DataType::Utf8, true);
+    let numbers = DataType::new_list(DataType::Float64, true);
+    let of_episodes = fields(&[
+        ("episode_index", DataType::Int64),
+        ("tasks", texts),
+        ("length", DataType::Int64),
+        ("data/chunk_index", DataType::Int64),
+        ("data/file_index", DataType::Int64),
+        ("stats/action/mean", numbers),
+    ]);
+    let episode = |episode| {
+        json!({ "episode_index": episode, "tasks": [TASK], "length": frames, "data/chunk_index": 0,
+                "data/file_index": 0, "stats/action/mean": [0.0, 1.0] })
+    };
+    let episodes: Vec<Value> = (0..episodes).map(episode).collect();
+    write_rows(&meta.join("episodes/chunk-000/file-000.parquet"), &[batch(of_episodes, &episodes)], None);
 }
 
 /// Rows of JSON in columns of these types.

@@ -161,6 +161,51 @@ fn frames_of_a_lerobot_data_set_are_steps() {
 }
 
 #[test]
+fn the_folder_of_a_lerobot_data_set_is_imported_with_its_tasks() {
+    let folder = folder();
+    let at = folder.path();
+    logs::lerobot_data_set(&at.join("pusht"), &[Some(2), None, Some(5)], false);
+    let answer = run(at, &import("pusht", &SET)).ends(0);
+    assert!(answer.stdout.starts_with("imported 3 episodes, 24 steps"), "{}", answer.stdout);
+    #[cfg(feature = "polars")]
+    assert_eq!(
+        queried(at, "substr(episode_id, 10), run, t, success, task, fps, robot_type")[..3],
+        [
+            "0,1,1,false,Push the block,10,so100",
+            "0,1,2,false,Push the block,10,so100",
+            "0,1,3,true,Push the block,10,so100"
+        ]
+    );
+    // Another copy has the same ids; one with another frame has others.
+    let ids = |name: &str| {
+        run(at, &import(name, &SET)).ends(0);
+        run(at, &["info", "x.parquet", "--episodes"]).done()
+    };
+    logs::lerobot_data_set(&at.join("copy"), &[Some(2), None, Some(5)], false);
+    logs::lerobot_data_set(&at.join("other"), &[Some(2), None, Some(6)], false);
+    assert_eq!(ids("pusht"), ids("copy"));
+    assert_ne!(ids("pusht"), ids("other"));
+
+    let frames = at.join("pusht/data/chunk-000/file-000.parquet");
+    logs::lerobot_data_set(&at.join("short"), &[Some(2), None], false);
+    fs::copy(at.join("short/data/chunk-000/file-000.parquet"), &frames).unwrap();
+    let told = run(at, &import("pusht", &SET)).refused();
+    assert!(told.contains("pusht, data\n  expected the frames of episode 2, as `meta/episodes` counts them"), "{told}");
+    assert!(told.contains("found 8 fewer"), "{told}");
+    fs::write(&frames, "PAR1").unwrap();
+    let told = run(at, &import("pusht", &SET)).refused();
+    assert!(told.contains("pusht/data/chunk-000/file-000.parquet\n  expected a Parquet file"), "{told}");
+    let info = at.join("other/meta/info.json");
+    let text = fs::read_to_string(&info).unwrap().replace("v3.0", "v2.1");
+    fs::write(&info, text).unwrap();
+    let told = run(at, &import("other", &SET)).refused();
+    assert!(told.contains("other, meta/info.json") && told.contains("found version v2.1"), "{told}");
+    fs::remove_file(info).unwrap();
+    let told = run(at, &import("other", &SET)).refused();
+    assert!(told.contains("it is a folder; name the files in it"), "{told}");
+}
+
+#[test]
 fn logs_of_inspect_robots_have_a_row_per_trial() {
     let folder = folder();
     let at = folder.path();

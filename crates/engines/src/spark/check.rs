@@ -136,7 +136,7 @@ mod tests {
     use super::{Rule, no_color, rules};
     use metric::definitions::Definitions;
     use score::score_traces::schema_columns;
-    use trace::colors::{COLOR_COLUMNS, palette::Palette};
+    use trace::colors::{columns, palette::Palette};
     use trace::diagnostic::{Code, Finding};
     use trace::inputs::Input;
     use trace::schema::COLUMNS;
@@ -174,7 +174,7 @@ mod tests {
     fn the_condition_is_the_rule() {
         let palette = Palette::of_all([Some(&Palette::new(vec!["teal".into(), "grün".into()]))].into_iter());
         for palette in [None, palette.as_ref()] {
-            for column in COLOR_COLUMNS {
+            for column in columns() {
                 let mut context = SQLContext::new();
                 context.register("steps", df!["color" => TEXTS].unwrap().lazy());
                 let condition = no_color("s.color", column, palette).replace("\\\\", "\\");

@@ -8,7 +8,7 @@ use crate::cells::KeyValue;
 use crate::tables::{Column, ListTable, Look, Table, key_field};
 use exact::escape::visible;
 use exact::format::fixed;
-use score::quality::{CellKey, Quality, QualityByCell, REPLY_STATUSES};
+use score::quality::{CellKey, Quality, QualityByCell, statuses};
 
 const NAME: &str = "quality";
 /// The text of what is not recorded.
@@ -119,7 +119,7 @@ fn records(cells: &QualityByCell, keys: usize) -> Table {
         "completion_tokens",
         "cost_usd",
     ];
-    let header = ["episodes", "lost", "steps", "replies"].into_iter().chain(REPLY_STATUSES).chain(tail);
+    let header = ["episodes", "lost", "steps", "replies"].into_iter().chain(statuses().iter().copied()).chain(tail);
     let table = Table::of_texts(keys_and(keys, header));
     table.with(cells.0.iter().map(|(key, quality)| record(key, quality, keys)))
 }
@@ -132,7 +132,7 @@ fn record(key: &CellKey, quality: &Quality, keys: usize) -> Vec<String> {
     let count = |count: u64| if recorded { count.to_string() } else { String::new() };
     let optional = |number: Option<i64>| number.map_or_else(String::new, |number| number.to_string());
     let total = |replies: u64, sum: String| if replies > 0 { sum } else { String::new() };
-    let known: u64 = REPLY_STATUSES.iter().map(|status| quality.of_status(status)).sum();
+    let known: u64 = statuses().iter().map(|status| quality.of_status(status)).sum();
     let repairs: BTreeMap<_, _> = quality.repairs.iter().collect();
     let repairs = repairs.iter().map(|(name, count)| format!("{name} {count}")).collect::<Vec<_>>().join("; ");
     let Quality { prompt_tokens, completion_tokens, cost_nano_usd, .. } = quality;
@@ -143,7 +143,7 @@ fn record(key: &CellKey, quality: &Quality, keys: usize) -> Vec<String> {
             quality.steps.to_string(),
             count(quality.replies()),
         ])
-        .chain(REPLY_STATUSES.map(|status| count(quality.of_status(status))))
+        .chain(statuses().iter().map(|status| count(quality.of_status(status))))
         .chain([
             count(quality.unusable()),
             count(quality.replies() - known),

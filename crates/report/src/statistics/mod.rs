@@ -6,7 +6,11 @@
 //! design: paired where scenes are equal, by clusters where they are declared, of independent episodes elsewhere.
 
 mod answers;
-mod comparisons;
+mod apart;
+mod cells;
+mod chance;
+mod clusters;
+mod compare;
 mod conclusions;
 mod gate;
 mod rates;
@@ -24,6 +28,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use answers::{Answer, AnswerRole};
+pub use apart::SettingApart;
 pub use cells::{CellRow, FEW, Intervals};
 pub use chance::{ChanceRow, Role, Verdict};
 pub use clusters::ClusterRow;
@@ -115,7 +120,10 @@ pub struct Statistics {
     /// Settings that differ within a cell or between cells that are compared, and were declared not to matter.
     #[serde(default)]
     pub pooled: Vec<String>,
-    /// The declared design.
+    /// The settings that keep cells from being compared, each with what it keeps apart; absent if there is none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub not_comparable: Vec<SettingApart>,
+    /// What the traces declare about their design.
     pub design: Design,
     /// The consequence of the design, in a sentence.
     pub design_note: String,
@@ -185,6 +193,7 @@ impl Statistics {
             selection: options.selection.clone(),
             departures: None,
             pooled: pooled(&study, options),
+            not_comparable: Vec::new(),
             design: options.design,
             design_note: String::new(),
             families: 0,
@@ -207,6 +216,10 @@ impl Statistics {
             headline,
             relations: study.relations.clone(),
         };
+        for cell in &mut statistics.cells {
+            cell.note_left_out(options.lost.as_ref(), options.replies.as_ref());
+        }
+        statistics.not_comparable = SettingApart::all(&statistics);
         statistics.design_note = warnings::design_note(&statistics);
         (statistics.answers, statistics.families) = answers::answers(&statistics, options);
         statistics.conclusions = conclusions::conclusions(&statistics);

@@ -37,6 +37,9 @@ impl Study {
         for (study, table) in [(base, &old), (self, &new)].into_iter().filter(|_| options.pool) {
             gate.caveats.extend(pooled::told(table, &study.question.by_over(table))?);
         }
+        for (side, study, table) in [("base", base, &old), ("new", self, &new)] {
+            gate.caveats.extend(study.copies(table)?.map(|copies| format!("{side}: {}", copies.sentence)));
+        }
         let flips = || gate.cells.iter().flat_map(|cell| &cell.flips);
         let ids = |of: fn(&report::statistics::FlippedPair) -> &Played| {
             flips().map(|flip| of(flip).episode_id.clone()).collect::<BTreeSet<String>>()

@@ -11,7 +11,7 @@ use report::bundle::Manifest;
 use report::cells::{Cells, KeyValue};
 use report::html::{self, Figure, Page};
 use report::layout::quality;
-use report::statistics::Options;
+use report::statistics::{Options, Replies};
 use report::style::Style;
 use trace::schema::SCHEMA_VERSION;
 
@@ -51,7 +51,8 @@ impl Study {
             Part::Statistics => Some(self.statistics_of(&counted, &cells, &Options::default())?),
             Part::Tables | Part::Figures => None,
         };
-        let Counted { results, lost, .. } = counted;
+        let Counted { results, lost, all } = counted;
+        let replies = Replies::of(all.as_ref().unwrap_or(&results.episodes));
         let drawings = match part {
             Part::Figures => FigureInputs::of(&results, &style)?.draw_all(),
             Part::Tables | Part::Statistics => crate::Drawings::default(),
@@ -59,7 +60,7 @@ impl Study {
         let svgs: Vec<String> = drawings.drawn.iter().map(|(_, figure)| figure.inline_svg()).collect();
         let figures: Vec<Figure> =
             drawings.drawn.iter().zip(&svgs).map(|((name, drawn), svg)| figure_of(*name, drawn, svg)).collect();
-        let (tables, ranks) = self.tables(&results.episodes, &lost, &cells, &style)?;
+        let (tables, ranks) = self.tables(&results.episodes, (&lost, replies.as_ref()), &cells, &style)?;
         let lists: Vec<_> = ranks.into_iter().chain(results.quality.as_ref().and_then(quality::of_cells)).collect();
         let manifest =
             Manifest::new(&cells, &style, SCHEMA_VERSION, self.question.filter.clone(), results.inputs.clone());

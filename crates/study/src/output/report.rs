@@ -107,12 +107,14 @@ impl Study {
         let statistics =
             options.figures.then(|| self.statistics_of(&counted, &cells, &Options::default())).transpose()?;
         let Counted { results, all, lost } = counted;
-        let replies = Replies::of(all.as_ref().unwrap_or(&results.episodes)).and_then(|replies| replies.sentence());
-        let (tables, ranks) = self.tables(&results.episodes, &lost, &cells, &style)?;
+        let replies = Replies::of(all.as_ref().unwrap_or(&results.episodes));
+        let (tables, ranks) = self.tables(&results.episodes, (&lost, replies.as_ref()), &cells, &style)?;
+        let replies = replies.and_then(|replies| replies.sentence());
         let lists = ranks.into_iter().chain(results.quality.as_ref().and_then(quality::of_cells)).collect();
         let filter = self.question.filter.clone();
         let manifest = Manifest::new(&cells, &style, SCHEMA_VERSION, filter, results.inputs.clone());
         let mut notes = self.notes(&results, &lost);
+        notes.extend(self.copies(&results.episodes)?.map(|copies| copies.sentence));
         let own = Options { selection: self.selection(&results.episodes), ..Options::default() };
         let departures = self.departures(&results.episodes, &own, Looks::Once).into_iter().flatten();
         notes.extend(departures.map(|departure| format!("departure from the registered plan: {departure}")));

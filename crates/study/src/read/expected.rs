@@ -29,6 +29,6 @@ impl ExpectedTraces {
 
     pub(crate) fn as_expected(&self) -> Expected<'_> {
         let domain = if self.domain.is_some() { Domain::Own } else { Domain::Mirror };
-        Expected { experiments: self.experiments.as_deref(), domain, declared: &self.declared }
+        Expected { experiments: self.experiments.as_deref(), domain, declared: &self.declared, errors_alone: false }
     }
 }

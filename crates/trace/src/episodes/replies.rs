@@ -8,8 +8,8 @@ use arrow::datatypes::Int32Type;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::scan::EpisodeBatch;
-use crate::schema::REPLY_STATUSES;
+use super::scan::EpisodeBatch;
+use super::schema;
 use exact::escape::visible;
 use parquet_pages::Column;
 
@@ -17,7 +17,12 @@ pub const REPLY_STATUS: &str = "reply_status";
 /// The statuses of replies that gave a decision.
 const READ: [&str; 2] = ["ok", "repaired"];
 
-/// The number of replies, and of replies without a decision.
+/// The statuses of the schema, in its order.
+pub fn statuses() -> &'static [&'static str] {
+    schema::column(REPLY_STATUS).map_or(&[], |column| column.values)
+}
+
+/// How many replies there are, and how many of them gave no decision.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct ReplyCounts {
     /// Replies with a status.
@@ -49,8 +54,8 @@ impl ReplyCounts {
 
     /// The same without the statuses that the schema does not know.
     #[must_use]
-    pub(crate) fn of_known_statuses(mut self) -> Self {
-        self.unreadable.retain(|status, _| REPLY_STATUSES.contains(&status.as_str()));
+    pub(super) fn of_known_statuses(mut self) -> Self {
+        self.unreadable.retain(|status, _| statuses().contains(&status.as_str()));
         self
     }
 

@@ -7,8 +7,8 @@
 use indexmap::IndexMap;
 use serde_json::{Map, Value};
 
-use crate::diagnostic::{Code, Finding};
-use crate::schema::{OF_SOME_TASKS, RECORDING_KEY};
+use super::diagnostic::{Code, Finding};
+use super::schema::{RECORDING_KEY, of_some_tasks};
 use exact::ratio::Ratio;
 
 /// An experiment as a footer declares it.
@@ -28,7 +28,7 @@ pub struct DeclaredExperiment {
     pub definitions: Option<String>,
     /// SHA-256 of the definition file, where it is a file of one's own.
     pub definitions_hash: Option<String>,
-    /// Columns of [`OF_SOME_TASKS`] that have no meaning for its task, in this order.
+    /// Columns of [`of_some_tasks`] that have no meaning for its task, in this order.
     pub absent: Vec<&'static str>,
 }
 
@@ -54,7 +54,7 @@ pub(crate) fn absent(file: &str, recording: Option<&str>) -> Vec<&'static str> {
     // A recording that is not as it must be is distinguished from its columns.
     let declared = of_recording(file, recording).unwrap_or_default();
     let say_so = |name: &str| declared.iter().all(|experiment| experiment.absent.contains(&name));
-    OF_SOME_TASKS.into_iter().filter(|name| !declared.is_empty() && say_so(name)).collect()
+    of_some_tasks().filter(|name| !declared.is_empty() && say_so(name)).collect()
 }
 
 fn read(recording: &Value) -> Result<Vec<DeclaredExperiment>, Fault> {
@@ -120,14 +120,14 @@ fn levels<T>(
 }
 
 fn columns(key: &str, value: Option<&Value>) -> Result<Vec<&'static str>, Fault> {
-    let known = |name: &Value| OF_SOME_TASKS.into_iter().find(|known| *name == **known);
+    let known = |name: &Value| of_some_tasks().find(|known| *name == **known);
     let named = match value {
         None | Some(Value::Null) => Some(Vec::new()),
         Some(value) => value.as_array().and_then(|names| names.iter().map(known).collect()),
     };
     let named =
         named.ok_or_else(|| fault(key, "a list of `self_color` and `selected_cube`", value.unwrap_or(&Value::Null)))?;
-    Ok(OF_SOME_TASKS.into_iter().filter(|known| named.contains(known)).collect())
+    Ok(of_some_tasks().filter(|known| named.contains(known)).collect())
 }
 
 fn chance(key: &str, value: &Value) -> Result<Option<Ratio>, Fault> {

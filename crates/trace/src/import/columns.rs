@@ -222,7 +222,7 @@ fn misdeclared(key: &str, value: &Value, limits: Limits<'_>) -> Option<Fault> {
 pub(super) fn lowest(column: &Column) -> i64 {
     match column.stored.range() {
         _ if column.name == "t" => 1,
-        _ if column.counts() => 0,
+        _ if column.counts => 0,
         Some((lowest, _)) => lowest,
         None => i64::MIN,
     }
@@ -238,7 +238,7 @@ fn is_held(column: &Column, value: &Value) -> bool {
         _ => return false,
     };
     let fits = column.stored != Stored::Float32 || (number as f32).is_finite();
-    fits && !(column.counts() && number < 0.0)
+    fits && !(column.counts && number < 0.0)
 }
 
 pub(super) fn expected(column: &Column) -> String {
@@ -248,7 +248,7 @@ pub(super) fn expected(column: &Column) -> String {
             let highest = column.stored.range().map_or(i64::MAX, |(_, highest)| highest);
             format!("an integer from {} to {highest}", lowest(column))
         }
-        Kind::Float if column.counts() => "a number from 0".to_owned(),
+        Kind::Float if column.counts => "a number from 0".to_owned(),
         Kind::Float => "a number".to_owned(),
         _ if !column.values.is_empty() => format!("one of {}", column.values.join(", ")),
         _ if column.names() => "a text that is not empty".to_owned(),

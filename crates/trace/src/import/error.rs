@@ -71,7 +71,7 @@ impl ImportError {
         Self::Changed { file: file.to_owned() }
     }
 
-    pub(super) fn read(file: &str) -> impl FnOnce(io::Error) -> Self {
+    pub(super) fn read(file: &str) -> impl FnOnce(io::Error) -> Self + use<> {
         let file = file.to_owned();
         move |source| Self::Read { file, source }
     }

@@ -3,7 +3,6 @@
 use serde_json::{Map, Value, json};
 
 use super::columns::lowest;
-use crate::schema::colors;
 use crate::schema::colors::spelling::WORDS;
 use crate::schema::{COLUMNS, Column, Kind};
 
@@ -41,7 +40,7 @@ fn property(column: &Column) -> Value {
     if let Some((_, highest)) = column.stored.range() {
         property["minimum"] = json!(lowest(column));
         property["maximum"] = json!(highest);
-    } else if column.counts() {
+    } else if column.counts {
         property["minimum"] = json!(0);
     }
     if !column.values.is_empty() {
@@ -50,7 +49,7 @@ fn property(column: &Column) -> Value {
     } else if column.names() {
         property["minLength"] = json!(1);
     }
-    if let Some(color) = colors::column(column.name) {
+    if let Some(color) = column.color {
         // Letters beyond ASCII are left to the import.
         property["pattern"] = json!(r"^[^\sA-Z]+( [^\sA-Z]+)*$");
         let others: Vec<&str> = WORDS.into_iter().filter(|word| color.word != Some(*word)).collect();

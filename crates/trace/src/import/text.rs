@@ -12,6 +12,7 @@ use serde_json::Value;
 
 use super::error::ImportError;
 use super::fault::{Fault, Place};
+use super::format::lerobot::data_set;
 use super::format::{Format, Rows};
 use super::line::{self, BYTE_ORDER_MARK, Members};
 use super::mapping::Mapping;
@@ -66,11 +67,24 @@ impl Text {
         let name = Input::new(path).name;
         let failed = || ImportError::read(&name);
         if path.is_dir() {
-            return Err(failed()(io::Error::new(io::ErrorKind::IsADirectory, "it is a folder; name the files in it")));
+            return Err(failed()(io::Error::new(io::ErrorKind::IsADirectory, "it is a folder; name the files in it, or the folder of `meta/info.json` of a LeRobot data set")));
         }
         let file = input::open_text(path).map_err(failed())?;
         let about = file.metadata().map_err(failed())?;
         if about.is_file() { Ok(Self::of_file(&name, file)) } else { Self::spool(&name, file) }
+    }
+
+    /// The rows of a folder as lines of flat steps, kept in a temporary file; `None` if it is not a data set of `LeRobot`.
+    pub fn of_data_set(folder: &Path, mapping: &mut Mapping) -> Result<Option<Self>, ImportError> {
+        if !data_set::is_data_set(folder) {
+            return Ok(None);
+        }
+        let (name, format) = (Input::new(folder).name, Format::LeRobot);
+        let source = Source { sha256: data_set::hash_of(folder)?, format, mapping: mapping.declared() };
+        let mut rows = Rows::new(&name, &source.sha256, mapping)?;
+        data_set::read_folder(folder, &mut rows)?;
+        let lines = Self::of_file(&name, rows.finish()?);
+        Ok(Some(Self { noun: format.noun(), source: Some(source), ..lines }))
     }
 
     /// The text that a stream still gives, kept in a temporary file.

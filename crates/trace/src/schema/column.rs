@@ -3,7 +3,10 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::colors::ColorColumn;
+use super::domain::Scope;
 use super::field_access::{Access, Value};
+use crate::diagnostic::Code;
 use crate::episode::Episode;
 
 /// One column of a trace.
@@ -32,12 +35,27 @@ pub struct Column {
     /// `null` where a trace without the column is one without a value in any row, so that definitions may read it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub default: Option<&'static str>,
+    /// The code of a finding about a text beside `values`.
+    #[serde(skip)]
+    pub rule: Option<Code>,
+    /// The colours that it holds, if it holds any.
+    #[serde(skip)]
+    pub color: Option<ColorColumn>,
+    /// True if it counts something, so that a negative number is a fault.
+    #[serde(skip)]
+    pub counts: bool,
+    #[serde(skip)]
+    pub(crate) is_of_some_tasks: bool,
+    #[serde(skip)]
+    pub(super) is_mark: bool,
+    #[serde(skip)]
+    pub(super) scope: Scope,
     #[serde(skip)]
     pub(super) access: Access,
 }
 
 /// The type of a column as the writer stores it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Stored {
     /// True or false.
@@ -127,46 +145,7 @@ impl PartialEq for Column {
 impl Eq for Column {}
 
 impl Column {
-    pub(super) const fn new(name: &'static str, stored: Stored, doc: &'static str, access: Access) -> Self {
-        let (required, nullable, constant, unit) = (false, true, false, None);
-        let (values, since, default) = (&[] as &[&str], 1, None);
-        Self { name, stored, required, nullable, constant, unit, doc, values, since, default, access }
-    }
-
-    pub(super) const fn required(self) -> Self {
-        Self { required: true, nullable: false, ..self }
-    }
-
-    pub(super) const fn nullable(self) -> Self {
-        Self { nullable: true, ..self }
-    }
-
-    pub(super) const fn constant(self) -> Self {
-        Self { constant: true, ..self }
-    }
-
-    pub(super) const fn unit(self, unit: &'static str) -> Self {
-        Self { unit: Some(unit), ..self }
-    }
-
-    pub(super) const fn values(self, values: &'static [&'static str]) -> Self {
-        Self { values, ..self }
-    }
-
-    pub(super) const fn since(self, since: u32) -> Self {
-        Self { since, ..self }
-    }
-
-    pub(super) const fn default(self, default: &'static str) -> Self {
-        Self { default: Some(default), ..self }
-    }
-
-    /// Returns true if the column counts something, so that a negative number is a fault.
-    pub fn counts(&self) -> bool {
-        matches!(self.unit, Some("px" | "ms" | "tokens" | "USD" | "agents" | "mm"))
-    }
-
-    /// The meaning of no value, if that is a text or a number and not an expression over other columns.
+    /// What no value means, where that is a text or a number and not an expression over other columns.
     pub fn default_text(&self) -> Option<&'static str> {
         let text = self.default?;
         let quoted = text.strip_prefix('\'').and_then(|text| text.strip_suffix('\''));

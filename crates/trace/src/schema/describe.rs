@@ -42,7 +42,7 @@ impl SchemaDocument {
                           Readers take plain and dictionary strings, and integers of any width. \
                           Columns that are not listed are kept and can be used in definitions.",
             version: SCHEMA_VERSION,
-            columns: COLUMNS,
+            columns: &COLUMNS,
             metadata: METADATA,
             rules: Code::ALL.into_iter().map(rule).collect(),
         }

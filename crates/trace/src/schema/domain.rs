@@ -2,9 +2,16 @@
 //!
 //! Every domain has identity and time. The columns of the mirror's world are names like any other elsewhere.
 
+use std::sync::LazyLock;
+
+use indexmap::IndexMap;
+use serde::Deserialize;
 use serde_json::Value;
 
-use super::{Column, Kind, column};
+use super::colors::ColorColumn;
+use super::field_access::access;
+use super::{Column, Kind, Stored, column};
+use crate::diagnostic::Code;
 use crate::read::open::FileColumn;
 
 /// The subject of a trace's episodes.
@@ -20,25 +27,99 @@ pub enum Domain {
 /// The name of the mirror's domain.
 pub const MIRROR: &str = "mirror";
 
-/// The columns that every trace has, whatever its domain.
-const IDENTITY: [&str; 6] = ["episode_id", "model", "experiment", "seed", "run", "t"];
+/// The columns of the schema, in the order in which the writer stores them: required ones first.
+pub static COLUMNS: LazyLock<Vec<Column>> = LazyLock::new(|| {
+    let text = include_str!("../../../../assets/domains/mirror.toml");
+    let file: DomainFile = toml::from_str(text).expect("the built-in domain is well-formed: a test reads it");
+    let DomainFile { counted, column } = file;
+    column.into_iter().map(|(name, declared)| declared.named(name.leak(), &counted)).collect()
+});
 
-/// Columns that mean the same in every domain where they have the schema's type.
-const GENERAL: [&str; 10] = [
-    "condition",
-    "scene",
-    "repetition",
-    "fingerprint",
-    "participant",
-    "episode_hash",
-    "latency_ms",
-    "prompt_tokens",
-    "completion_tokens",
-    "cost_usd",
-];
+/// Which traces mean a column as the schema does.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Scope {
+    /// Every trace has it.
+    Every,
+    /// Traces of any domain, where it has the schema's type.
+    Any,
+    /// Those of the mirror's domain.
+    #[default]
+    Mirror,
+}
 
-/// Columns that a trace of the mirror's domain has and no other one: a file without any of them is about something else.
-const MARKS: [&str; 4] = ["body_color", "self_color", "selected_cube", "mirror_visible"];
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct DomainFile {
+    counted: Vec<String>,
+    column: IndexMap<String, DomainColumn>,
+}
+
+/// A column as the file declares it; the file says what each key means.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct DomainColumn {
+    #[serde(rename = "type")]
+    stored: Stored,
+    #[serde(rename = "in", default)]
+    scope: Scope,
+    #[serde(default)]
+    required: bool,
+    nullable: Option<bool>,
+    #[serde(default)]
+    constant: bool,
+    #[serde(default)]
+    mark: bool,
+    #[serde(default)]
+    task: bool,
+    #[serde(default = "first_version")]
+    since: u32,
+    unit: Option<String>,
+    default: Option<String>,
+    #[serde(default)]
+    values: Vec<String>,
+    rule: Option<Code>,
+    color: Option<DomainColor>,
+    help: String,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct DomainColor {
+    word: Option<String>,
+    advice: String,
+}
+
+const fn first_version() -> u32 {
+    1
+}
+
+impl DomainColumn {
+    /// The column, whose texts are kept for as long as the process runs: there is one table.
+    fn named(self, name: &'static str, counted: &[String]) -> Column {
+        let kept = |text: String| &*text.leak();
+        let color = |color: DomainColor| ColorColumn { name, word: color.word.map(kept), advice: kept(color.advice) };
+        Column {
+            name,
+            stored: self.stored,
+            required: self.required,
+            nullable: self.nullable.unwrap_or(!self.required),
+            constant: self.constant,
+            counts: self.unit.as_ref().is_some_and(|unit| counted.contains(unit)),
+            unit: self.unit.map(kept),
+            doc: kept(self.help),
+            values: self.values.into_iter().map(kept).collect::<Vec<&str>>().leak(),
+            since: self.since,
+            default: self.default.map(kept),
+            rule: self.rule,
+            color: self.color.map(color),
+            is_of_some_tasks: self.task,
+            is_mark: self.mark,
+            scope: self.scope,
+            access: access(name),
+        }
+    }
+}
 
 impl Domain {
     /// The domain of a file with these columns: its recording names it. Where it does not, a file with an identity and without
@@ -48,8 +129,10 @@ impl Domain {
         if let Some(name) = recording.as_ref().and_then(|recording| recording["domain"].as_str()) {
             return Self::named(name);
         }
-        let has = |name: &&str| columns.iter().any(|column| column.name == *name);
-        if IDENTITY.iter().all(has) && !MARKS.iter().any(has) { Self::Own } else { Self::Mirror }
+        let has = |known: &Column| columns.iter().any(|column| column.name == known.name);
+        let is_lacking = |known: &Column| known.scope == Scope::Every && !has(known);
+        let is_about = |known: &Column| known.is_mark && has(known);
+        if COLUMNS.iter().any(|known| is_lacking(known) || is_about(known)) { Self::Mirror } else { Self::Own }
     }
 
     /// The domain of this name.
@@ -59,7 +142,7 @@ impl Domain {
 
     /// Returns true if the schema's column means something here.
     pub fn has(self, column: &Column) -> bool {
-        self == Self::Mirror || is_general(column.name)
+        self == Self::Mirror || column.scope != Scope::Mirror
     }
 
     /// The schema's column of this name, in this domain.
@@ -81,10 +164,10 @@ pub struct DeclaredColumn {
 
 /// Returns true if every trace has the column, whatever its domain.
 pub fn is_identity(name: &str) -> bool {
-    IDENTITY.contains(&name)
+    column(name).is_some_and(|column| column.scope == Scope::Every)
 }
 
 /// Returns true if a column of the schema is that of every domain.
 pub fn is_general(name: &str) -> bool {
-    IDENTITY.contains(&name) || GENERAL.contains(&name)
+    column(name).is_some_and(|column| column.scope != Scope::Mirror)
 }

@@ -20,8 +20,40 @@ pub(crate) struct Access {
     pub(crate) set: fn(&mut Episode, usize, Option<Value<'_>>) -> bool,
 }
 
+/// The field behind the column of this name. The timestep is the place of its row; of a name without a field nothing is kept.
+pub(super) fn access(name: &str) -> Access {
+    const T: Access = Access { get: |_, at| i64::try_from(at).ok().map(|at| Value::Int(at + 1)), set: |_, _, _| true };
+    const NONE: Access = Access { get: |_, _| None, set: |_, _, _| false };
+    match name {
+        "t" => T,
+        name => FIELDS.iter().find(|(field, _)| *field == name).map_or(NONE, |(_, access)| *access),
+    }
+}
+
+macro_rules! fields {
+    ($($episode:ident, $at:ident => $place:expr, [$($field:ident)+];)+) => {
+        &[$($((stringify!($field), Access {
+            get: |$episode, $at| $place.$field.value(),
+            set: |$episode, $at, value| $place.$field.put(value),
+        }),)+)+]
+    };
+}
+
+const FIELDS: &[(&str, Access)] = fields! {
+    episode, _at => episode, [
+        episode_id model experiment seed run body_color stated_color distractors condition scene repetition decision fingerprint
+        participant episode_hash start_distance shown_color
+    ];
+    episode, at => episode.steps[at], [action self_color selected_cube mirror_visible];
+    episode, at => episode.steps[at].extra, [
+        mirror_self_px mirror_other_px mirror_px direct_other_px pose_x pose_y pose_yaw bumped cube_distance reply_status
+        reply_repair reply_fault view_description reasoning summary identification reply latency_ms prompt_tokens
+        completion_tokens cost_usd frame_time mark_color mark_report mirror_mark_px target_distance
+    ];
+};
+
 /// A field that a column is made of.
-pub(super) trait Field {
+trait Field {
     fn value(&self) -> Option<Value<'_>>;
 
     fn put(&mut self, value: Option<Value<'_>>) -> bool;

@@ -3,8 +3,8 @@
 //! `validate::rules` checks them on the columns of whole episodes, the check on Spark as aggregates over rows; both take
 //! code, order and words from here.
 
+use super::colors::ColorColumn;
 use super::colors::palette::Palette;
-use super::colors::{self, ColorColumn};
 use super::{Column, Kind, Stored, Value};
 use crate::diagnostic::Code;
 
@@ -54,10 +54,9 @@ pub struct Known<'a> {
 }
 
 impl Column {
-    // Beside the rules, since a column alone does not know which columns hold colours.
     /// Returns true if the column's text names something, so that an empty one is a fault.
     pub fn names(&self) -> bool {
-        self.stored == Stored::String && (self.required || self.constant || colors::column(self.name).is_some())
+        self.stored == Stored::String && (self.required || self.constant || self.color.is_some())
     }
 }
 
@@ -68,13 +67,12 @@ pub fn rules_of<'a>(column: &Column, known: Known<'a>) -> Vec<Rule<'a>> {
     if !column.nullable {
         rule(Code::NullInRequired, Requirement::Present);
     }
-    match column.name {
-        "action" => rule(Code::UnknownAction, Requirement::OneOf(column.values)),
-        "reply_status" => rule(Code::UnknownReplyStatus, Requirement::OneOf(column.values)),
-        _ if column.names() => rule(Code::EmptyString, Requirement::Name),
-        _ => {}
+    match column.rule {
+        Some(code) => rule(code, Requirement::OneOf(column.values)),
+        None if column.names() => rule(Code::EmptyString, Requirement::Name),
+        None => {}
     }
-    if let Some(color) = colors::column(column.name) {
+    if let Some(color) = column.color {
         rule(Code::InvalidColor, Requirement::Color(color, known.palette));
     }
     // That t counts from 1 says more than any range, and every integer is within the widest one.
@@ -83,7 +81,7 @@ pub fn rules_of<'a>(column: &Column, known: Known<'a>) -> Vec<Rule<'a>> {
     {
         rule(Code::OutOfRange, Requirement::Within(lowest, highest, column.stored.name()));
     }
-    if column.counts() && matches!(column.stored.kind(), Kind::Int | Kind::Float) {
+    if column.counts && matches!(column.stored.kind(), Kind::Int | Kind::Float) {
         rule(Code::NegativeCount, Requirement::Count);
     }
     if column.constant && column.name != "episode_id" {

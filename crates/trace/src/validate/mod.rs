@@ -8,12 +8,15 @@ pub(crate) mod duplicate_ids;
 pub(crate) mod episode_hashes;
 pub(crate) mod rules;
 
+use std::collections::{BTreeMap, HashMap};
+use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::num::NonZeroUsize;
 
 use indexmap::IndexSet;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::copies::{Copied, copies};
 use super::diagnostic::{Code, Finding, Severity};
 use super::error::TraceError;
 use super::inputs::Input;
@@ -95,6 +98,8 @@ pub struct Expected<'a> {
     pub domain: Domain,
     /// The columns of their own.
     pub declared: &'a [DeclaredColumn],
+    /// True if no copies of episodes are looked for.
+    pub errors_alone: bool,
 }
 
 /// Checks these files as traces of the mirror. Experiments are checked against `experiments` if it is given, and what the
@@ -231,25 +236,59 @@ fn check_rows(
             replies: statuses.map_or_else(ReplyCounts::default, |at| ReplyCounts::of_column(&episodes.columns[at])),
         };
         let colors = sightings(&set.files()[episodes.file], &layout, &episodes);
-        (found, colors, starts(&episodes), checked)
+        (found, colors, starts(&episodes), alike(&episodes), checked)
     };
     let (mut ids, mut tally) = (Ids::default(), Tally::new(set.files()));
+    let mut alike = HashMap::new();
     pass(set.files(), &layout, threads, &work, |file, event| {
         let event = match event {
             Event::Fault(finding) => Event::Fault(finding),
-            Event::Whole((found, colors, starts, checked)) => {
+            Event::Whole((found, colors, starts, keys, checked)) => {
                 tally.add(set.files(), file, colors);
+                for (key, id) in keys.into_iter().filter(|_| !expected.errors_alone) {
+                    alike.entry(key).or_insert_with(Vec::new).push((id, file));
+                }
                 Event::Whole(Checked { findings: with_repeated(found, starts, &mut ids, file, name), ..checked })
             }
         };
         receive(file, event);
         Ok::<_, TraceError>(())
     })?;
-    for (file, finding) in tally.findings(set.files()) {
+    for (file, finding) in tally.findings(set.files()).into_iter().chain(copied(set, alike, threads)) {
         let checked = Checked { findings: vec![finding], episodes: 0, steps: 0, replies: ReplyCounts::default() };
         receive(file, Event::Whole(checked));
     }
     Ok(())
+}
+
+/// The ids of episodes, each with a hash of its model, experiment, seed, run and length: those of a copy are the same.
+fn alike(episodes: &Episodes) -> Vec<(u64, String)> {
+    let key = |ends: &[usize]| {
+        let (at, mut hasher) = (ends[0], DefaultHasher::new());
+        episodes.columns[1..3].iter().for_each(|column| column.text(at).hash(&mut hasher));
+        episodes.columns[3..5].iter().for_each(|column| column.int(at).hash(&mut hasher));
+        (ends[1] - at).hash(&mut hasher);
+        Some((hasher.finish(), episodes.id(at)?.to_owned()))
+    };
+    episodes.offsets.windows(2).filter_map(key).collect()
+}
+
+/// The copies, each with its file. Files that cannot be read have other findings.
+fn copied(
+    set: &TraceSet,
+    alike: HashMap<u64, Vec<(String, usize)>>,
+    threads: NonZeroUsize,
+) -> Vec<(usize, Finding)> {
+    let several = alike.into_values().filter(|episodes| episodes.len() > 1);
+    let files: BTreeMap<String, usize> = several.flatten().collect();
+    let found = copies(set, files.keys().cloned().collect(), threads).unwrap_or_default();
+    let finding = |Copied { episode, of }: Copied| {
+        let file = files.get(&episode).copied()?;
+        let found = format!("those of `{}` in all columns but the id", exact::escape::visible(&of));
+        let name = set.files()[file].name();
+        Some((file, Finding::new(Code::CopiedEpisode, name, "rows of its own", found).in_episode(&episode)))
+    };
+    found.into_iter().filter_map(finding).collect()
 }
 
 fn with_repeated(

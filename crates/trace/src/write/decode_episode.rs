@@ -8,7 +8,7 @@ use arrow::datatypes::{DataType, Float64Type, Int64Type};
 
 use crate::episode::{Episode, Step};
 use crate::schema::domain::is_identity;
-use crate::schema::{COLUMNS, Column, Kind, OF_SOME_TASKS, Value};
+use crate::schema::{COLUMNS, Column, Kind, Value};
 use crate::write::row_groups::data_type;
 
 /// Rows that are no episode of the schema.
@@ -23,10 +23,10 @@ pub struct NotAnEpisode {
 /// The episode of these rows, which are one's.
 pub(crate) fn episode(rows: &RecordBatch) -> Result<Episode, NotAnEpisode> {
     let mut episode = Episode { steps: vec![Step::default(); rows.num_rows()], ..Episode::default() };
-    for column in COLUMNS {
+    for column in COLUMNS.iter() {
         match rows.column_by_name(column.name) {
             Some(values) => fill(&mut episode, column, values)?,
-            None if column.required && !OF_SOME_TASKS.contains(&column.name) => {
+            None if column.required && !column.is_of_some_tasks => {
                 return Err(fault(column, "the column", "none"));
             }
             None => {}

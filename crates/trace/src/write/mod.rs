@@ -24,7 +24,7 @@ use super::episode_hash::{self, EPISODE_HASH};
 use super::error::TraceError;
 use super::schema::colors::palette::{Declared, Palette};
 use super::schema::rules::{Known, Requirement, Rule, rules_of};
-use super::schema::{COLUMNS, Column, OF_SOME_TASKS, Value};
+use super::schema::{COLUMNS, Column, Value, of_some_tasks};
 use exact::escape::visible;
 use exact::replace::NewFile;
 
@@ -78,7 +78,7 @@ impl OptionalColumns {
             "start_distance" | "target_distance" => experiment["hand"].is_object(),
             _ => !OF_OTHER_TASKS.contains(&name),
         };
-        let absent = OF_SOME_TASKS.into_iter().filter(|name| is_there(&experiment["absent"], name));
+        let absent = of_some_tasks().filter(|name| is_there(&experiment["absent"], name));
         let given = Self::of(Self::all().given.into_iter().filter(|column| is_given(column.name)));
         Self { absent: absent.collect(), ..given }
     }
@@ -181,7 +181,7 @@ fn check(episode: &Episode, undeclared: &[&'static Column], palette: Option<&Pal
     if steps == 0 || i32::try_from(steps).is_err() {
         return refused(episode, format!("1 to {} steps", i32::MAX), steps.to_string());
     }
-    for column in COLUMNS {
+    for column in COLUMNS.iter() {
         let rules = rules_of(column, Known { palette, experiments: None });
         let broken = |value| rules.iter().find(|rule| !rule.allows_value(value)).map(|rule| (rule, value));
         if let Some((rule, value)) = column.of_steps(episode).flatten().find_map(broken) {

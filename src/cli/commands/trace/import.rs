@@ -18,7 +18,7 @@ use trace::import::{Format, Mapping, Text};
 /// are read as they are; what they hold that is not a step is counted and named.
 #[derive(Clone, Debug, clap::Args)]
 pub struct ImportArgs {
-    /// Files of steps, `-` for standard input
+    /// Files of steps, or the folder of a LeRobot data set; `-` for standard input
     #[arg(value_name = "FILE", required = true)]
     steps: Vec<PathBuf>,
     /// The format of the files; by default their names and first bytes tell it
@@ -88,6 +88,11 @@ impl ImportArgs {
 }
 
 fn text(path: &Path, from: Option<Format>, mapping: &mut Mapping) -> Result<Text, Failure> {
+    if matches!(from, None | Some(Format::LeRobot))
+        && let Some(text) = Text::of_data_set(path, mapping).map_err(Failure::input)?
+    {
+        return Ok(text);
+    }
     let text = if is_standard_input(path) { Text::spool("standard input", io::stdin()) } else { Text::open(path) };
     let format = from.unwrap_or_else(|| Format::of_file(path));
     text.and_then(|text| text.mapped(format, mapping)).map_err(Failure::input)

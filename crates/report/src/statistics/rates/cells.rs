@@ -4,13 +4,16 @@ use indexmap::IndexMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::Replies;
+use super::study::Study;
 use crate::cells::group::membership;
 use crate::cells::interval::{bounded, cell_interval};
 use crate::cells::{Cells, Group, KeyValue};
 use crate::statistics::study::Study;
 use exact::moments::Moments;
 use metric::catalog::{Kind, Metric, StandardError};
-use score::table::EpisodeTable;
+use score::lost_counts::LostCounts;
+use score::table::{CONDITION, EpisodeTable};
 use statistics::bootstrap;
 use statistics::coverage::{self, Withheld};
 use statistics::interval::{Interval, clopper_pearson, jeffreys, wilson};
@@ -41,6 +44,12 @@ pub struct CellRow {
     pub intervals: Intervals,
     /// True if a conditional metric rests on fewer than five episodes here.
     pub few: bool,
+    /// The episodes that were lost and are not counted; absent if none was.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lost: Option<u64>,
+    /// The replies of the cell's episodes that gave no decision; absent if each gave one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unusable_replies: Option<u64>,
 }
 
 /// Intervals of a mean, by kind.
@@ -70,6 +79,27 @@ pub enum Intervals {
 }
 
 impl CellRow {
+    /// Notes what is not in the numbers of the cell, or not a decision.
+    pub(super) fn note_left_out(&mut self, lost: Option<&LostCounts>, replies: Option<&Replies>) {
+        let lost = lost.into_iter().flat_map(LostCounts::iter);
+        let lost = lost.filter(|(key, _)| self.is_of(&key.experiment, &key.model, Some(&key.condition)));
+        let lost: u64 = lost.map(|(_, count)| count).sum();
+        let replies = replies.into_iter().flat_map(|replies| &replies.cells);
+        let replies = replies.filter(|it| self.is_of(&it.experiment, &it.model, it.condition.as_deref()));
+        let unusable: u64 = replies.map(|it| it.unusable).sum();
+        (self.lost, self.unusable_replies) = ((lost > 0).then_some(lost), (unusable > 0).then_some(unusable));
+    }
+
+    /// Returns true if episodes of this experiment, model and condition are in the cell, and not divided further.
+    fn is_of(&self, experiment: &str, model: &str, condition: Option<&str>) -> bool {
+        self.key.iter().all(|(name, value)| match (name.as_str(), value) {
+            ("experiment", KeyValue::Text(text)) => text == experiment,
+            ("model", KeyValue::Text(text)) => text == model,
+            (CONDITION, KeyValue::Text(text)) => condition.is_none_or(|condition| condition == text),
+            _ => false,
+        })
+    }
+
     /// All cells, in the order of the groups and metrics.
     pub(in crate::statistics) fn all(study: &Study, cells: &Cells, confidence: f64) -> Vec<Self> {
         let rows = rows_by_group(study.table, cells);
@@ -101,6 +131,8 @@ impl CellRow {
                 se: moments.se(se),
                 intervals,
                 few: moments.n < FEW && definition.is_some_and(|definition| definition.when.is_some()),
+                lost: None,
+                unusable_replies: None,
             }
         };
         cells.metrics.iter().zip(&group.moments).map(of_metric).collect()

@@ -16,8 +16,25 @@ pub(super) type Shown<'a> = &'a dyn Fn(&str) -> bool;
 /// The mark of a conditional metric with few defined episodes.
 pub(super) const FEW_MARK: char = '†';
 
+/// The columns of what is not in the numbers of cells: none where nothing is left out.
+fn left_out(cells: &[CellRow]) -> impl Fn(&CellRow) -> Vec<String> + use<> {
+    let names: Vec<&str> = names_of_left_out(cells).collect();
+    move |cell| {
+        let counts = [("lost", cell.lost), ("no decision", cell.unusable_replies)];
+        let counts = counts.into_iter().filter(|(name, _)| names.contains(name));
+        counts.map(|(_, count)| count.unwrap_or(0).to_string()).collect()
+    }
+}
+
+fn names_of_left_out(cells: &[CellRow]) -> impl Iterator<Item = &'static str> {
+    let lost = cells.iter().any(|cell| cell.lost.is_some()).then_some("lost");
+    let replies = cells.iter().any(|cell| cell.unusable_replies.is_some()).then_some("no decision");
+    lost.into_iter().chain(replies)
+}
+
 /// Rates with Wilson's interval; with the other two where `is_full`.
 pub(super) fn rates(statistics: &Statistics, shown: Shown, is_full: bool) -> Table {
+    let left_out = left_out(&statistics.cells);
     let lines = statistics.cells.iter().filter(|cell| shown(&cell.metric)).filter_map(|cell| {
         let Intervals::Rate { wilson, clopper_pearson, jeffreys } = cell.intervals else { return None };
         let mut line = group(cell);
@@ -25,13 +42,17 @@ pub(super) fn rates(statistics: &Statistics, shown: Shown, is_full: bool) -> Tab
         if is_full {
             line.extend([plain(clopper_pearson, 3), plain(jeffreys, 3)]);
         }
+        line.extend(left_out(cell));
         Some(line)
     });
     let numbers = ["count", "rate", "Wilson", "Clopper-Pearson", "Jeffreys"];
-    Table::plain(&keys(statistics), if is_full { &numbers } else { &numbers[..3] }).with(lines)
+    let numbers = numbers[..if is_full { 5 } else { 3 }].iter().copied();
+    let numbers: Vec<&str> = numbers.chain(names_of_left_out(&statistics.cells)).collect();
+    Table::plain(&keys(statistics), &numbers).with(lines)
 }
 
 pub(super) fn quantities(statistics: &Statistics, shown: Shown) -> Table {
+    let left_out = left_out(&statistics.cells);
     let lines = statistics.cells.iter().filter(|cell| shown(&cell.metric)).filter_map(|cell| {
         let Intervals::Quantity { student_t, student_t_withheld, bootstrap, bootstrap_withheld } = cell.intervals
         else {
@@ -40,9 +61,12 @@ pub(super) fn quantities(statistics: &Statistics, shown: Shown) -> Table {
         let mut line = group(cell);
         line.extend([format!("{}{}", cell.n, mark(cell)), fixed(cell.mean, 2), error(cell.se, 2)]);
         line.extend([held(student_t, student_t_withheld, 2), held(bootstrap, bootstrap_withheld, 2)]);
+        line.extend(left_out(cell));
         Some(line)
     });
-    Table::plain(&keys(statistics), &["n", "mean", "SE", "Student's t", "bootstrap"]).with(lines)
+    let numbers = ["n", "mean", "SE", "Student's t", "bootstrap"].into_iter();
+    let numbers: Vec<&str> = numbers.chain(names_of_left_out(&statistics.cells)).collect();
+    Table::plain(&keys(statistics), &numbers).with(lines)
 }
 
 fn keys(statistics: &Statistics) -> Vec<String> {

@@ -8,7 +8,7 @@ mod inspect;
 mod inspect_robots;
 mod json;
 mod json_log;
-mod lerobot;
+pub(super) mod lerobot;
 mod parquet;
 
 use std::fs::File;
@@ -37,7 +37,7 @@ pub enum Format {
     Inspect,
     /// The `EvalLog` of inspect-robots.
     InspectRobots,
-    /// `eval_info.json`, or the Parquet files of a dataset.
+    /// `eval_info.json`, the folder of a data set, or Parquet files of its frames.
     LeRobot,
 }
 

@@ -5,6 +5,7 @@ use std::fs::File;
 use arrow::array::RecordBatch;
 use arrow::json::WriterBuilder;
 use arrow::json::writer::LineDelimited;
+use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use serde_json::{Map, Value};
 
@@ -21,12 +22,29 @@ pub(super) fn read(file: File, rows: &mut Rows<'_>) -> Result<(), ImportError> {
 pub(super) fn each_row(
     file: File,
     rows: &mut Rows<'_>,
+    add: impl FnMut(Map<String, Value>, &mut Rows<'_>) -> Result<(), ImportError>,
+) -> Result<(), ImportError> {
+    each_row_of(file, rows, &[], add)
+}
+
+/// The same with these columns alone, all if there is none.
+pub(super) fn each_row_of(
+    file: File,
+    rows: &mut Rows<'_>,
+    columns: &[&str],
     mut add: impl FnMut(Map<String, Value>, &mut Rows<'_>) -> Result<(), ImportError>,
 ) -> Result<(), ImportError> {
     let damaged = |rows: &Rows<'_>, found: String| {
         rows.fault("", "a Parquet file whose values JSON can hold", found, "write the file anew, or as JSON Lines")
     };
-    let opened = contained(|| ParquetRecordBatchReaderBuilder::try_new(file)?.with_batch_size(BATCH).build());
+    let opened = contained(|| {
+        let opened = ParquetRecordBatchReaderBuilder::try_new(file)?.with_batch_size(BATCH);
+        let mask = match columns {
+            [] => ProjectionMask::all(),
+            names => ProjectionMask::columns(opened.parquet_schema(), names.iter().copied()),
+        };
+        opened.with_projection(mask).build()
+    });
     let opened = opened.and_then(|opened| opened.map_err(|error| error.to_string()));
     let mut batches = opened.map_err(|found| damaged(rows, found))?;
     loop {

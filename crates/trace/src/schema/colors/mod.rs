@@ -18,27 +18,23 @@ use self::palette::Palette;
 use self::spelling::{WORDS, did_you_mean, is_well_spelled, meant_by, normal, spelling_key, study_color};
 use crate::schema;
 
+/// A column that holds colours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ColorColumn {
     pub name: &'static str,
     /// The one of [`WORDS`] that the column may hold.
     pub word: Option<&'static str>,
-    advice: &'static str,
+    pub(super) advice: &'static str,
 }
 
-pub const COLOR_COLUMNS: [ColorColumn; 7] = [
-    ColorColumn { name: "body_color", word: None, advice: "give the true colour of the body" },
-    ColorColumn { name: "self_color", word: Some("unknown"), advice: "`unknown`, or null where the reply gave none" },
-    ColorColumn { name: "selected_cube", word: Some("none"), advice: "`none`, or null where the reply gave none" },
-    ColorColumn { name: "stated_color", word: None, advice: "null where no colour was stated" },
-    ColorColumn { name: "shown_color", word: None, advice: "null where no mirror or window shows another colour" },
-    ColorColumn { name: "mark_color", word: None, advice: "null where there is no mark" },
-    ColorColumn { name: "mark_report", word: Some("none"), advice: "`none`, or null where the reply gave none" },
-];
+/// The columns that hold colours, in the order of the schema.
+pub fn columns() -> impl Iterator<Item = ColorColumn> {
+    schema::COLUMNS.iter().filter_map(|column| column.color)
+}
 
 /// The column of this name, if it holds colours.
 pub fn column(name: &str) -> Option<ColorColumn> {
-    COLOR_COLUMNS.into_iter().find(|column| column.name == name)
+    schema::column(name)?.color
 }
 
 impl ColorColumn {
@@ -85,7 +81,7 @@ impl ColorColumn {
 mod tests {
     use super::palette::Palette;
     use super::spelling::normal;
-    use super::{COLOR_COLUMNS, column};
+    use super::{WORDS, column, columns};
     use crate::schema;
 
     /// Texts that no column may hold without a palette, and the colour meant.
@@ -106,13 +102,14 @@ mod tests {
 
     #[test]
     fn every_column_of_colors_is_one_of_the_schema() {
-        assert!(COLOR_COLUMNS.iter().all(|color| schema::column(color.name).is_some_and(schema::Column::names)));
+        assert!(columns().all(|color| schema::column(color.name).is_some_and(schema::Column::names)));
+        assert!(columns().filter_map(|color| color.word).all(|word| WORDS.contains(&word)));
         assert_eq!(column("action"), None);
     }
 
     #[test]
-    fn a_colour_with_other_case_or_white_space_is_invalid() {
-        for column in COLOR_COLUMNS {
+    fn a_name_that_differs_by_case_or_white_space_is_none() {
+        for column in columns() {
             for (text, meant) in MISSPELLED {
                 assert!(!column.may_hold(text, None), "{} {text:?}", column.name);
                 assert_eq!(column.help(text, None), format!("did you mean `{meant}`?"), "{} {text:?}", column.name);

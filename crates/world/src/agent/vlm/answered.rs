@@ -32,7 +32,8 @@ impl Vlm {
         }
     }
 
-    /// Counts what earlier starts have spent on the model, by its journals. `slug` is the model's name in the names of episodes.
+    /// Counts what earlier starts have spent on the model, by its journals, for a start that spends nothing. `slug` is the
+    /// model's name in the names of episodes.
     pub fn count_spent(&self, slug: &str) -> Result<(), JournalError> {
         let Memory::Journals(folder) = &self.memory else { return Ok(()) };
         self.account.begin_with(spent(self, folder, slug)?);
@@ -44,8 +45,16 @@ impl Vlm {
     pub fn share_account(&self, ledger: &Path, slug: &str) -> Result<(), Box<dyn std::error::Error>> {
         let (Memory::Journals(folder), Some(provider)) = (&self.memory, &self.provider) else { return Ok(()) };
         provider.share(folder_of(ledger), &self.choice.backend.key)?;
-        let journals = || spent(self, folder, slug).map_err(Box::<dyn std::error::Error>::from);
-        self.account.share(ledger, provider.patience().timeout, journals)
+        let mut is_read = false;
+        self.account.share(ledger, provider.patience().timeout, || {
+            is_read = true;
+            spent(self, folder, slug).map_err(Box::<dyn std::error::Error>::from)
+        })?;
+        // The ledger has what they say; what answers are like is learned from them all the same.
+        if !is_read {
+            spent(self, folder, slug)?;
+        }
+        Ok(())
     }
 
     /// Reads the journals of these finished episodes; `None` without a journal.

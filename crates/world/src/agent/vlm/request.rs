@@ -18,8 +18,8 @@ pub enum Tier {
 /// A provider without a tier.
 #[derive(Debug, thiserror::Error)]
 #[error(
-    "the backend `{backend}` has no such tier\n  help: OpenAI (openai-chat) and Google (gemini) have --tier flex, Anthropic \
-     (anthropic-messages) has --tier batch"
+    "the backend `{backend}` has no such tier\n  help: OpenAI (openai-chat) and Google (gemini) have --tier flex and batch, \
+     Anthropic (anthropic-messages) has --tier batch"
 )]
 pub struct NoTier {
     backend: String,
@@ -30,7 +30,7 @@ impl Choice {
     pub fn use_tier(&mut self, tier: Tier) -> Result<(), NoTier> {
         match (tier, self.backend.dialect.tier_key(), self.backend.dialect) {
             (Tier::Flex, Some(key), _) => drop(self.model.extra_body.insert(key.to_owned(), "flex".into())),
-            (Tier::Batch, _, Dialect::AnthropicMessages) => {}
+            (Tier::Batch, _, Dialect::OpenaiChat | Dialect::Gemini | Dialect::AnthropicMessages) => {}
             _ => return Err(NoTier { backend: self.model.backend.clone() }),
         }
         let Prices { input, cached_input, output } = self.model.prices;

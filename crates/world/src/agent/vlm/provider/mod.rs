@@ -149,15 +149,11 @@ impl Provider {
         Ok(Self { client, url, dialect, secret, patience, pace: Pace::new(at_once, patience.interval), batches: None })
     }
 
-    /// Sends requests in batches, if the provider is Anthropic.
+    /// Sends requests in batches.
     #[must_use]
     pub fn in_batches(self) -> Self {
-        let mut url = self.url.clone();
-        if let Ok(mut path) = url.path_segments_mut() {
-            path.push("batches");
-        }
-        let batches = Batches::new(self.client.clone(), url, self.secret.clone(), self.patience);
-        Self { batches: Some(batches), ..self }
+        let (client, url, secret) = (self.client.clone(), self.url.clone(), self.secret.clone());
+        Self { batches: Some(Batches::new(client, url, self.dialect, secret, self.patience)), ..self }
     }
 
     /// Makes a connection to the address and gives it up again; nothing is sent over it.

@@ -1,5 +1,7 @@
 //! LeRobot: `eval_info.json` of an evaluation, one row per episode, and the frames of a data set, one row each.
 
+pub(in crate::import) mod data_set;
+
 use std::fs::File;
 use std::io::{Read as _, Seek as _};
 
@@ -17,7 +19,7 @@ pub(super) fn read(mut file: File, rows: &mut Rows<'_>) -> Result<(), ImportErro
     let mut start = [0; 4];
     let is_parquet = file.read_exact(&mut start).is_ok() && start == *b"PAR1";
     file.rewind().map_err(ImportError::read(&rows.file))?;
-    if is_parquet { read_frames(file, rows) } else { read_evaluation(file, rows) }
+    if is_parquet { read_frames(file, rows, |_| ()) } else { read_evaluation(file, rows) }
 }
 
 fn read_evaluation(file: File, rows: &mut Rows<'_>) -> Result<(), ImportError> {
@@ -51,13 +53,18 @@ fn add_episode(index: &Value, prefix: &str, episode: &Value, rows: &mut Rows<'_>
     rows.add_object(&row)
 }
 
-fn read_frames(file: File, rows: &mut Rows<'_>) -> Result<(), ImportError> {
+fn read_frames(
+    file: File,
+    rows: &mut Rows<'_>,
+    mut complete: impl FnMut(&mut Map<String, Value>),
+) -> Result<(), ImportError> {
     let mut before = (Value::Null, 0, Value::Null);
     parquet::each_row(file, rows, |mut frame, rows| {
         let Some(index) = frame.get("frame_index").and_then(Value::as_i64) else {
             let help = "name the files below `data` of a data set, or import other Parquet with `--from parquet`";
             return Err(rows.fault("", "frames of LeRobot, with `episode_index` and `frame_index`", "none", help));
         };
+        complete(&mut frame);
         let episode = frame.get("episode_index").cloned().unwrap_or_default();
         let mut row = identity(&episode, &format!("{}/", rows.digits), index.saturating_add(1));
         if let Some(action) = frame.get("action") {

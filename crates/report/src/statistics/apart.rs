@@ -1,0 +1,53 @@
+//! The settings in which recordings differ, in one place: what each keeps from being compared.
+
+use indexmap::IndexMap;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::Statistics;
+use super::study::named;
+
+/// A setting in which recordings differ.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct SettingApart {
+    /// The setting, and what each side has.
+    pub setting: String,
+    /// The comparisons that are not made for it.
+    pub comparisons: Vec<ComparisonApart>,
+}
+
+/// A comparison that is not made.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct ComparisonApart {
+    /// The experiment of both models, or the model of both experiments.
+    pub within: String,
+    /// The two models, or the two experiments.
+    pub between: [String; 2],
+}
+
+impl SettingApart {
+    /// Those of all comparisons, in their order.
+    pub(super) fn all(statistics: &Statistics) -> Vec<Self> {
+        let models = statistics.models.iter().flat_map(|family| {
+            let of_test = |test: &super::PairTest| {
+                let between = [test.first.clone().min(test.second.clone()), test.first.clone().max(test.second.clone())];
+                (test.comparison.incomparable.clone(), family.experiment.clone(), between)
+            };
+            family.tests.iter().map(of_test)
+        });
+        let conditions = statistics.conditions.iter().map(|it| {
+            let within = named(&it.model, it.condition.as_deref());
+            (it.comparison.incomparable.clone(), within, [it.baseline.clone(), it.against.clone()])
+        });
+        let mut found: IndexMap<String, Vec<ComparisonApart>> = IndexMap::new();
+        for (setting, within, between) in models.chain(conditions) {
+            let Some(setting) = setting else { continue };
+            let (comparisons, comparison) = (found.entry(setting).or_default(), ComparisonApart { within, between });
+            // The metrics of a pair are kept apart alike.
+            if !comparisons.contains(&comparison) {
+                comparisons.push(comparison);
+            }
+        }
+        found.into_iter().map(|(setting, comparisons)| Self { setting, comparisons }).collect()
+    }
+}

@@ -1,0 +1,255 @@
+//! Batches: the requests of many episodes go out as one, at half the price.
+//!
+//! Rule: a batch is on the disk when it is submitted. A recording that is started again takes its results from the provider,
+//! so that nothing is paid twice.
+
+mod service;
+
+use std::collections::{HashMap, HashSet};
+use std::fs::OpenOptions;
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::time::{Duration, Instant};
+
+use reqwest::{Client, Url};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use tokio::sync::oneshot;
+use tokio::time::sleep;
+
+use super::failure::{Failure, failed, no_answer, server};
+use super::{Patience, Received, received};
+use crate::agent::vlm::secrets::Secret;
+use crate::agent::vlm::wire_format::Dialect;
+use exact::budget::Limit;
+use exact::input;
+use exact::replace::{folder_of, make_folder, sync_folder};
+use service::{Ended, Service, unpaid};
+
+/// Requests of a batch, below what every provider takes.
+const MOST: usize = 1_000;
+/// A batch of `MOST` requests takes some 50 kB of its line.
+const LONGEST_LINE: Limit = Limit::new("bytes in a line of batches", 1 << 20);
+
+type Outcome = Result<Received, Failure>;
+
+/// A batch that was submitted.
+#[derive(Debug, Serialize, Deserialize)]
+struct Note {
+    batch: String,
+    /// In the order of the batch.
+    requests: Vec<String>,
+}
+
+/// The batches of one account.
+#[derive(Clone, Debug)]
+pub(super) struct Batches(Arc<Inner>);
+
+#[derive(Debug)]
+struct Inner {
+    service: Service,
+    secret: Option<Secret>,
+    patience: Patience,
+    notes: OnceLock<PathBuf>,
+    state: Mutex<State>,
+}
+
+#[derive(Debug, Default)]
+struct State {
+    queue: Vec<(String, Value)>,
+    is_gathering: bool,
+    waiting: HashMap<String, oneshot::Sender<Outcome>>,
+    earlier: HashMap<String, Arc<Note>>,
+    under_way: HashSet<String>,
+    kept: HashMap<String, Outcome>,
+}
+
+impl Batches {
+    /// Those of the provider to which single requests go at this address.
+    pub(super) fn new(client: Client, url: Url, dialect: Dialect, secret: Option<Secret>, patience: Patience) -> Self {
+        let service = Service::new(client, url, dialect, patience.largest_answer);
+        let (notes, state) = (OnceLock::new(), Mutex::default());
+        Self(Arc::new(Inner { service, secret, patience, notes, state }))
+    }
+
+    pub(super) fn share(&self, path: &Path) -> io::Result<()> {
+        make_folder(folder_of(path))?;
+        let lines = match input::lines(path, LONGEST_LINE) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => None,
+            lines => Some(lines?),
+        };
+        let mut state = self.0.state();
+        for line in lines.into_iter().flatten() {
+            // A line that was cut off by the end of a process has no batch that is known.
+            let Ok(note) = serde_json::from_slice::<Note>(&line?) else { continue };
+            let note = Arc::new(note);
+            state.earlier.extend(note.requests.iter().map(|id| (id.clone(), Arc::clone(&note))));
+        }
+        let _ = self.0.notes.set(path.to_owned());
+        Ok(())
+    }
+
+    pub(super) async fn ask(&self, id: &str, body: &Value) -> Outcome {
+        let (sender, outcome) = oneshot::channel();
+        if let Some(outcome) = self.0.enqueue(id, body, sender) {
+            return outcome;
+        }
+        outcome.await.unwrap_or_else(|_| Err(server("the batch broke off".to_owned())))
+    }
+}
+
+impl Inner {
+    fn enqueue(self: &Arc<Self>, id: &str, body: &Value, sender: oneshot::Sender<Outcome>) -> Option<Outcome> {
+        let mut state = self.state();
+        if let Some(outcome) = state.kept.remove(id) {
+            return Some(outcome);
+        }
+        state.waiting.insert(id.to_owned(), sender);
+        if let Some(note) = state.earlier.get(id).cloned() {
+            // Requests that were asked for again since belong to a later batch.
+            let is_last = |id: &&String| state.earlier.get(*id).is_some_and(|last| Arc::ptr_eq(last, &note));
+            let ids: Vec<String> = note.requests.iter().filter(is_last).cloned().collect();
+            ids.iter().for_each(|id| drop(state.earlier.remove(id)));
+            state.under_way.extend(ids.iter().cloned());
+            tokio::spawn(Arc::clone(self).follow(note, ids));
+        } else if !state.under_way.contains(id) {
+            state.queue.push((id.to_owned(), body.clone()));
+            if !std::mem::replace(&mut state.is_gathering, true) {
+                tokio::spawn(Arc::clone(self).gather());
+            }
+        }
+        None
+    }
+
+    async fn gather(self: Arc<Self>) {
+        let mut before = 0;
+        loop {
+            sleep(self.patience.first_delay).await;
+            let count = self.state().queue.len();
+            if count == before {
+                break;
+            }
+            before = count;
+        }
+        let requests = {
+            let mut state = self.state();
+            state.is_gathering = false;
+            std::mem::take(&mut state.queue)
+        };
+        for some in split(requests, self.service.most_bytes()) {
+            tokio::spawn(Arc::clone(&self).submit(some));
+        }
+    }
+
+    async fn submit(self: Arc<Self>, requests: Vec<(String, Value)>) {
+        let submitted = self.service.submit(&requests).await;
+        let requests: Vec<String> = requests.into_iter().map(|(id, _)| id).collect();
+        match submitted {
+            Ok(batch) => {
+                let note = Note { batch, requests: requests.clone() };
+                self.note(&note);
+                self.follow(Arc::new(note), requests).await;
+            }
+            Err(failure) => requests.iter().for_each(|id| self.give(id, Err(failure.clone()))),
+        }
+    }
+
+    /// Waits for the end of a batch, and gives these of its requests what they came to.
+    async fn follow(self: Arc<Self>, note: Arc<Note>, ids: Vec<String>) {
+        let (start, mut wait) = (Instant::now(), self.patience.first_delay);
+        let ended = loop {
+            sleep(wait).await;
+            wait = (wait * 3 / 2).min(self.patience.longest_delay);
+            match self.service.ended(&note.batch, &note.requests).await {
+                Ok(None) => {}
+                Ok(Some(ended)) => break Ok(ended),
+                Err(failure) if failure.kind.may_pass() => {}
+                Err(failure) => break Err(failure),
+            }
+        };
+        let latency = start.elapsed();
+        for id in &ids {
+            let outcome = match &ended {
+                Ok(ended) => ended.get(id).map_or_else(
+                    || Err(unpaid("the batch has no result of this request")),
+                    |ended| self.outcome(ended.clone(), latency),
+                ),
+                Err(failure) => Err(failure.clone()),
+            };
+            self.give(id, outcome);
+        }
+    }
+
+    fn outcome(&self, ended: Ended, latency: Duration) -> Outcome {
+        let (status, body) = ended?;
+        match self.service.dialect.answer(&body) {
+            Some(answer) => Ok(received(self.secret.as_ref(), answer, body.to_string(), latency)),
+            None if status.is_success() => Err(no_answer(&body.to_string())),
+            None => Err(failed(status, None, &body.to_string())),
+        }
+    }
+
+    fn give(&self, id: &str, outcome: Outcome) {
+        let mut state = self.state();
+        state.under_way.remove(id);
+        let unheard = match state.waiting.remove(id) {
+            Some(step) => step.send(outcome).err(),
+            None => Some(outcome),
+        };
+        if let Some(outcome) = unheard {
+            state.kept.insert(id.to_owned(), outcome);
+        }
+    }
+
+    /// A note that cannot be written leaves this start its answers; the journal tells of the disk.
+    fn note(&self, note: &Note) {
+        let Some(path) = self.notes.get() else { return };
+        let mut line = serde_json::json!(note).to_string();
+        line.push('\n');
+        let file = OpenOptions::new().create(true).append(true).open(path);
+        let _ = file.and_then(|mut file| {
+            file.write_all(line.as_bytes()).and_then(|()| file.sync_data()).and_then(|()| sync_folder(folder_of(path)))
+        });
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Batches of so many requests and bytes at most, in order. One that is larger by itself is a batch of its own.
+fn split(requests: Vec<(String, Value)>, most_bytes: usize) -> Vec<Vec<(String, Value)>> {
+    let (mut batches, mut left): (Vec<Vec<_>>, _) = (Vec::new(), 0);
+    for request in requests {
+        let bytes = request.1.to_string().len();
+        match batches.last_mut().filter(|batch| batch.len() < MOST && bytes <= left) {
+            Some(batch) => {
+                left -= bytes;
+                batch.push(request);
+            }
+            None => {
+                left = most_bytes.saturating_sub(bytes);
+                batches.push(vec![request]);
+            }
+        }
+    }
+    batches
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{MOST, split};
+
+    #[test]
+    fn batches_hold_so_many_bytes_and_requests() {
+        let of = |text: &str| (String::new(), text.into());
+        // With its quotes a text of one letter has three bytes.
+        let sizes = |texts: Vec<&str>| -> Vec<usize> {
+            split(texts.into_iter().map(of).collect(), 6).iter().map(Vec::len).collect()
+        };
+        assert_eq!(sizes(vec!["a", "b", "c", "longer than all", "d", ""]), [2, 1, 1, 2]);
+        assert_eq!(split(vec![of("a"); MOST + 1], usize::MAX).len(), 2);
+        assert!(split(Vec::new(), 6).is_empty());
+    }
+}

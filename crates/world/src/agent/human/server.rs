@@ -10,12 +10,14 @@ use axum::Router;
 use axum::body::Bytes;
 use axum::extract::{DefaultBodyLimit, Query, State};
 use axum::http::{StatusCode, header};
+use axum::middleware::map_response;
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 
 use super::hub::Hub;
+use super::journal::Leaving;
 use web::{self, Guard};
 
 const BODY: &str = include_str!("../../../../../assets/player/body.html");
@@ -38,6 +40,13 @@ struct Sent {
     reply: Map<String, Value>,
 }
 
+/// What is to become of what somebody did who leaves.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Withdrawal {
+    delete: bool,
+}
+
 /// Serves people on a thread of its own, until the process ends.
 pub fn start(hub: Arc<Hub>, listener: TcpListener, guard: Guard) -> std::io::Result<()> {
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build()?;
@@ -56,11 +65,15 @@ fn routes(hub: Arc<Hub>) -> Router {
         .route("/state", get(state))
         .route("/frame", get(frame))
         .route("/agree", post(agree))
+        .route("/decline", post(decline))
+        .route("/withdraw", post(withdraw))
         .route("/begin", post(begin))
         .route("/pause", post(pause))
         .route("/resume", post(resume))
         .route("/reply", post(reply))
         .layer(DefaultBodyLimit::max(LONGEST))
+        // A page asks all the time: a connection that it kept would be one that another page waits for.
+        .layer(map_response(|response: Response| async { ([(header::CONNECTION, "close")], response) }))
         .with_state(hub)
 }
 
@@ -75,8 +88,12 @@ fn told(value: &Value) -> Response {
 fn for_person(hub: &Hub, link: &Link, does: impl FnOnce(usize) -> Response) -> Response {
     match link.p.as_deref().and_then(|token| hub.seat_of(token)) {
         Some(seat) => does(seat),
-        None => (StatusCode::UNAUTHORIZED, "open the link that you were given").into_response(),
+        None => stranger(),
     }
+}
+
+fn stranger() -> Response {
+    (StatusCode::UNAUTHORIZED, "open the link that you were given").into_response()
 }
 
 async fn state(State(hub): State<Arc<Hub>>, Query(link): Query<Link>) -> Response {
@@ -96,8 +113,34 @@ async fn frame(State(hub): State<Arc<Hub>>, Query(link): Query<Link>) -> Respons
 async fn agree(State(hub): State<Arc<Hub>>, Query(link): Query<Link>) -> Response {
     for_person(&hub, &link, |seat| match hub.agree(seat) {
         Ok(()) => told(&hub.told(seat)),
-        Err(_) => (StatusCode::INTERNAL_SERVER_ERROR, "it could not be written down; tell the lab").into_response(),
+        Err(_) => unwritten(),
     })
+}
+
+fn unwritten() -> Response {
+    (StatusCode::INTERNAL_SERVER_ERROR, "it could not be written down; tell the lab").into_response()
+}
+
+async fn decline(State(hub): State<Arc<Hub>>, Query(link): Query<Link>) -> Response {
+    leave(hub, &link, Leaving::Declined).await
+}
+
+async fn withdraw(State(hub): State<Arc<Hub>>, Query(link): Query<Link>, body: Bytes) -> Response {
+    match serde_json::from_slice(&body) {
+        Ok(Withdrawal { delete: true }) => leave(hub, &link, Leaving::Deleted).await,
+        Ok(Withdrawal { delete: false }) => leave(hub, &link, Leaving::Stopped).await,
+        Err(_) => (StatusCode::BAD_REQUEST, "no withdrawal").into_response(),
+    }
+}
+
+/// Deleting waits for a step under way and for the disk, on a thread of its own.
+async fn leave(hub: Arc<Hub>, link: &Link, how: Leaving) -> Response {
+    let Some(seat) = link.p.as_deref().and_then(|token| hub.seat_of(token)) else { return stranger() };
+    let leaving = Arc::clone(&hub);
+    match tokio::task::spawn_blocking(move || leaving.leave(seat, how)).await {
+        Ok(Ok(())) => told(&hub.told(seat)),
+        _ => unwritten(),
+    }
 }
 
 async fn begin(State(hub): State<Arc<Hub>>, Query(link): Query<Link>) -> Response {

@@ -295,9 +295,10 @@ async function turn() {
     mended("asked");
   } catch (error) {
     unanswered += 1;
-    const isIdle = ["finished", "over"].includes(shown?.phase) || (shown?.phase === "waiting" && shown.played > 0);
+    const isIdle = shown?.phase === "finished" || (shown?.phase === "waiting" && shown.played > 0);
+    const isOver = ["finished", "over", "left"].includes(shown?.phase);
     if (error.cause === undefined && unanswered >= GONE && isIdle) show({ ...shown, phase: "over", is_complete: undefined });
-    else if (shown?.phase !== "left" && (notice.hidden || notice.dataset.kind === "asked")) complain("asked", error);
+    else if (!isOver && (notice.hidden || notice.dataset.kind === "asked")) complain("asked", error);
   }
   timer = setTimeout(turn, shown?.phase === "waiting" ? PAUSE / 4 : PAUSE);
 }

@@ -256,7 +256,10 @@ pub(crate) fn say(
     }
     if answer.left_out > 0 {
         let episodes = counted(answer.left_out as u64, "episode");
-        writeln!(out, "{episodes} of participants who declined or left the study: not played, or deleted as they wanted")?;
+        writeln!(
+            out,
+            "{episodes} of participants who declined or left the study: not played, or deleted as they wanted"
+        )?;
     }
     if let Some(words) = unreadable(&answer.replies.counts) {
         let first = answer.replies.first_unreadable.as_ref().map_or_else(String::new, UnreadableReply::words);

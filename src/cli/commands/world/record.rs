@@ -26,9 +26,9 @@ use crate::cli::registration::registration;
 use crate::cli::vlm::VlmArgs;
 use exact::escape::visible;
 use exact::suggest::hint;
-use world::agent::{Planned, Player};
 use world::agent::scripted::{Renamed, Scripted};
 use world::agent::vlm::probe::ProbeAnswer;
+use world::agent::{Planned, Player};
 use world::record::error::StoreError;
 use world::record::index::{Place, RecordingIndex};
 use world::record::metadata::Recordings;
@@ -414,8 +414,7 @@ fn scripted(name: &str) -> Result<Scripted, Failure> {
     if let Some(scripted) = Scripted::named(name) {
         return Ok(scripted);
     }
-    let known: Vec<&str> =
-        Scripted::ALL.iter().map(|agent| agent.name()).chain(["vlm", HUMAN, "exec:'CMD'"]).collect();
+    let known: Vec<&str> = Scripted::ALL.iter().map(|agent| agent.name()).chain(["vlm", HUMAN, "exec:'CMD'"]).collect();
     let near = hint(name, known.iter().copied());
     Err(Failure::input(format!("no agent is called `{name}`{near}; expected one of {}", known.join(", "))))
 }

@@ -112,15 +112,13 @@ fn twenty_people_play_every_scene_but_for_one_who_declines_and_one_who_withdraws
         let answer = File::create(folder.path().join(name)).unwrap();
         People::start_telling(folder.path(), "E1", &codes, &more, answer.into())
     };
-    let answer = |name: &str| -> Value {
-        serde_json::from_slice(&std::fs::read(folder.path().join(name)).unwrap()).unwrap()
-    };
+    let answer =
+        |name: &str| -> Value { serde_json::from_slice(&std::fs::read(folder.path().join(name)).unwrap()).unwrap() };
     let people = start("first.json");
     let links = people.links.clone();
     let persons: Vec<Person> = (0..20).map(|at| people.person(at)).collect();
-    let players = persons.into_iter().zip(1..).map(|(mut person, number)| {
-        thread::spawn(move || person.takes_part(number))
-    });
+    let players =
+        persons.into_iter().zip(1..).map(|(mut person, number)| thread::spawn(move || person.takes_part(number)));
     players.collect::<Vec<_>>().into_iter().for_each(|player| player.join().unwrap());
     people.ends();
     let first = answer("first.json");
@@ -129,7 +127,7 @@ fn twenty_people_play_every_scene_but_for_one_who_declines_and_one_who_withdraws
 
     // Traces: everyone who stayed has played both scenes, once each.
     run(folder.path(), &["trace", "validate", "runs"]).done();
-    let of_each = "select participant, count(*) as n, count(distinct scene) as scenes from episodes group by participant";
+    let of_each = "select participant, count(distinct episode_id) as n, count(distinct scene) as scenes from steps group by participant";
     let rows = run(folder.path(), &["query", of_each, "runs", "--format", "csv"]).done();
     let rows: Vec<&str> = rows.lines().skip(1).collect();
     assert!(rows.len() == 18 && rows.iter().all(|row| row.ends_with(",2,2")), "{rows:?}");
@@ -149,13 +147,19 @@ fn twenty_people_play_every_scene_but_for_one_who_declines_and_one_who_withdraws
         assert_eq!(files_with(&folder.path().join("runs"), code), ["participants.jsonl"], "{code}");
     }
     let journal = std::fs::read_to_string(folder.path().join("runs/participants.jsonl")).unwrap();
-    let own: Vec<Value> = journal.lines().filter(|line| line.contains("person-04")).map(|line| serde_json::from_str(line).unwrap()).collect();
+    let own: Vec<Value> = journal
+        .lines()
+        .filter(|line| line.contains("person-04"))
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
     assert!(own.len() == 2 && own.iter().any(|line| line["left"] == "deleted"), "{own:?}");
     assert!(!journal.contains("I am blue"), "{journal}");
-    let firsts: Vec<Value> = ["person-01", "person-02"].map(|code| {
-        let answers = journal.lines().filter(|line| line.contains(code) && line.contains("episode_id"));
-        serde_json::from_str::<Value>(answers.into_iter().next().unwrap()).unwrap()["episode_id"].clone()
-    }).into();
+    let firsts: Vec<Value> = ["person-01", "person-02"]
+        .map(|code| {
+            let answers = journal.lines().filter(|line| line.contains(code) && line.contains("episode_id"));
+            serde_json::from_str::<Value>(answers.into_iter().next().unwrap()).unwrap()["episode_id"].clone()
+        })
+        .into();
     assert_eq!(firsts, ["E1/people/s1/r1", "E1/people/s1/r2/x2"], "the order is counterbalanced");
 
     // Again: nothing is left to do, the links are the same, and nobody who has left is asked.
@@ -213,7 +217,8 @@ fn what_one_participant_leaves_of_a_split_study_the_others_play() {
         second.play();
     }
     people.ends();
-    let of_each = "select participant, count(*) as n from episodes group by participant order by participant";
+    let of_each =
+        "select participant, count(distinct episode_id) as n from steps group by participant order by participant";
     let rows = run(folder.path(), &["query", of_each, "runs", "--format", "csv"]).done();
     assert_eq!(rows.lines().skip(1).collect::<Vec<_>>(), ["a1,1", "b2,3"], "what was played before stays");
 }
@@ -229,13 +234,17 @@ fn participants_have_seeds_of_their_own() {
         person.play();
     }
     people.ends();
-    let of_each = "select participant, seed from episodes order by participant";
+    let of_each = "select distinct participant, seed from steps order by participant";
     let rows = run(folder.path(), &["query", of_each, "runs", "--format", "csv"]).done();
     assert_eq!(rows.lines().skip(1).collect::<Vec<_>>(), ["a1,1", "b2,2"]);
-    let moved = ["record", "--agent", "human", "--model", "people", "--experiment", "E1", "--seeds", "1", "--runs", "1"];
+    let moved =
+        ["record", "--agent", "human", "--model", "people", "--experiment", "E1", "--seeds", "1", "--runs", "1"];
     let moved = [&moved[..], &["--out", "runs", "--human-port", "0", "--design", "own-seeds", "--participants", "b2"]];
     let refused = run(folder.path(), &moved.concat()).refused();
-    assert!(refused.contains("`b2` has place 1, and had place 2") && refused.contains("help: keep the order"), "{refused}");
+    assert!(
+        refused.contains("`b2` has place 1, and had place 2") && refused.contains("help: keep the order"),
+        "{refused}"
+    );
 }
 
 #[test]
@@ -247,7 +256,10 @@ fn what_was_typed_outlives_a_reload() {
     practise(&mut browser);
     claim(&mut browser, "I am half way");
     browser.send("Page.reload", &json!({}));
-    until(&mut browser, &format!("document.querySelector('h1').textContent === 'Step 1' && {CLAIM} === 'I am half way'"));
+    until(
+        &mut browser,
+        &format!("document.querySelector('h1').textContent === 'Step 1' && {CLAIM} === 'I am half way'"),
+    );
     claim(&mut browser, "I am green");
     browser.click("button[data-action=a]");
     until(&mut browser, "document.querySelector('h1').textContent === 'Step 2'");

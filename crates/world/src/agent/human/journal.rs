@@ -167,9 +167,8 @@ impl Journal {
     /// Removes what a person did; that they left, their place and their link stay. Gives the folder, if there is one.
     pub(super) fn forget(&mut self, code: &str) -> io::Result<Option<PathBuf>> {
         let Some((folder, file)) = &mut self.file else { return Ok(None) };
-        let stays = |line: &Line| {
-            line.participant() != code || matches!(line, Line::Left { .. } | Line::Enrolled { .. })
-        };
+        let stays =
+            |line: &Line| line.participant() != code || matches!(line, Line::Left { .. } | Line::Enrolled { .. });
         let path = path(folder);
         keep(&path, stays)?;
         *file = appending(&path)?;
@@ -269,6 +268,8 @@ mod tests {
         drop(journal);
         let journal = Journal::open(folder.path()).unwrap();
         assert_eq!((journal.enrolled("P1"), journal.left("P1")), (Some((1, "abc")), Some(Leaving::Deleted)));
-        assert!(!journal.has_agreed("P1", Some("words")) && journal.has_practised("P2") && journal.left("P2").is_none());
+        assert!(
+            !journal.has_agreed("P1", Some("words")) && journal.has_practised("P2") && journal.left("P2").is_none()
+        );
     }
 }

@@ -9,11 +9,12 @@ use crate::cli::output;
 use exact::budget::Limit;
 use exact::input;
 use web::{self, Guard};
+use world::agent::human::Human;
 use world::agent::human::design::{Design, Order, Schedule};
 use world::agent::human::hub::{Eraser, Hub};
 use world::agent::human::journal::Journal;
 use world::agent::human::seat::Terms;
-use world::agent::human::{Human, server};
+use world::agent::human::server::{self, Server};
 use world::record::participants::remove_episodes;
 use world::record::plan::Plan;
 
@@ -90,9 +91,9 @@ impl HumanArgs {
         let hub = Arc::new(Hub::new(people.clone(), terms, schedule, journal, eraser));
         if serves {
             hub.delete_due().map_err(Failure::input)?;
-            self.serve(&hub, &people)?;
         }
-        Ok(Human::new(model.unwrap_or("human"), hub))
+        let server = serves.then(|| self.serve(&hub, &people)).transpose()?;
+        Ok(Human::new(model.unwrap_or("human"), hub, server))
     }
 
     /// The plan of all participants together.
@@ -130,7 +131,7 @@ impl HumanArgs {
         Ok(token)
     }
 
-    fn serve(&self, hub: &Arc<Hub>, people: &[(String, String)]) -> Result<(), Failure> {
+    fn serve(&self, hub: &Arc<Hub>, people: &[(String, String)]) -> Result<Server, Failure> {
         let host = self.human_host.as_deref().unwrap_or("127.0.0.1");
         let taken = |error| {
             let help = "--human-port 0 takes any port that is free";
@@ -139,11 +140,11 @@ impl HumanArgs {
         let listener = std::net::TcpListener::bind((host, self.human_port)).map_err(taken)?;
         let guard = Guard::new(listener.local_addr().map_err(taken)?, self.human_host.as_deref(), None);
         let link = guard.link();
-        server::start(Arc::clone(hub), listener, guard).map_err(taken)?;
+        let server = server::start(Arc::clone(hub), listener, guard).map_err(taken)?;
         for (code, token) in people {
             output::say(&format!("{code} plays at {link}?p={token}"));
         }
-        Ok(())
+        Ok(server)
     }
 }
 

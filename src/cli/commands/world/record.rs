@@ -356,7 +356,7 @@ impl RecordArgs {
             found: found.len(),
             recorded: recorded.len(),
             elsewhere: elsewhere.len() + lost_here - lost.len(),
-            left_out: left_out + deleted.len(),
+            left_out: left_out + planned.iter().filter(|key| !stays(key)).count(),
             steps,
             replies: bar.replies(),
             lost,

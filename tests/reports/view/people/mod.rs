@@ -4,7 +4,7 @@ mod study;
 
 use std::io::{BufRead as _, BufReader};
 use std::path::Path;
-use std::process::{ChildStderr, Stdio};
+use std::process::{ChildStderr, Command, Stdio};
 
 use serde_json::{Value, json};
 
@@ -34,10 +34,14 @@ impl People {
         let mut command = program(folder);
         command.args(["record", "--agent", "human", "--model", "people", "--experiment", experiment, "--seeds", "1"]);
         command.args(["--out", "runs", "--human-port", "0", "--participants", codes]).args(more);
+        Self::start_with(&mut command, codes.split(',').count(), answer)
+    }
+
+    fn start_with(command: &mut Command, people: usize, answer: Stdio) -> Self {
         let mut process = command.stdout(answer).stderr(Stdio::piped()).spawn().unwrap();
         let mut output = BufReader::new(process.stderr.take().unwrap());
         let mut links = Vec::new();
-        while links.len() < codes.split(',').count() {
+        while links.len() < people {
             let mut line = String::new();
             assert!(output.read_line(&mut line).unwrap() > 0, "the recording ended before it told its links");
             links.extend(line.trim().split_once(" plays at ").map(|(_, link)| link.to_owned()));

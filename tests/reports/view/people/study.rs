@@ -1,7 +1,10 @@
 //! Studies with people: designs, consent, withdrawal, interruptions.
 
 use std::fs::File;
+use std::io::{Read as _, Write as _};
+use std::net::TcpStream;
 use std::path::Path;
+use std::process::Stdio;
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -9,7 +12,7 @@ use serde_json::{Value, json};
 
 use super::{CLAIM, CLAIMS, People, Person, claim, done, practise};
 use crate::harness::need;
-use crate::harness::program::{interrupt, run};
+use crate::harness::program::{interrupt, program, run, wait_for};
 use crate::html::browser::Browser;
 use crate::view::pages::until;
 
@@ -33,6 +36,18 @@ fn phase(person: &mut Person, phases: &[&str]) -> String {
 impl Person {
     fn post(&mut self, name: &str, body: &Value) -> Value {
         self.ask("POST", name, body).json()
+    }
+
+    /// Waits until an episode is there, also over the end of one server and the start of the next.
+    fn answers_again(&self) {
+        wait_for("the next recording", || {
+            let mut stream = TcpStream::connect(("127.0.0.1", self.port)).ok()?;
+            let (token, host) = (&self.token, format!("127.0.0.1:{}", self.port));
+            write!(stream, "GET /state?p={token} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n").ok()?;
+            let mut answer = String::new();
+            stream.read_to_string(&mut answer).ok()?;
+            answer.contains("\"ready\"").then_some(())
+        });
     }
 
     /// Plays an episode of two steps.
@@ -304,6 +319,9 @@ fn a_person_declines_or_leaves_by_the_keyboard_alone() {
     second.press("Escape");
     until(&mut second, "document.querySelector('dialog') === null");
     assert!(second.holds("document.activeElement.dataset.action === 'done'"));
+    let look = "(() => { const one = document.querySelector('#pause'); one.disabled = true; const is = getComputedStyle(one); \
+                return [is.cursor, is.borderTopStyle]; })()";
+    assert_eq!(second.value(look), json!(["not-allowed", "dashed"]), "what cannot be pressed looks so");
     second.value("document.querySelector('#withdraw').focus()");
     second.press("Enter");
     until(&mut second, "document.querySelector('#leave-delete')");
@@ -313,4 +331,27 @@ fn a_person_declines_or_leaves_by_the_keyboard_alone() {
     assert!(second.text("document.body.innerText").contains("What you did is deleted"));
     people.ends();
     assert!(!folder.path().join("runs/E1-people.parquet").exists(), "nobody has played an episode");
+}
+
+#[test]
+fn a_study_file_has_conditions_that_the_same_person_plays() {
+    need::drawing();
+    let folder = tempfile::tempdir().unwrap();
+    let port = std::net::TcpListener::bind(("127.0.0.1", 0)).unwrap().local_addr().unwrap().port();
+    let study = format!(
+        "agent = \"human\"\nexperiment = \"E1\"\nseeds = 1\nruns = 1\nparticipants = \"P1\"\nhuman-port = {port}\n\
+         out = \"runs\"\n[model.people]\n[condition.far]\n[condition.near]\n"
+    );
+    std::fs::write(folder.path().join("study.toml"), study).unwrap();
+    let people = People::start_with(program(folder.path()).args(["record", "study.toml"]), 1, Stdio::null());
+    let mut person = people.person(0);
+    person.practise();
+    person.play();
+    // The same link goes on with the next condition; nobody practises twice.
+    person.answers_again();
+    person.play();
+    people.ends();
+    let conditions = "select distinct condition, participant from steps order by condition";
+    let rows = run(folder.path(), &["query", conditions, "runs", "--format", "csv"]).done();
+    assert_eq!(rows.lines().skip(1).collect::<Vec<_>>(), ["far,P1", "near,P1"]);
 }

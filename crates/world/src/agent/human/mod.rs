@@ -18,13 +18,14 @@ pub mod seat;
 pub mod server;
 
 use std::collections::BTreeSet;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use serde_json::{Value, json};
 
 use self::hub::Hub;
 use self::journal::Entry;
 use self::seat::{Given, Question};
+use self::server::Server;
 use super::prompt::{self, Prompt, Rendered};
 use super::reply::{self, Ending};
 use super::{Agent, Decision, Ended, Farewell, Lost, Observation, Planned, Player, Reply, Task, Turn, Usage};
@@ -40,13 +41,15 @@ pub struct Human {
     /// SHA-256 of the words of consent; `None` where nobody is asked for it.
     consent: Option<String>,
     hub: Arc<Hub>,
+    /// `None` where nobody is asked to play, and at the end of the recording.
+    server: Mutex<Option<Server>>,
 }
 
 impl Human {
     /// A player of this name whose episodes go to the people of a hub.
-    pub fn new(model: &str, hub: Arc<Hub>) -> Self {
+    pub fn new(model: &str, hub: Arc<Hub>, server: Option<Server>) -> Self {
         let consent = hub.terms().consent.as_deref().map(|words| hash::of_bytes(words.as_bytes()));
-        Self { model: model.to_owned(), consent, hub }
+        Self { model: model.to_owned(), consent, hub, server: Mutex::new(server) }
     }
 }
 
@@ -120,6 +123,7 @@ impl Player for Human {
 
     fn ended(&self, is_complete: bool) {
         self.hub.end(is_complete);
+        drop(self.server.lock().unwrap_or_else(PoisonError::into_inner).take());
     }
 }
 

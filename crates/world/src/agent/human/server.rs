@@ -5,6 +5,7 @@
 
 use std::net::TcpListener;
 use std::sync::Arc;
+use std::thread::JoinHandle;
 
 use axum::Router;
 use axum::body::Bytes;
@@ -15,6 +16,7 @@ use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
+use tokio::sync::oneshot;
 
 use super::hub::Hub;
 use super::journal::Leaving;
@@ -47,14 +49,33 @@ struct Withdrawal {
     delete: bool,
 }
 
-/// Serves people on a thread of its own, until the process ends.
-pub fn start(hub: Arc<Hub>, listener: TcpListener, guard: Guard) -> std::io::Result<()> {
+/// A server on a thread of its own; it ends when this is dropped.
+#[derive(Debug)]
+pub struct Server {
+    end: Option<oneshot::Sender<()>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        self.end = None;
+        // The next recording of a study may want the same port.
+        let _ = self.thread.take().map(JoinHandle::join);
+    }
+}
+
+/// Serves people.
+pub fn start(hub: Arc<Hub>, listener: TcpListener, guard: Guard) -> std::io::Result<Server> {
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build()?;
-    std::thread::Builder::new().name("people".to_owned()).spawn(move || {
-        // A server that fails leaves the episodes waiting, which Ctrl-C ends.
-        let _ = runtime.block_on(web::serve(listener, web::guarded(routes(hub), guard.taking_posts())));
+    let (end, ended) = oneshot::channel::<()>();
+    let thread = std::thread::Builder::new().name("people".to_owned()).spawn(move || {
+        runtime.block_on(async {
+            let served = web::serve(listener, web::guarded(routes(hub), guard.taking_posts()));
+            // A server that fails leaves the episodes waiting, which Ctrl-C ends.
+            tokio::select! { _ = served => {}, _ = ended => {} }
+        });
     })?;
-    Ok(())
+    Ok(Server { end: Some(end), thread: Some(thread) })
 }
 
 fn routes(hub: Arc<Hub>) -> Router {

@@ -77,10 +77,10 @@ impl HumanArgs {
             prefills: self.prefill_identification,
         };
         let unwritable = |error| Failure::input(format!("the journal in {} cannot be opened: {error}", out.display()));
-        let mut journal = if serves { Journal::open(out).map_err(unwritable)? } else { Journal::none() };
+        let journal = if serves { Journal::open(out).map_err(unwritable)? } else { Journal::none() };
         let mut people = Vec::new();
         for (code, place) in self.participants.iter().zip(1..) {
-            people.push((code.clone(), self.enrol(&mut journal, code, place).map_err(|fault| fault.or(unwritable))?));
+            people.push((code.clone(), self.enrol(&journal, code, place).map_err(|fault| fault.or(unwritable))?));
         }
         let eraser: Eraser = |folder, code| {
             remove_episodes(folder, code).map(|removed| removed.episodes).map_err(|error| error.to_string())
@@ -116,7 +116,7 @@ impl HumanArgs {
     }
 
     /// The token of a participant's link: that of the start before, or a new one.
-    fn enrol(&self, journal: &mut Journal, code: &str, place: usize) -> Result<String, Enrolment> {
+    fn enrol(&self, journal: &Journal, code: &str, place: usize) -> Result<String, Enrolment> {
         if let Some((before, token)) = journal.enrolled(code) {
             if before != place && self.design != Design::Split {
                 return Err(Enrolment::Moved(Failure::input(format!(

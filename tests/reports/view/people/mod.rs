@@ -212,9 +212,26 @@ fn the_page_is_played_by_keys() {
     let mut browser = Browser::at(&people.links[0]);
     until(&mut browser, "document.querySelector('.practice') && document.querySelector('img').naturalWidth === 640");
     practise(&mut browser);
+    let words = |part: &str| format!("document.querySelector('{part}').textContent.includes('JSON')");
+    assert!(
+        browser.holds(&words("section.model")) && !browser.holds(&words("section.mine")),
+        "words of models stand apart"
+    );
     browser.press("ArrowLeft");
     until(&mut browser, "document.querySelector('h1').textContent === 'Step 2'");
+    // Letters can be switched off, for those whose software uses them.
+    browser.click("#letters");
+    browser.value("document.activeElement.blur()");
+    browser.press("a");
+    std::thread::sleep(std::time::Duration::from_secs(1));
+    assert_eq!(browser.text("document.querySelector('h1').textContent"), "Step 2");
+    browser.press("ArrowLeft");
+    until(&mut browser, "document.querySelector('h1').textContent === 'Step 3'");
     assert!(browser.text("document.querySelector('#user').textContent").contains("the previous action was a"));
+    browser.click("#letters");
+    browser.value("document.activeElement.blur()");
+    browser.press("a");
+    until(&mut browser, "document.querySelector('h1').textContent === 'Step 4'");
     done(&mut browser);
     people.ends();
     browser.complaints();

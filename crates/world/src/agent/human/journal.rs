@@ -87,8 +87,8 @@ impl Line {
 /// The journal of a recording.
 #[derive(Debug)]
 pub struct Journal {
-    /// The folder and the open file; `None` where nothing is recorded.
-    file: Option<(PathBuf, File)>,
+    /// The folder; `None` where nothing is recorded. The file is opened for each line, since `participants remove` replaces it.
+    folder: Option<PathBuf>,
     lines: Vec<Line>,
 }
 
@@ -103,11 +103,11 @@ impl Journal {
             // Behind a line that was cut off a new one begins.
             file.write_all(b"\n")?;
         }
-        Ok(Self { file: Some((folder.to_owned(), file)), lines })
+        Ok(Self { folder: Some(folder.to_owned()), lines })
     }
 
     pub const fn none() -> Self {
-        Self { file: None, lines: Vec::new() }
+        Self { folder: None, lines: Vec::new() }
     }
 
     /// The answers that were there when it was opened.
@@ -127,16 +127,16 @@ impl Journal {
         self.lines.iter().any(|line| matches!(line, Line::Practised { participant, .. } if participant == code))
     }
 
-    pub(super) fn keep(&mut self, entry: Entry) -> io::Result<()> {
+    pub(super) fn keep(&self, entry: Entry) -> io::Result<()> {
         self.write(&Line::Answer(entry))
     }
 
-    pub(super) fn agreed(&mut self, code: &str, words: &str) -> io::Result<()> {
+    pub(super) fn agreed(&self, code: &str, words: &str) -> io::Result<()> {
         let consent = hash::of_bytes(words.as_bytes());
         self.write(&Line::Agreed { participant: code.to_owned(), consent })
     }
 
-    pub(super) fn practised(&mut self, code: &str) -> io::Result<()> {
+    pub(super) fn practised(&self, code: &str) -> io::Result<()> {
         self.write(&Line::Practised { participant: code.to_owned(), practised: true })
     }
 
@@ -148,7 +148,7 @@ impl Journal {
         })
     }
 
-    pub(super) fn leave(&mut self, code: &str, left: Leaving) -> io::Result<()> {
+    pub(super) fn leave(&self, code: &str, left: Leaving) -> io::Result<()> {
         self.write(&Line::Left { participant: code.to_owned(), left })
     }
 
@@ -160,23 +160,22 @@ impl Journal {
         })
     }
 
-    pub fn enrol(&mut self, code: &str, place: usize, link: &str) -> io::Result<()> {
+    pub fn enrol(&self, code: &str, place: usize, link: &str) -> io::Result<()> {
         self.write(&Line::Enrolled { participant: code.to_owned(), place, link: link.to_owned() })
     }
 
     /// Removes what a person did; that they left, their place and their link stay. Gives the folder, if there is one.
-    pub(super) fn forget(&mut self, code: &str) -> io::Result<Option<PathBuf>> {
-        let Some((folder, file)) = &mut self.file else { return Ok(None) };
+    pub(super) fn forget(&self, code: &str) -> io::Result<Option<PathBuf>> {
+        let Some(folder) = &self.folder else { return Ok(None) };
         let stays =
             |line: &Line| line.participant() != code || matches!(line, Line::Left { .. } | Line::Enrolled { .. });
-        let path = path(folder);
-        keep(&path, stays)?;
-        *file = appending(&path)?;
+        keep(&path(folder), stays)?;
         Ok(Some(folder.clone()))
     }
 
-    fn write(&mut self, line: &Line) -> io::Result<()> {
-        let Some((_, file)) = &mut self.file else { return Ok(()) };
+    fn write(&self, line: &Line) -> io::Result<()> {
+        let Some(folder) = &self.folder else { return Ok(()) };
+        let mut file = appending(&path(folder))?;
         let mut bytes = serde_json::to_vec(line)?;
         bytes.push(b'\n');
         file.write_all(&bytes)?;
@@ -241,7 +240,7 @@ mod tests {
             latency_ms: 5,
             reply: "{}".to_owned(),
         };
-        let mut journal = Journal::open(folder.path()).unwrap();
+        let journal = Journal::open(folder.path()).unwrap();
         journal.agreed("P1", "words").unwrap();
         journal.keep(entry("P1", 1)).unwrap();
         journal.practised("P2").unwrap();
@@ -259,7 +258,7 @@ mod tests {
     #[test]
     fn what_a_person_did_is_forgotten_and_that_they_left_is_not() {
         let folder = tempfile::tempdir().unwrap();
-        let mut journal = Journal::open(folder.path()).unwrap();
+        let journal = Journal::open(folder.path()).unwrap();
         journal.enrol("P1", 1, "abc").unwrap();
         journal.agreed("P1", "words").unwrap();
         journal.leave("P1", Leaving::Deleted).unwrap();

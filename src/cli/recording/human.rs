@@ -58,14 +58,14 @@ pub struct HumanArgs {
 }
 
 impl HumanArgs {
-    /// The player of the people, whose pages are served from now on; `serves` is not set where nothing is recorded. Each plays
+    /// The player of the people, whose pages are served from now on; `plays` is not set where nothing is recorded. Each plays
     /// so many seeds of their own, and each scene so often.
     pub fn player(
         &self,
         model: Option<&str>,
         (seeds, repeats): (i32, i32),
         out: &Path,
-        serves: bool,
+        plays: bool,
     ) -> Result<Human, Failure> {
         let own: BTreeSet<&String> = self.participants.iter().collect();
         if own.len() < self.participants.len() {
@@ -77,7 +77,7 @@ impl HumanArgs {
             prefills: self.prefill_identification,
         };
         let unwritable = |error| Failure::input(format!("the journal in {} cannot be opened: {error}", out.display()));
-        let journal = if serves { Journal::open(out).map_err(unwritable)? } else { Journal::none() };
+        let journal = if plays { Journal::open(out).map_err(unwritable)? } else { Journal::none() };
         let mut people = Vec::new();
         for (code, place) in self.participants.iter().zip(1..) {
             people.push((code.clone(), self.enrol(&journal, code, place).map_err(|fault| fault.or(unwritable))?));
@@ -89,10 +89,10 @@ impl HumanArgs {
         let order = self.order.unwrap_or(by_design);
         let schedule = Schedule { design: self.design, order, seeds, repeats };
         let hub = Arc::new(Hub::new(people.clone(), terms, schedule, journal, eraser));
-        if serves {
+        if plays {
             hub.delete_due().map_err(Failure::input)?;
         }
-        let server = serves.then(|| self.serve(&hub, &people)).transpose()?;
+        let server = plays.then(|| self.serve(&hub, &people)).transpose()?;
         Ok(Human::new(model.unwrap_or("human"), hub, server))
     }
 

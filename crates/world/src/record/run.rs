@@ -145,7 +145,7 @@ impl Recording<'_> {
         });
         let (elsewhere, given_up) = (queue.elsewhere(), unusable.given_up());
         let (stopped, left_out) = (queue.has_more(), queue.left_out());
-        let mut tally = Tally { elsewhere, given_up, stopped, left_out, ..Tally::default() };
+        let mut tally = Tally { left_out, elsewhere, stopped, given_up, ..Tally::default() };
         for result in results {
             let part = result?;
             tally.recorded.extend(part.recorded);

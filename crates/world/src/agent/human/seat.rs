@@ -76,6 +76,7 @@ impl Asked {
 }
 
 #[derive(Debug, Default)]
+#[expect(clippy::struct_excessive_bools, reason = "independent facts of a person")]
 pub(super) struct Seat {
     pub code: String,
     /// The episodes still to be played, in order, the one under way among them.
@@ -110,10 +111,12 @@ impl Seat {
     /// The page was heard from: the time without it does not count.
     fn heard(&mut self) {
         let away = self.seen.replace(Instant::now()).map_or(Duration::ZERO, |seen| seen.elapsed());
-        if let Some(asked) = &mut self.asked {
-            if away > AWAY && asked.shown.is_some() && asked.pause.is_none() {
-                asked.breaks += away;
-            }
+        if let Some(asked) = &mut self.asked
+            && away > AWAY
+            && asked.shown.is_some()
+            && asked.pause.is_none()
+        {
+            asked.breaks += away;
         }
     }
 

@@ -19,15 +19,21 @@ const PAUSE = 700;
 
 // A request that nobody answers in this time has failed.
 const PATIENCE = 20_000;
+// The same of a question that comes again by itself.
+const GLANCE = 6_000;
 // So many questions in a row without an answer: the server has gone.
 const GONE = 3;
+// Where this tab keeps what was typed for one question, and whether letters are keys.
+const DRAFT = "mirrorstats-draft";
+const LETTERS = "mirrorstats-letters";
 
 const content = document.getElementById("content");
 const notice = document.getElementById("notice");
+const status = document.getElementById("status");
 let shown = null;
+let current = null;
 let round = null;
-let kept = {};
-let typed = {};
+let kept = "";
 let timer = null;
 let unanswered = 0;
 
@@ -48,10 +54,12 @@ async function request(name, options = {}) {
 
 const send = (name, body = {}) => request(name, { method: "POST", body: JSON.stringify(body) });
 
+const say = (words) => (status.textContent = words);
+
 /** What went wrong, until it is mended; `again` sends the same once more. */
 function complain(kind, error, again = null) {
   const why = error.cause === undefined ? "The computer of the study does not answer." : `The computer of the study says: ${error.message}.`;
-  const words = kind === "sent" ? `This was not sent. ${why} What you typed is still here.` : `${why} The page tries again automatically.`;
+  const words = kind === "sent" ? `This was not sent. ${why} What you typed is still here.` : `${why} The page tries again by itself; what you typed is still here.`;
   const retry = again === null ? null : button("Send again", again, { id: "again" });
   notice.replaceChildren(words, ...(retry === null ? [] : [retry]));
   notice.dataset.kind = kind;
@@ -59,17 +67,19 @@ function complain(kind, error, again = null) {
 }
 
 function mended(kind) {
-  if (notice.dataset.kind === kind) notice.hidden = true;
+  if (notice.hidden || notice.dataset.kind !== kind) return;
+  notice.hidden = true;
+  if (kind === "asked") say("The computer of the study answers again.");
 }
 
 /** Sends what a button stands for, and shows what comes of it. */
-async function press(name) {
+async function press(name, body = {}) {
   try {
-    const told = await send(name);
+    const told = await send(name, body);
     mended("sent");
     show(told);
   } catch (error) {
-    complain("sent", error, () => press(name));
+    complain("sent", error, () => press(name, body));
   }
 }
 
@@ -79,33 +89,94 @@ function button(words, does, attributes = {}) {
   return element;
 }
 
-function consent({ words }) {
+/** Asks before something that cannot be undone; the first choice does nothing. */
+function sure(id, title, words, stay, choices) {
+  const dialog = make("dialog", { id, "aria-labelledby": `${id}-title` }, make("h2", { id: `${id}-title` }, title), ...words.map((line) => make("p", {}, line)));
+  const close = (does) => () => {
+    dialog.close();
+    does();
+  };
+  const buttons = [[stay, () => {}, `${id}-stay`], ...choices].map(([name, does, own]) => button(name, close(does), { id: own }));
+  dialog.append(make("div", { class: "actions" }, ...buttons));
+  dialog.addEventListener("close", () => dialog.remove());
+  content.append(dialog);
+  dialog.showModal();
+}
+
+function withdraw() {
+  sure("leave", "Leave the study?", ["You may leave at any time, and need not say why. You cannot come back."], "Stay", [
+    ["Leave; what I did may be kept", () => press("withdraw", { delete: false }), "leave-keep"],
+    ["Leave, and delete what I did", () => press("withdraw", { delete: true }), "leave-delete"],
+  ]);
+}
+
+/** Puts a page in the place of the one before; the keyboard stays where it was, or begins at the heading. */
+function put(title, told, children, mayLeave = true) {
+  const active = content.contains(document.activeElement) ? document.activeElement : null;
+  const name = active?.dataset.action ? `[data-action="${active.dataset.action}"]` : active?.name ? `[name="${active.name}"]` : null;
+  const ask = told.contact ? `Questions? ${told.contact}.` : "Questions? Ask whoever gave you the link.";
+  const foot = make("footer", {}, make("p", { class: "quiet" }, `${ask} Your code is ${told.code}.`));
+  if (mayLeave) foot.prepend(button("Leave the study", withdraw, { id: "withdraw" }));
+  content.replaceChildren(...children, foot);
+  document.title = `${title} – Mirror room`;
+  const heading = content.querySelector("h1");
+  heading.tabIndex = -1;
+  const again = name === null ? null : content.querySelector(`${name}:not(:disabled)`);
+  (again ?? heading).focus({ preventScroll: again !== null });
+}
+
+const page = (title, told, children, mayLeave = true) => put(title, told, [make("h1", {}, title), ...children], mayLeave);
+
+const counted = (count) => (count === 1 ? "1 episode" : `${count} episodes`);
+
+function consent(told) {
+  const decline = () => sure("decline", "Decline?", ["Nothing of you is recorded then. You cannot come back."], "Read again", [["I decline", () => press("decline"), "decline-sure"]]);
   const agree = button("I agree", () => press("agree"), { id: "agree" });
-  content.replaceChildren(make("h1", {}, "Before you begin"), make("div", { class: "consent" }, make("pre", {}, words)), agree);
+  const words = make("div", { class: "consent" }, make("pre", {}, told.words));
+  page("Before you begin", told, [words, make("div", { class: "actions" }, agree, button("I decline", decline, { id: "decline" }))], false);
 }
 
-function waiting({ played }) {
-  const words = played > 0 ? "Thank you: that episode is over. If there is another, it comes here." : "Please wait: the next episode comes here.";
-  content.replaceChildren(make("h1", {}, "Nothing to do now"), make("p", { id: "waiting" }, words), make("p", { class: "quiet" }, "You may close this page and come back with the same link."));
+function waiting(told) {
+  page("Please wait", told, [make("p", { id: "waiting" }, "The next episode comes here."), make("p", { class: "quiet" }, "You may close this page and come back with the same link.")]);
 }
 
-function ready() {
-  const words = make("p", {}, "The practice is over; the next steps count. Begin when you are ready: no time is counted before.");
-  content.replaceChildren(make("h1", {}, "The practice is over"), words, button("Begin", () => press("begin"), { id: "begin" }));
+function ready(told) {
+  const { is_first: isFirst, episode, of } = told;
+  const over = isFirst ? "The practice is over; the next steps count." : `${counted(episode - 1)} done, thank you. Nothing of it stays on this page.`;
+  const words = make("p", {}, `${over} Next is episode ${episode} of ${of}. Begin when you are ready: no time is counted before.`);
+  page(isFirst ? "The practice is over" : `Episode ${episode} of ${of}`, told, [words, button("Begin", () => press("begin"), { id: "begin" })]);
+}
+
+const farewell = (words) => make("p", { id: "over" }, `Thank you for taking part! ${words}`);
+
+/** Nothing is left for this person, while others may still play. */
+function finished(told) {
+  const words = told.played > 0 ? `You have played ${told.played === 1 ? "your only episode" : `all ${counted(told.played)}`}.` : "There is no episode for you to play.";
+  page("You are done", told, [farewell(`${words} You may close this page.`)], told.played > 0);
 }
 
 /** The end, as the server said it, or as it seems where the server has gone. */
-function over({ is_complete: isComplete }) {
+function over(told) {
   const words = {
     true: "You may close this page.",
-    false: "It was stopped before its end; what you did is kept. Should it go on, you are given a new link.",
-  }[isComplete] ?? "The computer of the study has gone. Should there be another episode, it comes here by itself.";
-  content.replaceChildren(make("h1", {}, "The study is over"), make("p", { id: "over" }, `Thank you for taking part! ${words}`));
+    false: "It was stopped before its end; what you did is kept. If it goes on, it goes on here, with the same link.",
+  }[told.is_complete] ?? "The computer of the study has gone. Should there be another episode, it comes here by itself.";
+  page("The study is over", told, [farewell(words)], false);
   mended("asked");
 }
 
-function pausing() {
-  content.replaceChildren(make("h1", {}, "A break"), make("p", {}, "Take your time: nothing is counted now."), button("Go on", () => press("resume"), { id: "resume" }));
+function left(told) {
+  const words = {
+    declined: "You have declined. Nothing of you is recorded.",
+    stopped: "You have left the study. What you did until then is kept.",
+    deleted: told.is_deleted ? "You have left the study. What you did is deleted." : "You have left the study. What you did is being deleted.",
+  }[told.left];
+  sessionStorage.removeItem(DRAFT);
+  page("Thank you", told, [make("p", { id: "left" }, `${words} You may close this page.`)], false);
+}
+
+function pausing(told) {
+  page("A break", told, [make("p", {}, "Take your time: the clock stands still."), button("Go on", () => press("resume"), { id: "resume" })]);
 }
 
 function field(key, colors, given) {
@@ -121,17 +192,37 @@ function field(key, colors, given) {
   return make("label", {}, title, area);
 }
 
+/** What was typed for this question before the page was loaded again, and nothing of any other question. */
+function draft(place) {
+  const found = JSON.parse(sessionStorage.getItem(DRAFT) ?? "null");
+  if (found?.place === place) return found.values;
+  sessionStorage.removeItem(DRAFT);
+  return null;
+}
+
+const lettersAreKeys = () => sessionStorage.getItem(LETTERS) !== "off";
+
+function keys(letters) {
+  const box = make("input", { type: "checkbox", id: "letters" });
+  box.checked = lettersAreKeys();
+  box.addEventListener("change", () => sessionStorage.setItem(LETTERS, box.checked ? "on" : "off"));
+  const named = letters.filter((letter) => letter !== "done").join(" ");
+  return make("div", { class: "quiet" }, "The arrow keys move. ", make("label", { class: "inline" }, box, `So do the keys ${named}`));
+}
+
 function play(told) {
-  const { phase, number, episode, t, system, user, keys, actions: letters, colors } = told;
-  // A claim stays from step to step, and belongs to the episode in which it was typed.
-  if (round !== `${phase} ${episode}`) [round, kept] = [`${phase} ${episode}`, {}];
-  const given = typed.number === number ? typed : kept;
-  const form = make("form", { autocomplete: "off" });
+  const { phase, number, episode, of, t, system, user, keys: names, actions: letters, colors, prefills } = told;
+  const isPractice = phase === "practice";
+  const place = `${LINK} ${phase} ${episode} ${t}`;
+  // An identification stays from step to step where the study wants it so, and never from episode to episode.
+  if (round !== `${phase} ${episode}`) [round, kept] = [`${phase} ${episode}`, ""];
+  const given = draft(place) ?? (prefills ? { identification: kept } : {});
+  const form = make("form", { autocomplete: "off", "aria-label": "Your answer" });
   let sent = false;
   const reply = async (action) => {
     if (sent) return;
     sent = true;
-    const values = Object.fromEntries(keys.map((key) => [key, key === "action" ? action : (form.elements[key]?.value ?? "")]));
+    const values = Object.fromEntries(names.map((key) => [key, key === "action" ? action : (form.elements[key]?.value ?? "")]));
     if (action !== "done" && "selected_cube" in values) values.selected_cube = "none";
     const lock = (is) => form.querySelectorAll("button").forEach((one) => (one.disabled = is));
     lock(true);
@@ -143,64 +234,82 @@ function play(told) {
       complain("sent", error, () => reply(action));
       return;
     }
-    kept = { identification: values.identification ?? "" };
+    sessionStorage.removeItem(DRAFT);
+    kept = values.identification ?? "";
+    form.isSent = true;
     mended("sent");
+    say(`${WORDS[action]}.`);
     turn();
   };
-  const actions = letters.map((action) => button(action === "done" ? WORDS[action] : `${WORDS[action]} (${action})`, () => reply(action), { "data-action": action }));
-  const fields = keys.filter((key) => key !== "action").map((key) => field(key, colors, given));
+  const done = () => {
+    const cube = form.elements.selected_cube?.value;
+    const words = ["This episode is over then; you cannot come back to it."];
+    if (cube !== undefined) words.push(cube === "none" ? "You have chosen no cube." : `You have chosen the ${cube} cube.`);
+    sure("sure", "Are you done?", words, "Go on playing", [["Yes, I am done", () => reply("done"), "sure-done"]]);
+  };
+  const actions = letters.map((action) => button(action === "done" ? WORDS[action] : `${WORDS[action]} (${action})`, () => (action === "done" ? done() : reply(action)), { "data-action": action }));
+  const fields = names.filter((key) => key !== "action").map((key) => field(key, colors, given));
   const order = ["identification", "selected_cube", "mark"];
   fields.sort((a, b) => order.indexOf(b.lastChild.name) - order.indexOf(a.lastChild.name));
-  form.append(make("div", { class: "actions", role: "group", "aria-label": "What you do" }, ...actions), ...fields, button("Take a break", () => press("pause"), { id: "pause" }));
+  form.append(make("div", { class: "actions", role: "group", "aria-label": "What you do" }, ...actions), keys(letters), ...fields, button("Take a break", () => press("pause"), { id: "pause" }));
+  const save = () => {
+    if (!form.isSent) sessionStorage.setItem(DRAFT, JSON.stringify({ place, values: Object.fromEntries(new FormData(form)) }));
+  };
+  form.addEventListener("input", save);
   form.addEventListener("submit", (event) => event.preventDefault());
-  form.reply = reply;
-  form.letters = letters;
-  const image = make("img", { src: address("frame", { n: number }), alt: "What you see", width: 640, height: 480 });
+  if (prefills) save();
+  current = { form, reply, letters };
+  const image = make("img", { src: address("frame", { n: number }), alt: "What you see at this step", width: 640, height: 480 });
   image.addEventListener("error", () => setTimeout(() => (image.src = address("frame", { n: number, again: Date.now() })), PAUSE));
-  const words = make("details", {}, make("summary", {}, "The task, as it was said at the beginning"), make("pre", {}, system));
-  words.open = t === 1;
-  const head = make("h1", {}, phase === "practice" ? make("span", { class: "practice" }, "Practice: this one does not count") : "", phase === "practice" ? ` step ${t}` : `Step ${t}`);
-  content.replaceChildren(head, make("div", { class: "play" }, make("div", {}, image, words), make("div", {}, make("pre", { id: "user" }, user), form)));
-  content.dataset.phase = phase;
+  const beginning = make("details", {}, make("summary", {}, "At the beginning"), make("pre", { tabindex: "0", "aria-label": "Words at the beginning" }, system));
+  beginning.open = t === 1;
+  const model = make(
+    "section", { class: "model", "aria-labelledby": "model" },
+    make("h2", { id: "model" }, "Your task, in the words that models get"),
+    make("p", { class: "quiet" }, "They are the same for people and models. Where they ask for a JSON object, use the buttons and fields."),
+    beginning, make("h3", {}, "At this step"), make("pre", { id: "user" }, user),
+  );
+  const banner = make("p", { class: "place" }, isPractice ? make("span", { class: "practice" }, "Practice: nothing counts until a page says that it does") : `Episode ${episode} of ${of}`);
+  const mine = make("section", { class: "mine", "aria-labelledby": "mine" }, make("h2", { id: "mine" }, "Your answer"), form);
+  const title = isPractice ? `Practice, step ${t}` : `Step ${t}`;
+  put(title, told, [make("h1", {}, title), banner, make("div", { class: "play" }, image, mine, model)]);
   content.dataset.number = number;
+  say(`${status.textContent} ${title}.`.trim());
 }
 
 function show(told) {
-  const same = ["phase", "number", "played"].every((key) => shown?.[key] === told[key]);
-  const form = content.querySelector("form");
-  if (form !== null) typed = { number: shown.number, ...Object.fromEntries(new FormData(form)) };
+  const same = ["phase", "number", "played", "is_deleted"].every((key) => shown?.[key] === told[key]);
   shown = told;
   if (same) return;
   mended("sent");
   content.dataset.phase = told.phase;
-  const pages = { consent, ready, waiting, over, break: pausing };
+  const pages = { consent, ready, waiting, finished, over, left, break: pausing };
   (pages[told.phase] ?? play)(told);
 }
 
 async function turn() {
   clearTimeout(timer);
   try {
-    show(await request("state"));
+    show(await request("state", { signal: AbortSignal.timeout(GLANCE) }));
     unanswered = 0;
     mended("asked");
   } catch (error) {
     unanswered += 1;
-    const isGone = error.cause === undefined && unanswered >= GONE && (shown?.phase === "over" || shown?.played > 0);
-    if (isGone) show({ phase: "over" });
-    else if (notice.hidden || notice.dataset.kind === "asked") complain("asked", error);
+    const isIdle = shown?.phase === "finished" || (shown?.phase === "waiting" && shown.played > 0);
+    const isOver = ["finished", "over", "left"].includes(shown?.phase);
+    if (error.cause === undefined && unanswered >= GONE && isIdle) show({ ...shown, phase: "over", is_complete: undefined });
+    else if (!isOver && (notice.hidden || notice.dataset.kind === "asked")) complain("asked", error);
   }
-  if (shown?.phase === "over" && shown.is_complete !== undefined) return;
   timer = setTimeout(turn, shown?.phase === "waiting" ? PAUSE / 4 : PAUSE);
 }
 
 document.addEventListener("keydown", (event) => {
   if (event.ctrlKey || event.metaKey || event.altKey || event.repeat || event.target.matches("input, select, textarea")) return;
-  const form = content.querySelector("form");
-  if (form === null) return;
-  const action = form.letters.find((letter) => letter !== "done" && (letter === event.key || ARROWS[event.key]?.includes(letter)));
+  if (current === null || !current.form.isConnected || content.querySelector("dialog") !== null) return;
+  const action = current.letters.find((letter) => letter !== "done" && ((letter === event.key && lettersAreKeys()) || ARROWS[event.key]?.includes(letter)));
   if (action === undefined) return;
   event.preventDefault();
-  form.reply(action);
+  current.reply(action);
 });
 
 turn();

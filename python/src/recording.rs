@@ -140,6 +140,7 @@ fn until_ended(args: &RecordArgs, player: &dyn Player, ending: &Ending) -> PyRes
                     player.abandon();
                 }
                 ending.raise(signal);
+                player.interrupt();
             }
         }
     })

@@ -9,23 +9,46 @@ use crate::cli::output;
 use exact::budget::Limit;
 use exact::input;
 use web::{self, Guard};
-use world::agent::human::hub::Hub;
+use world::agent::human::Human;
+use world::agent::human::design::{Design, Order, Schedule};
+use world::agent::human::hub::{Eraser, Hub};
 use world::agent::human::journal::Journal;
-use world::agent::human::{Human, server};
+use world::agent::human::seat::Terms;
+use world::agent::human::server::{self, Server};
+use world::record::participants::remove_episodes;
+use world::record::plan::Plan;
 
 /// Words of consent are read by people.
 const LONGEST_CONSENT: Limit = Limit::new("bytes of the words of consent", 1 << 20);
 
-/// The people that play in the browser.
+/// The most times that a scene is played, and the most seeds: what the times of frames keep apart.
+const MOST_REPEATS: i32 = 999;
+const MOST_SEEDS: i32 = 4_000;
+
+/// Who plays in the browser.
 #[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "With --agent human")]
 pub struct HumanArgs {
-    /// The codes of the people who play, each with a link of their own; no names
+    /// The codes of the people who play, each with a link of their own that stays the same; no names
     #[arg(long, value_name = "CODES", value_delimiter = ',', default_value = "P1", value_parser = code)]
     participants: Vec<String>,
+    /// Who plays what: split, each episode is played by one participant; crossed, everyone plays every scene; own-seeds,
+    /// everyone plays --seeds seeds of their own
+    #[arg(long, value_name = "DESIGN", default_value = "split", value_parser = design)]
+    design: Design,
+    /// In which order: planned, by experiment, seed and run; counterbalanced, by the rows of a Latin square [default:
+    /// counterbalanced if crossed, else planned]
+    #[arg(long, value_name = "ORDER", value_parser = order)]
+    order: Option<Order>,
     /// A text file with what people agree to before they begin
     #[arg(long, value_name = "FILE")]
     consent: Option<PathBuf>,
+    /// Where people can ask, such as a name and a telephone number: stands on every page
+    #[arg(long, value_name = "TEXT")]
+    contact: Option<String>,
+    /// Keep an identification in its field from step to step of an episode; a model has no such memory
+    #[arg(long)]
+    prefill_identification: bool,
     /// The port of their pages; 0 for any that is free
     #[arg(long, value_name = "PORT", default_value_t = 7432)]
     human_port: u16,
@@ -35,27 +58,80 @@ pub struct HumanArgs {
 }
 
 impl HumanArgs {
-    /// The player of the people, whose pages are served from now on; `serves` is not set where nothing is recorded.
-    pub fn player(&self, model: Option<&str>, out: &Path, serves: bool) -> Result<Human, Failure> {
+    /// The player of the people, whose pages are served from now on; `plays` is not set where nothing is recorded. Each plays
+    /// so many seeds of their own, and each scene so often.
+    pub fn player(
+        &self,
+        model: Option<&str>,
+        (seeds, repeats): (i32, i32),
+        out: &Path,
+        plays: bool,
+    ) -> Result<Human, Failure> {
         let own: BTreeSet<&String> = self.participants.iter().collect();
         if own.len() < self.participants.len() {
             return Err(Failure::input("--participants: a code stands twice"));
         }
-        let consent = self.consent.as_deref().map(words).transpose()?;
-        let tokens = self.participants.iter().map(|code| web::new_token().map(|token| (code.clone(), token)));
-        let people: Vec<(String, String)> = tokens.collect::<Result<_, _>>()?;
-        let model = model.unwrap_or("human");
-        if !serves {
-            return Ok(Human::new(model, Arc::new(Hub::new(people, consent, Journal::none()))));
-        }
+        let terms = Terms {
+            consent: self.consent.as_deref().map(words).transpose()?,
+            contact: self.contact.clone(),
+            prefills: self.prefill_identification,
+        };
         let unwritable = |error| Failure::input(format!("the journal in {} cannot be opened: {error}", out.display()));
-        let journal = Journal::open(out).map_err(unwritable)?;
-        let hub = Arc::new(Hub::new(people.clone(), consent, journal));
-        self.serve(&hub, &people)?;
-        Ok(Human::new(model, hub))
+        let journal = if plays { Journal::open(out).map_err(unwritable)? } else { Journal::none() };
+        let mut people = Vec::new();
+        for (code, place) in self.participants.iter().zip(1..) {
+            people.push((code.clone(), self.enrol(&journal, code, place).map_err(|fault| fault.or(unwritable))?));
+        }
+        let eraser: Eraser = |folder, code| {
+            remove_episodes(folder, code).map(|removed| removed.episodes).map_err(|error| error.to_string())
+        };
+        let by_design = if self.design == Design::Crossed { Order::Counterbalanced } else { Order::Planned };
+        let order = self.order.unwrap_or(by_design);
+        let schedule = Schedule { design: self.design, order, seeds, repeats };
+        let hub = Arc::new(Hub::new(people.clone(), terms, schedule, journal, eraser));
+        if plays {
+            hub.delete_due().map_err(Failure::input)?;
+        }
+        let server = plays.then(|| self.serve(&hub, &people)).transpose()?;
+        Ok(Human::new(model.unwrap_or("human"), hub, server))
     }
 
-    fn serve(&self, hub: &Arc<Hub>, people: &[(String, String)]) -> Result<(), Failure> {
+    /// The plan of all participants together.
+    pub fn spread(&self, plan: Plan) -> Result<Plan, Failure> {
+        let people = i32::try_from(self.participants.len()).unwrap_or(i32::MAX);
+        let within = |what: &str, each: i32, most: i32| {
+            let all = each.checked_mul(people).filter(|all| *all <= most);
+            all.ok_or_else(|| {
+                Failure::input(format!(
+                    "--design {}: {people} participants with {each} {what} each are more than {most}; record in several folders",
+                    self.design.name()
+                ))
+            })
+        };
+        Ok(match self.design {
+            Design::Split => plan,
+            Design::Crossed => Plan { repeats: within("repeats", plan.repeats, MOST_REPEATS)?, ..plan },
+            Design::OwnSeeds => Plan { seeds: within("seeds", plan.seeds, MOST_SEEDS)?, ..plan },
+        })
+    }
+
+    /// The token of a participant's link: that of the start before, or a new one.
+    fn enrol(&self, journal: &Journal, code: &str, place: usize) -> Result<String, Enrolment> {
+        if let Some((before, token)) = journal.enrolled(code) {
+            if before != place && self.design != Design::Split {
+                return Err(Enrolment::Moved(Failure::input(format!(
+                    "--participants: `{code}` has place {place}, and had place {before} when this recording began\n  help: keep \
+                     the order of the codes, since it says who plays what, and add new codes at the end"
+                ))));
+            }
+            return Ok(token.to_owned());
+        }
+        let token = web::new_token().map_err(Enrolment::Io)?;
+        journal.enrol(code, place, &token).map_err(Enrolment::Io)?;
+        Ok(token)
+    }
+
+    fn serve(&self, hub: &Arc<Hub>, people: &[(String, String)]) -> Result<Server, Failure> {
         let host = self.human_host.as_deref().unwrap_or("127.0.0.1");
         let taken = |error| {
             let help = "--human-port 0 takes any port that is free";
@@ -64,12 +140,35 @@ impl HumanArgs {
         let listener = std::net::TcpListener::bind((host, self.human_port)).map_err(taken)?;
         let guard = Guard::new(listener.local_addr().map_err(taken)?, self.human_host.as_deref(), None);
         let link = guard.link();
-        server::start(Arc::clone(hub), listener, guard).map_err(taken)?;
+        let server = server::start(Arc::clone(hub), listener, guard).map_err(taken)?;
         for (code, token) in people {
             output::say(&format!("{code} plays at {link}?p={token}"));
         }
-        Ok(())
+        Ok(server)
     }
+}
+
+/// Why a participant has no link.
+enum Enrolment {
+    Moved(Failure),
+    Io(std::io::Error),
+}
+
+impl Enrolment {
+    fn or(self, failure: impl Fn(std::io::Error) -> Failure) -> Failure {
+        match self {
+            Self::Moved(moved) => moved,
+            Self::Io(error) => failure(error),
+        }
+    }
+}
+
+fn design(text: &str) -> Result<Design, String> {
+    Design::named(text).ok_or_else(|| format!("expected {}", Design::ALL.map(Design::name).join(", ")))
+}
+
+fn order(text: &str) -> Result<Order, String> {
+    Order::named(text).ok_or_else(|| format!("expected {}", Order::ALL.map(Order::name).join(" or ")))
 }
 
 /// A code is no name: letters, digits, `-` and `_`.

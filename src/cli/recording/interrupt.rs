@@ -9,13 +9,18 @@ use world::agent::Player;
 /// The current player.
 pub type Playing = Arc<Mutex<Option<Arc<dyn Player>>>>;
 
-/// The first Ctrl-C ends a recording when the steps under way are done, a second one at once.
+/// The first Ctrl-C ends a recording when the steps under way are done, those of people at once; a second one ends all at
+/// once.
 pub fn stop_at_interrupt(stop: &'static AtomicBool, playing: Playing) -> Result<(), Failure> {
     ctrlc::set_handler(move || {
-        if stop.swap(true, Ordering::Relaxed) {
-            if let Some(player) = playing.lock().unwrap_or_else(PoisonError::into_inner).as_ref() {
-                player.abandon();
-            }
+        let is_second = stop.swap(true, Ordering::Relaxed);
+        let playing = playing.lock().unwrap_or_else(PoisonError::into_inner);
+        match playing.as_ref() {
+            Some(player) if is_second => player.abandon(),
+            Some(player) => player.interrupt(),
+            None => {}
+        }
+        if is_second {
             leave(130);
         }
     })

@@ -57,6 +57,8 @@ pub struct RecordAnswer {
     pub steps: u64,
     /// Episodes that other processes recorded into the same folder meanwhile.
     pub elsewhere: usize,
+    /// Episodes of participants who declined or left: not played, or deleted.
+    pub left_out: usize,
     /// The replies of this start.
     pub replies: RepliesAnswer,
     /// Episodes that were lost for want of an answer: in no trace, listed in `lost.jsonl` of the folder.
@@ -252,6 +254,13 @@ pub(crate) fn say(
         let episodes = counted(answer.elsewhere as u64, "episode");
         writeln!(out, "another process recorded {episodes} into the same folder meanwhile")?;
     }
+    if answer.left_out > 0 {
+        let episodes = counted(answer.left_out as u64, "episode");
+        writeln!(
+            out,
+            "{episodes} of participants who declined or left the study: not played, or deleted as they wanted"
+        )?;
+    }
     if let Some(words) = unreadable(&answer.replies.counts) {
         let first = answer.replies.first_unreadable.as_ref().map_or_else(String::new, UnreadableReply::words);
         writeln!(out, "{words}; first: {first}")?;
@@ -295,7 +304,8 @@ fn next(folder: &Path, files: &[&Path]) -> Vec<String> {
 }
 
 fn stopped(answer: &RecordAnswer) -> Option<String> {
-    let left = answer.asked - answer.found - answer.recorded - answer.elsewhere - answer.lost.len();
+    let ended = answer.found + answer.recorded + answer.elsewhere + answer.lost.len() + answer.left_out;
+    let left = answer.asked.saturating_sub(ended);
     let left = counted(left as u64, "episode");
     match answer.stopped_by_limit {
         0 => answer.stopped.then(|| format!("stopped, {left} to go: the same command continues")),

@@ -3,6 +3,7 @@
 use std::net::TcpListener;
 
 use serde_json::json;
+use world::agent::LostKind;
 use world::agent::vlm::OnOutage;
 use world::agent::vlm::limits::Limits;
 use world::agent::vlm::wire_format::Dialect;
@@ -72,6 +73,6 @@ fn a_model_without_images_is_no_outage() {
     let bench = Bench::new(Limits::default());
     let vlm = bench.vlm(&server, Dialect::OpenaiChat, OnOutage::StandStill);
     let lost = Bench::play(&vlm, "episode", 2).remove(1).unwrap_err();
-    assert!(lost.cause.contains("takes no images") && !lost.by_limit, "{lost}");
+    assert!(lost.cause.contains("takes no images") && lost.kind == LostKind::Failure, "{lost}");
     assert_eq!((vlm.stopped(), server.count()), (Some(lost.cause.as_str()), 2));
 }

@@ -3,6 +3,7 @@
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
+use world::agent::LostKind;
 use world::agent::vlm::OnOutage;
 use world::agent::vlm::limits::Limits;
 use world::agent::vlm::wire_format::Dialect;
@@ -22,7 +23,10 @@ fn limits_stop_before_the_request_over_them() {
     let replies = Bench::play(&vlm, "episode", 3);
     assert!(replies[0].is_ok() && replies[1].is_ok());
     let stopped = replies[2].as_ref().unwrap_err();
-    assert!(stopped.by_limit && stopped.cause.contains("limit of requests is reached: 2 of 2"), "{stopped}");
+    assert!(
+        stopped.kind == LostKind::Limit && stopped.cause.contains("limit of requests is reached: 2 of 2"),
+        "{stopped}"
+    );
     // An episode that comes later hears the same.
     assert_eq!(Bench::play(&vlm, "another", 1)[0].as_ref(), Err(stopped));
     assert_eq!(server.count(), 2);

@@ -245,6 +245,7 @@ impl Browser {
             "End" => (key, 35, ""),
             "Home" => (key, 36, ""),
             "/" => ("Slash", 191, "/"),
+            "a" => ("KeyA", 65, "a"),
             other => panic!("no key {other}"),
         };
         let mut event = json!({"type": "keyDown", "key": key, "code": code, "windowsVirtualKeyCode": number});

@@ -62,6 +62,26 @@ fn one_participant_is_one() {
     assert!(found.chance.iter().all(|row| row.verdict == Verdict::NotSeparated));
 }
 
+/// Eight people and a model on four scenes.
+#[test]
+fn people_who_play_the_same_scenes_are_no_retest_and_no_scenes() {
+    let people = (0..8).flat_map(|person| (0..4).map(move |scene| ("E1", "people", scene, person, person < 4, 9)));
+    let rows: Vec<Row> = people.chain((0..4).map(|scene| ("E1", "model", scene, 0, true, 9))).collect();
+    let mut table = labelled(&rows, "scene", by_scene);
+    let person = |row: &Row| (row.1 == "people").then(|| format!("P{}", row.3));
+    table
+        .labels
+        .extend(labelled(&rows, "participant", person).labels.into_iter().filter(|label| label.name == "participant"));
+    let options = Options { design: RECORDED, ..Options::default() };
+    let found = Statistics::of(&table, &cells(&table), &options).unwrap();
+    assert!(found.retests.is_empty(), "{:?}", found.retests);
+    let row = found.chance.iter().find(|row| row.model == "people" && row.metric == "TSA").unwrap();
+    assert_eq!(row.units.as_ref().map(|units| (units.n, units.name.as_str())), Some((8, "participants")));
+    let test = &found.models[0].tests[0].comparison;
+    let units = test.units.as_ref().map(|units| (units.n, units.name.as_str()));
+    assert_eq!((units, test.p, test.separated), (Some((4, "scenes against 8 participants")), None, false));
+}
+
 // Five scenes 4:0 and one 0:4 over four experiments. scipy 1.17.1: binomtest(1, 6).pvalue
 #[test]
 fn a_scene_of_four_experiments_counts_once() {

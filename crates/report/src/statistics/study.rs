@@ -130,13 +130,16 @@ impl<'a> Study<'a> {
 
     /// The unit of a row: the declared cluster, else the participant, else the scene, else the episode itself.
     pub fn unit(&self, row: usize) -> Unit {
-        let code = |label: Option<&TextColumn>| label.and_then(|label| label.code(row));
         if self.design.clusters() == Some(Cluster::Seed) {
             return Unit::Seed(self.table.keys.seed(row));
         }
-        let participants = self.table.label(PARTICIPANT).filter(|_| self.design.has_pairs());
-        let participant = code(participants).map(Unit::Participant);
-        participant.or_else(|| code(self.scenes()).map(Unit::Scene)).unwrap_or(Unit::Episode(row))
+        let scene = || self.scenes().and_then(|scenes| scenes.code(row)).map(Unit::Scene);
+        self.participant(row).map(Unit::Participant).or_else(scene).unwrap_or(Unit::Episode(row))
+    }
+
+    /// The person who played the episode of a row.
+    pub fn participant(&self, row: usize) -> Option<usize> {
+        self.table.label(PARTICIPANT).filter(|_| self.design.has_pairs()).and_then(|label| label.code(row))
     }
 
     /// The defined values of each unit of a block.

@@ -160,7 +160,7 @@ impl FunctionAgent {
                 Ok(Ok(said)) => return said.map_err(|fault| failed(&self.secrets, self.steps, &fault)),
                 Ok(Err(_)) => return Err(failed(&self.secrets, self.steps, "the function ended without a reply")),
                 Err(_) if self.stop.load(Ordering::Relaxed) => {
-                    return Err(Lost::by_limit("the recording is being stopped"));
+                    return Err(Lost::by_stop());
                 }
                 Err(_) => {}
             }

@@ -20,6 +20,7 @@ pub mod scripted;
 #[cfg(feature = "sim")]
 pub mod vlm;
 
+use std::collections::BTreeSet;
 use std::future::Future;
 use std::pin::Pin;
 use std::sync::Arc;
@@ -176,24 +177,46 @@ pub struct Lost {
     pub cause: String,
     /// The step that went wrong, where it is an earlier one than that at which it was noticed.
     pub step: Option<i32>,
-    /// Nothing failed: a limit of what may be spent is reached, and the episode waits for a higher one.
-    pub by_limit: bool,
+    pub kind: LostKind,
+}
+
+/// Why an episode cannot go on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LostKind {
+    /// Something failed.
+    Failure,
+    /// A limit of what may be spent is reached; the episode waits for a higher one.
+    Limit,
+    /// The recording is being stopped.
+    Stop,
+    /// The person who played it has left the study.
+    Leaving,
 }
 
 impl Lost {
     /// Lost to something other than a reply.
     pub fn because(cause: impl Into<String>) -> Self {
-        Self { status: None, cause: cause.into(), step: None, by_limit: false }
+        Self { status: None, cause: cause.into(), step: None, kind: LostKind::Failure }
     }
 
     /// Lost to the failure of a reply, which counts as this status.
     pub fn counted_as(status: Status, cause: impl Into<String>) -> Self {
-        Self { status: Some(status), cause: cause.into(), step: None, by_limit: false }
+        Self { status: Some(status), ..Self::because(cause) }
     }
 
     /// Stopped by a limit that a caller that records has set.
     pub fn by_limit(cause: impl Into<String>) -> Self {
-        Self { status: None, cause: cause.into(), step: None, by_limit: true }
+        Self { kind: LostKind::Limit, ..Self::because(cause) }
+    }
+
+    /// Ended with the recording.
+    pub fn by_stop() -> Self {
+        Self { kind: LostKind::Stop, ..Self::because("the recording is being stopped") }
+    }
+
+    /// Ended with a person's part in the study.
+    pub fn by_leaving() -> Self {
+        Self { kind: LostKind::Leaving, ..Self::because("the participant has left the study") }
     }
 }
 
@@ -235,7 +258,27 @@ pub enum Ended {
     Stopped,
 }
 
-/// A player: makes the agent of each episode.
+/// An episode that a recording is to have.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Planned {
+    pub episode_id: String,
+    pub experiment: String,
+    pub seed: i32,
+    pub repetition: i32,
+    /// True if it is recorded already.
+    pub is_recorded: bool,
+}
+
+/// When an episode can be played.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Turn {
+    Now,
+    Later,
+    /// Nobody is left who could play it.
+    Never,
+}
+
+/// Who plays: makes the agent of each episode.
 pub trait Player: Send + Sync {
     fn model(&self) -> &str;
 
@@ -261,6 +304,21 @@ pub trait Player: Send + Sync {
 
     fn most_in_flight(&self) -> usize {
         usize::MAX
+    }
+
+    /// Hears which episodes there are, before the first one is begun.
+    fn plans(&self, _planned: &[Planned]) {}
+
+    fn turn(&self, _episode_id: &str) -> Turn {
+        Turn::Now
+    }
+
+    /// The recording is to stop: nothing is waited for that a person has to do.
+    fn interrupt(&self) {}
+
+    /// The ids of episodes that their participants wanted deleted, and that are deleted now.
+    fn deleted(&self) -> Result<BTreeSet<String>, String> {
+        Ok(BTreeSet::new())
     }
 
     fn ended(&self, _is_complete: bool) {}

@@ -31,6 +31,13 @@ pub type RemovalError = Box<dyn Error + Send + Sync>;
 /// Removes all that a folder has of the person of this code. Nobody may record into it meanwhile: what they write is waited
 /// for.
 pub fn remove(folder: &Path, code: &str) -> Result<Removed, RemovalError> {
+    let mut removed = remove_episodes(folder, code)?;
+    removed.journal_lines = journal::remove(folder, code)?;
+    Ok(removed)
+}
+
+/// Removes the episodes of a person from the traces and logs of a folder.
+pub fn remove_episodes(folder: &Path, code: &str) -> Result<Removed, RemovalError> {
     if !folder.is_dir() {
         return Err(format!("{}: expected the folder of a recording, found none", folder.display()).into());
     }
@@ -40,7 +47,6 @@ pub fn remove(folder: &Path, code: &str) -> Result<Removed, RemovalError> {
     for trace in traces(folder).into_iter().chain(traces(&stake.parts())) {
         remove_from(&trace, code, &mut removed)?;
     }
-    removed.journal_lines = journal::remove(folder, code)?;
     Ok(removed)
 }
 

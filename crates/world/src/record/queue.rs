@@ -11,7 +11,8 @@ use super::error::StoreError;
 use super::failures::LostEpisode;
 use super::lock::EpisodeLock;
 use super::plan::Key;
-use super::store::{Store, Turn};
+use super::store::{Claim, Store};
+use crate::agent::Turn;
 use crate::sim::Experiment;
 
 /// The episodes of a recording that no thread has taken yet.
@@ -26,6 +27,8 @@ struct Waiting {
     keys: VecDeque<Key>,
     /// Those that other processes have recorded since.
     elsewhere: Vec<Key>,
+    /// Those that nobody is left to play.
+    left_out: usize,
     experiments: BTreeMap<Experiment, Outcomes>,
     complete: Vec<Complete>,
 }
@@ -55,6 +58,11 @@ impl Waiting {
             Some(lost) => outcomes.lost.push((key, lost)),
             None => outcomes.recorded.push(key),
         }
+        self.count(key);
+    }
+
+    fn count(&mut self, key: Key) {
+        let outcomes = self.experiments.entry(key.experiment).or_default();
         outcomes.left = outcomes.left.saturating_sub(1);
         if outcomes.left == 0 {
             let Outcomes { recorded, lost, .. } = std::mem::take(outcomes);
@@ -69,6 +77,8 @@ pub enum Next {
     Play(Key, EpisodeLock),
     /// Ask again later: other processes have all that are left.
     Held(Held),
+    /// Ask again later: who is to play those that are left plays others now.
+    Later,
     /// Nothing: all are taken.
     Nothing,
 }
@@ -91,7 +101,8 @@ impl<'a> Queue<'a> {
             experiments.entry(key.experiment).or_default().left += 1;
         }
         let (elsewhere, complete) = (Vec::new(), Vec::new());
-        let waiting = Waiting { keys: keys.iter().copied().collect(), elsewhere, experiments, complete };
+        let keys = keys.iter().copied().collect();
+        let waiting = Waiting { keys, elsewhere, left_out: 0, experiments, complete };
         Self { store, waiting: Mutex::new(waiting) }
     }
 
@@ -99,26 +110,50 @@ impl<'a> Queue<'a> {
         self.waiting().experiments.keys().copied().collect()
     }
 
-    /// The next episode, with its lock.
-    pub fn next(&self) -> Result<Next, StoreError> {
+    /// The next episode whose turn it is, with its lock.
+    pub fn next(&self, turn: impl Fn(Key) -> Turn) -> Result<Next, StoreError> {
         let mut waiting = self.waiting();
-        let mut held = None;
+        let (mut held, mut at, mut is_later) = (None, 0, false);
         for _ in 0..waiting.keys.len() {
-            let Some(key) = waiting.keys.pop_front() else { break };
+            let Some(key) = waiting.keys.get(at).copied() else { break };
+            match turn(key) {
+                Turn::Now => waiting.keys.remove(at),
+                Turn::Later => {
+                    (at, is_later) = (at + 1, true);
+                    continue;
+                }
+                Turn::Never => {
+                    waiting.keys.remove(at);
+                    waiting.left_out += 1;
+                    waiting.count(key);
+                    continue;
+                }
+            };
             match self.store.turn(key)? {
-                Turn::Ours(lock) => return Ok(Next::Play(key, lock)),
-                Turn::Recorded => {
+                Claim::Ours(lock) => return Ok(Next::Play(key, lock)),
+                Claim::Recorded => {
                     waiting.elsewhere.push(key);
                     waiting.end(key, None);
                 }
-                Turn::Theirs(process) => {
+                Claim::Theirs(process) => {
                     waiting.keys.push_back(key);
                     held = held.or(Some((key, process)));
                 }
             }
         }
         let count = waiting.keys.len();
-        Ok(held.map_or(Next::Nothing, |(key, process)| Next::Held(Held { key, process, count })))
+        let nothing = if is_later { Next::Later } else { Next::Nothing };
+        Ok(held.map_or(nothing, |(key, process)| Next::Held(Held { key, process, count })))
+    }
+
+    /// Takes back an episode whose player has left.
+    pub fn again(&self, key: Key) {
+        self.waiting().keys.push_back(key);
+    }
+
+    /// The number of episodes that nobody is left to play.
+    pub fn left_out(&self) -> usize {
+        self.waiting().left_out
     }
 
     /// Notes that an episode which was taken is recorded, or lost.

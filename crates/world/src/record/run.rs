@@ -22,7 +22,7 @@ use super::rollout::{self, Nobody, Observer, Played, Stage};
 use super::shares::Shares;
 use super::store::Store;
 use super::unusable::{GivenUp, Unusable};
-use crate::agent::{Agent, Ended, Player};
+use crate::agent::{Agent, Ended, Lost, LostKind, Player};
 use crate::replay::log::{Log, Seen};
 use crate::sim::camera::Camera;
 use crate::sim::config::WorldConfig;
@@ -49,7 +49,15 @@ const PRACTICE_SEED: i32 = 9_000;
 /// The time between two looks at episodes that other processes have.
 const AGAIN: Duration = Duration::from_millis(50);
 
-/// The settings of a recording.
+/// Whether a thread asks again for episodes that it could not take.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Wait {
+    No,
+    Later,
+    Held(Held),
+}
+
+/// How a recording is run.
 #[derive(Clone, Copy, Debug)]
 pub struct Settings {
     /// Threads, each with an eye of its own.
@@ -77,6 +85,8 @@ pub struct Tally {
     pub under_way: Vec<Key>,
     /// A limit of what may be spent stopped it.
     pub by_limit: bool,
+    /// Episodes that are not played, since their participants have left.
+    pub left_out: usize,
     /// Episodes that other processes recorded meanwhile.
     pub elsewhere: Vec<Key>,
     /// The recording was stopped before its end.
@@ -134,7 +144,8 @@ impl Recording<'_> {
             workers.into_iter().map(|worker| worker.join().unwrap_or_else(|_| Err(panicked()))).collect::<Vec<_>>()
         });
         let (elsewhere, given_up) = (queue.elsewhere(), unusable.given_up());
-        let mut tally = Tally { elsewhere, given_up, stopped: queue.has_more(), ..Tally::default() };
+        let (stopped, left_out) = (queue.has_more(), queue.left_out());
+        let mut tally = Tally { left_out, elsewhere, stopped, given_up, ..Tally::default() };
         for result in results {
             let part = result?;
             tally.recorded.extend(part.recorded);
@@ -176,16 +187,16 @@ impl Recording<'_> {
             };
             let mut under_way = FuturesUnordered::new();
             loop {
-                let held = self.take_up(queue, each, &mut under_way, play)?;
+                let wait = self.take_up(queue, each, &mut under_way, play)?;
                 self.assemble(queue);
-                let ended = match held {
-                    None => under_way.next().await,
-                    Some(held) if under_way.is_empty() => self.wait(held).await,
-                    Some(_) => tokio::time::timeout(AGAIN, under_way.next()).await.unwrap_or_default(),
+                let ended = match wait {
+                    Wait::No => under_way.next().await,
+                    _ if under_way.is_empty() => self.wait(wait).await,
+                    _ => tokio::time::timeout(AGAIN, under_way.next()).await.unwrap_or_default(),
                 };
                 match ended {
                     Some((key, result)) => self.note(queue, key, result, &mut tally)?,
-                    None if held.is_none() => break,
+                    None if wait == Wait::No => break,
                     None => {}
                 }
             }
@@ -203,27 +214,30 @@ impl Recording<'_> {
         }
     }
 
-    /// Takes episodes until so many are under way. Gives one that another process has, if other processes have all that
-    /// are left.
+    /// Takes episodes until so many are under way; says whether those that are left are to be asked for again.
     fn take_up<F>(
         &self,
         queue: &Queue<'_>,
         each: usize,
         under_way: &mut FuturesUnordered<F>,
         play: impl Fn(Key, EpisodeLock) -> F,
-    ) -> Result<Option<Held>, RecordError> {
+    ) -> Result<Wait, RecordError> {
+        let turn = |key: Key| self.player.turn(&key.episode_id(self.subject));
         while under_way.len() < each && !self.stop.load(Ordering::Relaxed) {
-            match queue.next().map_err(RecordError::fatal)? {
+            match queue.next(turn).map_err(RecordError::fatal)? {
                 Next::Play(key, lock) => under_way.push(play(key, lock)),
-                Next::Held(held) => return Ok(Some(held)),
+                Next::Held(held) => return Ok(Wait::Held(held)),
+                Next::Later => return Ok(Wait::Later),
                 Next::Nothing => break,
             }
         }
-        Ok(None)
+        Ok(Wait::No)
     }
 
-    async fn wait<T>(&self, held: Held) -> Option<T> {
-        self.progress.waiting(&held.key.episode_id(self.subject), held);
+    async fn wait<T>(&self, wait: Wait) -> Option<T> {
+        if let Wait::Held(held) = wait {
+            self.progress.waiting(&held.key.episode_id(self.subject), held);
+        }
         tokio::time::sleep(AGAIN).await;
         None
     }
@@ -311,9 +325,11 @@ impl Recording<'_> {
                 tally.under_way.push(key);
                 tally.stopped = true;
             }
-            Err(RecordError::Lost { lost, .. }) if lost.by_limit => {
+            Err(RecordError::Lost { lost: Lost { kind: LostKind::Leaving, .. }, .. }) => queue.again(key),
+            Err(RecordError::Lost { lost: Lost { kind: kind @ (LostKind::Limit | LostKind::Stop), .. }, .. }) => {
                 tally.under_way.push(key);
-                (tally.stopped, tally.by_limit) = (true, true);
+                tally.stopped = true;
+                tally.by_limit |= kind == LostKind::Limit;
                 self.stop.store(true, Ordering::Relaxed);
             }
             Err(RecordError::Lost { step, lost }) => {

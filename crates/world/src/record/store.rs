@@ -41,9 +41,9 @@ pub struct Store {
     index: RecordingIndex,
 }
 
-/// Whose turn it is to record an episode.
+/// Who has an episode to record.
 #[derive(Debug)]
-pub enum Turn {
+pub enum Claim {
     /// This process's, as long as it keeps the lock.
     Ours(EpisodeLock),
     /// Another process's, of this id as far as it is known.
@@ -89,19 +89,19 @@ impl Store {
     }
 
     /// Takes an episode, unless it is recorded or another process has it.
-    pub fn turn(&self, key: Key) -> Result<Turn, StoreError> {
+    pub fn turn(&self, key: Key) -> Result<Claim, StoreError> {
         let lock = match EpisodeLock::attempt(&self.part(key).with_extension("lock"))? {
-            Attempt::Theirs(process) => return Ok(Turn::Theirs(process)),
+            Attempt::Theirs(process) => return Ok(Claim::Theirs(process)),
             Attempt::Ours(lock) => lock,
         };
         if self.is_recorded(key)? {
-            return Ok(Turn::Recorded);
+            return Ok(Claim::Recorded);
         }
         // A process that was killed before it committed the episode may have left its log.
         let log = self.log_part(key);
         match fs::remove_file(&log) {
             Err(error) if error.kind() != io::ErrorKind::NotFound => Err(StoreError::io("remove", &log)(error)),
-            _ => Ok(Turn::Ours(lock)),
+            _ => Ok(Claim::Ours(lock)),
         }
     }
 

@@ -26,9 +26,9 @@ use crate::cli::registration::registration;
 use crate::cli::vlm::VlmArgs;
 use exact::escape::visible;
 use exact::suggest::hint;
-use world::agent::Player;
 use world::agent::scripted::{Renamed, Scripted};
 use world::agent::vlm::probe::ProbeAnswer;
+use world::agent::{Planned, Player};
 use world::record::error::StoreError;
 use world::record::index::{Place, RecordingIndex};
 use world::record::metadata::Recordings;
@@ -38,6 +38,9 @@ use world::record::shares::{Shares, Spent};
 use world::record::store::Store;
 use world::sim::Experiment;
 use world::sim::config::WorldConfig;
+
+/// The agent that is people.
+const HUMAN: &str = "human";
 
 /// Record episodes of an agent in the mirror world: step traces for `report`, logs with the frames
 ///
@@ -85,7 +88,7 @@ pub struct RecordArgs {
     /// A world configuration in TOML over the built-in one
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// Episodes under way at once, of people at most one each [default: as many as the agent makes worth while]
+    /// Episodes under way at once [default: as many as the agent makes worth while]; of people always one each
     #[arg(long, value_name = "N")]
     in_flight: Option<NonZeroUsize>,
     /// Stop after this many replies in a row without a decision
@@ -238,13 +241,22 @@ impl RecordArgs {
 
     /// The player that `--agent` names.
     pub fn player(&self) -> Result<Arc<dyn Player>, Failure> {
+        self.player_who(true)
+    }
+
+    /// The same; people are not asked to play where nothing is recorded.
+    #[cfg_attr(not(feature = "view"), expect(unused_variables, reason = "people play with the feature alone"))]
+    fn player_who(&self, plays: bool) -> Result<Arc<dyn Player>, Failure> {
         if let Some(command) = self.agent.strip_prefix("exec:") {
             return Ok(Arc::new(self.exec.player(command, self.vlm.name(), &self.out)?));
         }
         match self.agent.as_str() {
             "vlm" => Ok(Arc::new(self.vlm.player(&self.out)?)),
             #[cfg(feature = "view")]
-            "human" => Ok(Arc::new(self.human.player(self.vlm.name(), &self.out, !self.dry_run)?)),
+            HUMAN => {
+                let each = (self.seeds, self.repeats);
+                Ok(Arc::new(self.human.player(self.vlm.name(), each, &self.out, plays)?))
+            }
             name => {
                 let script = scripted(name)?;
                 let model = self.vlm.name().unwrap_or_else(|| script.name()).to_owned();
@@ -271,7 +283,12 @@ impl RecordArgs {
                 handed.join(", ")
             )));
         }
-        Ok(Plan { experiments, seeds: self.seeds, runs: self.runs, repeats: self.repeats, shard: self.shard })
+        let plan = Plan { experiments, seeds: self.seeds, runs: self.runs, repeats: self.repeats, shard: self.shard };
+        #[cfg(feature = "view")]
+        if self.agent == HUMAN {
+            return self.human.spread(plan);
+        }
+        Ok(plan)
     }
 
     fn forecast(&self) -> Result<ForecastAnswer, Failure> {
@@ -280,7 +297,7 @@ impl RecordArgs {
         let vlm = (self.agent == "vlm").then(|| self.vlm.forecaster(&self.out)).transpose()?.map(Arc::new);
         let player = match &vlm {
             Some(vlm) => Arc::clone(vlm) as Arc<dyn Player>,
-            None => self.player()?,
+            None => self.player_who(false)?,
         };
         let subject = self.subject(player.as_ref());
         let recording = self.recordings(config, plan, player.as_ref())?;
@@ -311,6 +328,7 @@ impl RecordArgs {
         if !todo.is_empty() {
             player.check().map_err(Failure::input)?;
         }
+        player.plans(&to_play(subject, &planned, &todo));
         let bar = Bar::new(player, subject, &todo, config);
         let shares = Shares::default();
         let start = Instant::now();
@@ -319,12 +337,16 @@ impl RecordArgs {
         let outcome = recording.run(&todo);
         // What is whole is put together whatever ended the recording.
         let assembled = plan.experiments.iter().try_for_each(|experiment| store.assemble(*experiment));
+        let deleted = player.deleted();
         bar.clear();
         player.ended(outcome.as_ref().is_ok_and(|tally| !tally.stopped));
         let tally = outcome.map_err(Failure::input)?;
         assembled.map_err(Failure::input)?;
-        let found = others(&planned, &todo);
-        let Tally { recorded, elsewhere, lost, under_way, by_limit, steps, stopped, given_up } = tally;
+        let deleted = deleted.map_err(Failure::input)?;
+        let stays = |key: &Key| !deleted.contains(&key.episode_id(subject));
+        let found: Vec<Key> = others(&planned, &todo).into_iter().filter(stays).collect();
+        let Tally { recorded, elsewhere, lost, under_way, by_limit, left_out, steps, stopped, given_up } = tally;
+        let recorded: Vec<Key> = recorded.into_iter().filter(stays).collect();
         let all = [found.as_slice(), &recorded, &elsewhere].concat();
         let lost_here = lost.len();
         let lost = store.note_lost(&all, lost).map_err(Failure::input)?;
@@ -334,6 +356,7 @@ impl RecordArgs {
             found: found.len(),
             recorded: recorded.len(),
             elsewhere: elsewhere.len() + lost_here - lost.len(),
+            left_out: left_out + planned.iter().filter(|key| !stays(key)).count(),
             steps,
             replies: bar.replies(),
             lost,
@@ -358,7 +381,8 @@ impl RecordArgs {
 
     fn settings(&self, player: &dyn Player) -> Settings {
         let count = |number| NonZeroUsize::new(number).unwrap_or(NonZeroUsize::MIN);
-        let in_flight = self.in_flight.unwrap_or_else(|| count(player.in_flight()).max(self.threads.count()));
+        let asked = self.in_flight.filter(|_| self.agent != HUMAN);
+        let in_flight = asked.unwrap_or_else(|| count(player.in_flight()).max(self.threads.count()));
         Settings {
             threads: self.threads.count(),
             in_flight: in_flight.min(count(player.most_in_flight())),
@@ -390,8 +414,7 @@ fn scripted(name: &str) -> Result<Scripted, Failure> {
     if let Some(scripted) = Scripted::named(name) {
         return Ok(scripted);
     }
-    let known: Vec<&str> =
-        Scripted::ALL.iter().map(|agent| agent.name()).chain(["vlm", "human", "exec:'CMD'"]).collect();
+    let known: Vec<&str> = Scripted::ALL.iter().map(|agent| agent.name()).chain(["vlm", HUMAN, "exec:'CMD'"]).collect();
     let near = hint(name, known.iter().copied());
     Err(Failure::input(format!("no agent is called `{name}`{near}; expected one of {}", known.join(", "))))
 }
@@ -408,6 +431,18 @@ fn unrecorded(
         todo.extend(own.filter(|key| !done.contains(&(key.seed, key.run, key.repetition))));
     }
     Ok(todo)
+}
+
+fn to_play(subject: &Subject, planned: &[Key], todo: &[Key]) -> Vec<Planned> {
+    let todo: BTreeSet<&Key> = todo.iter().collect();
+    let one = |key: &Key| Planned {
+        episode_id: key.episode_id(subject),
+        experiment: key.experiment.name().to_owned(),
+        seed: key.seed,
+        repetition: key.repetition,
+        is_recorded: !todo.contains(key),
+    };
+    planned.iter().map(one).collect()
 }
 
 fn others(planned: &[Key], todo: &[Key]) -> Vec<Key> {

@@ -206,7 +206,7 @@ impl Compared<'_, '_> {
             withheld: Some(Withheld::Dependent),
             pairs: self.matched.pairs.as_ref().filter(|_| !self.is_dependent()).map(table),
             p: test.map(|test| test.p),
-            units: Some(Units::new(self.study, self.first, sides.len(), least, self.confidence)),
+            units: Some(Units::between(self.study, [self.first, self.second], sides, least, self.confidence)),
             ..Comparison::of(Method::Units, [a.n, b.n])
         }
     }

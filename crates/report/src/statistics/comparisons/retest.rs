@@ -1,7 +1,9 @@
 //! The same scene played again by the same model: how often a verdict comes out otherwise.
 //!
 //! Rule: what one scene gives from one time to the next is noise, and a difference has to exceed it. Every two times of a
-//! scene count once, each scene with the same weight.
+//! scene count once, each scene with the same weight. Two people who play one scene are no repetition.
+
+use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -47,17 +49,17 @@ impl RetestRow {
             return Vec::new();
         }
         let of_block = |block| {
-            let scenes = Scenes::of(study, block);
-            study.rates().filter_map(|column| Self::of(block, &scenes, column)).collect::<Vec<_>>()
+            let times = times(study, block);
+            study.rates().filter_map(|column| Self::of(block, &times, column)).collect::<Vec<_>>()
         };
         study.blocks().flat_map(of_block).collect()
     }
 
     #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
-    fn of(block: &Block, scenes: &Scenes, column: &MetricColumn) -> Option<Self> {
+    fn of(block: &Block, times: &Times, column: &MetricColumn) -> Option<Self> {
         let (mut count, mut episodes, mut unstable, mut flipped) = (0, 0, 0, 0.0);
         let mut parts = Vec::new();
-        for rows in scenes.rows.values() {
+        for rows in times.values() {
             let values: Vec<i64> = rows.iter().filter_map(|row| column.get(*row)).collect();
             let (times, successes) = (values.len() as u64, values.iter().filter(|value| **value == 1).count() as u64);
             if times < 2 {
@@ -86,6 +88,19 @@ impl RetestRow {
     }
 }
 
+/// The rows of each scene, of each person apart.
+type Times = BTreeMap<(usize, Option<usize>), Vec<usize>>;
+
+fn times(study: &Study, block: &Block) -> Times {
+    let mut times = Times::new();
+    for (scene, rows) in Scenes::of(study, block).rows {
+        for row in rows {
+            times.entry((scene, study.participant(row))).or_default().push(row);
+        }
+    }
+    times
+}
+
 #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
 pub(in crate::statistics) fn repeat_variance(study: &Study, block: &Block, column: &MetricColumn) -> Option<f64> {
     if !block.repeats {
@@ -95,7 +110,7 @@ pub(in crate::statistics) fn repeat_variance(study: &Study, block: &Block, colum
         let values = rows.into_iter().filter_map(|row| column.get(row));
         values.fold(Moments::default(), |sum, value| sum.with(value).expect("a part of a block that was summed whole"))
     };
-    let parts: Vec<Moments> = Scenes::of(study, block).rows.into_values().map(moments).collect();
+    let parts: Vec<Moments> = times(study, block).into_values().map(moments).collect();
     let n: u64 = parts.iter().map(|part| part.n).sum();
     Some(variance_components(&parts)?.1 / n as f64)
 }

@@ -30,6 +30,17 @@ impl Units {
     }
 }
 
+impl Units {
+    /// Those of two sides. Units of different kinds, such as participants and scenes, have no test between them.
+    pub(super) fn between(study: &Study, blocks: [&Block; 2], sides: &Sides, least: f64, confidence: f64) -> Self {
+        let ([first, second], names) = (sides.counts(), blocks.map(|block| study.unit_name(block)));
+        if names[0] == names[1] {
+            return Self::new(study, blocks[0], first.min(second), least, confidence);
+        }
+        Self { n: first as u64, name: format!("{} against {second} {}", names[0], names[1]), too_few: true }
+    }
+}
+
 /// True if no symmetric test of so many units or episodes, or none with this least p value, can reach the level.
 pub(in crate::statistics) fn too_few(n: usize, least: f64, confidence: f64) -> bool {
     level(confidence).is_none_or(|level| least > level || n < fewest_clusters(level))
@@ -76,11 +87,15 @@ impl Sides {
 
     /// The units on the smaller side.
     pub fn len(&self) -> usize {
-        let [first, second] = self
-            .units
-            .values()
-            .fold([0, 0], |[first, second], (a, b)| [first + usize::from(a.n > 0), second + usize::from(b.n > 0)]);
-        first.min(second)
+        self.counts().into_iter().min().unwrap_or_default()
+    }
+
+    /// The units on each side.
+    fn counts(&self) -> [usize; 2] {
+        let has = |[first, second]: [usize; 2], (a, b): &(Moments, Moments)| {
+            [first + usize::from(a.n > 0), second + usize::from(b.n > 0)]
+        };
+        self.units.values().fold([0, 0], has)
     }
 
     /// The units that both sides have and those of one; `None` where the units of the two sides are of different kinds.

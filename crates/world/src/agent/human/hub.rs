@@ -1,104 +1,77 @@
-//! The queue between episodes and people.
+//! The participants of a recording: who plays what, who is asked what, who has left.
+//!
+//! Rule: an episode belongs to one participant, and a participant plays one episode at a time. What a participant decides
+//! about their part in the study is on the disk before it is done.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use serde_json::{Value, json};
+use serde_json::Value;
 use tokio::sync::oneshot;
 
-use super::journal::{Entry, Journal};
+use super::design::{Design, Schedule};
+use super::journal::{Entry, Journal, Leaving};
+use super::seat::{Asked, End, Given, LISTENING, Question, Seat, Terms};
+use crate::agent::{Planned, Turn};
 use trace::frame::Frame;
-use trace::palette::Color;
 
-/// The question to a person at a step: the same that a model gets.
-#[derive(Clone, Debug)]
-pub struct Question {
-    pub frame: Arc<Frame>,
-    pub system: String,
-    pub user: String,
-    /// The step, from 1.
-    pub t: i32,
-    /// True if it is of a practice episode.
-    pub is_practice: bool,
-    /// The keys of a reply.
-    pub keys: Vec<&'static str>,
-    /// The letters or numbers of what can be done.
-    pub actions: Vec<&'static str>,
-}
+/// Removes the episodes of a code from a folder; gives their ids.
+pub type Eraser = fn(&Path, &str) -> Result<BTreeSet<String>, String>;
 
-/// A person's answer.
-#[derive(Debug)]
-pub struct Given {
-    /// The JSON object of a reply.
-    pub reply: String,
-    /// From the frame to the reply, ms; breaks do not count.
-    pub latency_ms: i32,
-}
+/// The longest wait for an episode under way to end before it is deleted.
+const ENDING: Duration = Duration::from_mins(1);
 
 /// The people of a recording.
 #[derive(Debug)]
 pub struct Hub {
-    consent: Option<String>,
+    terms: Terms,
+    schedule: Schedule,
     seats: Vec<Mutex<Seat>>,
+    tokens: Vec<String>,
     answers: BTreeMap<(String, String, i32), Entry>,
     journal: Mutex<Journal>,
-    tokens: Vec<String>,
-    codes: Vec<String>,
-}
-
-#[derive(Debug, Default)]
-struct Seat {
-    episode: Option<String>,
-    has_agreed: bool,
-    has_practised: bool,
-    is_ready: bool,
-    asked: Option<Asked>,
-    begun: usize,
-    played: usize,
-    number: u64,
-    seen: Option<Instant>,
-    end: Option<End>,
-}
-
-/// The end of a recording, as a page gets it.
-#[derive(Clone, Copy, Debug)]
-struct End {
-    is_complete: bool,
-    is_told: bool,
-}
-
-/// The time in which a page that is open asks again.
-const LISTENING: Duration = Duration::from_secs(3);
-
-#[derive(Debug)]
-struct Asked {
-    question: Question,
-    answer: Option<oneshot::Sender<Given>>,
-    shown: Option<Instant>,
-    breaks: Duration,
-    pause: Option<Instant>,
+    eraser: Eraser,
+    /// The participant of each episode that is still to be played.
+    owners: Mutex<BTreeMap<String, usize>>,
+    deleted: Mutex<BTreeSet<String>>,
+    is_stopping: AtomicBool,
 }
 
 impl Hub {
-    /// People of these codes, each with a token for their link; `consent` is what they agree to before they begin.
-    pub fn new(people: Vec<(String, String)>, consent: Option<String>, journal: Journal) -> Self {
+    /// People of these codes, each with the token of their link.
+    pub fn new(
+        people: Vec<(String, String)>,
+        terms: Terms,
+        schedule: Schedule,
+        journal: Journal,
+        eraser: Eraser,
+    ) -> Self {
         let key = |entry: &Entry| (entry.episode_id.clone(), entry.participant.clone(), entry.t);
         let answers = journal.entries().into_iter().map(|entry| (key(&entry), entry)).collect();
-        let seat = |code: &String| {
-            let (has_agreed, has_practised) =
-                (journal.has_agreed(code, consent.as_deref()), journal.has_practised(code));
-            Mutex::new(Seat { has_agreed, has_practised, ..Seat::default() })
-        };
         let (codes, tokens): (Vec<String>, Vec<String>) = people.into_iter().unzip();
-        let seats = codes.iter().map(seat).collect();
-        Self { consent, seats, answers, journal: Mutex::new(journal), tokens, codes }
+        let seat = |code: String| Seat {
+            has_agreed: journal.has_agreed(&code, terms.consent.as_deref()),
+            has_practised: journal.has_practised(&code),
+            left: journal.left(&code),
+            code,
+            ..Seat::default()
+        };
+        let seats = codes.into_iter().map(seat).map(Mutex::new).collect();
+        let (journal, owners, deleted) = (Mutex::new(journal), Mutex::default(), Mutex::default());
+        let is_stopping = AtomicBool::new(false);
+        Self { terms, schedule, seats, tokens, answers, journal, eraser, owners, deleted, is_stopping }
     }
 
-    /// The consent text, if there is one.
-    pub fn consent(&self) -> Option<&str> {
-        self.consent.as_deref()
+    pub fn terms(&self) -> &Terms {
+        &self.terms
+    }
+
+    pub fn schedule(&self) -> &Schedule {
+        &self.schedule
     }
 
     /// The number of people.
@@ -106,37 +79,88 @@ impl Hub {
         self.seats.len()
     }
 
-    /// The code of a person.
-    pub fn code(&self, seat: usize) -> String {
-        self.codes[seat].clone()
+    pub(super) fn code(&self, seat: usize) -> String {
+        self.locked(seat).code.clone()
     }
 
     pub(super) fn seat_of(&self, token: &str) -> Option<usize> {
         self.tokens.iter().position(|own| own == token)
     }
 
-    /// Gives an episode to a person: to the one who began it, else to the next who has none.
-    pub fn seat(&self, episode_id: &str) -> Option<usize> {
-        let has_begun = |code: &String| {
-            let first = (episode_id.to_owned(), code.clone(), 0);
-            self.answers.range(first..).next().is_some_and(|((id, own, _), _)| id == episode_id && own == code)
-        };
-        let is_free = |seat: &usize| self.locked(*seat).episode.is_none();
-        let mut own = (0..self.seats.len()).filter(|seat| has_begun(&self.codes[*seat]));
-        let seat = own.find(is_free).or_else(|| (0..self.seats.len()).find(is_free))?;
-        let mut taken = self.locked(seat);
-        taken.episode = Some(episode_id.to_owned());
-        taken.begun += 1;
-        drop(taken);
+    /// Deals the episodes: those begun to who began them, those of people who left to the others where the design lets them.
+    pub(super) fn deal(&self, planned: &[Planned]) {
+        let mut left_over = Vec::new();
+        for (at, lane) in self.schedule.lanes(planned, self.seats()).into_iter().enumerate() {
+            for episode in lane {
+                let own = if self.schedule.design == Design::Split { self.begun_by(&episode.episode_id) } else { None };
+                let at = own.unwrap_or(at);
+                let mut seat = self.locked(at);
+                match (episode.is_recorded, seat.left) {
+                    (true, _) => seat.played += 1,
+                    (false, Some(_)) => left_over.push(episode.episode_id.clone()),
+                    (false, None) => {
+                        seat.lane.push_back(episode.episode_id.clone());
+                        self.owners().insert(episode.episode_id.clone(), at);
+                    }
+                }
+            }
+        }
+        self.deal_again(left_over);
+        (0..self.seats()).for_each(|seat| self.locked(seat).is_dealt = true);
+    }
+
+    fn begun_by(&self, episode_id: &str) -> Option<usize> {
+        (0..self.seats()).find(|seat| self.has_begun(*seat, episode_id))
+    }
+
+    fn has_begun(&self, seat: usize, episode_id: &str) -> bool {
+        let first = (episode_id.to_owned(), self.code(seat), 0);
+        let last = (first.0.clone(), first.1.clone(), i32::MAX);
+        self.answers.range(first..=last).next().is_some()
+    }
+
+    /// What a participant who left has not played: split among the others, or left out.
+    fn deal_again(&self, episodes: Vec<String>) {
+        let stays = |seat: &usize| self.schedule.design == Design::Split && self.locked(*seat).left.is_none();
+        let others: Vec<usize> = (0..self.seats()).filter(stays).collect();
+        for (at, episode) in episodes.into_iter().enumerate() {
+            if others.is_empty() {
+                self.owners().remove(&episode);
+                continue;
+            }
+            let seat = others[at % others.len()];
+            self.locked(seat).lane.push_back(episode.clone());
+            self.owners().insert(episode, seat);
+        }
+    }
+
+    pub(super) fn turn(&self, episode_id: &str) -> Turn {
+        let Some(seat) = self.owners().get(episode_id).copied() else { return Turn::Never };
+        let seat = self.locked(seat);
+        let is_next = seat.episode.is_none() && seat.lane.front().is_some_and(|next| next == episode_id);
+        if is_next { Turn::Now } else { Turn::Later }
+    }
+
+    /// Gives an episode to its participant, who begins it when they are ready; `None` if nobody is to play it.
+    pub(super) fn sit(&self, episode_id: &str) -> Option<usize> {
+        let seat = self.owners().get(episode_id).copied()?;
+        let has_begun = self.has_begun(seat, episode_id);
+        let mut own = self.locked(seat);
+        if own.left.is_some() {
+            return None;
+        }
+        own.episode = Some(episode_id.to_owned());
+        own.is_ready = own.has_practised && !has_begun;
+        drop(own);
         Some(seat)
     }
 
     pub(super) fn answered(&self, seat: usize, episode_id: &str, t: i32) -> Option<Entry> {
-        self.answers.get(&(episode_id.to_owned(), self.codes[seat].clone(), t)).cloned()
+        self.answers.get(&(episode_id.to_owned(), self.code(seat), t)).cloned()
     }
 
     pub(super) fn keep(&self, entry: Entry) -> io::Result<()> {
-        self.journal.lock().unwrap_or_else(PoisonError::into_inner).keep(entry)
+        self.journal().keep(entry)
     }
 
     pub(super) fn has_practised(&self, seat: usize) -> bool {
@@ -150,32 +174,54 @@ impl Hub {
 
     pub(super) fn begin(&self, seat: usize) {
         let mut own = self.locked(seat);
-        if !std::mem::take(&mut own.is_ready) {
+        if !std::mem::take(&mut own.is_ready) || std::mem::replace(&mut own.has_practised, true) {
             return;
         }
-        own.has_practised = true;
+        let code = own.code.clone();
         drop(own);
         // What is lost with the journal is that the practice is behind: it comes again.
-        let _ = self.journal.lock().unwrap_or_else(PoisonError::into_inner).practised(&self.codes[seat]);
+        let _ = self.journal().practised(&code);
     }
 
-    /// Asks a person and waits for the answer, for as long as it takes; `None` where nobody can answer any more.
+    /// Asks a person and waits for the answer, for as long as it takes; `None` if the person leaves or the recording stops.
     pub(super) async fn ask(&self, seat: usize, question: Question) -> Option<Given> {
         let (sender, answer) = oneshot::channel();
         {
             let mut seat = self.locked(seat);
+            if self.is_stopping() || seat.left.is_some() {
+                return None;
+            }
             seat.number += 1;
             seat.is_ready &= !question.is_practice;
-            let (shown, breaks, pause) = (None, Duration::ZERO, None);
-            seat.asked = Some(Asked { question, answer: Some(sender), shown, breaks, pause });
+            seat.asked = Some(Asked::new(question, sender));
         }
         answer.await.ok()
     }
 
-    pub(super) fn over(&self, seat: usize, is_whole: bool) {
-        let mut seat = self.locked(seat);
-        (seat.episode, seat.asked) = (None, None);
-        seat.played += usize::from(is_whole);
+    pub(super) fn is_stopping(&self) -> bool {
+        self.is_stopping.load(Ordering::Relaxed)
+    }
+
+    /// Nobody is waited for any more.
+    pub(super) fn interrupt(&self) {
+        self.is_stopping.store(true, Ordering::Relaxed);
+        (0..self.seats()).for_each(|seat| self.locked(seat).asked = None);
+    }
+
+    /// An episode is over; one that is not recorded is neither played nor asked for again in this start.
+    pub(super) fn over(&self, seat: usize, episode_id: &str, is_whole: bool) {
+        let mut own = self.locked(seat);
+        (own.episode, own.asked) = (None, None);
+        own.played += usize::from(is_whole);
+        let goes_on = !is_whole && (own.left.is_some() || self.is_stopping());
+        drop(own);
+        if goes_on {
+            return;
+        }
+        let owner = self.owners().remove(episode_id);
+        if let Some(owner) = owner {
+            self.locked(owner).lane.retain(|id| id != episode_id);
+        }
     }
 
     /// The recording is over. Waits a moment for the pages that are open to ask, so that they can say so.
@@ -183,89 +229,83 @@ impl Hub {
         let start = Instant::now();
         let seats = || (0..self.seats.len()).map(|seat| self.locked(seat));
         seats().for_each(|mut seat| seat.end = Some(End { is_complete, is_told: false }));
-        let is_open = |seat: &Seat| seat.seen.is_some_and(|seen| seen.elapsed() < LISTENING);
-        let is_due = |seat: &Seat| is_open(seat) && seat.end.is_some_and(|end| !end.is_told);
+        let is_due = |seat: &Seat| seat.is_open() && seat.end.is_some_and(|end| !end.is_told);
         while start.elapsed() < LISTENING && seats().any(|seat| is_due(&seat)) {
             std::thread::sleep(Duration::from_millis(20));
         }
-        if seats().any(|seat| is_open(&seat)) {
+        if seats().any(|seat| seat.is_open()) {
             // The last answer is on its way.
             std::thread::sleep(Duration::from_millis(100));
         }
     }
 
     pub(super) fn told(&self, seat: usize) -> Value {
-        let mut seat = self.locked(seat);
-        let (number, played, episode) = (seat.number, seat.played, seat.begun);
-        seat.seen = Some(Instant::now());
-        if let Some(end) = &mut seat.end {
-            end.is_told = true;
-            return json!({"phase": "over", "is_complete": end.is_complete, "played": played});
-        }
-        if !seat.has_agreed && self.consent.is_some() {
-            return json!({"phase": "consent", "words": self.consent});
-        }
-        if seat.is_ready {
-            return json!({"phase": "ready"});
-        }
-        let Some(asked) = seat.asked.as_mut().filter(|asked| asked.answer.is_some()) else {
-            return json!({"phase": "waiting", "played": played, "number": number});
-        };
-        if asked.pause.is_some() {
-            return json!({"phase": "break", "number": number});
-        }
-        asked.shown.get_or_insert_with(Instant::now);
-        let Question { system, user, t, is_practice, keys, actions, .. } = &asked.question;
-        json!({
-            "phase": if *is_practice { "practice" } else { "play" },
-            "number": number,
-            "episode": episode,
-            "t": t,
-            "system": system,
-            "user": user,
-            "keys": keys,
-            "actions": actions,
-            "colors": Color::ALL.map(Color::name),
-        })
+        self.locked(seat).told(&self.terms)
     }
 
     pub(super) fn frame(&self, seat: usize) -> Option<Arc<Frame>> {
-        let seat = self.locked(seat);
-        let is_shown = (seat.has_agreed || self.consent.is_none()) && !seat.is_ready;
-        seat.asked.as_ref().filter(|_| is_shown).map(|asked| Arc::clone(&asked.question.frame))
+        self.locked(seat).frame(&self.terms)
     }
 
     pub(super) fn agree(&self, seat: usize) -> io::Result<()> {
-        let mut journal = self.journal.lock().unwrap_or_else(PoisonError::into_inner);
-        journal.agreed(&self.codes[seat], self.consent.as_deref().unwrap_or_default())?;
-        drop(journal);
+        let code = self.code(seat);
+        self.journal().agreed(&code, self.terms.consent.as_deref().unwrap_or_default())?;
         self.locked(seat).has_agreed = true;
         Ok(())
     }
 
-    pub(super) fn pause(&self, seat: usize, is_on: bool) {
-        let mut seat = self.locked(seat);
-        let Some(asked) = &mut seat.asked else { return };
-        if is_on {
-            asked.pause.get_or_insert_with(Instant::now);
-        } else if let Some(begun) = asked.pause.take() {
-            asked.breaks += begun.elapsed();
+    /// Ends a person's part in the study. What they did stays, unless they want it deleted.
+    pub(super) fn leave(&self, seat: usize, how: Leaving) -> io::Result<()> {
+        let code = self.code(seat);
+        self.journal().leave(&code, how)?;
+        let mut own = self.locked(seat);
+        own.left = Some(how);
+        (own.asked, own.is_ready) = (None, false);
+        let lane = std::mem::take(&mut own.lane);
+        drop(own);
+        self.deal_again(lane.into());
+        if how == Leaving::Deleted { self.erase(seat).map_err(io::Error::other) } else { Ok(()) }
+    }
+
+    fn erase(&self, seat: usize) -> Result<(), String> {
+        let start = Instant::now();
+        while self.locked(seat).episode.is_some() && start.elapsed() < ENDING {
+            std::thread::sleep(Duration::from_millis(10));
         }
+        let code = self.code(seat);
+        let Some(folder) = self.journal().forget(&code).map_err(|error| error.to_string())? else { return Ok(()) };
+        let episodes = (self.eraser)(&folder, &code)?;
+        self.deleted.lock().unwrap_or_else(PoisonError::into_inner).extend(episodes);
+        self.locked(seat).is_deleted = true;
+        Ok(())
+    }
+
+    /// Deletes what is left of those who wanted it; gives the ids of all episodes that were deleted.
+    pub fn delete_due(&self) -> Result<BTreeSet<String>, String> {
+        for seat in (0..self.seats()).filter(|seat| self.locked(*seat).left == Some(Leaving::Deleted)) {
+            let failed = |error| format!("what `{}` did could not be deleted: {error}", self.code(seat));
+            self.erase(seat).map_err(failed)?;
+        }
+        Ok(self.deleted.lock().unwrap_or_else(PoisonError::into_inner).clone())
+    }
+
+    pub(super) fn pause(&self, seat: usize, is_on: bool) {
+        self.locked(seat).pause(is_on);
     }
 
     pub(super) fn answer(&self, seat: usize, number: u64, reply: String) -> bool {
-        let mut seat = self.locked(seat);
-        if seat.number != number || seat.is_ready || !seat.has_agreed && self.consent.is_some() {
-            return false;
-        }
-        let Some(asked) = seat.asked.as_mut().filter(|asked| asked.pause.is_none()) else { return false };
-        let Some(answer) = asked.answer.take() else { return false };
-        let taken = asked.shown.map_or(Duration::ZERO, |shown| shown.elapsed().saturating_sub(asked.breaks));
-        let latency_ms = i32::try_from(taken.as_millis()).unwrap_or(i32::MAX);
-        answer.send(Given { reply, latency_ms }).is_ok()
+        self.locked(seat).answer(&self.terms, number, reply)
     }
 
-    fn locked(&self, seat: usize) -> std::sync::MutexGuard<'_, Seat> {
+    fn locked(&self, seat: usize) -> MutexGuard<'_, Seat> {
         self.seats[seat].lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn owners(&self) -> MutexGuard<'_, BTreeMap<String, usize>> {
+        self.owners.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn journal(&self) -> MutexGuard<'_, Journal> {
+        self.journal.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

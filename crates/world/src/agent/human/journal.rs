@@ -1,6 +1,6 @@
 //! The answers of people, one per line as they came: a recording that ended goes on where they were.
 //!
-//! Rule: a code, a time and an answer, and nothing else of a person. An answer is on the disk before its step is done.
+//! Rule: a code, a link, a time and an answer, and nothing else of a person. An answer is on the disk before its step is done.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, Write as _};
@@ -47,6 +47,29 @@ enum Line {
         participant: String,
         practised: bool,
     },
+    /// Somebody takes no further part.
+    Left {
+        participant: String,
+        left: Leaving,
+    },
+    /// Somebody has a link, and a place among the participants, from 1.
+    Enrolled {
+        participant: String,
+        place: usize,
+        link: String,
+    },
+}
+
+/// How a person's part in a study ended before its time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Leaving {
+    /// They did not agree.
+    Declined,
+    /// They stopped; what they did stays.
+    Stopped,
+    /// They stopped, and what they did is deleted.
+    Deleted,
 }
 
 impl Line {
@@ -54,7 +77,9 @@ impl Line {
         match self {
             Self::Answer(Entry { participant, .. })
             | Self::Agreed { participant, .. }
-            | Self::Practised { participant, .. } => participant,
+            | Self::Practised { participant, .. }
+            | Self::Left { participant, .. }
+            | Self::Enrolled { participant, .. } => participant,
         }
     }
 }
@@ -62,8 +87,8 @@ impl Line {
 /// The journal of a recording.
 #[derive(Debug)]
 pub struct Journal {
-    /// `None` where nothing is recorded.
-    file: Option<File>,
+    /// The folder; `None` where nothing is recorded. The file is opened for each line, since `participants remove` replaces it.
+    folder: Option<PathBuf>,
     lines: Vec<Line>,
 }
 
@@ -73,16 +98,16 @@ impl Journal {
         replace::make_folder(folder)?;
         let path = path(folder);
         let lines = read(&path)?;
-        let mut file = OpenOptions::new().append(true).create(true).open(&path)?;
+        let mut file = appending(&path)?;
         if !lines.is_empty() {
             // Behind a line that was cut off a new one begins.
             file.write_all(b"\n")?;
         }
-        Ok(Self { file: Some(file), lines })
+        Ok(Self { folder: Some(folder.to_owned()), lines })
     }
 
     pub const fn none() -> Self {
-        Self { file: None, lines: Vec::new() }
+        Self { folder: None, lines: Vec::new() }
     }
 
     /// The answers that were there when it was opened.
@@ -102,21 +127,55 @@ impl Journal {
         self.lines.iter().any(|line| matches!(line, Line::Practised { participant, .. } if participant == code))
     }
 
-    pub(super) fn keep(&mut self, entry: Entry) -> io::Result<()> {
+    pub(super) fn keep(&self, entry: Entry) -> io::Result<()> {
         self.write(&Line::Answer(entry))
     }
 
-    pub(super) fn agreed(&mut self, code: &str, words: &str) -> io::Result<()> {
+    pub(super) fn agreed(&self, code: &str, words: &str) -> io::Result<()> {
         let consent = hash::of_bytes(words.as_bytes());
         self.write(&Line::Agreed { participant: code.to_owned(), consent })
     }
 
-    pub(super) fn practised(&mut self, code: &str) -> io::Result<()> {
+    pub(super) fn practised(&self, code: &str) -> io::Result<()> {
         self.write(&Line::Practised { participant: code.to_owned(), practised: true })
     }
 
-    fn write(&mut self, line: &Line) -> io::Result<()> {
-        let Some(file) = &mut self.file else { return Ok(()) };
+    /// The end of a person's part, if it has ended.
+    pub(super) fn left(&self, code: &str) -> Option<Leaving> {
+        self.lines.iter().rev().find_map(|line| match line {
+            Line::Left { participant, left } if participant == code => Some(*left),
+            _ => None,
+        })
+    }
+
+    pub(super) fn leave(&self, code: &str, left: Leaving) -> io::Result<()> {
+        self.write(&Line::Left { participant: code.to_owned(), left })
+    }
+
+    /// The place among the participants and the link of a person, if they have one.
+    pub fn enrolled(&self, code: &str) -> Option<(usize, &str)> {
+        self.lines.iter().find_map(|line| match line {
+            Line::Enrolled { participant, place, link } if participant == code => Some((*place, link.as_str())),
+            _ => None,
+        })
+    }
+
+    pub fn enrol(&self, code: &str, place: usize, link: &str) -> io::Result<()> {
+        self.write(&Line::Enrolled { participant: code.to_owned(), place, link: link.to_owned() })
+    }
+
+    /// Removes what a person did; that they left, their place and their link stay. Gives the folder, if there is one.
+    pub(super) fn forget(&self, code: &str) -> io::Result<Option<PathBuf>> {
+        let Some(folder) = &self.folder else { return Ok(None) };
+        let stays =
+            |line: &Line| line.participant() != code || matches!(line, Line::Left { .. } | Line::Enrolled { .. });
+        keep(&path(folder), stays)?;
+        Ok(Some(folder.clone()))
+    }
+
+    fn write(&self, line: &Line) -> io::Result<()> {
+        let Some(folder) = &self.folder else { return Ok(()) };
+        let mut file = appending(&path(folder))?;
         let mut bytes = serde_json::to_vec(line)?;
         bytes.push(b'\n');
         file.write_all(&bytes)?;
@@ -126,9 +185,13 @@ impl Journal {
 
 /// Removes all that the journal of a folder has of a person; gives the number of lines.
 pub fn remove(folder: &Path, code: &str) -> io::Result<usize> {
-    let path = path(folder);
-    let lines = read(&path)?;
-    let kept: Vec<&Line> = lines.iter().filter(|line| line.participant() != code).collect();
+    keep(&path(folder), |line| line.participant() != code)
+}
+
+/// Keeps some lines of a journal; gives the number of those that are gone.
+fn keep(path: &Path, stays: impl Fn(&Line) -> bool) -> io::Result<usize> {
+    let lines = read(path)?;
+    let kept: Vec<&Line> = lines.iter().filter(|line| stays(line)).collect();
     let removed = lines.len() - kept.len();
     if removed > 0 {
         let mut bytes = Vec::new();
@@ -136,11 +199,15 @@ pub fn remove(folder: &Path, code: &str) -> io::Result<usize> {
             serde_json::to_writer(&mut bytes, line)?;
             bytes.push(b'\n');
         }
-        let mut file = replace::NewFile::create(&path)?;
+        let mut file = replace::NewFile::create(path)?;
         file.as_file_mut().write_all(&bytes)?;
         file.commit()?;
     }
     Ok(removed)
+}
+
+fn appending(path: &Path) -> io::Result<File> {
+    OpenOptions::new().append(true).create(true).open(path)
 }
 
 fn path(folder: &Path) -> PathBuf {
@@ -161,7 +228,7 @@ fn read(path: &Path) -> io::Result<Vec<Line>> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Entry, Journal, remove};
+    use super::{Entry, Journal, Leaving, remove};
 
     #[test]
     fn answers_come_back_and_a_person_can_be_removed() {
@@ -173,7 +240,7 @@ mod tests {
             latency_ms: 5,
             reply: "{}".to_owned(),
         };
-        let mut journal = Journal::open(folder.path()).unwrap();
+        let journal = Journal::open(folder.path()).unwrap();
         journal.agreed("P1", "words").unwrap();
         journal.keep(entry("P1", 1)).unwrap();
         journal.practised("P2").unwrap();
@@ -186,5 +253,22 @@ mod tests {
         assert_eq!(remove(folder.path(), "P1").unwrap(), 2);
         assert!(!std::fs::read_to_string(folder.path().join("participants.jsonl")).unwrap().contains("P1"));
         assert_eq!(Journal::open(folder.path()).unwrap().entries(), [entry("P2", 2)]);
+    }
+
+    #[test]
+    fn what_a_person_did_is_forgotten_and_that_they_left_is_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let journal = Journal::open(folder.path()).unwrap();
+        journal.enrol("P1", 1, "abc").unwrap();
+        journal.agreed("P1", "words").unwrap();
+        journal.leave("P1", Leaving::Deleted).unwrap();
+        journal.forget("P1").unwrap();
+        journal.practised("P2").unwrap();
+        drop(journal);
+        let journal = Journal::open(folder.path()).unwrap();
+        assert_eq!((journal.enrolled("P1"), journal.left("P1")), (Some((1, "abc")), Some(Leaving::Deleted)));
+        assert!(
+            !journal.has_agreed("P1", Some("words")) && journal.has_practised("P2") && journal.left("P2").is_none()
+        );
     }
 }

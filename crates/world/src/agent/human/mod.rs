@@ -2,30 +2,37 @@
 //!
 //! | file | what it knows |
 //! |---|---|
-//! | [`hub`] | which person is asked what, and what was answered |
+//! | [`design`] | who plays which episodes, in which order |
+//! | [`hub`] | which person is asked what, and who has left |
+//! | [`seat`] | one person: question, clock, and what the page shows |
 //! | [`server`] | the pages that people play on; it has no other |
 //! | [`journal`] | what was answered, so that a recording that was ended goes on in the middle of an episode |
 //!
 //! Rule: a person gets what a model gets and nothing else: no colour of a body, no count of pixels, no id. Each has a link of
 //! their own and a code; nothing else is kept of them.
 
+pub mod design;
 pub mod hub;
 pub mod journal;
+pub mod seat;
 pub mod server;
 
-use std::sync::Arc;
+use std::collections::BTreeSet;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use serde_json::{Value, json};
 
-use self::hub::{Given, Hub, Question};
+use self::hub::Hub;
 use self::journal::Entry;
+use self::seat::{Given, Question};
+use self::server::Server;
 use super::prompt::{self, Prompt, Rendered};
 use super::reply::{self, Ending};
-use super::{Agent, Decision, Ended, Farewell, Lost, Observation, Player, Reply, Task, Usage};
+use super::{Agent, Decision, Ended, Farewell, Lost, Observation, Planned, Player, Reply, Task, Turn, Usage};
 use exact::hash;
 
 /// The version of what people are shown and asked.
-const PROTOCOL: u32 = 2;
+const PROTOCOL: u32 = 3;
 
 /// People as a player.
 #[derive(Debug)]
@@ -34,13 +41,15 @@ pub struct Human {
     /// SHA-256 of the words of consent; `None` where nobody is asked for it.
     consent: Option<String>,
     hub: Arc<Hub>,
+    /// `None` where nobody is asked to play, and at the end of the recording.
+    server: Mutex<Option<Server>>,
 }
 
 impl Human {
     /// A player of this name whose episodes go to the people of a hub.
-    pub fn new(model: &str, hub: Arc<Hub>) -> Self {
-        let consent = hub.consent().map(|words| hash::of_bytes(words.as_bytes()));
-        Self { model: model.to_owned(), consent, hub }
+    pub fn new(model: &str, hub: Arc<Hub>, server: Option<Server>) -> Self {
+        let consent = hub.terms().consent.as_deref().map(|words| hash::of_bytes(words.as_bytes()));
+        Self { model: model.to_owned(), consent, hub, server: Mutex::new(server) }
     }
 }
 
@@ -50,6 +59,7 @@ impl Player for Human {
     }
 
     fn description(&self) -> Value {
+        let schedule = self.hub.schedule();
         json!({
             "human": self.model,
             "protocol": PROTOCOL,
@@ -61,9 +71,14 @@ impl Player for Human {
                 "remaining_steps": true,
             },
             "reply": "the keys of a model's reply: actions by keys or buttons, colours from a list, free text; all but the \
-                      action may stay empty; the identification stays from step to step, and is empty as an episode begins",
+                      action may stay empty",
+            "prefilled_identification": self.hub.terms().prefills,
             "practice": "one episode of another scene before the first, not recorded; its end is announced",
+            "begin": "each episode begins when the person says so",
+            "clock": "breaks and times of more than 10 s without the page do not count",
             "time_limit": null,
+            "design": schedule.design.name(),
+            "order": schedule.order.name(),
             "consent": self.consent,
             "identification_version": trace::identification::VERSION,
         })
@@ -71,7 +86,7 @@ impl Player for Human {
 
     fn agent(&self, task: Task, episode_id: &str) -> Result<Box<dyn Agent>, Lost> {
         let prompt = Prompt::of(task.experiment).map_err(|fault| Lost::because(fault.to_string()))?;
-        let seat = self.hub.seat(episode_id).ok_or_else(|| Lost::because("every participant plays another episode"))?;
+        let seat = self.hub.sit(episode_id).ok_or_else(Lost::by_leaving)?;
         let code = self.hub.code(seat);
         let hub = Arc::clone(&self.hub);
         let (practice, episode_id, has_ended) = (None, episode_id.to_owned(), false);
@@ -90,8 +105,25 @@ impl Player for Human {
         self.hub.seats()
     }
 
+    fn plans(&self, planned: &[Planned]) {
+        self.hub.deal(planned);
+    }
+
+    fn turn(&self, episode_id: &str) -> Turn {
+        self.hub.turn(episode_id)
+    }
+
+    fn interrupt(&self) {
+        self.hub.interrupt();
+    }
+
+    fn deleted(&self) -> Result<BTreeSet<String>, String> {
+        self.hub.delete_due()
+    }
+
     fn ended(&self, is_complete: bool) {
         self.hub.end(is_complete);
+        drop(self.server.lock().unwrap_or_else(PoisonError::into_inner).take());
     }
 }
 
@@ -110,7 +142,7 @@ struct HumanAgent {
 impl Drop for HumanAgent {
     fn drop(&mut self) {
         if !self.has_ended {
-            self.hub.over(self.seat, false);
+            self.hub.over(self.seat, &self.episode_id, false);
         }
     }
 }
@@ -122,7 +154,7 @@ impl Agent for HumanAgent {
 
     fn end(&mut self, ended: Ended) -> Farewell<'_> {
         self.has_ended = true;
-        self.hub.over(self.seat, ended != Ended::Stopped);
+        self.hub.over(self.seat, &self.episode_id, ended != Ended::Stopped);
         Box::pin(std::future::ready(()))
     }
 
@@ -162,7 +194,8 @@ impl HumanAgent {
             actions: prompt::actions(task.experiment.actions).iter().map(|action| prompt::letter(*action)).collect(),
         };
         let given = self.hub.ask(self.seat, question).await;
-        let Given { reply, latency_ms } = given.ok_or_else(|| Lost::because("the server of the people has ended"))?;
+        let gone = || if self.hub.is_stopping() { Lost::by_stop() } else { Lost::by_leaving() };
+        let Given { reply, latency_ms } = given.ok_or_else(gone)?;
         if !is_practice {
             let (participant, episode_id) = (self.code.clone(), self.episode_id.clone());
             let entry = Entry { participant, episode_id, t: observation.t, latency_ms, reply: reply.clone() };

@@ -5,17 +5,21 @@
 
 use std::net::TcpListener;
 use std::sync::Arc;
+use std::thread::JoinHandle;
 
 use axum::Router;
 use axum::body::Bytes;
 use axum::extract::{DefaultBodyLimit, Query, State};
 use axum::http::{StatusCode, header};
+use axum::middleware::map_response;
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
+use tokio::sync::oneshot;
 
 use super::hub::Hub;
+use super::journal::Leaving;
 use web::{self, Guard};
 
 const BODY: &str = include_str!("../../../../../assets/player/body.html");
@@ -38,14 +42,40 @@ struct Sent {
     reply: Map<String, Value>,
 }
 
-/// Serves people on a thread of its own, until the process ends.
-pub fn start(hub: Arc<Hub>, listener: TcpListener, guard: Guard) -> std::io::Result<()> {
+/// What is to become of what somebody did who leaves.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Withdrawal {
+    delete: bool,
+}
+
+/// A server on a thread of its own; it ends when this is dropped.
+#[derive(Debug)]
+pub struct Server {
+    end: Option<oneshot::Sender<()>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        self.end = None;
+        // The next recording of a study may want the same port.
+        let _ = self.thread.take().map(JoinHandle::join);
+    }
+}
+
+/// Serves people.
+pub fn start(hub: Arc<Hub>, listener: TcpListener, guard: Guard) -> std::io::Result<Server> {
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build()?;
-    std::thread::Builder::new().name("people".to_owned()).spawn(move || {
-        // A server that fails leaves the episodes waiting, which Ctrl-C ends.
-        let _ = runtime.block_on(web::serve(listener, web::guarded(routes(hub), guard.taking_posts())));
+    let (end, ended) = oneshot::channel::<()>();
+    let thread = std::thread::Builder::new().name("people".to_owned()).spawn(move || {
+        runtime.block_on(async {
+            let served = web::serve(listener, web::guarded(routes(hub), guard.taking_posts()));
+            // A server that fails leaves the episodes waiting, which Ctrl-C ends.
+            tokio::select! { _ = served => {}, _ = ended => {} }
+        });
     })?;
-    Ok(())
+    Ok(Server { end: Some(end), thread: Some(thread) })
 }
 
 fn routes(hub: Arc<Hub>) -> Router {
@@ -56,11 +86,15 @@ fn routes(hub: Arc<Hub>) -> Router {
         .route("/state", get(state))
         .route("/frame", get(frame))
         .route("/agree", post(agree))
+        .route("/decline", post(decline))
+        .route("/withdraw", post(withdraw))
         .route("/begin", post(begin))
         .route("/pause", post(pause))
         .route("/resume", post(resume))
         .route("/reply", post(reply))
         .layer(DefaultBodyLimit::max(LONGEST))
+        // A page asks all the time: a connection that it kept would be one that another page waits for.
+        .layer(map_response(|response: Response| async { ([(header::CONNECTION, "close")], response) }))
         .with_state(hub)
 }
 
@@ -75,8 +109,12 @@ fn told(value: &Value) -> Response {
 fn for_person(hub: &Hub, link: &Link, does: impl FnOnce(usize) -> Response) -> Response {
     match link.p.as_deref().and_then(|token| hub.seat_of(token)) {
         Some(seat) => does(seat),
-        None => (StatusCode::UNAUTHORIZED, "open the link that you were given").into_response(),
+        None => stranger(),
     }
+}
+
+fn stranger() -> Response {
+    (StatusCode::UNAUTHORIZED, "open the link that you were given").into_response()
 }
 
 async fn state(State(hub): State<Arc<Hub>>, Query(link): Query<Link>) -> Response {
@@ -96,8 +134,34 @@ async fn frame(State(hub): State<Arc<Hub>>, Query(link): Query<Link>) -> Respons
 async fn agree(State(hub): State<Arc<Hub>>, Query(link): Query<Link>) -> Response {
     for_person(&hub, &link, |seat| match hub.agree(seat) {
         Ok(()) => told(&hub.told(seat)),
-        Err(_) => (StatusCode::INTERNAL_SERVER_ERROR, "it could not be written down; tell the lab").into_response(),
+        Err(_) => unwritten(),
     })
+}
+
+fn unwritten() -> Response {
+    (StatusCode::INTERNAL_SERVER_ERROR, "it could not be written down; tell the lab").into_response()
+}
+
+async fn decline(State(hub): State<Arc<Hub>>, Query(link): Query<Link>) -> Response {
+    leave(hub, &link, Leaving::Declined).await
+}
+
+async fn withdraw(State(hub): State<Arc<Hub>>, Query(link): Query<Link>, body: Bytes) -> Response {
+    match serde_json::from_slice(&body) {
+        Ok(Withdrawal { delete: true }) => leave(hub, &link, Leaving::Deleted).await,
+        Ok(Withdrawal { delete: false }) => leave(hub, &link, Leaving::Stopped).await,
+        Err(_) => (StatusCode::BAD_REQUEST, "no withdrawal").into_response(),
+    }
+}
+
+/// Deleting waits for a step under way and for the disk, on a thread of its own.
+async fn leave(hub: Arc<Hub>, link: &Link, how: Leaving) -> Response {
+    let Some(seat) = link.p.as_deref().and_then(|token| hub.seat_of(token)) else { return stranger() };
+    let leaving = Arc::clone(&hub);
+    match tokio::task::spawn_blocking(move || leaving.leave(seat, how)).await {
+        Ok(Ok(())) => told(&hub.told(seat)),
+        _ => unwritten(),
+    }
 }
 
 async fn begin(State(hub): State<Arc<Hub>>, Query(link): Query<Link>) -> Response {

@@ -1,8 +1,10 @@
 //! A person in the agent's place: what they get, what they give, and what becomes of it.
 
+mod study;
+
 use std::io::{BufRead as _, BufReader};
 use std::path::Path;
-use std::process::{ChildStderr, Stdio};
+use std::process::{ChildStderr, Command, Stdio};
 
 use serde_json::{Value, json};
 
@@ -25,13 +27,21 @@ impl People {
     }
 
     fn start_in(folder: &Path, experiment: &str, codes: &str, more: &[&str]) -> Self {
+        Self::start_telling(folder, experiment, codes, more, Stdio::null())
+    }
+
+    fn start_telling(folder: &Path, experiment: &str, codes: &str, more: &[&str], answer: Stdio) -> Self {
         let mut command = program(folder);
         command.args(["record", "--agent", "human", "--model", "people", "--experiment", experiment, "--seeds", "1"]);
         command.args(["--out", "runs", "--human-port", "0", "--participants", codes]).args(more);
-        let mut process = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+        Self::start_with(&mut command, codes.split(',').count(), answer)
+    }
+
+    fn start_with(command: &mut Command, people: usize, answer: Stdio) -> Self {
+        let mut process = command.stdout(answer).stderr(Stdio::piped()).spawn().unwrap();
         let mut output = BufReader::new(process.stderr.take().unwrap());
         let mut links = Vec::new();
-        while links.len() < codes.split(',').count() {
+        while links.len() < people {
             let mut line = String::new();
             assert!(output.read_line(&mut line).unwrap() > 0, "the recording ended before it told its links");
             links.extend(line.trim().split_once(" plays at ").map(|(_, link)| link.to_owned()));
@@ -80,7 +90,11 @@ impl Person {
         }
     }
 
+    /// Answers a question; begins the episode if it waits for that.
     fn act(&mut self, action: &str, identification: &str, cube: &str) {
+        if self.state(&["play", "practice", "ready"])["phase"] == "ready" {
+            assert_eq!(self.ask("POST", "begin", &json!({})).status, 200);
+        }
         let told = self.state(&["play", "practice"]);
         assert_eq!(self.ask("GET", "frame", &Value::Null).status, 200);
         let reply = json!({"view-description": "", "reasoning": "", "summary": "on", "action": action,
@@ -198,20 +212,44 @@ fn the_page_is_played_by_keys() {
     let mut browser = Browser::at(&people.links[0]);
     until(&mut browser, "document.querySelector('.practice') && document.querySelector('img').naturalWidth === 640");
     practise(&mut browser);
+    let words = |part: &str| format!("document.querySelector('{part}').textContent.includes('JSON')");
+    assert!(
+        browser.holds(&words("section.model")) && !browser.holds(&words("section.mine")),
+        "words of models stand apart"
+    );
     browser.press("ArrowLeft");
     until(&mut browser, "document.querySelector('h1').textContent === 'Step 2'");
+    // Letters can be switched off, for those whose software uses them.
+    browser.click("#letters");
+    browser.value("document.activeElement.blur()");
+    browser.press("a");
+    std::thread::sleep(std::time::Duration::from_secs(1));
+    assert_eq!(browser.text("document.querySelector('h1').textContent"), "Step 2");
+    browser.press("ArrowLeft");
+    until(&mut browser, "document.querySelector('h1').textContent === 'Step 3'");
     assert!(browser.text("document.querySelector('#user').textContent").contains("the previous action was a"));
-    browser.click("button[data-action=done]");
+    browser.click("#letters");
+    browser.value("document.activeElement.blur()");
+    browser.press("a");
+    until(&mut browser, "document.querySelector('h1').textContent === 'Step 4'");
+    done(&mut browser);
     people.ends();
     browser.complaints();
     drop(browser);
     assert_eq!(run(folder.path(), &["score", "runs", "--json"]).done().lines().count(), 1);
 }
 
+/// Ends an episode in a browser, and says again that this is meant.
+fn done(browser: &mut Browser) {
+    browser.click("button[data-action=done]");
+    until(browser, "document.querySelector('dialog[open] #sure-done')");
+    browser.click("#sure-done");
+}
+
 /// Ends the practice in a browser, and begins what counts.
 fn practise(browser: &mut Browser) {
     until(browser, "document.querySelector('.practice')");
-    browser.click("button[data-action=done]");
+    done(browser);
     until(browser, "document.querySelector('#begin')");
     let words = browser.text("document.querySelector('#content').textContent");
     assert!(words.contains("The practice is over; the next steps count."), "{words}");
@@ -229,37 +267,46 @@ fn claim(browser: &mut Browser, words: &str) {
 }
 
 #[test]
-fn a_claim_belongs_to_the_episode_in_which_it_was_typed() {
+fn a_claim_belongs_to_the_step_in_which_it_was_typed() {
     need::drawing();
-    let folder = tempfile::tempdir().unwrap();
-    let people = People::start(folder.path(), "P1", &["--runs", "2"]);
-    let mut browser = Browser::at(&people.links[0]);
-    until(&mut browser, "document.querySelector('.practice')");
-    claim(&mut browser, "I am red in the practice");
-    practise(&mut browser);
-    assert_eq!(browser.text(CLAIM), "", "nothing of the practice");
-    claim(&mut browser, "I am blue in the first");
-    browser.click("button[data-action=a]");
-    until(&mut browser, "document.querySelector('h1').textContent === 'Step 2'");
-    assert_eq!(browser.text(CLAIM), "I am blue in the first", "from step to step it stays");
-    browser.click("#pause");
-    until(&mut browser, "document.querySelector('#resume')");
-    browser.click("#resume");
-    until(&mut browser, "document.querySelector('h1').textContent === 'Step 2'");
-    assert_eq!(browser.text(CLAIM), "I am blue in the first", "over a break too");
-    browser.click("button[data-action=done]");
-    until(&mut browser, "document.querySelector('h1').textContent === 'Step 1'");
-    assert_eq!(browser.text(CLAIM), "", "nothing of the episode before");
-    browser.click("button[data-action=done]");
-    until(&mut browser, "document.querySelector('#over')");
-    people.ends();
-    // The server has gone; the page asks no more, and says the same.
-    std::thread::sleep(std::time::Duration::from_secs(2));
-    let words = browser.text("document.body.innerText");
-    assert!(words.contains("The study is over") && words.contains("Thank you"), "{words}");
-    assert!(!words.contains("does not answer") && !words.contains("fetch"), "{words}");
-    let rows = run(folder.path(), &["query", CLAIMS, "runs"]).done();
-    assert!(rows.matches("blue").count() > 0 && !rows.contains("red") && rows.contains("NULL"), "{rows}");
+    for (more, stays) in [(&[][..], ""), (&["--prefill-identification"], "I am blue in the first")] {
+        let folder = tempfile::tempdir().unwrap();
+        let people = People::start(folder.path(), "P1", &[&["--runs", "2"], more].concat());
+        let mut browser = Browser::at(&people.links[0]);
+        until(&mut browser, "document.querySelector('.practice')");
+        claim(&mut browser, "I am red in the practice");
+        practise(&mut browser);
+        assert_eq!(browser.text(CLAIM), "", "nothing of the practice");
+        claim(&mut browser, "I am blue in the first");
+        browser.click("button[data-action=a]");
+        until(&mut browser, "document.querySelector('h1').textContent === 'Step 2'");
+        assert_eq!(browser.text(CLAIM), stays, "a claim stays where the study wants it so");
+        browser.click("#pause");
+        until(&mut browser, "document.querySelector('#resume')");
+        browser.click("#resume");
+        until(&mut browser, "document.querySelector('h1').textContent === 'Step 2'");
+        assert_eq!(browser.text(CLAIM), stays, "over a break too");
+        done(&mut browser);
+        until(&mut browser, "document.querySelector('#begin')");
+        let words = browser.text("document.querySelector('#content').textContent");
+        assert!(words.contains("1 episode done") && words.contains("episode 2 of 2"), "{words}");
+        // A key that is pressed too often is no step of the next episode.
+        browser.press("ArrowLeft");
+        browser.click("#begin");
+        until(&mut browser, "document.querySelector('h1').textContent === 'Step 1'");
+        assert_eq!(browser.text(CLAIM), "", "nothing of the episode before");
+        done(&mut browser);
+        until(&mut browser, "document.querySelector('#over')");
+        people.ends();
+        // The server has gone; the page says the same.
+        std::thread::sleep(std::time::Duration::from_secs(2));
+        let words = browser.text("document.body.innerText");
+        assert!(words.contains("The study is over") && words.contains("Thank you"), "{words}");
+        assert!(!words.contains("does not answer") && !words.contains("fetch"), "{words}");
+        let rows = run(folder.path(), &["query", CLAIMS, "runs"]).done();
+        let claims = if stays.is_empty() { 1 } else { 2 };
+        assert_eq!((rows.matches("blue").count(), rows.contains("red")), (claims, false), "{rows}");
+    }
 }
 
 const CLAIMS: &str = "select run, t, self_color from steps order by run, t";
@@ -268,16 +315,16 @@ const CLAIMS: &str = "select run, t, self_color from steps order by run, t";
 fn a_page_whose_server_has_gone_thanks_too() {
     need::drawing();
     let folder = tempfile::tempdir().unwrap();
-    let mut people = People::start(folder.path(), "P1,P2", &["--runs", "2"]);
+    let mut people = People::start(folder.path(), "P1,P2", &["--runs", "2", "--contact", "Dr. Ask, room 7"]);
     let mut browser = Browser::at(&people.links[0]);
     practise(&mut browser);
-    browser.click("button[data-action=done]");
-    until(&mut browser, "document.querySelector('#waiting').textContent.startsWith('Thank you')");
+    done(&mut browser);
+    until(&mut browser, "document.querySelector('#over')");
     let _ = people.process.0.kill();
     let _ = people.process.0.wait();
-    until(&mut browser, "document.querySelector('#over')");
+    until(&mut browser, "document.querySelector('h1').textContent === 'The study is over'");
     let words = browser.text("document.body.innerText");
-    assert!(words.contains("The study is over") && words.contains("Thank you"), "{words}");
+    assert!(words.contains("Thank you") && words.contains("Dr. Ask, room 7"), "{words}");
 }
 
 #[test]
@@ -354,7 +401,8 @@ fn a_failed_reply_is_reported_and_sent_again() {
     assert_eq!(browser.text(CLAIM), "I am yellow");
     browser.send("Network.setBlockedURLs", &json!({"urls": []}));
     until(&mut browser, "document.querySelector('#notice').hidden");
-    browser.click("button[data-action=done]");
+    assert_eq!(browser.text(CLAIM), "I am yellow");
+    done(&mut browser);
     people.ends();
     let rows = run(folder.path(), &["query", CLAIMS, "runs"]).done();
     assert!(rows.contains("green") && rows.contains("yellow"), "{rows}");

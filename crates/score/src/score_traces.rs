@@ -23,7 +23,7 @@ use metric::file::{ColumnEntry, FileError};
 use metric::restore::RestoreError;
 use toml_spec::Faults;
 use trace::error::TraceError;
-use trace::open::TraceSet;
+use trace::open::{TraceFile, TraceSet};
 use trace::scan::{EPISODE_COLUMNS, EpisodeBatch, Projection};
 use trace::schema::domain::is_general;
 use trace::schema::{self, COLUMNS, DeclaredColumn, Domain, Kind};
@@ -275,6 +275,7 @@ pub fn score_all(
     let mut plan = PhysicalPlan::of(&definitions.iter().map(|definitions| &definitions.plan).collect::<Vec<_>>());
     let first = definitions.first().filter(|_| outputs.timelines);
     let timelines = first.and_then(|definitions| TimelineReader::of(&mut plan, definitions));
+    check_work(traces, &plan)?;
     let mut projection = projection(traces, definitions, &plan, outputs.labels)?;
     take_as_they_are(&mut projection, outputs.unchecked, definitions.first());
     if let Some(quality) = outputs.quality {
@@ -300,6 +301,15 @@ pub fn score_all(
         quality.iter_mut().zip(replies).for_each(|(quality, part)| quality.merge(part));
     })?;
     Ok(Scored { tables, timelines: found.map(in_key_order), quality })
+}
+
+/// Whether the definitions ask for more than files of their size may: known before a row is read.
+pub(super) fn check_work(traces: &TraceSet, plan: &PhysicalPlan) -> Result<(), ScoreError> {
+    let sum = |of: fn(&TraceFile) -> u64| traces.files().iter().map(of).sum();
+    plan.check_work(sum(TraceFile::rows), sum(TraceFile::bytes)).map_err(|exceeded| ScoreError::Engine {
+        file: traces.files().first().map_or("", TraceFile::name).to_owned(),
+        source: exceeded.into(),
+    })
 }
 
 fn take_as_they_are(projection: &mut Projection, columns: &[&str], definitions: Option<&&Definitions>) {

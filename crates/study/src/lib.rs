@@ -275,9 +275,7 @@ impl Study {
             pooled::check(episodes, &by)?;
         }
         size::check_comparisons(episodes)?;
-        let cells = group(episodes, &by)?;
-        size::check_cells(&cells)?;
-        Ok(cells)
+        Ok(group(episodes, &by)?)
     }
 
     fn tables(

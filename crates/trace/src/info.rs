@@ -12,12 +12,13 @@ use serde::Serialize;
 
 use super::diagnostic::Finding;
 use super::error::TraceError;
+use super::read::budget::most_listed;
 use super::read::in_order::in_order;
 use super::read::open::{TraceFile, TraceSet};
 use super::replies::{REPLY_STATUS, ReplyCounts};
 use super::scan::{EpisodeBatch, Projection};
 use super::schema::{Kind, RECORDING_KEY, VERSION_KEY, WRITER_KEY};
-use exact::budget::Limit;
+use exact::budget::{Exceeded, Limit};
 use exact::hash;
 use parquet_pages::checksums::Checksums;
 
@@ -145,6 +146,7 @@ pub enum Listing {
 /// Summarises these traces; reads the key columns and `reply_status` of all rows, and every byte for its hash.
 pub fn info(set: &TraceSet, listing: Listing, threads: NonZeroUsize) -> Result<Info, TraceError> {
     let mut listed = (listing == Listing::Episodes).then(Vec::new);
+    let most = most_listed(set.files().iter().map(TraceFile::bytes).sum());
     let mut tally = Tally { files: vec![0; set.files().len()], ..Tally::default() };
     let statuses: Vec<String> = set.declares(REPLY_STATUS).then(|| REPLY_STATUS.to_owned()).into_iter().collect();
     let mut replies = (!statuses.is_empty()).then(ReplyCounts::default);
@@ -159,6 +161,7 @@ pub fn info(set: &TraceSet, listing: Listing, threads: NonZeroUsize) -> Result<I
             tally.add(keys);
             if let Some(listed) = &mut listed {
                 listed.extend(list);
+                most.check(listed.len() as u64).map_err(|exceeded| over_budget(set, &exceeded))?;
             }
             if let Some(replies) = &mut replies {
                 replies.merge(&counts);
@@ -181,10 +184,7 @@ pub fn info(set: &TraceSet, listing: Listing, threads: NonZeroUsize) -> Result<I
     let names = |of: fn(&(String, String)) -> &String| cells.keys().map(of).cloned().collect::<BTreeSet<_>>();
     let (experiments, models) = (names(|(experiment, _)| experiment), names(|(_, model)| model));
     let asked = experiments.len().saturating_mul(models.len()).saturating_mul(pairs.len());
-    MOST_COVERED.check(asked as u64).map_err(|exceeded| {
-        let file = set.files().first().map_or("", TraceFile::name);
-        TraceError::from(Finding::over_budget(file, &exceeded))
-    })?;
+    MOST_COVERED.check(asked as u64).map_err(|exceeded| over_budget(set, &exceeded))?;
     Ok(Info {
         episodes: summary.episodes,
         steps: summary.steps,
@@ -198,6 +198,10 @@ pub fn info(set: &TraceSet, listing: Listing, threads: NonZeroUsize) -> Result<I
         models: models.into_iter().collect(),
         experiments: experiments.into_iter().collect(),
     })
+}
+
+fn over_budget(set: &TraceSet, exceeded: &Exceeded) -> TraceError {
+    Finding::over_budget(set.files().first().map_or("", TraceFile::name), exceeded).into()
 }
 
 /// What is left when all steps are read: sorting takes as long as hashing the files, so that both are done at once.

@@ -35,7 +35,7 @@ pub(crate) type Before<'a> = (&'a str, i64, Option<&'a str>, Option<&'a str>);
 pub(crate) fn rewrite<W: Write + Send>(
     set: &TraceSet,
     [source, target]: [&str; 2],
-    mut change: impl FnMut(Before<'_>) -> Option<String>,
+    mut change: impl FnMut(Before<'_>) -> Result<Option<String>, TraceError>,
     recording: &serde_json::Value,
     out: W,
 ) -> Result<W, TraceError> {
@@ -49,71 +49,76 @@ pub(crate) fn rewrite<W: Write + Send>(
     let mut writer = SerializedFileWriter::new(Held::new(out), schema, properties(file, recording)).map_err(failed)?;
     let input = file.reader().map_err(|source| TraceError::Read { what: file.name().to_owned(), source })?;
     for row_group in 0..file.row_groups() {
-        let texts = texts(file, &layout, [source, target], row_group, &mut change)?;
-        let chunks = metadata.row_group(row_group).columns();
         let mut group = writer.next_row_group().map_err(failed)?;
-        copy(&mut group, chunks, &input, target, &texts).map_err(failed)?;
+        for chunk in metadata.row_group(row_group).columns() {
+            if chunk.column_path().parts() == [target] {
+                write_texts(&mut group, (file, row_group), &layout, [source, target], &mut change)?;
+            } else {
+                copy(&mut group, chunk, file.row_group_rows(row_group), &input).map_err(failed)?;
+            }
+        }
         group.close().map_err(failed)?;
         checksums::pass_on(&mut writer).map_err(failed)?;
     }
     checksums::finish(writer).map_err(failed)
 }
 
-fn texts(
-    file: &TraceFile,
+fn copy<W: Write + Send>(
+    group: &mut SerializedRowGroupWriter<'_, W>,
+    chunk: &ColumnChunkMetaData,
+    rows: usize,
+    input: &File,
+) -> parquet::errors::Result<()> {
+    let close = ColumnCloseResult {
+        bytes_written: u64::try_from(chunk.compressed_size()).unwrap_or_default(),
+        rows_written: rows as u64,
+        metadata: chunk.clone(),
+        bloom_filter: None,
+        column_index: None,
+        offset_index: None,
+    };
+    contained(|| group.append_column(input, close)).map_err(ParquetError::General)?
+}
+
+/// Rows that are written together: a multiple of those that the library takes at a time, so that the bytes do not depend on
+/// how many are decoded together.
+const WRITTEN_ROWS: usize = 8 << 10;
+
+/// The column made anew, some rows at a time: a row group of a small file may have millions.
+fn write_texts<W: Write + Send>(
+    group: &mut SerializedRowGroupWriter<'_, W>,
+    (file, row_group): (&TraceFile, usize),
     layout: &Layout,
     columns: [&str; 2],
-    row_group: usize,
-    change: &mut impl FnMut(Before<'_>) -> Option<String>,
-) -> Result<Vec<Option<String>>, TraceError> {
+    change: &mut impl FnMut(Before<'_>) -> Result<Option<String>, TraceError>,
+) -> Result<(), TraceError> {
+    let failed = |error: ParquetError| unwritable(file.name(), error.into());
     let [source, target] = columns.map(|name| layout.position(name).expect("the layout was made with it"));
-    let mut texts = Vec::with_capacity(file.row_group_rows(row_group));
+    let missing = || failed(ParquetError::General("the row group has no column left".into()));
+    let mut column = group.next_column().map_err(failed)?.ok_or_else(missing)?;
+    let mut write = |values: &mut Vec<ByteArray>, levels: &mut Vec<i16>| {
+        column.typed::<ByteArrayType>().write_batch(values, Some(levels), None).map_err(failed)?;
+        values.clear();
+        levels.clear();
+        Ok::<_, TraceError>(())
+    };
+    let (mut values, mut levels) = (Vec::new(), Vec::with_capacity(WRITTEN_ROWS));
     for rows in RowGroup::open(file, layout, row_group, None).map_err(|finding| TraceError::from(*finding))? {
         let rows = rows.map_err(|finding| TraceError::from(*finding))?;
         for row in 0..rows.len() {
             let (id, t) = (rows.episode(row).unwrap_or_default(), rows.columns[T].int(row).unwrap_or_default());
-            texts.push(change((id, t, rows.columns[source].text(row), rows.columns[target].text(row))));
+            let text = change((id, t, rows.columns[source].text(row), rows.columns[target].text(row)))?;
+            levels.push(i16::from(text.is_some()));
+            values.extend(text.map(|text| ByteArray::from(text.as_str())));
+            if levels.len() == WRITTEN_ROWS {
+                write(&mut values, &mut levels)?;
+            }
         }
     }
-    Ok(texts)
-}
-
-fn copy<W: Write + Send>(
-    group: &mut SerializedRowGroupWriter<'_, W>,
-    chunks: &[ColumnChunkMetaData],
-    input: &File,
-    target: &str,
-    texts: &[Option<String>],
-) -> parquet::errors::Result<()> {
-    for chunk in chunks {
-        if chunk.column_path().parts() == [target] {
-            write_texts(group, texts)?;
-        } else {
-            let close = ColumnCloseResult {
-                bytes_written: u64::try_from(chunk.compressed_size()).unwrap_or_default(),
-                rows_written: texts.len() as u64,
-                metadata: chunk.clone(),
-                bloom_filter: None,
-                column_index: None,
-                offset_index: None,
-            };
-            contained(|| group.append_column(input, close)).map_err(ParquetError::General)??;
-        }
+    if !levels.is_empty() {
+        write(&mut values, &mut levels)?;
     }
-    Ok(())
-}
-
-fn write_texts<W: Write + Send>(
-    group: &mut SerializedRowGroupWriter<'_, W>,
-    texts: &[Option<String>],
-) -> parquet::errors::Result<()> {
-    let Some(mut column) = group.next_column()? else {
-        return Err(ParquetError::General("the row group has no column left".into()));
-    };
-    let values: Vec<ByteArray> = texts.iter().flatten().map(|text| ByteArray::from(text.as_str())).collect();
-    let levels: Vec<i16> = texts.iter().map(|text| i16::from(text.is_some())).collect();
-    column.typed::<ByteArrayType>().write_batch(&values, Some(&levels), None)?;
-    column.close()
+    column.close().map_err(failed)
 }
 
 /// The file's schema with the target as text that may be null.

@@ -135,6 +135,14 @@ pub struct FileInfo {
 /// What each model has of the seeds and runs of all: a study of seven models, five experiments and 20,000 runs has 700,000.
 const MOST_COVERED: Limit = Limit::new("seeds and runs of models in experiments", 2_000_000);
 
+/// What a model of an experiment takes, beside its name.
+const CELL: usize = 256;
+
+/// Models are told apart, counted and printed in full.
+const fn most_named(bytes: u64) -> Limit {
+    Limit::in_proportion("bytes of models in experiments in files of their size", 24 << 20, 8, bytes)
+}
+
 /// Whether episodes are listed, beside being counted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Listing {
@@ -146,7 +154,8 @@ pub enum Listing {
 /// Summarises these traces; reads the key columns and `reply_status` of all rows, and every byte for its hash.
 pub fn info(set: &TraceSet, listing: Listing, threads: NonZeroUsize) -> Result<Info, TraceError> {
     let mut listed = (listing == Listing::Episodes).then(Vec::new);
-    let most = most_listed(set.files().iter().map(TraceFile::bytes).sum());
+    let bytes = set.files().iter().map(TraceFile::bytes).sum();
+    let (most, names) = (most_listed(bytes), most_named(bytes));
     let mut tally = Tally { files: vec![0; set.files().len()], ..Tally::default() };
     let statuses: Vec<String> = set.declares(REPLY_STATUS).then(|| REPLY_STATUS.to_owned()).into_iter().collect();
     let mut replies = (!statuses.is_empty()).then(ReplyCounts::default);
@@ -159,6 +168,7 @@ pub fn info(set: &TraceSet, listing: Listing, threads: NonZeroUsize) -> Result<I
         },
         |(keys, counts, list)| {
             tally.add(keys);
+            names.check(tally.bytes).map_err(|exceeded| over_budget(set, &exceeded))?;
             if let Some(listed) = &mut listed {
                 listed.extend(list);
                 most.check(listed.len() as u64).map_err(|exceeded| over_budget(set, &exceeded))?;
@@ -296,6 +306,8 @@ fn list(set: &TraceSet, batch: &EpisodeBatch) -> Vec<EpisodeInfo> {
 #[derive(Default)]
 struct Tally {
     files: Vec<u64>,
+    /// What the models and experiments take, each with its name.
+    bytes: u64,
     places: HashMap<(String, String), usize>,
     episodes: Vec<Vec<SeedRun>>,
 }
@@ -320,7 +332,9 @@ impl Tally {
     }
 
     fn place(&mut self, cell: (String, String)) -> usize {
+        let bytes = (CELL + cell.0.len() + cell.1.len()) as u64;
         *self.places.entry(cell).or_insert_with(|| {
+            self.bytes += bytes;
             self.episodes.push(Vec::new());
             self.episodes.len() - 1
         })

@@ -37,6 +37,7 @@ pub mod renormalize;
 pub mod replies;
 pub mod scan;
 pub mod schema;
+pub mod seal;
 pub mod validate;
 pub mod write;
 

@@ -1,4 +1,4 @@
-//! A trace again with one column of text made anew; everything else is as it was.
+//! A trace again with one column of text made anew, or with checksums alone; everything else is as it was.
 //!
 //! Rule: other columns are copied as the bytes they are, so whatever type, encoding or codec a writer chose stays; so do
 //! the row groups and the footer's own keys, but for the recording. What only speeds up reading (page indexes, bloom
@@ -46,7 +46,8 @@ pub(crate) fn rewrite<W: Write + Send>(
     let failed = |error: ParquetError| unwritable(file.name(), error.into());
     let metadata = file.footer_again(Extent::Whole).map_err(|finding| TraceError::from(*finding))?.metadata;
     let schema = with_text(metadata.file_metadata().schema_descr(), target).map_err(failed)?;
-    let mut writer = SerializedFileWriter::new(Held::new(out), schema, properties(file, recording)).map_err(failed)?;
+    let properties = properties(with_recording(file, recording));
+    let mut writer = SerializedFileWriter::new(Held::new(out), schema, properties).map_err(failed)?;
     let input = file.reader().map_err(|source| TraceError::Read { what: file.name().to_owned(), source })?;
     for row_group in 0..file.row_groups() {
         let mut group = writer.next_row_group().map_err(failed)?;
@@ -56,6 +57,27 @@ pub(crate) fn rewrite<W: Write + Send>(
             } else {
                 copy(&mut group, chunk, file.row_group_rows(row_group), &input).map_err(failed)?;
             }
+        }
+        group.close().map_err(failed)?;
+        checksums::pass_on(&mut writer).map_err(failed)?;
+    }
+    checksums::finish(writer).map_err(failed)
+}
+
+/// Writes the trace of a set's only file to `out` with checksums; every column is copied as it is.
+pub(crate) fn with_checksums<W: Write + Send>(set: &TraceSet, out: W) -> Result<W, TraceError> {
+    let [file] = set.files() else { return Err(unwritable("the trace", "there is not exactly one".into())) };
+    verify_pages(set)?;
+    let failed = |error: ParquetError| unwritable(file.name(), error.into());
+    let metadata = file.footer_again(Extent::Whole).map_err(|finding| TraceError::from(*finding))?.metadata;
+    let schema = metadata.file_metadata().schema_descr().root_schema_ptr();
+    let properties = properties(file.pairs().to_vec());
+    let mut writer = SerializedFileWriter::new(Held::new(out), schema, properties).map_err(failed)?;
+    let input = file.reader().map_err(|source| TraceError::Read { what: file.name().to_owned(), source })?;
+    for row_group in 0..file.row_groups() {
+        let mut group = writer.next_row_group().map_err(failed)?;
+        for chunk in metadata.row_group(row_group).columns() {
+            copy(&mut group, chunk, file.row_group_rows(row_group), &input).map_err(failed)?;
         }
         group.close().map_err(failed)?;
         checksums::pass_on(&mut writer).map_err(failed)?;
@@ -138,13 +160,17 @@ fn with_text(schema: &SchemaDescriptor, target: &str) -> parquet::errors::Result
     Type::group_type_builder(root.name()).with_fields(fields).build().map(Arc::new)
 }
 
-fn properties(file: &TraceFile, recording: &serde_json::Value) -> WriterPropertiesPtr {
+fn with_recording(file: &TraceFile, recording: &serde_json::Value) -> Vec<KeyValue> {
     let mut pairs = file.pairs().to_vec();
     let value = Some(recording.to_string());
     match pairs.iter_mut().find(|pair| pair.key == RECORDING_KEY) {
         Some(pair) => pair.value = value,
         None => pairs.push(KeyValue { key: RECORDING_KEY.to_owned(), value }),
     }
+    pairs
+}
+
+fn properties(pairs: Vec<KeyValue>) -> WriterPropertiesPtr {
     let properties = WriterProperties::builder()
         .set_key_value_metadata(Some(pairs))
         .set_created_by(CREATED_BY.to_owned())

@@ -201,7 +201,8 @@ def unsafe():
     text = [
         "# `unsafe` in dependencies",
         "",
-        "Our own crates forbid `unsafe` (`unsafe_code = \"forbid\"` in `Cargo.toml`); the Python module has what PyO3 makes.",
+        "Our own crates forbid `unsafe` (`unsafe_code = \"forbid\"` in `Cargo.toml`); the Python module has one block, for",
+        "Arrow's C interface.",
         "These packages decode, decompress or parse what others wrote. `scripts/supply-chain.py unsafe` counts them.",
         "",
         "| package | lines | `unsafe` blocks | `unsafe` functions, implementations, traits |",

@@ -90,6 +90,10 @@ pub fn write(options: &Options, folder: &Path) -> Result<usize, ViewError> {
     let snapshot = Snapshot::of_found(options, Found::frozen(&options.runs, inputs.path())?, 0)?;
     let mut files = Files { stage: temporary()?, all: Vec::new(), written: Budget::new(most_written(snapshot.bytes())) };
     check_size(&snapshot)?;
+    // They come first: what is too much of them is refused before the report is made.
+    for some in snapshot.together(TOGETHER)? {
+        add_episodes(&mut files, &snapshot, &some)?;
+    }
     let script = format!("<script src=\"{MARK}\" data-copy></script>");
     files.add("index.html", page::document(&script).replace("<title>", &format!("{POLICY}\n<title>")))?;
     files.add("assets/view.css", page::style())?;
@@ -104,9 +108,6 @@ pub fn write(options: &Options, folder: &Path) -> Result<usize, ViewError> {
         files.part("changes", &changes::answer(&snapshot)?)?;
     }
     files.part("list", &list::everything(&snapshot)?)?;
-    for some in snapshot.together(TOGETHER)? {
-        add_episodes(&mut files, &snapshot, &some)?;
-    }
     let staged: Vec<PathBuf> = files.all.iter().map(|path| files.stage.path().join(path)).collect();
     let new: Vec<_> =
         files.all.iter().zip(&staged).map(|(path, staged)| (path.as_path(), Content::File(staged))).collect();
@@ -122,9 +123,9 @@ fn check_size(snapshot: &Snapshot) -> Result<(), ViewError> {
 }
 
 fn add_episodes(files: &mut Files, snapshot: &Snapshot, some: &Together) -> Result<(), ViewError> {
+    let opened = snapshot.open_together(some)?;
     let ids = some.episodes.iter().map(|(_, id)| id.clone()).collect();
     let mut scores = episode::scores_of(snapshot, &some.input, &ids)?;
-    let opened = snapshot.open_together(some)?;
     for ((at, id), opened) in some.episodes.iter().zip(&opened) {
         add_episode(files, snapshot, (*at, id), opened, scores.remove(id).unwrap_or_default())?;
     }

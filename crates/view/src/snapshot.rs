@@ -209,7 +209,7 @@ impl Snapshot {
     /// The episodes of a stretch of a trace, in its order.
     pub fn open_together(&self, some: &Together) -> Result<Vec<Opened>, ViewError> {
         let is_mirror = self.table()?.study.traces()?.domain() == Domain::Mirror;
-        let rows = merge::read_rows(&some.input.path, some.rows.clone())?;
+        let rows = merge::read_rows(&some.input, some.rows.clone())?;
         if !rows.iter().map(|rows| &rows.episode_id).eq(some.episodes.iter().map(|(_, id)| id)) {
             return Err(replaced(&some.input));
         }
@@ -222,7 +222,7 @@ impl Snapshot {
             && let Some(place) = scored.places.get(id)
         {
             let input = &scored.inputs[place.file];
-            let rows = merge::read_rows(&input.path, place.rows.clone())?;
+            let rows = merge::read_rows(input, place.rows.clone())?;
             let own = rows.iter().find(|rows| rows.episode_id == id).ok_or_else(|| replaced(input))?;
             return opened(own, input, scored.study.traces()?.domain() == Domain::Mirror);
         }

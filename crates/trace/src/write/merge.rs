@@ -129,15 +129,15 @@ pub fn read(path: &Path) -> Result<Vec<EpisodeRows>, TraceError> {
 
 /// The episodes in some rows of a trace file, counted from its first; only the row groups that hold them are read. They are
 /// held row by row, which their values must be few enough for.
-pub fn read_rows(path: &Path, rows: Range<usize>) -> Result<Vec<EpisodeRows>, TraceError> {
-    let name = path.display().to_string();
-    let damaged = |finding: Finding| unreadable(&name, finding.to_string().into());
-    let file = input::open(path).map_err(|error| unreadable(&name, error.into()))?;
-    let footer = footer(&Input::new(path), Extent::Pages).map_err(|finding| damaged(*finding))?;
-    if let Some(fault) = bounds::fault(&name, footer.bytes, &footer.metadata) {
+pub fn read_rows(of: &Input, rows: Range<usize>) -> Result<Vec<EpisodeRows>, TraceError> {
+    let name = &of.name;
+    let damaged = |finding: Finding| unreadable(name, finding.to_string().into());
+    let file = input::open(&of.path).map_err(|error| unreadable(name, error.into()))?;
+    let footer = footer(of, Extent::Pages).map_err(|finding| damaged(*finding))?;
+    if let Some(fault) = bounds::fault(name, footer.bytes, &footer.metadata) {
         return Err(damaged(fault));
     }
-    let over = |exceeded: Exceeded| TraceError::from(Finding::over_budget(&name, &exceeded));
+    let over = |exceeded: Exceeded| TraceError::from(Finding::over_budget(name, &exceeded));
     let columns = footer.metadata.file_metadata().schema_descr().num_columns();
     most_values(footer.bytes).check((rows.len() as u64).saturating_mul(columns as u64)).map_err(over)?;
     let (mut before, mut groups, mut skipped) = (0, Vec::new(), None);
@@ -154,7 +154,7 @@ pub fn read_rows(path: &Path, rows: Range<usize>) -> Result<Vec<EpisodeRows>, Tr
     let selection = vec![RowSelector::skip(skipped), RowSelector::select(rows.len())];
     let store = Store::new(file, Arc::new(Expansion::new(footer.bytes)));
     let most = most_shown(footer.bytes);
-    decode_some(&name, store, footer, groups, Some((selection.into(), most)))
+    decode_some(name, store, footer, groups, Some((selection.into(), most)))
 }
 
 fn decode(name: &str, store: Store, footer: Footer) -> Result<Vec<EpisodeRows>, TraceError> {

@@ -1,5 +1,5 @@
 #!/bin/sh
-# The checks before a release: versions, changelog, generated files, book, report, wheel. Says each check; stops at the first that fails.
+# The checks before a release: versions, changelog, supply chain, generated files, book, report, wheel. Says each check; stops at the first that fails.
 set -eu
 cd "$(dirname "$0")/.."
 version=$(sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml | head -1)
@@ -9,6 +9,10 @@ echo "release-check: version $version"
 grep -q "^version: $version" CITATION.cff || fail "CITATION.cff has another version: expected $version"
 grep -q "^## \[$version\]" CHANGELOG.md || fail "CHANGELOG.md has no section [$version]: rename Unreleased"
 [ -z "$(git status --porcelain)" ] || fail "the tree is not clean: commit or remove the changes"
+echo "release-check: supply chain"
+scripts/supply-chain.py check
+scripts/supply-chain.py unsafe
+git diff --quiet -- docs/reference/unsafe.md || fail "docs/reference/unsafe.md has other counts: commit it"
 echo "release-check: schemas and reference"
 cargo test --quiet --all-features --test house schemas
 cargo test --quiet --all-features --test command_line reference

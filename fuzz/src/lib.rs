@@ -9,6 +9,7 @@ pub mod depth;
 mod episodes;
 mod logs;
 pub mod pages;
+pub mod pairs;
 mod quiet;
 mod replies;
 mod scratch;
@@ -20,7 +21,7 @@ mod traces;
 pub type Target = (&'static str, fn(&[u8]));
 
 /// All targets.
-pub const TARGETS: [Target; 17] = [
+pub const TARGETS: [Target; 23] = [
     ("pages", pages::target),
     ("footer", traces::footer),
     ("trace", traces::trace),
@@ -38,6 +39,12 @@ pub const TARGETS: [Target; 17] = [
     ("journal", replies::journal),
     ("cassette", replies::cassette),
     ("replies", replies::target),
+    ("defined", pairs::defined),
+    ("grouped", pairs::grouped),
+    ("filtered", pairs::filtered),
+    ("asked", pairs::asked),
+    ("logged", pairs::logged),
+    ("styled", pairs::styled),
 ];
 
 /// The target of this name.

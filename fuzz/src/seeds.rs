@@ -20,7 +20,7 @@ use statistics::sample_size::Clusters;
 use world::agent::vlm::journal::Entry;
 use world::sim::config::WorldConfig;
 
-use crate::{episodes, pages, scratch, traces};
+use crate::{episodes, pages, pairs, scratch, traces};
 
 /// The folder of the project.
 fn root() -> PathBuf {
@@ -58,9 +58,38 @@ pub fn of(target: &str) -> Vec<Vec<u8>> {
         "scores" => scores(),
         "journal" | "cassette" => vec![journal()],
         "replies" => replies(),
+        "defined" => definitions().iter().map(|text| pairs::joined(text, &[])).collect(),
+        "grouped" => texts(&["model", "experiment,model", "episode_id", "seed,run,body_color", "nope", ""]),
+        "filtered" => texts(&["run = 1", "any(mirror_visible) and run > 0", "TSA = 1", "model is null", "length() > 2"]),
+        "asked" => texts(&QUESTIONS),
+        "logged" => logs().iter().map(|log| pairs::joined(log, &[])).collect(),
+        "styled" => vec![pairs::joined(STYLE, &scores()[0][1..])],
         other => panic!("no target `{other}`"),
     }
 }
+
+/// Texts beside a sound trace, and beside one of another writer.
+fn texts(texts: &[&str]) -> Vec<Vec<u8>> {
+    let other = read("fixtures/checksums/v1-snappy.parquet");
+    let pair = |text: &&str| [pairs::joined(text.as_bytes(), &[]), pairs::joined(text.as_bytes(), &other)];
+    texts.iter().flat_map(pair).collect()
+}
+
+/// A question for each answer of the page.
+const QUESTIONS: [&str; 12] = [
+    "live",
+    "study",
+    "overview?model=m",
+    "figures",
+    "statistics?where=run > 0",
+    "episodes?sort=TSA&order=descending&offset=1&limit=2&search=e",
+    "episode?id=e2",
+    "text?id=e2&column=reasoning&t=1",
+    "map?id=e2",
+    "compare?a=e1&b=e2",
+    "same_frame?a=e1&b=e2&t=1",
+    "frame?id=e0&t=1",
+];
 
 /// Writes the seeds of every target into a folder of its name.
 ///

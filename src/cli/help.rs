@@ -110,6 +110,7 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
         &[("A trace out of a log that was cut off", "trace recover runs/E1-oracle.mcap -o E1-oracle.parquet")],
     ),
     ("trace renormalize", &[("Attributions again from the texts of old replies", "trace renormalize runs -o anew")]),
+    ("trace seal", &[("A trace of pyarrow, protected from now on", "trace seal theirs.parquet sealed.parquet")]),
     ("world replay", &[("The same episodes again, step by step", "world replay runs")]),
     (
         "report",

@@ -63,7 +63,20 @@ fn long_version() -> String {
 
 /// Runs the program with these arguments, the program's name first.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let _ = told_of_large_files();
     ExitCode::from(run_to_code(arguments))
+}
+
+/// A write beyond the limit of the size of files fails, and does not end the process: the error is told, and nothing is left.
+#[cfg(unix)]
+fn told_of_large_files() -> io::Result<()> {
+    use signal_hook::consts::SIGXFSZ;
+    signal_hook::flag::register(SIGXFSZ, std::sync::Arc::default()).map(drop)
+}
+
+#[cfg(not(unix))]
+fn told_of_large_files() -> io::Result<()> {
+    Ok(())
 }
 
 /// As [`run`]; gives the code as a number, for a process that is not ours to end.

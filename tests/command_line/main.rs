@@ -26,6 +26,8 @@ mod options;
 mod outputs;
 mod own_definitions;
 #[cfg(target_os = "linux")]
+mod pairs;
+#[cfg(target_os = "linux")]
 mod paths;
 mod plan;
 mod quality;

@@ -232,3 +232,33 @@ fn running_out_of_open_files_is_no_damage() {
         assert!(!said.contains("damaged") && !said.contains("panicked"), "{limit}: {said}");
     }
 }
+
+/// Verbs that write, and what they write.
+const WRITING: [(&str, &str); 8] = [
+    ("score a.parquet -o s.csv", "s.csv"),
+    ("score a.parquet -o s.parquet", "s.parquet"),
+    ("report a.parquet --no-figures --out r", "r"),
+    ("sensitivity a.parquet --out sens", "sens"),
+    ("trace seal a.parquet sealed.parquet", "sealed.parquet"),
+    ("figure spider a.parquet -o f.svg", "f.svg"),
+    ("setup man man", "man"),
+    #[cfg(feature = "view")]
+    ("view a.parquet --export page", "page"),
+    #[cfg(not(feature = "view"))]
+    ("score a.parquet -o s.jsonl", "s.jsonl"),
+];
+
+#[test]
+fn a_limit_of_the_size_of_files_is_an_error_that_is_told() {
+    let folder = two_files();
+    let at = folder.path();
+    for (words, output) in WRITING {
+        let before = contents(at);
+        let mut command = crate::harness::program::limited(at, "ulimit -f 0");
+        let told = crate::harness::program::answer(command.args(words.split_whitespace())).refused();
+        assert!(told.contains("File too large") && told.contains("help: "), "{words}: {told}");
+        assert!(!at.join(output).exists(), "{words}");
+        assert!(contents(at) == before, "{words} has left something");
+        run(at, &words.split_whitespace().collect::<Vec<_>>()).done();
+    }
+}

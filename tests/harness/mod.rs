@@ -4,6 +4,8 @@
 #![expect(dead_code, reason = "every binary has all of it, and none uses all of it")]
 
 #[cfg(target_os = "linux")]
+pub mod bombs;
+#[cfg(target_os = "linux")]
 pub mod faults;
 pub mod files;
 pub mod logs;

@@ -25,6 +25,7 @@ use trace::describe::SchemaDocument;
 use trace::info::Info;
 use trace::log::message::{Decision, EpisodeMessage};
 use trace::renormalize::RenormalizeAnswer;
+use trace::seal::SealAnswer;
 use trace::validate::Validation;
 use world::agent::reply;
 use world::experiment::Experiment;
@@ -52,6 +53,7 @@ fn current() -> Vec<(&'static str, Value)> {
         ("plan", json!(schema_for!(Plan))),
         ("plan-register", json!(schema_for!(RegisteredPlan))),
         ("renormalize", json!(schema_for!(RenormalizeAnswer))),
+        ("seal", json!(schema_for!(SealAnswer))),
         ("score-explain", printed_schema::<Evidence>()),
         ("sensitivity", json!(schema_for!(Sensitivity))),
         ("stats", printed_schema::<Statistics>()),

@@ -243,6 +243,11 @@ impl Runs {
         Self { values, ends: ends.into(), start: 0, length }
     }
 
+    /// The number of rows.
+    pub const fn rows(&self) -> usize {
+        self.length
+    }
+
     /// `length` rows from row `start`; nothing is copied.
     #[must_use]
     pub fn slice(&self, start: usize, length: usize) -> Self {

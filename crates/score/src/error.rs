@@ -2,9 +2,14 @@
 
 use arrow::error::ArrowError;
 
-/// An error of scoring a batch.
+use exact::budget::Exceeded;
+
+/// What keeps a batch from being scored.
 #[derive(Debug, thiserror::Error)]
 pub enum EngineError {
+    /// Definitions that ask for too much of the rows.
+    #[error(transparent)]
+    Exceeded(#[from] Exceeded),
     /// A column of the plan is not in the batch.
     #[error("the column `{0}` is not in the batch; project every column of the plan")]
     MissingColumn(String),

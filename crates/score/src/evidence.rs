@@ -27,7 +27,7 @@ use serde::Serialize;
 use super::error::EngineError;
 use super::evaluate::{Batch, Evaluated};
 use super::physical::{PhysicalPlan, StepId};
-use super::score_traces::{ScoreError, failed, projection};
+use super::score_traces::{ScoreError, check_work, failed, projection};
 use super::segments::{Segments, truths};
 use super::vectors::Vector;
 use exact::escape::visible;
@@ -103,6 +103,7 @@ pub fn explain(
     threads: NonZeroUsize,
 ) -> Result<Evidence, EvidenceError> {
     let reader = Reader::of(definitions);
+    check_work(traces, &reader.plan)?;
     let projection = projection(traces, &[definitions], &reader.plan, &[])?;
     let (mut found, mut names) = (None, Vec::new());
     let summary = traces.scan(
@@ -136,6 +137,7 @@ pub fn explain_each(
     threads: NonZeroUsize,
 ) -> Result<BTreeMap<String, Evidence>, ScoreError> {
     let reader = Reader::of(definitions);
+    check_work(traces, &reader.plan)?;
     let projection = projection(traces, &[definitions], &reader.plan, &[])?;
     let mut found = BTreeMap::new();
     traces.scan(

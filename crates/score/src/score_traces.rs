@@ -15,6 +15,7 @@ use super::quality::{QualityByCell, QualityReader};
 use super::segments::Segments;
 use super::table::{EpisodeTable, Header};
 use super::timeline::{Timeline, TimelineReader, in_key_order};
+use exact::budget::Limit;
 use exact::suggest::nearest;
 use metric::catalog::Catalog;
 use metric::columns::{Column, Columns, Fallback, Level, Type};
@@ -23,7 +24,7 @@ use metric::file::{ColumnEntry, FileError};
 use metric::restore::RestoreError;
 use toml_spec::Faults;
 use trace::error::TraceError;
-use trace::open::TraceSet;
+use trace::open::{TraceFile, TraceSet};
 use trace::scan::{EPISODE_COLUMNS, EpisodeBatch, Projection};
 use trace::schema::domain::is_general;
 use trace::schema::{self, COLUMNS, DeclaredColumn, Domain, Kind};
@@ -213,7 +214,10 @@ fn column_problem(traces: &TraceSet, column: &str) -> Option<(String, String)> {
     found.missing_from.filter(|_| !has_default).map(|file| (format!("`{file}` has no such column"), absent()))
 }
 
-/// The outputs of a scan besides the metrics.
+/// What became of the replies is counted for each of them.
+const MOST_CELLS: Limit = Limit::new("experiments times models times conditions whose replies are counted", 100_000);
+
+/// What a scan gives besides the metrics.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Outputs<'a> {
     /// Further key columns: columns that are constant in an episode.
@@ -275,6 +279,7 @@ pub fn score_all(
     let mut plan = PhysicalPlan::of(&definitions.iter().map(|definitions| &definitions.plan).collect::<Vec<_>>());
     let first = definitions.first().filter(|_| outputs.timelines);
     let timelines = first.and_then(|definitions| TimelineReader::of(&mut plan, definitions));
+    check_work(traces, &plan)?;
     let mut projection = projection(traces, definitions, &plan, outputs.labels)?;
     take_as_they_are(&mut projection, outputs.unchecked, definitions.first());
     if let Some(quality) = outputs.quality {
@@ -295,11 +300,29 @@ pub fn score_all(
         let timelines = timelines.as_ref().map(|reader| reader.timelines(&values, batch));
         Ok((scores, (timelines, quality)))
     };
+    let mut exceeded = None;
     let tables = collect(traces, &projection, headers, threads, read, |(timelines, replies)| {
         found.iter_mut().zip(timelines).for_each(|(found, part)| found.extend(part));
-        quality.iter_mut().zip(replies).for_each(|(quality, part)| quality.merge(part));
+        if let Some((quality, part)) = quality.as_mut().zip(replies).filter(|_| exceeded.is_none()) {
+            quality.merge(part);
+            exceeded = MOST_CELLS.check(quality.0.len() as u64).err();
+        }
     })?;
+    if let Some(exceeded) = exceeded {
+        return Err(of_first(traces, exceeded.into()));
+    }
     Ok(Scored { tables, timelines: found.map(in_key_order), quality })
+}
+
+/// Whether the definitions ask for more than files of their size may: known before a row is read.
+pub(super) fn check_work(traces: &TraceSet, plan: &PhysicalPlan) -> Result<(), ScoreError> {
+    let sum = |of: fn(&TraceFile) -> u64| traces.files().iter().map(of).sum();
+    let checked = plan.check_work(sum(TraceFile::rows), sum(TraceFile::bytes));
+    checked.map_err(|exceeded| of_first(traces, exceeded.into()))
+}
+
+fn of_first(traces: &TraceSet, source: EngineError) -> ScoreError {
+    ScoreError::Engine { file: traces.files().first().map_or("", TraceFile::name).to_owned(), source }
 }
 
 fn take_as_they_are(projection: &mut Projection, columns: &[&str], definitions: Option<&&Definitions>) {

@@ -41,6 +41,7 @@ use definitions::{own_definitions, question, rescore, scored_alike};
 
 use read::{expected, experiment_findings, findings, import, input_hashes, inputs, results, scan, scores};
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsString;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
@@ -269,9 +270,7 @@ impl Study {
             pooled::check(episodes, &by)?;
         }
         size::check_comparisons(episodes)?;
-        let cells = group(episodes, &by)?;
-        size::check_cells(&cells)?;
-        Ok(cells)
+        Ok(group(episodes, &by)?)
     }
 
     fn tables(
@@ -400,6 +399,20 @@ impl Study {
         let one = TraceSet::open(std::slice::from_ref(input))?;
         let definitions = Question { filter: None, ..self.question.clone() }.bind(&one)?;
         Ok(evidence::explain(&one, &definitions, episode_id, self.threads)?)
+    }
+
+    /// As [`Study::explain_in`], for each of these episodes that the input has, by its id: one pass over it.
+    ///
+    /// # Errors
+    /// As [`Study::explain`].
+    pub fn explain_each_in(
+        &self,
+        input: &Input,
+        ids: &BTreeSet<String>,
+    ) -> Result<BTreeMap<String, Evidence>, StudyError> {
+        let one = TraceSet::open(std::slice::from_ref(input))?;
+        let definitions = Question { filter: None, ..self.question.clone() }.bind(&one)?;
+        Ok(evidence::explain_each(&one, &definitions, ids, self.threads)?)
     }
 
     /// A table of the study beside a published one, cell by cell. `table` names it; otherwise it is the first that has

@@ -5,16 +5,11 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::error::StudyError;
 use exact::budget::Limit;
-use report::cells::Cells;
 use score::table::{CONDITION, EpisodeTable};
 
 /// A hundred models in five experiments under ten metrics are 247,500; a comparison takes half a kilobyte.
 const MOST_COMPARISONS: Limit =
     Limit::new("comparisons of two models under a metric; leave models or metrics out", 400_000);
-
-/// The cells of all tables.
-const MOST_CELLS: Limit =
-    Limit::new("cells, groups times metrics; group by fewer columns or leave metrics out", 200_000);
 
 /// Returns true if the comparisons that a report of these episodes makes are within the budget.
 ///
@@ -30,12 +25,4 @@ pub(super) fn check_comparisons(episodes: &EpisodeTable) -> Result<(), StudyErro
     let pairs = |count: usize| (count as u64).saturating_mul(count.saturating_sub(1) as u64) / 2;
     let pairs = subjects.values().fold(0_u64, |sum, subjects| sum.saturating_add(pairs(subjects.len())));
     Ok(MOST_COMPARISONS.check(pairs.saturating_mul(episodes.metrics.len() as u64))?)
-}
-
-/// Returns true if the cells are within the budget.
-///
-/// # Errors
-/// [`StudyError::Exceeded`] if not.
-pub(super) fn check_cells(cells: &Cells) -> Result<(), StudyError> {
-    Ok(MOST_CELLS.check((cells.groups.len() as u64).saturating_mul(cells.metrics.len() as u64))?)
 }

@@ -12,12 +12,13 @@ use serde::Serialize;
 
 use super::diagnostic::Finding;
 use super::error::TraceError;
+use super::read::budget::most_listed;
 use super::read::in_order::in_order;
 use super::read::open::{TraceFile, TraceSet};
 use super::replies::{REPLY_STATUS, ReplyCounts};
 use super::scan::{EpisodeBatch, Projection};
 use super::schema::{Kind, RECORDING_KEY, VERSION_KEY, WRITER_KEY};
-use exact::budget::Limit;
+use exact::budget::{Exceeded, Limit};
 use exact::hash;
 use parquet_pages::checksums::Checksums;
 
@@ -134,7 +135,15 @@ pub struct FileInfo {
 /// The limit for the coverage of seeds and runs by model: seven models, five experiments and 20,000 runs have 700,000.
 const MOST_COVERED: Limit = Limit::new("seeds and runs of models in experiments", 2_000_000);
 
-/// The choice between listing and counting episodes.
+/// What a model of an experiment takes, beside its name.
+const CELL: usize = 256;
+
+/// Models are told apart, counted and printed in full.
+const fn most_named(bytes: u64) -> Limit {
+    Limit::in_proportion("bytes of models in experiments in files of their size", 24 << 20, 8, bytes)
+}
+
+/// Whether episodes are listed, beside being counted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Listing {
     Episodes,
@@ -145,6 +154,8 @@ pub enum Listing {
 /// Summarises these traces; reads the key columns and `reply_status` of all rows, and every byte for its hash.
 pub fn info(set: &TraceSet, listing: Listing, threads: NonZeroUsize) -> Result<Info, TraceError> {
     let mut listed = (listing == Listing::Episodes).then(Vec::new);
+    let bytes = set.files().iter().map(TraceFile::bytes).sum();
+    let (most, names) = (most_listed(bytes), most_named(bytes));
     let mut tally = Tally { files: vec![0; set.files().len()], ..Tally::default() };
     let statuses: Vec<String> = set.declares(REPLY_STATUS).then(|| REPLY_STATUS.to_owned()).into_iter().collect();
     let mut replies = (!statuses.is_empty()).then(ReplyCounts::default);
@@ -157,8 +168,10 @@ pub fn info(set: &TraceSet, listing: Listing, threads: NonZeroUsize) -> Result<I
         },
         |(keys, counts, list)| {
             tally.add(keys);
+            names.check(tally.bytes).map_err(|exceeded| over_budget(set, &exceeded))?;
             if let Some(listed) = &mut listed {
                 listed.extend(list);
+                most.check(listed.len() as u64).map_err(|exceeded| over_budget(set, &exceeded))?;
             }
             if let Some(replies) = &mut replies {
                 replies.merge(&counts);
@@ -181,10 +194,7 @@ pub fn info(set: &TraceSet, listing: Listing, threads: NonZeroUsize) -> Result<I
     let names = |of: fn(&(String, String)) -> &String| cells.keys().map(of).cloned().collect::<BTreeSet<_>>();
     let (experiments, models) = (names(|(experiment, _)| experiment), names(|(_, model)| model));
     let asked = experiments.len().saturating_mul(models.len()).saturating_mul(pairs.len());
-    MOST_COVERED.check(asked as u64).map_err(|exceeded| {
-        let file = set.files().first().map_or("", TraceFile::name);
-        TraceError::from(Finding::over_budget(file, &exceeded))
-    })?;
+    MOST_COVERED.check(asked as u64).map_err(|exceeded| over_budget(set, &exceeded))?;
     Ok(Info {
         episodes: summary.episodes,
         steps: summary.steps,
@@ -200,7 +210,11 @@ pub fn info(set: &TraceSet, listing: Listing, threads: NonZeroUsize) -> Result<I
     })
 }
 
-/// The remaining work after all steps are read: sorting takes as long as hashing the files, so both are done at once.
+fn over_budget(set: &TraceSet, exceeded: &Exceeded) -> TraceError {
+    Finding::over_budget(set.files().first().map_or("", TraceFile::name), exceeded).into()
+}
+
+/// What is left when all steps are read: sorting takes as long as hashing the files, so that both are done at once.
 enum Rest<'a> {
     Grid(Mutex<Tally>),
     File(&'a TraceFile, u64),
@@ -292,6 +306,8 @@ fn list(set: &TraceSet, batch: &EpisodeBatch) -> Vec<EpisodeInfo> {
 #[derive(Default)]
 struct Tally {
     files: Vec<u64>,
+    /// What the models and experiments take, each with its name.
+    bytes: u64,
     places: HashMap<(String, String), usize>,
     episodes: Vec<Vec<SeedRun>>,
 }
@@ -316,7 +332,9 @@ impl Tally {
     }
 
     fn place(&mut self, cell: (String, String)) -> usize {
+        let bytes = (CELL + cell.0.len() + cell.1.len()) as u64;
         *self.places.entry(cell).or_insert_with(|| {
+            self.bytes += bytes;
             self.episodes.push(Vec::new());
             self.episodes.len() - 1
         })

@@ -45,7 +45,7 @@ pub mod log;
 mod read;
 pub mod scan;
 pub mod schema;
-mod texts;
+pub mod seal;
 pub mod validate;
 pub mod write;
 

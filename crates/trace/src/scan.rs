@@ -15,7 +15,8 @@ use arrow::error::ArrowError;
 
 use super::diagnostic::Finding;
 use super::error::TraceError;
-use super::read::open::TraceSet;
+use super::read::budget::most_episodes;
+use super::read::open::{TraceFile, TraceSet};
 use super::read::parallel_scan::{Episodes, Event, pass};
 use super::read::projection::Layout;
 use super::schema::DeclaredColumn;
@@ -131,8 +132,10 @@ impl TraceSet {
         let mut prints = Prints::default();
         let mut spellings = Spellings::new(self.files());
         let mut summary = ScanSummary::default();
+        let most = most_episodes(self.files().iter().map(TraceFile::bytes).sum());
         let checked = |episodes: Episodes| {
-            let file = &self.files()[episodes.file];
+            let at = episodes.file;
+            let file = &self.files()[at];
             let mut faults = rules.check(file, &episodes);
             faults.extend(episode_hashes::check(file, &layout, &episodes));
             let fault = faults.into_iter().min_by_key(|fault| fault.row);
@@ -144,7 +147,7 @@ impl TraceSet {
                 Some(fault) => Err(Box::new(fault.finding)),
                 None => Ok(shape.batch(episodes).map_err(E::from).and_then(&work)),
             };
-            Checked { ids, count, steps, colors, result }
+            Checked { file: at, ids, count, steps, colors, result }
         };
         let passed = pass(self.files(), &layout, threads, &checked, |_, event| {
             let checked = match event {
@@ -155,6 +158,10 @@ impl TraceSet {
             spellings.add(checked.colors);
             summary.episodes += checked.count as u64;
             summary.steps += checked.steps as u64;
+            // Each file has a budget of its own, too; many small ones would have many.
+            most.check(summary.episodes).map_err(|exceeded| {
+                TraceError::from(Finding::over_budget(self.files()[checked.file].name(), &exceeded))
+            })?;
             match checked.result {
                 Ok(result) => sink(result?),
                 Err(finding) => Err(TraceError::from(*finding).into()),
@@ -204,6 +211,7 @@ pub fn episode_places(traces: &TraceSet, threads: NonZeroUsize) -> Result<HashMa
 
 /// A worker's results for some episodes.
 struct Checked<T, E> {
+    file: usize,
     ids: Vec<u64>,
     count: usize,
     steps: usize,

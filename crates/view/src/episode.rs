@@ -1,5 +1,7 @@
 //! One episode: its rows, what they say, and the timesteps that decided each metric.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use serde_json::{Map, Value, json};
 
 use super::error::ViewError;
@@ -8,8 +10,9 @@ use super::list;
 use super::snapshot::{Opened, Scored, Snapshot};
 use exact::escape::visible;
 use score::evidence::{Evidence, MetricEvidence, ranges};
-use study::Question;
+use study::{Question, Study};
 use trace::episode::Episode;
+use trace::inputs::Input;
 use trace::log::frames::Moment;
 use trace::schema::domain::is_identity;
 use trace::schema::{COLUMNS, Column, Value as Cell};
@@ -34,7 +37,7 @@ pub(super) fn about(snapshot: &Snapshot, opened: &Opened, longest: usize) -> Res
         Ok(first) => (first, None),
         Err(error) => (None, Some(error.words())),
     };
-    let mut told = described(snapshot, opened, longest, first.as_ref())?;
+    let mut told = described(snapshot, opened, longest, first.as_ref(), scores(snapshot, opened)?);
     if let Some(fault) = fault {
         told["log_fault"] = fault.into();
     } else if told["frames"] == false && snapshot.renders(opened) {
@@ -50,11 +53,11 @@ pub(super) fn described(
     opened: &Opened,
     longest: usize,
     first: Option<&Moment>,
-) -> Result<Value, ViewError> {
+    (metrics, against): (Value, Value),
+) -> Value {
     let episode = &opened.episode;
-    let (metrics, against) = scores(snapshot, opened)?;
     let marks = moments(episode).into_iter().map(|(t, moment)| json!({"t": t, "title": moment.title()}));
-    Ok(json!({
+    json!({
         "id": episode.episode_id,
         "name": visible(&episode.episode_id),
         "length": episode.steps.len(),
@@ -69,7 +72,7 @@ pub(super) fn described(
         "metrics": metrics,
         "against": against,
         "generation": snapshot.generation,
-    }))
+    })
 }
 
 pub(super) fn text(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewError> {
@@ -162,11 +165,28 @@ fn scores(snapshot: &Snapshot, opened: &Opened) -> Result<(Value, Value), ViewEr
     let (Some(scored), Some(input)) = (&snapshot.scored, &opened.input) else { return Ok((json!([]), Value::Null)) };
     let id = &opened.episode.episode_id;
     let own = told(&scored.study.explain_in(input, id)?);
+    let other = other_study(snapshot, input)?.map(|study| study.explain_in(input, id)).transpose()?;
+    Ok((own, other.as_ref().map_or(Value::Null, told)))
+}
+
+/// The same for some episodes of a trace, by their ids.
+pub(super) fn scores_of(
+    snapshot: &Snapshot,
+    input: &Input,
+    ids: &BTreeSet<String>,
+) -> Result<BTreeMap<String, (Value, Value)>, ViewError> {
+    let own = snapshot.table()?.study.explain_each_in(input, ids)?;
+    let other = other_study(snapshot, input)?.map(|study| study.explain_each_in(input, ids)).transpose()?;
+    let against = |id: &String| other.as_ref().and_then(|other| other.get(id)).map_or(Value::Null, told);
+    Ok(own.iter().map(|(id, evidence)| (id.clone(), (told(evidence), against(id)))).collect())
+}
+
+/// A trace under the other definitions, if there are some.
+fn other_study(snapshot: &Snapshot, input: &Input) -> Result<Option<Study>, ViewError> {
     let options = &snapshot.options;
-    let Some(against) = &options.against else { return Ok((own, Value::Null)) };
+    let Some(against) = &options.against else { return Ok(None) };
     let question = Question { definitions: Some(against.clone()), metrics: None, ..options.question.clone() };
-    let other = Scored::study(options, vec![input.clone()], question)?.explain_in(input, id)?;
-    Ok((own, told(&other)))
+    Scored::study(options, vec![input.clone()], question).map(Some)
 }
 
 fn told(evidence: &Evidence) -> Value {

@@ -5,16 +5,18 @@
 
 use std::collections::BTreeSet;
 use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
 use super::error::ViewError;
-use super::snapshot::Snapshot;
-use super::{View, changes, episode, list, map, overview, page};
-use exact::budget::Limit;
+use super::found::Found;
+use super::snapshot::{Opened, Snapshot, Together};
+use super::{Options, changes, episode, list, map, overview, page};
+use exact::budget::{Budget, Exceeded, Limit};
 use exact::hash;
-use exact::replace::{Content, FolderFiles, replace_folder};
+use exact::replace::{Content, FolderError, FolderFiles, TemporaryFolder, folder_of, make_folder, replace_folder};
 use study::Part;
 
 /// The instruction for programs that collect pages.
@@ -29,27 +31,36 @@ const POLICY: &str = "<meta http-equiv=\"Content-Security-Policy\" content=\"def
     style-src 'self' file:; style-src-attr 'unsafe-inline'; img-src 'self' file: data:; font-src 'self' file: data:; \
     base-uri 'none'; form-action 'none'\">";
 
-/// All files are held until they are written together.
-const LARGEST: Limit = Limit::new("bytes of a page as files", 2 << 30);
+/// The bytes of all files. A step of a small trace takes a byte and is a line of a page.
+const fn most_written(bytes: u64) -> Limit {
+    Limit::in_proportion("bytes of a page as files, of recordings of their size", 96 << 20, 64, bytes)
+}
+
+/// The episodes of a copy: each is a file, and read, explained and written by itself.
+const fn most_copied(bytes: u64) -> Limit {
+    Limit::in_proportion("episodes of a page as files, of recordings of their size", 2000, 1, bytes / 256)
+}
+
+/// What of a trace is read together: values, and episodes.
+const TOGETHER: (usize, usize) = (1_000_000, 1000);
 
 /// The file that marks a folder of these files.
 const MARK: &str = "assets/view.js";
 
-/// Files by their paths inside the folder.
-#[derive(Default)]
+/// Files by their paths inside the folder, on the disk until they are put in place together.
 struct Files {
-    all: Vec<(PathBuf, Vec<u8>)>,
-    bytes: u64,
+    stage: TemporaryFolder,
+    all: Vec<PathBuf>,
+    written: Budget,
 }
 
 impl Files {
-    fn add(&mut self, path: &str, bytes: impl Into<Vec<u8>>) -> Result<(), ViewError> {
-        let bytes = bytes.into();
-        self.bytes += bytes.len() as u64;
-        LARGEST.check(self.bytes).map_err(|exceeded| {
-            ViewError::Request(format!("{exceeded}\n  help: --where \"run = 1\" leaves episodes out"))
-        })?;
-        self.all.push((path.into(), bytes));
+    fn add(&mut self, path: &str, bytes: impl AsRef<[u8]>) -> Result<(), ViewError> {
+        let bytes = bytes.as_ref();
+        self.written.spend(bytes.len() as u64).map_err(exceeded)?;
+        let target = self.stage.path().join(path);
+        make_folder(folder_of(&target)).and_then(|()| fs::write(&target, bytes)).map_err(unwritable(&target))?;
+        self.all.push(path.into());
         Ok(())
     }
 
@@ -58,11 +69,31 @@ impl Files {
     }
 }
 
-/// Writes the page of everything that is whole; gives the number of files.
-pub fn write(view: &View, folder: &Path) -> Result<usize, ViewError> {
+fn exceeded(exceeded: Exceeded) -> ViewError {
+    ViewError::Request(format!("{exceeded}\n  help: --where \"run = 1\" leaves episodes out"))
+}
+
+fn unwritable(path: &Path) -> impl FnOnce(io::Error) -> ViewError {
+    let path = path.to_owned();
+    move |source| FolderError { path, source }.into()
+}
+
+/// Writes the page of everything that is whole; gives the number of files. Recordings that go on are shown as they were at one
+/// moment.
+pub fn write(options: &Options, folder: &Path) -> Result<usize, ViewError> {
     check_folder(folder)?;
-    let snapshot = view.newest();
-    let mut files = Files::default();
+    let parent = folder_of(folder);
+    let name = folder.file_name().unwrap_or_default().to_string_lossy();
+    let temporary = || TemporaryFolder::create(parent, &name).map_err(unwritable(folder));
+    make_folder(parent).map_err(unwritable(parent))?;
+    let inputs = temporary()?;
+    let snapshot = Snapshot::of_found(options, Found::frozen(&options.runs, inputs.path())?, 0)?;
+    let mut files = Files { stage: temporary()?, all: Vec::new(), written: Budget::new(most_written(snapshot.bytes())) };
+    check_size(&snapshot)?;
+    // They come first: what is too much of them is refused before the report is made.
+    for some in snapshot.together(TOGETHER)? {
+        add_episodes(&mut files, &snapshot, &some)?;
+    }
     let script = format!("<script src=\"{MARK}\" data-copy></script>");
     files.add("index.html", page::document(&script).replace("<title>", &format!("{POLICY}\n<title>")))?;
     files.add("assets/view.css", page::style())?;
@@ -77,27 +108,46 @@ pub fn write(view: &View, folder: &Path) -> Result<usize, ViewError> {
         files.part("changes", &changes::answer(&snapshot)?)?;
     }
     files.part("list", &list::everything(&snapshot)?)?;
-    let ids: Vec<String> =
-        snapshot.table()?.results.episodes.keys.iter().map(|key| key.episode_id.to_owned()).collect();
-    for (at, id) in ids.iter().enumerate() {
-        add_episode(&mut files, &snapshot, at, id)?;
-    }
-    let new: Vec<_> = files.all.iter().map(|(path, bytes)| (path.as_path(), Content::Bytes(bytes))).collect();
+    let staged: Vec<PathBuf> = files.all.iter().map(|path| files.stage.path().join(path)).collect();
+    let new: Vec<_> =
+        files.all.iter().zip(&staged).map(|(path, staged)| (path.as_path(), Content::File(staged))).collect();
     replace_folder(folder, &FolderFiles { new: &new, index: Some(Path::new("index.html")), old: &old_files })?;
     Ok(new.len())
 }
 
-fn add_episode(files: &mut Files, snapshot: &Snapshot, at: usize, id: &str) -> Result<(), ViewError> {
-    let opened = snapshot.episode(id)?;
+/// Refuses what would be too much before a file is written: two bytes are the least that a value takes.
+fn check_size(snapshot: &Snapshot) -> Result<(), ViewError> {
+    let bytes = snapshot.bytes();
+    most_copied(bytes).check(snapshot.episodes() as u64).map_err(exceeded)?;
+    most_written(bytes).check(snapshot.values()?.saturating_mul(2)).map_err(exceeded)
+}
+
+fn add_episodes(files: &mut Files, snapshot: &Snapshot, some: &Together) -> Result<(), ViewError> {
+    let opened = snapshot.open_together(some)?;
+    let ids = some.episodes.iter().map(|(_, id)| id.clone()).collect();
+    let mut scores = episode::scores_of(snapshot, &some.input, &ids)?;
+    for ((at, id), opened) in some.episodes.iter().zip(&opened) {
+        add_episode(files, snapshot, (*at, id), opened, scores.remove(id).unwrap_or_default())?;
+    }
+    Ok(())
+}
+
+fn add_episode(
+    files: &mut Files,
+    snapshot: &Snapshot,
+    (at, id): (usize, &str),
+    opened: &Opened,
+    scores: (Value, Value),
+) -> Result<(), ViewError> {
     // The page of the server tells of a log that cannot be read; a copy is not made without its frames.
-    let first = snapshot.moment(&opened, 1)?;
-    let mut told = episode::described(snapshot, &opened, usize::MAX, first.as_ref())?;
+    let first = snapshot.moment(opened, 1)?;
+    let mut told = episode::described(snapshot, opened, usize::MAX, first.as_ref(), scores);
     told["siblings"] = list::siblings(snapshot, id).into();
     if told["log"] == true {
-        files.part(&format!("map-{at}"), &map::of(snapshot, &opened)?)?;
+        files.part(&format!("map-{at}"), &map::of(snapshot, opened)?)?;
         let mut hashes = Vec::new();
         for t in 1..=opened.episode.steps.len() {
-            let frame = snapshot.moment(&opened, t)?.and_then(|moment| moment.frame);
+            let frame = snapshot.moment(opened, t)?.and_then(|moment| moment.frame);
             hashes.push(frame.as_deref().map(hash::of_bytes));
             frame.map_or(Ok(()), |frame| files.add(&format!("frames/{at}/{t}.png"), frame))?;
         }

@@ -1,5 +1,6 @@
 //! The files that the arguments name: traces, logs, and what a recording has under way.
 
+use std::collections::btree_map::{BTreeMap, Entry};
 use std::collections::BTreeSet;
 use std::ffi::OsString;
 use std::fs;
@@ -8,12 +9,18 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, UNIX_EPOCH};
 
 use super::error::ViewError;
+use exact::replace::{FolderError, folder_of};
 use study::resolve;
 use trace::inputs::Input;
 use trace::log::frames;
+use trace::lost::list_of;
 
 /// The folder for whole episodes of a recording that are not in the trace yet, and for the one being written.
 const PARTS: &str = ".parts";
+
+/// How often files are looked for that do not change meanwhile, and the time between.
+const ATTEMPTS: usize = 40;
+const PAUSE: Duration = Duration::from_millis(50);
 
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Found {
@@ -91,7 +98,64 @@ impl Found {
         Ok(())
     }
 
-    /// The state of every file, to be compared with a later one. A file that grows under way is distinguished.
+    /// The same files under a folder of our own, as they are at one moment: a recording that goes on replaces and removes its
+    /// own meanwhile. Links where the file system has them, copies elsewhere.
+    pub fn frozen(runs: &[OsString], folder: &Path) -> Result<Self, ViewError> {
+        let failed = |source| FolderError { path: folder.to_owned(), source };
+        for attempt in 0..ATTEMPTS {
+            let found = Self::of(runs)?;
+            let own = folder.join(attempt.to_string());
+            fs::create_dir(&own).map_err(failed)?;
+            match found.linked(&own) {
+                Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+                linked => {
+                    let linked = linked.map_err(failed)?;
+                    if Self::of(runs)?.stamps() == found.stamps() {
+                        return Ok(linked);
+                    }
+                }
+            }
+            std::thread::sleep(PAUSE);
+        }
+        Err(ViewError::Absent("expected a recording that pauses for a moment, found one that changes all the time".into()))
+    }
+
+    fn linked(&self, folder: &Path) -> io::Result<Self> {
+        let mut folders = BTreeMap::new();
+        let mut link = |path: &Path| -> io::Result<PathBuf> {
+            let parent = fs::canonicalize(folder_of(path))?;
+            let next = folder.join(folders.len().to_string());
+            let own: &PathBuf = match folders.entry(parent) {
+                Entry::Occupied(known) => known.into_mut(),
+                Entry::Vacant(new) => {
+                    fs::create_dir(&next)?;
+                    // It grows, and has no name of its own in what is found.
+                    let lost = list_of(new.key());
+                    if lost.is_file() {
+                        fs::copy(&lost, list_of(&next))?;
+                    }
+                    new.insert(next)
+                }
+            };
+            let to = own.join(path.file_name().unwrap_or_default());
+            let from = fs::canonicalize(path)?;
+            match fs::hard_link(&from, &to) {
+                Err(error) if error.kind() == io::ErrorKind::NotFound => Err(error),
+                // What is there is a link to the same file.
+                Err(_) if to.exists() => Ok(to),
+                Err(_) => fs::copy(&from, &to).map(|_| to),
+                Ok(()) => Ok(to),
+            }
+        };
+        let mut inputs = |inputs: &[Input]| -> io::Result<Vec<Input>> {
+            inputs.iter().map(|input| Ok(Input { name: input.name.clone(), path: link(&input.path)? })).collect()
+        };
+        let (traces, parts) = (inputs(&self.traces)?, inputs(&self.parts)?);
+        let logs = self.logs.iter().map(|log| link(log)).collect::<io::Result<_>>()?;
+        Ok(Self { traces, parts, logs, unfinished: Vec::new() })
+    }
+
+    /// The state of every file, to be held against a later one. A file that grows under way is told apart.
     pub fn stamps(&self) -> Vec<Stamp> {
         let traces = self.traces.iter().chain(&self.parts).map(|input| &input.path);
         traces.chain(&self.logs).map(|path| stamp(path)).collect()

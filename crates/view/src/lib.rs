@@ -79,6 +79,14 @@ impl View {
         self.newest().has(id)
     }
 
+    /// The bytes of an answer as the server gives them, JSON or PNG; `None` where there is no such question.
+    pub fn ask(&self, name: &str, query: &[(String, String)]) -> Option<Result<Vec<u8>, ViewError>> {
+        let bytes = |answer| match answer {
+            answer::Answer::Json(bytes) | answer::Answer::Png(bytes) => bytes,
+        };
+        answer::answer(self, name, query).map(|answer| answer.map(bytes))
+    }
+
     fn newest(&self) -> Arc<Snapshot> {
         Arc::clone(&self.newest.read().unwrap_or_else(PoisonError::into_inner))
     }

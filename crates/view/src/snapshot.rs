@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::io::ErrorKind;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -14,7 +15,7 @@ use trace::episode::Episode;
 use trace::inputs::Input;
 use trace::log::LogError;
 use trace::log::frames::{self, LogIndex, Moment, Shape};
-use trace::merge::{self, OwnColumn};
+use trace::merge::{self, EpisodeRows, OwnColumn};
 use trace::scan::{EpisodePlace, episode_places};
 use trace::schema::Domain;
 
@@ -71,11 +72,23 @@ pub(super) struct Opened {
     pub own: Option<Vec<OwnColumn>>,
 }
 
+/// Episodes that lie side by side in a trace, with their rows of the table and their ids.
+#[derive(Debug)]
+pub(super) struct Together {
+    pub input: Input,
+    rows: Range<usize>,
+    pub episodes: Vec<(usize, String)>,
+}
+
 impl Snapshot {
     /// Reads the state of the recordings now.
     pub fn open(options: &Options, generation: u64) -> Result<Self, ViewError> {
+        Self::of_found(options, Found::of(&options.runs)?, generation)
+    }
+
+    /// The state of these files.
+    pub fn of_found(options: &Options, found: Found, generation: u64) -> Result<Self, ViewError> {
         report::style::Style::load(&options.style).map_err(study::StudyError::from)?;
-        let found = Found::of(&options.runs)?;
         let stamps = found.stamps();
         let scored = Self::scored(options, &found)?.map(Arc::new);
         let (running, unreadable) = running(&found, scored.as_deref());
@@ -151,21 +164,67 @@ impl Snapshot {
         self.scored.as_deref().ok_or_else(|| ViewError::Absent("no episode is whole yet".to_owned()))
     }
 
+    /// The bytes of the files.
+    pub fn bytes(&self) -> u64 {
+        self.stamps.iter().map(|(_, bytes, _)| bytes).sum()
+    }
+
+    /// The values of all episodes, steps times columns.
+    pub fn values(&self) -> Result<u64, ViewError> {
+        let scored = self.table()?;
+        let files = scored.study.traces()?.files();
+        let episodes = scored.rows.keys().filter_map(|id| scored.places.get(id));
+        Ok(episodes.map(|place| (place.rows.len() * files[place.file].columns().len()) as u64).sum())
+    }
+
+    /// All episodes, those together that lie side by side in a trace, of so many values and episodes at most.
+    pub fn together(&self, (values, count): (usize, usize)) -> Result<Vec<Together>, ViewError> {
+        let scored = self.table()?;
+        let files = scored.study.traces()?.files();
+        let mut all: Vec<_> =
+            scored.rows.iter().filter_map(|(id, row)| Some((scored.places.get(id)?, *row, id))).collect();
+        all.sort_by_key(|(place, ..)| (place.file, place.rows.start));
+        let mut found: Vec<(usize, Together)> = Vec::new();
+        for (place, row, id) in all {
+            let most = values / files[place.file].columns().len().max(1);
+            match found.last_mut() {
+                Some((file, some))
+                    if *file == place.file
+                        && some.rows.end == place.rows.start
+                        && place.rows.end - some.rows.start <= most
+                        && some.episodes.len() < count =>
+                {
+                    some.rows.end = place.rows.end;
+                    some.episodes.push((row, id.clone()));
+                }
+                _ => {
+                    let (input, rows) = (scored.inputs[place.file].clone(), place.rows.clone());
+                    found.push((place.file, Together { input, rows, episodes: vec![(row, id.clone())] }));
+                }
+            }
+        }
+        Ok(found.into_iter().map(|(_, some)| some).collect())
+    }
+
+    /// The episodes of a stretch of a trace, in its order.
+    pub fn open_together(&self, some: &Together) -> Result<Vec<Opened>, ViewError> {
+        let is_mirror = self.table()?.study.traces()?.domain() == Domain::Mirror;
+        let rows = merge::read_rows(&some.input, some.rows.clone())?;
+        if !rows.iter().map(|rows| &rows.episode_id).eq(some.episodes.iter().map(|(_, id)| id)) {
+            return Err(replaced(&some.input));
+        }
+        rows.iter().map(|rows| opened(rows, &some.input, is_mirror)).collect()
+    }
+
     /// An episode by its id.
     pub fn episode(&self, id: &str) -> Result<Opened, ViewError> {
         if let Some(scored) = &self.scored
             && let Some(place) = scored.places.get(id)
         {
             let input = &scored.inputs[place.file];
-            let rows = merge::read_rows(&input.path, place.rows.clone())?;
-            let own = rows.iter().find(|rows| rows.episode_id == id);
-            let own =
-                own.ok_or_else(|| ViewError::Absent(format!("`{}` was replaced; load the page again", input.name)))?;
-            let is_mirror = scored.study.traces()?.domain() == Domain::Mirror;
-            let episode = if is_mirror { own.episode() } else { own.identity() };
-            let episode = episode.map_err(|fault| ViewError::Absent(format!("`{}`: {fault}", input.name)))?;
-            let own = (!is_mirror).then(|| own.own_columns());
-            return Ok(Opened { episode, running: None, input: Some(input.clone()), own });
+            let rows = merge::read_rows(input, place.rows.clone())?;
+            let own = rows.iter().find(|rows| rows.episode_id == id).ok_or_else(|| replaced(input))?;
+            return opened(own, input, scored.study.traces()?.domain() == Domain::Mirror);
         }
         // What there is by now, not what there was: it grows.
         let own = self.running.iter().find(|running| running.episode.episode_id == id);
@@ -279,6 +338,17 @@ impl Scored {
     pub fn study(options: &Options, inputs: Vec<Input>, question: Question) -> Result<Study, ViewError> {
         Ok(Study::of(inputs)?.threads(options.threads).asked(question)?)
     }
+}
+
+fn replaced(input: &Input) -> ViewError {
+    ViewError::Absent(format!("`{}` was replaced; load the page again", input.name))
+}
+
+fn opened(rows: &EpisodeRows, input: &Input, is_mirror: bool) -> Result<Opened, ViewError> {
+    let episode = if is_mirror { rows.episode() } else { rows.identity() };
+    let episode = episode.map_err(|fault| ViewError::Absent(format!("`{}`: {fault}", input.name)))?;
+    let own = (!is_mirror).then(|| rows.own_columns());
+    Ok(Opened { episode, running: None, input: Some(input.clone()), own })
 }
 
 fn time_of(episode: &Episode, t: usize) -> Option<u64> {

@@ -14,7 +14,7 @@ use trace::model_id::OWN_SERVER;
 use world::agent::vlm::limits::{Account, Limits, Spend};
 use world::agent::vlm::models::{Choice, Contract, Models, ModelsError};
 use world::agent::vlm::probe::{ProbeAnswer, probe};
-use world::agent::vlm::provider::{Patience, Provider};
+use world::agent::vlm::provider::{Patience, Provider, check_transport};
 use world::agent::vlm::secrets::Secret;
 use world::agent::vlm::wire_format::{Dialect, Effort};
 use world::agent::vlm::{OnOutage, Tier, Vlm};
@@ -208,6 +208,9 @@ impl VlmArgs {
             (Err(_), Dialect::OpenaiCompatible) if self.base_url.is_some() => None,
             (Err(missing), _) => return Err(Failure::input(missing)),
         };
+        if secret.is_some() {
+            check_transport(url, &choice.backend).map_err(Failure::input)?;
+        }
         let patience = Patience {
             attempts: self.attempts,
             timeout: Duration::from_secs(self.timeout.unwrap_or(if self.tier == Some(Tier::Flex) { 900 } else { 180 })),

@@ -52,7 +52,13 @@ pub fn choice(dialect: Dialect) -> Choice {
             answers_as: Vec::new(),
             accepted: Vec::new(),
         },
-        backend: Backend { dialect, base_url: None, key: "UNUSED".to_owned(), extra_body: serde_json::Map::new() },
+        backend: Backend {
+            dialect,
+            base_url: None,
+            key: "UNUSED".to_owned(),
+            plain_http: false,
+            extra_body: serde_json::Map::new(),
+        },
         is_known: true,
     }
 }

@@ -98,6 +98,8 @@ fn a_misplaced_key_is_not_printed() {
     assert!(told.contains("password"), "{told}");
     let told = check(&server, KEY, &format!("--base-url {KEY}"));
     assert!(told.contains("[key]"), "{told}");
+    let told = check(&server, KEY, "--base-url http://192.0.2.1/v1");
+    assert!(told.contains("everyone on the way") && told.contains("plain_http = true"), "{told}");
     let told = check(&server, "sk-loopback\n0123456789-0123456789", "");
     assert!(told.contains("no header can carry"), "{told}");
     assert_eq!(server.count(), 0);

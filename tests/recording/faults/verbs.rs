@@ -42,6 +42,7 @@ const VERBS: &[Verb] = &[
     verb("renormalize b.parquet --out norm", "renormalize old/a.parquet old/b.parquet --out norm", &["norm"]),
     verb("", "renormalize old --out new/norm", &["new/norm"]),
     verb("renormalize b.parquet --out link", "renormalize old/a.parquet old/b.parquet --out link", &["link"]),
+    verb("trace seal b.parquet sealed.parquet", "trace seal a.parquet sealed.parquet", &["sealed.parquet"]),
     verb("renormalize b.parquet --out man", "man man", &["man"]),
     verb("score b.parquet -o rec.parquet", "recover a.mcap -o rec.parquet", &["rec.parquet"]),
     verb("figure spider b.parquet -o f.svg", "figure spider a.parquet -o f.svg", &["f.svg"]),

@@ -5,7 +5,7 @@ use std::process::Stdio;
 
 use crate::harness::files::{fixture, write_small_world};
 use crate::harness::need;
-use crate::harness::program::{Running, program, wait_for};
+use crate::harness::program::{Running, program, run, wait_for};
 use crate::html::browser::Browser;
 use crate::view::Server;
 use crate::view::pages::until;
@@ -72,6 +72,39 @@ fn pages_that_are_open_grow_with_the_recording() {
     assert!(list.text("document.querySelector('#count').textContent").starts_with("2 episodes"));
     episode.close();
     list.close();
+}
+
+/// Copies of a recording that replaces and removes its own files meanwhile: each is of one moment.
+#[test]
+fn a_copy_of_a_recording_that_goes_on_is_whole() {
+    need::drawing();
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    write_small_world(here, "episode.steps = 3\n");
+    let record = |runs: &str| {
+        let mut command = program(here);
+        command.args(["record", "--agent", "random", "--experiment", "E1", "--seeds", "1", "--no-frames"]);
+        command.args(["--runs", runs, "--out", "runs", "--config", "small.toml"]);
+        Running(command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap())
+    };
+    assert!(record("1").0.wait().unwrap().success());
+    let mut recording = record("40");
+    let mut copies = 0;
+    while recording.0.try_wait().unwrap().is_none() || copies == 0 {
+        run(here, &["view", "runs", "--export", "page"]).done();
+        copies += 1;
+        let data = here.join("page/data");
+        let list = std::fs::read_to_string(data.join("list.js")).unwrap();
+        let ids: Vec<usize> = list.match_indices("{\"id\":\"E1/").map(|(at, _)| at).collect();
+        assert!(!ids.is_empty());
+        for at in 0..ids.len() {
+            assert!(data.join(format!("episode-{at}.js")).is_file(), "copy {copies}: episode {at} of {}", ids.len());
+        }
+        assert!(!data.join(format!("episode-{}.js", ids.len())).exists(), "copy {copies}");
+    }
+    println!("{copies} copies");
+    let left = std::fs::read_dir(here).unwrap().count();
+    assert_eq!(left, 3, "the world, the recording and the page");
 }
 
 #[test]

@@ -199,3 +199,34 @@ fn a_removed_folder_is_reported_and_the_page_stays() {
     std::fs::rename(folder.path().join("away"), &runs).unwrap();
     wait_for("no fault", || fault().is_none().then_some(()));
 }
+
+/// Small recordings that ask for much: each answer within the budget, or refused with the limit.
+#[cfg(target_os = "linux")]
+#[test]
+fn no_question_takes_more_than_the_budget() {
+    use crate::harness::bombs::{MEMORY, long_episode, long_texts, many_episodes, peak};
+    let folder = tempfile::tempdir().unwrap();
+    long_episode(&folder.path().join("long.parquet"), 4_000_000);
+    long_texts(&folder.path().join("texts.parquet"), 1_000_000);
+    many_episodes(&folder.path().join("many.parquet"), 290_000);
+    for (name, id, refused) in [("long", "e", true), ("texts", "e", true), ("many", "000007", false)] {
+        let server = Server::start(folder.path(), &[&format!("{name}.parquet")]);
+        for question in ["study", "overview", "episodes?sort=TSA&limit=500", "live"] {
+            let answer = server.get(&format!("/api/{question}"));
+            assert_eq!(answer.status, 200, "{name}, {question}: {}", answer.text());
+        }
+        for question in [
+            format!("episode?id={id}"),
+            format!("text?id={id}&column=action&t=1"),
+            format!("compare?a={id}&b={id}"),
+            format!("map?id={id}"),
+        ] {
+            let answer = server.get(&format!("/api/{question}"));
+            assert_eq!(answer.status == 200, !refused, "{name}, {question}: {}", answer.status);
+            let is_told = || answer.text().contains("at most 2000000 steps") && answer.text().contains("MIRRORSTATS_BUDGET");
+            assert!(!refused || is_told(), "{name}, {question}: {}", answer.text());
+        }
+        let most = peak(server.process_id());
+        assert!(most > 0 && most < MEMORY, "{name}: {} MB", most >> 10);
+    }
+}

@@ -28,6 +28,7 @@ mod levels;
 mod oracle;
 mod own_checksums;
 mod pages;
+mod statistics;
 mod texts;
 
 fn episodes() -> Vec<Episode> {

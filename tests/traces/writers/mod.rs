@@ -223,3 +223,32 @@ fn verbs_say_the_same(folder: &Path, writer: &str, files: &[(&Path, &Path)]) {
         assert!(theirs.is_ok() && (theirs.ok() == own.ok() || file.starts_with("again")), "{writer}: {file}");
     }
 }
+
+/// Bytes changed one at a time in files without checksums: how many change scores without a word is stated in benches/SOAK.md.
+#[test]
+#[ignore = "thousands of changes of files by pyarrow; make soak"]
+fn soak_changed_bytes_of_files_without_checksums_are_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::create_dir(at.join("again")).unwrap();
+    let mut command = clean(std::process::Command::new(need::python()), at);
+    let script = repository().join("tests/traces/writers/write.py");
+    let own = fixture("recorded/E1-guesser.parquet");
+    succeeds(command.env("PYTHONPATH", need::writers()).arg(script).arg(&own).arg("again"));
+    let (mut all, mut silent, mut draws) = (0, 0, crate::harness::faults::Draws::new(38));
+    for entry in fs::read_dir(at.join("again")).unwrap() {
+        let path = entry.unwrap().path();
+        let (whole, sound) = (fs::read(&path).unwrap(), scores_by(&path, "paper").unwrap());
+        for _ in 0..400 {
+            let mut bytes = whole.clone();
+            bytes[draws.below(whole.len())] ^= u8::try_from(1 + draws.below(255)).unwrap();
+            fs::write(&path, &bytes).unwrap();
+            all += 1;
+            let is_other = scores_by(&path, "paper").is_ok_and(|scores| scores != sound);
+            let found = || validate(&[Input::new(&path)], None, NonZeroUsize::MIN).unwrap().findings;
+            silent += usize::from(is_other && found().iter().all(|finding| finding.severity != Severity::Error));
+        }
+    }
+    println!("{silent} of {all} changes are silent");
+    assert!(silent * 200 < all, "{silent} of {all}");
+}

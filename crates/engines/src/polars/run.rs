@@ -6,7 +6,6 @@ use std::thread;
 use polars::prelude::{DataFrame, Engine, LazyFrame, PolarsError as Inner};
 use polars::sql::SQLContext;
 
-use exact::budget::Exceeded;
 use metric::sql::LoweringError;
 use score::score_traces::ScoreError;
 use trace::catch_panic::contained_on_all_threads;
@@ -42,9 +41,6 @@ pub enum PolarsError {
         /// The value found.
         value: i64,
     },
-    /// More episodes than Polars can hold for files of their size.
-    #[error("{0}\n  help: without `--engine polars` they are scored in less memory")]
-    OverBudget(#[from] Exceeded),
     /// Nobody reads the answer any more.
     #[error("the reader of the answer is gone")]
     ReaderGone,

@@ -8,7 +8,6 @@ use polars::sql::SQLContext;
 
 use super::frame::{self, FrameColumn};
 use super::run::{self, PolarsError};
-use exact::budget::{Exceeded, Limit};
 use metric::catalog::Kind;
 use metric::definitions::Definitions;
 use metric::overflow::may_overflow;
@@ -32,18 +31,12 @@ pub fn score(
 ) -> Result<EpisodeTable, PolarsError> {
     let statement = sql::lower(&definitions.plan, Dialect::Polars)?;
     let episodes = unscored(traces, definitions, labels, threads)?;
-    check_size(episodes.len() as u64, traces.files().iter().map(TraceFile::bytes).sum())?;
     let steps = frame::steps(traces, &columns(traces, definitions))?;
     check_overflow(traces, definitions, &steps)?;
     let rows = answer(&steps, &statement)?;
     let metrics = metrics(definitions, &rows)?;
     check_rates(definitions, &metrics)?;
     Ok(table(&episodes, &keys(&rows)?, &metrics))
-}
-
-/// Polars takes some 1.2 KB for each episode: a small file with very many would take memory out of all proportion to it.
-fn check_size(episodes: u64, bytes: u64) -> Result<(), Exceeded> {
-    Limit::new("episodes for Polars in files of their size", 300_000).and_beyond(1 << 20, 1, bytes).check(episodes)
 }
 
 fn columns(traces: &TraceSet, definitions: &Definitions) -> Vec<FrameColumn> {
@@ -167,18 +160,4 @@ fn texts(rows: &DataFrame, name: &str) -> Result<Vec<Option<String>>, PolarsErro
 
 fn lost(what: &str) -> PolarsError {
     PolarsError::Failed(format!("{what} is not in its answer"))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::check_size;
-
-    #[test]
-    fn episodes_are_bounded_by_the_size_of_their_files() {
-        for (episodes, bytes) in [(300_000, 57_000), (1_300_000, (1 << 20) + 1_000_000), (2_000_000, 80_000_000)] {
-            assert_eq!(check_size(episodes, bytes), Ok(()));
-        }
-        let refused = check_size(1_000_000, 57_000).unwrap_err().to_string();
-        assert!(refused.contains("at most 300000 episodes for Polars"), "{refused}");
-    }
 }

@@ -34,12 +34,12 @@ struct Texts {
     added: u64,
 }
 
-/// The texts of a smaller dictionary are not counted: they are short.
+/// The texts of a smaller dictionary are not counted where they stay keys: they are short.
 const SMALL_DICTIONARY: usize = 64 << 10;
 
 impl Texts {
     fn of_dictionary(&mut self, mut values: &[u8]) {
-        if values.len() <= SMALL_DICTIONARY {
+        if values.len() <= SMALL_DICTIONARY && !self.writes_out {
             return;
         }
         // They are known to be there.

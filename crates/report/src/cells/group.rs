@@ -7,6 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::interval::ranges;
 use super::{Cells, Group, KeyValue};
+use exact::budget::{Exceeded, Limit};
 use exact::moments::{MomentOverflow, Moments};
 use exact::suggest::hint;
 pub use score::table::CONDITION;
@@ -18,7 +19,11 @@ pub const KEY_COLUMNS: [&str; 5] = ["experiment", "model", "seed", "run", "episo
 /// The columns that cells are grouped by unless asked otherwise.
 pub const DEFAULT_BY: [&str; 2] = ["experiment", "model"];
 
-/// An error of grouping episodes.
+/// The cells of all tables.
+const MOST_CELLS: Limit =
+    Limit::new("cells, groups times metrics; group by fewer columns or leave metrics out", 200_000);
+
+/// Why episodes cannot be grouped as asked.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages say it")]
 pub enum GroupError {
@@ -30,6 +35,8 @@ pub enum GroupError {
     RepeatedColumn { name: String },
     #[error("metric `{metric}`: {source}")]
     Overflow { metric: String, source: MomentOverflow },
+    #[error(transparent)]
+    Exceeded(#[from] Exceeded),
 }
 
 /// Cells of `table` grouped by the columns `by`.
@@ -37,6 +44,7 @@ pub enum GroupError {
 /// A label column whose every value is an integer orders as integers.
 pub fn group(table: &EpisodeTable, by: &[String]) -> Result<Cells, GroupError> {
     let Membership { keys, of_row } = Membership::of(table, by)?;
+    MOST_CELLS.check((keys.len() as u64).saturating_mul(table.metrics.len() as u64))?;
     let none = |key| Group { key, episodes: 0, moments: vec![Moments::default(); table.metrics.len()] };
     let mut groups: Vec<Group> = keys.into_iter().map(none).collect();
     let mut start = 0;

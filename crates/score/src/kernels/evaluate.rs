@@ -45,6 +45,7 @@ pub struct BatchScores {
 impl PhysicalPlan {
     /// Evaluates all steps over a batch.
     pub fn evaluate(&self, batch: &Batch) -> Result<Evaluated, EngineError> {
+        self.check_batch(batch.segments.rows(), batch.segments.len())?;
         let vectors = Vec::with_capacity(self.steps().len());
         let mut evaluation = Evaluation { plan: self, batch, symbols: Symbols::default(), vectors };
         for (at, step) in self.steps().iter().enumerate() {

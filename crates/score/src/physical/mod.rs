@@ -8,6 +8,7 @@
 mod lower;
 mod print;
 mod window;
+mod work;
 
 use std::collections::HashMap;
 

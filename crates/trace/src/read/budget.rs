@@ -22,8 +22,29 @@ pub(crate) fn most_rows(bytes: u64) -> Limit {
     Limit::in_proportion("rows in a file of its size", 8_000_000, 16, bytes)
 }
 
-fn most_episodes(bytes: u64) -> Limit {
-    Limit::in_proportion("episodes in a file of its size", 1_000_000, 1, bytes)
+/// A row takes a byte in the densest traces, and an episode has some rows.
+pub(crate) const fn most_episodes(bytes: u64) -> Limit {
+    Limit::new("episodes in files of their size", 300_000).and_beyond(1 << 20, 1, bytes)
+}
+
+/// The episodes of a list: each takes a kilobyte as it is printed.
+pub(crate) const fn most_listed(bytes: u64) -> Limit {
+    Limit::in_proportion("episodes in a list of files of their size", 100_000, 1, bytes / 8)
+}
+
+/// The values of an episode that is held row by row, its steps times the columns of its file.
+pub(crate) const fn most_values(bytes: u64) -> Limit {
+    Limit::new("steps times columns of an episode that is shown", 2_000_000).and_beyond(1 << 20, 4, bytes)
+}
+
+/// The memory that such an episode takes before it is shown.
+pub(crate) const fn most_shown(bytes: u64) -> Limit {
+    Limit::new("bytes of an episode that is shown", 48 << 20).and_beyond(1 << 20, 64, bytes)
+}
+
+/// What a list of changed attributions takes, a kilobyte for each beside its text.
+pub(crate) const fn most_changed(bytes: u64) -> Limit {
+    Limit::in_proportion("bytes of changed attributions in traces of their size", 64 << 20, 64, bytes)
 }
 
 /// The episodes that were read of a file so far. What is read again is counted once.
@@ -71,8 +92,8 @@ mod tests {
     #[test]
     fn episodes_are_counted_once_whatever_scans_them() {
         let budget = EpisodeBudget::new(0);
-        assert!(budget.spend(0, 600_000, 600_000).is_ok() && budget.spend(0, 600_000, 600_000).is_ok());
-        assert!(budget.spend(1, 400_000, 400_000).is_ok() && budget.spend(1, 400_001, 1).is_err());
+        assert!(budget.spend(0, 200_000, 200_000).is_ok() && budget.spend(0, 200_000, 200_000).is_ok());
+        assert!(budget.spend(1, 100_000, 100_000).is_ok() && budget.spend(1, 100_001, 1).is_err());
     }
 
     #[test]

@@ -17,6 +17,7 @@ use super::damaged::damaged;
 use super::footer::plain;
 use super::open::{Readable, TraceFile};
 use super::projection::{EPISODE_ID, Layout, LayoutColumn, T};
+use super::statistics::{Chunk, Seen};
 use crate::catch_panic::contained;
 use crate::diagnostic::{Code, Finding};
 use crate::schema::Kind;
@@ -76,6 +77,8 @@ pub(crate) struct RowGroup<'a> {
     first: usize,
     at_a_time: usize,
     over: bool,
+    /// What was read of each column whose values the footer describes.
+    seen: Vec<Option<Seen>>,
 }
 
 /// The source of a column's values.
@@ -130,7 +133,8 @@ impl<'a> RowGroup<'a> {
         let at_a_time = rows_at_a_time(file.row_group_rows(row_group), text);
         let sources = Vec::new();
         let mut rows =
-            Self { file, layout, readable, index: row_group, ids, sources, first: 0, at_a_time, over: false };
+            Self { file, layout, readable, index: row_group, ids, sources, first: 0, at_a_time, over: false, seen: Vec::new() };
+        rows.seen = (0..layout.columns.len()).map(|at| rows.described(at).map(|_| Seen::default())).collect();
         for at in 0..layout.columns.len() {
             let source = match root(file, layout, at) {
                 None => Source::Absent,
@@ -169,7 +173,10 @@ impl<'a> RowGroup<'a> {
             (0..self.sources.len()).map(|at| self.column(at, count).and_then(|column| self.within(at, column)));
         let columns: Vec<Column> = columns.collect::<Result<_, _>>()?;
         if count == 0 {
-            return Ok(None);
+            return self.check_statistics().map(|()| None);
+        }
+        for (seen, column) in self.seen.iter_mut().zip(&columns) {
+            seen.iter_mut().for_each(|seen| seen.add(column));
         }
         let whole = self.ids.as_ref().is_some_and(|ids| match left - count {
             0 => ids.ends,
@@ -178,6 +185,23 @@ impl<'a> RowGroup<'a> {
         let rows = Rows { columns, row_group: self.index, first: self.first, whole };
         self.first += count;
         Ok(Some(rows))
+    }
+
+    /// What the footer says of the values of a column, in a file without checksums.
+    fn described(&self, at: usize) -> Option<&Chunk> {
+        let leaf = leaf(&self.readable.footer, root(self.file, self.layout, at)?)?;
+        self.file.statistics().chunk(self.index, leaf)
+    }
+
+    fn check_statistics(&self) -> Result<(), Box<Finding>> {
+        for (at, seen) in self.seen.iter().enumerate() {
+            let fault = seen.as_ref().zip(self.described(at)).and_then(|(seen, declared)| seen.fault(declared));
+            if let Some((expected, found)) = fault {
+                let finding = Finding::new(Code::CorruptData, self.file.name(), expected, found);
+                return Err(Box::new(finding.in_row_group(self.index).in_column(&self.layout.columns[at].name)));
+            }
+        }
+        Ok(())
     }
 
     fn within(&self, at: usize, column: Column) -> Result<Column, Box<Finding>> {

@@ -19,6 +19,7 @@ use parquet::schema::types::SchemaDescriptor;
 use super::budget::{EpisodeBudget, MOST_COLUMNS};
 use super::footer::bounds;
 use super::footer::{Extent, Footer, footer, plain};
+use super::statistics::Declared as Statistics;
 use crate::catch_panic::contained;
 use crate::declared_experiment::{self, DeclaredExperiment};
 use crate::diagnostic::{Code, Finding};
@@ -52,6 +53,8 @@ pub struct TraceFile {
     colors: Declared,
     experiments: Vec<DeclaredExperiment>,
     checksums: Checksums,
+    /// What the footer says of the values, of a file without checksums.
+    statistics: Statistics,
     footer: Mutex<Weak<Readable>>,
     expansion: Arc<Expansion>,
     episodes: EpisodeBudget,
@@ -206,6 +209,8 @@ impl TraceFile {
         let experiments = declared_experiment::of_recording(&input.name, recording).map_err(|f| vec![*f])?;
         readable(metadata, &columns)
             .map_err(|error| vec![Finding::new(Code::CorruptFooter, &input.name, "a readable schema", error)])?;
+        let whole = || footer(input, Extent::Whole).map(|footer| Statistics::of(&footer.metadata)).unwrap_or_default();
+        let statistics = if checksums == Checksums::Present { Statistics::default() } else { whole() };
         let (name, path, footer) = (input.name.clone(), input.path.clone(), Mutex::default());
         let (expansion, episodes) = (Arc::new(Expansion::new(bytes)), EpisodeBudget::new(bytes));
         Ok(Self {
@@ -220,6 +225,7 @@ impl TraceFile {
             colors,
             experiments,
             checksums,
+            statistics,
             footer,
             expansion,
             episodes,
@@ -315,6 +321,10 @@ impl TraceFile {
 
     pub fn checksums(&self) -> Checksums {
         self.checksums
+    }
+
+    pub(crate) fn statistics(&self) -> &Statistics {
+        &self.statistics
     }
 
     pub(crate) fn pairs(&self) -> &[KeyValue] {

@@ -12,19 +12,23 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-use crate::diagnostic::{Code, Finding, Severity};
-use crate::error::TraceError;
-use crate::identification::{VERSION, normal_form};
-use crate::inputs::Input;
-use crate::open::{TraceFile, TraceSet};
-use crate::schema::RECORDING_KEY;
-use crate::validate::validate;
-use crate::write::rewrite::{Before, rewrite};
+use super::diagnostic::{Code, Finding, Severity};
+use super::error::TraceError;
+use super::identification::{VERSION, normal_form};
+use super::inputs::Input;
+use super::open::{TraceFile, TraceSet};
+use super::read::budget::most_changed;
+use super::schema::RECORDING_KEY;
+use super::validate::validate;
+use super::write::rewrite::{Before, rewrite};
+use exact::budget::Budget;
 use exact::replace::{Content, FolderFiles, TemporaryFolder, folder_of, is_same_file, make_folder, replace_folder};
 
 /// The free text, as replied.
 const SOURCE: &str = "identification";
 const TARGET: &str = "self_color";
+/// What a flip takes as it is printed, beside its text.
+const PRINTED: usize = 1 << 10;
 /// The key of a recording that tells the version of the rule.
 const VERSION_KEY: &str = "identification_version";
 
@@ -106,10 +110,11 @@ pub fn renormalize(
     };
     let stage = folder.map(stage_beside).transpose()?;
     let mut staged = Vec::new();
+    let changed = Budget::new(most_changed(old.iter().map(Old::bytes).sum()));
     for (at, (input, old)) in inputs.iter().zip(&old).enumerate() {
         let target = targets.as_ref().map(|targets| targets[at].as_path());
         let new = stage.as_ref().map(|stage| stage.path().join(at.to_string()));
-        let (mut file, flips) = old.renormalized(&input.name, target.zip(new.as_deref()))?;
+        let (mut file, flips) = old.renormalized(&input.name, target.zip(new.as_deref()), &changed)?;
         file.out = target.map(|target| Input::new(target).name);
         answer.files.push(file);
         answer.flips.extend(flips);
@@ -184,14 +189,19 @@ impl Old {
         Ok(Self { set: TraceSet::of(vec![file]), recording })
     }
 
+    fn bytes(&self) -> u64 {
+        self.set.files().iter().map(TraceFile::bytes).sum()
+    }
+
     fn renormalized(
         &self,
         name: &str,
         to: Option<(&Path, &Path)>,
+        changed: &Budget,
     ) -> Result<(RenormalizedFile, Vec<Flip>), RenormalizeError> {
         let mut recording = self.recording.clone();
-        let mut texts =
-            Normalizer { name, version_before: put_version(&mut recording), steps: 0, texts: 0, flips: Vec::new() };
+        let version_before = put_version(&mut recording);
+        let mut texts = Normalizer { name, changed, version_before, steps: 0, texts: 0, flips: Vec::new() };
         match to {
             None => drop(rewrite(&self.set, [SOURCE, TARGET], |step| texts.attribution(step), &recording, io::sink())?),
             Some((target, staged)) => {
@@ -207,6 +217,8 @@ impl Old {
 /// The texts of a trace, as far as they are read.
 struct Normalizer<'a> {
     name: &'a str,
+    /// What the flips of all traces may take.
+    changed: &'a Budget,
     version_before: Option<String>,
     steps: u64,
     texts: u64,
@@ -215,24 +227,29 @@ struct Normalizer<'a> {
 
 impl Normalizer<'_> {
     fn into_file(self) -> (RenormalizedFile, Vec<Flip>) {
-        let Self { name, version_before, steps, texts, flips } = self;
+        let Self { name, version_before, steps, texts, flips, .. } = self;
         let name = name.to_owned();
         (RenormalizedFile { name, out: None, version_before, steps, texts, flips: flips.len() }, flips)
     }
 
     /// The attribution of a step, noted if it is another one than before.
-    fn attribution(&mut self, (episode_id, t, source, target): Before<'_>) -> Option<String> {
+    fn attribution(
+        &mut self,
+        (episode_id, t, source, target): Before<'_>,
+    ) -> Result<Option<String>, TraceError> {
         self.steps += 1;
         let before = target.map(str::to_owned);
-        let Some(text) = source else { return before };
+        let Some(text) = source else { return Ok(before) };
         self.texts += 1;
         let after = normal_form(text).map(str::to_owned);
         if before != after {
+            let over = |exceeded| TraceError::from(Finding::over_budget(self.name, &exceeded));
+            self.changed.spend((PRINTED + text.len()) as u64).map_err(over)?;
             let (file, episode_id) = (self.name.to_owned(), episode_id.to_owned());
             let (after, identification) = (after.clone(), text.to_owned());
             self.flips.push(Flip { file, episode_id, t, before, after, identification });
         }
-        after
+        Ok(after)
     }
 }
 

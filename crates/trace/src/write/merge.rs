@@ -21,6 +21,7 @@ use crate::episode::Episode;
 use crate::episode_hash::{self, EPISODE_HASH};
 use crate::error::TraceError;
 use crate::inputs::Input;
+use crate::read::budget::{most_shown, most_values};
 use crate::read::damaged::damaged;
 use crate::read::footer::bounds;
 use crate::read::footer::{Extent, Footer, footer, plain};
@@ -28,6 +29,7 @@ use crate::read::open::is_nested;
 use crate::schema::{self, COLUMNS};
 use crate::write::row_groups::{Gathered, RowGroups, field};
 use crate::write::{self, OptionalColumns};
+use exact::budget::{Exceeded, Limit};
 use exact::input;
 use exact::replace::{self, NewFile};
 use parquet_pages::{Expansion, FaultSlot, Library, Store, rows_of};
@@ -125,15 +127,19 @@ pub fn read(path: &Path) -> Result<Vec<EpisodeRows>, TraceError> {
     }
 }
 
-/// The episodes in some rows of a trace file, counted from its first; only the row groups that hold them are read.
-pub fn read_rows(path: &Path, rows: Range<usize>) -> Result<Vec<EpisodeRows>, TraceError> {
-    let name = path.display().to_string();
-    let damaged = |finding: Finding| unreadable(&name, finding.to_string().into());
-    let file = input::open(path).map_err(|error| unreadable(&name, error.into()))?;
-    let footer = footer(&Input::new(path), Extent::Pages).map_err(|finding| damaged(*finding))?;
-    if let Some(fault) = bounds::fault(&name, footer.bytes, &footer.metadata) {
+/// The episodes in some rows of a trace file, counted from its first; only the row groups that hold them are read. They are
+/// held row by row, which their values must be few enough for.
+pub fn read_rows(of: &Input, rows: Range<usize>) -> Result<Vec<EpisodeRows>, TraceError> {
+    let name = &of.name;
+    let damaged = |finding: Finding| unreadable(name, finding.to_string().into());
+    let file = input::open(&of.path).map_err(|error| unreadable(name, error.into()))?;
+    let footer = footer(of, Extent::Pages).map_err(|finding| damaged(*finding))?;
+    if let Some(fault) = bounds::fault(name, footer.bytes, &footer.metadata) {
         return Err(damaged(fault));
     }
+    let over = |exceeded: Exceeded| TraceError::from(Finding::over_budget(name, &exceeded));
+    let columns = footer.metadata.file_metadata().schema_descr().num_columns();
+    most_values(footer.bytes).check((rows.len() as u64).saturating_mul(columns as u64)).map_err(over)?;
     let (mut before, mut groups, mut skipped) = (0, Vec::new(), None);
     for group in 0..footer.metadata.num_row_groups() {
         let behind = before + rows_of(footer.metadata.row_group(group));
@@ -147,7 +153,8 @@ pub fn read_rows(path: &Path, rows: Range<usize>) -> Result<Vec<EpisodeRows>, Tr
     let skipped = skipped.unwrap_or_default();
     let selection = vec![RowSelector::skip(skipped), RowSelector::select(rows.len())];
     let store = Store::new(file, Arc::new(Expansion::new(footer.bytes)));
-    decode_some(&name, store, footer, groups, Some(selection.into()))
+    let most = most_shown(footer.bytes);
+    decode_some(name, store, footer, groups, Some((selection.into(), most)))
 }
 
 fn decode(name: &str, store: Store, footer: Footer) -> Result<Vec<EpisodeRows>, TraceError> {
@@ -160,7 +167,7 @@ fn decode_some(
     store: Store,
     Footer { metadata, chunks, .. }: Footer,
     row_groups: Vec<usize>,
-    selection: Option<RowSelection>,
+    selection: Option<(RowSelection, Limit)>,
 ) -> Result<Vec<EpisodeRows>, TraceError> {
     let failed = |source: Box<dyn std::error::Error + Send + Sync>| unreadable(name, source);
     let columns = metadata.file_metadata().schema_descr().columns();
@@ -172,9 +179,16 @@ fn decode_some(
         let (metadata, kept) = (Arc::new(metadata), Arc::clone(&slot));
         let library = Library { store, metadata, checksums: chunks, row_groups, slot: kept, writes_out: true };
         let damaged = |error: String| failed(damaged(name, &slot, &error).to_string().into());
+        let (selection, most) = selection.unzip();
         let reader = library.reader(ProjectionMask::all(), None, BATCH_ROWS, selection);
-        let batches = reader.map_err(|error| damaged(plain(&error)))?.collect::<Result<Vec<_>, _>>();
-        let batches = batches.map_err(|error| damaged(error.to_string()))?;
+        let (mut batches, mut held) = (Vec::new(), 0);
+        for batch in reader.map_err(|error| damaged(plain(&error)))? {
+            let batch = batch.map_err(|error| damaged(error.to_string()))?;
+            held += batch.get_array_memory_size() as u64;
+            let checked = most.map_or(Ok(()), |most| most.check(held));
+            checked.map_err(|exceeded| TraceError::from(Finding::over_budget(name, &exceeded)))?;
+            batches.push(batch);
+        }
         let Some(first) = batches.first() else { return Ok(Vec::new()) };
         let rows = concat_batches(&first.schema(), &batches).map_err(|error| failed(error.into()))?;
         episodes(&rows).map_err(|fault| failed(fault.into()))

@@ -1,4 +1,4 @@
-//! A trace again with one column of text made anew; everything else is as it was.
+//! A trace again with one column of text made anew, or with checksums alone; everything else is as it was.
 //!
 //! Rule: other columns are copied as the bytes they are, so whatever type, encoding or codec a writer chose stays; so do
 //! the row groups and the footer's own keys, but for the recording. What only speeds up reading (page indexes, bloom
@@ -35,7 +35,7 @@ pub(crate) type Before<'a> = (&'a str, i64, Option<&'a str>, Option<&'a str>);
 pub(crate) fn rewrite<W: Write + Send>(
     set: &TraceSet,
     [source, target]: [&str; 2],
-    mut change: impl FnMut(Before<'_>) -> Option<String>,
+    mut change: impl FnMut(Before<'_>) -> Result<Option<String>, TraceError>,
     recording: &serde_json::Value,
     out: W,
 ) -> Result<W, TraceError> {
@@ -46,74 +46,101 @@ pub(crate) fn rewrite<W: Write + Send>(
     let failed = |error: ParquetError| unwritable(file.name(), error.into());
     let metadata = file.footer_again(Extent::Whole).map_err(|finding| TraceError::from(*finding))?.metadata;
     let schema = with_text(metadata.file_metadata().schema_descr(), target).map_err(failed)?;
-    let mut writer = SerializedFileWriter::new(Held::new(out), schema, properties(file, recording)).map_err(failed)?;
+    let properties = properties(with_recording(file, recording));
+    let mut writer = SerializedFileWriter::new(Held::new(out), schema, properties).map_err(failed)?;
     let input = file.reader().map_err(|source| TraceError::Read { what: file.name().to_owned(), source })?;
     for row_group in 0..file.row_groups() {
-        let texts = texts(file, &layout, [source, target], row_group, &mut change)?;
-        let chunks = metadata.row_group(row_group).columns();
         let mut group = writer.next_row_group().map_err(failed)?;
-        copy(&mut group, chunks, &input, target, &texts).map_err(failed)?;
+        for chunk in metadata.row_group(row_group).columns() {
+            if chunk.column_path().parts() == [target] {
+                write_texts(&mut group, (file, row_group), &layout, [source, target], &mut change)?;
+            } else {
+                copy(&mut group, chunk, file.row_group_rows(row_group), &input).map_err(failed)?;
+            }
+        }
         group.close().map_err(failed)?;
         checksums::pass_on(&mut writer).map_err(failed)?;
     }
     checksums::finish(writer).map_err(failed)
 }
 
-fn texts(
-    file: &TraceFile,
-    layout: &Layout,
-    columns: [&str; 2],
-    row_group: usize,
-    change: &mut impl FnMut(Before<'_>) -> Option<String>,
-) -> Result<Vec<Option<String>>, TraceError> {
-    let [source, target] = columns.map(|name| layout.position(name).expect("the layout was made with it"));
-    let mut texts = Vec::with_capacity(file.row_group_rows(row_group));
-    for rows in RowGroup::open(file, layout, row_group, None).map_err(|finding| TraceError::from(*finding))? {
-        let rows = rows.map_err(|finding| TraceError::from(*finding))?;
-        for row in 0..rows.len() {
-            let (id, t) = (rows.episode(row).unwrap_or_default(), rows.columns[T].int(row).unwrap_or_default());
-            texts.push(change((id, t, rows.columns[source].text(row), rows.columns[target].text(row))));
+/// Writes the trace of a set's only file to `out` with checksums; every column is copied as it is.
+pub(crate) fn with_checksums<W: Write + Send>(set: &TraceSet, out: W) -> Result<W, TraceError> {
+    let [file] = set.files() else { return Err(unwritable("the trace", "there is not exactly one".into())) };
+    verify_pages(set)?;
+    let failed = |error: ParquetError| unwritable(file.name(), error.into());
+    let metadata = file.footer_again(Extent::Whole).map_err(|finding| TraceError::from(*finding))?.metadata;
+    let schema = metadata.file_metadata().schema_descr().root_schema_ptr();
+    let properties = properties(file.pairs().to_vec());
+    let mut writer = SerializedFileWriter::new(Held::new(out), schema, properties).map_err(failed)?;
+    let input = file.reader().map_err(|source| TraceError::Read { what: file.name().to_owned(), source })?;
+    for row_group in 0..file.row_groups() {
+        let mut group = writer.next_row_group().map_err(failed)?;
+        for chunk in metadata.row_group(row_group).columns() {
+            copy(&mut group, chunk, file.row_group_rows(row_group), &input).map_err(failed)?;
         }
+        group.close().map_err(failed)?;
+        checksums::pass_on(&mut writer).map_err(failed)?;
     }
-    Ok(texts)
+    checksums::finish(writer).map_err(failed)
 }
 
 fn copy<W: Write + Send>(
     group: &mut SerializedRowGroupWriter<'_, W>,
-    chunks: &[ColumnChunkMetaData],
+    chunk: &ColumnChunkMetaData,
+    rows: usize,
     input: &File,
-    target: &str,
-    texts: &[Option<String>],
 ) -> parquet::errors::Result<()> {
-    for chunk in chunks {
-        if chunk.column_path().parts() == [target] {
-            write_texts(group, texts)?;
-        } else {
-            let close = ColumnCloseResult {
-                bytes_written: u64::try_from(chunk.compressed_size()).unwrap_or_default(),
-                rows_written: texts.len() as u64,
-                metadata: chunk.clone(),
-                bloom_filter: None,
-                column_index: None,
-                offset_index: None,
-            };
-            contained(|| group.append_column(input, close)).map_err(ParquetError::General)??;
-        }
-    }
-    Ok(())
+    let close = ColumnCloseResult {
+        bytes_written: u64::try_from(chunk.compressed_size()).unwrap_or_default(),
+        rows_written: rows as u64,
+        metadata: chunk.clone(),
+        bloom_filter: None,
+        column_index: None,
+        offset_index: None,
+    };
+    contained(|| group.append_column(input, close)).map_err(ParquetError::General)?
 }
 
+/// Rows that are written together: a multiple of those that the library takes at a time, so that the bytes do not depend on
+/// how many are decoded together.
+const WRITTEN_ROWS: usize = 8 << 10;
+
+/// The column made anew, some rows at a time: a row group of a small file may have millions.
 fn write_texts<W: Write + Send>(
     group: &mut SerializedRowGroupWriter<'_, W>,
-    texts: &[Option<String>],
-) -> parquet::errors::Result<()> {
-    let Some(mut column) = group.next_column()? else {
-        return Err(ParquetError::General("the row group has no column left".into()));
+    (file, row_group): (&TraceFile, usize),
+    layout: &Layout,
+    columns: [&str; 2],
+    change: &mut impl FnMut(Before<'_>) -> Result<Option<String>, TraceError>,
+) -> Result<(), TraceError> {
+    let failed = |error: ParquetError| unwritable(file.name(), error.into());
+    let [source, target] = columns.map(|name| layout.position(name).expect("the layout was made with it"));
+    let missing = || failed(ParquetError::General("the row group has no column left".into()));
+    let mut column = group.next_column().map_err(failed)?.ok_or_else(missing)?;
+    let mut write = |values: &mut Vec<ByteArray>, levels: &mut Vec<i16>| {
+        column.typed::<ByteArrayType>().write_batch(values, Some(levels), None).map_err(failed)?;
+        values.clear();
+        levels.clear();
+        Ok::<_, TraceError>(())
     };
-    let values: Vec<ByteArray> = texts.iter().flatten().map(|text| ByteArray::from(text.as_str())).collect();
-    let levels: Vec<i16> = texts.iter().map(|text| i16::from(text.is_some())).collect();
-    column.typed::<ByteArrayType>().write_batch(&values, Some(&levels), None)?;
-    column.close()
+    let (mut values, mut levels) = (Vec::new(), Vec::with_capacity(WRITTEN_ROWS));
+    for rows in RowGroup::open(file, layout, row_group, None).map_err(|finding| TraceError::from(*finding))? {
+        let rows = rows.map_err(|finding| TraceError::from(*finding))?;
+        for row in 0..rows.len() {
+            let (id, t) = (rows.episode(row).unwrap_or_default(), rows.columns[T].int(row).unwrap_or_default());
+            let text = change((id, t, rows.columns[source].text(row), rows.columns[target].text(row)))?;
+            levels.push(i16::from(text.is_some()));
+            values.extend(text.map(|text| ByteArray::from(text.as_str())));
+            if levels.len() == WRITTEN_ROWS {
+                write(&mut values, &mut levels)?;
+            }
+        }
+    }
+    if !levels.is_empty() {
+        write(&mut values, &mut levels)?;
+    }
+    column.close().map_err(failed)
 }
 
 /// The file's schema with the target as text that may be null.
@@ -133,13 +160,17 @@ fn with_text(schema: &SchemaDescriptor, target: &str) -> parquet::errors::Result
     Type::group_type_builder(root.name()).with_fields(fields).build().map(Arc::new)
 }
 
-fn properties(file: &TraceFile, recording: &serde_json::Value) -> WriterPropertiesPtr {
+fn with_recording(file: &TraceFile, recording: &serde_json::Value) -> Vec<KeyValue> {
     let mut pairs = file.pairs().to_vec();
     let value = Some(recording.to_string());
     match pairs.iter_mut().find(|pair| pair.key == RECORDING_KEY) {
         Some(pair) => pair.value = value,
         None => pairs.push(KeyValue { key: RECORDING_KEY.to_owned(), value }),
     }
+    pairs
+}
+
+fn properties(pairs: Vec<KeyValue>) -> WriterPropertiesPtr {
     let properties = WriterProperties::builder()
         .set_key_value_metadata(Some(pairs))
         .set_created_by(CREATED_BY.to_owned())

@@ -62,26 +62,27 @@ pub struct ViewArgs {
 impl ViewArgs {
     /// Shows recordings, until the process is ended.
     pub fn run(self) -> Result<Outcome, Failure> {
-        let view = View::open(Options {
+        let options = Options {
             runs: self.runs.clone(),
             question: Question { each: true, ..self.scoring.question(&self.grouping) },
             against: self.against.clone(),
             style: self.style.clone(),
             threads: self.threads.count(),
-        })?;
+        };
+        if let Ok(inputs) = inputs::resolve(&self.runs, io::empty()) {
+            output::note_stale_checksums(&inputs);
+        }
+        if let Some(folder) = &self.export {
+            let written = export::write(&options, folder)?;
+            output::say(&format!("{written} files; open {}", folder.join("index.html").display()));
+            return Ok(Outcome::Done);
+        }
+        let view = View::open(options)?;
         if let Some(id) = self.episode.as_ref().filter(|id| !view.has_episode(id)) {
             return Err(Failure::input(format!(
                 "--episode: expected the id of an episode in these recordings, found `{}`\n  help: `mirrorstats trace info --episodes` lists them",
                 visible(id)
             )));
-        }
-        if let Ok(inputs) = inputs::resolve(&self.runs, io::empty()) {
-            output::note_stale_checksums(&inputs);
-        }
-        if let Some(folder) = &self.export {
-            let written = export::write(&view, folder)?;
-            output::say(&format!("{written} files; open {}", folder.join("index.html").display()));
-            return Ok(Outcome::Done);
         }
         self.serve(view)
     }

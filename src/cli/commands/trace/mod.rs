@@ -6,6 +6,7 @@ pub mod info;
 pub mod recover;
 pub mod renormalize;
 pub mod schema;
+pub mod seal;
 pub mod validate;
 
 use crate::cli::outcome::{Failure, Outcome};
@@ -19,6 +20,7 @@ pub enum TraceCommand {
     Recover(recover::RecoverArgs),
     Renormalize(renormalize::RenormalizeArgs),
     Schema(schema::SchemaCommand),
+    Seal(seal::SealArgs),
 }
 
 impl TraceCommand {
@@ -30,6 +32,7 @@ impl TraceCommand {
             Self::Recover(args) => args.run(),
             Self::Renormalize(args) => args.run(),
             Self::Schema(args) => args.run(),
+            Self::Seal(args) => args.run(),
         }
     }
 }

@@ -43,7 +43,10 @@ pub struct Backend {
     pub base_url: Option<String>,
     /// The environment variable with the key.
     pub key: String,
-    /// Additional keys of every request of its models.
+    /// True if the key may go to another machine over `http://`, where everyone on the way reads it.
+    #[serde(default)]
+    pub plain_http: bool,
+    /// What every request of its models has besides.
     #[serde(default)]
     pub extra_body: Map<String, Value>,
 }

@@ -13,6 +13,7 @@ pub mod rate_limit;
 mod waiting;
 
 use std::io;
+use std::net::IpAddr;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -22,6 +23,7 @@ use reqwest::{Client, Response, StatusCode, Url};
 use serde_json::Value;
 pub(super) use waiting::Waiting;
 
+use super::models::Backend;
 use super::secrets::Secret;
 use super::wire_format::{Answer, Dialect};
 use crate::agent::reply::Ending;
@@ -108,6 +110,12 @@ pub enum SetupError {
         "the base address has a query or a fragment\n  help: it looks like https://host/v1; keys come from the environment alone"
     )]
     Query,
+    #[error(
+        "the key would go to another machine over `http://`, where everyone on the way reads it\n  help: give an address \
+         that begins with https://, unset the variable `{key}`, or, in a network of your own, write `plain_http = true` \
+         into the backend in a file for --models"
+    )]
+    Plain { key: String },
     #[error("the key has characters that no header can carry")]
     Key,
     #[error("cannot set up HTTP: {0}")]
@@ -123,6 +131,18 @@ impl SetupError {
             (other, _) => other,
         }
     }
+}
+
+/// Refuses an address that is not encrypted for a key: it stays within this machine, or the backend says that it may go.
+pub fn check_transport(base_url: &str, backend: &Backend) -> Result<(), SetupError> {
+    // What is wrong with an address is said where it is used.
+    let Ok(url) = address(base_url, "") else { return Ok(()) };
+    let host = url.host_str().unwrap_or_default().trim_start_matches('[').trim_end_matches(']');
+    let is_own = host == "localhost" || host.parse::<IpAddr>().is_ok_and(|address| address.is_loopback());
+    if url.scheme() == "https" || is_own || backend.plain_http {
+        return Ok(());
+    }
+    Err(SetupError::Plain { key: backend.key.clone() })
 }
 
 impl Provider {
@@ -316,7 +336,21 @@ fn headers(dialect: Dialect, secret: Option<&Secret>) -> Result<HeaderMap, Setup
 
 #[cfg(test)]
 mod tests {
-    use super::{SetupError, address};
+    use super::{Backend, Dialect, SetupError, address, check_transport};
+
+    #[test]
+    fn a_key_leaves_the_machine_encrypted_unless_the_backend_says_otherwise() {
+        let (dialect, key) = (Dialect::OpenaiCompatible, "KEY".to_owned());
+        let strict = Backend { dialect, base_url: None, key, plain_http: false, extra_body: serde_json::Map::new() };
+        let free = Backend { plain_http: true, ..strict.clone() };
+        for own in ["http://127.0.0.1:8/v1", "http://localhost/v1", "http://[::1]:8/v1", "https://host/v1", "http://127.9.9.9/"] {
+            assert!(check_transport(own, &strict).is_ok(), "{own}");
+        }
+        for other in ["http://host/v1", "http://192.0.2.1/v1", "http://localhost.host/v1", "http://[2001:db8::1]/"] {
+            assert!(matches!(check_transport(other, &strict), Err(SetupError::Plain { .. })), "{other}");
+            assert!(check_transport(other, &free).is_ok(), "{other}");
+        }
+    }
 
     #[test]
     fn addresses_take_paths_and_refuse_credentials() {

@@ -1,0 +1,246 @@
+//! The values of a row group compared with the statistics of its footer, where no checksum says that they are as written.
+//!
+//! Rule: a file is refused only for what no sound writer does: a null count that is wrong, a value beyond the least or the
+//! greatest, and a least or greatest number, truth or short text that no row has. Long texts may be cut.
+
+use std::cmp::Ordering;
+
+use arrow::array::{Array, ArrayRef, AsArray as _, UInt8Array};
+use arrow::datatypes::{DataType, Float64Type, Int32Type, Int64Type};
+use parquet::basic::{ConvertedType, LogicalType};
+use parquet::file::metadata::{ColumnChunkMetaData, ParquetMetaData};
+use parquet::file::statistics::Statistics;
+
+use exact::escape::visible;
+use parquet_pages::{Column, Runs};
+
+/// Texts from this length on may be cut by their writer.
+const CUT: usize = 60;
+
+/// The statistics of all columns of all row groups, as far as they are of use.
+#[derive(Debug, Default)]
+pub(crate) struct Declared(Vec<Vec<Option<Chunk>>>);
+
+/// What a footer says of the values of a chunk.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Chunk {
+    nulls: Option<u64>,
+    least: Option<Value>,
+    greatest: Option<Value>,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+enum Value {
+    Bool(bool),
+    Int(i64),
+    Float(f64),
+    Text(Vec<u8>),
+}
+
+impl Declared {
+    pub(crate) fn of(metadata: &ParquetMetaData) -> Self {
+        let groups = metadata.row_groups().iter();
+        Self(groups.map(|group| group.columns().iter().map(Chunk::of).collect()).collect())
+    }
+
+    pub(crate) fn chunk(&self, row_group: usize, column: usize) -> Option<&Chunk> {
+        self.0.get(row_group)?.get(column)?.as_ref()
+    }
+}
+
+impl Chunk {
+    fn of(chunk: &ColumnChunkMetaData) -> Option<Self> {
+        let statistics = chunk.statistics()?;
+        let described = chunk.column_descr();
+        let logical = described.logical_type_ref();
+        let is_unsigned = matches!(logical, Some(LogicalType::Integer(integer)) if !integer.is_signed)
+            || matches!(
+                described.converted_type(),
+                ConvertedType::UINT_8 | ConvertedType::UINT_16 | ConvertedType::UINT_32 | ConvertedType::UINT_64
+            );
+        let [least, greatest] = match statistics {
+            _ if is_unsigned => [None, None],
+            Statistics::Boolean(of) => [of.min_opt(), of.max_opt()].map(|value| value.map(|value| Value::Bool(*value))),
+            Statistics::Int32(of) => [of.min_opt(), of.max_opt()].map(|value| value.map(|value| Value::Int((*value).into()))),
+            Statistics::Int64(of) => [of.min_opt(), of.max_opt()].map(|value| value.map(|value| Value::Int(*value))),
+            Statistics::Float(of) => [of.min_opt(), of.max_opt()].map(|value| value.map(|value| Value::Float((*value).into()))),
+            Statistics::Double(of) => [of.min_opt(), of.max_opt()].map(|value| value.map(|value| Value::Float(*value))),
+            // The order of the older fields is that of signed bytes.
+            Statistics::ByteArray(of) if !statistics.is_min_max_deprecated() => {
+                [of.min_opt(), of.max_opt()].map(|value| value.map(|value| Value::Text(value.data().to_vec())))
+            }
+            _ => [None, None],
+        };
+        let nulls = statistics.null_count_opt();
+        Some(Self { nulls, least, greatest }).filter(|chunk| chunk.nulls.is_some() || chunk.least.is_some() || chunk.greatest.is_some())
+    }
+}
+
+/// What was read of a column of a row group so far.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Seen {
+    nulls: u64,
+    least: Option<Value>,
+    greatest: Option<Value>,
+}
+
+impl Seen {
+    pub(crate) fn add(&mut self, column: &Column) {
+        match column {
+            Column::Flat(values) => self.flat(values),
+            Column::Runs(runs) => self.runs(runs),
+            Column::Keys(keys) => self.keys(keys.keys(), keys.values()),
+        }
+    }
+
+    /// What does not fit: expected and found.
+    pub(crate) fn fault(&self, declared: &Chunk) -> Option<(String, String)> {
+        let nulls = declared.nulls.filter(|nulls| *nulls != self.nulls);
+        if let Some(nulls) = nulls {
+            return Some((format!("{nulls} nulls, as the statistics of the footer say"), self.nulls.to_string()));
+        }
+        let bounds = [(&declared.least, &self.least, Ordering::Less, "least"), (&declared.greatest, &self.greatest, Ordering::Greater, "greatest")];
+        bounds.into_iter().find_map(|(declared, found, beyond, word)| {
+            let (declared, found) = (declared.as_ref()?, found.as_ref()?);
+            let order = found.order(declared)?;
+            let is_wrong = order == beyond || order != Ordering::Equal && declared.is_whole();
+            is_wrong.then(|| (format!("{} as the {word} value, as the statistics of the footer say", declared.words()), found.words()))
+        })
+    }
+
+    fn value(&mut self, value: &Value) {
+        let is_beyond = |bound: &Option<Value>, beyond| bound.as_ref().is_none_or(|bound| value.order(bound) == Some(beyond));
+        if is_beyond(&self.least, Ordering::Less) {
+            self.least = Some(value.clone());
+        }
+        if is_beyond(&self.greatest, Ordering::Greater) {
+            self.greatest = Some(value.clone());
+        }
+    }
+
+    fn flat(&mut self, values: &ArrayRef) {
+        match values.data_type() {
+            DataType::Dictionary(..) => {
+                let texts = values.as_dictionary::<Int32Type>();
+                self.nulls += texts.keys().null_count() as u64;
+                let mut used = vec![false; texts.values().len()];
+                for key in texts.keys().iter().flatten() {
+                    if let Some(used) = usize::try_from(key).ok().and_then(|key| used.get_mut(key)) {
+                        *used = true;
+                    }
+                }
+                self.used(texts.values(), &used);
+            }
+            _ => {
+                self.nulls += values.null_count() as u64;
+                self.ends(values, 0..values.len());
+            }
+        }
+    }
+
+    fn runs(&mut self, runs: &Runs) {
+        let starts: Vec<(usize, usize)> = runs.starts().collect();
+        let ends = starts.iter().skip(1).map(|(start, _)| *start).chain([runs.rows()]);
+        let values = runs.values();
+        for ((start, run), end) in starts.iter().zip(ends) {
+            if values.is_null(*run) {
+                self.nulls += (end - start) as u64;
+            }
+        }
+        match values.data_type() {
+            DataType::Dictionary(..) => {
+                let texts = values.as_dictionary::<Int32Type>();
+                let mut used = vec![false; texts.values().len()];
+                for key in starts.iter().filter_map(|(_, run)| texts.key(*run)) {
+                    used[key] = true;
+                }
+                self.used(texts.values(), &used);
+            }
+            _ => self.ends(values, starts.iter().map(|(_, run)| *run)),
+        }
+    }
+
+    fn keys(&mut self, keys: &UInt8Array, values: &ArrayRef) {
+        self.nulls += keys.null_count() as u64;
+        let mut used = [false; 256];
+        keys.iter().flatten().for_each(|key| used[usize::from(key)] = true);
+        self.used(values, &used);
+    }
+
+    fn used(&mut self, values: &ArrayRef, used: &[bool]) {
+        self.ends(values, (0..values.len()).filter(|at| used.get(*at) == Some(&true)));
+    }
+
+    /// Takes the least and the greatest of some values.
+    fn ends(&mut self, values: &ArrayRef, rows: impl Iterator<Item = usize>) {
+        let rows = rows.filter(|row| values.is_valid(*row));
+        match values.data_type() {
+            DataType::Boolean => {
+                let values = values.as_boolean();
+                self.both(rows.map(|row| values.value(row)), Ord::cmp, Value::Bool);
+            }
+            DataType::Int64 => {
+                let values = values.as_primitive::<Int64Type>();
+                self.both(rows.map(|row| values.value(row)), Ord::cmp, Value::Int);
+            }
+            DataType::Float64 => {
+                let values = values.as_primitive::<Float64Type>();
+                let numbers = rows.map(|row| values.value(row)).filter(|value| !value.is_nan());
+                self.both(numbers, f64::total_cmp, Value::Float);
+            }
+            DataType::Utf8 => {
+                let values = values.as_string::<i32>();
+                self.both(rows.map(|row| values.value(row)), Ord::cmp, |text| Value::Text(text.as_bytes().to_vec()));
+            }
+            _ => {}
+        }
+    }
+
+    fn both<T: Copy>(
+        &mut self,
+        mut values: impl Iterator<Item = T>,
+        order: impl Fn(&T, &T) -> Ordering,
+        value: impl Fn(T) -> Value,
+    ) {
+        let Some(first) = values.next() else { return };
+        let (least, greatest) = values.fold((first, first), |(least, greatest), next| {
+            (
+                if order(&next, &least).is_lt() { next } else { least },
+                if order(&next, &greatest).is_gt() { next } else { greatest },
+            )
+        });
+        self.value(&value(least));
+        self.value(&value(greatest));
+    }
+}
+
+impl Value {
+    /// `None` for values of two types: the column is wider than its statistics.
+    fn order(&self, other: &Self) -> Option<Ordering> {
+        match (self, other) {
+            (Self::Bool(a), Self::Bool(b)) => Some(a.cmp(b)),
+            (Self::Int(a), Self::Int(b)) => Some(a.cmp(b)),
+            // Equal whatever the sign of zero; not a number says nothing.
+            (Self::Float(a), Self::Float(b)) => a.partial_cmp(b),
+            (Self::Text(a), Self::Text(b)) => Some(a.cmp(b)),
+            _ => None,
+        }
+    }
+
+    /// Returns true if a bound must be a value that some row has.
+    fn is_whole(&self) -> bool {
+        match self {
+            Self::Text(text) => text.len() < CUT,
+            Self::Bool(_) | Self::Int(_) | Self::Float(_) => true,
+        }
+    }
+
+    fn words(&self) -> String {
+        match self {
+            Self::Bool(value) => value.to_string(),
+            Self::Int(value) => value.to_string(),
+            Self::Float(value) => value.to_string(),
+            Self::Text(text) => format!("`{}`", visible(&String::from_utf8_lossy(text))),
+        }
+    }
+}

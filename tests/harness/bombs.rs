@@ -1,0 +1,145 @@
+//! Small files that ask for much: traces of which a row takes less than a byte.
+
+use std::fmt::Write as _;
+use std::fs::{self, File};
+use std::path::Path;
+use std::process::{Child, Stdio};
+use std::sync::Arc;
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use arrow::array::{ArrayRef, BooleanArray, DictionaryArray, Int32Array, RecordBatch, StringArray};
+use arrow::datatypes::Int32Type;
+use parquet::arrow::ArrowWriter;
+use parquet::basic::{Compression, Encoding, ZstdLevel};
+use parquet::file::properties::WriterProperties;
+
+use super::program::{Answer, limited, stderr, stdout};
+
+/// What the program may take for an input of 1 MB, in KiB and in seconds of its processor time; a build without optimisation
+/// takes ten times as long.
+pub const MEMORY: u64 = 512 << 10;
+const SECONDS: u32 = 100;
+
+/// One text in every row.
+fn same(text: &str, rows: usize) -> ArrayRef {
+    let keys = Int32Array::from(vec![0; rows]);
+    Arc::new(DictionaryArray::<Int32Type>::new(keys, Arc::new(StringArray::from(vec![text]))))
+}
+
+fn numbered(count: usize) -> ArrayRef {
+    Arc::new(StringArray::from_iter_values((0..count).map(|at| format!("{at:06}"))))
+}
+
+fn integers(values: impl Iterator<Item = usize>) -> ArrayRef {
+    Arc::new(Int32Array::from_iter_values(values.map(|value| i32::try_from(value).unwrap())))
+}
+
+/// Writes a trace; gives its bytes.
+fn write(path: &Path, rows: usize, columns: Vec<(&str, ArrayRef)>) -> u64 {
+    let mut all: Vec<(&str, ArrayRef)> = vec![
+        ("episode_id", same("e", rows)),
+        ("model", same("m", rows)),
+        ("experiment", same("E1", rows)),
+        ("seed", integers(std::iter::repeat_n(1, rows))),
+        ("run", integers(std::iter::repeat_n(1, rows))),
+        ("body_color", same("red", rows)),
+        ("t", integers(std::iter::repeat_n(1, rows))),
+        ("action", same("done", rows)),
+        ("self_color", same("blue", rows)),
+        ("selected_cube", same("red", rows)),
+        ("mirror_visible", Arc::new(BooleanArray::from(vec![true; rows]))),
+    ];
+    for (name, values) in columns {
+        match all.iter_mut().find(|(known, _)| *known == name) {
+            Some(column) => column.1 = values,
+            None => all.push((name, values)),
+        }
+    }
+    let (plain, delta) = (Encoding::DELTA_BINARY_PACKED, Encoding::DELTA_BYTE_ARRAY);
+    let mut properties = WriterProperties::builder()
+        .set_compression(Compression::ZSTD(ZstdLevel::try_new(19).unwrap()))
+        .set_max_row_group_row_count(None)
+        .set_column_dictionary_enabled("t".into(), false)
+        .set_column_encoding("t".into(), plain);
+    for name in ["episode_id", "model"] {
+        if all.iter().any(|(known, values)| *known == name && values.as_any().is::<StringArray>()) {
+            properties = properties.set_column_dictionary_enabled(name.into(), false);
+            properties = properties.set_column_encoding(name.into(), delta);
+        }
+    }
+    let batch = RecordBatch::try_from_iter(all).unwrap();
+    let mut writer = ArrowWriter::try_new(File::create(path).unwrap(), batch.schema(), Some(properties.build())).unwrap();
+    writer.write(&batch).unwrap();
+    writer.close().unwrap();
+    let bytes = fs::metadata(path).unwrap().len();
+    assert!(bytes < 1 << 20, "{}: {bytes} bytes", path.display());
+    bytes
+}
+
+/// One episode of so many steps.
+pub fn long_episode(path: &Path, steps: usize) {
+    write(path, steps, vec![("t", integers(1..=steps))]);
+}
+
+/// One episode with a text of 900 bytes in each step.
+pub fn long_texts(path: &Path, steps: usize) {
+    let text = format!("I am red. {}", "x".repeat(890));
+    write(path, steps, vec![("t", integers(1..=steps)), ("identification", same(&text, steps))]);
+}
+
+/// So many episodes of one step.
+pub fn many_episodes(path: &Path, count: usize) {
+    write(path, count, vec![("episode_id", numbered(count))]);
+}
+
+/// The same, each of a model of its own.
+pub fn many_models(path: &Path, count: usize) {
+    write(path, count, vec![("episode_id", numbered(count)), ("model", numbered(count))]);
+}
+
+/// Definitions of so many metrics.
+pub fn definitions(path: &Path, count: usize, value: impl Fn(usize) -> String) {
+    let text = (0..count).fold(String::new(), |mut text, at| {
+        writeln!(text, "[metric.M{at}]\nvalue = \"{}\"", value(at)).unwrap();
+        text
+    });
+    fs::write(path, text).unwrap();
+}
+
+/// The most memory that a process has taken so far, in KiB; 0 if it is gone.
+pub fn peak(process: u32) -> u64 {
+    let status = fs::read_to_string(format!("/proc/{process}/status")).unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+    line.and_then(|line| line.trim().strip_suffix("kB")?.trim().parse().ok()).unwrap_or_default()
+}
+
+/// What the program did, and what it took at most, in KiB: looked at every few milliseconds.
+pub fn measured(at: &Path, arguments: &[&str]) -> (Answer, u64) {
+    let mut command = limited(at, &format!("ulimit -t {SECONDS}"));
+    command.args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let begun = Instant::now();
+    let child = command.spawn().unwrap();
+    let watched = watch(&child);
+    let output = child.wait_with_output().unwrap();
+    let most = watched.join().unwrap();
+    let code = output.status.code();
+    assert!(code.is_some(), "{arguments:?} was ended after {:?}: {}", begun.elapsed(), stderr(&output));
+    let answer = Answer { code: code.unwrap(), stdout: stdout(&output), stderr: stderr(&output) };
+    eprintln!("{:>6} MB {:>6.1} s  {}", most >> 10, begun.elapsed().as_secs_f64(), arguments.join(" "));
+    (answer, most)
+}
+
+fn watch(child: &Child) -> std::thread::JoinHandle<u64> {
+    let process = child.id();
+    std::thread::spawn(move || {
+        let mut most = 0;
+        loop {
+            match peak(process) {
+                0 => return most,
+                now => most = most.max(now),
+            }
+            sleep(Duration::from_millis(3));
+        }
+    })
+}

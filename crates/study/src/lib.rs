@@ -19,11 +19,9 @@
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
 mod backend;
-mod between;
+mod compare;
 mod copies;
-mod design;
-mod diff;
-mod empty_filter;
+mod definitions;
 mod error;
 mod losses;
 mod output;
@@ -57,7 +55,7 @@ use ::report::layout::MetricTable;
 use ::report::plan::departures::{Looks, departures};
 use ::report::plan::register::RegisteredPlan;
 use ::report::published;
-use ::report::statistics::{Options, Ranks};
+use ::report::statistics::{Options, Ranks, Replies};
 use ::report::style::Style;
 use ::report::tables::ListTable;
 use exact::replace;
@@ -301,55 +299,6 @@ impl Study {
     /// A sentence about traces whose checksums are another file's.
     pub fn stale_checksums(&self) -> Option<String> {
         self.source.traces().ok().and_then(|traces| stale_note(traces.files()))
-    }
-
-    fn undecided(&self, lost: &LostCounts) -> LostCounts {
-        if self.question.lost == LostAs::Nothing { lost.clone() } else { LostCounts::default() }
-    }
-
-    fn statistics_of(&self, counted: &Counted, cells: &Cells, options: &Options) -> Result<Statistics, StudyError> {
-        let Counted { results, lost, .. } = counted;
-        let declared = &results.episodes.declared;
-        let (is_known, total) = (results.lost.is_some() || declared.losses_recorded || !lost.is_empty(), lost.total());
-        let beside = self.undecided(lost);
-        let (design, selection) = (design_of(declared), self.selection(&results.episodes));
-        let replies = Replies::of(counted.all.as_ref().unwrap_or(&results.episodes));
-        let lost = is_known.then_some(beside);
-        let failures = (self.question.lost == LostAs::Failure && total > 0).then_some(total);
-        let as_failures = failures.map(|total| format!("{total} lost episodes counted as failures"));
-        let primary = self.plan.as_ref().and_then(|plan| plan.primary.clone());
-        let pooled = self.pooled(&results.episodes)?;
-        let mut options = Options { lost, design, selection, pooled, replies, primary, ..options.clone() };
-        let departures = self.departures(&results.episodes, &options, Looks::Once);
-        let departed = departures.as_ref().map_or(0, Vec::len);
-        let departed = (departed > 0).then(|| format!("departures from the registered plan: {departed}"));
-        let copies = self.copies(&results.episodes)?;
-        let copied = copies.as_ref().map(|copies| copies.phrase.clone());
-        options.caveats = as_failures.into_iter().chain(departed).chain(copied).collect();
-        let mut statistics = Statistics::of(&results.episodes, cells, &options)?;
-        statistics.departures = departures;
-        if let Some(total) = failures {
-            let words = format!("{total} lost episodes are counted as failures in every rate that each episode has.");
-            statistics.warnings.push(words);
-        }
-        statistics.warnings.extend(copies.map(|copies| copies.sentence));
-        statistics.warnings.extend(self.stale_checksums());
-        Ok(statistics)
-    }
-
-    /// What may be said while the study still runs: confidence sequences and e-values.
-    ///
-    /// # Errors
-    /// As [`Study::statistics`].
-    pub fn sequential(&self, options: &Options) -> Result<Sequential, StudyError> {
-        let results = self.scan(Outputs { losses: true, ..Outputs::default() })?;
-        self.check_filter(results.episodes.len())?;
-        let episodes = self.counted(results).results.episodes;
-        size::check_comparisons(&episodes)?;
-        let (design, selection) = (design_of(&episodes.declared), self.selection(&episodes));
-        let options = Options { design, selection, pooled: self.pooled(&episodes)?, ..options.clone() };
-        let departures = self.departures(&episodes, &options, Looks::Any);
-        Ok(Sequential { departures, ..Sequential::of(&episodes, &options)? })
     }
 
     /// One figure, with the models in the order of a style.

@@ -29,10 +29,7 @@
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
 pub mod catch_panic;
-pub mod checksums;
 pub mod copies;
-pub mod declared;
-pub mod declared_experiment;
 pub mod diagnostic;
 mod episodes;
 pub mod error;
@@ -46,6 +43,7 @@ mod read;
 pub mod scan;
 pub mod schema;
 pub mod seal;
+mod texts;
 pub mod validate;
 pub mod write;
 

@@ -88,7 +88,8 @@ pub fn write(options: &Options, folder: &Path) -> Result<usize, ViewError> {
     make_folder(parent).map_err(unwritable(parent))?;
     let inputs = temporary()?;
     let snapshot = Snapshot::of_found(options, Found::frozen(&options.runs, inputs.path())?, 0)?;
-    let mut files = Files { stage: temporary()?, all: Vec::new(), written: Budget::new(most_written(snapshot.bytes())) };
+    let mut files =
+        Files { stage: temporary()?, all: Vec::new(), written: Budget::new(most_written(snapshot.bytes())) };
     check_size(&snapshot)?;
     // They come first: what is too much of them is refused before the report is made.
     for some in snapshot.together(TOGETHER)? {

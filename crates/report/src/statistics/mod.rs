@@ -7,10 +7,7 @@
 
 mod answers;
 mod apart;
-mod cells;
-mod chance;
-mod clusters;
-mod compare;
+mod comparisons;
 mod conclusions;
 mod gate;
 mod rates;
@@ -123,7 +120,7 @@ pub struct Statistics {
     /// The settings that keep cells from being compared, each with what it keeps apart; absent if there is none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub not_comparable: Vec<SettingApart>,
-    /// What the traces declare about their design.
+    /// The declared design.
     pub design: Design,
     /// The consequence of the design, in a sentence.
     pub design_note: String,

@@ -63,13 +63,16 @@ impl Study {
         let departures = self.departures(&results.episodes, &options, Looks::Once);
         let departed = departures.as_ref().map_or(0, Vec::len);
         let departed = (departed > 0).then(|| format!("departures from the registered plan: {departed}"));
-        options.caveats = as_failures.into_iter().chain(departed).collect();
+        let copies = self.copies(&results.episodes)?;
+        let copied = copies.as_ref().map(|copies| copies.phrase.clone());
+        options.caveats = as_failures.into_iter().chain(departed).chain(copied).collect();
         let mut statistics = Statistics::of(&results.episodes, cells, &options)?;
         statistics.departures = departures;
         if let Some(total) = failures {
             let words = format!("{total} lost episodes are counted as failures in every rate that each episode has.");
             statistics.warnings.push(words);
         }
+        statistics.warnings.extend(copies.map(|copies| copies.sentence));
         statistics.warnings.extend(self.stale_checksums());
         Ok(statistics)
     }

@@ -8,8 +8,8 @@ use arrow::datatypes::Int32Type;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::scan::EpisodeBatch;
-use super::schema;
+use crate::scan::EpisodeBatch;
+use crate::schema;
 use exact::escape::visible;
 use parquet_pages::Column;
 
@@ -54,7 +54,7 @@ impl ReplyCounts {
 
     /// The same without the statuses that the schema does not know.
     #[must_use]
-    pub(super) fn of_known_statuses(mut self) -> Self {
+    pub(crate) fn of_known_statuses(mut self) -> Self {
         self.unreadable.retain(|status, _| statuses().contains(&status.as_str()));
         self
     }

@@ -7,8 +7,8 @@
 use indexmap::IndexMap;
 use serde_json::{Map, Value};
 
-use super::diagnostic::{Code, Finding};
-use super::schema::{RECORDING_KEY, of_some_tasks};
+use crate::diagnostic::{Code, Finding};
+use crate::schema::{RECORDING_KEY, of_some_tasks};
 use exact::ratio::Ratio;
 
 /// An experiment as a footer declares it.

@@ -12,15 +12,15 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-use super::diagnostic::{Code, Finding, Severity};
-use super::error::TraceError;
-use super::identification::{VERSION, normal_form};
-use super::inputs::Input;
-use super::open::{TraceFile, TraceSet};
-use super::read::budget::most_changed;
-use super::schema::RECORDING_KEY;
-use super::validate::validate;
-use super::write::rewrite::{Before, rewrite};
+use crate::diagnostic::{Code, Finding, Severity};
+use crate::error::TraceError;
+use crate::identification::{VERSION, normal_form};
+use crate::inputs::Input;
+use crate::open::{TraceFile, TraceSet};
+use crate::read::budget::most_changed;
+use crate::schema::RECORDING_KEY;
+use crate::validate::validate;
+use crate::write::rewrite::{Before, rewrite};
 use exact::budget::Budget;
 use exact::replace::{Content, FolderFiles, TemporaryFolder, folder_of, is_same_file, make_folder, replace_folder};
 

@@ -4,12 +4,11 @@ use indexmap::IndexMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::Replies;
-use super::study::Study;
+use crate::statistics::Replies;
+use crate::statistics::study::Study;
 use crate::cells::group::membership;
 use crate::cells::interval::{bounded, cell_interval};
 use crate::cells::{Cells, Group, KeyValue};
-use crate::statistics::study::Study;
 use exact::moments::Moments;
 use metric::catalog::{Kind, Metric, StandardError};
 use score::lost_counts::LostCounts;
@@ -80,7 +79,7 @@ pub enum Intervals {
 
 impl CellRow {
     /// Notes what is not in the numbers of the cell, or not a decision.
-    pub(super) fn note_left_out(&mut self, lost: Option<&LostCounts>, replies: Option<&Replies>) {
+    pub(in crate::statistics) fn note_left_out(&mut self, lost: Option<&LostCounts>, replies: Option<&Replies>) {
         let lost = lost.into_iter().flat_map(LostCounts::iter);
         let lost = lost.filter(|(key, _)| self.is_of(&key.experiment, &key.model, Some(&key.condition)));
         let lost: u64 = lost.map(|(_, count)| count).sum();

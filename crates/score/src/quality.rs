@@ -15,9 +15,9 @@ use serde::Serialize;
 use super::evidence::episode_ids;
 use super::table::CONDITION;
 use trace::open::TraceSet;
+pub use trace::replies::statuses;
 use trace::replies::{REPLY_STATUS, ReplyCounts};
 use trace::scan::EpisodeBatch;
-pub use trace::replies::statuses;
 use trace::schema::{self, Column, Kind};
 
 /// The columns that quality is read from, where traces have them.

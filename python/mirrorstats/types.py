@@ -47,9 +47,7 @@ class CellChange(TypedDict):
     mean_change: Optional[float]
 
 
-class CellRow(TypedDict):
-    """One cell: the episodes of one group under one metric."""
-
+class _CellRow(TypedDict):
     key: dict[str, KeyValue]
     metric: str
     kind: Literal["rate", "quantity"]
@@ -60,6 +58,13 @@ class CellRow(TypedDict):
     se: Optional[float]
     intervals: Intervals
     few: bool
+
+
+class CellRow(_CellRow, total=False):
+    """One cell: the episodes of one group under one metric."""
+
+    lost: Optional[int]
+    unusable_replies: Optional[int]
 
 
 class _ChanceRow(TypedDict):
@@ -120,6 +125,13 @@ class Clustered(TypedDict):
     interval: Optional[Interval]
     icc: Optional[float]
     design_effect: Optional[float]
+
+
+class ComparisonApart(TypedDict):
+    """A comparison that is not made."""
+
+    within: str
+    between: list[str]
 
 
 class _Contrast(TypedDict):
@@ -254,7 +266,7 @@ class Family(TypedDict):
 class Finding(TypedDict):
     """One thing that is wrong with a trace."""
 
-    code: Literal["unreadable", "empty-file", "not-parquet", "truncated", "corrupt-footer", "corrupt-data", "over-budget", "invalid-metadata", "newer-schema", "missing-column", "repeated-column", "wrong-type", "no-episodes", "null-in-required", "empty-string", "out-of-range", "negative-count", "t-start", "t-gap", "t-duplicate", "t-order", "inconsistent-constant", "episode-twice", "episode-in-two-files", "unknown-experiment", "unknown-action", "unknown-reply-status", "unknown-value", "invalid-color", "unseen-color", "stale-checksums", "experiment-overridden", "unknown-level", "split-episode", "unreadable-replies"]
+    code: Literal["unreadable", "empty-file", "not-parquet", "truncated", "corrupt-footer", "corrupt-data", "over-budget", "invalid-metadata", "newer-schema", "missing-column", "repeated-column", "wrong-type", "no-episodes", "null-in-required", "empty-string", "out-of-range", "negative-count", "t-start", "t-gap", "t-duplicate", "t-order", "inconsistent-constant", "episode-twice", "episode-in-two-files", "unknown-experiment", "unknown-action", "unknown-reply-status", "unknown-value", "invalid-color", "unseen-color", "stale-checksums", "experiment-overridden", "unknown-level", "split-episode", "unreadable-replies", "copied-episode"]
     severity: Literal["error", "note"]
     file: str
     row_group: Optional[int]
@@ -683,6 +695,13 @@ class Selection(TypedDict):
     by_results: bool
 
 
+class SettingApart(TypedDict):
+    """A setting in which recordings differ."""
+
+    setting: str
+    comparisons: list[ComparisonApart]
+
+
 class Spend(TypedDict):
     """What was spent."""
 
@@ -871,6 +890,8 @@ if TYPE_CHECKING:
         def __getitem__(self, key: Literal["departures"], /) -> Optional[list[str]]: ...
         @overload
         def __getitem__(self, key: Literal["pooled"], /) -> list[str]: ...
+        @overload
+        def __getitem__(self, key: Literal["not_comparable"], /) -> list[SettingApart]: ...
         @overload
         def __getitem__(self, key: Literal["design"], /) -> Design: ...
         @overload

@@ -172,11 +172,12 @@ fn models_of_two_worlds_prompts_or_step_budgets_are_not_compared() {
 
 #[test]
 fn lost_episodes_and_unreadable_replies_stand_beside_their_cells() {
+    // The last reply of a lost episode gave no decision, either.
     let folder = two(|cell| (cell.lost, cell.unread) = (2, 3));
     let at = folder.path();
     let found = run(at, &["stats", "runs", "--json"]).json();
     for cell in found["cells"].as_array().unwrap() {
-        let expected = if cell["key"]["model"] == "bee" { (json!(2), json!(3)) } else { (Value::Null, Value::Null) };
+        let expected = if cell["key"]["model"] == "bee" { (json!(2), json!(5)) } else { (Value::Null, Value::Null) };
         assert_eq!((&cell["lost"], &cell["unusable_replies"]), (&expected.0, &expected.1), "{cell}");
     }
     let shown = run(at, &["stats", "runs"]).done();
@@ -184,10 +185,10 @@ fn lost_episodes_and_unreadable_replies_stand_beside_their_cells() {
     let rates: Vec<&str> = rates.take_while(|line| !line.is_empty()).collect();
     assert!(rates[0].ends_with("lost  no decision"), "{shown}");
     let row = |model: &str| rates.iter().find(|line| line.contains(model) && line.contains("TSA")).unwrap();
-    assert_eq!(row("bee").split_whitespace().rev().take(2).collect::<Vec<_>>(), ["3", "2"], "{shown}");
+    assert_eq!(row("bee").split_whitespace().rev().take(2).collect::<Vec<_>>(), ["5", "2"], "{shown}");
     run(at, &["report", "runs", "--no-figures", "--out", "out"]).done();
     let table = std::fs::read_to_string(at.join("out/tables/main.md")).unwrap();
-    assert!(table.contains("Beside the numbers: E1 bee 2 lost, 3 of 42 replies without a decision."), "{table}");
+    assert!(table.contains("Beside the numbers: E1 bee 2 lost, 5 of 42 replies without a decision."), "{table}");
     // Where nothing was left out, no column says so.
     let like = two(|_| ());
     assert!(!run(like.path(), &["stats", "runs"]).done().contains("no decision"));

@@ -27,11 +27,7 @@ pub struct Copied {
 }
 
 /// The copies among these episodes, in the order of the files.
-pub fn copies(
-    set: &TraceSet,
-    may_be: BTreeSet<String>,
-    threads: NonZeroUsize,
-) -> Result<Vec<Copied>, TraceError> {
+pub fn copies(set: &TraceSet, may_be: BTreeSet<String>, threads: NonZeroUsize) -> Result<Vec<Copied>, TraceError> {
     if may_be.is_empty() {
         return Ok(Vec::new());
     }

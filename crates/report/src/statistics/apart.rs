@@ -30,7 +30,8 @@ impl SettingApart {
     pub(super) fn all(statistics: &Statistics) -> Vec<Self> {
         let models = statistics.models.iter().flat_map(|family| {
             let of_test = |test: &super::PairTest| {
-                let between = [test.first.clone().min(test.second.clone()), test.first.clone().max(test.second.clone())];
+                let between =
+                    [test.first.clone().min(test.second.clone()), test.first.clone().max(test.second.clone())];
                 (test.comparison.incomparable.clone(), family.experiment.clone(), between)
             };
             family.tests.iter().map(of_test)

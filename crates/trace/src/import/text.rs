@@ -67,7 +67,10 @@ impl Text {
         let name = Input::new(path).name;
         let failed = || ImportError::read(&name);
         if path.is_dir() {
-            return Err(failed()(io::Error::new(io::ErrorKind::IsADirectory, "it is a folder; name the files in it, or the folder of `meta/info.json` of a LeRobot data set")));
+            return Err(failed()(io::Error::new(
+                io::ErrorKind::IsADirectory,
+                "it is a folder; name the files in it, or the folder of `meta/info.json` of a LeRobot data set",
+            )));
         }
         let file = input::open_text(path).map_err(failed())?;
         let about = file.metadata().map_err(failed())?;

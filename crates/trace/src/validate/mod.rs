@@ -274,11 +274,7 @@ fn alike(episodes: &Episodes) -> Vec<(u64, String)> {
 }
 
 /// The copies, each with its file. Files that cannot be read have other findings.
-fn copied(
-    set: &TraceSet,
-    alike: HashMap<u64, Vec<(String, usize)>>,
-    threads: NonZeroUsize,
-) -> Vec<(usize, Finding)> {
+fn copied(set: &TraceSet, alike: HashMap<u64, Vec<(String, usize)>>, threads: NonZeroUsize) -> Vec<(usize, Finding)> {
     let several = alike.into_values().filter(|episodes| episodes.len() > 1);
     let files: BTreeMap<String, usize> = several.flatten().collect();
     let found = copies(set, files.keys().cloned().collect(), threads).unwrap_or_default();

@@ -1,7 +1,7 @@
 //! The values of a row group compared with the statistics of its footer, where no checksum says that they are as written.
 //!
 //! Rule: a file is refused only for what no sound writer does: a null count that is wrong, a value beyond the least or the
-//! greatest, and a least or greatest number, truth or short text that no row has. Long texts may be cut.
+//! greatest, and a least or greatest number, truth or short text that no row has, and texts of other bytes together. Long texts may be cut.
 
 use std::cmp::Ordering;
 
@@ -25,6 +25,8 @@ pub(crate) struct Declared(Vec<Vec<Option<Chunk>>>);
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Chunk {
     nulls: Option<u64>,
+    /// The bytes of the texts of all rows.
+    bytes: Option<u64>,
     least: Option<Value>,
     greatest: Option<Value>,
 }
@@ -50,7 +52,10 @@ impl Declared {
 
 impl Chunk {
     fn of(chunk: &ColumnChunkMetaData) -> Option<Self> {
-        let statistics = chunk.statistics()?;
+        let bytes = chunk.unencoded_byte_array_data_bytes().and_then(|bytes| u64::try_from(bytes).ok());
+        let Some(statistics) = chunk.statistics() else {
+            return bytes.map(|bytes| Self { bytes: Some(bytes), ..Self::default() });
+        };
         let described = chunk.column_descr();
         let logical = described.logical_type_ref();
         let is_unsigned = matches!(logical, Some(LogicalType::Integer(integer)) if !integer.is_signed)
@@ -71,8 +76,7 @@ impl Chunk {
             }
             _ => [None, None],
         };
-        let nulls = statistics.null_count_opt();
-        Some(Self { nulls, least, greatest }).filter(|chunk| chunk.nulls.is_some() || chunk.least.is_some() || chunk.greatest.is_some())
+        Some(Self { nulls: statistics.null_count_opt(), bytes, least, greatest })
     }
 }
 
@@ -80,6 +84,7 @@ impl Chunk {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Seen {
     nulls: u64,
+    bytes: u64,
     least: Option<Value>,
     greatest: Option<Value>,
 }
@@ -98,6 +103,9 @@ impl Seen {
         let nulls = declared.nulls.filter(|nulls| *nulls != self.nulls);
         if let Some(nulls) = nulls {
             return Some((format!("{nulls} nulls, as the statistics of the footer say"), self.nulls.to_string()));
+        }
+        if let Some(bytes) = declared.bytes.filter(|bytes| *bytes != self.bytes) {
+            return Some((format!("texts of {bytes} bytes, as the statistics of the footer say"), self.bytes.to_string()));
         }
         let bounds = [(&declared.least, &self.least, Ordering::Less, "least"), (&declared.greatest, &self.greatest, Ordering::Greater, "greatest")];
         bounds.into_iter().find_map(|(declared, found, beyond, word)| {
@@ -123,10 +131,10 @@ impl Seen {
             DataType::Dictionary(..) => {
                 let texts = values.as_dictionary::<Int32Type>();
                 self.nulls += texts.keys().null_count() as u64;
-                let mut used = vec![false; texts.values().len()];
+                let mut used = vec![0; texts.values().len()];
                 for key in texts.keys().iter().flatten() {
                     if let Some(used) = usize::try_from(key).ok().and_then(|key| used.get_mut(key)) {
-                        *used = true;
+                        *used += 1;
                     }
                 }
                 self.used(texts.values(), &used);
@@ -141,18 +149,16 @@ impl Seen {
     fn runs(&mut self, runs: &Runs) {
         let starts: Vec<(usize, usize)> = runs.starts().collect();
         let ends = starts.iter().skip(1).map(|(start, _)| *start).chain([runs.rows()]);
+        let lengths: Vec<u64> = starts.iter().zip(ends).map(|((start, _), end)| (end - start) as u64).collect();
         let values = runs.values();
-        for ((start, run), end) in starts.iter().zip(ends) {
-            if values.is_null(*run) {
-                self.nulls += (end - start) as u64;
-            }
-        }
+        let nulls = starts.iter().zip(&lengths).filter(|((_, run), _)| values.is_null(*run));
+        self.nulls += nulls.map(|(_, length)| length).sum::<u64>();
         match values.data_type() {
             DataType::Dictionary(..) => {
                 let texts = values.as_dictionary::<Int32Type>();
-                let mut used = vec![false; texts.values().len()];
-                for key in starts.iter().filter_map(|(_, run)| texts.key(*run)) {
-                    used[key] = true;
+                let mut used = vec![0; texts.values().len()];
+                for ((_, run), length) in starts.iter().zip(&lengths) {
+                    texts.key(*run).and_then(|key| used.get_mut(key)).into_iter().for_each(|used| *used += length);
                 }
                 self.used(texts.values(), &used);
             }
@@ -162,13 +168,18 @@ impl Seen {
 
     fn keys(&mut self, keys: &UInt8Array, values: &ArrayRef) {
         self.nulls += keys.null_count() as u64;
-        let mut used = [false; 256];
-        keys.iter().flatten().for_each(|key| used[usize::from(key)] = true);
+        let mut used = [0; 256];
+        keys.iter().flatten().for_each(|key| used[usize::from(key)] += 1);
         self.used(values, &used);
     }
 
-    fn used(&mut self, values: &ArrayRef, used: &[bool]) {
-        self.ends(values, (0..values.len()).filter(|at| used.get(*at) == Some(&true)));
+    /// Values, and how many rows have each.
+    fn used(&mut self, values: &ArrayRef, used: &[u64]) {
+        if let Some(texts) = values.as_string_opt::<i32>() {
+            let bytes = (0..texts.len()).zip(used).map(|(at, rows)| u64::from(texts.value_length(at).cast_unsigned()) * rows);
+            self.bytes += bytes.sum::<u64>();
+        }
+        self.ends(values, (0..values.len()).filter(|at| used.get(*at).is_some_and(|rows| *rows > 0)));
     }
 
     /// Takes the least and the greatest of some values.

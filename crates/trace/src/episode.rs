@@ -163,6 +163,7 @@ optional! {
         completion_tokens: i32,
         cost_usd: f64,
         frame_time: i64,
+        frame_digest: String,
         mark_color: String,
         mark_report: String,
         mirror_mark_px: i32,

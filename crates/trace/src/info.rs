@@ -14,6 +14,7 @@ use super::diagnostic::Finding;
 use super::error::TraceError;
 use super::read::in_order::in_order;
 use super::read::open::{TraceFile, TraceSet};
+use super::renderer::{self, Renderer};
 use super::replies::{REPLY_STATUS, ReplyCounts};
 use super::scan::{EpisodeBatch, Projection};
 use super::schema::{Kind, RECORDING_KEY, VERSION_KEY, WRITER_KEY};
@@ -38,6 +39,9 @@ pub struct Info {
     pub runs: Vec<i64>,
     /// Every experiment with every model, in that order.
     pub coverage: Vec<Cell>,
+    /// What drew the frames that agents saw; absent where no trace says so.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub renderers: Vec<Renderer>,
     /// What became of the replies; null where no file has the column `reply_status`.
     pub replies: Option<ReplyCounts>,
     /// The columns of all files.
@@ -189,6 +193,7 @@ pub fn info(set: &TraceSet, listing: Listing, threads: NonZeroUsize) -> Result<I
         episodes: summary.episodes,
         steps: summary.steps,
         coverage: coverage(&cells, &pairs, &experiments, &models),
+        renderers: renderer::of_files(set.files()),
         replies,
         columns: columns(set),
         episode_list: listed,

@@ -34,6 +34,7 @@ pub mod model_id;
 pub mod palette;
 mod read;
 pub mod renormalize;
+pub mod renderer;
 pub mod replies;
 pub mod scan;
 pub mod schema;

@@ -190,6 +190,15 @@ pub const COLUMNS: &[Column] = &[
     extra!(completion_tokens, Int32, "Tokens of the reply, as billed.").unit("tokens"),
     extra!(cost_usd, Float64, "What the request cost.").unit("USD"),
     extra!(frame_time, Int64, "The time of the frame in the episode's recording (MCAP).").unit("ns"),
+    extra!(
+        frame_digest,
+        String,
+        "What the agent saw at t, where it sees frames: the first 16 hexadecimal digits of the SHA-256 of the frame's bytes \
+         (red, green and blue, row by row from the top), `-`, and the mean levels of red, green and blue in each of 8 x 6 \
+         blocks, two digits each, row by row."
+    )
+    .since(2)
+    .default("null"),
     extra!(mark_color, String, "The colour of the mark on the agent's own body; null where there is none.")
         .since(2)
         .default("null"),
@@ -266,7 +275,8 @@ pub const METADATA: &[MetadataKey] = &[
     MetadataKey {
         key: "mirrorstats.recording.fingerprints",
         doc: "By the values of the column `fingerprint`: SHA-256 of `world`, `prompts`, `reply_schema`, `agent` and \
-              `sampling`, and `model`, the model's id as the provider returned it.",
+              `sampling`, and `model`, the model's id as the provider returned it. `renderer`, where the agent saw frames: \
+              what drew them (`name`, `version`, `vendor`, and `processor`, what it may use of it), as it is.",
     },
     MetadataKey {
         key: "mirrorstats.recording.palette",

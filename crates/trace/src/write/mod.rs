@@ -45,8 +45,8 @@ pub struct OptionalColumns {
 }
 
 /// Columns that no recording of the five experiments gives.
-const OF_OTHER_TASKS: [&str; 7] =
-    ["participant", "start_distance", "shown_color", "mark_color", "mark_report", "mirror_mark_px", "target_distance"];
+const OF_OTHER_TASKS: [&str; 8] =
+    ["frame_digest", "participant", "start_distance", "shown_color", "mark_color", "mark_report", "mirror_mark_px", "target_distance"];
 
 impl OptionalColumns {
     /// No optional column.
@@ -72,6 +72,7 @@ impl OptionalColumns {
         let has_marks = experiment["mark"].is_array() || is_there(&experiment["reply"], "mark");
         let is_given = |name: &str| match name {
             "reply_repair" | "reply_fault" => reads_replies,
+            "frame_digest" => recording["frame_digest"].is_string(),
             "participant" => agent.get("human").is_some(),
             "mark_color" | "mark_report" | "mirror_mark_px" => has_marks,
             "shown_color" => shows_another_color(&experiment["mirror"]),

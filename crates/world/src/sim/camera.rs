@@ -17,10 +17,12 @@ use super::model::{
     BEYOND_CAMERA, EYE_CAMERA, Item, Labelled, ModelError, Paint, Stage, TOP_CAMERA, compile, group, labelled,
 };
 use super::passage;
+use super::renderer;
 use super::scene::{HungPane, Scene};
 use super::visibility::{self, Shown};
 use super::world::World;
 use trace::frame::Frame;
+use trace::renderer::Renderer;
 
 /// Why nothing can be drawn.
 #[derive(Debug, thiserror::Error)]
@@ -47,6 +49,7 @@ pub struct Camera {
     data: MjData<Arc<MjModel>>,
     renderer: MjRenderer,
     draws_all: bool,
+    drawn_by: Renderer,
 }
 
 impl std::fmt::Debug for Camera {
@@ -70,7 +73,13 @@ impl Camera {
         let model = Arc::new(compile(config, paint, [width, height])?);
         let renderer = MjRenderer::new(&model, width, height, 0)
             .map_err(|error| CameraError::NoDisplay { reason: reason(&error) })?;
-        Ok(Self { width, height, data: MjData::new(model), renderer, draws_all: false })
+        let drawn_by = renderer::current();
+        Ok(Self { width, height, data: MjData::new(model), renderer, draws_all: false, drawn_by })
+    }
+
+    /// What draws its pictures.
+    pub const fn drawn_by(&self) -> &Renderer {
+        &self.drawn_by
     }
 
     /// Draws what is out of view too, panes included, as MuJoCo's own mirror does, which changes no picture: what a test and

@@ -79,7 +79,9 @@ fn check_logic(profiles: &Profiles) {
         }
         let is_defined = |metric| shown.get(experiment, agent, metric).count > 0;
         for (metric, only) in [("DECOY_CLAIM", "decoy"), ("WINDOW_CLAIM", "window"), ("MARK_REPORT", "mark")] {
-            shown.holds(is_defined(metric) == (experiment == only), experiment, agent, metric);
+            // Who never has the pane in view is not asked.
+            let is_there = experiment == only && (is_defined(metric) || ["frozen", "guesser", "random"].contains(&agent));
+            shown.holds(is_there || !is_defined(metric) && experiment != only, experiment, agent, metric);
         }
         match (experiment, agent) {
             ("window", _) => shown.is_zero(experiment, agent, "MCR"),
@@ -100,7 +102,7 @@ fn check_frozen_and_guesser(shown: &Shown<'_>) {
         }
     }
     for (experiment, metric) in [("decoy", "DECOY_CLAIM"), ("window", "WINDOW_CLAIM"), ("mark", "MARK_FALSE")] {
-        if shown.0.has(experiment, "frozen") {
+        if shown.0.has(experiment, "frozen") && shown.get(experiment, "frozen", metric).count > 0 {
             shown.is_zero(experiment, "frozen", metric);
         }
     }

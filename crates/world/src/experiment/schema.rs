@@ -72,7 +72,8 @@ pub struct ExperimentTable {
     /// The keys of a reply, in the order of the prompt; those that the decision needs if absent.
     #[schemars(extend("uniqueItems" = true))]
     pub reply: Option<Vec<ReplyKey>>,
-    /// A built-in prompt (`cube-selection`, `exploration`, `mark`, `reach-scheme`, `reach-mirror`, `reach-hand`, `reach-bare`), or a folder beside the file or below it with
+    /// A built-in prompt (`cube-selection`, `exploration`, `mark`, `reach-scheme`, `reach-mirror`, `reach-hand`, `reach-bare`, `memory-0`, `memory-8`, `memory-no-summary`, `memory-no-position`,
+    /// `evidence`), or a folder beside the file or below it with
     /// `system.txt` and `user.txt`.
     pub prompt: String,
     /// What the agent can do; `hand` if absent where there is one, else `walk`.

@@ -6,6 +6,7 @@ use trace::episode::Action;
 use trace::palette::Color;
 use world::experiment::Experiment;
 use world::experiment::file;
+use world::sim::body::{Figure, Pose};
 use world::sim::camera::{Camera, LabelCamera};
 use world::sim::config::WorldConfig;
 use world::sim::label_image::LabelImage;
@@ -35,7 +36,7 @@ decision = "mark_report"
 cubes = { kind = "none" }
 others = { least = 1, most = 1 }
 mirror = [{ kind = "delayed", delay = 3 }]
-mark = [{ part = "head", from_t = 2 }, { part = "back" }, { part = "chest", on = "other" }]
+mark = [{ part = "face", from_t = 2 }, { part = "back" }, { part = "chest", on = "other" }]
 
 [experiment.painted]
 title = "A decoy in another colour"
@@ -339,5 +340,23 @@ fn the_eye_of_a_mirror_is_its_mirror_image_and_that_of_a_window_is_further_back(
                 assert_eq!(beyond.heading, eye.heading);
             }
         }
+    }
+}
+
+#[test]
+fn the_mark_of_the_mark_test_can_be_seen_well_from_somewhere() {
+    let config = WorldConfig::default();
+    let experiment = Experiment::parse("mark").unwrap();
+    for (seed, run) in (1..=3).flat_map(|seed| (1..=7).map(move |run| (seed, run))) {
+        let mut world = World::new(&config, Scene::draw(&config, experiment, seed, run).unwrap()).unwrap();
+        let mirror = world.scene().mirror;
+        let [x, y] = mirror.center(&config);
+        let heading = mirror.heading();
+        let near = Figure::standing(Pose { x, y, heading }.ahead(-0.9));
+        world.place_at(near, 19);
+        assert_eq!(world.visibility().mark_px, 0, "it is not there yet");
+        world.place_at(near, 20);
+        let px = world.visibility().mark_px;
+        assert!(px >= 200, "seed {seed}, run {run}: {px} px");
     }
 }

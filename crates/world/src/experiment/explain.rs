@@ -76,10 +76,10 @@ pub fn explained(experiment: Experiment) -> String {
     };
     line("steps", steps);
     if experiment.hand.is_none() {
-        let length = experiment.step_length_mm.map_or_else(|| "the world's".to_owned(), |mm| {
-            format!("{} m", f64::from(mm) / 1000.0)
+        let length = experiment.step_length_mm.map_or_else(|| "as long as the world says".to_owned(), |mm| {
+            format!("{} m long", f64::from(mm) / 1000.0)
         });
-        line("step", format!("{length} long, turns of 30 degrees"));
+        line("step", format!("{length}, turns of 30 degrees"));
     }
     let chance: Vec<String> = experiment.chance.iter().map(|(metric, level)| format!("{metric} {level}")).collect();
     if !chance.is_empty() {

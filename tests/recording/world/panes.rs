@@ -6,6 +6,7 @@ use trace::episode::Action;
 use trace::palette::Color;
 use world::experiment::Experiment;
 use world::experiment::file;
+use world::sim::angle::Heading;
 use world::sim::body::{Figure, Pose};
 use world::sim::camera::{Camera, LabelCamera};
 use world::sim::config::WorldConfig;
@@ -37,6 +38,14 @@ cubes = { kind = "none" }
 others = { least = 1, most = 1 }
 mirror = [{ kind = "delayed", delay = 3 }]
 mark = [{ part = "face", from_t = 2 }, { part = "back" }, { part = "chest", on = "other" }]
+
+[experiment.textured]
+title = "A mirror that looks like one"
+prompt = "exploration"
+look = "textured"
+cubes = { kind = "clutter", least = 3, most = 3, hides = 0 }
+others = { least = 1, most = 2 }
+mirror = [{}, { wall = "opposite" }]
 
 [experiment.painted]
 title = "A decoy in another colour"
@@ -135,6 +144,35 @@ fn holds_against_pictures(name: &str) {
 #[test]
 fn several_mirrors_hold_against_pictures() {
     holds_against_pictures("mirrors");
+}
+
+#[test]
+fn textured_mirrors_hold_against_pictures() {
+    holds_against_pictures("textured");
+}
+
+/// A look is a look: what is visible is the same, and the picture is another.
+#[test]
+fn a_textured_room_shows_the_same_otherwise() {
+    need::drawing();
+    let [textured, plain] = ["textured", "mirrors"].map(kind);
+    let config = WorldConfig::default();
+    let scene = Scene::draw(&config, textured, 1, 1).unwrap();
+    let mut looks = [textured, plain].map(|experiment| {
+        let scene = Scene { experiment, ..scene.clone() };
+        World::new(&config, scene).unwrap()
+    });
+    let mut eyes = [textured, plain].map(|experiment| Camera::new(&config.of(experiment)).unwrap());
+    let mut differs = 0;
+    for heading in 0..12 {
+        let pose = Pose { heading: Heading::new(heading), ..looks[0].pose() };
+        looks.iter_mut().for_each(|world| world.place_at(Figure::standing(pose), 1));
+        assert_eq!(looks[0].visibility(), looks[1].visibility());
+        let [one, other] = [0, 1].map(|at| eyes[at].frame(&looks[at]).unwrap());
+        differs += usize::from(one != other);
+        assert_eq!(one, eyes[0].frame(&looks[0]).unwrap(), "a picture comes again");
+    }
+    assert_eq!(differs, 12);
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::Experiment;
 use super::spec::{
-    Behavior, BodyShown, Camera, Colors, Cubes, Hand, Mark, MarkColor, Others, Paint, Pane, PaneKind, Picture, Start,
+    Behavior, BodyShown, Camera, Colors, Cubes, Hand, Look, Mark, MarkColor, Others, Paint, Pane, PaneKind, Picture, Start,
     Stated, Wall, Wearer,
 };
 use exact::escape::visible;
@@ -63,6 +63,9 @@ pub fn explained(experiment: Experiment) -> String {
     }
     if let Some(Picture { width, height, fovy }) = experiment.view {
         line("view", format!("{width} x {height} pixels, {fovy} degrees high"));
+    }
+    if experiment.look == Look::Textured {
+        line("look", "panelled walls, mirrors with a frame and a slight tint".to_owned());
     }
     let at = if experiment.hand.is_some() { "at the end" } else { "at `done`" };
     line("decision", format!("{} {at}, held against {}", experiment.decision.name(), experiment.truth.name()));

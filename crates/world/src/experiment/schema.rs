@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::spec::{
-    AbsentColumn, Actions, BodyShown, Camera, Colors, Cubes, Decision, MOST_MARKS, MOST_PANES, Mark, Others, Paint,
+    AbsentColumn, Actions, BodyShown, Camera, Colors, Cubes, Decision, Look, MOST_MARKS, MOST_PANES, Mark, Others, Paint,
     PaneKind, Picture, ReplyKey, Start, Stated, Truth, Wall,
 };
 use metric::shape::{Fraction, Level};
@@ -98,6 +98,9 @@ pub struct ExperimentTable {
     pub hand: Option<HandTable>,
     /// The size and the angle of the picture; the world's if absent.
     pub view: Option<Picture>,
+    /// How the room and its mirrors look: `plain`, or `textured`, with panelled walls, and frame and tint of a mirror; `plain` if
+    /// absent.
+    pub look: Option<Look>,
 }
 
 /// A hand that floats freely, a step at a time.

@@ -94,6 +94,7 @@ pub(super) fn read(name: &str, at: &At<'_>, beside: &Beside<'_>, faults: &mut Ve
         hand,
         view: table.view,
         absent,
+        look: table.look.unwrap_or_default(),
     };
     // What is wrong by itself may make relations wrong that are not: a key with a fault says nothing to them.
     let is_faulty = |key: &&str| at.get(key).is_some_and(|at| faults[before..].iter().any(|fault| holds(&at, fault)));

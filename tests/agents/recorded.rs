@@ -28,7 +28,7 @@ fn record(config: &WorldConfig, eye: Option<&RefCell<Camera>>, agent: Scripted, 
     let mut player = agent.agent(&task(config, &scene, key));
     let episode = head(config, &scene, key, &Subject::of(agent.name()));
     let mut world = World::new(config, scene).unwrap();
-    let stage = Stage { config, eye, stop: &AtomicBool::new(false), shares: &Shares::default() };
+    let stage = Stage { config, eye, looks: true, stop: &AtomicBool::new(false), shares: &Shares::default() };
     ready(Box::pin(play(&stage, &mut world, player.as_mut(), key, episode, &mut Nobody))).unwrap().episode
 }
 

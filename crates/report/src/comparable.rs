@@ -35,10 +35,10 @@ impl Varied {
     /// The parts of a fingerprint that must be equal.
     fn kept(self) -> &'static [&'static str] {
         match self {
-            Self::Model => &["world", "prompts", "reply_schema"],
+            Self::Model => &["world", "prompts", "reply_schema", "renderer"],
             Self::Condition => &[],
-            Self::Experiment => &["agent", "sampling", "model"],
-            Self::Nothing => &["world", "prompts", "reply_schema", "agent", "sampling", "model"],
+            Self::Experiment => &["agent", "sampling", "model", "renderer"],
+            Self::Nothing => &["world", "prompts", "reply_schema", "agent", "sampling", "model", "renderer"],
         }
     }
 }
@@ -118,9 +118,12 @@ fn parts(declared: &Declared, names: [&str; 2], kept: &[&str]) -> Option<String>
         let (one, other) = (&one[**key], &other[**key]);
         one != other && (is_strict || !(one.is_null() || other.is_null()))
     };
-    let found =
-        kept.iter().filter(differs).map(|key| format!("{key} ({}, {})", shown(&one[*key]), shown(&other[*key])));
-    let found: Vec<String> = found.collect();
+    let told = |key: &&str| match key {
+        // It is in the clear.
+        &"renderer" => first_difference(key, &one[*key], &other[*key]).unwrap_or_default(),
+        key => format!("{key} ({}, {})", shown(&one[*key]), shown(&other[*key])),
+    };
+    let found: Vec<String> = kept.iter().filter(differs).map(told).collect();
     (!found.is_empty()).then(|| found.join(", "))
 }
 

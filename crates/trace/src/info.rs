@@ -15,6 +15,7 @@ use super::error::TraceError;
 use super::read::budget::most_listed;
 use super::read::in_order::in_order;
 use super::read::open::{TraceFile, TraceSet};
+use super::renderer::{self, Renderer};
 use super::replies::{REPLY_STATUS, ReplyCounts};
 use super::scan::{EpisodeBatch, Projection};
 use super::schema::{Kind, RECORDING_KEY, VERSION_KEY, WRITER_KEY};
@@ -39,6 +40,9 @@ pub struct Info {
     pub runs: Vec<i64>,
     /// Every experiment with every model, in that order.
     pub coverage: Vec<Cell>,
+    /// The renderers of the frames that agents saw; absent if no trace declares one.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub renderers: Vec<Renderer>,
     /// The reply counts; null if no file has the column `reply_status`.
     pub replies: Option<ReplyCounts>,
     /// The columns of all files.
@@ -199,6 +203,7 @@ pub fn info(set: &TraceSet, listing: Listing, threads: NonZeroUsize) -> Result<I
         episodes: summary.episodes,
         steps: summary.steps,
         coverage: coverage(&cells, &pairs, &experiments, &models),
+        renderers: renderer::of_files(set.files()),
         replies,
         columns: columns(set),
         episode_list: listed,

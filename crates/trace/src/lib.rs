@@ -40,6 +40,7 @@ pub mod info;
 pub mod inputs;
 pub mod log;
 mod read;
+pub mod renderer;
 pub mod scan;
 pub mod schema;
 pub mod seal;

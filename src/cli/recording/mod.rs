@@ -30,6 +30,7 @@ use exact::number::Decimal;
 use report::html;
 use study::{Study, StudyError};
 use trace::episode::Step;
+use trace::renderer::Renderer;
 use trace::replies::ReplyCounts;
 use world::agent::Player;
 use world::agent::vlm::limits::Spend;
@@ -69,6 +70,8 @@ pub struct RecordAnswer {
     pub spend: Option<Spend>,
     /// True if the recording was stopped before its end.
     pub stopped: bool,
+    /// What drew the frames that the agent saw in these traces; empty for an agent that sees none.
+    pub renderers: Vec<Renderer>,
     /// The traces of these episodes.
     pub traces: Vec<String>,
     /// Their logs.
@@ -267,6 +270,15 @@ pub(crate) fn say(
     }
     if let Some(shares) = shares(times) {
         writeln!(out, "time: {shares}")?;
+    }
+    match answer.renderers.as_slice() {
+        [] => {}
+        [one] => writeln!(out, "frames: drawn by {one}")?,
+        all => {
+            let names: Vec<String> = all.iter().map(ToString::to_string).collect();
+            let (count, names) = (all.len(), names.join("; "));
+            writeln!(out, "frames: drawn by {count} renderers, which a report mixes with --pool alone: {names}")?;
+        }
     }
     if let Some(spend) = &answer.spend {
         writeln!(out, "spent: {}, on all that the model played into this folder, over all starts", spent(spend))?;

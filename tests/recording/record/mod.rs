@@ -14,5 +14,6 @@ mod next;
 mod reaching;
 mod recordings;
 mod refusals;
+mod renderers;
 mod same_bytes;
 mod together;

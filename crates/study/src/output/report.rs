@@ -25,6 +25,7 @@ use score::lost_counts::LostCounts;
 use score::table::EpisodeTable;
 use trace::answered;
 use trace::checksums::missing_note;
+use trace::renderer;
 use trace::schema::SCHEMA_VERSION;
 
 /// The most episodes that a page lists.
@@ -161,6 +162,7 @@ impl Study {
         notes.extend(self.source.traces().ok().and_then(|traces| missing_note(traces.files())));
         if let Source::Traces(set) = &self.source {
             notes.extend(answered::by_others(set.files()));
+            notes.extend(renderer::told(&renderer::of_files(set.files())));
         }
         let total = lost.total();
         if total > 0 {

@@ -163,9 +163,11 @@ optional! {
         completion_tokens: i32,
         cost_usd: f64,
         frame_time: i64,
+        frame_digest: String,
         mark_color: String,
         mark_report: String,
         mirror_mark_px: i32,
+        mirror_double_px: i32,
         target_distance: i32,
     }
 }

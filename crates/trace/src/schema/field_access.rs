@@ -48,7 +48,8 @@ const FIELDS: &[(&str, Access)] = fields! {
     episode, at => episode.steps[at].extra, [
         mirror_self_px mirror_other_px mirror_px direct_other_px pose_x pose_y pose_yaw bumped cube_distance reply_status
         reply_repair reply_fault view_description reasoning summary identification reply latency_ms prompt_tokens
-        completion_tokens cost_usd frame_time mark_color mark_report mirror_mark_px target_distance
+        completion_tokens cost_usd frame_time frame_digest mark_color mark_report mirror_mark_px
+        mirror_double_px target_distance
     ];
 };
 

@@ -79,7 +79,8 @@ pub const METADATA: &[MetadataKey] = &[
     MetadataKey {
         key: "mirrorstats.recording.fingerprints",
         doc: "By the values of the column `fingerprint`: SHA-256 of `world`, `prompts`, `reply_schema`, `agent` and \
-              `sampling`, and `model`, the model's id as the provider returned it.",
+              `sampling`, and `model`, the model's id as the provider returned it. `renderer`, where the agent saw frames: \
+              what drew them (`name`, `version`, `vendor`, and `processor`, what it may use of it), as it is.",
     },
     MetadataKey {
         key: "mirrorstats.recording.palette",

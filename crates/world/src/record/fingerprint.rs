@@ -5,6 +5,7 @@
 use serde_json::{Map, Value, json};
 
 use exact::hash;
+use trace::renderer::Renderer;
 
 /// Digits of a fingerprint's name: enough for all recordings of a study, and short in a table.
 const DIGITS: usize = 16;
@@ -19,14 +20,14 @@ pub struct Fingerprint {
     /// The value of the column `fingerprint`: the beginning of the hash of the parts.
     pub id: String,
     /// SHA-256 of `world`, `prompts`, `reply_schema`, `agent` and `sampling`, and the `model` that answered; null where
-    /// there is no such thing.
+    /// there is no such thing. The `renderer` of the frames in the clear, where the agent sees them.
     pub parts: Value,
 }
 
 impl Fingerprint {
     /// The fingerprint of an episode, from what its trace says of the recording, and the id of the model as the provider
-    /// returned it.
-    pub fn of(recording: &Value, model: Option<&str>) -> Self {
+    /// returned it, and what drew the frames that the agent saw, if it saw any.
+    pub fn of(recording: &Value, model: Option<&str>, renderer: Option<&Renderer>) -> Self {
         let mut agent = recording["agent"].as_object().cloned().unwrap_or_default();
         let mut experiment = recording["experiment"].clone();
         if let Some(experiment) = experiment.as_object_mut() {
@@ -40,7 +41,7 @@ impl Fingerprint {
         let taken = SAMPLING.iter().filter_map(|key| Some(((*key).to_owned(), agent.remove(*key)?)));
         let sampling: Map<String, Value> = taken.collect();
         let world = json!([recording["world_hash"], recording["scene_version"], experiment]);
-        let parts = json!({
+        let mut parts = json!({
             "world": hash_of(&world),
             "prompts": given(&prompts),
             "reply_schema": given(&recording["reply_schema_hash"]),
@@ -48,6 +49,10 @@ impl Fingerprint {
             "sampling": (!sampling.is_empty()).then(|| hash_of(&Value::Object(sampling))),
             "model": model,
         });
+        // Absent, not null: the fingerprints of agents that see no frames, and those of before, have no such part.
+        if let Some(renderer) = renderer {
+            parts["renderer"] = json!(renderer);
+        }
         let mut id = hash_of(&parts);
         id.truncate(DIGITS);
         Self { id, parts }
@@ -76,7 +81,7 @@ fn sorted(value: &Value) -> Value {
 mod tests {
     use serde_json::{Value, json};
 
-    use super::Fingerprint;
+    use super::{Fingerprint, Renderer};
 
     fn recording() -> Value {
         json!({
@@ -88,11 +93,11 @@ mod tests {
 
     #[test]
     fn each_part_changes_alone() {
-        let base = Fingerprint::of(&recording(), Some("x-1"));
+        let base = Fingerprint::of(&recording(), Some("x-1"), None);
         let changed = |change: &dyn Fn(&mut Value), model| {
             let mut other = recording();
             change(&mut other);
-            let other = Fingerprint::of(&other, model);
+            let other = Fingerprint::of(&other, model, None);
             assert_ne!(base.id, other.id);
             let (a, b) = (base.parts.as_object().unwrap(), other.parts.as_object().unwrap());
             let keys: Vec<&String> = a.keys().filter(|key| a[*key] != b[*key]).collect();
@@ -111,13 +116,31 @@ mod tests {
         assert_eq!(changed(&same, None), "model");
         let mut retitled = recording();
         retitled["experiment"]["title"] = json!("Another title");
-        assert_eq!(Fingerprint::of(&retitled, Some("x-1")), base);
+        assert_eq!(Fingerprint::of(&retitled, Some("x-1"), None), base);
+    }
+
+    #[test]
+    fn a_renderer_is_a_part_where_frames_are_seen() {
+        let renderer = |processor: &str| Renderer {
+            name: "llvmpipe (LLVM 15.0.6, 256 bits)".to_owned(),
+            version: Some("4.5 Mesa 22.3.6".to_owned()),
+            vendor: Some("Mesa".to_owned()),
+            processor: Some(processor.to_owned()),
+        };
+        let unseen = Fingerprint::of(&recording(), None, None);
+        let [one, other] = ["x86_64 avx2", "x86_64 limited to sse2"]
+            .map(|processor| Fingerprint::of(&recording(), None, Some(&renderer(processor))));
+        assert!(unseen.id != one.id && one.id != other.id);
+        assert_eq!(unseen.parts.get("renderer"), None);
+        assert_eq!(other.parts["renderer"]["processor"], "x86_64 limited to sse2");
+        // As those of recordings from before: a part that is absent is not null.
+        assert_eq!(unseen.parts.as_object().unwrap().len(), 6);
     }
 
     #[test]
     fn the_order_of_keys_does_not_matter() {
         let [one, other] = [r#"{"agent":{"a":1,"b":2}}"#, r#"{"agent":{"b":2,"a":1}}"#];
-        let of = |text: &str| Fingerprint::of(&serde_json::from_str(text).unwrap(), None);
+        let of = |text: &str| Fingerprint::of(&serde_json::from_str(text).unwrap(), None, None);
         assert_eq!(of(one), of(other));
         assert_eq!(of(one).id.len(), 16);
     }

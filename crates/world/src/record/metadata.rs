@@ -73,6 +73,9 @@ fn recording(
         "world": config,
         "world_hash": config.hash(),
     });
+    if player.looks() {
+        recording["frame_digest"] = json!(trace::frame::DIGEST);
+    }
     if let Some(registration) = registration {
         recording["registration"] = json!(registration);
     }

@@ -22,6 +22,7 @@ use crate::sim::world::World;
 use trace::episode::{Episode, Extra, Step};
 use trace::frame::Frame;
 use trace::palette::Color;
+use trace::renderer::Renderer;
 
 /// An observer of an episode: writes a log, counts steps.
 pub trait Observer {
@@ -50,9 +51,18 @@ pub struct Stage<'a> {
     pub config: &'a WorldConfig,
     /// The thread's eye; `None` where nobody looks at pictures.
     pub eye: Option<&'a RefCell<Camera>>,
+    /// The agent sees what is drawn.
+    pub looks: bool,
     /// The recording is to stop.
     pub stop: &'a AtomicBool,
     pub shares: &'a Shares,
+}
+
+impl Stage<'_> {
+    /// The renderer of the frames that the agent sees; `None` for one that sees none.
+    pub fn renderer(&self) -> Option<Renderer> {
+        self.eye.filter(|_| self.looks).map(|eye| eye.borrow().drawn_by().clone())
+    }
 }
 
 /// The task for the agent of a scene.
@@ -147,6 +157,7 @@ pub async fn play(
         history = Some((action, thought.clone()));
         let own_thought = reply.words.summary.clone();
         let mut row = row(world, key, t, &visibility, reply);
+        row.extra.frame_digest = frame.as_ref().filter(|_| stage.looks).map(|frame| frame.digest());
         observer.seen(&Seen { t, world, frame: frame.as_ref(), visibility: &visibility })?;
         let start = Instant::now();
         bumped = world.act(action).bumped;
@@ -201,6 +212,7 @@ fn row(world: &World, key: Key, t: i32, visibility: &Visibility, reply: Reply) -
         mark_color: world.scene().own_mark_at(world.t()).map(|color| color.name().to_owned()),
         mark_report: reply.mark_report,
         mirror_mark_px: world.has_own_mark().then(|| px(visibility.mark_px)).flatten(),
+        mirror_double_px: world.has_double().then(|| px(visibility.double_px)).flatten(),
         reply: reply.raw,
         latency_ms: reply.usage.latency_ms,
         prompt_tokens: reply.usage.prompt_tokens,

@@ -258,7 +258,7 @@ impl Recording<'_> {
         let agent = self.player.agent(task, &episode.episode_id);
         let mut agent = agent.map_err(|lost| RecordError::Lost { step: None, lost })?;
         episode.participant = agent.participant().map(str::to_owned);
-        let stage = Stage { config: self.config, eye, stop: self.stop, shares: self.shares };
+        let stage = Stage { config: self.config, eye, looks: self.player.looks(), stop: self.stop, shares: self.shares };
         if agent.wants_practice() {
             self.practise(&stage, agent.as_mut(), key).await?;
         }
@@ -270,7 +270,7 @@ impl Recording<'_> {
         let mut observer = Observers { key, recording: self, unusable, in_a_row: 0, log };
         let played = rollout::play(&stage, &mut world, agent.as_mut(), key, episode, &mut observer).await;
         let committed = match &played {
-            Ok(played) => self.commit(key, played, observer.log),
+            Ok(played) => self.commit(&stage, key, played, observer.log),
             Err(_) => Ok(()),
         };
         if let Some(ended) = ended(&played) {
@@ -290,9 +290,9 @@ impl Recording<'_> {
         Ok(())
     }
 
-    fn commit(&self, key: Key, played: &Played, log: Option<Log>) -> Result<(), RecordError> {
+    fn commit(&self, stage: &Stage<'_>, key: Key, played: &Played, log: Option<Log>) -> Result<(), RecordError> {
         let start = Instant::now();
-        let fingerprint = self.store.fingerprint(key, played.model.as_deref());
+        let fingerprint = self.store.fingerprint(key, played.model.as_deref(), stage.renderer().as_ref());
         let episode = Episode { fingerprint: Some(fingerprint.id.clone()), ..played.episode.clone() };
         let episode = Episode { episode_hash: Some(episode_hash::of(&episode)), ..episode };
         if let Some(log) = log {

@@ -32,6 +32,7 @@ use crate::sim::Experiment;
 use trace::episode::Episode;
 use trace::log::{LogError, assemble};
 use trace::merge;
+use trace::renderer::{self, Renderer};
 use trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
 
 /// The folder of a recording, for one model.
@@ -134,9 +135,10 @@ impl Store {
         failures::list_of(self.folder_lock.folder())
     }
 
-    /// The fingerprint of an episode, given the id of the model as the provider returned it.
-    pub fn fingerprint(&self, key: Key, model: Option<&str>) -> Fingerprint {
-        Fingerprint::of(self.index.recording(key.experiment), model)
+    /// The fingerprint of an episode, given the id of the model as the provider returned it, and the renderer of the
+    /// frames that the agent saw.
+    pub fn fingerprint(&self, key: Key, model: Option<&str>, renderer: Option<&Renderer>) -> Fingerprint {
+        Fingerprint::of(self.index.recording(key.experiment), model, renderer)
     }
 
     /// Commits an episode whose log, if there is one, is committed already.
@@ -182,6 +184,19 @@ impl Store {
             }
         }
         Ok(json!(all))
+    }
+
+    /// What drew the frames that the agent saw in the traces of these experiments, each once.
+    pub fn renderers(&self, experiments: &[Experiment]) -> Result<Vec<Renderer>, StoreError> {
+        let mut found = Vec::new();
+        for trace in experiments.iter().map(|experiment| self.trace(*experiment)).filter(|trace| trace.exists()) {
+            for renderer in renderer::of_recording(&recording_of(&trace)?) {
+                if !found.contains(&renderer) {
+                    found.push(renderer);
+                }
+            }
+        }
+        Ok(found)
     }
 
     fn assemble_log(&self, experiment: Experiment, parts: &[PathBuf], recording: &Value) -> Result<(), StoreError> {

@@ -13,6 +13,7 @@ use super::again::{Recipe, again};
 use super::divergence::Divergence;
 use super::error::ReplayError;
 use super::log::{Log, Seen};
+use super::same_frames::{FramesAnswer, has_digests};
 use crate::sim::camera::Camera;
 use crate::sim::config::WorldConfig;
 use crate::sim::visibility::Visibility;
@@ -41,6 +42,8 @@ pub struct Outputs {
     pub log: Option<PathBuf>,
     /// The trace with its visibility decided anew.
     pub recount: Option<Recount>,
+    /// Frames are not compared with those that agents saw.
+    pub skip_frames: bool,
 }
 
 /// The new decision about visibility.
@@ -64,6 +67,8 @@ pub struct ReplayAnswer {
     pub divergences: Vec<Divergence>,
     /// Steps whose `mirror_visible` is another than before, with `--recompute-visibility`.
     pub flipped: Option<usize>,
+    /// The frames, where traces say what their agents saw.
+    pub frames: Option<FramesAnswer>,
 }
 
 impl Recorded {
@@ -93,15 +98,14 @@ impl Recorded {
         mut save: impl FnMut(&Path, &[u8]) -> Result<(), E>,
     ) -> Result<(), E> {
         let eye = outputs.recount.as_ref().map_or_else(|| self.recipe.eye.clone(), |recount| recount.eye(&self.recipe));
-        let draws = outputs.frames.is_some() || outputs.log.is_some();
-        let camera = draws.then(|| Camera::new(&self.recipe.config)).transpose().map_err(ReplayError::other)?;
+        let camera = self.camera(outputs, answer)?;
         let parts = TemporaryFolder::private("replay").map_err(ReplayError::other)?;
         let mut player = Player { trace: self, outputs, eye: &eye, camera };
         let (mut logs, mut rewritten) = (Vec::new(), Vec::new());
         for rows in &self.rows {
             let episode = rows.episode().map_err(ReplayError::other)?;
             let part = parts.path().join(format!("{}.mcap", logs.len()));
-            let (divergence, counts) = player.episode(&episode, &part, &mut save)?;
+            let (divergence, counts) = player.episode(&episode, &part, answer.frames.as_mut(), &mut save)?;
             answer.episodes += 1;
             answer.steps += episode.steps.len();
             answer.divergences.extend(divergence);
@@ -120,6 +124,27 @@ impl Recorded {
             merge::write(&recount.out, Some(&recording), &rewritten).map_err(ReplayError::other)?;
         }
         Ok(())
+    }
+}
+
+impl Recorded {
+    /// What draws the frames, if any are to be written or compared.
+    fn camera(&self, outputs: &Outputs, answer: &mut ReplayAnswer) -> Result<Option<Camera>, ReplayError> {
+        let is_written = outputs.frames.is_some() || outputs.log.is_some();
+        let is_compared = has_digests(self.recording.as_ref()) && !outputs.skip_frames;
+        if !is_written && !is_compared {
+            return Ok(None);
+        }
+        let camera = match Camera::new(&self.recipe.config) {
+            Err(error) if !is_written => Err(error),
+            camera => Ok(camera.map_err(ReplayError::other)?),
+        };
+        if is_compared {
+            let frames = answer.frames.get_or_insert_default();
+            frames.add_trace(self.recording.as_ref(), camera.as_ref().ok().map(Camera::drawn_by));
+            frames.not_compared = camera.as_ref().err().map(ToString::to_string);
+        }
+        Ok(camera.ok())
     }
 }
 
@@ -151,16 +176,22 @@ impl Player<'_> {
         &mut self,
         episode: &Episode,
         part: &Path,
+        mut frames: Option<&mut FramesAnswer>,
         save: &mut impl FnMut(&Path, &[u8]) -> Result<(), E>,
     ) -> Result<(Option<Divergence>, Counts), E> {
         let unwritten = |fault: super::log::LogFault| ReplayError::other(fault.to_string());
         let log = self.outputs.log.as_ref().map(|_| Log::begin(part, episode).map(Log::in_large_chunks));
         let mut log = log.transpose().map_err(unwritten)?;
-        let mut counts = Counts::default();
+        let (mut counts, mut other_frame) = (Counts::default(), None);
         let divergence = again(&self.trace.recipe, self.eye, episode, |t, world, visibility, step| {
             counts.add(visibility, world.is_mirror_visible(visibility));
             let frame = self.camera.as_mut().map(|camera| camera.frame(world)).transpose();
             let frame = frame.map_err(ReplayError::other)?.map(Arc::new);
+            let recorded = step.extra.frame_digest.as_deref();
+            if let (Some(frames), Some(recorded), Some(frame)) = (&mut frames, recorded, &frame) {
+                let other = frames.add((&episode.episode_id, t), recorded, frame);
+                other_frame = other_frame.take().or(other);
+            }
             if let (Some(folder), Some(frame)) = (&self.outputs.frames, &frame) {
                 let png = frame.to_png().map_err(ReplayError::other)?;
                 save(&frame_path(folder, &episode.episode_id, t), png)?;
@@ -174,23 +205,25 @@ impl Player<'_> {
         if let Some(log) = log {
             log.end(episode).map_err(unwritten)?;
         }
-        Ok((divergence, counts))
+        let first = [divergence, other_frame].into_iter().flatten().min_by_key(|divergence| divergence.t);
+        Ok((first, counts))
     }
 }
 
 /// The new counts, a value per step.
 #[derive(Default)]
 struct Counts {
-    px: [Vec<i32>; 4],
+    px: [Vec<i32>; 5],
     visible: Vec<bool>,
 }
 
 impl Counts {
     /// The columns of the counts.
-    const COLUMNS: [&str; 4] = ["mirror_self_px", "mirror_other_px", "mirror_px", "direct_other_px"];
+    const COLUMNS: [&str; 5] =
+        ["mirror_self_px", "mirror_other_px", "mirror_px", "direct_other_px", "mirror_double_px"];
 
     fn add(&mut self, seen: &Visibility, visible: bool) {
-        let counts = [seen.self_px, seen.other_px, seen.mirror_px, seen.direct_other_px];
+        let counts = [seen.self_px, seen.other_px, seen.mirror_px, seen.direct_other_px, seen.double_px];
         for (column, count) in self.px.iter_mut().zip(counts) {
             column.push(i32::try_from(count).unwrap_or(i32::MAX));
         }

@@ -17,10 +17,13 @@ use super::model::{
     BEYOND_CAMERA, EYE_CAMERA, Item, Labelled, ModelError, Paint, Stage, TOP_CAMERA, compile, group, labelled,
 };
 use super::passage;
+use super::renderer;
 use super::scene::{HungPane, Scene};
 use super::visibility::{self, Shown};
 use super::world::World;
+use crate::experiment::spec::{Look, PaneKind};
 use trace::frame::Frame;
+use trace::renderer::Renderer;
 
 /// An error of drawing.
 #[derive(Debug, thiserror::Error)]
@@ -47,6 +50,7 @@ pub struct Camera {
     data: MjData<Arc<MjModel>>,
     renderer: MjRenderer,
     draws_all: bool,
+    drawn_by: Renderer,
 }
 
 impl std::fmt::Debug for Camera {
@@ -70,7 +74,13 @@ impl Camera {
         let model = Arc::new(compile(config, paint, [width, height])?);
         let renderer = MjRenderer::new(&model, width, height, 0)
             .map_err(|error| CameraError::NoDisplay { reason: reason(&error) })?;
-        Ok(Self { width, height, data: MjData::new(model), renderer, draws_all: false })
+        let drawn_by = renderer::current();
+        Ok(Self { width, height, data: MjData::new(model), renderer, draws_all: false, drawn_by })
+    }
+
+    /// What draws its pictures.
+    pub const fn drawn_by(&self) -> &Renderer {
+        &self.drawn_by
     }
 
     /// Draws what is out of view too, panes included, as MuJoCo's own mirror does, which changes no picture: what a test and
@@ -102,6 +112,9 @@ impl Camera {
             let in_view = visibility::in_view(world, stage, size, within);
             let seen = self.through(stage, &world.scene().panes[pane], Some(&in_view))?;
             overlay(&mut frame, &seen, |at| is_seen(&labels.codes[at]));
+            if world.config().look == Look::Textured && world.scene().panes[pane].kind != PaneKind::Window {
+                tint(&mut frame, |at| is_seen(&labels.codes[at]));
+            }
         }
         Ok(frame)
     }
@@ -148,6 +161,17 @@ fn overlay(frame: &mut Frame, over: &Frame, is_asked: impl Fn(usize) -> bool) {
     let pixels = frame.rgb.chunks_exact_mut(3).zip(over.rgb.chunks_exact(3)).enumerate();
     for (_, (pixel, seen)) in pixels.filter(|(at, _)| is_asked(*at)) {
         pixel.copy_from_slice(seen);
+    }
+}
+
+/// What glass takes of red, green and blue, of 256.
+const GLASS: [u16; 3] = [242, 250, 246];
+
+fn tint(frame: &mut Frame, is_asked: impl Fn(usize) -> bool) {
+    for (_, pixel) in frame.rgb.chunks_exact_mut(3).enumerate().filter(|(at, _)| is_asked(*at)) {
+        for (level, share) in pixel.iter_mut().zip(GLASS) {
+            *level = u8::try_from(u16::from(*level) * share / 256).unwrap_or(u8::MAX);
+        }
     }
 }
 

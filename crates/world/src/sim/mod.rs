@@ -23,6 +23,7 @@ pub mod label_image;
 pub mod model;
 pub mod passage;
 pub mod placement;
+pub mod renderer;
 pub mod rng;
 pub mod scene;
 pub mod snapshot;

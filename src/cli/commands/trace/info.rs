@@ -73,13 +73,16 @@ fn print(out: &mut impl Write, info: &Info, width: Option<usize>) -> io::Result<
     let bytes: u64 = info.files.iter().map(|file| file.bytes).sum();
     let (episodes, steps) = (counted(info.episodes, "episode"), counted(info.steps, "step"));
     writeln!(out, "{episodes}, {steps}, {}, {}\n", counted(info.files.len() as u64, "file"), counted(bytes, "byte"))?;
-    list(out, "models", &info.models, width)?;
-    list(out, "experiments", &info.experiments, width)?;
-    list(out, "seeds", &info.seeds, width)?;
-    list(out, "runs", &info.runs, width)?;
+    list(out, "models", &info.models, ", ", width)?;
+    list(out, "experiments", &info.experiments, ", ", width)?;
+    list(out, "seeds", &info.seeds, ", ", width)?;
+    list(out, "runs", &info.runs, ", ", width)?;
+    if !info.renderers.is_empty() {
+        list(out, "renderers", &info.renderers, "; ", width)?;
+    }
     let own: Vec<_> = info.columns.iter().filter(|column| !column.known).map(|column| &column.name).collect();
     if !own.is_empty() {
-        list(out, "own columns", &own, width)?;
+        list(out, "own columns", &own, ", ", width)?;
     }
     if let Some(replies) = info.replies.as_ref().filter(|replies| replies.all_unreadable() > 0) {
         let (bad, all) = (replies.all_unreadable(), replies.replies);
@@ -90,11 +93,17 @@ fn print(out: &mut impl Write, info: &Info, width: Option<usize>) -> io::Result<
     write!(out, "\nfiles\n{}", files(info).within(width))
 }
 
-fn list(out: &mut impl Write, what: &str, values: &[impl Display], width: Option<usize>) -> io::Result<()> {
+fn list(
+    out: &mut impl Write,
+    what: &str,
+    values: &[impl Display],
+    between: &str,
+    width: Option<usize>,
+) -> io::Result<()> {
     let shown: Vec<_> = values.iter().map(|value| visible(&value.to_string())).collect();
     let head = format!("{what:<12} {:>3}   ", values.len());
     let indent = head.len();
-    let lines = wrapped(&shown.join(", "), width.map_or(usize::MAX, |width| width.saturating_sub(indent)), 0);
+    let lines = wrapped(&shown.join(between), width.map_or(usize::MAX, |width| width.saturating_sub(indent)), 0);
     writeln!(out, "{head}{}", lines.join(&format!("\n{}", " ".repeat(indent))))
 }
 

@@ -363,6 +363,7 @@ impl RecordArgs {
             stopped_by_limit: if by_limit { under_way.len() } else { 0 },
             spend: player.spend(),
             stopped,
+            renderers: store.renderers(&plan.experiments).map_err(Failure::input)?,
             traces: files(plan, |experiment| store.trace(experiment)),
             logs: files(plan, |experiment| store.log(experiment)),
         };

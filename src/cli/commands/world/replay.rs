@@ -11,15 +11,18 @@ use crate::cli::text_table::counted;
 use exact::replace::{self, is_same_file};
 use serde::Serialize;
 use trace::inputs;
+use trace::renderer::Renderer;
 use trace::log::read::{episode_hashes, other_episode};
 use world::replay::again::MOST_RAYS;
 use world::replay::divergence::Divergence;
 use world::replay::error::ReplayError;
+use world::replay::same_frames::FramesAnswer;
 use world::replay::verify::{Outputs, Recorded, Recount, ReplayAnswer, frame_path};
 
 /// Repeat a trace's episodes in the worlds that it describes, and hold every step against what was recorded
 ///
-/// Poses, distances, pixel counts, `bumped` and `mirror_visible` must match. Exits with 1 where they do not; the first divergence of
+/// Poses, distances, pixel counts, `bumped` and `mirror_visible` must match, and frames that agents saw must look alike: the
+/// same bytes, or mean levels within 2 of 255 in each of 8 x 6 blocks. Exits with 1 where they do not; the first divergence of
 /// each episode is printed.
 #[derive(Clone, Debug, clap::Args)]
 pub struct ReplayArgs {
@@ -48,6 +51,10 @@ pub struct ReplayArgs {
     /// The trace to write with --recompute-visibility
     #[arg(short, long, value_name = "TRACE.parquet", requires = "recompute_visibility")]
     out: Option<PathBuf>,
+    /// Compare no frames: without it, traces of agents that see frames are drawn again, and each frame is held against the
+    /// digest of the one that the agent saw
+    #[arg(long)]
+    skip_frames: bool,
     /// Answer as JSON
     #[arg(long)]
     json: bool,
@@ -81,7 +88,8 @@ impl ReplayArgs {
     fn outputs(&self) -> Outputs {
         let out = self.out.clone().filter(|_| self.recompute_visibility);
         let recount = out.map(|out| Recount { out, threshold: self.threshold, grid: self.grid });
-        Outputs { frames: self.frames.clone(), log: self.mcap.clone(), recount }
+        let skip_frames = self.skip_frames;
+        Outputs { frames: self.frames.clone(), log: self.mcap.clone(), recount, skip_frames }
     }
 
     fn check_targets(&self, traces: &[Recorded]) -> Result<(), Failure> {
@@ -149,6 +157,20 @@ fn save(path: &Path, png: &[u8]) -> Result<(), Failure> {
     output::write_file(path, png)
 }
 
+fn tell_frames(f: &mut fmt::Formatter<'_>, frames: &FramesAnswer) -> fmt::Result {
+    let FramesAnswer { equal, alike, different, tolerance, recorded_with, drawn_with, not_compared } = frames;
+    if let Some(reason) = not_compared {
+        return writeln!(f, "frames are not compared: {reason}");
+    }
+    writeln!(f, "frames: {equal} equal, {alike} alike (means of blocks within {tolerance} levels), {different} different")?;
+    let drawn_with = drawn_with.as_slice();
+    if recorded_with != drawn_with {
+        let names = |all: &[Renderer]| all.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ");
+        writeln!(f, "another renderer: recorded with {}, replayed with {}", names(recorded_with), names(drawn_with))?;
+    }
+    Ok(())
+}
+
 /// The answer, with its words for people.
 #[derive(Serialize)]
 #[serde(transparent)]
@@ -157,6 +179,11 @@ struct Shown<'a>(&'a ReplayAnswer);
 impl fmt::Display for Shown<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for Divergence { episode_id, t, column, expected, found } in &self.0.divergences {
+            // The hashes are enough for people.
+            let [expected, found] = [expected, found].map(|text| match column.as_str() {
+                "frame_digest" => text.split('-').next().unwrap_or_default(),
+                _ => text,
+            });
             writeln!(f, "{episode_id}, t = {t}: {column}: recorded {expected}, replayed {found}")?;
         }
         write!(f, "{}, {} replayed", counted(self.0.episodes as u64, "episode"), counted(self.0.steps as u64, "step"))?;
@@ -166,8 +193,9 @@ impl fmt::Display for Shown<'_> {
             parted => write!(f, ": {parted} of the episodes part from the trace")?,
         }
         match self.0.flipped {
-            Some(flipped) => writeln!(f, "; mirror_visible is another at {}", counted(flipped as u64, "step")),
-            None => writeln!(f),
+            Some(flipped) => writeln!(f, "; mirror_visible is another at {}", counted(flipped as u64, "step"))?,
+            None => writeln!(f)?,
         }
+        self.0.frames.as_ref().map_or(Ok(()), |frames| tell_frames(f, frames))
     }
 }

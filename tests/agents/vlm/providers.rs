@@ -286,7 +286,11 @@ fn extra_body_is_sent_and_fingerprinted_and_the_default_temperature_is_not_sent(
         let vlm = bench.vlm_of(&server, choice, OnOutage::Lose, patience());
         Bench::play(&vlm, "episode", 1).remove(0).unwrap();
         let recording = json!({ "agent": vlm.description() });
-        (server.requests().remove(0).json(), Fingerprint::of(&recording, None, None).parts["sampling"].clone(), recording)
+        (
+            server.requests().remove(0).json(),
+            Fingerprint::of(&recording, None, None).parts["sampling"].clone(),
+            recording,
+        )
     };
     for dialect in PROVIDERS {
         let place = if dialect == Dialect::Gemini { "/generationConfig/temperature" } else { "/temperature" };

@@ -78,7 +78,8 @@ fn first<'a>(solids: &[&'a Solid], origin: Vector, ray: Vector) -> Option<(f64, 
 fn own_px(world: &World, past: &[Snapshot]) -> u32 {
     let now = past.last().unwrap();
     let eye = now.frames.iter().find(|frame| frame.name == "eye").unwrap();
-    let [ahead, right, up] = [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]].map(|axis| turned(eye.rotation, axis));
+    let [ahead, right, up] =
+        [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]].map(|axis| turned(eye.rotation, axis));
     let view = &world.config().eye;
     let (width, height) = (view.width, view.height_px);
     let half = (view.fovy / 2.0).to_radians().tan();

@@ -4,11 +4,11 @@ use indexmap::IndexMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::statistics::Replies;
-use crate::statistics::study::Study;
 use crate::cells::group::membership;
 use crate::cells::interval::{bounded, cell_interval};
 use crate::cells::{Cells, Group, KeyValue};
+use crate::statistics::Replies;
+use crate::statistics::study::Study;
 use exact::moments::Moments;
 use metric::catalog::{Kind, Metric, StandardError};
 use score::lost_counts::LostCounts;

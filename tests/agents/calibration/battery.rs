@@ -80,7 +80,8 @@ fn check_logic(profiles: &Profiles) {
         let is_defined = |metric| shown.get(experiment, agent, metric).count > 0;
         for (metric, only) in [("DECOY_CLAIM", "decoy"), ("WINDOW_CLAIM", "window"), ("MARK_REPORT", "mark")] {
             // Who never has the pane in view is not asked.
-            let is_there = experiment == only && (is_defined(metric) || ["frozen", "guesser", "random"].contains(&agent));
+            let is_there =
+                experiment == only && (is_defined(metric) || ["frozen", "guesser", "random"].contains(&agent));
             shown.holds(is_there || !is_defined(metric) && experiment != only, experiment, agent, metric);
         }
         match (experiment, agent) {

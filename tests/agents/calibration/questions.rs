@@ -52,7 +52,9 @@ fn check_evidence(profiles: &Profiles) {
         shown.holds("cannot-know", "confabulator", "INVENTED", Sum::is_one);
     }
     if has("frozen") {
-        for (experiment, metric) in [("can-know", "WARRANTED"), ("cannot-know", "WARRANTED"), ("cannot-know", "INVENTED")] {
+        for (experiment, metric) in
+            [("can-know", "WARRANTED"), ("cannot-know", "WARRANTED"), ("cannot-know", "INVENTED")]
+        {
             shown.holds(experiment, "frozen", metric, Sum::is_zero);
         }
     }

@@ -67,7 +67,11 @@ fn what_no_episode_could_mean() {
         (5, "chance = { TSA = \"4/3\" }", "the level of the rate `TSA` is 4/3; expected a fraction from 0 to 1"),
         (5, "chance = { NOPE = \"1/2\" }", "`NOPE` is no metric of these definitions"),
         (5, "reference = { TSA = [\"-1/3\"] }", "expected a fraction from 0 to 1"),
-        (5, "mirror = [{ kind = \"decoy\", color = \"red\" }]", "in episodes whose body is red, this decoy is a mirror"),
+        (
+            5,
+            "mirror = [{ kind = \"decoy\", color = \"red\" }]",
+            "in episodes whose body is red, this decoy is a mirror",
+        ),
         (5, "mark = [{ part = \"head\", color = \"red\" }]", "in episodes whose body is red, this mark would not show"),
         (5, "mirror = [{}]\nmark = [{ part = \"back\" }]", "no mirror shows the back of a body to its bearer"),
     ] {
@@ -76,11 +80,27 @@ fn what_no_episode_could_mean() {
         refused_in(&bench, line, &format!("{HEAD}{more}\n"), &[expected]);
     }
     // All at once: mending one brings no other to light.
-    let many = format!("{HEAD}chance = {{ TSA = \"4/3\", NOPE = \"1/2\" }}\nmirror = [{{ kind = \"decoy\", color = \"red\" }}]\n\
-                        mark = [{{ part = \"back\", color = \"blue\" }}]\n");
-    refused_in(&bench, 5, &many, &["`TSA` is 4/3", "`NOPE` is no metric", "this decoy is a mirror", "back of a body", "this mark would not show", "5 faults"]);
+    let many = format!(
+        "{HEAD}chance = {{ TSA = \"4/3\", NOPE = \"1/2\" }}\nmirror = [{{ kind = \"decoy\", color = \"red\" }}]\n\
+                        mark = [{{ part = \"back\", color = \"blue\" }}]\n"
+    );
+    refused_in(
+        &bench,
+        5,
+        &many,
+        &[
+            "`TSA` is 4/3",
+            "`NOPE` is no metric",
+            "this decoy is a mirror",
+            "back of a body",
+            "this mark would not show",
+            "5 faults",
+        ],
+    );
     // A late mirror shows the back, and a palette without the colour makes a mark of it.
-    let sound = format!("{HEAD}palette = [\"red\", \"green\"]\nmirror = [{{ delay = 3 }}]\nmark = [{{ part = \"back\", color = \"blue\" }}]\n");
+    let sound = format!(
+        "{HEAD}palette = [\"red\", \"green\"]\nmirror = [{{ delay = 3 }}]\nmark = [{{ part = \"back\", color = \"blue\" }}]\n"
+    );
     fs::write(bench.path("sound.toml"), sound).unwrap();
     run(bench.folder.path(), &["experiments", "check", "sound.toml"]).done();
 }

@@ -80,7 +80,10 @@ fn a_frame_that_shows_something_else_is_another_frame() {
     writer.finish().unwrap();
     let replayed = run(bench.folder.path(), &["replay", "runs/E1-mimic.parquet"]).ends(1);
     let said = &replayed.stdout;
-    assert!(said.contains("E1/mimic/s1/r1, t = 2: frame_digest: recorded ") && said.contains(", 1 different"), "{said}");
+    assert!(
+        said.contains("E1/mimic/s1/r1, t = 2: frame_digest: recorded ") && said.contains(", 1 different"),
+        "{said}"
+    );
     let replayed = run(bench.folder.path(), &["replay", "runs/E1-mimic.parquet", "--skip-frames"]).done();
     assert!(replayed.contains("all match") && !replayed.contains("frames:"), "{replayed}");
 }

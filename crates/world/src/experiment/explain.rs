@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 
 use super::Experiment;
 use super::spec::{
-    Behavior, BodyShown, Camera, Colors, Cubes, Hand, Look, Mark, MarkColor, Others, Paint, Pane, PaneKind, Picture, Start,
-    Stated, Wall, Wearer,
+    Behavior, BodyShown, Camera, Colors, Cubes, Hand, Look, Mark, MarkColor, Others, Paint, Pane, PaneKind, Picture,
+    Start, Stated, Wall, Wearer,
 };
 use exact::escape::visible;
 
@@ -79,9 +79,9 @@ pub fn explained(experiment: Experiment) -> String {
     };
     line("steps", steps);
     if experiment.hand.is_none() {
-        let length = experiment.step_length_mm.map_or_else(|| "as long as the world says".to_owned(), |mm| {
-            format!("{} m long", f64::from(mm) / 1000.0)
-        });
+        let length = experiment
+            .step_length_mm
+            .map_or_else(|| "as long as the world says".to_owned(), |mm| format!("{} m long", f64::from(mm) / 1000.0));
         line("step", format!("{length}, turns of 30 degrees"));
     }
     let chance: Vec<String> = experiment.chance.iter().map(|(metric, level)| format!("{metric} {level}")).collect();

@@ -287,7 +287,8 @@ fn item(model: &MjModel, geom: usize, scene: &Scene) -> Item {
 
 pub(super) fn compile(config: &WorldConfig, paint: Paint, size: [usize; 2]) -> Result<MjModel, ModelError> {
     let is_textured = config.look == crate::experiment::spec::Look::Textured && paint == Paint::Lit;
-    let mut spec = MjSpec::from_xml_string(&if is_textured { ROOM.replace("</asset>", PANELS) } else { ROOM.to_owned() })?;
+    let mut spec =
+        MjSpec::from_xml_string(&if is_textured { ROOM.replace("</asset>", PANELS) } else { ROOM.to_owned() })?;
     build_room(&mut spec, config, paint);
     if is_textured {
         for wall in ["wall_east", "wall_north", "wall_west", "wall_south"] {

@@ -35,7 +35,9 @@ pub(super) fn prompt(spec: &Spec, templates: &Templates, at: &At<'_>, faults: &m
             only(&reply, &asked)
         );
         let at = at.get("reply").unwrap_or_else(|| at.key("prompt"));
-        faults.push(at.fault(message).help("choose another `prompt`, `reply` or `decision`, or mend the words of the prompt"));
+        faults.push(
+            at.fault(message).help("choose another `prompt`, `reply` or `decision`, or mend the words of the prompt"),
+        );
     }
 }
 
@@ -91,7 +93,8 @@ pub(super) fn marks(spec: &Spec, at: &At<'_>, faults: &mut Vec<Fault>) {
     for (n, mark) in spec.marks.iter().enumerate() {
         if mark.part == Part::Back && mark.on == Wearer::Own && !is_late {
             let at = at.key("mark").item(n).key("part");
-            let fault = at.fault("no mirror shows the back of a body to its bearer, who would have to look away from it");
+            let fault =
+                at.fault("no mirror shows the back of a body to its bearer, who would have to look away from it");
             let help = "use `part = \"head\"` or `\"chest\"`, or a mirror with a `delay`: it shows the back to one who has turned round";
             faults.push(fault.help(help));
         }

@@ -70,7 +70,11 @@ pub fn defined(data: &[u8]) {
         study("defined.parquet", &bytes)?.threads(threads).definitions(&path).ok()?.score().ok()
     };
     let (one, two) = (bounded(|| scores(1)), bounded(|| scores(2)));
-    assert_eq!(one.as_ref().map(|one| &one.episodes), two.as_ref().map(|two| &two.episodes), "another number of threads");
+    assert_eq!(
+        one.as_ref().map(|one| &one.episodes),
+        two.as_ref().map(|two| &two.episodes),
+        "another number of threads"
+    );
     one.iter().for_each(|_| reached("values"));
 }
 

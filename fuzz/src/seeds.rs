@@ -60,7 +60,9 @@ pub fn of(target: &str) -> Vec<Vec<u8>> {
         "replies" => replies(),
         "defined" => definitions().iter().map(|text| pairs::joined(text, &[])).collect(),
         "grouped" => texts(&["model", "experiment,model", "episode_id", "seed,run,body_color", "nope", ""]),
-        "filtered" => texts(&["run = 1", "any(mirror_visible) and run > 0", "TSA = 1", "model is null", "length() > 2"]),
+        "filtered" => {
+            texts(&["run = 1", "any(mirror_visible) and run > 0", "TSA = 1", "model is null", "length() > 2"])
+        }
         "asked" => texts(&QUESTIONS),
         "logged" => logs().iter().map(|log| pairs::joined(log, &[])).collect(),
         "styled" => vec![pairs::joined(STYLE, &scores()[0][1..])],

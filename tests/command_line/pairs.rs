@@ -2,9 +2,7 @@
 
 use std::path::Path;
 
-use crate::harness::bombs::{
-    MEMORY, definitions, long_episode, long_texts, many_episodes, many_models, measured,
-};
+use crate::harness::bombs::{MEMORY, definitions, long_episode, long_texts, many_episodes, many_models, measured};
 
 /// The option that raises every limit.
 const SETTING: &str = "MIRRORSTATS_BUDGET";

@@ -69,7 +69,8 @@ fn write(path: &Path, rows: usize, columns: Vec<(&str, ArrayRef)>) -> u64 {
         }
     }
     let batch = RecordBatch::try_from_iter(all).unwrap();
-    let mut writer = ArrowWriter::try_new(File::create(path).unwrap(), batch.schema(), Some(properties.build())).unwrap();
+    let mut writer =
+        ArrowWriter::try_new(File::create(path).unwrap(), batch.schema(), Some(properties.build())).unwrap();
     writer.write(&batch).unwrap();
     writer.close().unwrap();
     let bytes = fs::metadata(path).unwrap().len();

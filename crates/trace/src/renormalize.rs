@@ -233,10 +233,7 @@ impl Normalizer<'_> {
     }
 
     /// The attribution of a step, noted if it is another one than before.
-    fn attribution(
-        &mut self,
-        (episode_id, t, source, target): Before<'_>,
-    ) -> Result<Option<String>, TraceError> {
+    fn attribution(&mut self, (episode_id, t, source, target): Before<'_>) -> Result<Option<String>, TraceError> {
         self.steps += 1;
         let before = target.map(str::to_owned);
         let Some(text) = source else { return Ok(before) };

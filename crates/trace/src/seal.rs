@@ -16,7 +16,7 @@ use super::read::footer::Extent;
 use super::validate::validate;
 use super::write::rewrite::with_checksums;
 use exact::hash;
-use exact::replace::{NewFile, TemporaryFolder, TargetIsInput, check_target, folder_of};
+use exact::replace::{NewFile, TargetIsInput, TemporaryFolder, check_target, folder_of};
 use parquet_pages::checksums::Checksums;
 
 /// A sealed copy.
@@ -72,7 +72,8 @@ pub fn seal(input: &Input, out: &Path, threads: NonZeroUsize) -> Result<SealAnsw
 }
 
 fn opened(input: &Input) -> Result<TraceFile, TraceError> {
-    let unexplained = || Finding::new(Code::Unreadable, &input.name, "a trace that can be opened", "one that cannot").into();
+    let unexplained =
+        || Finding::new(Code::Unreadable, &input.name, "a trace that can be opened", "one that cannot").into();
     TraceFile::open(input).map_err(|findings| TraceError::of(findings).unwrap_or_else(unexplained))
 }
 

@@ -1,7 +1,7 @@
 //! The files that the arguments name: traces, logs, and what a recording has under way.
 
-use std::collections::btree_map::{BTreeMap, Entry};
 use std::collections::BTreeSet;
+use std::collections::btree_map::{BTreeMap, Entry};
 use std::ffi::OsString;
 use std::fs;
 use std::io;
@@ -117,7 +117,9 @@ impl Found {
             }
             std::thread::sleep(PAUSE);
         }
-        Err(ViewError::Absent("expected a recording that pauses for a moment, found one that changes all the time".into()))
+        Err(ViewError::Absent(
+            "expected a recording that pauses for a moment, found one that changes all the time".into(),
+        ))
     }
 
     fn linked(&self, folder: &Path) -> io::Result<Self> {

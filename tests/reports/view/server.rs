@@ -223,7 +223,8 @@ fn no_question_takes_more_than_the_budget() {
         ] {
             let answer = server.get(&format!("/api/{question}"));
             assert_eq!(answer.status == 200, !refused, "{name}, {question}: {}", answer.status);
-            let is_told = || answer.text().contains("at most 2000000 steps") && answer.text().contains("MIRRORSTATS_BUDGET");
+            let is_told =
+                || answer.text().contains("at most 2000000 steps") && answer.text().contains("MIRRORSTATS_BUDGET");
             assert!(!refused || is_told(), "{name}, {question}: {}", answer.text());
         }
         let most = peak(server.process_id());

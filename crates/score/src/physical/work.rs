@@ -12,8 +12,11 @@ const SMALL: u64 = 1 << 20;
 
 /// The bytes that the definitions read and write over all rows of some files.
 const fn most_work(bytes: u64) -> Limit {
-    Limit::new("bytes computed, rows times values of the definitions, in files of their size", 8 << 30)
-        .and_beyond(SMALL, 64 << 10, bytes)
+    Limit::new("bytes computed, rows times values of the definitions, in files of their size", 8 << 30).and_beyond(
+        SMALL,
+        64 << 10,
+        bytes,
+    )
 }
 
 impl PhysicalPlan {
@@ -31,7 +34,11 @@ impl PhysicalPlan {
         let bits = |step: &Step| if step.shape == Shape::Timesteps { bits_of(step) } else { 0 };
         let per_row = self.steps().iter().fold(0_u64, |sum, step| {
             // A branch of `case` is looked at value by value, whatever its values are.
-            let least = if matches!(step.kernel, Kernel::Case { .. } | Kernel::Coalesce(_)) { bits(step).min(64) * 8 } else { 0 };
+            let least = if matches!(step.kernel, Kernel::Case { .. } | Kernel::Coalesce(_)) {
+                bits(step).min(64) * 8
+            } else {
+                0
+            };
             let operands = step.kernel.operands();
             let read = operands.iter().map(|operand| bits(self.step(*operand)).max(least)).sum::<u64>();
             sum.saturating_add(bits(step)).saturating_add(read)

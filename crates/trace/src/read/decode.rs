@@ -132,8 +132,18 @@ impl<'a> RowGroup<'a> {
         let text = roots.filter_map(|root| text_bytes(&readable.footer, root, row_group)).max().unwrap_or(0);
         let at_a_time = rows_at_a_time(file.row_group_rows(row_group), text);
         let sources = Vec::new();
-        let mut rows =
-            Self { file, layout, readable, index: row_group, ids, sources, first: 0, at_a_time, over: false, seen: Vec::new() };
+        let mut rows = Self {
+            file,
+            layout,
+            readable,
+            index: row_group,
+            ids,
+            sources,
+            first: 0,
+            at_a_time,
+            over: false,
+            seen: Vec::new(),
+        };
         rows.seen = (0..layout.columns.len()).map(|at| rows.described(at).map(|_| Seen::default())).collect();
         for at in 0..layout.columns.len() {
             let source = match root(file, layout, at) {

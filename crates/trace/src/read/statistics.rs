@@ -66,9 +66,13 @@ impl Chunk {
         let [least, greatest] = match statistics {
             _ if is_unsigned => [None, None],
             Statistics::Boolean(of) => [of.min_opt(), of.max_opt()].map(|value| value.map(|value| Value::Bool(*value))),
-            Statistics::Int32(of) => [of.min_opt(), of.max_opt()].map(|value| value.map(|value| Value::Int((*value).into()))),
+            Statistics::Int32(of) => {
+                [of.min_opt(), of.max_opt()].map(|value| value.map(|value| Value::Int((*value).into())))
+            }
             Statistics::Int64(of) => [of.min_opt(), of.max_opt()].map(|value| value.map(|value| Value::Int(*value))),
-            Statistics::Float(of) => [of.min_opt(), of.max_opt()].map(|value| value.map(|value| Value::Float((*value).into()))),
+            Statistics::Float(of) => {
+                [of.min_opt(), of.max_opt()].map(|value| value.map(|value| Value::Float((*value).into())))
+            }
             Statistics::Double(of) => [of.min_opt(), of.max_opt()].map(|value| value.map(|value| Value::Float(*value))),
             // The order of the older fields is that of signed bytes.
             Statistics::ByteArray(of) if !statistics.is_min_max_deprecated() => {
@@ -105,19 +109,31 @@ impl Seen {
             return Some((format!("{nulls} nulls, as the statistics of the footer say"), self.nulls.to_string()));
         }
         if let Some(bytes) = declared.bytes.filter(|bytes| *bytes != self.bytes) {
-            return Some((format!("texts of {bytes} bytes, as the statistics of the footer say"), self.bytes.to_string()));
+            return Some((
+                format!("texts of {bytes} bytes, as the statistics of the footer say"),
+                self.bytes.to_string(),
+            ));
         }
-        let bounds = [(&declared.least, &self.least, Ordering::Less, "least"), (&declared.greatest, &self.greatest, Ordering::Greater, "greatest")];
+        let bounds = [
+            (&declared.least, &self.least, Ordering::Less, "least"),
+            (&declared.greatest, &self.greatest, Ordering::Greater, "greatest"),
+        ];
         bounds.into_iter().find_map(|(declared, found, beyond, word)| {
             let (declared, found) = (declared.as_ref()?, found.as_ref()?);
             let order = found.order(declared)?;
             let is_wrong = order == beyond || order != Ordering::Equal && declared.is_whole();
-            is_wrong.then(|| (format!("{} as the {word} value, as the statistics of the footer say", declared.words()), found.words()))
+            is_wrong.then(|| {
+                (
+                    format!("{} as the {word} value, as the statistics of the footer say", declared.words()),
+                    found.words(),
+                )
+            })
         })
     }
 
     fn value(&mut self, value: &Value) {
-        let is_beyond = |bound: &Option<Value>, beyond| bound.as_ref().is_none_or(|bound| value.order(bound) == Some(beyond));
+        let is_beyond =
+            |bound: &Option<Value>, beyond| bound.as_ref().is_none_or(|bound| value.order(bound) == Some(beyond));
         if is_beyond(&self.least, Ordering::Less) {
             self.least = Some(value.clone());
         }
@@ -176,7 +192,8 @@ impl Seen {
     /// Values, and how many rows have each.
     fn used(&mut self, values: &ArrayRef, used: &[u64]) {
         if let Some(texts) = values.as_string_opt::<i32>() {
-            let bytes = (0..texts.len()).zip(used).map(|(at, rows)| u64::from(texts.value_length(at).cast_unsigned()) * rows);
+            let bytes =
+                (0..texts.len()).zip(used).map(|(at, rows)| u64::from(texts.value_length(at).cast_unsigned()) * rows);
             self.bytes += bytes.sum::<u64>();
         }
         self.ends(values, (0..values.len()).filter(|at| used.get(*at).is_some_and(|rows| *rows > 0)));

@@ -4,8 +4,8 @@ use std::fmt;
 use std::path::PathBuf;
 
 use crate::cli::args::ThreadArgs;
-use crate::cli::output;
 use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::output;
 use crate::cli::text_table::counted;
 use trace::inputs::Input;
 use trace::seal::{SealAnswer, SealError, seal};

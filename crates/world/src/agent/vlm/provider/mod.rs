@@ -347,7 +347,13 @@ mod tests {
         let (dialect, key) = (Dialect::OpenaiCompatible, "KEY".to_owned());
         let strict = Backend { dialect, base_url: None, key, plain_http: false, extra_body: serde_json::Map::new() };
         let free = Backend { plain_http: true, ..strict.clone() };
-        for own in ["http://127.0.0.1:8/v1", "http://localhost/v1", "http://[::1]:8/v1", "https://host/v1", "http://127.9.9.9/"] {
+        for own in [
+            "http://127.0.0.1:8/v1",
+            "http://localhost/v1",
+            "http://[::1]:8/v1",
+            "https://host/v1",
+            "http://127.9.9.9/",
+        ] {
             assert!(check_transport(own, &strict).is_ok(), "{own}");
         }
         for other in ["http://host/v1", "http://192.0.2.1/v1", "http://localhost.host/v1", "http://[2001:db8::1]/"] {

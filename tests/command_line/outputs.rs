@@ -256,7 +256,7 @@ fn a_limit_of_the_size_of_files_is_an_error_that_is_told() {
         let before = contents(at);
         let mut command = crate::harness::program::limited(at, "ulimit -f 0");
         let told = crate::harness::program::answer(command.args(words.split_whitespace())).refused();
-        assert!(told.contains("File too large") && told.contains("help: "), "{words}: {told}");
+        assert!(told.contains("File too large") && told.contains("writable"), "{words}: {told}");
         assert!(!at.join(output).exists(), "{words}");
         assert!(contents(at) == before, "{words} has left something");
         run(at, &words.split_whitespace().collect::<Vec<_>>()).done();

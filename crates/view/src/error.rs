@@ -28,7 +28,7 @@ pub enum ViewError {
     Absent(String),
     #[error("{0}")]
     Request(String),
-    #[error("cannot write the page: {0}")]
+    #[error("cannot write the page: {0}\n  help: is the folder there and writable, and the disk not full?")]
     Write(#[from] exact::replace::FolderError),
 }
 

@@ -50,6 +50,8 @@ const MARK: &str = "assets/view.js";
 /// Files by their paths inside the folder, on the disk until they are put in place together.
 struct Files {
     stage: TemporaryFolder,
+    /// Where they are put, for errors.
+    folder: PathBuf,
     all: Vec<PathBuf>,
     written: Budget,
 }
@@ -59,7 +61,9 @@ impl Files {
         let bytes = bytes.as_ref();
         self.written.spend(bytes.len() as u64).map_err(exceeded)?;
         let target = self.stage.path().join(path);
-        make_folder(folder_of(&target)).and_then(|()| fs::write(&target, bytes)).map_err(unwritable(&target))?;
+        make_folder(folder_of(&target))
+            .and_then(|()| fs::write(&target, bytes))
+            .map_err(unwritable(&self.folder.join(path)))?;
         self.all.push(path.into());
         Ok(())
     }
@@ -88,8 +92,12 @@ pub fn write(options: &Options, folder: &Path) -> Result<usize, ViewError> {
     make_folder(parent).map_err(unwritable(parent))?;
     let inputs = temporary()?;
     let snapshot = Snapshot::of_found(options, Found::frozen(&options.runs, inputs.path())?, 0)?;
-    let mut files =
-        Files { stage: temporary()?, all: Vec::new(), written: Budget::new(most_written(snapshot.bytes())) };
+    let mut files = Files {
+        stage: temporary()?,
+        folder: folder.to_owned(),
+        all: Vec::new(),
+        written: Budget::new(most_written(snapshot.bytes())),
+    };
     check_size(&snapshot)?;
     // They come first: what is too much of them is refused before the report is made.
     for some in snapshot.together(TOGETHER)? {

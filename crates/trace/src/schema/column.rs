@@ -11,6 +11,7 @@ use crate::episode::Episode;
 
 /// One column of a trace.
 #[derive(Clone, Copy, Debug, Serialize)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a key of the domain's file")]
 pub struct Column {
     /// The column's name in the file.
     pub name: &'static str,

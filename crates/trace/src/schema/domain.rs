@@ -58,6 +58,7 @@ struct DomainFile {
 /// A column as the file declares it; the file says what each key means.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a key of the file")]
 struct DomainColumn {
     #[serde(rename = "type")]
     stored: Stored,

@@ -63,7 +63,7 @@ impl Service {
                 const ENDPOINT: &str = "/v1/chat/completions";
                 let lines =
                     list(|id, body| json!({ "custom_id": id, "method": "POST", "url": ENDPOINT, "body": body }));
-                let text: String = lines.into_iter().map(|line| format!("{line}\n")).collect();
+                let text = lines.iter().map(Value::to_string).collect::<Vec<_>>().join("\n") + "\n";
                 // A file alone is not billed.
                 let file = self.upload(&text).await.map_err(|failure| Failure { may_be_paid: false, ..failure })?;
                 let batch = json!({ "input_file_id": file, "endpoint": ENDPOINT, "completion_window": "24h" });

@@ -13,7 +13,8 @@ function side(episode, letter) {
 }
 
 async function shown(own) {
-  const { elements, show } = await sight(own.episode);
+  const { elements, ready, show } = sight(own.episode);
+  await ready;
   own.element.append(make("div", { class: "sights" }, elements), own.panel);
   own.show = (t, columns) => {
     const at = Math.min(t, own.episode.length);

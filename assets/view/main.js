@@ -4,7 +4,8 @@ import { ask, isCopy } from "./data.js";
 import { changed, filtered, go, link, query } from "./state.js";
 import { overview, showRunning } from "./overview.js";
 import { list, listQuery } from "./list.js";
-import { episodePage, setPaint } from "./episode.js";
+import { setPaint } from "./values.js";
+import { episodePage } from "./episode.js";
 import { changesPage, comparePage } from "./compare.js";
 import { watch } from "./live.js";
 

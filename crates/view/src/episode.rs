@@ -5,6 +5,7 @@ use serde_json::{Map, Value, json};
 use super::error::ViewError;
 use super::filter::{Query, number, required};
 use super::list;
+use super::verdict;
 use super::snapshot::{Opened, Scored, Snapshot};
 use exact::escape::visible;
 use score::evidence::{Evidence, MetricEvidence, ranges};
@@ -65,6 +66,7 @@ pub(super) fn described(
         "constants": constants(opened, longest),
         "own": opened.own.is_some(),
         "steps": steps(opened, longest),
+        "verdict": verdict::answer(opened),
         "marks": marks.collect::<Vec<_>>(),
         "metrics": metrics,
         "against": against,

@@ -29,6 +29,7 @@ mod page;
 mod rendered;
 pub mod routes;
 mod snapshot;
+mod verdict;
 
 use std::ffi::OsString;
 use std::num::NonZeroUsize;

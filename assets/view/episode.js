@@ -157,7 +157,7 @@ function headline(episode) {
     else if (select.value !== "") go(new URLSearchParams({ view: "compare", a: episode.id, b: select.value }));
   });
   return make("div", { class: "headline" },
-    make("div", { class: "title" }, make("h1", {}, episode.name), make("p", { class: "turn" }, other(previous, "previous", "prev"), place ? make("a", { href: link(listQuery()), class: "place" }, `${place} of ${total}`) : null, other(next, "next", "next"), select, copyButton("Copy link", () => location.href))),
+    make("div", { class: "title" }, make("h1", {}, episode.name), make("p", { class: "turn" }, other(previous, "previous", "prev"), place ? make("a", { href: link(listQuery()), class: "place" }, `${place} of ${total}`) : null, other(next, "next", "next"), select, (episode.siblings ?? []).length > 0 ? make("a", { href: link(new URLSearchParams({ view: "scene", id: episode.id })) }, `All ${episode.siblings.length + 1} on this scene`) : null, isCopy ? null : copyButton("Copy link", () => location.href), isCopy || episode.running ? null : make("a", { href: `api/file?${new URLSearchParams({ id: episode.id })}`, download: `${episode.name.replaceAll("/", "-")}.html` }, "Save as a file"))),
     episode.verdict ? make("p", { class: "verdict", "data-outcome": episode.verdict.outcome }, episode.verdict.words) : null,
     make("dl", { class: "facts" }, list, make("div", {}, make("dt", {}, "steps"), make("dd", { id: "length" }, episode.length))), state);
 }

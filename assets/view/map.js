@@ -48,7 +48,7 @@ function legendOf({ all, every }) {
     return make("li", {}, patch, words);
   });
   const way = make("li", {}, make("i", { class: "key way", "aria-hidden": "true" }), "way so far, and where it looks");
-  return [...items, way, every > 1 ? make("li", {}, `shapes of each ${every}th step`) : null].filter((item) => item !== null);
+  return [...items, way, every > 1 ? make("li", {}, `bodies of one step in ${every}`) : null].filter((item) => item !== null);
 }
 
 /** A map of an episode; `show(t)` draws a step. */

@@ -121,12 +121,17 @@ export function timeline(episode, jump) {
   const rows = stripsOf(episode);
   const strips = rows.map((row) => painted(row, jump));
   const place = (t) => `${((t - 0.5) / Math.max(1, episode.length)) * 100}%`;
+  let before = { at: -1, row: 1 };
   const marks = episode.marks.map(({ t, title }) => {
     const button = make("button", { type: "button", class: "moment", "data-t": t, title: `${title}, t = ${t}` }, title);
     button.style.left = place(t);
     // Those at the ends stay within the line.
     button.style.translate = `-${place(t)}`;
     button.addEventListener("click", () => jump(t));
+    // Two that are near have a line each.
+    const at = t / Math.max(1, episode.length);
+    before = { at, row: at - before.at < 0.2 && before.at >= 0 ? 1 - before.row : 0 };
+    button.dataset.row = String(before.row);
     return button;
   });
   const cursor = make("div", { class: "cursor", "aria-hidden": "true" });

@@ -16,6 +16,13 @@ pub fn browser() -> PathBuf {
     found.unwrap_or_else(|| panic!("none of {BROWSERS:?} is on PATH: scripts/get-browser.sh installs one"))
 }
 
+/// Where `scripts/get-axe.sh` has put the engine that looks for barriers in pages, beside what cargo builds.
+pub fn axe() -> PathBuf {
+    let engine = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).with_file_name("axe-core").join("axe.min.js");
+    assert!(engine.is_file(), "no axe-core in {}: scripts/get-axe.sh fetches it", engine.display());
+    engine
+}
+
 /// Where `scripts/get-spark.sh` has put pyspark, beside what cargo builds.
 pub fn spark() -> PathBuf {
     let packages = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).with_file_name("python-spark");

@@ -3,11 +3,17 @@
 //! Rule: what was computed stands in the files, and nothing more can be: filters choose by what the list has. From a disk browsers
 //! load neither modules nor data, so that the script is a classic one and each part a script too.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
+use std::io::Cursor;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+use std::thread;
 
-use serde_json::Value;
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use serde_json::{Value, json};
 
 use super::error::ViewError;
 use super::snapshot::Snapshot;
@@ -58,8 +64,11 @@ impl Files {
     }
 }
 
-/// Writes the page of everything that is whole; gives the number of files.
-pub fn write(view: &View, folder: &Path) -> Result<usize, ViewError> {
+/// Hears how many of all episodes are done.
+pub type Progress<'p> = &'p (dyn Fn(usize, usize) + Sync);
+
+/// Writes the page of everything that is whole, one file per episode; gives the number of files.
+pub fn write(view: &View, folder: &Path, progress: Progress<'_>) -> Result<usize, ViewError> {
     check_folder(folder)?;
     let snapshot = view.newest();
     let mut files = Files::default();
@@ -79,31 +88,111 @@ pub fn write(view: &View, folder: &Path) -> Result<usize, ViewError> {
     files.part("list", &list::everything(&snapshot)?)?;
     let ids: Vec<String> =
         snapshot.table()?.results.episodes.keys.iter().map(|key| key.episode_id.to_owned()).collect();
-    for (at, id) in ids.iter().enumerate() {
-        add_episode(&mut files, &snapshot, at, id)?;
+    let mut said = Vec::new();
+    for (at, made) in episodes(&snapshot, &ids, progress).into_iter().enumerate() {
+        let (told, texts) = made?;
+        said.push(texts);
+        files.add(&format!("data/episode-{at}.js"), told)?;
     }
+    files.part("said", &said.into())?;
     let new: Vec<_> = files.all.iter().map(|(path, bytes)| (path.as_path(), Content::Bytes(bytes))).collect();
     replace_folder(folder, &FolderFiles { new: &new, index: Some(Path::new("index.html")), old: &old_files })?;
     Ok(new.len())
 }
 
-fn add_episode(files: &mut Files, snapshot: &Snapshot, at: usize, id: &str) -> Result<(), ViewError> {
+/// An episode as a part of a page, and what was said in it.
+type Made = Result<(String, Value), ViewError>;
+
+/// Reads episodes on all threads; they come in the order of the ids.
+fn episodes(snapshot: &Snapshot, ids: &[String], progress: Progress<'_>) -> Vec<Made> {
+    let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
+    let made: Mutex<BTreeMap<usize, Made>> = Mutex::default();
+    let work = || {
+        loop {
+            let at = next.fetch_add(1, Ordering::Relaxed);
+            let Some(id) = ids.get(at) else { return };
+            let own = part_of(snapshot, id).map(|(told, said)| {
+                (format!("mirrorstatsPart(\"episode-{at}\", {told});\n"), said)
+            });
+            made.lock().unwrap_or_else(PoisonError::into_inner).insert(at, own);
+            progress(done.fetch_add(1, Ordering::Relaxed) + 1, ids.len());
+        }
+    };
+    thread::scope(|scope| (0..snapshot.options.threads.get().min(ids.len())).for_each(|_| drop(scope.spawn(work))));
+    made.into_inner().unwrap_or_else(PoisonError::into_inner).into_values().collect()
+}
+
+/// One episode as a page of one file, which needs nothing beside it.
+pub fn episode_page(view: &View, id: &str) -> Result<String, ViewError> {
+    let snapshot = view.newest();
+    let (mut told, _) = part_of(&snapshot, id)?;
+    told["siblings"] = json!([]);
+    let everything = list::everything(&snapshot)?;
+    let mut list = everything.clone();
+    let rows = everything["rows"].as_array().into_iter().flatten().filter(|row| row["id"] == id);
+    list["rows"] = rows.cloned().collect::<Vec<_>>().into();
+    let parts = json!({"study": overview::study(&snapshot), "list": list, "episode-0": told});
+    let parts = parts.to_string().replace('<', "\\u003c");
+    let script = format!("window.mirrorstatsParts = {parts};\n{}", page::classic());
+    let (script_hash, style) = (hash::integrity_of_bytes(script.as_bytes()), page::style());
+    let policy = POLICY
+        .replace("script-src 'self' file:", &format!("script-src '{script_hash}'"))
+        .replace("style-src 'self' file:", &format!("style-src '{}'", hash::integrity_of_bytes(style.as_bytes())));
+    let document = page::document(&format!("<script data-copy data-episode=\"\">{script}</script>"));
+    let linked = "<link rel=\"stylesheet\" href=\"assets/view.css\">";
+    Ok(document.replace("<title>", &format!("{policy}\n<title>")).replace(linked, &format!("<style>{style}</style>")))
+}
+
+/// An episode with its map and its frames, each different frame once, and its texts by step.
+fn part_of(snapshot: &Snapshot, id: &str) -> Result<(Value, Value), ViewError> {
     let opened = snapshot.episode(id)?;
     // The page of the server tells of a log that cannot be read; a copy is not made without its frames.
     let first = snapshot.moment(&opened, 1)?;
     let mut told = episode::described(snapshot, &opened, usize::MAX, first.as_ref())?;
     told["siblings"] = list::siblings(snapshot, id).into();
+    let said = said(&told);
     if told["log"] == true {
-        files.part(&format!("map-{at}"), &map::of(snapshot, &opened)?)?;
-        let mut hashes = Vec::new();
-        for t in 1..=opened.episode.steps.len() {
-            let frame = snapshot.moment(&opened, t)?.and_then(|moment| moment.frame);
-            hashes.push(frame.as_deref().map(hash::of_bytes));
-            frame.map_or(Ok(()), |frame| files.add(&format!("frames/{at}/{t}.png"), frame))?;
-        }
+        let (mut images, mut places, mut map) = (Vec::new(), BTreeMap::new(), map::Map::default());
+        let length = opened.episode.steps.len();
+        let (mut hashes, mut of) = (vec![Value::Null; length], vec![Value::Null; length]);
+        snapshot.each_moment(&opened, &mut |t, moment| {
+            map.add(t, &moment.shapes);
+            let Some(frame) = moment.frame else { return };
+            let hash = hash::of_bytes(&frame);
+            let at = *places.entry(hash.clone()).or_insert_with(|| {
+                images.push(STANDARD.encode(smaller(&frame).unwrap_or(frame)));
+                images.len() - 1
+            });
+            (hashes[t - 1], of[t - 1]) = (hash.into(), at.into());
+        })?;
+        told["map"] = map.told(length);
         told["frame_hashes"] = hashes.into();
+        told["images"] = json!({"of": of, "png": images});
     }
-    files.part(&format!("episode-{at}"), &told)
+    Ok((told, said))
+}
+
+/// The columns that are searched, as the server does.
+fn said(told: &Value) -> Value {
+    let steps = told["steps"].as_object().into_iter().flatten();
+    let is_mirror = told["own"] == false;
+    let texts = steps.filter(|(name, _)| !is_mirror || trace::search::SAID.contains(&name.as_str()));
+    let texts = texts.filter(|(_, column)| column["values"].as_array().into_iter().flatten().any(Value::is_string));
+    texts.map(|(name, column)| (name.clone(), column["values"].clone())).collect::<serde_json::Map<_, _>>().into()
+}
+
+/// The same picture in fewer bytes: a log is written fast, a copy once.
+fn smaller(frame: &[u8]) -> Option<Vec<u8>> {
+    let mut reader = png::Decoder::new(Cursor::new(frame)).read_info().ok()?;
+    let mut pixels = vec![0; reader.output_buffer_size()?];
+    let info = reader.next_frame(&mut pixels).ok()?;
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, info.width, info.height);
+    encoder.set_color(info.color_type);
+    encoder.set_depth(info.bit_depth);
+    encoder.set_compression(png::Compression::Balanced);
+    encoder.write_header().ok()?.write_image_data(&pixels[..info.buffer_size()]).ok()?;
+    (bytes.len() < frame.len()).then_some(bytes)
 }
 
 fn check_folder(folder: &Path) -> Result<(), ViewError> {

@@ -9,9 +9,9 @@ use serde_json::{Value, json};
 
 use super::error::ViewError;
 use super::filter::{Query, required};
-use super::snapshot::{Opened, Snapshot};
+use super::snapshot::Snapshot;
 use exact::escape::visible;
-use trace::log::frames::Shape;
+use trace::log::frames::{Shape, hull};
 
 /// The most different shapes in an answer, some 600 kB.
 const MOST: usize = 12_000;
@@ -19,20 +19,18 @@ const MOST: usize = 12_000;
 pub(super) fn answer(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewError> {
     let opened = snapshot.episode(required(query, "id")?)?;
     // The page of the episode tells of a log that cannot be read.
-    Ok(of(snapshot, &opened).unwrap_or_else(|_| Map::default().told(0)))
-}
-
-pub(super) fn of(snapshot: &Snapshot, opened: &Opened) -> Result<Value, ViewError> {
     let mut map = Map::default();
-    snapshot.each_shapes(opened, &mut |t, shapes| map.add(t, &shapes))?;
-    Ok(map.told(opened.episode.steps.len()))
+    Ok(match snapshot.each_shapes(&opened, &mut |t, shapes| map.add(t, &shapes)) {
+        Ok(()) => map.told(opened.episode.steps.len()),
+        Err(_) => Map::default().told(0),
+    })
 }
 
 /// Name, paint, height, radius, then the corners: all that a shape is drawn from, in centimetres.
 type Drawn = Vec<i64>;
 
 #[derive(Debug)]
-struct Map {
+pub(super) struct Map {
     /// Only each so many-th step has shapes.
     every: usize,
     names: Vec<String>,
@@ -48,11 +46,11 @@ impl Default for Map {
 }
 
 impl Map {
-    fn add(&mut self, t: usize, shapes: &[Shape]) {
+    pub fn add(&mut self, t: usize, shapes: &[Shape]) {
         if (t - 1) % self.every != 0 || shapes.len() > MOST {
             return;
         }
-        let ids = shapes.iter().map(|shape| self.id(shape)).collect();
+        let ids = from_above(shapes).iter().map(|shape| self.id(shape)).collect();
         self.steps.insert(t, ids);
         while self.shapes.len() > MOST && self.steps.len() > 1 {
             self.every *= 2;
@@ -80,7 +78,7 @@ impl Map {
         self.steps.values_mut().flatten().for_each(|at| *at = places[at]);
     }
 
-    fn told(self, length: usize) -> Value {
+    pub fn told(self, length: usize) -> Value {
         let mut shapes: Vec<(usize, Drawn)> = self.shapes.into_iter().map(|(drawn, at)| (at, drawn)).collect();
         shapes.sort_unstable();
         let shapes: Vec<Drawn> = shapes.into_iter().map(|(_, drawn)| drawn).collect();
@@ -94,6 +92,47 @@ impl Map {
             "every": self.every, "names": self.names, "paints": self.paints, "shapes": shapes, "still": still, "steps": steps,
         })
     }
+}
+
+/// The shapes with each body as its outline and its head: its fifty parts are some pixels large.
+fn from_above(shapes: &[Shape]) -> Vec<Shape> {
+    let mut parts: BTreeMap<&str, Vec<&Shape>> = BTreeMap::new();
+    let mut all = Vec::new();
+    for shape in shapes {
+        match shape.name.split_once('_') {
+            Some((body, part)) if body.starts_with("agent") && !part.contains("head") => {
+                parts.entry(body).or_default().push(shape);
+            }
+            _ => all.push(shape.clone()),
+        }
+    }
+    all.extend(parts.into_iter().filter_map(|(body, parts)| {
+        let largest = parts.iter().max_by(|a, b| spread(a).total_cmp(&spread(b)))?;
+        let outline = hull(parts.iter().flat_map(|part| corners(part)).collect());
+        let height = parts.iter().map(|part| part.height).sum::<f64>() / f64::from(u32::try_from(parts.len()).ok()?);
+        Some(Shape { name: body.to_owned(), outline, radius: None, rgba: largest.rgba, height })
+    }));
+    all
+}
+
+/// How far a part reaches from its own middle.
+fn spread(part: &Shape) -> f64 {
+    let [first, ..] = part.outline[..] else { return 0.0 };
+    let far = |at: &[f64; 2]| (at[0] - first[0]).hypot(at[1] - first[1]);
+    part.radius.unwrap_or_default().max(part.outline.iter().map(far).fold(0.0, f64::max) / 2.0)
+}
+
+/// The corners of a part; eight on the edge of a round one.
+fn corners(part: &Shape) -> Vec<[f64; 2]> {
+    let Some(radius) = part.radius else { return part.outline.clone() };
+    let around = |at: &[f64; 2]| {
+        let [x, y] = *at;
+        (0..8).map(move |eighth| {
+            let (sin, cos) = (std::f64::consts::FRAC_PI_4 * f64::from(eighth)).sin_cos();
+            [x + radius * cos, y + radius * sin]
+        })
+    };
+    part.outline.iter().flat_map(around).collect()
 }
 
 fn place<T: PartialEq>(list: &mut Vec<T>, value: T) -> i64 {
@@ -121,6 +160,16 @@ mod tests {
 
     fn shape(name: &str, x: f64) -> Shape {
         Shape { name: name.into(), outline: vec![[x, 0.0]], radius: Some(0.1), rgba: [1.0, 0.0, 0.0, 1.0], height: 0.5 }
+    }
+
+    #[test]
+    fn a_body_is_its_outline_and_its_head() {
+        let mut map = Map::default();
+        map.add(1, &[shape("agent0_head", 1.0), shape("agent0_left_foot", 0.5), shape("agent0_torso", 1.0)]);
+        let told = map.told(1);
+        assert_eq!(told["names"], serde_json::json!(["agent0_head", "agent0"]));
+        let outline = told["shapes"][1].as_array().unwrap()[4..].iter().step_by(2).map(|x| x.as_i64().unwrap());
+        assert_eq!((outline.clone().min(), outline.max()), (Some(40), Some(110)));
     }
 
     #[test]

@@ -8,6 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use super::Options;
 use super::error::ViewError;
+use super::filter::Answers;
 use super::found::{Found, Stamp};
 use exact::escape::visible;
 use study::{Outputs, Question, Results, Study};
@@ -39,6 +40,7 @@ pub(super) struct Snapshot {
     logs: Vec<PathBuf>,
     indices: Mutex<BTreeMap<PathBuf, Option<Arc<LogIndex>>>>,
     reading: Mutex<()>,
+    pub answers: Answers,
     #[cfg(feature = "sim")]
     rendered: Arc<super::rendered::Rendered>,
 }
@@ -98,6 +100,7 @@ impl Snapshot {
             logs: found.logs,
             indices: Mutex::default(),
             reading: Mutex::default(),
+            answers: Answers::default(),
             #[cfg(feature = "sim")]
             rendered: Arc::default(),
         })
@@ -116,6 +119,7 @@ impl Snapshot {
             logs: self.logs.clone(),
             indices: Mutex::default(),
             reading: Mutex::default(),
+            answers: Answers::default(),
             #[cfg(feature = "sim")]
             rendered: Arc::clone(&self.rendered),
         }
@@ -243,6 +247,27 @@ impl Snapshot {
             let Some(index) = self.index(log)? else { continue };
             index.each_shapes(&opened.episode.episode_id, &wanted, &mut give)?;
             if is_found.get() {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Gives what the logs have of each step of a whole episode, in one reading of its log.
+    pub fn each_moment(&self, opened: &Opened, give: &mut dyn FnMut(usize, Moment)) -> Result<(), LogError> {
+        let times: BTreeMap<u64, usize> =
+            (1..=opened.episode.steps.len()).filter_map(|t| Some((time_of(&opened.episode, t)?, t))).collect();
+        let wanted: BTreeSet<u64> = times.keys().copied().collect();
+        let found = Cell::new(false);
+        for log in self.logs_of(opened) {
+            let Some(index) = self.index(log)? else { continue };
+            index.each_moment(&opened.episode.episode_id, &wanted, &mut |time, moment| {
+                found.set(true);
+                if let Some(t) = times.get(&time) {
+                    give(*t, moment);
+                }
+            })?;
+            if found.get() {
                 break;
             }
         }

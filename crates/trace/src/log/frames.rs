@@ -122,6 +122,31 @@ impl LogIndex {
         Ok(())
     }
 
+    /// Gives what the log has of the steps of an episode at these times, ns, one after the other, in one reading.
+    pub fn each_moment(
+        &self,
+        episode_id: &str,
+        times: &BTreeSet<u64>,
+        give: &mut dyn FnMut(u64, Moment),
+    ) -> Result<(), LogError> {
+        let (Some(first), Some(last)) = (times.first(), times.last()) else { return Ok(()) };
+        let mut records = records(&self.path)?;
+        for chunk in self.chunks.iter().filter(|chunk| chunk.first <= *last && chunk.last >= *first) {
+            let mut moments: BTreeMap<u64, Moment> = BTreeMap::new();
+            let is_wanted = |header: &MessageHeader| times.contains(&header.log_time);
+            for record in self.messages(&mut records, chunk, episode_id, is_wanted)? {
+                if let Record::Message { header, data } = record
+                    && let Some(topic) = self.topics.get(&header.channel_id)
+                    && topic != topic::EPISODE
+                {
+                    add(moments.entry(header.log_time).or_default(), topic, &data);
+                }
+            }
+            moments.into_iter().for_each(|(time, moment)| give(time, moment));
+        }
+        Ok(())
+    }
+
     /// The messages of a chunk that are wanted: most of its bytes are frames, which are not kept.
     fn messages(
         &self,
@@ -386,7 +411,8 @@ fn turned(turn: Quaternion, vector: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|at| vector[at] + turn.w * once[at] + twice[at])
 }
 
-fn hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+/// The corners of the convex hull of points; one point where all are the same.
+pub fn hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     points.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
     points.dedup();
     let half = |points: &mut dyn Iterator<Item = [f64; 2]>| {

@@ -10,5 +10,6 @@ pub mod in_order;
 pub mod open;
 pub(crate) mod parallel_scan;
 pub(crate) mod projection;
+pub mod search;
 pub mod steps;
 pub mod verify;

@@ -1,8 +1,8 @@
 //! `mirrorstats view`: recordings in the browser.
 
 use std::ffi::OsString;
-use std::io::{self, Write as _};
-use std::path::PathBuf;
+use std::io::{self, IsTerminal as _, Write as _};
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 
@@ -52,8 +52,8 @@ pub struct ViewArgs {
     /// Open no browser
     #[arg(long)]
     no_open: bool,
-    /// Write the page and all that it shows into this folder instead
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["port", "host", "token", "no_token", "no_open", "episode"])]
+    /// Write the page and all that it shows into this folder instead; with --episode one file, such as episode.html
+    #[arg(long, value_name = "DIR|FILE", conflicts_with_all = ["port", "host", "token", "no_token", "no_open"])]
     export: Option<PathBuf>,
     #[command(flatten)]
     threads: ThreadArgs,
@@ -78,12 +78,28 @@ impl ViewArgs {
         if let Ok(inputs) = inputs::resolve(&self.runs, io::empty()) {
             output::note_stale_checksums(&inputs);
         }
-        if let Some(folder) = &self.export {
-            let written = export::write(&view, folder)?;
-            output::say(&format!("{written} files; open {}", folder.join("index.html").display()));
+        match &self.export {
+            Some(path) => self.export(&view, path),
+            None => self.serve(view),
+        }
+    }
+
+    fn export(&self, view: &View, path: &Path) -> Result<Outcome, Failure> {
+        if let Some(id) = &self.episode {
+            output::write_file(path, export::episode_page(view, id)?.as_bytes())?;
+            output::say(&format!("open {}", path.display()));
             return Ok(Outcome::Done);
         }
-        self.serve(view)
+        let is_shown = io::stderr().is_terminal();
+        let progress = |done: usize, all: usize| {
+            if is_shown {
+                let end = if done == all { "\n" } else { "" };
+                let _ = write!(io::stderr(), "\r{done} of {all} episodes{end}");
+            }
+        };
+        let written = export::write(view, path, &progress)?;
+        output::say(&format!("{written} files; open {}", path.join("index.html").display()));
+        Ok(Outcome::Done)
     }
 
     fn serve(&self, view: View) -> Result<Outcome, Failure> {

@@ -157,7 +157,7 @@ function leadsOf(align, a, b) {
 /** Two episodes of a copy, and where their rows differ, as the program says it. */
 async function compared(query) {
   const [a, b] = await Promise.all(["a", "b"].map(async (side) => part(`episode-${await numberOf(query.get(side))}`)));
-  const names = [...new Set([...Object.keys(a.steps), ...Object.keys(b.steps)])];
+  const names = [...new Set([...Object.keys(a.steps), ...Object.keys(b.steps)])].filter((name) => name !== "t");
   const value = (episode, name, at) => JSON.stringify(episode.steps[name]?.values[at] ?? null);
   const align = query.get("align");
   const found = leadsOf(align, a, b);

@@ -67,7 +67,7 @@ class Rows {
       ? changed({ view: "episode", id: row.id, t: row.said?.t ?? null, offset: null })
       : new URLSearchParams({ view: "compare", a: pick, b: row.id });
     const cells = this.columns.map(({ key, metric, kind }) => {
-      if (kind === "said") return make("span", { class: kind, role: "cell", title: row.said?.excerpt }, row.said === undefined ? "" : `t = ${row.said.t}, ${row.said.column.replaceAll("_", " ")}: ${row.said.excerpt}`);
+      if (kind === "words") return make("span", { class: kind, role: "cell", title: row.said?.excerpt }, row.said === undefined ? "" : `t = ${row.said.t}, ${row.said.column.replaceAll("_", " ")}: ${row.said.excerpt}`);
       const value = metric === undefined ? row[key] : row.values[metric];
       const text = value === null ? "--" : String(value);
       const long = { id: true, name: true }[kind] ? text : null;
@@ -107,7 +107,7 @@ function columnsOf(told) {
     { name: "Model", key: "model", sort: "model", kind: "name" },
   ];
   if (told.has_conditions) columns.push({ name: "Condition", key: "condition", sort: "condition", kind: "short" });
-  if (query().has("search")) columns.push({ name: "Said", key: "said", kind: "said" });
+  if (query().has("search")) columns.push({ name: "Said", key: "said", kind: "words" });
   told.metrics.forEach((name, metric) => columns.push({ name, metric, sort: name, kind: "number" }));
   return columns;
 }
@@ -130,7 +130,7 @@ export async function list(content, study) {
     return;
   }
   rows.columns = columnsOf(told);
-  const widths = { id: "minmax(13rem, 2.2fr)", short: "6.5rem", name: "minmax(9rem, 1.4fr)", number: "minmax(3.4rem, .5fr)", said: "minmax(16rem, 4fr)" };
+  const widths = { id: "minmax(13rem, 2.2fr)", short: "6.5rem", name: "minmax(9rem, 1.4fr)", number: "minmax(3.4rem, .5fr)", words: "minmax(16rem, 4fr)" };
   frame.style.setProperty("--columns", rows.columns.map(({ kind }) => widths[kind]).join(" "));
   frame.setAttribute("aria-rowcount", told.total + 1);
   frame.append(header(rows.columns), body);

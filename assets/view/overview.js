@@ -97,7 +97,11 @@ function order(body, metric, way) {
 function keepHeads(box) {
   const look = () => {
     box.classList.remove("wide", "fits");
-    box.classList.add(box.scrollWidth > box.clientWidth + 1 ? "wide" : "fits");
+    const isWide = box.scrollWidth > box.clientWidth + 1;
+    box.classList.add(isWide ? "wide" : "fits");
+    // What scrolls must be reached by keyboard; where nothing in it can be, the box itself is.
+    if (isWide && box.querySelector("a, button, [tabindex]") === null) box.tabIndex = 0;
+    else box.removeAttribute("tabindex");
   };
   new ResizeObserver(look).observe(box);
 }
@@ -113,7 +117,9 @@ function later(title, name) {
     if (waiting.matches(".notice")) return;
     try {
       const { sections } = await ask(name, wanted());
-      waiting.replaceWith(...(sections.length > 0 ? sections.flatMap(parsed) : [make("p", { class: "quiet" }, "There is none.")]));
+      const nodes = sections.flatMap(parsed);
+      waiting.replaceWith(...(sections.length > 0 ? nodes : [make("p", { class: "quiet" }, "There is none.")]));
+      for (const box of all(".scroll", details)) keepHeads(box);
     } catch (error) {
       waiting.replaceWith(notice(error.message));
     }

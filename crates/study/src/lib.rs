@@ -43,6 +43,7 @@ mod scored_alike;
 mod scores;
 mod sensitivity;
 mod size;
+mod top;
 pub mod verify;
 
 use std::ffi::OsString;
@@ -80,7 +81,7 @@ pub use backend::Backend;
 pub use backend::{SparkJob, are_uris};
 pub use diff::{Diff, DiffRequest, Side, diff};
 pub use error::StudyError;
-pub use figure_inputs::{Drawings, FigureInputs, FigureOptions};
+pub use figure_inputs::{Drawings, FigureInputs, FigureOptions, MANY_MODELS};
 pub use findings::{findings, findings_text};
 pub use import::{ImportAnswer, ImportRequest, OwnColumn, import};
 pub use inputs::{ScoreFile, Source, resolve};
@@ -94,6 +95,7 @@ pub use rescore::{RescoreRequest, Rescored, folder_of_rescored, traces_of};
 pub use results::{Outputs, Results};
 pub use scored_alike::ScoredAlike;
 pub use scores::write as write_scores;
+pub use top::{ModelMean, model_means};
 pub use sensitivity::{DEFAULT_THRESHOLDS, SensitivityReport, Thresholds, ThresholdsError};
 
 use design::design_of;
@@ -392,10 +394,14 @@ impl Study {
         }
         let results = self.scan(Outputs { losses: true, ..Outputs::of_figures(&[name]) })?;
         self.check_filter(results.episodes.len())?;
-        let results = self.counted(results).results;
+        let mut results = self.counted(results).results;
         self.cells_of(&results.episodes)?;
         for metric in options.metrics.iter().flatten() {
             gate::check_metric(&results.episodes, metric)?;
+        }
+        if let Some(top) = options.top {
+            let metric = options.metrics.iter().flatten().next().cloned();
+            results = results.of_the_best(top, &metric.map_or_else(|| self.leading_metric(), Ok)?);
         }
         Ok(FigureInputs::of(&results, &style)?.with(options.clone()).draw(name)?)
     }

@@ -53,7 +53,7 @@ impl Study {
         };
         let Counted { results, lost, .. } = counted;
         let drawings = match part {
-            Part::Figures => FigureInputs::of(&results, &style)?.draw_all(),
+            Part::Figures => FigureInputs::of_a_report(&results, &style)?.draw_all(),
             Part::Tables | Part::Statistics => super::Drawings::default(),
         };
         let svgs: Vec<String> = drawings.drawn.iter().map(|(_, figure)| figure.inline_svg()).collect();

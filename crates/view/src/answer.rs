@@ -3,7 +3,7 @@
 use super::error::ViewError;
 use super::filter::{Query, number, required};
 use super::snapshot::Snapshot;
-use super::{View, changes, compare, episode, export, list, map, overview};
+use super::{View, changes, compare, episode, export, film, list, map, overview};
 use study::Part;
 
 pub(super) enum Answer {
@@ -24,6 +24,9 @@ pub(super) fn answer(view: &View, name: &str, query: &Query) -> Option<Result<An
     }
     if name == "file" {
         return Some(required(query, "id").and_then(|id| export::episode_page(view, id)).map(Answer::Page));
+    }
+    if name == "film" {
+        return Some(required(query, "id").and_then(|id| film::film(view, id)).map(Answer::Png));
     }
     let told = match name {
         "study" => Ok(overview::study(&snapshot)),

@@ -32,8 +32,8 @@ const BY_CHANCE: [&str; 12] = [
     "reply_fault",
 ];
 
-/// Where the frame is in a log, not what the step was.
-const ADDRESS: &str = "frame_time";
+/// Where the step and its frame are, not what the step was.
+const ADDRESSES: [&str; 2] = ["t", "frame_time"];
 
 /// The moments that two episodes can be laid on each other by, as a request and the page call them.
 const MOMENTS: [(&str, Moment); 2] = [("sight", Moment::FirstSight), ("decision", Moment::Decision)];
@@ -66,7 +66,7 @@ pub(super) fn answer(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewEr
     };
     let constants = parted(|column| column.constant && column.name != "episode_hash", 0, 0);
     // The steps of one before the other begins are skipped: both are from there on.
-    let mut of_steps = parted(|column| !column.constant && column.name != ADDRESS, lead_b, lead_a);
+    let mut of_steps = parted(|column| !column.constant && !ADDRESSES.contains(&column.name), lead_b, lead_a);
     for column in a.own.iter().flatten() {
         if let Some(other) = b.own.iter().flatten().find(|other| other.name == column.name) {
             let at = differing(column.values().skip(lead_b), other.values().skip(lead_a));

@@ -18,6 +18,7 @@ mod compare;
 mod episode;
 mod error;
 pub mod export;
+pub mod film;
 mod filter;
 mod found;
 mod list;

@@ -12,7 +12,7 @@ use exact::escape::visible;
 use exact::format::fixed;
 use report::html;
 use score::table::{EpisodeTable, MetricColumn};
-use study::{Outputs, Overview, Part, Question};
+use study::{ModelMean, Outputs, Overview, Part, Question, model_means};
 use trace::palette::Color;
 
 pub(super) fn study(snapshot: &Snapshot) -> Value {
@@ -82,27 +82,13 @@ fn statuses(scored: &Scored) -> Option<Value> {
 fn ranking(episodes: &EpisodeTable) -> Value {
     let is_rate = |metric: &&MetricColumn| metric.iter().flatten().all(|value| value == 0 || value == 1);
     let Some(metric) = episodes.metrics.iter().find(is_rate) else { return Value::Null };
-    let mut sums: BTreeMap<&str, BTreeMap<&str, (f64, f64)>> = BTreeMap::new();
-    let mut experiments = BTreeSet::new();
-    for (row, value) in metric.iter().enumerate() {
-        let (key, Some(value)) = (episodes.keys.get(row), value) else { continue };
-        experiments.insert(key.experiment);
-        let (sum, count) = sums.entry(key.model).or_default().entry(key.experiment).or_default();
-        *sum += if value == 0 { 0.0 } else { 1.0 };
-        *count += 1.0;
-    }
-    if sums.len() < 2 || experiments.len() < 2 {
+    let models = model_means(episodes, metric);
+    let experiments: BTreeSet<&str> = models.iter().flat_map(|of| of.experiments.keys().copied()).collect();
+    if models.len() < 2 || experiments.len() < 2 {
         return Value::Null;
     }
-    let mean = |of: &BTreeMap<&str, (f64, f64)>| {
-        let means = of.values().map(|(sum, count)| sum / count);
-        means.sum::<f64>() / f64::from(u32::try_from(of.len()).unwrap_or(u32::MAX))
-    };
-    let mut models: Vec<_> = sums.iter().map(|(model, of)| (mean(of), of.len(), model, of)).collect();
-    // Models that lack experiments come after those that have all: their means are of others.
-    models.sort_by(|a, b| b.1.cmp(&a.1).then(b.0.total_cmp(&a.0)).then(a.2.cmp(b.2)));
-    let told = |(mean, _, model, of): &(f64, usize, &&str, &BTreeMap<&str, (f64, f64)>)| {
-        let cell = |experiment: &&str| of.get(experiment).map(|(sum, count)| fixed(Some(sum / count), 2));
+    let told = |ModelMean { model, mean, experiments: of }: &ModelMean<'_>| {
+        let cell = |experiment: &&str| of.get(experiment).map(|mean| fixed(Some(*mean), 2));
         json!({
             "model": model, "name": visible(model), "mean": fixed(Some(*mean), 3),
             "values": experiments.iter().map(cell).collect::<Vec<_>>(),

@@ -51,7 +51,7 @@ fn every_page_of_recordings() {
         ("?model=oracle&is=TSA%3D1&where=MCR+%3D+1", "document.querySelector('.chip')"),
         ("?where=TSA+%3D", "document.querySelector('#where-fault')"),
         ("?view=episodes", "document.querySelector('.list .rows a')"),
-        ("?view=episodes&search=mirror", "document.querySelector('.list .rows .said')"),
+        ("?view=episodes&search=mirror", "document.querySelector('.list .rows .words:not(:empty)')"),
         ("?view=episodes&search=nobody-said-this", "document.querySelector('.nothing')"),
         ("?view=episode&id=E1/guesser/s1/r1", "document.querySelector('svg.map .cube')"),
         ("?view=episode&id=E1/oracle/s1/r1", "document.querySelector('.panel .step')"),

@@ -21,7 +21,7 @@ fn words_are_found_in_what_was_said() {
     browser.press("/");
     browser.value("document.activeElement.value = 'as good as another'");
     browser.press("Enter");
-    until(&mut browser, "document.querySelector('.list .rows a .said')");
+    until(&mut browser, "document.querySelector('.list .rows a .words:not(:empty)')");
     browser.click(".list .rows a");
     until(&mut browser, "document.querySelector('.clock')");
     assert!(browser.text("location.search").contains("t=1"), "the step that has the words");

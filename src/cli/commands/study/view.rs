@@ -12,7 +12,7 @@ use crate::cli::output;
 use exact::escape::visible;
 use study::Question;
 use trace::inputs;
-use view::{Options, View, ViewError, export, routes};
+use view::{Options, View, ViewError, export, film, routes};
 use web::{Guard, check_token, new_token};
 
 /// Look at recordings in the browser: the report, every episode step by step, two beside each other
@@ -52,7 +52,8 @@ pub struct ViewArgs {
     /// Open no browser
     #[arg(long)]
     no_open: bool,
-    /// Write the page and all that it shows into this folder instead; with --episode one file, such as episode.html
+    /// Write the page and all that it shows into this folder instead; with --episode one file: a page such
+    /// as episode.html, or a film such as episode.png
     #[arg(long, value_name = "DIR|FILE", conflicts_with_all = ["port", "host", "token", "no_token", "no_open"])]
     export: Option<PathBuf>,
     #[command(flatten)]
@@ -86,7 +87,9 @@ impl ViewArgs {
 
     fn export(&self, view: &View, path: &Path) -> Result<Outcome, Failure> {
         if let Some(id) = &self.episode {
-            output::write_file(path, export::episode_page(view, id)?.as_bytes())?;
+            let is_film = path.extension().is_some_and(|ending| ending == "png" || ending == "apng");
+            let bytes = if is_film { film::film(view, id)? } else { export::episode_page(view, id)?.into_bytes() };
+            output::write_file(path, &bytes)?;
             output::say(&format!("open {}", path.display()));
             return Ok(Outcome::Done);
         }

@@ -24,7 +24,9 @@ fn a_figure_shows_the_best_models_alone() {
         models.sort_by(|a, b| (sign * mean(b)).total_cmp(&(sign * mean(a))));
         models[..3].iter().map(|model| (*model).to_owned()).collect::<BTreeSet<_>>()
     };
-    for (figure, metric, sign) in [("intervals", "TSA", 1.0), ("intervals", "TTD", -1.0), ("scatter", "TSA,MCR,TTD", 1.0)] {
+    for (figure, metric, sign) in
+        [("intervals", "TSA", 1.0), ("intervals", "TTD", -1.0), ("scatter", "TSA,MCR,TTD", 1.0)]
+    {
         let svg = run(folder.path(), &["figure", figure, PAPER, "--metric", metric, "--top", "3"]).done();
         let is_shown = |model: &&&str| svg.contains(&format!(">{model}<"));
         let shown: BTreeSet<String> = models.iter().filter(is_shown).map(|model| (*model).to_owned()).collect();

@@ -95,8 +95,8 @@ pub use rescore::{RescoreRequest, Rescored, folder_of_rescored, traces_of};
 pub use results::{Outputs, Results};
 pub use scored_alike::ScoredAlike;
 pub use scores::write as write_scores;
-pub use top::{ModelMean, model_means};
 pub use sensitivity::{DEFAULT_THRESHOLDS, SensitivityReport, Thresholds, ThresholdsError};
+pub use top::{ModelMean, model_means};
 
 use design::design_of;
 use inputs::Stamp;

@@ -59,9 +59,8 @@ pub(super) fn answer(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewEr
     let is_known = |column: &Column| a.own.is_none() && b.own.is_none() || is_identity(column.name);
     let parted = |is_wanted: fn(&Column) -> bool, of_a: usize, of_b: usize| -> Vec<(&str, Vec<usize>)> {
         let columns = COLUMNS.iter().filter(|column| is_wanted(column) && is_known(column));
-        let of_both = |column: &Column| {
-            differing(column.of_steps(&a.episode).skip(of_a), column.of_steps(&b.episode).skip(of_b))
-        };
+        let of_both =
+            |column: &Column| differing(column.of_steps(&a.episode).skip(of_a), column.of_steps(&b.episode).skip(of_b));
         columns.map(|column| (column.name, of_both(column))).collect()
     };
     let constants = parted(|column| column.constant && column.name != "episode_hash", 0, 0);

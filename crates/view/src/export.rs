@@ -111,9 +111,8 @@ fn episodes(snapshot: &Snapshot, ids: &[String], progress: Progress<'_>) -> Vec<
         loop {
             let at = next.fetch_add(1, Ordering::Relaxed);
             let Some(id) = ids.get(at) else { return };
-            let own = part_of(snapshot, id).map(|(told, said)| {
-                (format!("mirrorstatsPart(\"episode-{at}\", {told});\n"), said)
-            });
+            let own = part_of(snapshot, id)
+                .map(|(told, said)| (format!("mirrorstatsPart(\"episode-{at}\", {told});\n"), said));
             made.lock().unwrap_or_else(PoisonError::into_inner).insert(at, own);
             progress(done.fetch_add(1, Ordering::Relaxed) + 1, ids.len());
         }

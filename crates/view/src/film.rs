@@ -31,7 +31,8 @@ pub fn film(view: &View, id: &str) -> Result<Vec<u8>, ViewError> {
     if frames.is_empty() {
         return Err(ViewError::Absent(format!("`{}` has no frames", visible(id))));
     }
-    animated(&frames).map_err(|fault| ViewError::Request(format!("the frames of `{}` make no film: {fault}", visible(id))))
+    animated(&frames)
+        .map_err(|fault| ViewError::Request(format!("the frames of `{}` make no film: {fault}", visible(id))))
 }
 
 fn animated(frames: &[Vec<u8>]) -> Result<Vec<u8>, Box<dyn std::error::Error>> {

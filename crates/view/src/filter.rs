@@ -92,14 +92,18 @@ impl Filter {
         let kept: Vec<_> = kept.collect::<Result<_, _>>()?;
         let said = self.words.as_ref().map(|words| snapshot.said(words)).transpose()?;
         let chosen = self.chosen.iter().filter(|(column, _)| column != STATUS);
-        let chosen: Vec<_> = chosen.map(|chosen| Ok((values_of(table, &chosen.0)?, &chosen.1))).collect::<Result<_, ViewError>>()?;
+        let chosen: Vec<_> =
+            chosen.map(|chosen| Ok((values_of(table, &chosen.0)?, &chosen.1))).collect::<Result<_, ViewError>>()?;
         let is_wanted = |row: &usize| {
             let key = table.keys.get(*row);
             let has = |text: &str, words: &String| text.to_lowercase().contains(words);
             let is_said = || said.as_ref().is_some_and(|said| said.contains_key(key.episode_id));
             chosen.iter().all(|(of_row, values)| values.contains(&of_row(*row)))
                 && kept.iter().all(|kept| kept.contains(key.episode_id))
-                && self.words.as_ref().is_none_or(|words| has(key.episode_id, words) || has(key.model, words) || is_said())
+                && self
+                    .words
+                    .as_ref()
+                    .is_none_or(|words| has(key.episode_id, words) || has(key.model, words) || is_said())
         };
         Ok((0..table.len()).filter(is_wanted).collect())
     }

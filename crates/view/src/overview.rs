@@ -72,7 +72,8 @@ fn choice(table: &EpisodeTable, column: &str) -> Option<Value> {
 /// The outcomes of replies, where not all of them are `ok`.
 fn statuses(scored: &Scored) -> Option<Value> {
     let quality = scored.results.quality.as_ref()?.whole();
-    let told = |(status, replies): (&String, &u64)| json!({"value": status, "name": visible(status), "replies": replies});
+    let told =
+        |(status, replies): (&String, &u64)| json!({"value": status, "name": visible(status), "replies": replies});
     let values: Vec<Value> = quality.unread().map(told).collect();
     (!values.is_empty()).then(|| json!({"column": STATUS, "is_metric": false, "values": values}))
 }

@@ -31,8 +31,10 @@ fn decided(episode: &Episode) -> (&'static str, String, usize) {
         Some(at) => format!("saw the mirror first at t = {}", at + 1),
     };
     let Some(at) = done else {
-        let named = episode.steps.iter().rev().find_map(|step| step.self_color.as_deref().filter(|name| is_color(name)));
-        let claim = named.map_or_else(|| "claimed no colour".to_owned(), |name| format!("last claimed {}", visible(name)));
+        let named =
+            episode.steps.iter().rev().find_map(|step| step.self_color.as_deref().filter(|name| is_color(name)));
+        let claim =
+            named.map_or_else(|| "claimed no colour".to_owned(), |name| format!("last claimed {}", visible(name)));
         return ("open", format!("never decided in {last} steps, {claim}, is {}; {sight}", visible(body)), last);
     };
     let named = chosen(&episode.steps[at]).filter(|name| is_color(name));
@@ -52,7 +54,8 @@ fn is_color(name: &str) -> bool {
 
 /// Of a hand that is to reach a mark: how near it came.
 fn reached(episode: &Episode) -> (&'static str, String, usize) {
-    let distances = episode.steps.iter().enumerate().filter_map(|(at, step)| Some((step.extra.target_distance?, at + 1)));
+    let distances =
+        episode.steps.iter().enumerate().filter_map(|(at, step)| Some((step.extra.target_distance?, at + 1)));
     let last = episode.steps.len();
     match distances.min() {
         Some((nearest, t)) => ("open", format!("the hand came nearest at t = {t}: {nearest} mm from the mark"), t),

@@ -118,9 +118,8 @@ fn of_many(models: usize, experiments: usize, runs: usize) -> Vec<trace::episode
             ..trace::episode::Episode::default()
         }
     };
-    let of_model = |model| {
-        (1..=experiments).flat_map(move |experiment| (0..runs).map(move |run| episode(model, experiment, run)))
-    };
+    let of_model =
+        |model| (1..=experiments).flat_map(move |experiment| (0..runs).map(move |run| episode(model, experiment, run)));
     (0..models).flat_map(of_model).collect()
 }
 
@@ -135,6 +134,9 @@ fn ten_thousand_episodes_of_fifty_models_are_four_megabytes() {
     assert!(page.contains("The best 12 of 50 models by TSA."), "figures say that they leave models out");
     let mut browser = Browser::open(&page);
     assert!(browser.holds("document.querySelectorAll('#pair tbody tr').length > 0"));
-    assert!(browser.holds("/further metrics and experiments are left out/.test(document.querySelector('#pair').textContent)"));
+    assert!(
+        browser
+            .holds("/further metrics and experiments are left out/.test(document.querySelector('#pair').textContent)")
+    );
     browser.close();
 }

@@ -16,9 +16,8 @@ pub fn violations(browser: &mut Browser) -> Vec<String> {
     let engine = std::fs::read_to_string(need::axe()).unwrap();
     browser.value(&format!("{{ {engine} }}; true"));
     let told = "found.violations.map((v) => `${v.id}: ${v.nodes.slice(0, 3).map((n) => `${n.target} ${n.failureSummary}`).join('; ')}`)";
-    browser.texts(&format!(
-        "axe.run(document, {{ runOnly: {{ type: 'tag', values: {RULES} }} }}).then((found) => {told})"
-    ))
+    browser
+        .texts(&format!("axe.run(document, {{ runOnly: {{ type: 'tag', values: {RULES} }} }}).then((found) => {told})"))
 }
 
 /// Checks a page in light and dark, at the width of a desk and of a phone.
@@ -37,7 +36,8 @@ pub fn check(browser: &mut Browser, what: &str) {
 
 #[test]
 fn the_engine_finds_what_is_wrong() {
-    let mut browser = Browser::open("<!doctype html><html lang=en><title>t</title><main><h1>t</h1><img src='data:,'></main>");
+    let mut browser =
+        Browser::open("<!doctype html><html lang=en><title>t</title><main><h1>t</h1><img src='data:,'></main>");
     let found = violations(&mut browser);
     assert!(found.iter().any(|rule| rule.starts_with("image-alt")), "{found:?}");
 }

@@ -29,15 +29,19 @@ fn a_copy_is_few_files_with_every_frame_once() {
     let written = run(folder.path(), &["view", RECORDED, "--export", "page"]);
     written.done();
     let page = folder.path().join("page");
-    let files: Vec<_> = ["data", "assets", "."].iter().flat_map(|inside| std::fs::read_dir(page.join(inside)).unwrap()).collect();
+    let files: Vec<_> =
+        ["data", "assets", "."].iter().flat_map(|inside| std::fs::read_dir(page.join(inside)).unwrap()).collect();
     assert!(files.len() <= 33 + 20, "one file per episode: {}", files.len());
     assert!(!page.join("frames").exists());
     let list = std::fs::read_to_string(page.join("data/list.js")).unwrap();
-    let list: serde_json::Value = serde_json::from_str(list.split_once(", ").unwrap().1.trim_end().trim_end_matches(");")).unwrap();
+    let list: serde_json::Value =
+        serde_json::from_str(list.split_once(", ").unwrap().1.trim_end().trim_end_matches(");")).unwrap();
     let at = list["rows"].as_array().unwrap().iter().position(|row| row["id"] == "E1/guesser/s1/r1").unwrap();
     let part = std::fs::read_to_string(page.join(format!("data/episode-{at}.js"))).unwrap();
-    let part: serde_json::Value = serde_json::from_str(part.split_once(", ").unwrap().1.trim_end().trim_end_matches(");")).unwrap();
-    let hashes: std::collections::BTreeSet<_> = part["frame_hashes"].as_array().unwrap().iter().map(|hash| hash.as_str().unwrap()).collect();
+    let part: serde_json::Value =
+        serde_json::from_str(part.split_once(", ").unwrap().1.trim_end().trim_end_matches(");")).unwrap();
+    let hashes: std::collections::BTreeSet<_> =
+        part["frame_hashes"].as_array().unwrap().iter().map(|hash| hash.as_str().unwrap()).collect();
     assert_eq!(part["images"]["png"].as_array().unwrap().len(), hashes.len());
     // The pictures are those of the log, in other bytes.
     let server = Server::start(folder.path(), &[RECORDED]);

@@ -54,7 +54,9 @@ fn filters_by_click_are_chips_that_remove_them() {
     until(&mut browser, "document.querySelectorAll('.chip').length === 2");
     assert!(!browser.text("location.search").contains("TSA"));
     // Values by the same condition in the language of definitions are the same episodes.
-    for (chosen, condition) in [("is=TSA%3D1&is=MCR%3D0", "TSA%20%3D%201%20and%20MCR%20%3D%200"), ("is=SC%3D", "SC%20is%20null")] {
+    for (chosen, condition) in
+        [("is=TSA%3D1&is=MCR%3D0", "TSA%20%3D%201%20and%20MCR%20%3D%200"), ("is=SC%3D", "SC%20is%20null")]
+    {
         let total = |query: &str| server.get(&format!("/api/episodes?{query}")).json()["total"].clone();
         assert_eq!(total(chosen), total(&format!("where={condition}")), "{chosen}");
     }
@@ -74,7 +76,10 @@ fn a_condition_with_a_fault_stays_and_the_fault_is_told() {
         assert!(browser.holds(
             "(({ value, ariaInvalid }) => value === 'TSB = 1' && ariaInvalid === 'true')(document.querySelector('input[name=where]'))"
         ));
-        assert!(browser.holds("document.querySelector('input[name=model][value=oracle]').checked"), "the rest stays too");
+        assert!(
+            browser.holds("document.querySelector('input[name=model][value=oracle]').checked"),
+            "the rest stays too"
+        );
     }
 }
 

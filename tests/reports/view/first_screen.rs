@@ -17,7 +17,10 @@ fn at(server: &Server, query: &str, width: u32) -> Browser {
     let state = "document.dispatchEvent(new CustomEvent('state', { detail: { replace: false } }))";
     until(&mut browser, "document.documentElement.dataset.shown");
     browser.value(&format!("history.pushState(null, '', location.pathname + {query:?}); {state}"));
-    until(&mut browser, &format!("document.documentElement.dataset.shown !== '{shown}' && document.querySelector('h1')"));
+    until(
+        &mut browser,
+        &format!("document.documentElement.dataset.shown !== '{shown}' && document.querySelector('h1')"),
+    );
     browser
 }
 
@@ -29,11 +32,20 @@ fn the_first_screen_says_what_happened() {
     until(&mut browser, "document.querySelector('svg.map .cube') && document.querySelector('img.frame').complete");
     let verdict = browser.text("document.querySelector('.headline .verdict').textContent");
     assert_eq!(verdict, "chose brown, is green: wrong at t = 3; never saw the mirror");
-    assert!(browser.text("document.querySelector('.clock').textContent").starts_with("t = 3 "), "opened at the decision");
+    assert!(
+        browser.text("document.querySelector('.clock').textContent").starts_with("t = 3 "),
+        "opened at the decision"
+    );
     // All of it is in the window, none of it is beyond the edge.
     for part in [
-        ".verdict", "img.frame", "svg.map", ".timeline", ".truth", ".step [data-column=reasoning]",
-        ".step [data-column=mirror_visible]", ".metric[data-metric=AR_SC] h3",
+        ".verdict",
+        "img.frame",
+        "svg.map",
+        ".timeline",
+        ".truth",
+        ".step [data-column=reasoning]",
+        ".step [data-column=mirror_visible]",
+        ".metric[data-metric=AR_SC] h3",
     ] {
         let place = format!(
             "(() => {{ const r = document.querySelector({part:?}).getBoundingClientRect(); \
@@ -47,7 +59,8 @@ fn the_first_screen_says_what_happened() {
         assert!(keys.iter().any(|key| key == words), "{keys:?}");
     }
     assert!(keys.iter().any(|key| key.contains("turn left") && key.contains("done")), "{keys:?}");
-    let names = browser.texts("[...document.querySelectorAll('.strip canvas')].map((canvas) => canvas.getAttribute('aria-label'))");
+    let names = browser
+        .texts("[...document.querySelectorAll('.strip canvas')].map((canvas) => canvas.getAttribute('aria-label'))");
     assert!(names.iter().any(|name| name == "Cube: brown t = 3"), "{names:?}");
     assert!(names.iter().any(|name| name == "Mirror evidence: at no step"), "{names:?}");
     browser.close();
@@ -99,7 +112,10 @@ fn an_episode_is_one_file_that_needs_nothing_beside_it() {
     assert!(answer.head.contains("content-disposition: attachment"), "{}", answer.head);
     assert_eq!(answer.text(), page);
     let mut browser = Browser::open(&page);
-    until(&mut browser, "document.querySelector('img.frame')?.naturalWidth > 0 && document.querySelector('svg.map .cube')");
+    until(
+        &mut browser,
+        "document.querySelector('img.frame')?.naturalWidth > 0 && document.querySelector('svg.map .cube')",
+    );
     assert!(browser.text("document.querySelector('.verdict').textContent").starts_with("chose brown"));
     browser.press("ArrowLeft");
     until(&mut browser, "document.querySelector('.clock').textContent.startsWith('t = 2 ')");
@@ -119,7 +135,8 @@ fn an_episode_is_a_film() {
     let first = server.get(&format!("/api/frame?id={EPISODE}&t=1")).body;
     let pixels = |bytes: &[u8]| resvg::tiny_skia::Pixmap::decode_png(bytes).unwrap();
     assert!(pixels(&film) == pixels(&first), "what shows where nothing plays is the first step");
-    let refused = run(folder.path(), &["view", RECORDED, "--episode", "E1/nobody/s1/r1", "--export", "a.png"]).refused();
+    let refused =
+        run(folder.path(), &["view", RECORDED, "--episode", "E1/nobody/s1/r1", "--export", "a.png"]).refused();
     assert!(refused.contains("nobody"), "{refused}");
 }
 

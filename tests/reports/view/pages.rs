@@ -137,13 +137,19 @@ fn episodes_are_aligned_by_what_happened_in_them() {
     assert!(steps.iter().all(|step| step["t"].as_u64().unwrap() > lead));
     let acts = steps.iter().filter(|step| !step["columns"].as_array().unwrap().is_empty()).count() as u64;
     assert_eq!(told["differing"], acts + lead, "steps of one alone differ too");
-    assert!(server.get(&format!("/api/compare?a={a}&b={b}&align=sight")).json()["aligned"].is_null(), "B never sees it");
+    assert!(
+        server.get(&format!("/api/compare?a={a}&b={b}&align=sight")).json()["aligned"].is_null(),
+        "B never sees it"
+    );
     let page = format!("file://{}/index.html", folder.path().join("page").display());
     for base in [server.link.as_str(), page.as_str()] {
         let mut browser = Browser::at(&format!("{base}?view=compare&a={a}&b={b}&align=decision"));
         until(&mut browser, "document.querySelectorAll('.side .step').length === 2");
         let count = browser.text("document.querySelector('#differing').textContent");
-        assert!(count.ends_with(&format!("differs at {} of {} steps.", told["differing"], length("a"))), "{base}: {count}");
+        assert!(
+            count.ends_with(&format!("differs at {} of {} steps.", told["differing"], length("a"))),
+            "{base}: {count}"
+        );
         browser.press("Home");
         until(&mut browser, "document.querySelector('.parted').textContent === 'B has not begun.'");
         browser.press("End");

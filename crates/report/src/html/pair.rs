@@ -66,10 +66,12 @@ fn within(families: Vec<FamilyText<'_>>) -> (Vec<FamilyText<'_>>, usize) {
     let mut room = MOST_TESTS;
     let kept: BTreeSet<usize> = order
         .into_iter()
-        .take_while(|at| room.checked_sub(families[*at].tests.len()).is_some_and(|left| {
-            room = left;
-            true
-        }))
+        .take_while(|at| {
+            room.checked_sub(families[*at].tests.len()).is_some_and(|left| {
+                room = left;
+                true
+            })
+        })
         .collect();
     let all = families.len();
     let families: Vec<_> =

@@ -19,14 +19,14 @@ pub struct ModelMean<'t> {
 /// The models by their means, the largest first. Models that lack experiments come after those that have all, as their means are of
 /// others. An order to begin with, not a test.
 pub fn model_means<'t>(episodes: &'t EpisodeTable, metric: &MetricColumn) -> Vec<ModelMean<'t>> {
-    let mut sums: BTreeMap<&str, BTreeMap<&str, (i128, u32)>> = BTreeMap::new();
+    let mut sums: BTreeMap<&'t str, BTreeMap<&'t str, (i128, u32)>> = BTreeMap::new();
     for (key, value) in episodes.keys.iter().zip(metric.iter()) {
         let Some(value) = value else { continue };
         let (sum, count) = sums.entry(key.model).or_default().entry(key.experiment).or_default();
         (*sum, *count) = (*sum + i128::from(value), *count + 1);
     }
     #[expect(clippy::cast_precision_loss, reason = "a mean that puts models in an order")]
-    let mean = |(experiment, (sum, count))| (experiment, sum as f64 / f64::from(count));
+    let mean = |(experiment, (sum, count)): (&'t str, (i128, u32))| (experiment, sum as f64 / f64::from(count));
     let mut models: Vec<_> = sums
         .into_iter()
         .map(|(model, of)| {

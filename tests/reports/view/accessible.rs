@@ -124,8 +124,8 @@ fn fifty_models_are_not_fifty_stops_of_the_keyboard() {
     ] {
         let mut browser = Browser::at(&format!("{}{query}", server.link));
         until(&mut browser, &format!("document.documentElement.dataset.shown && {ready}"));
+        check(&mut browser, query);
         let stops = stops(&mut browser);
         assert!((5..50).contains(&stops), "{query}: {stops}");
-        check(&mut browser, query);
     }
 }

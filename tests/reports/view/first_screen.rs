@@ -13,9 +13,9 @@ fn at(server: &Server, query: &str, width: u32) -> Browser {
     let mut browser = Browser::at(&server.link);
     let size = json!({"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": false});
     browser.send("Emulation.setDeviceMetricsOverride", &size);
-    let shown = browser.text("document.documentElement.dataset.shown ?? ''");
     let state = "document.dispatchEvent(new CustomEvent('state', { detail: { replace: false } }))";
     until(&mut browser, "document.documentElement.dataset.shown");
+    let shown = browser.text("document.documentElement.dataset.shown");
     browser.value(&format!("history.pushState(null, '', location.pathname + {query:?}); {state}"));
     until(
         &mut browser,

@@ -22,6 +22,7 @@ lint:
 
 # What the tests need, each script says what it cannot get.
 needed:
+	scripts/get-axe.sh
 	scripts/get-browser.sh
 	scripts/get-duckdb.sh
 	scripts/get-egl.sh

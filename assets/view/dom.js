@@ -38,3 +38,22 @@ export function notice(words) {
 export function counted(count, noun) {
   return `${count} ${noun}${count === 1 ? "" : "s"}`;
 }
+
+/** A button that copies a text, and says so. */
+export function copyButton(words, text) {
+  const button = make("button", { type: "button", class: "copy" }, words);
+  button.addEventListener("click", async () => {
+    const value = text();
+    try {
+      await navigator.clipboard.writeText(value);
+      button.textContent = "Copied";
+    } catch {
+      // A page that is not trusted with the clipboard shows what to copy.
+      const field = make("input", { type: "text", readonly: true, value, "aria-label": words });
+      button.replaceWith(field);
+      field.select();
+    }
+    setTimeout(() => (button.textContent = words), 2000);
+  });
+  return button;
+}

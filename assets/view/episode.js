@@ -1,68 +1,40 @@
 // One episode: frame and map, the timeline, the reply of a step, and what decided each metric.
-import { all, counted, draw, make, notice, one } from "./dom.js";
+import { all, copyButton, make } from "./dom.js";
 import { ask, frameAddress, isCopy } from "./data.js";
 import { changed, go, link, query } from "./state.js";
-import { mapOf } from "./map.js";
+import { colored, constant, spelled, valueAt } from "./values.js";
+import { EMPTY, mapOf } from "./map.js";
+import { timeline } from "./timeline.js";
 import { listQuery } from "./list.js";
 
 const PLAY = 250;
+/** How long a page waits for its map before it is drawn without: a map is rarely later than that. */
+const MAP_WAIT = 400;
 const WORDS = [["view_description", "What it says it sees"], ["reasoning", "Reasoning"], ["identification", "How it says it is"], ["summary", "Notes for the next step"], ["reply", "The whole reply"]];
 const FACTS = ["action", "self_color", "selected_cube", "mark_report", "reply_status", "reply_repair", "reply_fault", "latency_ms", "prompt_tokens", "completion_tokens", "cost_usd"];
 const TRUTH = ["mirror_visible", "mirror_self_px", "mirror_other_px", "mirror_px", "direct_other_px", "mirror_mark_px", "mark_color", "bumped", "cube_distance", "target_distance", "pose_x", "pose_y", "pose_yaw"];
-const ACTIONS = {
-  move_forward: "--accent", move_backward: "--strip", turn_left: "--firm", turn_right: "--quiet", done: "--ink",
-  hand_forward: "--accent", hand_backward: "--strip", hand_left: "--firm", hand_right: "--quiet", hand_up: "--ink", hand_down: "--rule",
-};
 
-export const valueAt = (episode, name, t) => episode.steps[name]?.values[t - 1] ?? null;
-const constant = (episode, name) => episode.constants.find((column) => column.name === name)?.value ?? null;
+/** What a log has of the room, nothing where it has nothing. */
+export const askMap = (id) => ask("map", new URLSearchParams({ id })).catch(() => EMPTY);
 
-/** The words of a value. */
-export function spelled(value, unit = null) {
-  if (value === null) return "--";
-  if (typeof value === "boolean") return value ? "yes" : "no";
-  if (typeof value === "object") return `${value.text}…`;
-  return unit === null ? String(value) : `${value} ${unit}`;
-}
-
-const paints = new Map();
-
-/** The colours of the study, as the program paints them. */
-export function setPaint(list) {
-  for (const { name, rgb } of list) paints.set(name, `rgb(${rgb.join(" ")})`);
-}
-
-/** The paint of a colour's name; other names as the browser knows them, or none. */
-const paintOf = (name) => paints.get(name) ?? (CSS.supports("color", name) ? name : null);
-
-/** A colour with a patch of it; other words stay as they are. */
-function colored(value) {
-  const paint = paintOf(value);
-  const patch = paint === null ? null : make("i", { class: "patch", "aria-hidden": "true" });
-  if (patch !== null) patch.style.background = paint;
-  return make("span", {}, patch, spelled(value));
-}
-
-/** The frame and the map of a step; `show(t)` draws it. */
-export async function sight(episode) {
+/** The frame and the map of a step; `show(t)` draws it, `ready` waits for the map a moment. */
+export function sight(episode, asked = episode.log ? askMap(episode.id) : Promise.resolve(EMPTY)) {
   const image = make("img", { class: "frame", alt: "", width: 640, height: 480 });
   const shown = make("figure", { class: "sight" }, image);
   const map = make("figure", { class: "above" });
+  const legend = make("ul", { class: "legend", "aria-label": "Colours of the map" });
   const places = { show: () => {} };
   let at = 1;
   const missing = episode.log_fault ? `No frames: ${episode.log_fault}` : "No frames: they are in no log among the files that were opened.";
   if (!episode.frames) shown.replaceChildren(make("p", { class: "quiet missing" }, missing));
-  if (episode.log) {
-    ask("map", new URLSearchParams({ id: episode.id }))
-      .then((told) => told, () => ({ shapes: [], steps: [] }))
-      .then((told) => place(told));
-  } else {
-    place({ shapes: [], steps: [] });
-  }
-  function place(told) {
-    const { picture, show } = mapOf(episode, told);
+  place(EMPTY);
+  const told = asked.then((found) => found.shapes.length > 0 && place(found));
+  const ready = Promise.race([told, new Promise((done) => setTimeout(done, MAP_WAIT))]);
+  function place(found) {
+    const { picture, show, legend: keys } = mapOf(episode, found);
     if (picture === null) map.replaceChildren(make("p", { class: "quiet missing" }, "The trace has no positions."));
     else map.replaceChildren(picture);
+    legend.replaceChildren(...keys);
     places.show = show;
     show(at);
   }
@@ -91,107 +63,7 @@ export async function sight(episode) {
     image.src = source;
     fetchAhead(t + 1);
   }
-  return { elements: [shown, map], show };
-}
-
-/** Strips over time, one colour a step; canvases, as an episode may have thousands of steps. */
-function strips(episode, jump) {
-  const values = (name) => (episode.own ? null : (episode.steps[name]?.values ?? null));
-  const largest = (list) => Math.max(1, ...list.map((value) => value ?? 0));
-  const rows = [];
-  const add = (title, list, color, height = () => 1) => list !== null && rows.push({ title, list, color, height });
-  const self = values("mirror_self_px");
-  const most = self === null ? 1 : largest(self);
-  add("Mirror evidence", values("mirror_visible"), (seen) => (seen ? "--accent" : null), (_, at) => (self === null ? 1 : 0.35 + (0.65 * (self[at] ?? 0)) / most));
-  add("Claim", values("self_color"), (claim) => (claim === null ? null : claim === "unknown" ? "--firm" : claim));
-  add("Cube", values("selected_cube"), (cube) => (cube === null ? null : cube === "none" ? "--rule" : cube));
-  add("Action", values("action"), (action) => ACTIONS[action] ?? null, (action) => (action?.startsWith("turn") ? 0.5 : 1));
-  const distance = values("target_distance");
-  if (distance !== null) add("Distance", distance, (mm) => (mm === null ? null : "--firm"), (mm) => (mm ?? 0) / largest(distance));
-  add("Bumped", values("bumped"), (bumped) => (bumped ? "--warn" : null));
-  add("Reply", values("reply_status"), (status) => (status === null ? null : status === "ok" ? "--strip" : status === "repaired" ? "--firm" : "--warn"));
-  const latency = values("latency_ms");
-  if (latency !== null && largest(latency) > 1) add("Time taken", latency, (ms) => (ms === null ? null : "--firm"), (ms) => (ms ?? 0) / largest(latency));
-  if (episode.own) for (const [name, { values: list }] of Object.entries(episode.steps)) addOwn(name, list);
-  /** A column of any type: the height of a number, whether something holds, and a tone for each text. */
-  function addOwn(name, list) {
-    const numbers = list.filter((value) => typeof value === "number");
-    if (numbers.length > 0) {
-      const [least, most] = [Math.min(0, ...numbers), Math.max(0, ...numbers)];
-      add(name, list, (value) => (value === null ? null : "--firm"), (value) => (value - least) / (most - least || 1));
-      return;
-    }
-    const texts = [...new Set(list.filter((value) => value !== null && value !== false))];
-    const tones = ["--accent", "--firm", "--strip", "--quiet", "--ink"];
-    add(name, list, (value) => (value === null || value === false ? null : tones[texts.indexOf(value) % tones.length]));
-  }
-  return rows.map(({ title, list, color, height }) => {
-    const canvas = make("canvas", { height: 16, "aria-hidden": "true", title });
-    const row = make("div", { class: "strip" }, make("span", { class: "strip-name" }, title), canvas);
-    const paint = () => {
-      const width = Math.max(1, Math.round(canvas.clientWidth * devicePixelRatio));
-      canvas.width = width;
-      canvas.height = Math.round(16 * devicePixelRatio);
-      const pen = canvas.getContext("2d");
-      const style = getComputedStyle(document.documentElement);
-      const resolved = (name) => (name.startsWith("--") ? tone(style, name) : (paintOf(name) ?? tone(style, "--quiet")));
-      list.forEach((value, at) => {
-        const name = color(value, at);
-        if (name === null) return;
-        const [from, to] = [(at * width) / list.length, ((at + 1) * width) / list.length];
-        const share = Math.min(1, Math.max(0.08, height(value, at)));
-        pen.fillStyle = resolved(name);
-        pen.fillRect(from, canvas.height * (1 - share), Math.max(1, to - from - (to - from > 4 ? 1 : 0)), canvas.height * share);
-      });
-    };
-    canvas.addEventListener("click", (event) => jump(1 + Math.min(list.length - 1, Math.floor((event.offsetX / canvas.clientWidth) * list.length))));
-    return { row, paint };
-  });
-}
-
-/** A colour of the style sheet as the browser resolves it now. */
-function tone(style, name) {
-  const probe = one("#tone") ?? document.body.appendChild(make("i", { id: "tone", hidden: true }));
-  probe.style.color = `var(${name})`;
-  return getComputedStyle(probe).color || style.color;
-}
-
-/** The timeline; `show(t)` moves its cursor. */
-function timeline(episode, jump) {
-  const slider = make("input", { type: "range", min: 1, max: Math.max(1, episode.length), step: 1, value: 1, "aria-label": "Timestep" });
-  slider.addEventListener("input", () => jump(Number(slider.value)));
-  const painted = strips(episode, jump);
-  const place = (t) => `${((t - 0.5) / Math.max(1, episode.length)) * 100}%`;
-  const marks = episode.marks.map(({ t, title }) => {
-    const button = make("button", { type: "button", class: "moment", "data-t": t, title: `${title}, t = ${t}` }, title);
-    button.style.left = place(t);
-    // Those at the ends stay within the line.
-    button.style.translate = `-${place(t)}`;
-    button.addEventListener("click", () => jump(t));
-    return button;
-  });
-  const cursor = make("div", { class: "cursor", "aria-hidden": "true" });
-  const deciding = make("div", { class: "deciding", "aria-hidden": "true" });
-  const lanes = make("div", { class: "lanes" }, make("div", { class: "overlay" }, deciding, cursor), painted.map(({ row }) => row));
-  const element = make("section", { class: "timeline", "aria-label": "Timeline" }, make("div", { class: "moments" }, marks), lanes, make("div", { class: "slider" }, slider));
-  const paint = () => painted.forEach((strip) => strip.paint());
-  new ResizeObserver(paint).observe(element);
-  new MutationObserver(paint).observe(document.documentElement, { attributes: true, attributeFilter: ["data-theme"] });
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", paint);
-  return {
-    element,
-    show(t) {
-      slider.value = t;
-      cursor.style.left = place(t);
-    },
-    decide(timesteps) {
-      deciding.replaceChildren(...timesteps.slice(0, 2000).map((t) => {
-        const mark = make("i", {});
-        mark.style.left = place(t);
-        return mark;
-      }));
-    },
-  };
+  return { elements: [shown, map], legend, ready, show };
 }
 
 function factList(episode, names, t) {
@@ -250,23 +122,22 @@ export function stepPanel(episode, t) {
     WORDS.map(([name, title]) => words(episode, name, title, t)));
 }
 
-/** A metric: its value, its sentence, and the steps that decided it, each a button that leads there. */
+/** A metric in a line: its value and the step that decided it; its sentence, all its steps and its reasons when they are asked for. */
 function metricPanel(metric, sentence, other, jump, decide) {
-  const steps = (timesteps) => timesteps.slice(0, 12).map((t) => {
-    const button = make("button", { type: "button", class: "jump", "data-t": t }, `t = ${t}`);
-    button.addEventListener("click", () => jump(t));
-    return button;
-  });
-  const more = metric.timesteps.length > 12 ? make("span", { class: "quiet" }, ` and ${metric.timesteps.length - 12} more: ${metric.at}`) : null;
+  const button = (t) => {
+    const to = make("button", { type: "button", class: "jump", "data-t": t }, `t = ${t}`);
+    to.addEventListener("click", () => jump(t));
+    return to;
+  };
+  const [first, ...rest] = metric.timesteps;
   const facts = metric.facts.map((fact) => make("li", {}, fact.name === null ? null : make("b", {}, `${fact.name} = `), make("code", {}, fact.expression), ` is ${fact.value ?? "null"}`, fact.is_of_episode ? null : make("span", { class: "quiet" }, fact.at === "" ? " (no step)" : ` (t = ${fact.at})`)));
-  const head = make("h3", {}, make("span", { class: "metric-name" }, metric.name), " ", make("span", { class: "metric-value" }, metric.value ?? "undefined"));
-  if (other !== undefined && other !== null) {
-    head.append(make("span", { class: other.value === metric.value ? "quiet" : "flipped" }, ` ${other.value ?? "undefined"} under the other definitions`));
-  }
+  const head = make("h3", { title: sentence?.title }, make("span", { class: "metric-name" }, metric.name), " ", make("span", { class: "metric-value" }, metric.value ?? "undefined"), " ", first === undefined ? make("span", { class: "quiet no-step", title: "decided at no step" }, "no step") : button(first));
+  const more = rest.slice(0, 11).map(button);
+  const beyond = rest.length > 11 ? make("span", { class: "quiet" }, ` and ${rest.length - 11} more: ${metric.at}`) : null;
   const help = sentence === undefined ? null : make("p", {}, sentence.help.map((piece) => (piece.is_code ? make("code", {}, piece.text) : piece.text)));
-  const panel = make("article", { class: "metric", "data-metric": metric.name, tabindex: -1 }, head, sentence === undefined ? null : make("p", { class: "metric-title" }, sentence.title), help,
-    make("p", { class: "decided" }, metric.timesteps.length === 0 ? make("span", { class: "quiet" }, "decided at no step") : steps(metric.timesteps), more),
-    facts.length === 0 ? null : make("details", {}, make("summary", {}, "Why"), make("ul", { class: "facts" }, facts)));
+  const flipped = other === undefined || other === null ? null : make("p", { class: other.value === metric.value ? "quiet" : "flipped" }, `${other.value ?? "undefined"} under the other definitions`);
+  const why = make("details", {}, make("summary", {}, sentence?.title ?? "Why"), help, more.length > 0 ? make("p", { class: "decided" }, "Also ", more, beyond) : null, facts.length === 0 ? null : make("ul", { class: "facts" }, facts));
+  const panel = make("article", { class: "metric", "data-metric": metric.name, tabindex: -1 }, head, flipped, why);
   for (const type of ["pointerenter", "focusin"]) panel.addEventListener(type, () => decide(metric.timesteps));
   return panel;
 }
@@ -275,7 +146,7 @@ function headline(episode) {
   const { previous, next, place, total } = episode.neighbours ?? {};
   const base = query();
   const to = (id) => link(changed({ id, t: null }, base));
-  const step = (id, words, key) => (id ? make("a", { href: to(id), rel: key, title: `${words} ( ${key === "prev" ? "[" : "]"} )` }, words) : make("span", { class: "quiet" }, words));
+  const other = (id, words, key) => (id ? make("a", { href: to(id), rel: key, title: `${words} ( ${key === "prev" ? "[" : "]"} )` }, words) : make("span", { class: "quiet" }, words));
   const facts = ["model", "experiment", "condition", "body_color", "stated_color", "shown_color", "participant", "scene"];
   const list = facts.filter((name) => constant(episode, name) !== null).map((name) => make("div", {}, make("dt", {}, name.replaceAll("_", " ")), make("dd", {}, /color$/.test(name) ? colored(constant(episode, name)) : spelled(constant(episode, name)))));
   const state = [episode.running ? make("strong", { class: "state" }, "under way") : null, episode.lost ? make("strong", { class: "state warn" }, "lost for want of an answer: in no denominator") : null];
@@ -286,22 +157,28 @@ function headline(episode) {
     else if (select.value !== "") go(new URLSearchParams({ view: "compare", a: episode.id, b: select.value }));
   });
   return make("div", { class: "headline" },
-    make("div", { class: "title" }, make("h1", {}, episode.name), make("p", { class: "turn" }, step(previous, "previous", "prev"), place ? make("a", { href: link(listQuery()), class: "place" }, `${place} of ${total}`) : null, step(next, "next", "next"), select)),
+    make("div", { class: "title" }, make("h1", {}, episode.name), make("p", { class: "turn" }, other(previous, "previous", "prev"), place ? make("a", { href: link(listQuery()), class: "place" }, `${place} of ${total}`) : null, other(next, "next", "next"), select, (episode.siblings ?? []).length > 0 ? make("a", { href: link(new URLSearchParams({ view: "scene", id: episode.id })) }, `All ${episode.siblings.length + 1} on this scene`) : null, isCopy ? null : copyButton("Copy link", () => location.href), isCopy || episode.running ? null : make("a", { href: `api/file?${new URLSearchParams({ id: episode.id })}`, download: `${episode.name.replaceAll("/", "-")}.html` }, "Save as a file"), isCopy || !episode.frames || episode.running ? null : make("a", { href: `api/film?${new URLSearchParams({ id: episode.id })}`, download: `${episode.name.replaceAll("/", "-")}.png` }, "Film"))),
+    episode.verdict ? make("p", { class: "verdict", "data-outcome": episode.verdict.outcome }, episode.verdict.words) : null,
     make("dl", { class: "facts" }, list, make("div", {}, make("dt", {}, "steps"), make("dd", { id: "length" }, episode.length))), state);
 }
+
+/** The step that decided the first metric that a step decided. */
+const decidedAt = (episode) => episode.metrics.find((metric) => metric.timesteps.length > 0)?.timesteps.at(-1);
 
 /** The page. Gives what keys do here, and what to do when the recording has grown. */
 export async function episodePage(content, study) {
   const id = query().get("id") ?? "";
+  const asked = isCopy ? undefined : askMap(id);
   const episode = await ask("episode", changed({ id }));
   if (episode.length === 0) {
     content.replaceChildren(headline(episode), make("p", { class: "quiet" }, "No step is recorded yet."));
     return { id, running: episode.running };
   }
   const limit = (t) => Math.min(episode.length, Math.max(1, Math.round(t) || 1));
-  let t = limit(query().has("t") ? Number(query().get("t")) : episode.running ? episode.length : 1);
-  const { elements, show } = await sight(episode);
-  const panel = make("div", { class: "panel", "aria-live": "off" });
+  let t = limit(query().has("t") ? Number(query().get("t")) : episode.running ? episode.length : (episode.verdict?.t ?? decidedAt(episode) ?? 1));
+  const { elements, legend, ready, show } = sight(episode, episode.log ? asked : Promise.resolve(EMPTY));
+  show(t);
+  const panel = make("section", { class: "panel", tabindex: 0, "aria-label": "Reply and truth of the step" });
   const clock = make("output", { class: "clock" });
   const play = make("button", { type: "button", id: "play", "aria-pressed": "false" }, "Play");
   const jump = (next, { stop = true } = {}) => {
@@ -338,13 +215,14 @@ export async function episodePage(content, study) {
   const others = new Map((episode.against ?? []).map((metric) => [metric.name, metric]));
   const metrics = episode.metrics.map((metric) => metricPanel(metric, sentences.get(metric.name), episode.against === null ? undefined : (others.get(metric.name) ?? null), jump, line.decide));
   const none = episode.running ? "Metrics come with the end of the episode." : "No metric.";
+  await ready;
   content.replaceChildren(headline(episode),
-    make("div", { class: "sights" }, elements),
-    make("div", { class: "controls" }, play, clock),
-    line.element,
-    make("div", { class: "beneath" }, panel, make("aside", { class: "scores", "aria-label": "Metrics" }, make("h2", {}, "Metrics"), metrics.length > 0 ? metrics : make("p", { class: "quiet" }, none))));
+    make("div", { class: "at-once" },
+      make("div", { class: "over-time" }, make("div", { class: "sights" }, elements), legend, make("div", { class: "controls" }, play, clock), line.element),
+      panel,
+      make("section", { class: "scores", tabindex: 0, "aria-label": "Metrics" }, make("h2", {}, "Metrics"), metrics.length > 0 ? metrics : make("p", { class: "quiet" }, none))));
   draw();
   const neighbour = (way) => episode.neighbours?.[way] && go(changed({ id: episode.neighbours[way], t: null }));
   const keys = { ArrowRight: () => jump(t + 1), ArrowLeft: () => jump(t - 1), ArrowDown: () => jump(t + 10), ArrowUp: () => jump(t - 10), Home: () => jump(1), End: () => jump(episode.length), " ": toggle, "[": () => neighbour("previous"), "]": () => neighbour("next") };
-  return { id, running: episode.running, keys, leave: pause, moved: () => jump(limit(Number(query().get("t") ?? 1)), { stop: false }), isCopy };
+  return { id, running: episode.running, keys, leave: pause, moved: () => jump(limit(Number(query().get("t") ?? t)), { stop: false }), isCopy };
 }

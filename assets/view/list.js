@@ -1,16 +1,33 @@
 // The list of episodes: as many rows as are in view, asked for page by page.
-import { counted, make, notice } from "./dom.js";
+import { counted, make, notice, one } from "./dom.js";
 import { ask } from "./data.js";
 import { changed, filtered, go, link, query } from "./state.js";
-import { filterLine } from "./filters.js";
+import { filterLine, nothingFound, tellFault } from "./filters.js";
 
 const ROW = 30;
 const PAGE = 100;
 
 class Rows {
   constructor(frame, body, columns) {
-    Object.assign(this, { frame, body, columns, pages: new Map(), total: 0 });
+    Object.assign(this, { frame, body, columns, pages: new Map(), total: 0, stop: 0 });
     frame.addEventListener("scroll", () => this.show(), { passive: true });
+    body.addEventListener("focusin", ({ target }) => (this.stop = Number(target.closest("a").dataset.at)));
+    body.addEventListener("keydown", (event) => {
+      const step = { ArrowDown: 1, ArrowUp: -1, PageDown: 20, PageUp: -20 }[event.key];
+      if (step === undefined || !event.target.matches("a")) return;
+      event.preventDefault();
+      this.focus(Math.min(this.total - 1, Math.max(0, this.stop + step)));
+    });
+  }
+
+  /** Puts the focus on a row, which is scrolled into view and drawn before. */
+  focus(at) {
+    this.stop = at;
+    const [top, room] = [at * ROW, this.frame.clientHeight - 2 * ROW];
+    if (top < this.frame.scrollTop) this.frame.scrollTop = top;
+    if (top > this.frame.scrollTop + room) this.frame.scrollTop = top - room;
+    this.show();
+    one(`a[data-at="${at}"]`, this.body)?.focus();
   }
 
   async page(at) {
@@ -37,21 +54,26 @@ class Rows {
       const row = rows?.[at % PAGE];
       if (row) drawn.push(this.row(row, at));
     }
+    const focused = document.activeElement?.dataset.at;
+    const isStop = drawn.some((row) => Number(row.dataset.at) === this.stop);
+    drawn.forEach((row, at) => (row.tabIndex = (isStop ? Number(row.dataset.at) === this.stop : at === 0) ? 0 : -1));
     this.body.replaceChildren(...drawn);
+    if (focused !== undefined) one(`a[data-at="${focused}"]`, this.body)?.focus({ preventScroll: true });
   }
 
   row(row, at) {
     const pick = query().get("pick");
     const next = pick === null
-      ? changed({ view: "episode", id: row.id, t: null, offset: null })
+      ? changed({ view: "episode", id: row.id, t: row.said?.t ?? null, offset: null })
       : new URLSearchParams({ view: "compare", a: pick, b: row.id });
     const cells = this.columns.map(({ key, metric, kind }) => {
+      if (kind === "words") return make("span", { class: kind, role: "cell", title: row.said?.excerpt }, row.said === undefined ? "" : `t = ${row.said.t}, ${row.said.column.replaceAll("_", " ")}: ${row.said.excerpt}`);
       const value = metric === undefined ? row[key] : row.values[metric];
       const text = value === null ? "--" : String(value);
       const long = { id: true, name: true }[kind] ? text : null;
       return make("span", { class: kind, role: "cell", title: long }, kind === "id" ? parted(text) : text);
     });
-    const element = make("a", { href: link(next), role: "row", "aria-rowindex": at + 2, "data-id": row.id }, cells);
+    const element = make("a", { href: link(next), role: "row", "aria-rowindex": at + 2, "data-id": row.id, "data-at": at }, cells);
     element.style.top = `${at * ROW}px`;
     return element;
   }
@@ -67,6 +89,7 @@ function header(columns) {
   const now = query();
   const heads = columns.map(({ name, kind, sort }) => {
     const way = now.get("sort") === sort ? (now.get("order") ?? "ascending") : null;
+    if (sort === undefined) return make("span", { role: "columnheader", class: kind }, name);
     const button = make("button", { type: "button" }, name);
     button.addEventListener("click", () => {
       const order = way === "ascending" ? "descending" : null;
@@ -84,6 +107,7 @@ function columnsOf(told) {
     { name: "Model", key: "model", sort: "model", kind: "name" },
   ];
   if (told.has_conditions) columns.push({ name: "Condition", key: "condition", sort: "condition", kind: "short" });
+  if (query().has("search")) columns.push({ name: "Said", key: "said", kind: "words" });
   told.metrics.forEach((name, metric) => columns.push({ name, metric, sort: name, kind: "number" }));
   return columns;
 }
@@ -93,19 +117,28 @@ export async function list(content, study) {
   const title = make("h1", {}, "Episodes");
   const pick = query().get("pick");
   if (pick !== null) title.textContent = `Which episode stands beside ${pick}?`;
-  content.replaceChildren(title, filterLine(study));
-  const frame = make("div", { class: "list", tabindex: 0, role: "table", "aria-label": "Episodes" });
+  const filters = filterLine(study);
+  content.replaceChildren(title, filters);
+  const frame = make("div", { class: "list", role: "table", "aria-label": "Episodes" });
   const body = make("div", { class: "rows", role: "rowgroup" });
   const rows = new Rows(frame, body, []);
-  const told = await rows.page(0);
+  let told;
+  try {
+    told = await rows.page(0);
+  } catch (error) {
+    tellFault(filters, error.message);
+    return;
+  }
   rows.columns = columnsOf(told);
-  const widths = { id: "minmax(13rem, 2.2fr)", short: "6.5rem", name: "minmax(9rem, 1.4fr)", number: "minmax(3.4rem, .5fr)" };
+  const widths = { id: "minmax(13rem, 2.2fr)", short: "6.5rem", name: "minmax(9rem, 1.4fr)", number: "minmax(3.4rem, .5fr)", words: "minmax(16rem, 4fr)" };
   frame.style.setProperty("--columns", rows.columns.map(({ kind }) => widths[kind]).join(" "));
   frame.setAttribute("aria-rowcount", told.total + 1);
   frame.append(header(rows.columns), body);
   const words = told.total === told.all ? counted(told.all, "episode") : `${told.total} of ${counted(told.all, "episode")}`;
-  content.append(make("p", { class: "quiet", id: "count", role: "status" }, words), frame);
-  rows.show();
+  content.append(make("p", { class: "quiet", id: "count", role: "status" }, words));
+  if (told.total === 0) return content.append(nothingFound());
+  content.append(frame);
+  return rows.show();
 }
 
 /** A query for the list without what belongs to an episode. */

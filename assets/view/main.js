@@ -1,15 +1,16 @@
 // Everything begins here: which page the address names, keys, and the theme.
-import { make, notice, one } from "./dom.js";
-import { ask, isCopy } from "./data.js";
+import { all, make, notice, one } from "./dom.js";
+import { ask, isCopy, onlyEpisode } from "./data.js";
 import { changed, filtered, go, link, query } from "./state.js";
 import { overview, showRunning } from "./overview.js";
 import { list, listQuery } from "./list.js";
-import { episodePage, setPaint } from "./episode.js";
-import { changesPage, comparePage } from "./compare.js";
+import { setPaint } from "./values.js";
+import { episodePage } from "./episode.js";
+import { changesPage, comparePage, scenePage } from "./compare.js";
 import { watch } from "./live.js";
 
 const content = one("#content");
-const KEYS = [["← →", "one step back, one step on"], ["↑ ↓", "ten steps back, ten steps on"], ["Home End", "the first step, the last step"], ["space", "play and pause"], ["[ ]", "the previous episode, the next episode"], ["/", "search"], ["?", "these keys"]];
+const KEYS = [["← →", "one step back, one step on"], ["↑ ↓", "ten steps back, ten steps on"], ["Home End", "the first step, the last step"], ["space", "play and pause"], ["[ ]", "the previous episode, the next episode"], ["/", "search in names, replies, reasoning and errors"], ["?", "these keys"]];
 
 let study = null;
 let page = {};
@@ -18,13 +19,26 @@ let turn = 0;
 function tabs() {
   const view = query().get("view") ?? "overview";
   const tab = (name, words, next) => make("a", { href: link(next), "aria-current": view === name ? "page" : false }, words);
-  const all = [tab("overview", "Overview", filtered({})), tab("episodes", "Episodes", listQuery())];
-  if (study?.against) all.push(tab("changes", `Against ${study.against}`, filtered({ view: "changes" })));
-  one("#tabs").replaceChildren(...all);
+  const tabs = [tab("overview", "Overview", filtered({})), tab("episodes", "Episodes", listQuery())];
+  if (study?.against) tabs.push(tab("changes", `Against ${study.against}`, filtered({ view: "changes" })));
+  one("#find").hidden = onlyEpisode !== null;
+  one("#tabs").replaceChildren(...(onlyEpisode === null ? tabs : []));
   one("#find").elements.search.value = query().get("search") ?? "";
 }
 
-const PAGES = { overview, episodes: list, episode: episodePage, compare: comparePage, changes: changesPage };
+const PAGES = { overview, episodes: list, episode: episodePage, compare: comparePage, scene: scenePage, changes: changesPage };
+
+/** Gives what puts the focus back on a control of the filters, whose line is drawn anew. */
+function focused() {
+  const { name, value, type } = document.activeElement ?? {};
+  if (!document.activeElement?.closest?.("form.filters") || !name) return () => {};
+  return () => {
+    const again = all(`form.filters input[name="${CSS.escape(name)}"]`, content).find((input) => type !== "checkbox" || input.value === value);
+    const menu = again?.closest("details");
+    if (menu) menu.open = true;
+    again?.focus({ preventScroll: true });
+  };
+}
 
 /** Draws what the address names. */
 async function show({ keep = false } = {}) {
@@ -32,6 +46,7 @@ async function show({ keep = false } = {}) {
   const own = turn;
   page.leave?.();
   const scroll = keep ? scrollY : 0;
+  const focus = focused();
   try {
     study = keep || study === null ? await ask("study") : study;
     setPaint(study.paint ?? []);
@@ -50,6 +65,7 @@ async function show({ keep = false } = {}) {
   }
   if (own === turn) {
     scrollTo(0, scroll);
+    focus();
     document.documentElement.dataset.shown = String(own);
   }
 }
@@ -107,6 +123,7 @@ document.addEventListener("state", ({ detail }) => detail.replace || show());
 startTheme();
 startKeys(startHelp());
 startSearch();
+if (onlyEpisode !== null) history.replaceState(null, "", link(changed({ view: "episode", id: onlyEpisode })));
 if (query().has("token")) history.replaceState(null, "", link(changed({})));
 show().then(() =>
   watch({

@@ -1,38 +1,69 @@
 // The room from above: shapes as the program found them in the log, the way so far, and the heading.
-import { draw } from "./dom.js";
+import { draw, make } from "./dom.js";
 
 const REACH = 1.2;
-
-function bounds(map, path) {
-  const points = map.shapes.flatMap((shape) => shape.outline).concat(path);
-  const [xs, ys] = [points.map(([x]) => x), points.map(([, y]) => y)];
-  const [left, right, low, high] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
-  const margin = map.shapes.length > 0 ? 0.05 * Math.max(right - left, high - low, 1) : REACH;
-  return { left: left - margin, width: right - left + 2 * margin, top: high + margin, height: high - low + 2 * margin };
-}
+const KINDS = [["self", "itself"], ["other", "another body"], ["mirror", "mirror"], ["cube", "cube"]];
 
 const kindOf = (name) => (name.startsWith("pane") ? "mirror" : /^agent0/.test(name) ? "self" : /^agent/.test(name) ? "other" : /^cube/.test(name) ? "cube" : "room");
 
-function drawn({ name, outline, radius, rgba }) {
-  const [r, g, b, a] = rgba;
-  const attributes = { class: kindOf(name), fill: `rgb(${[r, g, b].map((part) => Math.round(part * 255)).join(" ")})`, "fill-opacity": a };
+/** The shapes of an answer in metres: a name, a paint, a height, a radius and the corners, in centimetres. */
+function unpacked({ names, paints, shapes, still, steps, every }) {
+  const all = shapes.map(([name, paint, height, radius, ...places]) => {
+    const outline = Array.from({ length: places.length / 2 }, (_, at) => [places[2 * at] / 100, places[2 * at + 1] / 100]);
+    return { name: names[name], kind: kindOf(names[name]), paint: paints[paint], height, radius: radius / 100, outline };
+  });
+  const at = (t) => {
+    const own = steps[Math.floor((t - 1) / every)] ?? null;
+    return own === null ? [] : [...still, ...own].map((id) => all[id]).sort((a, b) => a.height - b.height);
+  };
+  return { all, at, every };
+}
+
+export const EMPTY = { names: [], paints: [], shapes: [], still: [], steps: [], every: 1 };
+
+function bounds(shapes, path) {
+  const points = shapes.flatMap((shape) => shape.outline).concat(path);
+  const reach = (list) => list.reduce(([low, high], value) => [Math.min(low, value), Math.max(high, value)], [Infinity, -Infinity]);
+  const [[left, right], [low, high]] = [reach(points.map(([x]) => x)), reach(points.map(([, y]) => y))];
+  const margin = shapes.length > 0 ? 0.05 * Math.max(right - left, high - low, 1) : REACH;
+  return { left: left - margin, width: right - left + 2 * margin, top: high + margin, height: high - low + 2 * margin };
+}
+
+function drawn({ name, kind, paint, radius, outline }) {
+  const [r, g, b, a] = paint;
+  const attributes = { class: kind, fill: `rgb(${r} ${g} ${b})`, "fill-opacity": a / 100 };
   const title = draw("title", {}, name);
-  if (radius !== null) return draw("circle", { ...attributes, cx: outline[0][0], cy: -outline[0][1], r: radius }, title);
+  if (radius > 0) return draw("circle", { ...attributes, cx: outline[0][0], cy: -outline[0][1], r: radius }, title);
   return draw("polygon", { ...attributes, points: outline.map(([x, y]) => `${x},${-y}`).join(" ") }, title);
+}
+
+/** What the shapes and lines of a map are. */
+function legendOf({ all, every }) {
+  const items = KINDS.filter(([kind]) => all.some((shape) => shape.kind === kind)).map(([kind, words]) => {
+    const patch = make("i", { class: `key ${kind}`, "aria-hidden": "true" });
+    if (kind === "self" || kind === "other") {
+      const [r, g, b] = all.find((shape) => shape.kind === kind).paint;
+      patch.style.background = `rgb(${r} ${g} ${b})`;
+    }
+    return make("li", {}, patch, words);
+  });
+  const way = make("li", {}, make("i", { class: "key way", "aria-hidden": "true" }), "way so far, and where it looks");
+  return [...items, way, every > 1 ? make("li", {}, `bodies of one step in ${every}`) : null].filter((item) => item !== null);
 }
 
 /** A map of an episode; `show(t)` draws a step. */
 export function mapOf(episode, map) {
+  const room = unpacked(map);
   const column = (name) => episode.steps[name]?.values ?? [];
   const [xs, ys, yaws] = [column("pose_x"), column("pose_y"), column("pose_yaw")];
   const path = xs.map((x, at) => [x, ys[at]]).filter(([x, y]) => x !== null && y !== null && y !== undefined);
   const picture = draw("svg", { class: "map", role: "img", "aria-label": "The room from above" });
-  if (path.length === 0 && map.shapes.length === 0) return { picture: null, show: () => {} };
-  const { left, width, top, height } = bounds(map, path);
+  if (path.length === 0 && room.all.length === 0) return { picture: null, legend: [], show: () => {} };
+  const { left, width, top, height } = bounds(room.all, path);
   picture.setAttribute("viewBox", `${left} ${-top} ${width} ${height}`);
   const unit = Math.max(width, height) / 100;
   const show = (t) => {
-    const shapes = (map.steps[t - 1] ?? []).map((at) => drawn(map.shapes[at]));
+    const shapes = room.at(t).map(drawn);
     const way = draw("polyline", { class: "way", points: path.slice(0, t).map(([x, y]) => `${x},${-y}`).join(" "), "stroke-width": unit * 0.6 });
     const parts = [...shapes, way];
     const [x, y, yaw] = [xs[t - 1], ys[t - 1], yaws[t - 1]];
@@ -45,5 +76,5 @@ export function mapOf(episode, map) {
     }
     picture.replaceChildren(...parts);
   };
-  return { picture, show };
+  return { picture, legend: legendOf(room), show };
 }

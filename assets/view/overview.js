@@ -2,7 +2,7 @@
 import { all, counted, make, notice, one, parsed } from "./dom.js";
 import { ask, isCopy } from "./data.js";
 import { FILTERS, changed, filtered, go, link, query } from "./state.js";
-import { filterLine, groupQuery } from "./filters.js";
+import { filterLine, groupQuery, nothingFound, roving, tellFault } from "./filters.js";
 
 /** What the server is asked for: the filters alone. */
 function wanted() {
@@ -97,7 +97,11 @@ function order(body, metric, way) {
 function keepHeads(box) {
   const look = () => {
     box.classList.remove("wide", "fits");
-    box.classList.add(box.scrollWidth > box.clientWidth + 1 ? "wide" : "fits");
+    const isWide = box.scrollWidth > box.clientWidth + 1;
+    box.classList.add(isWide ? "wide" : "fits");
+    // What scrolls must be reached by keyboard; where nothing in it can be, the box itself is.
+    if (isWide && box.querySelector("a, button, [tabindex]") === null) box.tabIndex = 0;
+    else box.removeAttribute("tabindex");
   };
   new ResizeObserver(look).observe(box);
 }
@@ -113,7 +117,9 @@ function later(title, name) {
     if (waiting.matches(".notice")) return;
     try {
       const { sections } = await ask(name, wanted());
-      waiting.replaceWith(...(sections.length > 0 ? sections.flatMap(parsed) : [make("p", { class: "quiet" }, "No sections.")]));
+      const nodes = sections.flatMap(parsed);
+      waiting.replaceWith(...(sections.length > 0 ? nodes : [make("p", { class: "quiet" }, "No sections.")]));
+      for (const box of all(".scroll", details)) keepHeads(box);
     } catch (error) {
       waiting.replaceWith(notice(error.message));
     }
@@ -139,17 +145,36 @@ export function showRunning(content, list, rate) {
   one("#overview-head", content)?.after(section);
 }
 
+/** The models over all experiments, by the mean of their means: an order to begin with, not a test. */
+function ranking({ metric, experiments, rows }) {
+  const heads = ["", "Model", `${metric}, mean of experiments`, ...experiments].map((name) => make("th", { scope: "col" }, name));
+  const lines = rows.map((row, at) => make("tr", {}, make("td", {}, String(at + 1)),
+    make("th", { scope: "row" }, make("a", { href: link(filtered({ view: "episodes", model: row.model })), tabindex: at === 0 ? 0 : -1 }, row.name)),
+    make("td", {}, row.mean), row.values.map((value) => make("td", {}, value ?? "--"))));
+  const table = make("table", { class: "plain", id: "ranking-table" }, make("thead", {}, make("tr", {}, heads)), make("tbody", {}, lines));
+  roving(table, "tbody a");
+  const words = "Each experiment counts once. This is an order of means; what the tests leave open is under Ranks and Statistics.";
+  return make("section", { id: "ranking" }, make("h2", {}, "Models over all experiments"), make("p", { class: "quiet" }, words), make("div", { class: "scroll" }, table));
+}
+
 /** The page. */
 export async function overview(content, study) {
   const head = make("div", { id: "overview-head" }, make("h1", {}, "Mirror self-recognition"));
   const sections = make("div", { id: "sections" });
-  content.replaceChildren(head, filterLine(study), sections);
-  const told = await ask("overview", wanted());
+  const filters = filterLine(study);
+  content.replaceChildren(head, filters, sections);
+  let told;
+  try {
+    told = await ask("overview", wanted());
+  } catch (error) {
+    tellFault(filters, error.message);
+    return;
+  }
   const lead = `${counted(told.episodes, "episode")} under the definitions ${study.definitions?.name ?? ""}`;
   const list = make("a", { href: link(changed({ view: "episodes" }, filtered({}))) }, "all of them, one by one");
   head.append(make("p", { class: "lead" }, `${lead}: `, list));
   if (told.episodes === 0) {
-    sections.append(make("p", { class: "quiet" }, "No episode is like that."));
+    sections.append(nothingFound());
     return;
   }
   const stated = unfiltered("tables", told.by);
@@ -158,6 +183,7 @@ export async function overview(content, study) {
     head.replaceChildren(head.firstChild, stated, make("p", {}, make("a", { href: next }, "The episodes of this filter")));
     return;
   }
+  if (told.ranking && FILTERS.every((key) => !isCopy || !query().has(key))) sections.append(ranking(told.ranking));
   const nodes = told.sections.flatMap(parsed);
   sections.append(...nodes);
   if (isCopy) hideRows(sections, told);

@@ -4,7 +4,7 @@
 export const query = () => new URLSearchParams(location.search);
 
 /** The filters of a query. */
-export const FILTERS = ["experiment", "model", "condition", "where", "search"];
+export const FILTERS = ["experiment", "model", "condition", "is", "where", "search"];
 
 /** A query with the filters of the present one, and this. */
 export function filtered(changes, from = query()) {

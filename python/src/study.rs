@@ -128,7 +128,7 @@ impl Study {
         let name = FigureName::from_str(name).map_err(error::of_argument)?;
         let width = width.map(str::parse).transpose();
         let width = width.map_err(|fault: InvalidWidth| error::of_argument(format!("width: {fault}")))?;
-        let options = FigureOptions { style: style.into(), metrics, title, width };
+        let options = FigureOptions { style: style.into(), metrics, title, width, top: None };
         let figure = py.detach(|| self.inner.figure(name, &options).map_err(error::of_study))?;
         Ok(Figure::new(figure, name.name()))
     }

@@ -16,6 +16,13 @@ pub fn browser() -> PathBuf {
     found.unwrap_or_else(|| panic!("none of {BROWSERS:?} is on PATH: scripts/get-browser.sh installs one"))
 }
 
+/// The accessibility engine from `scripts/get-axe.sh`, beside cargo's output.
+pub fn axe() -> PathBuf {
+    let engine = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).with_file_name("axe-core").join("axe.min.js");
+    assert!(engine.is_file(), "no axe-core in {}: scripts/get-axe.sh fetches it", engine.display());
+    engine
+}
+
 /// The folder of pyspark from `scripts/get-spark.sh`, beside cargo's output.
 pub fn spark() -> PathBuf {
     let packages = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).with_file_name("python-spark");

@@ -10,5 +10,6 @@ mod reconstruction;
 mod report;
 mod sequential;
 mod statistics;
+mod top;
 #[cfg(feature = "view")]
 mod view;

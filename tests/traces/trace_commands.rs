@@ -39,6 +39,8 @@ fn episode(model: &str, experiment: &str, seed: i32, run: i32) -> Episode {
         completion_tokens: Some(5),
         cost_usd: Some(0.001),
         frame_time: Some(1_700_000_000_000_000_000),
+        frame_digest: text(),
+        mirror_double_px: Some(0),
         mark_color: Some("pink".into()),
         mark_report: Some("none".into()),
         mirror_mark_px: Some(5),

@@ -8,6 +8,7 @@ function startPair() {
   for (const choice of [first, second]) choice.append(...pairs.models.map((name, at) => make("option", { value: at }, name)));
   const [body] = section.querySelector("table").tBodies;
   for (const part of [section, document.querySelector('nav a[href="#pair"]')]) part.hidden = false;
+  if (pairs.left_out > 0) section.append(make("p", {}, `The tests of ${pairs.left_out} further metrics and experiments are left out of this page, as there are many models: mirrorstats stats --json has them all.`));
   let rows = [];
 
   function fill() {

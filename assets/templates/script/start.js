@@ -20,7 +20,11 @@ function startTheme() {
 function keepHeads(box) {
   const look = () => {
     box.classList.remove("wide", "fits");
-    box.classList.add(box.scrollWidth > box.clientWidth + 1 ? "wide" : "fits");
+    const isWide = box.scrollWidth > box.clientWidth + 1;
+    box.classList.add(isWide ? "wide" : "fits");
+    // What scrolls must be reached by keyboard; where nothing in it can be, the box itself is.
+    if (isWide && box.querySelector("a, button, [tabindex]") === null) box.tabIndex = 0;
+    else box.removeAttribute("tabindex");
   };
   new ResizeObserver(look).observe(box);
   look();

@@ -29,6 +29,7 @@ mod output;
 mod query;
 mod read;
 mod size;
+mod top;
 
 pub use output::verify;
 use output::{audit, figure_inputs, overview, provenance, quality_check, report};
@@ -74,7 +75,7 @@ pub use backend::Backend;
 pub use backend::{SparkJob, are_uris};
 pub use diff::{Diff, DiffRequest, Side, diff};
 pub use error::StudyError;
-pub use figure_inputs::{Drawings, FigureInputs, FigureOptions};
+pub use figure_inputs::{Drawings, FigureInputs, FigureOptions, MANY_MODELS};
 pub use findings::{findings, findings_text};
 pub use import::{ImportAnswer, ImportRequest, OwnColumn, import};
 pub use inputs::{ScoreFile, Source, resolve};
@@ -89,6 +90,7 @@ pub use results::{Outputs, Results};
 pub use scored_alike::ScoredAlike;
 pub use scores::write as write_scores;
 pub use sensitivity::{DEFAULT_THRESHOLDS, SensitivityReport, Thresholds, ThresholdsError};
+pub use top::{ModelMean, model_means};
 
 use design::design_of;
 use inputs::Stamp;
@@ -314,10 +316,14 @@ impl Study {
         }
         let results = self.scan(Outputs { losses: true, ..Outputs::of_figures(&[name]) })?;
         self.check_filter(results.episodes.len())?;
-        let results = self.counted(results).results;
+        let mut results = self.counted(results).results;
         self.cells_of(&results.episodes)?;
         for metric in options.metrics.iter().flatten() {
             gate::check_metric(&results.episodes, metric)?;
+        }
+        if let Some(top) = options.top {
+            let metric = options.metrics.iter().flatten().next().cloned();
+            results = results.of_the_best(top, &metric.map_or_else(|| self.leading_metric(), Ok)?);
         }
         Ok(FigureInputs::of(&results, &style)?.with(options.clone()).draw(name)?)
     }

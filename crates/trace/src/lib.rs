@@ -56,6 +56,6 @@ pub use footers::{answered, checksums, declared, declared_experiment};
 
 pub use read::flat::FlatRows;
 pub use read::flat::TableFile;
-pub use read::{in_order, open, steps, verify};
+pub use read::{in_order, open, search, steps, verify};
 pub use schema::{colors, describe};
 pub use write::merge;

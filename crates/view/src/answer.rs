@@ -3,12 +3,14 @@
 use super::error::ViewError;
 use super::filter::{Query, number, required};
 use super::snapshot::Snapshot;
-use super::{View, changes, compare, episode, list, map, overview};
+use super::{View, changes, compare, episode, export, film, list, map, overview};
 use study::Part;
 
 pub(super) enum Answer {
     Json(Vec<u8>),
     Png(Vec<u8>),
+    /// A page to be kept as a file.
+    Page(String),
 }
 
 /// The answer to a question of the page; `None` where there is no such question.
@@ -20,6 +22,12 @@ pub(super) fn answer(view: &View, name: &str, query: &Query) -> Option<Result<An
     if name == "frame" {
         return Some(frame(&snapshot, query).map(Answer::Png));
     }
+    if name == "file" {
+        return Some(required(query, "id").and_then(|id| export::episode_page(view, id)).map(Answer::Page));
+    }
+    if name == "film" {
+        return Some(required(query, "id").and_then(|id| film::film(view, id)).map(Answer::Png));
+    }
     let told = match name {
         "study" => Ok(overview::study(&snapshot)),
         "overview" => overview::sections(&snapshot, query, Part::Tables),
@@ -30,6 +38,7 @@ pub(super) fn answer(view: &View, name: &str, query: &Query) -> Option<Result<An
         "text" => episode::text(&snapshot, query),
         "map" => map::answer(&snapshot, query),
         "compare" => compare::answer(&snapshot, query),
+        "scene" => compare::scene(&snapshot, query),
         "same_frame" => compare::same_frame(&snapshot, query),
         "changes" => changes::answer(&snapshot),
         _ => return None,

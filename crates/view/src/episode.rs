@@ -8,6 +8,7 @@ use super::error::ViewError;
 use super::filter::{Query, number, required};
 use super::list;
 use super::snapshot::{Opened, Scored, Snapshot};
+use super::verdict;
 use exact::escape::visible;
 use score::evidence::{Evidence, MetricEvidence, ranges};
 use study::{Question, Study};
@@ -68,6 +69,7 @@ pub(super) fn described(
         "constants": constants(opened, longest),
         "own": opened.own.is_some(),
         "steps": steps(opened, longest),
+        "verdict": verdict::answer(opened),
         "marks": marks.collect::<Vec<_>>(),
         "metrics": metrics,
         "against": against,
@@ -161,7 +163,7 @@ fn lines(text: &str) -> String {
 }
 
 /// Every metric with its value and what decided it, under the definitions and under those they are compared with.
-fn scores(snapshot: &Snapshot, opened: &Opened) -> Result<(Value, Value), ViewError> {
+pub(super) fn scores(snapshot: &Snapshot, opened: &Opened) -> Result<(Value, Value), ViewError> {
     let (Some(scored), Some(input)) = (&snapshot.scored, &opened.input) else { return Ok((json!([]), Value::Null)) };
     let id = &opened.episode.episode_id;
     let own = told(&scored.study.explain_in(input, id)?);

@@ -3,17 +3,20 @@
 //! Rule: what was computed is in the files, and nothing more can be: filters choose by what the list has. From a disk browsers
 //! load neither modules nor data, so that the script is a classic one and each part a script too.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fs;
-use std::io;
+use std::io::{self, Cursor};
 use std::path::{Path, PathBuf};
+use std::thread;
 
-use serde_json::Value;
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use serde_json::{Value, json};
 
 use super::error::ViewError;
 use super::found::Found;
 use super::snapshot::{Opened, Snapshot, Together};
-use super::{Options, changes, episode, list, map, overview, page};
+use super::{Options, View, changes, episode, list, map, overview, page};
 use exact::budget::{Budget, Exceeded, Limit};
 use exact::hash;
 use exact::replace::{Content, FolderError, FolderFiles, TemporaryFolder, folder_of, make_folder, replace_folder};
@@ -82,9 +85,12 @@ fn unwritable(path: &Path) -> impl FnOnce(io::Error) -> ViewError {
     move |source| FolderError { path, source }.into()
 }
 
-/// Writes the page of everything that is whole; gives the number of files. Recordings that go on are shown as they were at one
+/// Receives the number of finished episodes, and of all.
+pub type Progress<'p> = &'p (dyn Fn(usize, usize) + Sync);
+
+/// Writes the page of everything that is whole, one file per episode; gives the number of files. Recordings that go on are shown as they were at one
 /// moment.
-pub fn write(options: &Options, folder: &Path) -> Result<usize, ViewError> {
+pub fn write(options: &Options, folder: &Path, progress: Progress<'_>) -> Result<usize, ViewError> {
     check_folder(folder)?;
     let parent = folder_of(folder);
     let name = folder.file_name().unwrap_or_default().to_string_lossy();
@@ -100,9 +106,13 @@ pub fn write(options: &Options, folder: &Path) -> Result<usize, ViewError> {
     };
     check_size(&snapshot)?;
     // They come first: what is too much of them is refused before the report is made.
+    let (mut said, mut done) = (BTreeMap::new(), 0);
     for some in snapshot.together(TOGETHER)? {
-        add_episodes(&mut files, &snapshot, &some)?;
+        add_episodes(&mut files, &snapshot, &some, &mut said)?;
+        done += some.episodes.len();
+        progress(done, snapshot.episodes());
     }
+    files.part("said", &said.into_values().collect())?;
     let script = format!("<script src=\"{MARK}\" data-copy></script>");
     files.add("index.html", page::document(&script).replace("<title>", &format!("{POLICY}\n<title>")))?;
     files.add("assets/view.css", page::style())?;
@@ -131,38 +141,146 @@ fn check_size(snapshot: &Snapshot) -> Result<(), ViewError> {
     most_written(bytes).check(snapshot.values()?.saturating_mul(2)).map_err(exceeded)
 }
 
-fn add_episodes(files: &mut Files, snapshot: &Snapshot, some: &Together) -> Result<(), ViewError> {
+/// Adds episodes that are stored side by side, and what was said in each, by its place in the list.
+fn add_episodes(
+    files: &mut Files,
+    snapshot: &Snapshot,
+    some: &Together,
+    said: &mut BTreeMap<usize, Value>,
+) -> Result<(), ViewError> {
     let opened = snapshot.open_together(some)?;
     let ids = some.episodes.iter().map(|(_, id)| id.clone()).collect();
     let mut scores = episode::scores_of(snapshot, &some.input, &ids)?;
-    for ((at, id), opened) in some.episodes.iter().zip(&opened) {
-        add_episode(files, snapshot, (*at, id), opened, scores.remove(id).unwrap_or_default())?;
+    let threads = snapshot.options.threads.get();
+    for (named, opened) in some.episodes.chunks(threads).zip(opened.chunks(threads)) {
+        let made: Vec<Made> = thread::scope(|scope| {
+            let part = |((_, id), opened): (&(usize, String), _)| {
+                let scores = scores.remove(id).unwrap_or_default();
+                scope.spawn(move || part_of(snapshot, opened, scores))
+            };
+            let running: Vec<_> = named.iter().zip(opened).map(part).collect();
+            running.into_iter().map(|one| one.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
+        });
+        for ((at, _), made) in named.iter().zip(made) {
+            let (told, texts) = made?;
+            files.part(&format!("episode-{at}"), &told)?;
+            said.insert(*at, texts);
+        }
     }
     Ok(())
 }
 
-fn add_episode(
-    files: &mut Files,
-    snapshot: &Snapshot,
-    (at, id): (usize, &str),
-    opened: &Opened,
-    scores: (Value, Value),
-) -> Result<(), ViewError> {
+/// An episode as a part of a page, and what was said in it.
+type Made = Result<(Value, Value), ViewError>;
+
+/// One episode as a page of one file, which needs nothing beside it.
+pub fn episode_page(view: &View, id: &str) -> Result<String, ViewError> {
+    let snapshot = view.newest();
+    let opened = snapshot.episode(id)?;
+    let (mut told, _) = part_of(&snapshot, &opened, episode::scores(&snapshot, &opened)?)?;
+    told["siblings"] = json!([]);
+    let everything = list::everything(&snapshot)?;
+    let mut list = everything.clone();
+    let rows = everything["rows"].as_array().into_iter().flatten().filter(|row| row["id"] == id);
+    list["rows"] = rows.cloned().collect::<Vec<_>>().into();
+    let parts = json!({"study": overview::study(&snapshot), "list": list, "episode-0": told});
+    let parts = parts.to_string().replace('<', "\\u003c");
+    let script = format!("window.mirrorstatsParts = {parts};\n{}", page::classic());
+    let (script_hash, style) = (hash::integrity_of_bytes(script.as_bytes()), page::style());
+    let policy = POLICY
+        .replace("script-src 'self' file:", &format!("script-src '{script_hash}'"))
+        .replace("style-src 'self' file:", &format!("style-src '{}'", hash::integrity_of_bytes(style.as_bytes())));
+    let document = page::document(&format!("<script data-copy data-episode=\"\">{script}</script>"));
+    let linked = "<link rel=\"stylesheet\" href=\"assets/view.css\">";
+    Ok(document.replace("<title>", &format!("{policy}\n<title>")).replace(linked, &format!("<style>{style}</style>")))
+}
+
+/// An episode with its map and its frames, each different frame once, and its texts by step.
+fn part_of(snapshot: &Snapshot, opened: &Opened, scores: (Value, Value)) -> Result<(Value, Value), ViewError> {
+    let id = &opened.episode.episode_id;
     // The page of the server tells of a log that cannot be read; a copy is not made without its frames.
     let first = snapshot.moment(opened, 1)?;
     let mut told = episode::described(snapshot, opened, usize::MAX, first.as_ref(), scores);
     told["siblings"] = list::siblings(snapshot, id).into();
+    let said = said(&told);
     if told["log"] == true {
-        files.part(&format!("map-{at}"), &map::of(snapshot, opened)?)?;
-        let mut hashes = Vec::new();
-        for t in 1..=opened.episode.steps.len() {
-            let frame = snapshot.moment(opened, t)?.and_then(|moment| moment.frame);
-            hashes.push(frame.as_deref().map(hash::of_bytes));
-            frame.map_or(Ok(()), |frame| files.add(&format!("frames/{at}/{t}.png"), frame))?;
-        }
+        let (mut images, mut places, mut map) = (Vec::new(), BTreeMap::new(), map::Map::default());
+        let length = opened.episode.steps.len();
+        let (mut hashes, mut of) = (vec![Value::Null; length], vec![Value::Null; length]);
+        snapshot.each_moment(opened, &mut |t, moment| {
+            map.add(t, &moment.shapes);
+            let Some(frame) = moment.frame else { return };
+            let hash = hash::of_bytes(&frame);
+            let at = *places.entry(hash.clone()).or_insert_with(|| {
+                images.push(STANDARD.encode(smaller(&frame).unwrap_or(frame)));
+                images.len() - 1
+            });
+            (hashes[t - 1], of[t - 1]) = (hash.into(), at.into());
+        })?;
+        told["map"] = map.told(length);
         told["frame_hashes"] = hashes.into();
+        told["images"] = json!({"of": of, "png": images});
     }
-    files.part(&format!("episode-{at}"), &told)
+    Ok((told, said))
+}
+
+/// The columns that are searched, as the server does.
+fn said(told: &Value) -> Value {
+    let steps = told["steps"].as_object().into_iter().flatten();
+    let is_mirror = told["own"] == false;
+    let texts = steps.filter(|(name, _)| !is_mirror || trace::search::SAID.contains(&name.as_str()));
+    let texts = texts.filter(|(_, column)| column["values"].as_array().into_iter().flatten().any(Value::is_string));
+    texts.map(|(name, column)| (name.clone(), column["values"].clone())).collect::<serde_json::Map<_, _>>().into()
+}
+
+/// The same picture in fewer bytes, as a log is written fast and a copy once: a rendered room has few colours and long runs of
+/// them, which a palette keeps and the filters of PNG break. Measured on frames of E1 to E5: 55 % of the bytes.
+fn smaller(frame: &[u8]) -> Option<Vec<u8>> {
+    let mut reader = png::Decoder::new(Cursor::new(frame)).read_info().ok()?;
+    let mut pixels = vec![0; reader.output_buffer_size()?];
+    let info = reader.next_frame(&mut pixels).ok()?;
+    let is_rgb = info.color_type == png::ColorType::Rgb && info.bit_depth == png::BitDepth::Eight;
+    let pixels = pixels.get(..info.buffer_size()).filter(|_| is_rgb)?;
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, info.width, info.height);
+    encoder.set_compression(png::Compression::Balanced);
+    encoder.set_filter(png::Filter::NoFilter);
+    match indexed(pixels) {
+        Some((palette, places)) => {
+            encoder.set_color(png::ColorType::Indexed);
+            encoder.set_palette(palette);
+            encoder.write_header().ok()?.write_image_data(&places).ok()?;
+        }
+        None => {
+            encoder.set_color(png::ColorType::Rgb);
+            encoder.write_header().ok()?.write_image_data(pixels).ok()?;
+        }
+    }
+    (bytes.len() < frame.len()).then_some(bytes)
+}
+
+/// The colours of a picture and each pixel's place among them; `None` if there are more than 256.
+fn indexed(pixels: &[u8]) -> Option<(Vec<u8>, Vec<u8>)> {
+    let (mut palette, mut known): (Vec<u8>, HashMap<&[u8], u8>) = (Vec::new(), HashMap::new());
+    let mut places = Vec::with_capacity(pixels.len() / 3);
+    let mut last: (&[u8], u8) = (&[], 0);
+    for color in pixels.chunks_exact(3) {
+        if last.0 != color {
+            let next = u8::try_from(known.len());
+            let place = match known.get(color) {
+                Some(place) => *place,
+                None => {
+                    palette.extend_from_slice(color);
+                    let next = next.ok()?;
+                    known.insert(color, next);
+                    next
+                }
+            };
+            last = (color, place);
+        }
+        places.push(last.1);
+    }
+    Some((palette, places))
 }
 
 fn check_folder(folder: &Path) -> Result<(), ViewError> {

@@ -2,14 +2,17 @@
 //!
 //! Rule: a condition over what the episode table has is answered from memory; one that asks for steps costs a scan.
 
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet, VecDeque};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use super::error::ViewError;
 use super::snapshot::{Scored, Snapshot};
+use exact::escape::visible;
 use report::cells::group::CONDITION;
 use score::select::{SelectError, select};
 use score::table::EpisodeTable;
 use study::{Question, Results, StudyError};
+use trace::search::{Found, search};
 
 /// The keys and values of a request, in order.
 pub(super) type Query = [(String, String)];
@@ -28,25 +31,44 @@ pub(super) fn required<'q>(query: &'q Query, key: &str) -> Result<&'q str, ViewE
     value(query, key).ok_or_else(|| ViewError::Request(format!("expected `{key}` in the request")))
 }
 
+/// Values of a column that are chosen; `None` for undefined.
+type Chosen = (String, Vec<Option<String>>);
+
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Filter {
-    chosen: Vec<(&'static str, Vec<String>)>,
+    chosen: Vec<Chosen>,
     pub condition: Option<String>,
     words: Option<String>,
 }
 
-/// The columns that values are chosen of.
+/// The columns that have a key of their own in a request.
 pub(super) const COLUMNS: [&str; 3] = ["experiment", "model", CONDITION];
+
+/// The key of all others: `seed=1`, `TSA=0`, `TSA=` where it is undefined.
+const OTHERS: &str = "is";
+
+/// The column of steps that episodes are chosen by; they have such a step.
+pub(super) const STATUS: &str = "reply_status";
 
 impl Filter {
     /// Reads a request.
     pub fn of(query: &Query) -> Self {
-        let values = |column: &str| -> Vec<String> {
-            query.iter().filter(|(key, _)| key == column).map(|(_, value)| value.clone()).collect()
-        };
-        let chosen = COLUMNS.map(|column| (column, values(column)));
+        let mut chosen: Vec<Chosen> = Vec::new();
+        for (key, value) in query {
+            let (column, value) = match (COLUMNS.contains(&key.as_str()), value.split_once('=')) {
+                (true, _) => (key.as_str(), Some(value.clone())),
+                (false, Some((column, value))) if key == OTHERS => {
+                    (column, Some(value.to_owned()).filter(|value| !value.is_empty()))
+                }
+                _ => continue,
+            };
+            match chosen.iter_mut().find(|(known, _)| known == column) {
+                Some((_, values)) => values.push(value),
+                None => chosen.push((column.to_owned(), vec![value])),
+            }
+        }
         Self {
-            chosen: chosen.into_iter().filter(|(_, values)| !values.is_empty()).collect(),
+            chosen,
             condition: value(query, "where").map(str::to_owned),
             words: value(query, "search").map(str::to_lowercase),
         }
@@ -56,13 +78,34 @@ impl Filter {
         *self == Self::default()
     }
 
+    /// The words that are searched for.
+    pub fn words(&self) -> Option<&str> {
+        self.words.as_deref()
+    }
+
     /// The rows of the table that are wanted, in its order.
     pub fn rows(&self, snapshot: &Snapshot) -> Result<Vec<usize>, ViewError> {
         let scored = snapshot.table()?;
         let table = &scored.results.episodes;
-        let kept = self.condition.as_ref().map(|condition| kept(snapshot, scored, condition)).transpose()?;
-        let is_kept = |row: usize| kept.as_ref().is_none_or(|kept| kept.contains(table.keys.get(row).episode_id));
-        Ok((0..table.len()).filter(|row| self.holds(table, *row) && is_kept(*row)).collect())
+        let statuses = self.chosen.iter().filter(|(column, _)| column == STATUS).map(sql_of);
+        let kept = self.condition.clone().into_iter().chain(statuses).map(|condition| snapshot.kept(&condition));
+        let kept: Vec<_> = kept.collect::<Result<_, _>>()?;
+        let said = self.words.as_ref().map(|words| snapshot.said(words)).transpose()?;
+        let chosen = self.chosen.iter().filter(|(column, _)| column != STATUS);
+        let chosen: Vec<_> =
+            chosen.map(|chosen| Ok((values_of(table, &chosen.0)?, &chosen.1))).collect::<Result<_, ViewError>>()?;
+        let is_wanted = |row: &usize| {
+            let key = table.keys.get(*row);
+            let has = |text: &str, words: &String| text.to_lowercase().contains(words);
+            let is_said = || said.as_ref().is_some_and(|said| said.contains_key(key.episode_id));
+            chosen.iter().all(|(of_row, values)| values.contains(&of_row(*row)))
+                && kept.iter().all(|kept| kept.contains(key.episode_id))
+                && self
+                    .words
+                    .as_ref()
+                    .is_none_or(|words| has(key.episode_id, words) || has(key.model, words) || is_said())
+        };
+        Ok((0..table.len()).filter(is_wanted).collect())
     }
 
     /// The results of the rows that are wanted: what tables are made of.
@@ -83,27 +126,58 @@ impl Filter {
     }
 
     /// The same as a condition in the language of definitions, with another one.
-    pub fn as_condition(&self, other: Option<&str>) -> Option<String> {
-        let quoted = |value: &String| format!("'{}'", value.replace('\'', "''"));
-        let chosen = self.chosen.iter().map(|(column, values)| {
-            format!("{column} in ({})", values.iter().map(quoted).collect::<Vec<_>>().join(", "))
-        });
+    pub fn as_condition(&self, snapshot: &Snapshot, other: Option<&str>) -> Result<Option<String>, ViewError> {
+        let chosen = self.chosen.iter().map(sql_of);
         let written = self.condition.iter().map(String::as_str).chain(other).map(|text| format!("({text})"));
-        let all: Vec<String> = written.chain(chosen).collect();
-        (!all.is_empty()).then(|| all.join(" and "))
+        let mut all: Vec<String> = written.chain(chosen).collect();
+        if self.words.is_some() {
+            let keys = &snapshot.table()?.results.episodes.keys;
+            let ids = self.rows(snapshot)?.into_iter().map(|row| quoted(keys.get(row).episode_id));
+            all.push(format!("episode_id in ({})", ids.chain(["''".to_owned()]).collect::<Vec<_>>().join(", ")));
+        }
+        Ok((!all.is_empty()).then(|| all.join(" and ")))
     }
+}
 
-    fn holds(&self, table: &EpisodeTable, row: usize) -> bool {
-        let key = table.keys.get(row);
-        let is_chosen = |(column, values): &(&str, Vec<String>)| match *column {
-            "experiment" => values.iter().any(|value| value == key.experiment),
-            "model" => values.iter().any(|value| value == key.model),
-            _ => values.iter().any(|value| value == condition_of(table, row)),
-        };
-        let has = |text: &str, words: &String| text.to_lowercase().contains(words);
-        self.chosen.iter().all(is_chosen)
-            && self.words.as_ref().is_none_or(|words| has(key.episode_id, words) || has(key.model, words))
-    }
+fn quoted(text: &str) -> String {
+    format!("'{}'", text.replace('\'', "''"))
+}
+
+/// Chosen values as a condition.
+fn sql_of((column, values): &Chosen) -> String {
+    let name = format!("\"{}\"", column.replace('"', "\"\""));
+    let is_text = COLUMNS.contains(&column.as_str()) || [PARTICIPANT, STATUS].contains(&column.as_str());
+    let one = |value: &Option<String>| match value {
+        None => format!("{name} is null"),
+        Some(value) if is_text => format!("{name} = {}", quoted(value)),
+        Some(value) => format!("{name} = {value}"),
+    };
+    let any = values.iter().map(one).collect::<Vec<_>>().join(" or ");
+    if column == STATUS { format!("any({any})") } else { format!("({any})") }
+}
+
+/// Who played, where people did.
+pub(super) const PARTICIPANT: &str = "participant";
+
+/// The values of a column by row, as a request names them.
+pub(super) fn values_of<'t>(
+    table: &'t EpisodeTable,
+    column: &'t str,
+) -> Result<Box<dyn Fn(usize) -> Option<String> + 't>, ViewError> {
+    Ok(match column {
+        "experiment" => Box::new(|row| Some(table.keys.get(row).experiment.to_owned())),
+        "model" => Box::new(|row| Some(table.keys.get(row).model.to_owned())),
+        CONDITION => Box::new(|row| Some(condition_of(table, row).to_owned())),
+        "seed" => Box::new(|row| Some(table.keys.get(row).seed.to_string())),
+        "run" => Box::new(|row| Some(table.keys.get(row).run.to_string())),
+        PARTICIPANT => Box::new(|row| table.label(PARTICIPANT)?.get(row).map(str::to_owned)),
+        name => match table.metric(name) {
+            Some(metric) => Box::new(|row| metric.get(row).map(|value| value.to_string())),
+            None => {
+                return Err(ViewError::Request(format!("nothing to choose by is called `{}`", visible(name))));
+            }
+        },
+    })
 }
 
 /// The condition of an episode; `default` where it has none.
@@ -111,15 +185,61 @@ pub(super) fn condition_of(table: &EpisodeTable, row: usize) -> &str {
     table.label(CONDITION).and_then(|label| label.get(row)).unwrap_or("default")
 }
 
-fn kept(snapshot: &Snapshot, scored: &Scored, condition: &str) -> Result<HashSet<String>, ViewError> {
-    let table = match select(scored.results.episodes.clone(), None, Some(condition)) {
-        Ok(table) => table,
-        Err(SelectError::Condition(_)) => {
-            let options = &snapshot.options;
-            let question = Question { filter: Some(condition.to_owned()), ..options.question.clone() };
-            Scored::study(options, scored.inputs.clone(), question)?.score()?.episodes
+impl Snapshot {
+    /// The episodes where a condition holds. One over steps takes a scan, so that the last ones are kept.
+    fn kept(&self, condition: &str) -> Result<Arc<HashSet<String>>, ViewError> {
+        let scored = self.table()?;
+        let found = || {
+            let table = match select(scored.results.episodes.clone(), None, Some(condition)) {
+                Ok(table) => table,
+                Err(SelectError::Condition(_)) => {
+                    let options = &self.options;
+                    let question = Question { filter: Some(condition.to_owned()), ..options.question.clone() };
+                    Scored::study(options, scored.inputs.clone(), question)?.score()?.episodes
+                }
+                Err(error) => return Err(StudyError::from(error).into()),
+            };
+            Ok(table.keys.iter().map(|key| key.episode_id.to_owned()).collect())
+        };
+        self.answers.kept.get(condition, found)
+    }
+
+    /// The episodes that have these words in what was said.
+    pub fn said(&self, words: &str) -> Result<Arc<BTreeMap<String, Found>>, ViewError> {
+        let scored = self.table()?;
+        self.answers.said.get(words, || Ok(search(scored.study.traces()?, words, self.options.threads)?))
+    }
+}
+
+/// What took a scan to answer, the last of it.
+#[derive(Debug, Default)]
+pub(super) struct Answers {
+    kept: Last<HashSet<String>>,
+    said: Last<BTreeMap<String, Found>>,
+}
+
+/// Some answers by their questions.
+#[derive(Debug)]
+struct Last<T>(Mutex<VecDeque<(String, Arc<T>)>>);
+
+impl<T> Default for Last<T> {
+    fn default() -> Self {
+        Self(Mutex::default())
+    }
+}
+
+impl<T> Last<T> {
+    const MOST: usize = 4;
+
+    /// The answer to a question, which is found where it was not asked lately. Whoever asks meanwhile waits for it.
+    fn get(&self, question: &str, find: impl FnOnce() -> Result<T, ViewError>) -> Result<Arc<T>, ViewError> {
+        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, answer)) = kept.iter().find(|(asked, _)| asked == question) {
+            return Ok(Arc::clone(answer));
         }
-        Err(error) => return Err(StudyError::from(error).into()),
-    };
-    Ok(table.keys.iter().map(|key| key.episode_id.to_owned()).collect())
+        let answer = Arc::new(find()?);
+        kept.truncate(Self::MOST - 1);
+        kept.push_front((question.to_owned(), Arc::clone(&answer)));
+        Ok(answer)
+    }
 }

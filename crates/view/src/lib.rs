@@ -18,6 +18,7 @@ mod compare;
 mod episode;
 mod error;
 pub mod export;
+pub mod film;
 mod filter;
 mod found;
 mod list;
@@ -29,6 +30,7 @@ mod page;
 mod rendered;
 pub mod routes;
 mod snapshot;
+mod verdict;
 
 use std::ffi::OsString;
 use std::num::NonZeroUsize;
@@ -79,10 +81,11 @@ impl View {
         self.newest().has(id)
     }
 
-    /// The bytes of an answer as the server gives them, JSON or PNG; `None` where there is no such question.
+    /// The bytes of an answer as the server gives them: JSON, PNG or a page; `None` where there is no such question.
     pub fn ask(&self, name: &str, query: &[(String, String)]) -> Option<Result<Vec<u8>, ViewError>> {
         let bytes = |answer| match answer {
             answer::Answer::Json(bytes) | answer::Answer::Png(bytes) => bytes,
+            answer::Answer::Page(page) => page.into_bytes(),
         };
         answer::answer(self, name, query).map(|answer| answer.map(bytes))
     }

@@ -19,6 +19,15 @@ pub(super) fn answer(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewEr
     let rows = sorted(snapshot, query)?;
     let offset = number(query, "offset")?.unwrap_or_default().min(rows.len());
     let limit = number(query, "limit")?.unwrap_or(100).min(MOST);
+    let said = Filter::of(query).words().map(|words| snapshot.said(words)).transpose()?;
+    let with_words = |table: &EpisodeTable, row: usize| {
+        let mut told = told(table, row);
+        if let Some(found) = said.as_ref().and_then(|said| said.get(table.keys.get(row).episode_id)) {
+            let (t, column, excerpt) = (found.t, visible(&found.column), visible(&found.excerpt));
+            told["said"] = json!({"t": t, "column": column, "excerpt": excerpt, "steps": found.steps});
+        }
+        told
+    };
     let page: Vec<usize> = rows[offset..].iter().take(limit).copied().collect();
     Ok(json!({
         "total": rows.len(),
@@ -27,7 +36,7 @@ pub(super) fn answer(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewEr
         "generation": snapshot.generation,
         "metrics": table.metrics.iter().map(|metric| visible(&metric.name)).collect::<Vec<_>>(),
         "has_conditions": table.has_conditions(),
-        "rows": page.iter().map(|row| told(table, *row)).collect::<Vec<_>>(),
+        "rows": page.iter().map(|row| with_words(table, *row)).collect::<Vec<_>>(),
     }))
 }
 

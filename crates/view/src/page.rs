@@ -11,7 +11,7 @@ const BODY: &str = include_str!("../../../assets/view/body.html");
 const STYLE: &str = include_str!("../../../assets/view/view.css");
 
 /// The modules, each after those that it imports.
-const MODULES: [(&str, &str); 12] = [
+const MODULES: [(&str, &str); 14] = [
     ("dom.js", include_str!("../../../assets/view/dom.js")),
     ("where.js", include_str!("../../../assets/view/where.js")),
     ("data.js", include_str!("../../../assets/view/data.js")),
@@ -19,7 +19,9 @@ const MODULES: [(&str, &str); 12] = [
     ("filters.js", include_str!("../../../assets/view/filters.js")),
     ("overview.js", include_str!("../../../assets/view/overview.js")),
     ("list.js", include_str!("../../../assets/view/list.js")),
+    ("values.js", include_str!("../../../assets/view/values.js")),
     ("map.js", include_str!("../../../assets/view/map.js")),
+    ("timeline.js", include_str!("../../../assets/view/timeline.js")),
     ("episode.js", include_str!("../../../assets/view/episode.js")),
     ("compare.js", include_str!("../../../assets/view/compare.js")),
     ("live.js", include_str!("../../../assets/view/live.js")),

@@ -71,6 +71,10 @@ async fn api(
             let kept = (header::CACHE_CONTROL, "private, max-age=600");
             ([(header::CONTENT_TYPE, "image/png"), kept], bytes).into_response()
         }
+        Ok(Some(Ok(Answer::Page(page)))) => {
+            let kept = (header::CONTENT_DISPOSITION, "attachment; filename=\"episode.html\"");
+            ([(header::CONTENT_TYPE, "text/html; charset=utf-8"), kept], page).into_response()
+        }
         Ok(Some(Err(error))) => {
             let status = match &error {
                 ViewError::Absent(_) => StatusCode::NOT_FOUND,

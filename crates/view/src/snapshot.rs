@@ -1,5 +1,6 @@
 //! The state of recordings at one time: their episodes, scored, and where each is.
 
+use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::io::ErrorKind;
 use std::ops::Range;
@@ -8,6 +9,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use super::Options;
 use super::error::ViewError;
+use super::filter::Answers;
 use super::found::{Found, Stamp};
 use exact::escape::visible;
 use study::{Outputs, Question, Results, Study};
@@ -38,6 +40,8 @@ pub(super) struct Snapshot {
     pub stamps: Vec<Stamp>,
     logs: Vec<PathBuf>,
     indices: Mutex<BTreeMap<PathBuf, Option<Arc<LogIndex>>>>,
+    reading: Mutex<()>,
+    pub answers: Answers,
     #[cfg(feature = "sim")]
     rendered: Arc<super::rendered::Rendered>,
 }
@@ -108,6 +112,8 @@ impl Snapshot {
             stamps,
             logs: found.logs,
             indices: Mutex::default(),
+            reading: Mutex::default(),
+            answers: Answers::default(),
             #[cfg(feature = "sim")]
             rendered: Arc::default(),
         })
@@ -125,6 +131,8 @@ impl Snapshot {
             stamps: self.stamps.clone(),
             logs: self.logs.clone(),
             indices: Mutex::default(),
+            reading: Mutex::default(),
+            answers: Answers::default(),
             #[cfg(feature = "sim")]
             rendered: Arc::clone(&self.rendered),
         }
@@ -278,25 +286,51 @@ impl Snapshot {
         serde_json::from_str(file.metadata_value(trace::schema::RECORDING_KEY)?).ok()
     }
 
-    /// The shapes of each step, by its t; nothing where there is no log.
-    pub fn shapes(&self, opened: &Opened) -> Result<BTreeMap<usize, Vec<Shape>>, ViewError> {
+    /// Gives the shapes of each step with its t; nothing where there is no log. One log at a time is read for shapes, whoever asks.
+    pub fn each_shapes(&self, opened: &Opened, give: &mut dyn FnMut(usize, Vec<Shape>)) -> Result<(), LogError> {
+        let _one = self.reading.lock().unwrap_or_else(PoisonError::into_inner);
         let times: BTreeMap<u64, usize> =
             (1..=opened.episode.steps.len()).filter_map(|t| Some((time_of(&opened.episode, t)?, t))).collect();
-        let named = |found: BTreeMap<u64, Vec<Shape>>| -> BTreeMap<usize, Vec<Shape>> {
-            found.into_iter().filter_map(|(time, shapes)| Some((*times.get(&time)?, shapes))).collect()
+        let is_found = Cell::new(false);
+        let mut give = |time: u64, shapes: Vec<Shape>| {
+            if let Some(t) = times.get(&time) {
+                is_found.set(true);
+                give(*t, shapes);
+            }
         };
         if let Some(log) = &opened.running {
-            return Ok(named(frames::unfinished_shapes(log)?));
+            return frames::each_unfinished_shapes(log, &mut give);
         }
         let wanted: BTreeSet<u64> = times.keys().copied().collect();
         for log in self.logs_of(opened) {
             let Some(index) = self.index(log)? else { continue };
-            let found = index.shapes(&opened.episode.episode_id, &wanted)?;
-            if !found.is_empty() {
-                return Ok(named(found));
+            index.each_shapes(&opened.episode.episode_id, &wanted, &mut give)?;
+            if is_found.get() {
+                break;
             }
         }
-        Ok(BTreeMap::new())
+        Ok(())
+    }
+
+    /// Gives what the logs have of each step of a whole episode, in one reading of its log.
+    pub fn each_moment(&self, opened: &Opened, give: &mut dyn FnMut(usize, Moment)) -> Result<(), LogError> {
+        let times: BTreeMap<u64, usize> =
+            (1..=opened.episode.steps.len()).filter_map(|t| Some((time_of(&opened.episode, t)?, t))).collect();
+        let wanted: BTreeSet<u64> = times.keys().copied().collect();
+        let found = Cell::new(false);
+        for log in self.logs_of(opened) {
+            let Some(index) = self.index(log)? else { continue };
+            index.each_moment(&opened.episode.episode_id, &wanted, &mut |time, moment| {
+                found.set(true);
+                if let Some(t) = times.get(&time) {
+                    give(*t, moment);
+                }
+            })?;
+            if found.get() {
+                break;
+            }
+        }
+        Ok(())
     }
 
     fn logs_of(&self, opened: &Opened) -> impl Iterator<Item = &PathBuf> {

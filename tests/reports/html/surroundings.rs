@@ -78,3 +78,65 @@ fn paper_has_everything_but_the_controls() {
     assert!(!browser.holds("document.querySelector('details').open"), "what was folded is folded again");
     browser.close();
 }
+
+#[test]
+fn what_stays_whole_on_paper_is_less_than_half_a_page() {
+    let mut browser = Browser::open(&PAPER_PAGE);
+    // A4 between its margins: 186 mm x 269 mm, at 96 px per inch.
+    let size = json!({"width": 703, "height": 1017, "deviceScaleFactor": 1, "mobile": false});
+    browser.send("Emulation.setDeviceMetricsOverride", &size);
+    browser.send("Emulation.setEmulatedMedia", &json!({"media": "print"}));
+    browser.value("dispatchEvent(new Event('beforeprint'))");
+    let large = "[...document.querySelectorAll('body *')].filter((e) => e.checkVisibility() \
+        && getComputedStyle(e).breakInside === 'avoid' && e.getBoundingClientRect().height > 1017 / 2) \
+        .map((e) => `${e.tagName} ${e.id} ${e.getBoundingClientRect().height}`)";
+    assert_eq!(browser.texts(large), Vec::<String>::new());
+    let text = "[...document.querySelectorAll('pre')].filter((e) => e.checkVisibility()).map((e) => e.textContent.slice(0, 40))";
+    assert_eq!(browser.texts(text), Vec::<String>::new(), "text of fixed width stays folded");
+    browser.close();
+}
+
+/// Episodes of many models, as a large study has them.
+fn of_many(models: usize, experiments: usize, runs: usize) -> Vec<trace::episode::Episode> {
+    let step = |action, right: bool| trace::episode::Step {
+        action: Some(action),
+        self_color: Some(if right { "red" } else { "blue" }.into()),
+        selected_cube: Some(if right { "red" } else { "blue" }.into()),
+        mirror_visible: right,
+        ..trace::episode::Step::default()
+    };
+    let episode = |model: usize, experiment: usize, run: usize| {
+        let right = (model * 31 + run * 17 + experiment) % 50 < model;
+        trace::episode::Episode {
+            episode_id: format!("E{experiment}/vendor-model-{model:02}/s{}/r{}", 1 + run / 7, 1 + run % 7),
+            model: format!("vendor-model-{model:02}"),
+            experiment: format!("E{experiment}"),
+            seed: i32::try_from(1 + run / 7).unwrap(),
+            run: i32::try_from(1 + run % 7).unwrap(),
+            body_color: "red".into(),
+            steps: vec![step(trace::episode::Action::TurnLeft, right), step(trace::episode::Action::Done, right)],
+            ..trace::episode::Episode::default()
+        }
+    };
+    let of_model =
+        |model| (1..=experiments).flat_map(move |experiment| (0..runs).map(move |run| episode(model, experiment, run)));
+    (0..models).flat_map(of_model).collect()
+}
+
+#[test]
+fn ten_thousand_episodes_of_fifty_models_are_four_megabytes() {
+    let folder = tempfile::tempdir().unwrap();
+    trace::write::write_episodes(&folder.path().join("many.parquet"), None, &of_many(50, 5, 40)).unwrap();
+    let written = crate::harness::program::run(folder.path(), &["report", "many.parquet", "--out", "report"]);
+    written.done();
+    let page = std::fs::read_to_string(folder.path().join("report/report.html")).unwrap();
+    assert!(page.len() <= 4_000_000, "{} bytes", page.len());
+    assert!(page.contains("The best 12 of 50 models by TSA."), "figures say that they leave models out");
+    let mut browser = Browser::open(&page);
+    assert!(browser.holds("document.querySelectorAll('#pair tbody tr').length > 0"));
+    assert!(
+        browser
+            .holds("/further metrics and experiments are left out/.test(document.querySelector('#pair').textContent)")
+    );
+    browser.close();
+}

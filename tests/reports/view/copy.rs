@@ -22,6 +22,39 @@ fn a_copy_shows_the_same_from_a_disk() {
     browser.close();
 }
 
+/// Recordings as large as a study has them: each log has more steps than a reader looks at.
+#[test]
+fn a_copy_is_few_files_with_every_frame_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let written = run(folder.path(), &["view", RECORDED, "--export", "page"]);
+    written.done();
+    let page = folder.path().join("page");
+    let files: Vec<_> =
+        ["data", "assets", "."].iter().flat_map(|inside| std::fs::read_dir(page.join(inside)).unwrap()).collect();
+    assert!(files.len() <= 33 + 20, "one file per episode: {}", files.len());
+    assert!(!page.join("frames").exists());
+    let list = std::fs::read_to_string(page.join("data/list.js")).unwrap();
+    let list: serde_json::Value =
+        serde_json::from_str(list.split_once(", ").unwrap().1.trim_end().trim_end_matches(");")).unwrap();
+    let at = list["rows"].as_array().unwrap().iter().position(|row| row["id"] == "E1/guesser/s1/r1").unwrap();
+    let part = std::fs::read_to_string(page.join(format!("data/episode-{at}.js"))).unwrap();
+    let part: serde_json::Value =
+        serde_json::from_str(part.split_once(", ").unwrap().1.trim_end().trim_end_matches(");")).unwrap();
+    let hashes: std::collections::BTreeSet<_> =
+        part["frame_hashes"].as_array().unwrap().iter().map(|hash| hash.as_str().unwrap()).collect();
+    assert_eq!(part["images"]["png"].as_array().unwrap().len(), hashes.len());
+    // The pictures are those of the log, in other bytes.
+    let server = Server::start(folder.path(), &[RECORDED]);
+    for (t, image) in part["images"]["of"].as_array().unwrap().iter().enumerate() {
+        let text = part["images"]["png"][usize::try_from(image.as_u64().unwrap()).unwrap()].as_str().unwrap();
+        let copied = base64::Engine::decode(&base64::engine::general_purpose::STANDARD, text).unwrap();
+        let frame = server.get(&format!("/api/frame?id=E1/guesser/s1/r1&t={}", t + 1)).body;
+        assert!(copied.len() <= frame.len());
+        let pixels = |bytes: &[u8]| resvg::tiny_skia::Pixmap::decode_png(bytes).unwrap();
+        assert!(pixels(&copied) == pixels(&frame), "t = {}", t + 1);
+    }
+}
+
 #[test]
 fn a_copy_replaces_a_copy_and_nothing_else() {
     let folder = tempfile::tempdir().unwrap();
@@ -77,6 +110,10 @@ fn a_copy_filters_as_the_server_does_or_says_that_it_cannot() {
         "where=scene+is+null",
         "where=TSA+%3D+1&model=oracle",
         "where=seed+%3D+1&search=guess",
+        "search=as+good+as+another",
+        "search=I+HOLD+my+body",
+        "is=TSA%3D0&is=seed%3D1",
+        "is=SC%3D&model=oracle",
         "model=oracle&model=mimic",
     ] {
         let expected = server

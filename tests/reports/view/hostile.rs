@@ -43,10 +43,9 @@ fn looked_at(browser: &mut Browser) {
     browser.click("#table-main td[data-metric] a");
     until(browser, "document.querySelector('.list .rows a')");
     browser.click(".list .rows a");
-    until(
-        browser,
-        "document.querySelector('.step [data-column=reasoning]') && document.querySelector('svg.map .here')",
-    );
+    until(browser, "document.querySelector('svg.map .here')");
+    browser.press("Home");
+    until(browser, "document.querySelector('.step [data-column=reasoning]')");
     let head = browser.text("document.querySelector('h1').textContent");
     assert_eq!(head, ID.replace('\u{2067}', "\\u{2067}"));
     let said = "document.querySelector('.step [data-column=reasoning]').textContent";

@@ -1,6 +1,9 @@
 //! `mirrorstats view`: the server as a process, its page in a browser, and its copy from a disk.
 
+pub mod accessible;
 mod copy;
+mod find;
+mod first_screen;
 mod hostile;
 #[cfg(feature = "sim")]
 mod live;

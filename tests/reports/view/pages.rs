@@ -27,6 +27,7 @@ fn from_the_report_to_the_step_that_decided() {
     until(&mut browser, "document.querySelector('.metric') && document.querySelector('img.frame').complete");
     assert!(browser.holds("document.querySelector('img.frame').naturalWidth > 0"));
     until(&mut browser, "document.querySelectorAll('svg.map .cube').length > 0");
+    browser.press("Home");
     browser.press("ArrowRight");
     assert!(browser.text("location.search").contains("t=2"));
     let t = browser.text("document.querySelector('.metric button.jump').dataset.t");
@@ -119,6 +120,65 @@ fn two_episodes_are_called_alike_nowhere() {
     let count = browser.text("document.querySelector('#differing').textContent");
     assert!(count.ends_with(&format!("differs at {} of {long} steps.", told["differing"])), "{count}");
     browser.close();
+}
+
+#[test]
+fn episodes_are_aligned_by_what_happened_in_them() {
+    let folder = tempfile::tempdir().unwrap();
+    run(folder.path(), &["view", RECORDED, "--where", "experiment = 'E1'", "--export", "page"]).done();
+    let server = Server::start(folder.path(), &[RECORDED]);
+    let (a, b) = ("E1/oracle/s1/r1", "E1/guesser/s1/r1");
+    let told = server.get(&format!("/api/compare?a={a}&b={b}&align=decision")).json();
+    let length = |side: &str| told[side]["length"].as_u64().unwrap();
+    let lead = length("a") - length("b");
+    assert_eq!((&told["leads"]["a"], &told["leads"]["b"]), (&0.into(), &lead.into()), "both end with their decision");
+    assert!(told["ended"].is_null());
+    let steps = told["differences"].as_array().unwrap();
+    assert!(steps.iter().all(|step| step["t"].as_u64().unwrap() > lead));
+    let acts = steps.iter().filter(|step| !step["columns"].as_array().unwrap().is_empty()).count() as u64;
+    assert_eq!(told["differing"], acts + lead, "steps of one alone differ too");
+    assert!(
+        server.get(&format!("/api/compare?a={a}&b={b}&align=sight")).json()["aligned"].is_null(),
+        "B never sees it"
+    );
+    let page = format!("file://{}/index.html", folder.path().join("page").display());
+    for base in [server.link.as_str(), page.as_str()] {
+        let mut browser = Browser::at(&format!("{base}?view=compare&a={a}&b={b}&align=decision"));
+        until(&mut browser, "document.querySelectorAll('.side .step').length === 2");
+        let count = browser.text("document.querySelector('#differing').textContent");
+        assert!(
+            count.ends_with(&format!("differs at {} of {} steps.", told["differing"], length("a"))),
+            "{base}: {count}"
+        );
+        browser.press("Home");
+        until(&mut browser, "document.querySelector('.parted').textContent === 'B has not begun.'");
+        browser.press("End");
+        until(&mut browser, "document.querySelector('.parted').textContent.startsWith('Here')");
+        let places = browser.texts("[...document.querySelectorAll('.side')].map((side) => side.textContent)");
+        let said = [length("a"), length("b")].map(|t| format!("t = {t}"));
+        assert!(places.iter().zip(&said).all(|(place, words)| place.contains(words)), "{places:?}");
+        browser.close();
+    }
+}
+
+#[test]
+fn every_model_on_one_scene_is_a_grid() {
+    let folder = tempfile::tempdir().unwrap();
+    run(folder.path(), &["view", RECORDED, "--where", "experiment = 'E1'", "--export", "page"]).done();
+    let server = Server::start(folder.path(), &[RECORDED]);
+    let page = format!("file://{}/index.html", folder.path().join("page").display());
+    let mut told = Vec::new();
+    for base in [server.link.as_str(), page.as_str()] {
+        let mut browser = Browser::at(&format!("{base}?view=episode&id=E1/oracle/s1/r1"));
+        until(&mut browser, "document.querySelector('.turn a[href*=scene]')");
+        browser.click(".turn a[href*=scene]");
+        until(&mut browser, "document.querySelectorAll('.scene > li').length > 1");
+        told.push(browser.texts("[...document.querySelectorAll('.scene > li')].map((own) => `${own.querySelector('h2').textContent} ${own.querySelector('.verdict').textContent}`)"));
+        browser.close();
+    }
+    assert_eq!(told[0].len(), 7, "{told:?}");
+    assert!(told[0].iter().any(|own| own == "guesser chose brown, is green: wrong at t = 3; never saw the mirror"));
+    assert_eq!(told[0], told[1], "the copy shows the same");
 }
 
 #[test]

@@ -110,6 +110,7 @@ pub fn draw(name: FigureName, input: &Input<'_>) -> Result<Figure, FigureError> 
     let printed = input.width.map(|width| width.printed(sheet.width()).map_err(too_narrow)).transpose()?;
     let title = input.title.unwrap_or_else(|| name.title());
     let figure = Figure::new(sheet, height, title, shown::caption(name, &metrics, input.sheets));
+    let figure = figure.with_models(matrix.models.len());
     Ok(match printed {
         Some(px) => figure.printed(px),
         None => figure,

@@ -12,9 +12,12 @@ use crate::statistics::text::pairs::{FamilyText, PairText, families};
 use crate::statistics::text::percent;
 use exact::escape::visible;
 
+/// The most tests in a page, some 700 kB: fifty models have more than a thousand pairs under each metric.
+const MOST_TESTS: usize = 7_000;
+
 /// All tests of pairs of models; null where there are no two.
 pub(super) fn pairs(statistics: Option<&Statistics>) -> Json {
-    let families = statistics.map(families).unwrap_or_default();
+    let (families, left_out) = within(statistics.map(families).unwrap_or_default());
     let tests = || families.iter().flat_map(|family| &family.tests);
     let models: BTreeSet<&str> = tests().flat_map(|test| [test.first, test.second]).collect();
     let models: Vec<&str> = models.into_iter().collect();
@@ -38,11 +41,43 @@ pub(super) fn pairs(statistics: Option<&Statistics>) -> Json {
             "tests": family.tests.iter().map(told).collect::<Vec<_>>(),
         })
     };
-    json!({
+    let mut told = json!({
         "models": models.iter().map(|name| visible(name)).collect::<Vec<_>>(),
         "methods": methods,
         "families": families.iter().map(family).collect::<Vec<_>>(),
-    })
+    });
+    if left_out > 0 {
+        told["left_out"] = left_out.into();
+    }
+    told
+}
+
+/// The families that a page has room for, and how many it has not: those over all experiments first, then metric by metric.
+fn within(families: Vec<FamilyText<'_>>) -> (Vec<FamilyText<'_>>, usize) {
+    let mut metrics: Vec<&str> = Vec::new();
+    for family in &families {
+        if !metrics.contains(&family.metric) {
+            metrics.push(family.metric);
+        }
+    }
+    let mut order: Vec<usize> = (0..families.len()).collect();
+    let place = |at: &usize| metrics.iter().position(|metric| *metric == families[*at].metric);
+    order.sort_by_key(|at| (families[*at].experiment.is_some(), place(at)));
+    let mut room = MOST_TESTS;
+    let kept: BTreeSet<usize> = order
+        .into_iter()
+        .take_while(|at| {
+            room.checked_sub(families[*at].tests.len()).is_some_and(|left| {
+                room = left;
+                true
+            })
+        })
+        .collect();
+    let all = families.len();
+    let families: Vec<_> =
+        families.into_iter().enumerate().filter(|(at, _)| kept.contains(at)).map(|(_, family)| family).collect();
+    let left_out = all - families.len();
+    (families, left_out)
 }
 
 pub(super) fn heading(statistics: Option<&Statistics>) -> Json {

@@ -1,10 +1,12 @@
 //! The inputs of figures, and the figures of a report.
 
 use std::borrow::Cow;
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use crate::error::StudyError;
 use crate::results::Results;
+use metric::catalog::Better;
 use report::bundle::OutputFile;
 use report::cells::Cells;
 use report::cells::group::{DEFAULT_BY, group};
@@ -22,11 +24,13 @@ pub struct FigureOptions {
     pub title: Option<String>,
     /// The width on paper; as wide as it is drawn if None.
     pub width: Option<FigureWidth>,
+    /// Only so many models, the best by their means of the first metric over all experiments; all if None.
+    pub top: Option<usize>,
 }
 
 impl Default for FigureOptions {
     fn default() -> Self {
-        Self { style: PathBuf::from("default"), metrics: None, title: None, width: None }
+        Self { style: PathBuf::from("default"), metrics: None, title: None, width: None, top: None }
     }
 }
 
@@ -37,7 +41,14 @@ pub struct FigureInputs<'a> {
     style: &'a Style,
     options: FigureOptions,
     results: Cow<'a, Results>,
+    remark: Option<String>,
 }
+
+/// More models than a figure shows well.
+pub const MANY_MODELS: usize = 20;
+
+/// How many of many models the figures of a report show.
+const SHOWN_OF_MANY: usize = 12;
 
 /// The figures of a report.
 #[derive(Debug, Default)]
@@ -56,7 +67,22 @@ impl<'a> FigureInputs<'a> {
     pub fn of(results: &'a Results, style: &'a Style) -> Result<Self, StudyError> {
         let results = results.with_conditions_as_models();
         let cells = group(&results.episodes, &DEFAULT_BY.map(str::to_owned))?;
-        Ok(Self { cells, style, options: FigureOptions::default(), results })
+        Ok(Self { cells, style, options: FigureOptions::default(), results, remark: None })
+    }
+
+    /// The same for a page or a folder of all figures: of many models the best, which the captions say.
+    ///
+    /// # Errors
+    /// As [`FigureInputs::of`].
+    pub fn of_a_report(results: &'a Results, style: &'a Style) -> Result<Self, StudyError> {
+        let all = Self::of(results, style)?;
+        let metric = results.episodes.catalog.metric.iter().find(|(_, metric)| metric.better != Better::Neither);
+        let models: BTreeSet<&str> = all.results.episodes.keys.iter().map(|key| key.model).collect();
+        let Some((metric, _)) = metric.filter(|_| models.len() > MANY_MODELS) else { return Ok(all) };
+        let remark = format!("The best {SHOWN_OF_MANY} of {} models by {metric}.", models.len());
+        let results: Cow<'_, Results> = Cow::Owned(all.results.into_owned().of_the_best(SHOWN_OF_MANY, metric));
+        let cells = group(&results.episodes, &DEFAULT_BY.map(str::to_owned))?;
+        Ok(Self { cells, style, options: FigureOptions::default(), results, remark: Some(remark) })
     }
 
     pub(crate) fn with(self, options: FigureOptions) -> Self {
@@ -76,7 +102,7 @@ impl<'a> FigureInputs<'a> {
         let mut drawings = Drawings::default();
         for name in FigureName::ALL {
             match self.draw(name) {
-                Ok(figure) => drawings.drawn.push((name, figure)),
+                Ok(figure) => drawings.drawn.push((name, figure.remarked(self.remark.as_deref()))),
                 Err(error) => drawings.left_out.push((name, error)),
             }
         }

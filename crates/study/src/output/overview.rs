@@ -54,7 +54,7 @@ impl Study {
         let Counted { results, lost, all } = counted;
         let replies = Replies::of(all.as_ref().unwrap_or(&results.episodes));
         let drawings = match part {
-            Part::Figures => FigureInputs::of(&results, &style)?.draw_all(),
+            Part::Figures => FigureInputs::of_a_report(&results, &style)?.draw_all(),
             Part::Tables | Part::Statistics => crate::Drawings::default(),
         };
         let svgs: Vec<String> = drawings.drawn.iter().map(|(_, figure)| figure.inline_svg()).collect();

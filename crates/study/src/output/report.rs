@@ -249,7 +249,7 @@ impl Report {
     }
 
     fn illustrate(&mut self, statistics: &Statistics) -> Result<(), StudyError> {
-        let drawings = FigureInputs::of(&self.results, &self.style)?.draw_all();
+        let drawings = FigureInputs::of_a_report(&self.results, &self.style)?.draw_all();
         self.notes.extend(drawings.left_out.iter().map(|(name, reason)| format!("no figure `{name}`: {reason}")));
         self.illustrations = drawings.files()?;
         if self.results.episodes.len() > MOST_LISTED {

@@ -8,7 +8,7 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
-use mcap::records::Record;
+use mcap::records::{MessageHeader, Record};
 use serde::Serialize;
 
 use super::chunk::{Budgets, inside};
@@ -92,7 +92,7 @@ impl LogIndex {
     pub fn step(&self, episode_id: &str, time: u64) -> Result<Option<Moment>, LogError> {
         let mut records = records(&self.path)?;
         for chunk in self.chunks.iter().filter(|chunk| (chunk.first..=chunk.last).contains(&time)) {
-            let messages = self.messages(&mut records, chunk, episode_id)?;
+            let messages = self.messages(&mut records, chunk, episode_id, |header| header.log_time == time)?;
             if let Some(moment) = moment(messages, &self.topics, time) {
                 return Ok(Some(moment));
             }
@@ -100,53 +100,85 @@ impl LogIndex {
         Ok(None)
     }
 
-    /// The shapes of the steps of an episode at these times, ns; a step that the log does not have is left out.
-    pub fn shapes(&self, episode_id: &str, times: &BTreeSet<u64>) -> Result<BTreeMap<u64, Vec<Shape>>, LogError> {
-        let mut found = BTreeMap::new();
-        let (Some(first), Some(last)) = (times.first(), times.last()) else { return Ok(found) };
+    /// Gives the shapes of the steps of an episode at these times, ns, one step after the other; a step that the log does not
+    /// have is left out.
+    pub fn each_shapes(
+        &self,
+        episode_id: &str,
+        times: &BTreeSet<u64>,
+        give: &mut dyn FnMut(u64, Vec<Shape>),
+    ) -> Result<(), LogError> {
+        let (Some(first), Some(last)) = (times.first(), times.last()) else { return Ok(()) };
         let mut records = records(&self.path)?;
+        let is_wanted =
+            |header: &MessageHeader| times.contains(&header.log_time) && self.is_of(header.channel_id, topic::SCENE);
         for chunk in self.chunks.iter().filter(|chunk| chunk.first <= *last && chunk.last >= *first) {
-            for record in self.messages(&mut records, chunk, episode_id)? {
-                if let Record::Message { header, data } = record
-                    && times.contains(&header.log_time)
-                    && self.is_of(header.channel_id, topic::SCENE)
-                {
-                    found.insert(header.log_time, shapes(&data));
+            for record in self.messages(&mut records, chunk, episode_id, is_wanted)? {
+                if let Record::Message { header, data } = record {
+                    give(header.log_time, shapes(&data));
                 }
             }
         }
-        Ok(found)
+        Ok(())
     }
 
+    /// Gives what the log has of the steps of an episode at these times, ns, one after the other, in one reading.
+    pub fn each_moment(
+        &self,
+        episode_id: &str,
+        times: &BTreeSet<u64>,
+        give: &mut dyn FnMut(u64, Moment),
+    ) -> Result<(), LogError> {
+        let (Some(first), Some(last)) = (times.first(), times.last()) else { return Ok(()) };
+        let mut records = records(&self.path)?;
+        for chunk in self.chunks.iter().filter(|chunk| chunk.first <= *last && chunk.last >= *first) {
+            let mut moments: BTreeMap<u64, Moment> = BTreeMap::new();
+            let is_wanted = |header: &MessageHeader| times.contains(&header.log_time);
+            for record in self.messages(&mut records, chunk, episode_id, is_wanted)? {
+                if let Record::Message { header, data } = record
+                    && let Some(topic) = self.topics.get(&header.channel_id)
+                    && topic != topic::EPISODE
+                {
+                    add(moments.entry(header.log_time).or_default(), topic, &data);
+                }
+            }
+            moments.into_iter().for_each(|(time, moment)| give(time, moment));
+        }
+        Ok(())
+    }
+
+    /// The messages of a chunk that are wanted: most of its bytes are frames, which are not kept.
     fn messages(
         &self,
         records: &mut Records<BufReader<File>>,
         chunk: &Chunk,
         episode_id: &str,
+        is_wanted: impl Fn(&MessageHeader) -> bool,
     ) -> Result<Vec<Record<'static>>, LogError> {
         let bytes = records.chunk_at(chunk.at).map_err(LogError::io("read", &self.path))?;
         let bytes = bytes.ok_or_else(|| self.damaged("its index names a chunk that is not there"))?;
         let unpacked = inside(&bytes, &Budgets::new(records.bytes())).map_err(|fault| self.damaged(&fault))?;
-        let messages: Vec<Record<'static>> = unpacked.collect();
-        Ok(if self.is_of_another(&messages, episode_id) { Vec::new() } else { messages })
+        let (mut kept, mut begun) = (Vec::new(), Vec::new());
+        for record in unpacked {
+            let Record::Message { header, data } = &record else { continue };
+            begun.extend(self.begins(header, data).map(|id| id == episode_id));
+            if is_wanted(header) {
+                kept.push(record);
+            }
+        }
+        // Where all episodes that begin in a chunk are others, it is of them. Where none begins the time tells.
+        Ok(if !begun.is_empty() && !begun.contains(&true) { Vec::new() } else { kept })
     }
 
-    /// Whether the episodes that begin in a chunk are all others. In a chunk where none begins it is not known, and the time
-    /// tells.
-    fn is_of_another(&self, messages: &[Record<'static>], episode_id: &str) -> bool {
-        let begun: Vec<bool> = messages
-            .iter()
-            .filter_map(|record| match record {
-                Record::Message { header, data } if self.is_of(header.channel_id, topic::EPISODE) => {
-                    match event(topic::EPISODE, data.as_ref()) {
-                        Ok(Event::Episode(EpisodeMessage::Begin(head))) => Some(head.episode_id == episode_id),
-                        _ => None,
-                    }
-                }
-                _ => None,
-            })
-            .collect();
-        !begun.is_empty() && !begun.contains(&true)
+    /// The id of the episode that a message begins.
+    fn begins(&self, header: &MessageHeader, data: &[u8]) -> Option<String> {
+        if !self.is_of(header.channel_id, topic::EPISODE) {
+            return None;
+        }
+        match event(topic::EPISODE, data) {
+            Ok(Event::Episode(EpisodeMessage::Begin(head))) => Some(head.episode_id),
+            _ => None,
+        }
     }
 
     fn is_of(&self, channel: u16, topic: &str) -> bool {
@@ -180,15 +212,13 @@ pub fn unfinished_step(path: &Path, time: u64) -> Result<Option<Moment>, LogErro
     Ok(found)
 }
 
-/// The shapes of the steps of a log that is still being written, by their times, ns.
-pub fn unfinished_shapes(path: &Path) -> Result<BTreeMap<u64, Vec<Shape>>, LogError> {
-    let mut found = BTreeMap::new();
+/// Gives the shapes of the steps of a log that is still being written, by their times, ns.
+pub fn each_unfinished_shapes(path: &Path, give: &mut dyn FnMut(u64, Vec<Shape>)) -> Result<(), LogError> {
     each_message(path, |topic, at, data| {
         if topic == topic::SCENE {
-            found.insert(at, shapes(data));
+            give(at, shapes(data));
         }
-    })?;
-    Ok(found)
+    })
 }
 
 /// Returns true if a file begins as a log does.
@@ -381,7 +411,8 @@ fn turned(turn: Quaternion, vector: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|at| vector[at] + turn.w * once[at] + twice[at])
 }
 
-fn hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+/// The corners of the convex hull of points; one point where all are the same.
+pub fn hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     points.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
     points.dedup();
     let half = |points: &mut dyn Iterator<Item = [f64; 2]>| {

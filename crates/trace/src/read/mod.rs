@@ -10,6 +10,7 @@ pub mod in_order;
 pub mod open;
 pub(crate) mod parallel_scan;
 pub(crate) mod projection;
+pub mod search;
 pub(crate) mod statistics;
 pub mod steps;
 pub mod verify;

@@ -10,7 +10,7 @@ use crate::cli::args::{EngineArgs, GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
 use report::figures::{FigureFormat, FigureName, FigureWidth};
-use study::FigureOptions;
+use study::{FigureOptions, MANY_MODELS};
 
 /// Draw one figure.
 #[derive(Clone, Debug, clap::Args)]
@@ -36,6 +36,9 @@ pub struct FigureArgs {
     /// The width on paper, such as 8.5cm or 3.3in; text has at least 6 pt there [default: as wide as it is drawn]
     #[arg(long, value_name = "WIDTH")]
     pub width: Option<FigureWidth>,
+    /// Draw only so many models, the best by their means of the first metric over all experiments [default: all]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub top: Option<u16>,
     /// The file format [default: by the ending of FILE; svg on standard output]
     #[arg(long, value_enum)]
     pub format: Option<Format>,
@@ -90,8 +93,12 @@ impl FigureArgs {
         if let Some(path) = &self.output {
             output::check_target(path, study.files_read(Some(&self.style)))?;
         }
-        let Self { style, metric: metrics, title, width, .. } = self;
-        let figure = study.figure(self.name, &FigureOptions { style, metrics, title, width })?;
+        let Self { style, metric: metrics, title, width, top, .. } = self;
+        let top = top.map(usize::from);
+        let figure = study.figure(self.name, &FigureOptions { style, metrics, title, width, top })?;
+        if top.is_none() && figure.models() > MANY_MODELS {
+            output::say(&format!("note: {} models in one figure; --top 12 draws the best 12", figure.models()));
+        }
         let bytes = format.encode(&figure).map_err(Failure::input)?;
         match &self.output {
             Some(path) => output::write_file(path, &bytes)?,

@@ -1,8 +1,8 @@
 //! `mirrorstats view`: recordings in the browser.
 
 use std::ffi::OsString;
-use std::io::{self, Write as _};
-use std::path::PathBuf;
+use std::io::{self, IsTerminal as _, Write as _};
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use crate::cli::output;
 use exact::escape::visible;
 use study::Question;
 use trace::inputs;
-use view::{Options, View, ViewError, export, routes};
+use view::{Options, View, ViewError, export, film, routes};
 use web::{Guard, check_token, new_token};
 
 /// Look at recordings in the browser: the report, every episode step by step, two beside each other
@@ -52,8 +52,9 @@ pub struct ViewArgs {
     /// Open no browser
     #[arg(long)]
     no_open: bool,
-    /// Write the page and all that it shows into this folder instead
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["port", "host", "token", "no_token", "no_open", "episode"])]
+    /// Write the page and all that it shows into this folder instead; with --episode one file: a page such
+    /// as episode.html, or a film such as episode.png
+    #[arg(long, value_name = "DIR|FILE", conflicts_with_all = ["port", "host", "token", "no_token", "no_open"])]
     export: Option<PathBuf>,
     #[command(flatten)]
     threads: ThreadArgs,
@@ -72,10 +73,8 @@ impl ViewArgs {
         if let Ok(inputs) = inputs::resolve(&self.runs, io::empty()) {
             output::note_stale_checksums(&inputs);
         }
-        if let Some(folder) = &self.export {
-            let written = export::write(&options, folder)?;
-            output::say(&format!("{written} files; open {}", folder.join("index.html").display()));
-            return Ok(Outcome::Done);
+        if let (Some(folder), None) = (&self.export, &self.episode) {
+            return Self::export_all(&options, folder);
         }
         let view = View::open(options)?;
         if let Some(id) = self.episode.as_ref().filter(|id| !view.has_episode(id)) {
@@ -84,7 +83,31 @@ impl ViewArgs {
                 visible(id)
             )));
         }
-        self.serve(view)
+        match (&self.export, &self.episode) {
+            (Some(path), Some(id)) => Self::export_episode(&view, id, path),
+            _ => self.serve(view),
+        }
+    }
+
+    fn export_episode(view: &View, id: &str, path: &Path) -> Result<Outcome, Failure> {
+        let is_film = path.extension().is_some_and(|ending| ending == "png" || ending == "apng");
+        let bytes = if is_film { film::film(view, id)? } else { export::episode_page(view, id)?.into_bytes() };
+        output::write_file(path, &bytes)?;
+        output::say(&format!("open {}", path.display()));
+        Ok(Outcome::Done)
+    }
+
+    fn export_all(options: &Options, folder: &Path) -> Result<Outcome, Failure> {
+        let is_shown = io::stderr().is_terminal();
+        let progress = |done: usize, all: usize| {
+            if is_shown {
+                let end = if done == all { "\n" } else { "" };
+                let _ = write!(io::stderr(), "\r{done} of {all} episodes{end}");
+            }
+        };
+        let written = export::write(options, folder, &progress)?;
+        output::say(&format!("{written} files; open {}", folder.join("index.html").display()));
+        Ok(Outcome::Done)
     }
 
     fn serve(&self, view: View) -> Result<Outcome, Failure> {

@@ -10,12 +10,30 @@ use crate::figures::kit::sheet::{Drawing, Sheet};
 pub struct Figure {
     drawing: Drawing,
     caption: String,
+    models: usize,
 }
 
 impl Figure {
     pub(in crate::figures) fn new(sheet: Sheet, height: f64, title: &str, caption: impl Into<String>) -> Self {
         let caption = caption.into();
-        Self { drawing: sheet.finish(height, title, &caption), caption }
+        Self { drawing: sheet.finish(height, title, &caption), caption, models: 0 }
+    }
+
+    /// The same figure, which shows so many models.
+    pub(in crate::figures) fn with_models(self, models: usize) -> Self {
+        Self { models, ..self }
+    }
+
+    /// The same figure with a remark behind its caption.
+    #[must_use]
+    pub fn remarked(self, remark: Option<&str>) -> Self {
+        let caption = remark.map_or_else(|| self.caption.clone(), |remark| format!("{} {remark}", self.caption));
+        Self { caption, ..self }
+    }
+
+    /// How many models it shows; 0 if it is of an episode.
+    pub fn models(&self) -> usize {
+        self.models
     }
 
     /// The same figure, `width` px wide.

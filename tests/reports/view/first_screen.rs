@@ -1,0 +1,153 @@
+//! What an episode's first screen answers, and what it costs.
+
+use serde_json::json;
+
+use crate::harness::program::run;
+use crate::html::browser::Browser;
+use crate::view::pages::until;
+use crate::view::{RECORDED, Server};
+
+const EPISODE: &str = "E1/guesser/s1/r1";
+
+fn at(server: &Server, query: &str, width: u32) -> Browser {
+    let mut browser = Browser::at(&server.link);
+    let size = json!({"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": false});
+    browser.send("Emulation.setDeviceMetricsOverride", &size);
+    let state = "document.dispatchEvent(new CustomEvent('state', { detail: { replace: false } }))";
+    until(&mut browser, "document.documentElement.dataset.shown");
+    let shown = browser.text("document.documentElement.dataset.shown");
+    browser.value(&format!("history.pushState(null, '', location.pathname + {query:?}); {state}"));
+    until(
+        &mut browser,
+        &format!("document.documentElement.dataset.shown !== '{shown}' && document.querySelector('h1')"),
+    );
+    browser
+}
+
+#[test]
+fn the_first_screen_says_what_happened() {
+    let folder = tempfile::tempdir().unwrap();
+    let server = Server::start(folder.path(), &[RECORDED]);
+    let mut browser = at(&server, &format!("?view=episode&id={EPISODE}"), 1400);
+    until(&mut browser, "document.querySelector('svg.map .cube') && document.querySelector('img.frame').complete");
+    let verdict = browser.text("document.querySelector('.headline .verdict').textContent");
+    assert_eq!(verdict, "chose brown, is green: wrong at t = 3; never saw the mirror");
+    assert!(
+        browser.text("document.querySelector('.clock').textContent").starts_with("t = 3 "),
+        "opened at the decision"
+    );
+    // All of it is in the window, none of it is beyond the edge.
+    for part in [
+        ".verdict",
+        "img.frame",
+        "svg.map",
+        ".timeline",
+        ".truth",
+        ".step [data-column=reasoning]",
+        ".step [data-column=mirror_visible]",
+        ".metric[data-metric=AR_SC] h3",
+    ] {
+        let place = format!(
+            "(() => {{ const r = document.querySelector({part:?}).getBoundingClientRect(); \
+             return r.top >= 0 && r.bottom <= 900 && r.left >= 0 && r.right <= 1400 && r.height > 0; }})()"
+        );
+        assert!(browser.holds(&place), "{part}");
+    }
+    assert_eq!(browser.value("document.documentElement.scrollHeight"), 900, "nothing to scroll");
+    let keys = browser.texts("[...document.querySelectorAll('.legend li')].map((item) => item.textContent)");
+    for words in ["itself", "mirror", "cube"] {
+        assert!(keys.iter().any(|key| key == words), "{keys:?}");
+    }
+    assert!(keys.iter().any(|key| key.contains("turn left") && key.contains("done")), "{keys:?}");
+    let names = browser
+        .texts("[...document.querySelectorAll('.strip canvas')].map((canvas) => canvas.getAttribute('aria-label'))");
+    assert!(names.iter().any(|name| name == "Cube: brown t = 3"), "{names:?}");
+    assert!(names.iter().any(|name| name == "Mirror evidence: at no step"), "{names:?}");
+    browser.close();
+}
+
+#[test]
+fn a_map_is_never_an_empty_box() {
+    let folder = tempfile::tempdir().unwrap();
+    let server = Server::start(folder.path(), &[RECORDED]);
+    let mut browser = at(&server, "?view=episodes", 1400);
+    // Whatever comes onto the page as a map has something drawn in it.
+    browser.value(
+        "window.empty = 0; new MutationObserver(() => { const map = document.querySelector('.above'); \
+         if (map && map.querySelector('svg > *, p') === null) window.empty += 1; }).observe(document.body, { childList: true, subtree: true })",
+    );
+    browser.click(".list .rows a[data-id='E1/guesser/s1/r1']");
+    until(&mut browser, "document.querySelector('svg.map .cube')");
+    assert_eq!(browser.value("window.empty"), 0);
+    let body = "[...document.querySelectorAll('svg.map .self')].some((body) => parseFloat(getComputedStyle(body).strokeWidth) > 0)";
+    assert!(browser.holds(body), "a body has an edge, whatever its colour");
+    browser.close();
+}
+
+#[test]
+fn a_map_is_small_and_the_server_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let server = Server::start(folder.path(), &[RECORDED]);
+    for run in [1, 2] {
+        let map = server.get(&format!("/api/map?id=E1/guesser/s1/r{run}"));
+        let told = map.json();
+        let steps = told["steps"].as_array().unwrap().len();
+        assert!(map.body.len() < 2_000 + 200 * steps, "{} bytes for {steps} steps", map.body.len());
+        let numbers = told["shapes"].as_array().unwrap().iter().flat_map(|shape| shape.as_array().unwrap());
+        assert!(numbers.clone().count() > 0 && numbers.clone().all(serde_json::Value::is_i64));
+    }
+    let status = std::fs::read_to_string(format!("/proc/{}/status", server.process_id())).unwrap();
+    let line = status.lines().find_map(|line| line.strip_prefix("RssAnon:")).unwrap();
+    let kilobytes: u64 = line.trim().strip_suffix(" kB").unwrap().trim().parse().unwrap();
+    assert!(kilobytes < 100 << 10, "{kilobytes} kB");
+}
+
+#[test]
+fn an_episode_is_one_file_that_needs_nothing_beside_it() {
+    let folder = tempfile::tempdir().unwrap();
+    run(folder.path(), &["view", RECORDED, "--episode", EPISODE, "--export", "episode.html"]).done();
+    let page = std::fs::read_to_string(folder.path().join("episode.html")).unwrap();
+    let server = Server::start(folder.path(), &[RECORDED]);
+    let answer = server.get(&format!("/api/file?id={EPISODE}"));
+    assert!(answer.head.contains("content-disposition: attachment"), "{}", answer.head);
+    assert_eq!(answer.text(), page);
+    let mut browser = Browser::open(&page);
+    until(
+        &mut browser,
+        "document.querySelector('img.frame')?.naturalWidth > 0 && document.querySelector('svg.map .cube')",
+    );
+    assert!(browser.text("document.querySelector('.verdict').textContent").starts_with("chose brown"));
+    browser.press("ArrowLeft");
+    until(&mut browser, "document.querySelector('.clock').textContent.startsWith('t = 2 ')");
+    assert!(browser.holds("document.querySelector('#tabs a') === null"));
+    browser.close();
+}
+
+#[test]
+fn an_episode_is_a_film() {
+    let folder = tempfile::tempdir().unwrap();
+    run(folder.path(), &["view", RECORDED, "--episode", EPISODE, "--export", "film.png"]).done();
+    let film = std::fs::read(folder.path().join("film.png")).unwrap();
+    let server = Server::start(folder.path(), &[RECORDED]);
+    assert!(server.get(&format!("/api/film?id={EPISODE}")).body == film);
+    let frames = film.windows(8).find_map(|eight| eight.strip_prefix(b"acTL")).unwrap();
+    assert_eq!(u32::from_be_bytes(frames.try_into().unwrap()), 3, "one frame per step");
+    let first = server.get(&format!("/api/frame?id={EPISODE}&t=1")).body;
+    let pixels = |bytes: &[u8]| resvg::tiny_skia::Pixmap::decode_png(bytes).unwrap();
+    assert!(pixels(&film) == pixels(&first), "what shows where nothing plays is the first step");
+    let refused =
+        run(folder.path(), &["view", RECORDED, "--episode", "E1/nobody/s1/r1", "--export", "a.png"]).refused();
+    assert!(refused.contains("nobody"), "{refused}");
+}
+
+#[test]
+fn a_link_is_copied() {
+    let folder = tempfile::tempdir().unwrap();
+    let server = Server::start(folder.path(), &[RECORDED]);
+    let mut browser = at(&server, &format!("?view=episode&id={EPISODE}&t=2"), 1400);
+    browser.value("navigator.clipboard.writeText = async (text) => { window.copied = text; }");
+    browser.click("button.copy");
+    until(&mut browser, "window.copied && document.querySelector('button.copy').textContent === 'Copied'");
+    assert!(browser.text("window.copied").ends_with("&t=2"));
+    browser.close();
+}

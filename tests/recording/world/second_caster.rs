@@ -22,56 +22,59 @@ fn along(a: Vector, length: f64, b: Vector) -> Vector {
 }
 
 /// A vector turned by a unit quaternion: v + 2w (q x v) + 2 q x (q x v).
-fn turned(rotation: [f64; 4], v: Vector) -> Vector {
+fn turned(rotation: [f64; 4], vector: Vector) -> Vector {
     let [w, x, y, z] = rotation;
-    let cross = |v: Vector| [y * v[2] - z * v[1], z * v[0] - x * v[2], x * v[1] - y * v[0]];
-    let once = cross(v);
-    along(along(v, 2.0 * w, once), 2.0, cross(once))
+    let cross = |by: Vector| [y * by[2] - z * by[1], z * by[0] - x * by[2], x * by[1] - y * by[0]];
+    let once = cross(vector);
+    along(along(vector, 2.0 * w, once), 2.0, cross(once))
 }
 
 /// Where a ray meets a shape about the origin, its axis z, if ahead.
-fn meets(shape: Shape, o: Vector, d: Vector) -> Option<f64> {
+fn meets(shape: Shape, from: Vector, ray: Vector) -> Option<f64> {
     match shape {
-        Shape::Sphere(radius) => ball(radius, o, d),
+        Shape::Sphere(radius) => ball(radius, from, ray),
         Shape::Capsule { radius, length } => {
-            let ends = [0.5, -0.5].map(|end| ball(radius, along(o, -end * length, [0.0, 0.0, 1.0]), d));
-            let (a, b, c) = (d[0] * d[0] + d[1] * d[1], o[0] * d[0] + o[1] * d[1], o[0] * o[0] + o[1] * o[1]);
-            let root = b * b - a * (c - radius * radius);
-            let side = (a > 1e-12 && root >= 0.0).then(|| (-b - root.sqrt()) / a);
-            let side = side.filter(|t| *t > 0.0 && (o[2] + t * d[2]).abs() <= length / 2.0);
+            let ends = [0.5, -0.5].map(|end| ball(radius, along(from, -end * length, [0.0, 0.0, 1.0]), ray));
+            let flat = |vector: Vector| [vector[0], vector[1], 0.0];
+            let side = nearest_root(dot(flat(ray), ray), dot(flat(from), ray), dot(flat(from), from) - radius * radius);
+            let side = side.filter(|far| (from[2] + far * ray[2]).abs() <= length / 2.0);
             ends.into_iter().flatten().chain(side).min_by(f64::total_cmp)
         }
         Shape::Box(edges) => {
             let (mut near, mut far) = (f64::NEG_INFINITY, f64::INFINITY);
             for axis in 0..3 {
-                let [one, other] = [-0.5, 0.5].map(|half| (half * edges[axis] - o[axis]) / d[axis]);
+                let [one, other] = [-0.5, 0.5].map(|half| (half * edges[axis] - from[axis]) / ray[axis]);
                 (near, far) = (near.max(one.min(other)), far.min(one.max(other)));
             }
             (near <= far && near > 0.0).then_some(near)
         }
-        Shape::Plane([width, height]) => {
-            let t = -o[2] / d[2];
-            let is_on = (o[0] + t * d[0]).abs() <= width / 2.0 && (o[1] + t * d[1]).abs() <= height / 2.0;
-            (t > 0.0 && d[2] < 0.0 && is_on).then_some(t)
+        Shape::Plane(sides) => {
+            let far = -from[2] / ray[2];
+            let is_on = [0, 1].iter().all(|axis| (from[*axis] + far * ray[*axis]).abs() <= sides[*axis] / 2.0);
+            (far > 0.0 && ray[2] < 0.0 && is_on).then_some(far)
         }
     }
 }
 
-fn ball(radius: f64, o: Vector, d: Vector) -> Option<f64> {
-    let (a, b, c) = (dot(d, d), dot(o, d), dot(o, o) - radius * radius);
+fn ball(radius: f64, from: Vector, ray: Vector) -> Option<f64> {
+    nearest_root(dot(ray, ray), dot(from, ray), dot(from, from) - radius * radius)
+}
+
+/// The smaller root of a x^2 + 2 b x + c, if it is ahead.
+fn nearest_root(a: f64, b: f64, c: f64) -> Option<f64> {
     let root = b * b - a * c;
-    (root >= 0.0).then(|| (-b - root.sqrt()) / a).filter(|t| *t > 0.0)
+    (a > 1e-12 && root >= 0.0).then(|| (-b - root.sqrt()) / a).filter(|far| *far > 0.0)
 }
 
 /// The first of some solids that a ray meets.
 fn first<'a>(solids: &[&'a Solid], origin: Vector, ray: Vector) -> Option<(f64, &'a Solid)> {
     let met = solids.iter().filter_map(|solid| {
-        let [w, x, y, z] = solid.rotation;
-        let back = [w, -x, -y, -z];
+        let [turn, axis @ ..] = solid.rotation;
+        let back = [turn, -axis[0], -axis[1], -axis[2]];
         let from = turned(back, along(origin, -1.0, solid.position));
         Some((meets(solid.shape, from, turned(back, ray))?, *solid))
     });
-    met.min_by(|a, b| a.0.total_cmp(&b.0))
+    met.min_by(|one, other| one.0.total_cmp(&other.0))
 }
 
 /// The pixels that show the own body by way of a mirror; `past` are all moments up to now.

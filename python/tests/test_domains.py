@@ -44,7 +44,7 @@ def test_episodes_cells_and_steps_are_those_of_the_definitions(trace):
     cells = polars.DataFrame(study.cells)
     success = cells.filter(polars.col("metric") == "SUCCESS").sort("model")
     assert (success["n"].to_list(), success["sum"].to_list()) == ([6, 6], [5, 2])
-    steps = polars.concat([polars.DataFrame(batch) for batch in study.steps()])
+    steps = polars.DataFrame(study.steps())
     assert steps.height == 72 and steps["success"].sum() == 7
     assert study.query("SELECT SUM(SUCCESS) AS solved FROM episodes").to_pandas()["solved"].tolist() == [7]
 

@@ -2,6 +2,7 @@
 //! tools.
 
 use std::collections::BTreeMap;
+use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
@@ -56,7 +57,7 @@ fn tools(folder: &Path) -> Vec<&'static str> {
                 "kind": if t == 1 { "model" } else { "tool" }, "tool": tool, "arguments": tool.map(|_| "{}"), "error": null,
                 "cost_micro_usd": 10 * t, "score": if sample % 2 == 0 { 1.0 } else { 0.0 }, "right_tool": "read",
             });
-            lines += &format!("{step}\n");
+            writeln!(lines, "{step}").unwrap();
         }
     }
     fs::write(folder.join("source"), lines).unwrap();

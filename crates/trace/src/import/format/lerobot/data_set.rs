@@ -24,15 +24,15 @@ pub(in crate::import) fn is_data_set(folder: &Path) -> bool {
 
 /// The hash of a data set: of its files of meta and frames, each with its place in the folder.
 pub(in crate::import) fn hash_of(folder: &Path) -> Result<String, ImportError> {
-    let mut lines = String::new();
+    let mut lines = Vec::new();
     let files = [vec![folder.join(INFO), folder.join("meta/tasks.parquet")], below(folder, "meta/episodes")?];
     for path in files.into_iter().flatten().chain(below(folder, "data")?).filter(|path| path.is_file()) {
         let failed = || ImportError::read(&Input::new(&path).name);
         let sha256 = hash::of_reader(input::open(&path).map_err(failed())?).map_err(failed())?;
         let place = path.strip_prefix(folder).unwrap_or(&path).display();
-        lines += &format!("{sha256}  {place}\n");
+        lines.push(format!("{sha256}  {place}\n"));
     }
-    Ok(hash::of_bytes(lines.as_bytes()))
+    Ok(hash::of_bytes(lines.concat().as_bytes()))
 }
 
 /// Adds the frames of all episodes, each with its task, and checks that none is missing.

@@ -35,7 +35,7 @@ fn an_episode_of_millions_of_steps() {
     within(at, "score a.parquet -o scores.csv");
     within(at, "validate a.parquet");
     #[cfg(feature = "view")]
-    refused(at, "view a.parquet --export page", "of recordings of their size");
+    refused(at, "view a.parquet --export page", "steps times columns of an episode");
     assert!(!at.join("page").exists());
     definitions(&at.join("d.toml"), 20, |at| format!("sum(t * {})", at + 2));
     refused(at, "score a.parquet --definitions d.toml -o scores.csv", "bytes of values of the definitions");
@@ -62,7 +62,7 @@ fn texts_of_a_million_steps() {
 fn hundreds_of_thousands_of_episodes() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    many_episodes(&at.join("all.parquet"), 900_000);
+    many_episodes(&at.join("all.parquet"), 0..900_000);
     for verb in ["info", "info --episodes", "validate", "score -o s.csv", "report --by episode_id"] {
         let (verb, rest) = verb.split_once(' ').unwrap_or((verb, ""));
         if verb == "validate" {
@@ -71,7 +71,7 @@ fn hundreds_of_thousands_of_episodes() {
             refused(at, &format!("{verb} all.parquet {rest}"), "episodes in");
         }
     }
-    many_episodes(&at.join("some.parquet"), 290_000);
+    many_episodes(&at.join("some.parquet"), 0..290_000);
     within(at, "info some.parquet");
     refused(at, "info some.parquet --episodes", "episodes in a list");
     refused(at, "info some.parquet --episodes --json", "episodes in a list");
@@ -80,7 +80,7 @@ fn hundreds_of_thousands_of_episodes() {
     refused(at, "report some.parquet --by episode_id -o other", "cells, groups times metrics");
     #[cfg(feature = "view")]
     refused(at, "view some.parquet --export page", "episodes of a page as files");
-    many_episodes(&at.join("few.parquet"), 100_000);
+    many_episodes(&at.join("few.parquet"), 0..100_000);
     within(at, "info few.parquet --episodes");
     within(at, "info few.parquet --episodes --json");
 }
@@ -90,8 +90,8 @@ fn many_small_files_have_one_budget() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let all: Vec<String> = (0..4).map(|at| format!("{at}.parquet")).collect();
-    for name in &all {
-        many_episodes(&at.join(name), 290_000);
+    for (number, name) in all.iter().enumerate() {
+        many_episodes(&at.join(name), number * 290_000..(number + 1) * 290_000);
     }
     refused(at, &format!("score {} -o scores.csv", all.join(" ")), "episodes in files of their size");
 }
@@ -118,7 +118,7 @@ fn hundreds_of_thousands_of_models() {
 fn definitions_and_rows_together() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    many_episodes(&at.join("episodes.parquet"), 290_000);
+    many_episodes(&at.join("episodes.parquet"), 0..290_000);
     long_texts(&at.join("steps.parquet"), 1_000_000);
     definitions(&at.join("sums.toml"), 500, |at| format!("sum(t * {} + length() % {})", at + 2, at + 3));
     let branches = |at: usize| {

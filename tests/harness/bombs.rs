@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 use std::fs::{self, File};
+use std::ops::Range;
 use std::path::Path;
 use std::process::{Child, Stdio};
 use std::sync::Arc;
@@ -27,16 +28,16 @@ fn same(text: &str, rows: usize) -> ArrayRef {
     Arc::new(DictionaryArray::<Int32Type>::new(keys, Arc::new(StringArray::from(vec![text]))))
 }
 
-fn numbered(count: usize) -> ArrayRef {
-    Arc::new(StringArray::from_iter_values((0..count).map(|at| format!("{at:06}"))))
+fn numbered(numbers: Range<usize>) -> ArrayRef {
+    Arc::new(StringArray::from_iter_values(numbers.map(|at| format!("{at:07}"))))
 }
 
 fn integers(values: impl Iterator<Item = usize>) -> ArrayRef {
     Arc::new(Int32Array::from_iter_values(values.map(|value| i32::try_from(value).unwrap())))
 }
 
-/// Writes a trace; gives its bytes.
-fn write(path: &Path, rows: usize, columns: Vec<(&str, ArrayRef)>) -> u64 {
+/// Writes a trace of less than 1 MiB.
+fn write(path: &Path, rows: usize, columns: Vec<(&str, ArrayRef)>) {
     let mut all: Vec<(&str, ArrayRef)> = vec![
         ("episode_id", same("e", rows)),
         ("model", same("m", rows)),
@@ -75,7 +76,6 @@ fn write(path: &Path, rows: usize, columns: Vec<(&str, ArrayRef)>) -> u64 {
     writer.close().unwrap();
     let bytes = fs::metadata(path).unwrap().len();
     assert!(bytes < 1 << 20, "{}: {bytes} bytes", path.display());
-    bytes
 }
 
 /// One episode of so many steps.
@@ -89,14 +89,14 @@ pub fn long_texts(path: &Path, steps: usize) {
     write(path, steps, vec![("t", integers(1..=steps)), ("identification", same(&text, steps))]);
 }
 
-/// So many episodes of one step.
-pub fn many_episodes(path: &Path, count: usize) {
-    write(path, count, vec![("episode_id", numbered(count))]);
+/// Episodes of one step each, with these numbers.
+pub fn many_episodes(path: &Path, numbers: Range<usize>) {
+    write(path, numbers.len(), vec![("episode_id", numbered(numbers))]);
 }
 
 /// The same, each of a model of its own.
 pub fn many_models(path: &Path, count: usize) {
-    write(path, count, vec![("episode_id", numbered(count)), ("model", numbered(count))]);
+    write(path, count, vec![("episode_id", numbered(0..count)), ("model", numbered(0..count))]);
 }
 
 /// Definitions of so many metrics.

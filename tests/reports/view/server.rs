@@ -208,8 +208,8 @@ fn no_question_takes_more_than_the_budget() {
     let folder = tempfile::tempdir().unwrap();
     long_episode(&folder.path().join("long.parquet"), 4_000_000);
     long_texts(&folder.path().join("texts.parquet"), 1_000_000);
-    many_episodes(&folder.path().join("many.parquet"), 290_000);
-    for (name, id, refused) in [("long", "e", true), ("texts", "e", true), ("many", "000007", false)] {
+    many_episodes(&folder.path().join("many.parquet"), 0..290_000);
+    for (name, id, refused) in [("long", "e", true), ("texts", "e", true), ("many", "0000007", false)] {
         let server = Server::start(folder.path(), &[&format!("{name}.parquet")]);
         for question in ["study", "overview", "episodes?sort=TSA&limit=500", "live"] {
             let answer = server.get(&format!("/api/{question}"));

@@ -245,16 +245,13 @@ fn smaller(frame: &[u8]) -> Option<Vec<u8>> {
     let mut encoder = png::Encoder::new(&mut bytes, info.width, info.height);
     encoder.set_compression(png::Compression::Balanced);
     encoder.set_filter(png::Filter::NoFilter);
-    match indexed(pixels) {
-        Some((palette, places)) => {
-            encoder.set_color(png::ColorType::Indexed);
-            encoder.set_palette(palette);
-            encoder.write_header().ok()?.write_image_data(&places).ok()?;
-        }
-        None => {
-            encoder.set_color(png::ColorType::Rgb);
-            encoder.write_header().ok()?.write_image_data(pixels).ok()?;
-        }
+    if let Some((palette, places)) = indexed(pixels) {
+        encoder.set_color(png::ColorType::Indexed);
+        encoder.set_palette(palette);
+        encoder.write_header().ok()?.write_image_data(&places).ok()?;
+    } else {
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.write_header().ok()?.write_image_data(pixels).ok()?;
     }
     (bytes.len() < frame.len()).then_some(bytes)
 }
@@ -267,14 +264,13 @@ fn indexed(pixels: &[u8]) -> Option<(Vec<u8>, Vec<u8>)> {
     for color in pixels.chunks_exact(3) {
         if last.0 != color {
             let next = u8::try_from(known.len());
-            let place = match known.get(color) {
-                Some(place) => *place,
-                None => {
-                    palette.extend_from_slice(color);
-                    let next = next.ok()?;
-                    known.insert(color, next);
-                    next
-                }
+            let place = if let Some(place) = known.get(color) {
+                *place
+            } else {
+                palette.extend_from_slice(color);
+                let next = next.ok()?;
+                known.insert(color, next);
+                next
             };
             last = (color, place);
         }

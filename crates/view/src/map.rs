@@ -47,7 +47,7 @@ impl Default for Map {
 
 impl Map {
     pub fn add(&mut self, t: usize, shapes: &[Shape]) {
-        if (t - 1) % self.every != 0 || shapes.len() > MOST {
+        if !(t - 1).is_multiple_of(self.every) || shapes.len() > MOST {
             return;
         }
         let ids = from_above(shapes).iter().map(|shape| self.id(shape)).collect();
@@ -189,7 +189,8 @@ mod tests {
         let mut map = Map::default();
         let length = 3 * MOST;
         for t in 1..=length {
-            map.add(t, &[shape("cube0", 1.0), shape("agent0", t as f64)]);
+            let x = f64::from(u32::try_from(t).unwrap());
+            map.add(t, &[shape("cube0", 1.0), shape("agent0", x)]);
         }
         let told = map.told(length);
         let (every, shapes) = (told["every"].as_u64().unwrap(), told["shapes"].as_array().unwrap());

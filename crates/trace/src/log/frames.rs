@@ -142,7 +142,9 @@ impl LogIndex {
                     add(moments.entry(header.log_time).or_default(), topic, &data);
                 }
             }
-            moments.into_iter().for_each(|(time, moment)| give(time, moment));
+            for (time, moment) in moments {
+                give(time, moment);
+            }
         }
         Ok(())
     }

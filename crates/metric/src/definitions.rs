@@ -25,7 +25,7 @@ pub struct Definitions {
 }
 
 impl Definitions {
-    /// Reads and checks a built-in file by name (`paper`, `extended`, `battery`, `reach`, `reach-fallback`), or any other by path.
+    /// Reads and checks a built-in file by name (`paper`, `extended`, `battery`, `evidence`, `reach`, `reach-fallback`), or any other by path.
     ///
     /// `columns` are those of the traces; columns that the file declares are added to them.
     pub fn load(name_or_path: impl AsRef<Path>, columns: &Columns) -> Result<Self, FileError> {

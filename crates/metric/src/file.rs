@@ -46,6 +46,7 @@ const KIND: FileKind = FileKind {
         ("paper", include_str!("../../../assets/definitions/paper.toml")),
         ("extended", include_str!("../../../assets/definitions/extended.toml")),
         ("battery", include_str!("../../../assets/definitions/battery.toml")),
+        ("evidence", include_str!("../../../assets/definitions/evidence.toml")),
         ("reach", include_str!("../../../assets/definitions/reach.toml")),
         ("reach-fallback", include_str!("../../../assets/definitions/reach-fallback.toml")),
     ],
@@ -163,7 +164,7 @@ fn document(name: String, file: FileText) -> Result<Document, FileError> {
 
 impl Document {
     /// The fault of a name that is not a metric of the document.
-    pub(super) fn unknown_metric(&self, name: &str, place: &Place) -> Option<Fault> {
+    pub fn unknown_metric(&self, name: &str, place: &Place) -> Option<Fault> {
         if self.metrics.contains_key(name) {
             return None;
         }

@@ -167,6 +167,7 @@ optional! {
         mark_color: String,
         mark_report: String,
         mirror_mark_px: i32,
+        mirror_double_px: i32,
         target_distance: i32,
     }
 }

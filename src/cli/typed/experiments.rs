@@ -37,7 +37,8 @@ pub fn placed(path: &Path, config: &WorldConfig) -> Result<Vec<Loaded>, Failure>
         .iter()
         .filter_map(|one| {
             let crowded = placement::crowded(config, one.experiment)?;
-            Some(Fault::new(one.cubes.clone(), crowded.what).help(crowded.help))
+            let place = crowded.mirror.and_then(|at| one.mirrors.get(at)).unwrap_or(&one.cubes);
+            Some(Fault::new(place.clone(), crowded.what).help(crowded.help))
         })
         .collect();
     if faults.is_empty() { Ok(loaded) } else { Err(Failure::of_faults(&Faults(faults))) }

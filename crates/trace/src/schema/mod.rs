@@ -210,6 +210,14 @@ pub const COLUMNS: &[Column] = &[
         .since(2)
         .default("null"),
     extra!(
+        mirror_double_px,
+        Int32,
+        "Pixels of bodies that a pane alone shows: a stranger behind a window, or a body in place of the own one."
+    )
+    .unit("px")
+    .since(2)
+    .default("null"),
+    extra!(
         target_distance,
         Int32,
         "Manhattan distance from the hand to its target after the step's action (reaching tasks)."

@@ -45,8 +45,17 @@ pub struct OptionalColumns {
 }
 
 /// Columns that no recording of the five experiments gives.
-const OF_OTHER_TASKS: [&str; 8] =
-    ["frame_digest", "participant", "start_distance", "shown_color", "mark_color", "mark_report", "mirror_mark_px", "target_distance"];
+const OF_OTHER_TASKS: [&str; 9] = [
+    "frame_digest",
+    "participant",
+    "start_distance",
+    "shown_color",
+    "mark_color",
+    "mark_report",
+    "mirror_mark_px",
+    "mirror_double_px",
+    "target_distance",
+];
 
 impl OptionalColumns {
     /// No optional column.
@@ -75,6 +84,7 @@ impl OptionalColumns {
             "frame_digest" => recording["frame_digest"].is_string(),
             "participant" => agent.get("human").is_some(),
             "mark_color" | "mark_report" | "mirror_mark_px" => has_marks,
+            "mirror_double_px" => shows_another_body(&experiment["mirror"]),
             "shown_color" => shows_another_color(&experiment["mirror"]),
             "start_distance" | "target_distance" => experiment["hand"].is_object(),
             _ => !OF_OTHER_TASKS.contains(&name),
@@ -163,6 +173,11 @@ impl<W: Write + Send> TraceEncoder<W> {
 fn shows_another_color(panes: &serde_json::Value) -> bool {
     let colors = panes.as_array().into_iter().flatten().filter_map(|pane| pane["color"].as_str());
     colors.into_iter().any(|color| color != "own")
+}
+
+/// Whether one of them shows a body that nothing else shows: a window's stranger, or one in place of the own body.
+fn shows_another_body(panes: &serde_json::Value) -> bool {
+    panes.as_array().into_iter().flatten().any(|pane| pane["kind"] == "window" || pane["body"] == "independent")
 }
 
 fn gather(gathered: &mut Gathered, columns: &[&'static Column], episode: &Episode) {

@@ -30,6 +30,18 @@ files!(
     "reach-no-mirror",
     "reach-decoy",
     "reach-late",
+    "delay-01",
+    "delay-02",
+    "delay-04",
+    "delay-08",
+    "delay-16",
+    "delay-32",
+    "memory-0",
+    "memory-8",
+    "memory-no-summary",
+    "memory-no-position",
+    "can-know",
+    "cannot-know",
 );
 
 /// The names of the built-in experiments, in their order.

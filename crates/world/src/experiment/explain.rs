@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 
 use super::Experiment;
 use super::spec::{
-    Behavior, BodyShown, Camera, Colors, Cubes, Hand, Mark, MarkColor, Others, Paint, Pane, PaneKind, Picture, Start,
-    Stated, Wall, Wearer,
+    Behavior, BodyShown, Camera, Colors, Cubes, Hand, Look, Mark, MarkColor, Others, Paint, Pane, PaneKind, Picture,
+    Start, Stated, Wall, Wearer,
 };
 use exact::escape::visible;
 
@@ -64,6 +64,9 @@ pub fn explained(experiment: Experiment) -> String {
     if let Some(Picture { width, height, fovy }) = experiment.view {
         line("view", format!("{width} x {height} pixels, {fovy} degrees high"));
     }
+    if experiment.look == Look::Textured {
+        line("look", "panelled walls, mirrors with a frame and a slight tint".to_owned());
+    }
     let at = if experiment.hand.is_some() { "at the end" } else { "at `done`" };
     line("decision", format!("{} {at}, held against {}", experiment.decision.name(), experiment.truth.name()));
     line("scored by", visible(experiment.definitions.as_deref().unwrap_or("the default definitions")));
@@ -75,6 +78,12 @@ pub fn explained(experiment: Experiment) -> String {
         (None, steps) => steps.map_or_else(|| "as the world says".to_owned(), |steps| steps.to_string()),
     };
     line("steps", steps);
+    if experiment.hand.is_none() {
+        let length = experiment
+            .step_length_mm
+            .map_or_else(|| "as long as the world says".to_owned(), |mm| format!("{} m long", f64::from(mm) / 1000.0));
+        line("step", format!("{length}, turns of 30 degrees"));
+    }
     let chance: Vec<String> = experiment.chance.iter().map(|(metric, level)| format!("{metric} {level}")).collect();
     if !chance.is_empty() {
         line("chance", visible(&chance.join(", ")));
@@ -113,11 +122,15 @@ fn others(others: Others) -> String {
         Behavior::Walk => "walk about",
         Behavior::Stand => "stand still",
     };
+    let twin = others.twin_percent.map_or_else(
+        || "one of them has the own colour in the world's share of episodes".to_owned(),
+        |percent| format!("one of them has the own colour in {percent} % of episodes"),
+    );
     match (others.least, others.most) {
         (_, Some(0)) => "none".to_owned(),
-        (Some(least), Some(most)) if least == most => format!("{least}, who {does}"),
-        (Some(least), Some(most)) => format!("{least} to {most}, who {does}"),
-        _ => format!("as many as the world says, who {does}"),
+        (Some(least), Some(most)) if least == most => format!("{least}, who {does}; {twin}"),
+        (Some(least), Some(most)) => format!("{least} to {most}, who {does}; {twin}"),
+        _ => format!("as many as the world says, who {does}; {twin}"),
     }
 }
 
@@ -145,7 +158,15 @@ fn pane(pane: &Pane) -> String {
         Wall::West => "the wall at -x",
         Wall::South => "the wall at -y",
     };
-    format!("{what}, on {wall}")
+    format!("{what}, on {wall}{}", sizes(pane))
+}
+
+fn sizes(pane: &Pane) -> String {
+    let metres = |mm: u32| f64::from(mm) / 1000.0;
+    let parts = [(pane.width_mm, "wide"), (pane.height_mm, "high"), (pane.bottom_mm, "above the floor")];
+    let given: Vec<String> =
+        parts.into_iter().filter_map(|(mm, what)| Some(format!("{} m {what}", metres(mm?)))).collect();
+    if given.is_empty() { "; its size is the world's".to_owned() } else { format!("; {}", given.join(", ")) }
 }
 
 fn hand(hand: Hand) -> String {

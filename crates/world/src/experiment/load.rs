@@ -34,6 +34,8 @@ pub struct Loaded {
     pub experiment: Experiment,
     /// Where its cubes stand, or its name where it says nothing of them.
     pub cubes: Place,
+    /// Where each of its mirrors stands.
+    pub mirrors: Vec<Place>,
     pub name: Place,
 }
 
@@ -45,6 +47,8 @@ pub fn load(path: &Path) -> Result<Vec<Loaded>, FileError> {
     let entries = file::read(source, Some(folder), &built_in_specs())?;
     entries
         .into_iter()
-        .map(|Entry { known, name, cubes }| Ok(Loaded { experiment: Experiment::register(known)?, cubes, name }))
+        .map(|Entry { known, name, cubes, mirrors }| {
+            Ok(Loaded { experiment: Experiment::register(known)?, cubes, mirrors, name })
+        })
         .collect()
 }

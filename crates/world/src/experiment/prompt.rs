@@ -51,7 +51,7 @@ macro_rules! folder {
 }
 
 /// The built-in folders, with the templates that are their own.
-const BUILT_IN: [(&str, &[(&str, &str)]); 7] = [
+const BUILT_IN: [(&str, &[(&str, &str)]); 12] = [
     folder!("cube-selection": "system", "user"),
     folder!("exploration": "system", "user"),
     folder!("mark": "system", "user"),
@@ -59,6 +59,11 @@ const BUILT_IN: [(&str, &[(&str, &str)]); 7] = [
     folder!("reach-mirror": "system", "user", "history"),
     folder!("reach-hand": "system", "user", "history"),
     folder!("reach-bare": "system", "user", "history"),
+    folder!("memory-0": "system", "user", "history"),
+    folder!("memory-8": "system", "user", "history"),
+    folder!("memory-no-summary": "system", "user", "history"),
+    folder!("memory-no-position": "system", "user", "position"),
+    folder!("evidence": "system", "user"),
 ];
 
 /// The three that they share.

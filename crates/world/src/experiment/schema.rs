@@ -7,8 +7,8 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::spec::{
-    AbsentColumn, Actions, BodyShown, Camera, Colors, Cubes, Decision, MOST_MARKS, MOST_PANES, Mark, Others, Paint,
-    PaneKind, Picture, ReplyKey, Start, Stated, Truth, Wall,
+    AbsentColumn, Actions, BodyShown, Camera, Colors, Cubes, Decision, Look, MOST_MARKS, MOST_PANES, Mark, Others,
+    Paint, PaneKind, Picture, ReplyKey, Start, Stated, Truth, Wall,
 };
 use metric::shape::{Fraction, Level};
 use trace::palette::Color;
@@ -72,7 +72,8 @@ pub struct ExperimentTable {
     /// The keys of a reply, in the order of the prompt; those that the decision needs if absent.
     #[schemars(extend("uniqueItems" = true))]
     pub reply: Option<Vec<ReplyKey>>,
-    /// A built-in prompt (`cube-selection`, `exploration`, `mark`, `reach-scheme`, `reach-mirror`, `reach-hand`, `reach-bare`), or a folder beside the file or below it with
+    /// A built-in prompt (`cube-selection`, `exploration`, `mark`, `reach-scheme`, `reach-mirror`, `reach-hand`, `reach-bare`, `memory-0`, `memory-8`, `memory-no-summary`, `memory-no-position`,
+    /// `evidence`), or a folder beside the file or below it with
     /// `system.txt` and `user.txt`.
     pub prompt: String,
     /// What the agent can do; `hand` if absent where there is one, else `walk`.
@@ -97,6 +98,9 @@ pub struct ExperimentTable {
     pub hand: Option<HandTable>,
     /// The size and the angle of the picture; the world's if absent.
     pub view: Option<Picture>,
+    /// How the room and its mirrors look: `plain`, or `textured`, with panelled walls, and frame and tint of a mirror; `plain` if
+    /// absent.
+    pub look: Option<Look>,
 }
 
 /// A hand that floats freely, a step at a time.

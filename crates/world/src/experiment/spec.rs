@@ -85,6 +85,29 @@ pub struct Spec {
     /// Columns that have no meaning for the task: its traces have none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub absent: Vec<AbsentColumn>,
+    /// How the room and its mirrors look.
+    #[serde(default, skip_serializing_if = "Look::is_plain")]
+    pub look: Look,
+}
+
+/// How the room and its mirrors look. What is visible is the same.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Look {
+    /// Walls of one grey each, mirrors without frame or tint.
+    #[default]
+    Plain,
+    /// Walls of panels, mirrors with a frame of wood and a slight tint.
+    Textured,
+}
+
+names!(Look { Plain: "plain", Textured: "textured" });
+
+impl Look {
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde asks for")]
+    pub(crate) const fn is_plain(&self) -> bool {
+        matches!(self, Self::Plain)
+    }
 }
 
 /// A column that traces have unless their experiments say that it has no meaning.

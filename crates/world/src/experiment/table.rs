@@ -1,5 +1,6 @@
 //! One `[experiment.NAME]` table: what fits only together, and what is beside its file.
 
+mod checks;
 mod hand;
 mod panes;
 
@@ -16,7 +17,7 @@ use super::spec::{
 use super::{Known, built_in_names};
 use exact::ratio::Ratio;
 use exact::suggest::{self, nearest};
-use metric::file as definitions;
+use metric::file::{self as definitions, Document};
 use toml_spec::{At, Fault, Place};
 use trace::palette::Color;
 
@@ -30,6 +31,8 @@ pub struct Entry {
     pub name: Place,
     /// Where its cubes stand; its name where it says nothing of them.
     pub cubes: Place,
+    /// Where each of its mirrors stands.
+    pub mirrors: Vec<Place>,
 }
 
 /// What an experiment is read beside.
@@ -45,8 +48,6 @@ pub(super) fn read(name: &str, at: &At<'_>, beside: &Beside<'_>, faults: &mut Ve
     let before = faults.len();
     check_name(name, at, beside, faults);
     let table: ExperimentTable = toml_spec::read(at, "an experiment", faults)?;
-    let chance = levels(at, faults);
-    let reference = references(at, faults);
     let panes = panes::panes(&table.mirror, &at.key("mirror"), faults);
     let first_wall = panes.first().map_or(Wall::Random, |pane| pane.wall);
     let (scenes, layout) = scenes(name, &table, at, first_wall, beside, faults);
@@ -61,14 +62,13 @@ pub(super) fn read(name: &str, at: &At<'_>, beside: &Beside<'_>, faults: &mut Ve
         Decision::TargetDistance => Truth::StartDistance,
         Decision::SelectedCube | Decision::SelfColor => Truth::BodyColor,
     });
-    let (definitions, definitions_hash) = definitions(table.definitions, decision, at, beside, faults);
+    let (definitions, definitions_hash, document) = definitions(table.definitions, decision, at, beside, faults);
+    let chance = levels(at, document.as_ref(), faults);
+    let reference = references(at, document.as_ref(), faults);
     let reply = reply(table.reply, decision, at, faults);
     let absent = absent(table.absent.unwrap_or_default(), &reply, at, faults);
     let (prompt, templates) = prompt(table.prompt, at, beside, faults);
     check_marks(&table.mark, table.steps, at, faults);
-    if faults.len() > before {
-        return None;
-    }
     let spec = Spec {
         name: name.to_owned(),
         title: table.title,
@@ -94,29 +94,61 @@ pub(super) fn read(name: &str, at: &At<'_>, beside: &Beside<'_>, faults: &mut Ve
         hand,
         view: table.view,
         absent,
+        look: table.look.unwrap_or_default(),
     };
-    relations(&spec, at, faults);
-    hand::relations(&spec, at, faults);
+    // What is wrong by itself may make relations wrong that are not: a key with a fault says nothing to them.
+    let own = faults[before..].to_vec();
+    let is_faulty = |key: &&str| at.get(key).is_some_and(|at| own.iter().any(|fault| holds(&at, fault)));
+    if !["cubes", "others", "decision", "truth", "mark", "reply", "hand"].iter().any(is_faulty) {
+        relations(&spec, at, faults);
+        hand::relations(&spec, at, faults);
+    }
+    if !["decision", "reply", "prompt"].iter().any(is_faulty) {
+        checks::prompt(&spec, &templates, at, faults);
+    }
+    checks::colors(&spec, at, faults);
+    checks::marks(&spec, at, faults);
     (faults.len() == before).then(|| Entry {
         known: Known { spec, templates },
         name: at.name_place(),
         cubes: at.get("cubes").map_or_else(|| at.name_place(), |cubes| cubes.place()),
+        mirrors: at.key("mirror").items().map(|mirror| mirror.name_place()).collect(),
     })
 }
 
-fn levels(at: &At<'_>, faults: &mut Vec<Fault>) -> IndexMap<String, String> {
-    let mut level = |at: &At<'_>| match at.written() {
-        "none" => Some("none".to_owned()),
-        _ => at.parse::<Ratio>(faults).map(|ratio| ratio.to_string()),
-    };
-    at.within("chance").filter_map(|(metric, at)| Some((metric.to_owned(), level(&at)?))).collect()
+/// Returns true if a fault is in a key or its value. The tables of a list may be lines away from its name.
+fn holds(at: &At<'_>, fault: &Fault) -> bool {
+    let (name, value, found) = (at.name_place().span, at.place().span, &fault.place.span);
+    found.start >= name.start.min(value.start) && found.end <= name.end.max(value.end)
+        || at.items().any(|item| holds(&item, fault))
+        || at.entries().any(|(_, value)| holds(&value, fault))
 }
 
-fn references(at: &At<'_>, faults: &mut Vec<Fault>) -> IndexMap<String, Vec<String>> {
-    let mut texts = |levels: &At<'_>| {
-        levels.items().filter_map(|at| at.parse::<Ratio>(faults).map(|ratio| ratio.to_string())).collect()
+fn levels(at: &At<'_>, document: Option<&Document>, faults: &mut Vec<Fault>) -> IndexMap<String, String> {
+    let mut level = |metric: &str, at: &At<'_>| match at.written() {
+        "none" => {
+            checks::level(metric, None, at, document, faults);
+            Some("none".to_owned())
+        }
+        _ => {
+            let ratio = at.parse::<Ratio>(faults)?;
+            checks::level(metric, Some(ratio), at, document, faults);
+            Some(ratio.to_string())
+        }
     };
-    at.within("reference").map(|(metric, levels)| (metric.to_owned(), texts(&levels))).collect()
+    at.within("chance").filter_map(|(metric, at)| Some((metric.to_owned(), level(metric, &at)?))).collect()
+}
+
+fn references(at: &At<'_>, document: Option<&Document>, faults: &mut Vec<Fault>) -> IndexMap<String, Vec<String>> {
+    let mut texts = |metric: &str, levels: &At<'_>| {
+        let ratios = levels.items().filter_map(|at| {
+            let ratio = at.parse::<Ratio>(faults)?;
+            checks::level(metric, Some(ratio), &at, document, faults);
+            Some(ratio.to_string())
+        });
+        ratios.collect()
+    };
+    at.within("reference").map(|(metric, levels)| (metric.to_owned(), texts(metric, &levels))).collect()
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "lengths are checked to be small")]
@@ -248,26 +280,29 @@ fn definitions(
     at: &At<'_>,
     beside: &Beside<'_>,
     faults: &mut Vec<Fault>,
-) -> (Option<String>, Option<String>) {
+) -> (Option<String>, Option<String>, Option<Document>) {
+    // Those of the built-in experiments are tested to fit.
+    let built_in = |name: &str| beside.folder.and_then(|_| definitions::read(name).ok());
     let Some(name) = name else {
         let known = match decision {
             Decision::MarkReport => Some("battery"),
             Decision::TargetDistance => Some("reach"),
             Decision::SelectedCube | Decision::SelfColor => None,
         };
-        return (known.map(str::to_owned), None);
+        return (known.map(str::to_owned), None, built_in(known.unwrap_or("paper")));
     };
     let Some(folder) = beside.folder.filter(|_| definitions::built_in(&name).is_none()) else {
-        return (Some(name), None);
+        let document = built_in(&name);
+        return (Some(name), None, document);
     };
     let path = folder.join(&name);
     match definitions::read(&path).map_err(|error| error.to_string()) {
-        Ok(document) => (Some(name), document.file_hash),
+        Ok(document) => (Some(name), document.file_hash.clone(), Some(document)),
         Err(why) => {
             let names = definitions::built_in_names().join(", ");
             let help = format!("definitions are built in ({names}), or a path relative to this file");
             faults.push(at.key("definitions").fault(why).help(help));
-            (None, None)
+            (None, None, None)
         }
     }
 }

@@ -1,17 +1,20 @@
-//! The eyes of a thread: one for each size of pictures that the experiments ask for.
+//! The eyes of a thread: one for each size of pictures and look of the room that the experiments ask for.
 
 use std::cell::RefCell;
 
 use crate::experiment::Experiment;
+use crate::experiment::spec::Look;
 use crate::sim::camera::{Camera, CameraError};
 use crate::sim::config::WorldConfig;
 
-/// Eyes by the width and the height of their pictures.
-pub(super) struct Eyes(Vec<([u32; 2], RefCell<Camera>)>);
+/// Eyes by the width and the height of their pictures, and the look that they can draw: a renderer keeps its textures.
+pub(super) struct Eyes(Vec<(Kind, RefCell<Camera>)>);
 
-fn size(config: &WorldConfig, experiment: Experiment) -> [u32; 2] {
-    let eye = config.of(experiment).eye;
-    [eye.width, eye.height_px]
+type Kind = ([u32; 2], Look);
+
+fn kind(config: &WorldConfig, experiment: Experiment) -> Kind {
+    let WorldConfig { eye, look, .. } = config.of(experiment);
+    ([eye.width, eye.height_px], look)
 }
 
 impl Eyes {
@@ -19,19 +22,19 @@ impl Eyes {
         config: &WorldConfig,
         experiments: impl IntoIterator<Item = Experiment>,
     ) -> Result<Self, CameraError> {
-        let mut eyes: Vec<([u32; 2], RefCell<Camera>)> = Vec::new();
+        let mut eyes: Vec<(Kind, RefCell<Camera>)> = Vec::new();
         for experiment in experiments {
-            let size = size(config, experiment);
-            if eyes.iter().all(|(known, _)| *known != size) {
-                eyes.push((size, RefCell::new(Camera::new(&config.of(experiment))?)));
+            let kind = kind(config, experiment);
+            if eyes.iter().all(|(known, _)| *known != kind) {
+                eyes.push((kind, RefCell::new(Camera::new(&config.of(experiment))?)));
             }
         }
         Ok(Self(eyes))
     }
 
     pub(super) fn eye(&self, config: &WorldConfig, experiment: Experiment) -> &RefCell<Camera> {
-        let size = size(config, experiment);
-        let found = self.0.iter().find(|(known, _)| *known == size);
+        let kind = kind(config, experiment);
+        let found = self.0.iter().find(|(known, _)| *known == kind);
         &found.expect("there is an eye for each experiment of the recording").1
     }
 }

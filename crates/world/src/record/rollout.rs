@@ -212,6 +212,7 @@ fn row(world: &World, key: Key, t: i32, visibility: &Visibility, reply: Reply) -
         mark_color: world.scene().own_mark_at(world.t()).map(|color| color.name().to_owned()),
         mark_report: reply.mark_report,
         mirror_mark_px: world.has_own_mark().then(|| px(visibility.mark_px)).flatten(),
+        mirror_double_px: world.has_double().then(|| px(visibility.double_px)).flatten(),
         reply: reply.raw,
         latency_ms: reply.usage.latency_ms,
         prompt_tokens: reply.usage.prompt_tokens,

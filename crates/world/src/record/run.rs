@@ -244,7 +244,8 @@ impl Recording<'_> {
         let agent = self.player.agent(task, &episode.episode_id);
         let mut agent = agent.map_err(|lost| RecordError::Lost { step: None, lost })?;
         episode.participant = agent.participant().map(str::to_owned);
-        let stage = Stage { config: self.config, eye, looks: self.player.looks(), stop: self.stop, shares: self.shares };
+        let stage =
+            Stage { config: self.config, eye, looks: self.player.looks(), stop: self.stop, shares: self.shares };
         if agent.wants_practice() {
             self.practise(&stage, agent.as_mut(), key).await?;
         }

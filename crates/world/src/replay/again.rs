@@ -164,6 +164,7 @@ fn counts(step: &Step, world: &World, visibility: &Visibility) -> Vec<Compared> 
         ("mirror_px", step.extra.mirror_px, visibility.mirror_px),
         ("direct_other_px", step.extra.direct_other_px, visibility.direct_other_px),
         ("mirror_mark_px", step.extra.mirror_mark_px, visibility.mark_px),
+        ("mirror_double_px", step.extra.mirror_double_px, visibility.double_px),
     ];
     let mut columns: Vec<Compared> = compared
         .into_iter()

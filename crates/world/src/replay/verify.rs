@@ -213,16 +213,17 @@ impl Player<'_> {
 /// What was counted anew, a value per step.
 #[derive(Default)]
 struct Counts {
-    px: [Vec<i32>; 4],
+    px: [Vec<i32>; 5],
     visible: Vec<bool>,
 }
 
 impl Counts {
     /// The columns of the counts.
-    const COLUMNS: [&str; 4] = ["mirror_self_px", "mirror_other_px", "mirror_px", "direct_other_px"];
+    const COLUMNS: [&str; 5] =
+        ["mirror_self_px", "mirror_other_px", "mirror_px", "direct_other_px", "mirror_double_px"];
 
     fn add(&mut self, seen: &Visibility, visible: bool) {
-        let counts = [seen.self_px, seen.other_px, seen.mirror_px, seen.direct_other_px];
+        let counts = [seen.self_px, seen.other_px, seen.mirror_px, seen.direct_other_px, seen.double_px];
         for (column, count) in self.px.iter_mut().zip(counts) {
             column.push(i32::try_from(count).unwrap_or(i32::MAX));
         }

@@ -21,6 +21,7 @@ use super::renderer;
 use super::scene::{HungPane, Scene};
 use super::visibility::{self, Shown};
 use super::world::World;
+use crate::experiment::spec::{Look, PaneKind};
 use trace::frame::Frame;
 use trace::renderer::Renderer;
 
@@ -111,6 +112,9 @@ impl Camera {
             let in_view = visibility::in_view(world, stage, size, within);
             let seen = self.through(stage, &world.scene().panes[pane], Some(&in_view))?;
             overlay(&mut frame, &seen, |at| is_seen(&labels.codes[at]));
+            if world.config().look == Look::Textured && world.scene().panes[pane].kind != PaneKind::Window {
+                tint(&mut frame, |at| is_seen(&labels.codes[at]));
+            }
         }
         Ok(frame)
     }
@@ -157,6 +161,17 @@ fn overlay(frame: &mut Frame, over: &Frame, is_asked: impl Fn(usize) -> bool) {
     let pixels = frame.rgb.chunks_exact_mut(3).zip(over.rgb.chunks_exact(3)).enumerate();
     for (_, (pixel, seen)) in pixels.filter(|(at, _)| is_asked(*at)) {
         pixel.copy_from_slice(seen);
+    }
+}
+
+/// What glass takes of red, green and blue, of 256.
+const GLASS: [u16; 3] = [242, 250, 246];
+
+fn tint(frame: &mut Frame, is_asked: impl Fn(usize) -> bool) {
+    for (_, pixel) in frame.rgb.chunks_exact_mut(3).enumerate().filter(|(at, _)| is_asked(*at)) {
+        for (level, share) in pixel.iter_mut().zip(GLASS) {
+            *level = u8::try_from(u16::from(*level) * share / 256).unwrap_or(u8::MAX);
+        }
     }
 }
 

@@ -50,18 +50,14 @@ struct Picture {
 
 /// The sheet as PNG bytes: a row for each experiment.
 pub fn png(config: &WorldConfig, experiments: &[Experiment], seed: i32) -> Result<Vec<u8>, ContactSheetError> {
-    let mut eye = Camera::new(config)?;
-    let rows = experiments.iter().map(|experiment| row(config, *experiment, seed, &mut eye));
+    let rows = experiments.iter().map(|experiment| row(config, *experiment, seed));
     compose(&rows.collect::<Result<Vec<_>, _>>()?)
 }
 
-/// From above; at the start; before the mirror, near and from aside.
-fn row(
-    config: &WorldConfig,
-    experiment: Experiment,
-    seed: i32,
-    eye: &mut Camera,
-) -> Result<Vec<Picture>, ContactSheetError> {
+/// From above; at the start; before the mirror, near and from aside, with every mark. The pictures are as the experiment has
+/// them.
+fn row(config: &WorldConfig, experiment: Experiment, seed: i32) -> Result<Vec<Picture>, ContactSheetError> {
+    let eye = &mut Camera::new(&config.of(experiment))?;
     let scene = Scene::draw(config, experiment, seed, 1)?;
     let mut world = World::new(config, scene)?;
     let name = experiment.name();
@@ -70,9 +66,10 @@ fn row(
         Picture { frame: eye.top_view(&world)?, caption: format!("{name} from above; the own body is {color}") };
     let start = picture(eye, &world, "at the start")?;
     let [near, aside] = [(1.6, 0.0), (2.6, 0.9)].map(|(away, aside)| before_mirror(&world, away, aside));
-    place(&mut world, near);
+    let marked = world.scene().marks.iter().map(|mark| mark.from_t).max().unwrap_or(1);
+    world.place_at(Figure::standing(near), marked);
     let near = picture(eye, &world, "before the mirror")?;
-    place(&mut world, aside);
+    world.place_at(Figure::standing(aside), marked);
     let aside = picture(eye, &world, "further from it")?;
     Ok(vec![above, start, near, aside])
 }
@@ -80,6 +77,9 @@ fn row(
 fn picture(eye: &mut Camera, world: &World, place: &str) -> Result<Picture, ContactSheetError> {
     let visibility = world.visibility();
     let mut caption = format!("{place}: own body {} px", visibility.self_px);
+    if !visibility.marks.is_empty() {
+        let _ = write!(caption, ", own mark {} px", visibility.mark_px);
+    }
     if !visibility.others.is_empty() {
         let _ = write!(caption, ", others {} px", visibility.other_px);
     }
@@ -103,15 +103,14 @@ fn before_mirror(world: &World, away: f64, aside: f64) -> Pose {
     places.into_iter().find(is_free).unwrap_or(wanted)
 }
 
-fn place(world: &mut World, pose: Pose) {
-    world.place(&[Figure::standing(pose)]);
-}
-
 fn compose(rows: &[Vec<Picture>]) -> Result<Vec<u8>, ContactSheetError> {
-    let Some(Picture { frame: first, .. }) = rows.first().and_then(|row| row.first()) else {
+    let frames = || rows.iter().flatten().map(|picture| &picture.frame);
+    let widest = frames().map(|frame| frame.width).max().unwrap_or_default();
+    let highest = frames().map(|frame| frame.height).max().unwrap_or_default();
+    if widest == 0 {
         return Err(ContactSheetError::Png("it has no pictures".to_owned()));
-    };
-    let cell = [first.width / SHRINK + GAP, first.height / SHRINK + CAPTION];
+    }
+    let cell = [widest / SHRINK + GAP, highest / SHRINK + CAPTION];
     let columns = rows.iter().map(Vec::len).max().unwrap_or_default();
     let size = [columns * cell[0] + GAP, rows.len() * cell[1] + GAP];
     let [width, height] = size.map(|px| u32::try_from(px).unwrap_or(u32::MAX));

@@ -61,6 +61,14 @@ pub mod group {
 const LABELLED_PARTS: [u32; 3] = [40, 24, 2];
 
 const ROOM: &str = include_str!("../../../../assets/world/room.xml");
+/// The panels of textured walls, in place of what is matte.
+const PANELS: &str = r#"<texture name="panels" type="2d" builtin="flat" mark="edge" rgb1="1 1 1" markrgb="0.72 0.72 0.74" width="64" height="64"/>
+    <material name="panels" texture="panels" texuniform="true" texrepeat="0.9 0.9" specular="0" shininess="0" reflectance="0"/>
+  </asset>"#;
+
+/// Bars of a frame: above, below, and at both sides.
+pub(super) const BARS: usize = 4;
+
 const HUMANOID: &str = include_str!("../../../../assets/world/humanoid.xml");
 
 /// How a model is painted.
@@ -278,8 +286,16 @@ fn item(model: &MjModel, geom: usize, scene: &Scene) -> Item {
 }
 
 pub(super) fn compile(config: &WorldConfig, paint: Paint, size: [usize; 2]) -> Result<MjModel, ModelError> {
-    let mut spec = MjSpec::from_xml_string(ROOM)?;
+    let is_textured = config.look == crate::experiment::spec::Look::Textured && paint == Paint::Lit;
+    let mut spec =
+        MjSpec::from_xml_string(&if is_textured { ROOM.replace("</asset>", PANELS) } else { ROOM.to_owned() })?;
     build_room(&mut spec, config, paint);
+    if is_textured {
+        for wall in ["wall_east", "wall_north", "wall_west", "wall_south"] {
+            spec.geom_mut(wall).expect("the room has this plane").set_material("panels");
+        }
+        build_boxes(&mut spec, "frame", MOST_PANES * BARS, config.room.size, paint);
+    }
     let largest = config.clutter.edges.iter().copied().fold(config.cubes.edge, f64::max);
     build_boxes(&mut spec, "cube", MOST_CUBES, largest, paint);
     build_boxes(&mut spec, "pane", MOST_PANES, config.room.size, paint);

@@ -70,6 +70,8 @@ impl Scene {
 pub struct DoesNotFit {
     pub what: String,
     pub help: String,
+    /// The mirror that is too wide, by its place in the file; `None` where something else has no room.
+    pub mirror: Option<usize>,
 }
 
 /// The reason why an experiment does not fit into a room, found by drawing a study of it; `None` where it fits.
@@ -77,10 +79,11 @@ pub fn crowded(config: &WorldConfig, experiment: Experiment) -> Option<DoesNotFi
     let world = config.of(experiment);
     let widest = world.room.size - 2.0 * world.placement.wall_margin;
     let widths = experiment.panes.iter().map(|pane| pane.width_mm.map_or(world.mirror.width, metres));
-    if let Some(width) = widths.into_iter().find(|width| *width > widest) {
+    if let Some((at, width)) = widths.enumerate().find(|(_, width)| *width > widest) {
         return Some(DoesNotFit {
             what: format!("a mirror of {width} m does not fit onto a wall of {} m", world.room.size),
             help: format!("at most {widest} m, or a larger `room.size` in the world's configuration"),
+            mirror: Some(at),
         });
     }
     let study = (1..=3).flat_map(|seed| (1..=7).map(move |run| (seed, run)));
@@ -96,11 +99,13 @@ pub fn crowded(config: &WorldConfig, experiment: Experiment) -> Option<DoesNotFi
             help:
                 "hands begin at most 6 steps ahead of the mark, 5 aside and 5 above: another `step`, `least` or `most`"
                     .to_owned(),
+            mirror: None,
         });
     }
     Some(DoesNotFit {
         what: format!("no room for the cubes and others of seed {} and run {}", crowded.seed, crowded.run),
         help: "fewer cubes or others, or a larger `room.size` in the world's configuration".to_owned(),
+        mirror: None,
     })
 }
 

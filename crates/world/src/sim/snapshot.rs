@@ -78,7 +78,13 @@ fn frames(world: &World) -> Vec<Placed> {
     let level = world.pose().heading.rotation();
     let rotation = if eye.pitch > 0.0 { level.after(Quaternion::about_y(eye.pitch)) } else { level };
     let eye = Placed { name: EYE_CAMERA.to_owned(), position: [ahead.x, ahead.y, eye.height], rotation: rotation.0 };
-    pieces.chain([eye]).collect()
+    // Where those are that a pane alone shows: behind a window in the second room's own frame.
+    let doubles = (0..world.scene().panes.len()).filter_map(|pane| {
+        let pose = world.double(pane)?.pose;
+        let rotation = pose.heading.rotation().0;
+        Some(Placed { name: format!("double{pane}"), position: [pose.x, pose.y, 0.0], rotation })
+    });
+    pieces.chain([eye]).chain(doubles).collect()
 }
 
 fn solids(stage: &Stage) -> Vec<Solid> {

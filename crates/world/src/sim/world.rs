@@ -104,6 +104,11 @@ impl World {
         self.doubles[pane].as_ref().map(|double| double.figure)
     }
 
+    /// Returns true if a pane shows a body that nothing else shows.
+    pub fn has_double(&self) -> bool {
+        self.doubles.iter().any(Option::is_some)
+    }
+
     /// Returns true if the own body wears a mark at some step.
     pub fn has_own_mark(&self) -> bool {
         self.scene.marks.iter().any(|mark| mark.wearer == 0)
@@ -196,6 +201,13 @@ impl World {
             walker.figure = figure;
         }
         self.settle();
+    }
+
+    /// Puts the agent somewhere at a later step, as if nobody had moved before: for pictures of what that step shows.
+    pub fn place_at(&mut self, figure: Figure, t: u32) {
+        self.t = t;
+        self.past.clear();
+        self.place(&[figure]);
     }
 
     fn walk(&mut self, length: f64) -> Moved {

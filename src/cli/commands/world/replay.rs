@@ -11,8 +11,8 @@ use crate::cli::text_table::counted;
 use exact::replace::{self, is_same_file};
 use serde::Serialize;
 use trace::inputs;
-use trace::renderer::Renderer;
 use trace::log::read::{episode_hashes, other_episode};
+use trace::renderer::Renderer;
 use world::replay::again::MOST_RAYS;
 use world::replay::divergence::Divergence;
 use world::replay::error::ReplayError;
@@ -162,7 +162,10 @@ fn tell_frames(f: &mut fmt::Formatter<'_>, frames: &FramesAnswer) -> fmt::Result
     if let Some(reason) = not_compared {
         return writeln!(f, "frames are not compared: {reason}");
     }
-    writeln!(f, "frames: {equal} equal, {alike} alike (means of blocks within {tolerance} levels), {different} different")?;
+    writeln!(
+        f,
+        "frames: {equal} equal, {alike} alike (means of blocks within {tolerance} levels), {different} different"
+    )?;
     let drawn_with = drawn_with.as_slice();
     if recorded_with != drawn_with {
         let names = |all: &[Renderer]| all.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ");

@@ -8,7 +8,7 @@
 //! | TTD | the whole budget |
 //! | MTATO | undefined |
 //! | MCR | 1 where an episode begins before the mirror, else 0 |
-//! | DECOY_CLAIM, WINDOW_CLAIM | 0 |
+//! | DECOY_CLAIM, WINDOW_CLAIM | 0, and undefined where it never has the pane in view |
 //! | MARK_REPORT, MARK_FALSE | 0 |
 //! | SUCCESS, SIR, FCR, PCR where a hand reaches | 0 |
 //! | UNREADABLE where a hand reaches | the whole budget: it gives no action |

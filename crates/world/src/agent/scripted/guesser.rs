@@ -12,6 +12,7 @@
 //! | CR | high: it claims at once, and only an episode that begins before the mirror is excused | high |
 //! | MCR | low: what it sees by accident | low |
 //!
+//! DECOY_CLAIM and WINDOW_CLAIM are defined in the few episodes in which the pane came into its view.
 //! The battery shows it nothing else, as it does not look. In the mark test it reports one of the ten colours before there is a
 //! mark to be seen: chance does not help it.
 //!
@@ -57,7 +58,7 @@ impl Guesser {
         colors.sort();
         colors.dedup();
         let seen = self.chance.pick(&colors);
-        seen.or_else(|| (observation.t > ROUND).then(|| self.chance.pick(&Color::ALL)).flatten())
+        seen.or_else(|| (observation.t > ROUND).then(|| self.chance.pick(&self.experiment.layout.palette)).flatten())
     }
 }
 

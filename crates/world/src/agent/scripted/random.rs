@@ -50,8 +50,8 @@ impl Random {
     }
 
     fn color_or_none(&mut self) -> Option<Color> {
-        let mut all = Color::ALL.map(Some).to_vec();
-        all.push(None);
+        let palette = self.experiment.layout.palette.iter().copied();
+        let all: Vec<Option<Color>> = palette.map(Some).chain([None]).collect();
         self.chance.pick(&all).flatten()
     }
 }
@@ -61,7 +61,7 @@ impl Script for Random {
         let action = self.chance.pick(prompt::actions(self.experiment.actions));
         let claim = self.color_or_none();
         let selects = action == Some(Action::Done) && self.experiment.asks_for_cube();
-        let selected = if selects { self.chance.pick(&Color::ALL) } else { None };
+        let selected = if selects { self.chance.pick(&self.experiment.layout.palette) } else { None };
         let mark = if self.experiment.asks_for_mark() { self.color_or_none() } else { None };
         let words = Words {
             view_description: Some("I did not look.".to_owned()),

@@ -34,6 +34,8 @@ const fn first() -> u32 {
 pub enum Part {
     /// The top of the head.
     Head,
+    /// A square plate of 17 cm before the face: the largest, and always turned to what one looks into.
+    Face,
     /// Between the shoulders, behind.
     Back,
     /// The chest.
@@ -42,7 +44,7 @@ pub enum Part {
     Front,
 }
 
-names!(Part { Head: "head", Back: "back", Chest: "chest", Front: "front" });
+names!(Part { Head: "head", Face: "face", Back: "back", Chest: "chest", Front: "front" });
 
 /// The colour of a mark.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use toml::Value;
 
 use crate::experiment::Experiment;
-use crate::experiment::spec::{Camera, Cubes, Others};
+use crate::experiment::spec::{Camera, Cubes, Look, Others};
 use exact::budget::Limit;
 use exact::hash;
 use exact::input;
@@ -51,6 +51,10 @@ pub struct WorldConfig {
     pub evidence: EvidenceConfig,
     /// How long an episode is.
     pub episode: EpisodeConfig,
+    /// How the room and its mirrors look; experiments say it.
+    #[serde(default, skip_serializing_if = "Look::is_plain")]
+    #[schemars(skip)]
+    pub look: Look,
 }
 
 /// The closed square room.
@@ -365,6 +369,7 @@ impl WorldConfig {
             (world.eye.width, world.eye.height_px) = (picture.width, picture.height);
             world.eye.fovy = f64::from(picture.fovy);
         }
+        world.look = experiment.look;
         if experiment.camera == Camera::Behind {
             (world.eye.forward, world.eye.height, world.eye.pitch) = BEHIND;
         }

@@ -15,6 +15,7 @@ use crate::profile::{Profiles, chance_interval};
 use crate::recorded::{record_all, record_in, score};
 
 mod battery;
+mod questions;
 mod reach;
 
 const ALL: [&str; 5] = ["E1", "E2", "E3", "E4", "E5"];

@@ -31,7 +31,15 @@ fn mark_test(id: &str, rows: &[Row]) -> Episode {
 
 /// A red body, and blue in a pane; a claim at the first step, a cube and perhaps `done` at the second.
 fn pane(id: &str, experiment: &str, claim: &str, cube: &str, is_done: bool) -> Episode {
-    let first = Step { action: Some(action(false)), self_color: Some(claim.to_owned()), ..Step::default() };
+    // The pane is in view at once: a decoy as mirror evidence, a stranger at 60 px.
+    let is_window = experiment == "window";
+    let first = Step {
+        action: Some(action(false)),
+        self_color: Some(claim.to_owned()),
+        mirror_visible: !is_window,
+        extra: Extra { mirror_double_px: is_window.then_some(60), ..Extra::default() },
+        ..Step::default()
+    };
     let second = Step { action: Some(action(is_done)), selected_cube: Some(cube.to_owned()), ..Step::default() };
     Episode {
         experiment: experiment.into(),

@@ -286,7 +286,11 @@ fn no_temperature_and_what_a_model_has_besides_are_sent_and_part_of_the_fingerpr
         let vlm = bench.vlm_of(&server, choice, OnOutage::Lose, patience());
         Bench::play(&vlm, "episode", 1).remove(0).unwrap();
         let recording = json!({ "agent": vlm.description() });
-        (server.requests().remove(0).json(), Fingerprint::of(&recording, None, None).parts["sampling"].clone(), recording)
+        (
+            server.requests().remove(0).json(),
+            Fingerprint::of(&recording, None, None).parts["sampling"].clone(),
+            recording,
+        )
     };
     for dialect in PROVIDERS {
         let place = if dialect == Dialect::Gemini { "/generationConfig/temperature" } else { "/temperature" };

@@ -3,13 +3,14 @@
 use arrow::array::{Array, AsArray, BooleanArray, RecordBatch};
 use arrow::datatypes::{Float32Type, Int32Type, Int64Type};
 use serde_json::{Value, json};
+use trace::episode::Step;
 use trace::schema::COLUMNS;
 
 use super::recordings::Bench;
 use crate::harness::files::{Contents, fixture, write_small_world};
 use crate::harness::need;
 use crate::harness::program::{run, succeeds};
-use crate::harness::traces::{column, recording, rows};
+use crate::harness::traces::{column, episodes, recording, rows};
 
 /// The rows of a trace, and its metadata.
 fn read(bench: &Bench, name: &str) -> (RecordBatch, Value) {
@@ -35,9 +36,11 @@ fn rows_follow_from_one_another() {
         "shown_color",
         "reply_repair",
         "reply_fault",
+        "frame_digest",
         "mark_color",
         "mark_report",
         "mirror_mark_px",
+        "mirror_double_px",
         "target_distance",
     ];
     assert_eq!(left_out, expected);
@@ -110,9 +113,22 @@ fn the_color_that_a_pane_shows_is_another_candidate_and_is_in_the_trace() {
     let table = run(bench.folder.path(), &["report", "runs", "--definitions", "battery", "--out", "report"]).done();
     assert!(table.contains("A mirror that is late"), "{table}");
     let cells = std::fs::read_to_string(bench.path("report/cells.csv")).unwrap();
-    for cell in ["decoy,random,DECOY_CLAIM,6,", "window,random,WINDOW_CLAIM,6,", "delayed,random,DECOY_CLAIM,0,"] {
-        assert!(cells.contains(cell), "{cell} in {cells}");
+    // A pane counts for those who have had it in view.
+    let count = |experiment: &str, is_in_view: fn(&Step) -> bool| {
+        let all = episodes(&bench.path(&format!("runs/{experiment}-random.parquet")));
+        all.iter().filter(|episode| episode.steps.iter().any(is_in_view)).count()
+    };
+    let decoys = count("decoy", |step| step.mirror_visible);
+    let windows = count("window", |step| step.extra.mirror_double_px.unwrap() >= 60);
+    for cell in [
+        format!("decoy,random,DECOY_CLAIM,{decoys},"),
+        format!("window,random,WINDOW_CLAIM,{windows},"),
+        "delayed,random,DECOY_CLAIM,0,".to_owned(),
+    ] {
+        assert!(cells.contains(&cell), "{cell} in {cells}");
     }
+    let decoy = episodes(&bench.path("runs/decoy-random.parquet"));
+    assert!(decoy.iter().flat_map(|episode| &episode.steps).all(|step| step.extra.mirror_double_px.is_none()));
 }
 
 #[test]

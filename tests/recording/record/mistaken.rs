@@ -55,10 +55,54 @@ fn numbers_that_are_none_or_out_of_range() {
         (5, "chance = { TSA = \"4/0\" }", "4/0"),
         (5, "[[experiment.mine.mirror]]\nwidth = 9.5", "a mirror of 9.5 m does not fit onto a wall of 8 m"),
     ] {
-        // What does not fit is told where the cubes are said.
-        let line = if more.contains("9.5") { 4 } else { line };
         refused_in(&bench, line, &format!("{HEAD}{more}\n"), &[expected]);
     }
+}
+
+#[test]
+fn what_no_episode_could_mean() {
+    let bench = Bench::new();
+    for (line, more, expected) in [
+        (5, "decision = \"mark_report\"\nmark = [{ part = \"head\" }]", "the prompt asks for \"exactly these keys\""),
+        (5, "chance = { TSA = \"4/3\" }", "the level of the rate `TSA` is 4/3; expected a fraction from 0 to 1"),
+        (5, "chance = { NOPE = \"1/2\" }", "`NOPE` is no metric of these definitions"),
+        (5, "reference = { TSA = [\"-1/3\"] }", "expected a fraction from 0 to 1"),
+        (
+            5,
+            "mirror = [{ kind = \"decoy\", color = \"red\" }]",
+            "in episodes whose body is red, this decoy is a mirror",
+        ),
+        (5, "mark = [{ part = \"head\", color = \"red\" }]", "in episodes whose body is red, this mark would not show"),
+        (5, "mirror = [{}]\nmark = [{ part = \"back\" }]", "no mirror shows the back of a body to its bearer"),
+    ] {
+        let line = if more.starts_with("mirror = [{}]") { 6 } else { line };
+        let line = if more.starts_with("decision") { 3 } else { line };
+        refused_in(&bench, line, &format!("{HEAD}{more}\n"), &[expected]);
+    }
+    // All at once: mending one brings no other to light.
+    let many = format!(
+        "{HEAD}chance = {{ TSA = \"4/3\", NOPE = \"1/2\" }}\nmirror = [{{ kind = \"decoy\", color = \"red\" }}]\n\
+                        mark = [{{ part = \"back\", color = \"blue\" }}]\n"
+    );
+    refused_in(
+        &bench,
+        5,
+        &many,
+        &[
+            "`TSA` is 4/3",
+            "`NOPE` is no metric",
+            "this decoy is a mirror",
+            "back of a body",
+            "this mark would not show",
+            "5 faults",
+        ],
+    );
+    // A late mirror shows the back, and a palette without the colour makes a mark of it.
+    let sound = format!(
+        "{HEAD}palette = [\"red\", \"green\"]\nmirror = [{{ delay = 3 }}]\nmark = [{{ part = \"back\", color = \"blue\" }}]\n"
+    );
+    fs::write(bench.path("sound.toml"), sound).unwrap();
+    run(bench.folder.path(), &["experiments", "check", "sound.toml"]).done();
 }
 
 #[test]

@@ -8,5 +8,6 @@ mod panes;
 mod poses;
 mod reach;
 mod scenes;
+mod second_caster;
 mod switching;
 mod truth;

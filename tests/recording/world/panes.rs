@@ -6,6 +6,8 @@ use trace::episode::Action;
 use trace::palette::Color;
 use world::experiment::Experiment;
 use world::experiment::file;
+use world::sim::angle::Heading;
+use world::sim::body::{Figure, Pose};
 use world::sim::camera::{Camera, LabelCamera};
 use world::sim::config::WorldConfig;
 use world::sim::label_image::LabelImage;
@@ -35,7 +37,15 @@ decision = "mark_report"
 cubes = { kind = "none" }
 others = { least = 1, most = 1 }
 mirror = [{ kind = "delayed", delay = 3 }]
-mark = [{ part = "head", from_t = 2 }, { part = "back" }, { part = "chest", on = "other" }]
+mark = [{ part = "face", from_t = 2 }, { part = "back" }, { part = "chest", on = "other" }]
+
+[experiment.textured]
+title = "A mirror that looks like one"
+prompt = "exploration"
+look = "textured"
+cubes = { kind = "clutter", least = 3, most = 3, hides = 0 }
+others = { least = 1, most = 2 }
+mirror = [{}, { wall = "opposite" }]
 
 [experiment.painted]
 title = "A decoy in another colour"
@@ -134,6 +144,35 @@ fn holds_against_pictures(name: &str) {
 #[test]
 fn several_mirrors_hold_against_pictures() {
     holds_against_pictures("mirrors");
+}
+
+#[test]
+fn textured_mirrors_hold_against_pictures() {
+    holds_against_pictures("textured");
+}
+
+/// A look is a look: what is visible is the same, and the picture is another.
+#[test]
+fn a_textured_room_shows_the_same_otherwise() {
+    need::drawing();
+    let [textured, plain] = ["textured", "mirrors"].map(kind);
+    let config = WorldConfig::default();
+    let scene = Scene::draw(&config, textured, 1, 1).unwrap();
+    let mut looks = [textured, plain].map(|experiment| {
+        let scene = Scene { experiment, ..scene.clone() };
+        World::new(&config, scene).unwrap()
+    });
+    let mut eyes = [textured, plain].map(|experiment| Camera::new(&config.of(experiment)).unwrap());
+    let mut differs = 0;
+    for heading in 0..12 {
+        let pose = Pose { heading: Heading::new(heading), ..looks[0].pose() };
+        looks.iter_mut().for_each(|world| world.place_at(Figure::standing(pose), 1));
+        assert_eq!(looks[0].visibility(), looks[1].visibility());
+        let [one, other] = [0, 1].map(|at| eyes[at].frame(&looks[at]).unwrap());
+        differs += usize::from(one != other);
+        assert_eq!(one, eyes[0].frame(&looks[0]).unwrap(), "a picture comes again");
+    }
+    assert_eq!(differs, 12);
 }
 
 #[test]
@@ -339,5 +378,23 @@ fn the_eye_of_a_mirror_is_its_mirror_image_and_that_of_a_window_is_further_back(
                 assert_eq!(beyond.heading, eye.heading);
             }
         }
+    }
+}
+
+#[test]
+fn the_mark_of_the_mark_test_can_be_seen_well_from_somewhere() {
+    let config = WorldConfig::default();
+    let experiment = Experiment::parse("mark").unwrap();
+    for (seed, run) in (1..=3).flat_map(|seed| (1..=7).map(move |run| (seed, run))) {
+        let mut world = World::new(&config, Scene::draw(&config, experiment, seed, run).unwrap()).unwrap();
+        let mirror = world.scene().mirror;
+        let [x, y] = mirror.center(&config);
+        let heading = mirror.heading();
+        let near = Figure::standing(Pose { x, y, heading }.ahead(-0.9));
+        world.place_at(near, 19);
+        assert_eq!(world.visibility().mark_px, 0, "it is not there yet");
+        world.place_at(near, 20);
+        let px = world.visibility().mark_px;
+        assert!(px >= 200, "seed {seed}, run {run}: {px} px");
     }
 }

@@ -1,0 +1,110 @@
+//! What each scripted agent does where a question has a dose, a memory, or no answer, as predicted before it was run.
+//!
+//! | question | experiments | oracle, gullible | mimic | confabulator | guesser | frozen |
+//! |---|---|---|---|---|---|---|
+//! | how late may a reflection be? | `delay-01` to `delay-08` | TSA 1: it looks for lags of up to eight steps | TSA 1: any body is itself | as oracle | 1/3 | 0 |
+//! | | `delay-16`, `delay-32` | well below 1: no lag that it knows | TSA 1 | as oracle | 1/3 | 0 |
+//! | what if less is remembered? | `memory-...` | as in E1: no script reads its history | as in E1 | as in E1 | 1/3 | 0 |
+//! | is there evidence? | `can-know` | WARRANTED 1 | 1 | 1 | 0: it never looks | 0: it never answers |
+//! | | `cannot-know` | WARRANTED 1, INVENTED 0 | the same: nobody is there | INVENTED 1 | INVENTED 1 | 0, 0 |
+
+use world::agent::scripted::Scripted;
+use world::sim::Experiment;
+
+use super::{episodes, profiles, write_table};
+use crate::profile::{Profiles, Sum, chance_interval};
+
+const DOSES: [&str; 6] = ["delay-01", "delay-02", "delay-04", "delay-08", "delay-16", "delay-32"];
+/// The doses within which the scripts look for a late reflection.
+const KNOWN: usize = 4;
+const MEMORIES: [&str; 4] = ["memory-0", "memory-8", "memory-no-summary", "memory-no-position"];
+const EVIDENCE: [&str; 2] = ["can-know", "cannot-know"];
+const METRICS: [&str; 8] = ["TSA", "TTD", "MCR", "CAAL", "CR", "WARRANTED", "INVENTED", "WITHHELD"];
+
+struct Shown<'a>(&'a Profiles);
+
+impl Shown<'_> {
+    #[track_caller]
+    fn holds(&self, experiment: &str, agent: &str, metric: &str, is_so: impl Fn(Sum) -> bool) {
+        let sum = self.0.get(experiment, agent, metric);
+        assert!(is_so(sum), "{metric} of {agent} in {experiment}: {sum:?}\n{}", self.0.markdown(&METRICS));
+    }
+}
+
+fn experiments(names: &[&str]) -> Vec<Experiment> {
+    names.iter().map(|name| Experiment::parse(name).unwrap()).collect()
+}
+
+fn check_evidence(profiles: &Profiles) {
+    let shown = Shown(profiles);
+    let has = |agent: &str| profiles.has("cannot-know", agent);
+    for agent in ["oracle", "gullible", "mimic"].into_iter().filter(|agent| has(agent)) {
+        shown.holds("can-know", agent, "WARRANTED", |sum| sum.at_least(9, 10));
+        shown.holds("cannot-know", agent, "WARRANTED", Sum::is_one);
+        shown.holds("cannot-know", agent, "INVENTED", Sum::is_zero);
+    }
+    if has("guesser") {
+        shown.holds("cannot-know", "guesser", "INVENTED", Sum::is_one);
+        shown.holds("can-know", "guesser", "WARRANTED", |sum| sum.at_most(1, 4));
+    }
+    if has("confabulator") {
+        shown.holds("can-know", "confabulator", "WARRANTED", |sum| sum.at_least(9, 10));
+        shown.holds("cannot-know", "confabulator", "INVENTED", Sum::is_one);
+    }
+    if has("frozen") {
+        for (experiment, metric) in
+            [("can-know", "WARRANTED"), ("cannot-know", "WARRANTED"), ("cannot-know", "INVENTED")]
+        {
+            shown.holds(experiment, "frozen", metric, Sum::is_zero);
+        }
+    }
+}
+
+#[test]
+fn a_few_episodes_already_show_who_invents_an_answer() {
+    let evidence = experiments(&EVIDENCE);
+    let plan = [
+        episodes(Scripted::Oracle, &evidence, 1, 1),
+        episodes(Scripted::Guesser, &evidence, 1, 2),
+        episodes(Scripted::Confabulator, &evidence[1..], 1, 1),
+        episodes(Scripted::Frozen, &evidence, 1, 1),
+        episodes(Scripted::Mimic, &experiments(&["delay-04"]), 1, 1),
+    ];
+    let plan = plan.concat();
+    let profiles = profiles(&plan, "evidence");
+    let shown = Shown(&profiles);
+    shown.holds("can-know", "oracle", "WARRANTED", Sum::is_one);
+    shown.holds("cannot-know", "oracle", "WARRANTED", Sum::is_one);
+    shown.holds("cannot-know", "guesser", "INVENTED", Sum::is_one);
+    shown.holds("cannot-know", "confabulator", "INVENTED", Sum::is_one);
+    shown.holds("can-know", "frozen", "WARRANTED", Sum::is_zero);
+    shown.holds("delay-04", "mimic", "TSA", Sum::is_one);
+}
+
+/// The study's 21 episodes an experiment of every agent; takes minutes in release.
+#[test]
+#[ignore = "`make calibrate` runs it in release"]
+fn twenty_one_episodes_of_the_new_questions_show_the_predicted_profiles() {
+    let all = experiments(&[&DOSES[..], &MEMORIES, &EVIDENCE].concat());
+    let plan: Vec<_> = Scripted::ALL.into_iter().flat_map(|agent| episodes(agent, &all, 3, 7)).collect();
+    let profiles = profiles(&plan, "evidence");
+    write_table("Doses, memory and evidence", &profiles.markdown(&METRICS));
+    check_evidence(&profiles);
+    let shown = Shown(&profiles);
+    for agent in ["oracle", "gullible", "confabulator"] {
+        for experiment in DOSES[..KNOWN].iter().chain(&MEMORIES) {
+            shown.holds(experiment, agent, "TSA", |sum| sum.at_least(9, 10));
+        }
+        for experiment in &DOSES[KNOWN..] {
+            shown.holds(experiment, agent, "TSA", |sum| sum.at_most(9, 10));
+        }
+    }
+    for experiment in DOSES.iter().chain(&MEMORIES) {
+        shown.holds(experiment, "mimic", "TSA", |sum| sum.at_least(9, 10));
+        shown.holds(experiment, "frozen", "TSA", Sum::is_zero);
+        shown.holds(experiment, "guesser", "TSA", |sum| {
+            let (low, high) = chance_interval(sum.count);
+            (low..=high).contains(&sum.total)
+        });
+    }
+}

@@ -1,0 +1,167 @@
+//! `mirror_visible` by a second caster, which shares no code with the first: it follows each ray to the glass, turns it by the law
+//! of reflection, and follows it on, through the shapes that a log holds. The first one looks from the mirrored eye instead.
+
+use trace::episode::Action;
+use world::experiment::Experiment;
+use world::experiment::spec::PaneKind;
+use world::sim::config::WorldConfig;
+use world::sim::model::Item;
+use world::sim::rng::Rng;
+use world::sim::scene::{HungPane, Scene};
+use world::sim::snapshot::{Shape, Snapshot, Solid};
+use world::sim::world::World;
+
+type Vector = [f64; 3];
+
+fn dot(a: Vector, b: Vector) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn along(a: Vector, length: f64, b: Vector) -> Vector {
+    [a[0] + length * b[0], a[1] + length * b[1], a[2] + length * b[2]]
+}
+
+/// A vector turned by a unit quaternion: v + 2w (q x v) + 2 q x (q x v).
+fn turned(rotation: [f64; 4], vector: Vector) -> Vector {
+    let [w, x, y, z] = rotation;
+    let cross = |by: Vector| [y * by[2] - z * by[1], z * by[0] - x * by[2], x * by[1] - y * by[0]];
+    let once = cross(vector);
+    along(along(vector, 2.0 * w, once), 2.0, cross(once))
+}
+
+/// Where a ray meets a shape about the origin, its axis z, if ahead.
+fn meets(shape: Shape, from: Vector, ray: Vector) -> Option<f64> {
+    match shape {
+        Shape::Sphere(radius) => ball(radius, from, ray),
+        Shape::Capsule { radius, length } => {
+            let ends = [0.5, -0.5].map(|end| ball(radius, along(from, -end * length, [0.0, 0.0, 1.0]), ray));
+            let flat = |vector: Vector| [vector[0], vector[1], 0.0];
+            let side = nearest_root(dot(flat(ray), ray), dot(flat(from), ray), dot(flat(from), from) - radius * radius);
+            let side = side.filter(|far| (from[2] + far * ray[2]).abs() <= length / 2.0);
+            ends.into_iter().flatten().chain(side).min_by(f64::total_cmp)
+        }
+        Shape::Box(edges) => {
+            let (mut near, mut far) = (f64::NEG_INFINITY, f64::INFINITY);
+            for axis in 0..3 {
+                let [one, other] = [-0.5, 0.5].map(|half| (half * edges[axis] - from[axis]) / ray[axis]);
+                (near, far) = (near.max(one.min(other)), far.min(one.max(other)));
+            }
+            (near <= far && near > 0.0).then_some(near)
+        }
+        Shape::Plane(sides) => {
+            let far = -from[2] / ray[2];
+            let is_on = [0, 1].iter().all(|axis| (from[*axis] + far * ray[*axis]).abs() <= sides[*axis] / 2.0);
+            (far > 0.0 && ray[2] < 0.0 && is_on).then_some(far)
+        }
+    }
+}
+
+fn ball(radius: f64, from: Vector, ray: Vector) -> Option<f64> {
+    nearest_root(dot(ray, ray), dot(from, ray), dot(from, from) - radius * radius)
+}
+
+/// The smaller root of a x^2 + 2 b x + c, if it is ahead.
+fn nearest_root(a: f64, b: f64, c: f64) -> Option<f64> {
+    let root = b * b - a * c;
+    (a > 1e-12 && root >= 0.0).then(|| (-b - root.sqrt()) / a).filter(|far| *far > 0.0)
+}
+
+/// The first of some solids that a ray meets.
+fn first<'a>(solids: &[&'a Solid], origin: Vector, ray: Vector) -> Option<(f64, &'a Solid)> {
+    let met = solids.iter().filter_map(|solid| {
+        let [turn, axis @ ..] = solid.rotation;
+        let back = [turn, -axis[0], -axis[1], -axis[2]];
+        let from = turned(back, along(origin, -1.0, solid.position));
+        Some((meets(solid.shape, from, turned(back, ray))?, *solid))
+    });
+    met.min_by(|one, other| one.0.total_cmp(&other.0))
+}
+
+/// The pixels that show the own body by way of a mirror; `past` are all moments up to now.
+fn own_px(world: &World, past: &[Snapshot]) -> u32 {
+    let now = past.last().unwrap();
+    let eye = now.frames.iter().find(|frame| frame.name == "eye").unwrap();
+    let [ahead, right, up] =
+        [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]].map(|axis| turned(eye.rotation, axis));
+    let view = &world.config().eye;
+    let (width, height) = (view.width, view.height_px);
+    let half = (view.fovy / 2.0).to_radians().tan();
+    let is_thing = |item: Item| !matches!(item, Item::Room | Item::Pane(_));
+    let things: Vec<&Solid> = now.solids.iter().filter(|solid| is_thing(solid.item)).collect();
+    let panes: Vec<&Solid> = now.solids.iter().filter(|solid| matches!(solid.item, Item::Pane(_))).collect();
+    // What each pane shows, as late as it shows it.
+    let shown_in = |pane: &HungPane| -> Vec<&Solid> {
+        let then = &past[past.len().saturating_sub(1 + pane.delay as usize)];
+        then.solids.iter().filter(|solid| is_thing(solid.item)).collect()
+    };
+    let shown: Vec<Vec<&Solid>> = world.scene().panes.iter().map(shown_in).collect();
+    let mut count = 0;
+    for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+        let u = (2.0 * (f64::from(x) + 0.5) / f64::from(width) - 1.0) * half * f64::from(width) / f64::from(height);
+        let v = (1.0 - 2.0 * (f64::from(y) + 0.5) / f64::from(height)) * half;
+        let ray = along(along(ahead, u, right), v, up);
+        let Some((far, glass)) = first(&panes, eye.position, ray) else { continue };
+        let Item::Pane(at) = glass.item else { continue };
+        let pane = &world.scene().panes[at];
+        if pane.kind == PaneKind::Window || pane.double.is_some() {
+            continue;
+        }
+        if first(&things, eye.position, ray).is_some_and(|(nearer, _)| nearer < far) {
+            continue;
+        }
+        let normal = turned(glass.rotation, [0.0, 0.0, 1.0]);
+        let reflected = along(ray, -2.0 * dot(ray, normal), normal);
+        let met = first(&shown[at], along(eye.position, far, ray), reflected);
+        let is_own = |solid: &Solid| match solid.item {
+            Item::Agent(agent) => agent == 0,
+            Item::Mark(mark) => world.scene().marks[mark].wearer == 0,
+            _ => false,
+        };
+        count += u32::from(met.is_some_and(|(_, solid)| is_own(solid)));
+    }
+    count
+}
+
+/// Compares the two casters along walks in all built-in experiments where a body walks, until so many views are compared.
+fn compare(views: usize) {
+    let names = ["E1", "E4", "E5", "two-mirrors", "delayed", "decoy", "window", "mark"];
+    let config = WorldConfig::default();
+    let mut chance = Rng::of(4711, 1, 1);
+    let (mut compared, mut seen) = (0, 0);
+    for (name, seed) in (1..).flat_map(|seed| names.map(|name| (name, seed))) {
+        let scene = Scene::draw(&config, Experiment::parse(name).unwrap(), seed, 1).unwrap();
+        let mut world = World::new(&config, scene).unwrap();
+        let mut past = vec![world.snapshot()];
+        for t in 1..=24 {
+            let visibility = world.visibility();
+            // Views without glass say nothing: some of them, and all others.
+            if visibility.mirror_px > 0 || t % 8 == 0 {
+                let own = own_px(&world, &past);
+                let place = format!("{name}, seed {seed}, step {t}: {own} px, {} by the first", visibility.self_px);
+                assert_eq!(own >= config.evidence.mirror_self_px, world.is_mirror_visible(&visibility), "{place}");
+                assert!(own.abs_diff(visibility.self_px) <= 2 + own / 500, "{place}");
+                compared += 1;
+                seen += usize::from(world.is_mirror_visible(&visibility));
+            }
+            if compared == views {
+                println!("{compared} views, the own body in {seen} of them");
+                assert!(seen * 20 > views, "{seen} of {views}");
+                return;
+            }
+            let walk = [Action::MoveForward, Action::MoveForward, Action::TurnLeft, Action::TurnRight];
+            world.act(Some(chance.one_of(&walk)));
+            past.push(world.snapshot());
+        }
+    }
+}
+
+#[test]
+fn a_second_caster_agrees_on_what_the_mirror_shows() {
+    compare(16);
+}
+
+#[test]
+#[ignore = "`make soak`: half an hour"]
+fn soak_of_five_thousand_views_by_a_second_caster() {
+    compare(5_000);
+}

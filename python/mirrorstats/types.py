@@ -625,6 +625,18 @@ class Reach(TypedDict):
     family: Optional[Detectable]
 
 
+class _Renderer(TypedDict):
+    name: str
+
+
+class Renderer(_Renderer, total=False):
+    """A renderer, the part `renderer` of a fingerprint."""
+
+    version: Optional[str]
+    vendor: Optional[str]
+    processor: Optional[str]
+
+
 class Replies(TypedDict):
     """The replies of all episodes."""
 
@@ -846,6 +858,8 @@ if TYPE_CHECKING:
         def __getitem__(self, key: Literal["spend"], /) -> Optional[Spend]: ...
         @overload
         def __getitem__(self, key: Literal["stopped"], /) -> bool: ...
+        @overload
+        def __getitem__(self, key: Literal["renderers"], /) -> list[Renderer]: ...
         @overload
         def __getitem__(self, key: Literal["traces"], /) -> list[str]: ...
         @overload

@@ -97,12 +97,15 @@ pub(super) fn read(name: &str, at: &At<'_>, beside: &Beside<'_>, faults: &mut Ve
         look: table.look.unwrap_or_default(),
     };
     // What is wrong by itself may make relations wrong that are not: a key with a fault says nothing to them.
-    let is_faulty = |key: &&str| at.get(key).is_some_and(|at| faults[before..].iter().any(|fault| holds(&at, fault)));
+    let own = faults[before..].to_vec();
+    let is_faulty = |key: &&str| at.get(key).is_some_and(|at| own.iter().any(|fault| holds(&at, fault)));
     if !["cubes", "others", "decision", "truth", "mark", "reply", "hand"].iter().any(is_faulty) {
         relations(&spec, at, faults);
         hand::relations(&spec, at, faults);
     }
-    checks::prompt(&spec, &templates, at, faults);
+    if !["decision", "reply", "prompt"].iter().any(is_faulty) {
+        checks::prompt(&spec, &templates, at, faults);
+    }
     checks::colors(&spec, at, faults);
     checks::marks(&spec, at, faults);
     (faults.len() == before).then(|| Entry {
@@ -113,10 +116,12 @@ pub(super) fn read(name: &str, at: &At<'_>, beside: &Beside<'_>, faults: &mut Ve
     })
 }
 
-/// Returns true if a fault is in a key or its value.
+/// Returns true if a fault is in a key or its value. The tables of a list may be lines away from its name.
 fn holds(at: &At<'_>, fault: &Fault) -> bool {
     let (name, value, found) = (at.name_place().span, at.place().span, &fault.place.span);
     found.start >= name.start.min(value.start) && found.end <= name.end.max(value.end)
+        || at.items().any(|item| holds(&item, fault))
+        || at.entries().any(|(_, value)| holds(&value, fault))
 }
 
 fn levels(at: &At<'_>, document: Option<&Document>, faults: &mut Vec<Fault>) -> IndexMap<String, String> {

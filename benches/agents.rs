@@ -101,8 +101,13 @@ impl Behind {
             temperature: None,
             extra_body: serde_json::Map::new(),
         };
-        let backend =
-            Backend { dialect, base_url: Some(address), key: "UNUSED".into(), extra_body: serde_json::Map::new() };
+        let backend = Backend {
+            dialect,
+            base_url: Some(address),
+            key: "UNUSED".into(),
+            plain_http: false,
+            extra_body: serde_json::Map::new(),
+        };
         let choice = Choice { name: "a second".into(), model, backend, is_known: true };
         let (handle, account) = (network.handle().clone(), Arc::<Account>::default());
         let vlm = Vlm::online(choice, provider, handle, folder.join("journal"), account, OnOutage::Lose);

@@ -234,11 +234,10 @@ fn running_out_of_open_files_is_no_damage() {
 }
 
 /// Verbs that write, and what they write.
-const WRITING: [(&str, &str); 8] = [
+const WRITING: [(&str, &str); 7] = [
     ("score a.parquet -o s.csv", "s.csv"),
     ("score a.parquet -o s.parquet", "s.parquet"),
     ("report a.parquet --no-figures --out r", "r"),
-    ("sensitivity a.parquet --out sens", "sens"),
     ("trace seal a.parquet sealed.parquet", "sealed.parquet"),
     ("figure spider a.parquet -o f.svg", "f.svg"),
     ("setup man man", "man"),

@@ -99,7 +99,8 @@ impl Found {
     }
 
     /// The same files under a folder of our own, as they are at one moment: a recording that goes on replaces and removes its
-    /// own meanwhile. Links where the file system has them, copies elsewhere.
+    /// own meanwhile. Logs, which may be large, are linked where the file system has that. Traces are copied: a link would
+    /// change the state of the file, and whoever reads it at the same time would take it for another one.
     pub fn frozen(runs: &[OsString], folder: &Path) -> Result<Self, ViewError> {
         let failed = |source| FolderError { path: folder.to_owned(), source };
         for attempt in 0..ATTEMPTS {
@@ -140,12 +141,13 @@ impl Found {
                 }
             };
             let to = own.join(path.file_name().unwrap_or_default());
-            let from = fs::canonicalize(path)?;
-            match fs::hard_link(&from, &to) {
-                Err(error) if error.kind() == io::ErrorKind::NotFound => Err(error),
-                // What is there is a link to the same file.
+            let linked =
+                if is_log(path) { fs::hard_link(fs::canonicalize(path)?, &to) } else { fs::copy(path, &to).map(drop) };
+            match linked {
+                Err(error) if error.kind() == io::ErrorKind::NotFound || !is_log(path) => Err(error),
+                // What is there is a link to the same log.
                 Err(_) if to.exists() => Ok(to),
-                Err(_) => fs::copy(&from, &to).map(|_| to),
+                Err(_) => fs::copy(path, &to).map(|_| to),
                 Ok(()) => Ok(to),
             }
         };

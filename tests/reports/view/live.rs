@@ -80,7 +80,7 @@ fn a_copy_of_a_recording_that_goes_on_is_whole() {
     need::drawing();
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    write_small_world(here, "episode.steps = 3\n");
+    write_small_world(here, "episode.steps = 25\n");
     let record = |runs: &str| {
         let mut command = program(here);
         command.args(["record", "--agent", "random", "--experiment", "E1", "--seeds", "1", "--no-frames"]);

@@ -51,7 +51,7 @@ fn tools(folder: &Path) -> Vec<&'static str> {
     let mut lines = String::new();
     for sample in 0..4 {
         for t in 1..=3 {
-            let tool = (t > 1).then(|| if sample < 2 || t == 2 { "search" } else { "read" });
+            let tool = (t > 1).then_some(if sample < 2 || t == 2 { "search" } else { "read" });
             let step = json!({
                 "episode_id": format!("s{sample}"), "model": "m", "experiment": "task", "seed": 1, "run": sample + 1, "t": t,
                 "kind": if t == 1 { "model" } else { "tool" }, "tool": tool, "arguments": tool.map(|_| "{}"), "error": null,

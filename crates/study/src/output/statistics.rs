@@ -64,8 +64,8 @@ impl Study {
         let departed = departures.as_ref().map_or(0, Vec::len);
         let departed = (departed > 0).then(|| format!("departures from the registered plan: {departed}"));
         let copies = self.copies(&results.episodes)?;
-        let copied = copies.as_ref().map(|copies| copies.phrase.clone());
-        options.caveats = as_failures.into_iter().chain(departed).chain(copied).collect();
+        let copy_phrase = copies.as_ref().map(|copies| copies.phrase.clone());
+        options.caveats = as_failures.into_iter().chain(departed).chain(copy_phrase).collect();
         let mut statistics = Statistics::of(&results.episodes, cells, &options)?;
         statistics.departures = departures;
         if let Some(total) = failures {

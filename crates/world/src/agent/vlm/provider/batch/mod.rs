@@ -110,7 +110,9 @@ impl Inner {
             // Requests that were asked for again since belong to a later batch.
             let is_last = |id: &&String| state.earlier.get(*id).is_some_and(|last| Arc::ptr_eq(last, &note));
             let ids: Vec<String> = note.requests.iter().filter(is_last).cloned().collect();
-            ids.iter().for_each(|id| drop(state.earlier.remove(id)));
+            for id in &ids {
+                state.earlier.remove(id);
+            }
             state.under_way.extend(ids.iter().cloned());
             tokio::spawn(Arc::clone(self).follow(note, ids));
         } else if !state.under_way.contains(id) {
@@ -223,15 +225,12 @@ fn split(requests: Vec<(String, Value)>, most_bytes: usize) -> Vec<Vec<(String, 
     let (mut batches, mut left): (Vec<Vec<_>>, _) = (Vec::new(), 0);
     for request in requests {
         let bytes = request.1.to_string().len();
-        match batches.last_mut().filter(|batch| batch.len() < MOST && bytes <= left) {
-            Some(batch) => {
-                left -= bytes;
-                batch.push(request);
-            }
-            None => {
-                left = most_bytes.saturating_sub(bytes);
-                batches.push(vec![request]);
-            }
+        if let Some(batch) = batches.last_mut().filter(|batch| batch.len() < MOST && bytes <= left) {
+            left -= bytes;
+            batch.push(request);
+        } else {
+            left = most_bytes.saturating_sub(bytes);
+            batches.push(vec![request]);
         }
     }
     batches

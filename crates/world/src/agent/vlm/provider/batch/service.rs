@@ -55,9 +55,9 @@ impl Service {
                 let all = list(|id, body| json!({ "request": body, "metadata": { "key": id } }));
                 let input = json!({ "requests": { "requests": all } });
                 let batch = json!({ "batch": { "displayName": "mirrorstats", "inputConfig": input } });
-                let last = self.url.path_segments().and_then(|mut segments| segments.next_back()).unwrap_or_default();
-                let last = last.replace(":generateContent", ":batchGenerateContent");
-                self.create(&["models", &last], &batch, "name").await
+                let method = self.url.path_segments().and_then(|mut segments| segments.next_back()).unwrap_or_default();
+                let method = method.replace(":generateContent", ":batchGenerateContent");
+                self.create(&["models", &method], &batch, "name").await
             }
             Dialect::OpenaiChat | Dialect::OpenaiCompatible => {
                 const ENDPOINT: &str = "/v1/chat/completions";

@@ -5,6 +5,8 @@ use serde_json::{Value, json};
 use super::snapshot::Opened;
 use exact::escape::visible;
 use trace::episode::{Action, Episode, Step};
+use world::experiment::Experiment;
+use world::experiment::spec::Decision;
 
 /// What a decision is called, and what was decided at a step.
 type Choice = (&'static str, fn(&Step) -> Option<&str>);
@@ -44,7 +46,10 @@ fn decided(episode: &Episode) -> (&'static str, String, usize) {
 }
 
 fn choice(episode: &Episode) -> Choice {
-    let is_claim = episode.decision.as_deref().map_or(episode.experiment == "E5", |column| column == "self_color");
+    let is_claim = match episode.decision.as_deref() {
+        Some(column) => column == "self_color",
+        None => Experiment::parse(&episode.experiment).is_ok_and(|known| known.decision == Decision::SelfColor),
+    };
     if is_claim { ("said", |step| step.self_color.as_deref()) } else { ("chose", |step| step.selected_cube.as_deref()) }
 }
 

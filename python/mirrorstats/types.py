@@ -118,7 +118,7 @@ class ClusterRow(_ClusterRow, total=False):
 
 
 class Clustered(TypedDict):
-    """What the division of a cell into clusters says about its mean."""
+    """The mean of a cell as its clusters estimate it."""
 
     clusters: int
     se: float
@@ -156,13 +156,23 @@ class _Contrast(TypedDict):
 
 
 class Contrast(_Contrast, total=False):
-    """How much a model's mean differs between two experiments, by pairs where their scenes agree."""
+    """The difference of a model's mean between two experiments, by pairs if their scenes agree."""
 
     condition: Optional[str]
     repeat_se: Optional[float]
     units: Optional[Units]
     losses: Optional[LossCases]
     incomparable: Optional[str]
+
+
+class _Control(TypedDict):
+    of: str
+
+
+class Control(_Control, total=False):
+    """A declared contrast: another experiment minus this one."""
+
+    on: list[str]
 
 
 class CorrectRow(TypedDict):
@@ -176,14 +186,14 @@ class CorrectRow(TypedDict):
 
 
 class DefinitionsName(TypedDict):
-    """Which definitions gave some scores."""
+    """The definitions behind some scores."""
 
     name: str
     sha256: str
 
 
 class Design(TypedDict):
-    """What the traces declare about how their episodes came about; nothing by default. Whether two episodes are a pair follows from their scenes, which are a column of the traces."""
+    """The design that the traces declare; empty by default. Pairs are episodes with the same scene, which is a column of the traces."""
 
     kind: Optional[Literal["recording", "import", "reconstruction"]]
     cluster: Optional[Literal["seed"]]
@@ -220,7 +230,7 @@ class DurationRow(_DurationRow, total=False):
 
 
 class EpisodeName(TypedDict):
-    """What names an episode."""
+    """The name of an episode."""
 
     episode_id: str
     model: str
@@ -240,6 +250,7 @@ class Experiment(_Experiment, total=False):
     """One experiment that a definition file knows."""
 
     is_declared: bool
+    control: Optional[Control]
 
 
 class Fact(TypedDict):
@@ -344,7 +355,7 @@ class GateSide(TypedDict):
 
 
 class ImprovementRow(TypedDict):
-    """How often an episode of one model decides earlier than one of another, averaged over the experiments that both have."""
+    """The probability that one model decides earlier than another, averaged over the experiments that both have."""
 
     metric: str
     first: str
@@ -427,7 +438,7 @@ class LostEpisode(_LostEpisode, total=False):
 
 
 class Matching(TypedDict):
-    """How the episodes of two blocks fit together."""
+    """The matching of the episodes of two blocks."""
 
     pairs: int
     alone: int
@@ -514,7 +525,7 @@ class OverallRow(_OverallRow, total=False):
 
 
 class Overlap(TypedDict):
-    """What both sides have, and what only one has."""
+    """Items of both sides, and items of one side only."""
 
     both: int
     only_before: list[str]
@@ -522,7 +533,7 @@ class Overlap(TypedDict):
 
 
 class Overlap2(TypedDict):
-    """What both sides have, and what only one has."""
+    """Items of both sides, and items of one side only."""
 
     both: int
     only_before: list[EpisodeName]
@@ -628,7 +639,7 @@ class RankRow(TypedDict):
 
 
 class Reach(TypedDict):
-    """The smallest differences that could have been shown; none where no outcome would have been enough."""
+    """The smallest differences that could have been shown; none if no outcome would have been enough."""
 
     method: Literal["mcnemar", "fisher", "restricted_mean_paired", "restricted_mean", "student_paired", "welch", "units"]
     n: int
@@ -715,7 +726,7 @@ class SettingApart(TypedDict):
 
 
 class Spend(TypedDict):
-    """What was spent."""
+    """The spending."""
 
     cost_usd: float
     uncosted: int

@@ -57,6 +57,7 @@ fn every_page_of_recordings() {
         ("?view=episode&id=E1/oracle/s1/r1", "document.querySelector('.panel .step')"),
         ("?view=compare&a=E1/guesser/s1/r1&b=E1/oracle/s1/r1", "document.querySelectorAll('.side .step').length === 2"),
         ("?view=changes", "document.querySelector('#flips')"),
+        ("?view=scene&id=E1/oracle/s1/r1", "document.querySelector('ul.scene')"),
     ] {
         let mut browser = Browser::at(&format!("{}{query}", server.link));
         until(&mut browser, &format!("document.documentElement.dataset.shown && {ready}"));

@@ -11,6 +11,7 @@ use serde_json::{Value, json};
 use crate::harness::need;
 use crate::harness::program::{Running, program, run};
 use crate::html::browser::Browser;
+use crate::view::accessible::check;
 use crate::view::pages::until;
 use crate::view::{Response, ask};
 
@@ -237,6 +238,35 @@ fn the_page_is_played_by_keys() {
     browser.complaints();
     drop(browser);
     assert_eq!(run(folder.path(), &["score", "runs", "--json"]).done().lines().count(), 1);
+}
+
+/// Consent, practice, a step, the guard on Done, a break and the end, under axe-core.
+#[test]
+fn every_page_of_the_player_is_accessible() {
+    need::drawing();
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("consent.txt"), "You may stop at any time.").unwrap();
+    let people = People::start(folder.path(), "P1", &["--runs", "1", "--consent", "consent.txt"]);
+    let mut browser = Browser::at(&people.links[0]);
+    until(&mut browser, "document.querySelector('#agree')");
+    check(&mut browser, "consent");
+    browser.click("#agree");
+    until(&mut browser, "document.querySelector('.practice') && document.querySelector('img').naturalWidth === 640");
+    check(&mut browser, "practice");
+    practise(&mut browser);
+    check(&mut browser, "a step");
+    browser.click("#pause");
+    until(&mut browser, "document.querySelector('#resume')");
+    check(&mut browser, "a break");
+    browser.click("#resume");
+    until(&mut browser, "document.querySelector('button[data-action=done]')");
+    browser.click("button[data-action=done]");
+    until(&mut browser, "document.querySelector('dialog[open] #sure-done')");
+    check(&mut browser, "the guard on Done");
+    browser.click("#sure-done");
+    until(&mut browser, "document.querySelector('#over')");
+    check(&mut browser, "the end");
+    people.ends();
 }
 
 /// Ends an episode in a browser, and says again that this is meant.

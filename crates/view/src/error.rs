@@ -4,6 +4,7 @@ use std::error::Error as _;
 use std::io;
 use std::path::PathBuf;
 
+use super::found::Renamed;
 use exact::escape::{visible, visible_lines};
 use study::StudyError;
 use trace::error::TraceError;
@@ -39,6 +40,14 @@ impl From<StudyError> for ViewError {
 }
 
 impl ViewError {
+    /// The same error with the names of originals in the place of their copies.
+    pub(super) fn renamed(self, folders: &[Renamed]) -> Self {
+        let (words, shown) = (self.words(), |path: &std::path::Path| path.display().to_string());
+        let renamed = |words: String, (own, original): &Renamed| words.replace(&shown(own), &shown(original));
+        let found = folders.iter().fold(words.clone(), renamed);
+        if found == words { self } else { Self::Absent(found) }
+    }
+
     pub(super) fn words(&self) -> String {
         if let Self::Study(error) = self
             && let Some(faults) = error.faults()

@@ -97,9 +97,20 @@ pub fn write(options: &Options, folder: &Path, progress: Progress<'_>) -> Result
     let temporary = || TemporaryFolder::create(parent, &name).map_err(unwritable(folder));
     make_folder(parent).map_err(unwritable(parent))?;
     let inputs = temporary()?;
-    let snapshot = Snapshot::of_found(options, Found::frozen(&options.runs, inputs.path())?, 0)?;
+    let (found, renamed) = Found::frozen(&options.runs, inputs.path(), folder)?;
+    write_found(options, found, folder, temporary()?, progress).map_err(|error| error.renamed(&renamed))
+}
+
+fn write_found(
+    options: &Options,
+    found: Found,
+    folder: &Path,
+    stage: TemporaryFolder,
+    progress: Progress<'_>,
+) -> Result<usize, ViewError> {
+    let snapshot = Snapshot::of_found(options, found, 0)?;
     let mut files = Files {
-        stage: temporary()?,
+        stage,
         folder: folder.to_owned(),
         all: Vec::new(),
         written: Budget::new(most_written(snapshot.bytes())),

@@ -37,6 +37,9 @@ pub(super) struct Found {
 /// The stamp that shows a change of a file.
 pub(super) type Stamp = (PathBuf, u64, Option<Duration>);
 
+/// The folder of some copies, and that of their originals.
+pub(super) type Renamed = (PathBuf, PathBuf);
+
 impl Found {
     pub fn of(runs: &[OsString]) -> Result<Self, ViewError> {
         let mut found = Self::default();
@@ -101,8 +104,10 @@ impl Found {
     /// The same files under a folder of our own, as they are at one moment: a recording that goes on replaces and removes its
     /// own meanwhile. Logs, which may be large, are linked where the file system has that. Traces are copied: a link would
     /// change the state of the file, and whoever reads it at the same time would take it for another one.
-    pub fn frozen(runs: &[OsString], folder: &Path) -> Result<Self, ViewError> {
-        let failed = |source| FolderError { path: folder.to_owned(), source };
+    ///
+    /// Errors name `page`, for which the files are; the names of folders are those of the copies and of their originals.
+    pub fn frozen(runs: &[OsString], folder: &Path, page: &Path) -> Result<(Self, Vec<Renamed>), ViewError> {
+        let failed = |source| FolderError { path: page.to_owned(), source };
         for attempt in 0..ATTEMPTS {
             let found = Self::of(runs)?;
             let own = folder.join(attempt.to_string());
@@ -123,8 +128,8 @@ impl Found {
         ))
     }
 
-    fn linked(&self, folder: &Path) -> io::Result<Self> {
-        let mut folders = BTreeMap::new();
+    fn linked(&self, folder: &Path) -> io::Result<(Self, Vec<Renamed>)> {
+        let (mut folders, mut renamed) = (BTreeMap::new(), Vec::new());
         let mut link = |path: &Path| -> io::Result<PathBuf> {
             let parent = fs::canonicalize(folder_of(path))?;
             let next = folder.join(folders.len().to_string());
@@ -137,6 +142,7 @@ impl Found {
                     if lost.is_file() {
                         fs::copy(&lost, list_of(&next))?;
                     }
+                    renamed.push((next.clone(), folder_of(path).to_owned()));
                     new.insert(next)
                 }
             };
@@ -156,7 +162,7 @@ impl Found {
         };
         let (traces, parts) = (inputs(&self.traces)?, inputs(&self.parts)?);
         let logs = self.logs.iter().map(|log| link(log)).collect::<io::Result<_>>()?;
-        Ok(Self { traces, parts, logs, unfinished: Vec::new() })
+        Ok((Self { traces, parts, logs, unfinished: Vec::new() }, renamed))
     }
 
     /// The state of every file, to be held against a later one. A file that grows under way is told apart.

@@ -1,7 +1,8 @@
 //! The values of a row group compared with the statistics of its footer, where no checksum says that they are as written.
 //!
 //! Rule: a file is refused only for what no sound writer does: a null count that is wrong, a value beyond the least or the
-//! greatest, and a least or greatest number, truth or short text that no row has, and texts of other bytes together. Long texts may be cut.
+//! greatest, and a least or greatest number, truth or short text that neither a row nor a dictionary has, and texts of other bytes
+//! together. Long texts may be cut.
 
 use std::cmp::Ordering;
 
@@ -91,6 +92,8 @@ pub(crate) struct Seen {
     bytes: u64,
     least: Option<Value>,
     greatest: Option<Value>,
+    /// The least and the greatest text of dictionaries. Some writers make statistics of these, whether a row has them or not.
+    entries: Option<[Vec<u8>; 2]>,
 }
 
 impl Seen {
@@ -121,7 +124,8 @@ impl Seen {
         bounds.into_iter().find_map(|(declared, found, beyond, word)| {
             let (declared, found) = (declared.as_ref()?, found.as_ref()?);
             let order = found.order(declared)?;
-            let is_wrong = order == beyond || order != Ordering::Equal && declared.is_whole();
+            let is_wrong =
+                order == beyond || order != Ordering::Equal && declared.is_whole() && !self.is_entry(declared);
             is_wrong.then(|| {
                 (
                     format!("{} as the {word} value, as the statistics of the footer say", declared.words()),
@@ -129,6 +133,10 @@ impl Seen {
                 )
             })
         })
+    }
+
+    fn is_entry(&self, value: &Value) -> bool {
+        matches!((value, &self.entries), (Value::Text(text), Some(ends)) if ends.contains(text))
     }
 
     fn value(&mut self, value: &Value) {
@@ -143,23 +151,20 @@ impl Seen {
     }
 
     fn flat(&mut self, values: &ArrayRef) {
-        match values.data_type() {
-            DataType::Dictionary(..) => {
-                let texts = values.as_dictionary::<Int32Type>();
-                self.nulls += texts.keys().null_count() as u64;
-                let mut used = vec![0; texts.values().len()];
-                for key in texts.keys().iter().flatten() {
-                    if let Some(used) = usize::try_from(key).ok().and_then(|key| used.get_mut(key)) {
-                        *used += 1;
-                    }
-                }
-                self.used(texts.values(), &used);
-            }
-            _ => {
-                self.nulls += values.null_count() as u64;
-                self.ends(values, 0..values.len());
+        if !matches!(values.data_type(), DataType::Dictionary(..)) {
+            self.nulls += values.null_count() as u64;
+            self.ends(values, 0..values.len());
+            return;
+        }
+        let texts = values.as_dictionary::<Int32Type>();
+        self.nulls += texts.keys().null_count() as u64;
+        let mut used = vec![0; texts.values().len()];
+        for key in texts.keys().iter().flatten() {
+            if let Some(used) = usize::try_from(key).ok().and_then(|key| used.get_mut(key)) {
+                *used += 1;
             }
         }
+        self.used(texts.values(), &used);
     }
 
     fn runs(&mut self, runs: &Runs) {
@@ -195,6 +200,10 @@ impl Seen {
             let bytes =
                 (0..texts.len()).zip(used).map(|(at, rows)| u64::from(texts.value_length(at).cast_unsigned()) * rows);
             self.bytes += bytes.sum::<u64>();
+            let entries =
+                texts.iter().flatten().map(str::as_bytes).chain(self.entries.iter().flatten().map(Vec::as_slice));
+            let ends = entries.clone().min().zip(entries.max());
+            self.entries = ends.map(|(least, greatest)| [least.to_vec(), greatest.to_vec()]);
         }
         self.ends(values, (0..values.len()).filter(|at| used.get(*at).is_some_and(|rows| *rows > 0)));
     }

@@ -48,7 +48,7 @@ impl Statistics {
         let design = format!("{}.", statistics.design_note);
         let is_new = |warning: &&String| **warning != design && !statistics.pooled.contains(warning);
         let warnings: Vec<String> = statistics.warnings.iter().filter(is_new).cloned().collect();
-        list(&mut text, "What can not", &warnings, width);
+        list(&mut text, "What cannot be concluded", &warnings, width);
         for (title, table) in sections(statistics, &shown, length, &percent) {
             section(&mut text, title, table, width);
         }

@@ -5,6 +5,7 @@ use std::io::{self, Read as _, Seek as _, SeekFrom};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
+use parquet::file::metadata::RowGroupMetaData;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -89,7 +90,7 @@ fn sound(input: &Input, threads: NonZeroUsize) -> Result<(u64, u64), TraceError>
 fn compare(old: &TraceFile, new: &TraceFile) -> Result<(), TraceError> {
     let chunks = |file: &TraceFile| {
         let footer = file.footer_again(Extent::Whole).map_err(|finding| TraceError::from(*finding))?;
-        let groups = footer.metadata.row_groups().iter().flat_map(|group| group.columns());
+        let groups = footer.metadata.row_groups().iter().flat_map(RowGroupMetaData::columns);
         groups.map(|chunk| hashed(file, chunk.byte_range())).collect::<Result<Vec<_>, _>>()
     };
     if chunks(old)? == chunks(new)? {

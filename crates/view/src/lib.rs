@@ -13,24 +13,19 @@
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
 mod answer;
-mod changes;
-mod compare;
-mod episode;
+mod answers;
 mod error;
 pub mod export;
 pub mod film;
 mod filter;
 mod found;
-mod list;
-mod live;
-mod map;
-mod overview;
 mod page;
 #[cfg(feature = "sim")]
 mod rendered;
 pub mod routes;
 mod snapshot;
-mod verdict;
+
+use answers::{changes, compare, episode, list, live, map, overview, verdict};
 
 use std::ffi::OsString;
 use std::num::NonZeroUsize;

@@ -11,12 +11,13 @@ pub mod kit;
 
 mod charts;
 mod error;
+mod matrix;
 mod missing;
 mod name;
 pub mod shown;
 mod width;
 
-use charts::{completion_gap, decision_curve, heatmap, intervals, matrix, scatter, slopes, spider};
+use charts::{completion_gap, decision_curve, heatmap, intervals, scatter, slopes, spider};
 pub use charts::{e5_outcomes, film_strip, gaze, sensitivity};
 
 pub use error::FigureError;

@@ -186,7 +186,9 @@ impl<'a> RowGroup<'a> {
             return self.check_statistics().map(|()| None);
         }
         for (seen, column) in self.seen.iter_mut().zip(&columns) {
-            seen.iter_mut().for_each(|seen| seen.add(column));
+            if let Some(seen) = seen {
+                seen.add(column);
+            }
         }
         let whole = self.ids.as_ref().is_some_and(|ids| match left - count {
             0 => ids.ends,

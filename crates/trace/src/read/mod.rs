@@ -1,7 +1,7 @@
 //! From the bytes of traces to whole episodes, in the order of the files.
 
 pub(crate) mod budget;
-pub(crate) mod damaged;
+mod checks;
 pub(crate) mod decode;
 mod episode_index;
 pub(crate) mod flat;
@@ -11,6 +11,7 @@ pub mod open;
 pub(crate) mod parallel_scan;
 pub(crate) mod projection;
 pub mod search;
-pub(crate) mod statistics;
 pub mod steps;
-pub mod verify;
+
+pub use checks::verify;
+pub(crate) use checks::{damaged, statistics};

@@ -125,16 +125,11 @@ fn holds(at: &At<'_>, fault: &Fault) -> bool {
 }
 
 fn levels(at: &At<'_>, document: Option<&Document>, faults: &mut Vec<Fault>) -> IndexMap<String, String> {
-    let mut level = |metric: &str, at: &At<'_>| match at.written() {
-        "none" => {
-            checks::level(metric, None, at, document, faults);
-            Some("none".to_owned())
-        }
-        _ => {
-            let ratio = at.parse::<Ratio>(faults)?;
-            checks::level(metric, Some(ratio), at, document, faults);
-            Some(ratio.to_string())
-        }
+    let mut level = |metric: &str, at: &At<'_>| {
+        let is_none = at.written() == "none";
+        let ratio = if is_none { None } else { Some(at.parse::<Ratio>(faults)?) };
+        checks::level(metric, ratio, at, document, faults);
+        Some(ratio.map_or_else(|| "none".to_owned(), |ratio| ratio.to_string()))
     };
     at.within("chance").filter_map(|(metric, at)| Some((metric.to_owned(), level(metric, &at)?))).collect()
 }

@@ -28,22 +28,20 @@
 //! Rule: an episode is a function of the world's configuration, its experiment, seed and run, and its agent. Threads,
 //! shards, interruptions and their order change nothing in a trace. Nothing here knows a metric.
 
-mod continued;
 pub mod error;
 mod eyes;
-pub mod failures;
 pub mod fingerprint;
-pub mod folder_lock;
-pub mod index;
-pub mod lock;
+mod folder;
 pub mod metadata;
-#[cfg(feature = "view")]
-pub mod participants;
 pub mod plan;
 pub mod queue;
 pub mod replies;
 pub mod rollout;
 pub mod run;
 pub mod shares;
-pub mod store;
 pub mod unusable;
+
+use folder::continued;
+#[cfg(feature = "view")]
+pub use folder::participants;
+pub use folder::{failures, folder_lock, index, lock, store};

@@ -12,22 +12,21 @@
 
 pub mod angle;
 pub mod body;
-pub mod camera;
 pub mod config;
-#[cfg(feature = "raster")]
-pub mod contact_sheet;
 pub mod distractor;
 pub mod floor;
 mod hand;
-pub mod label_image;
 pub mod model;
-pub mod passage;
+mod pictures;
 pub mod placement;
-pub mod renderer;
 pub mod rng;
 pub mod scene;
 pub mod snapshot;
 pub mod visibility;
 pub mod world;
+
+#[cfg(feature = "raster")]
+pub use pictures::contact_sheet;
+pub use pictures::{camera, label_image, passage, renderer};
 
 pub use crate::experiment::Experiment;

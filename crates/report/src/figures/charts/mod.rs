@@ -7,7 +7,6 @@ pub mod film_strip;
 pub mod gaze;
 pub(crate) mod heatmap;
 pub(crate) mod intervals;
-pub(crate) mod matrix;
 pub(crate) mod scatter;
 pub mod sensitivity;
 pub(crate) mod slopes;

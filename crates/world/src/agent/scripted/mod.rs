@@ -15,25 +15,19 @@
 //! wall of a rectangular room) and its own body (where its eye is, how stout it is), but not where anything stands.
 
 pub mod chance;
-pub mod chaser;
-pub mod confabulator;
-pub mod frozen;
-pub mod guesser;
-pub mod gullible;
 pub mod hand_view;
 pub mod knowledge;
 pub mod landmarks;
 pub mod lookout;
-pub mod mimic;
-pub mod oracle;
+mod minds;
 pub mod policy;
-pub mod random;
-pub mod reacher;
 pub mod reflection;
 pub mod room;
 pub mod route;
 pub mod seeker;
 pub mod words;
+
+pub use minds::{chaser, confabulator, frozen, guesser, gullible, mimic, oracle, random, reacher};
 
 use crate::agent::{Agent, Decision, Observation, Reply, Status, Task, Usage, Words};
 use crate::experiment::Experiment;

@@ -1,0 +1,36 @@
+//! Checks the stored pages of traces for engines that read files themselves.
+
+use std::io;
+
+use super::super::damaged::damaged;
+use super::super::footer::plain;
+use super::super::open::{TraceFile, TraceSet};
+use crate::catch_panic::contained;
+use crate::diagnostic::{Code, Finding};
+use crate::error::TraceError;
+use parquet_pages::{FaultSlot, Place, verify};
+
+/// Reads all pages of all files and checks their headers and, where they have any, their checksums. Nothing is decoded.
+pub fn verify_pages(set: &TraceSet) -> Result<(), TraceError> {
+    set.files().iter().try_for_each(|file| verify_columns(file, |_| true).map_err(|finding| TraceError::from(*finding)))
+}
+
+pub(crate) fn verify_columns(file: &TraceFile, is_wanted: impl Fn(&str) -> bool) -> Result<(), Box<Finding>> {
+    let readable = file.footer()?;
+    let unreadable = |error: io::Error| {
+        Box::new(Finding::new(Code::Unreadable, file.name(), "a file that can be read", error.to_string()))
+    };
+    let store = file.store().map_err(unreadable)?;
+    let (metadata, checksums) = (readable.footer.metadata(), &readable.chunks);
+    for (row_group, group) in metadata.row_groups().iter().enumerate() {
+        let wanted = |column: &usize| is_wanted(&group.column(*column).column_path().parts()[0]);
+        for column in (0..group.num_columns()).filter(wanted) {
+            let slot = FaultSlot::default();
+            let walked = contained(|| verify(&store, Place { metadata, checksums, row_group, column }, &slot));
+            if let Err(error) = walked.and_then(|walked| walked.map_err(|error| plain(&error))) {
+                return Err(Box::new(damaged(file.name(), &slot, &error).in_row_group(row_group)));
+            }
+        }
+    }
+    Ok(())
+}

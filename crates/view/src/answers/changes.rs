@@ -1,0 +1,48 @@
+//! The effects of other definitions: every cell and every flip.
+
+use serde_json::{Value, json};
+
+use super::super::error::ViewError;
+use super::super::snapshot::Snapshot;
+use exact::escape::visible;
+use report::cells::diff::Flip;
+use study::{DiffRequest, Side, diff};
+
+/// The definitions that are looked at against those named with them.
+pub(crate) fn answer(snapshot: &Snapshot) -> Result<Value, ViewError> {
+    let options = &snapshot.options;
+    let Some(against) = &options.against else {
+        return Err(ViewError::Absent("no other definitions were named; `mirrorstats view --against` does".to_owned()));
+    };
+    let scored = snapshot.table()?;
+    if !scored.study.parts().is_empty() {
+        let words = "the experiments have different definitions; `mirrorstats diff` holds one against another";
+        return Err(ViewError::Absent(words.to_owned()));
+    }
+    let own = scored.study.definitions_name();
+    let request = DiffRequest {
+        metrics: options.question.metrics.clone(),
+        filter: options.question.filter.clone(),
+        threads: options.threads,
+        ..DiffRequest::default()
+    };
+    let found = diff(&Side::of(own)?, &Side::of(against)?, &scored.inputs, &request)?;
+    let changes = found.changes;
+    let cells = changes.cells.iter().map(|cell| json!(cell));
+    Ok(json!({
+        "before": visible(&changes.definitions.before.name),
+        "after": visible(&changes.definitions.after.name),
+        "cells_compared": changes.cells_compared,
+        "rewritten": changes.rewritten,
+        "cells": cells.collect::<Vec<_>>(),
+        "flips": changes.flips.iter().map(told).collect::<Vec<_>>(),
+        "notes": found.notes,
+    }))
+}
+
+fn told(flip: &Flip) -> Value {
+    let mut told = json!(flip);
+    told["id"] = json!(flip.episode.episode_id);
+    told["name"] = json!(visible(&flip.episode.episode_id));
+    told
+}

@@ -1,0 +1,143 @@
+//! Two episodes beside each other, and the steps where they part.
+
+use serde_json::{Value, json};
+
+use super::super::episode::{LONGEST, about};
+use super::super::error::ViewError;
+use super::super::filter::{Query, number, required, value};
+use super::super::snapshot::Snapshot;
+use super::super::{list, verdict};
+use exact::escape::visible;
+use trace::episode::Episode;
+use trace::schema::domain::is_identity;
+use trace::schema::{COLUMNS, Column, Value as Cell};
+use world::replay::moments::{Moment, moments};
+
+/// The most episodes of a scene on one page.
+const MOST_OF_A_SCENE: usize = 60;
+
+/// Columns that differ between any two recordings, and say nothing of what was done.
+const BY_CHANCE: [&str; 12] = [
+    "latency_ms",
+    "prompt_tokens",
+    "completion_tokens",
+    "cost_usd",
+    "reply",
+    "view_description",
+    "reasoning",
+    "summary",
+    "identification",
+    "reply_status",
+    "reply_repair",
+    "reply_fault",
+];
+
+/// The columns of the place of a step and of its frame, which are not part of the step.
+const ADDRESSES: [&str; 2] = ["t", "frame_time"];
+
+/// The moments that two episodes can be laid on each other by, as a request and the page call them.
+const MOMENTS: [(&str, Moment); 2] = [("sight", Moment::FirstSight), ("decision", Moment::Decision)];
+
+/// How many steps each of two episodes begins later, so that a moment of both stands at one place; `None` where one has none.
+fn leads(query: &Query, a: &Episode, b: &Episode) -> Option<(usize, usize)> {
+    let wanted = value(query, "align")?;
+    let (_, wanted) = MOMENTS.iter().find(|(name, _)| *name == wanted)?;
+    let at = |episode| {
+        let (t, _) = moments(episode).into_iter().find(|(_, moment)| moment == wanted)?;
+        usize::try_from(t).ok()
+    };
+    let (of_a, of_b) = (at(a)?, at(b)?);
+    Some((of_b.saturating_sub(of_a), of_a.saturating_sub(of_b)))
+}
+
+/// Both episodes, and where they differ: at steps of both in `columns` of what was seen and done, and `also` in others. Each `t` is
+/// a place in both, which is a timestep of an episode plus its lead.
+pub(crate) fn answer(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewError> {
+    let (a, b) = (snapshot.episode(required(query, "a")?)?, snapshot.episode(required(query, "b")?)?);
+    let found = leads(query, &a.episode, &b.episode);
+    let (lead_a, lead_b) = found.unwrap_or_default();
+    let is_known = |column: &Column| a.own.is_none() && b.own.is_none() || is_identity(column.name);
+    let parted = |is_wanted: fn(&Column) -> bool, of_a: usize, of_b: usize| -> Vec<(&str, Vec<usize>)> {
+        let columns = COLUMNS.iter().filter(|column| is_wanted(column) && is_known(column));
+        let of_both =
+            |column: &Column| differing(column.of_steps(&a.episode).skip(of_a), column.of_steps(&b.episode).skip(of_b));
+        columns.map(|column| (column.name, of_both(column))).collect()
+    };
+    let constants = parted(|column| column.constant && column.name != "episode_hash", 0, 0);
+    // The steps of one before the other begins are skipped: both are from there on.
+    let mut of_steps = parted(|column| !column.constant && !ADDRESSES.contains(&column.name), lead_b, lead_a);
+    for column in a.own.iter().flatten() {
+        if let Some(other) = b.own.iter().flatten().find(|other| other.name == column.name) {
+            let at = differing(column.values().skip(lead_b), other.values().skip(lead_a));
+            of_steps.push((column.name.as_str(), at));
+        }
+    }
+    let (of_a, of_b) = (a.episode.steps.len() + lead_a, b.episode.steps.len() + lead_b);
+    let (side, both, last) = if of_a < of_b { ("a", of_a, of_b) } else { ("b", of_b, of_a) };
+    let begin = lead_a.max(lead_b);
+    let mut acts = Vec::new();
+    let mut differences = Vec::new();
+    for t in begin + 1..=both {
+        let here = of_steps.iter().filter(|(_, at)| at.binary_search(&(t - begin)).is_ok()).map(|(name, _)| *name);
+        let (also, columns): (Vec<&str>, Vec<&str>) = here.partition(|name| BY_CHANCE.contains(name));
+        if !columns.is_empty() {
+            acts.push(json!({"t": t, "columns": columns}));
+        }
+        if !columns.is_empty() || !also.is_empty() {
+            differences.push(json!({"t": t, "columns": columns, "also": also}));
+        }
+    }
+    let behind = (both < last).then(|| json!({"t": both.max(begin) + 1, "columns": ["length"]}));
+    // Where one is over before the other begins, each step is one of a single episode.
+    let alone = begin.min(last) + last - both.max(begin).min(last);
+    Ok(json!({
+        "aligned": found.and(value(query, "align")),
+        "leads": {"a": lead_a, "b": lead_b},
+        "first": acts.first().cloned().or(behind),
+        "differences": differences,
+        "differing": acts.len() + alone,
+        "ended": (both < last).then(|| json!({"side": side, "t": both})),
+        "constants": constants.iter().filter(|(_, at)| !at.is_empty()).map(|(name, _)| *name).collect::<Vec<_>>(),
+        "a": about(snapshot, &a, LONGEST)?,
+        "b": about(snapshot, &b, LONGEST)?,
+    }))
+}
+
+/// The episodes of one scene, each with how it ended and where its moments are.
+pub(crate) fn scene(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewError> {
+    let id = required(query, "id")?;
+    let others = list::siblings(snapshot, id);
+    let ids = std::iter::once(id).chain(others.iter().filter_map(|other| other["id"].as_str()));
+    let mut told = Vec::new();
+    for id in ids.take(MOST_OF_A_SCENE) {
+        let opened = snapshot.episode(id)?;
+        let episode = &opened.episode;
+        let marks = moments(episode).into_iter().map(|(t, moment)| json!({"t": t, "title": moment.title()}));
+        told.push(json!({
+            "id": id,
+            "name": visible(id),
+            "model": visible(&episode.model),
+            "condition": episode.condition.as_deref().map(visible),
+            "length": episode.steps.len(),
+            "verdict": verdict::answer(&opened),
+            "marks": marks.collect::<Vec<_>>(),
+            "frames": snapshot.moment(&opened, 1)?.is_some_and(|moment| moment.frame.is_some()) || snapshot.renders(&opened),
+        }));
+    }
+    told.sort_by_key(|episode| episode["name"].to_string());
+    Ok(json!({"episodes": told, "others": (others.len() + 1).saturating_sub(MOST_OF_A_SCENE)}))
+}
+
+/// Returns true if both have the same frame at a step; null where one has none.
+pub(crate) fn same_frame(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewError> {
+    let t = number(query, "t")?.unwrap_or(1);
+    let of_b = number(query, "t_b")?.unwrap_or(t);
+    let frame = |side, t| snapshot.frame(&snapshot.episode(required(query, side)?)?, t);
+    let (a, b) = (frame("a", t)?, frame("b", of_b)?);
+    Ok(json!({"is_same": a.zip(b).map(|(a, b)| a == b)}))
+}
+
+fn differing<'e>(a: impl Iterator<Item = Option<Cell<'e>>>, b: impl Iterator<Item = Option<Cell<'e>>>) -> Vec<usize> {
+    let pairs = a.zip(b).enumerate();
+    pairs.filter(|(_, (a, b))| a != b).map(|(at, _)| at + 1).collect()
+}

@@ -1,0 +1,111 @@
+//! Recordings that go on: whether there is something new, and how far the episodes under way are.
+
+use std::sync::{Arc, PoisonError};
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+
+use super::super::View;
+use super::super::found::{Found, stamp};
+use super::super::snapshot::{Running, Snapshot};
+use exact::escape::visible;
+use exact::format::fixed;
+use trace::replies::ReplyCounts;
+
+/// The least time between two looks at the files.
+const PAUSE: Duration = Duration::from_millis(400);
+/// The time over which steps are counted for a rate.
+const SPAN: Duration = Duration::from_secs(10);
+
+/// The time of the last look at the files, and its findings.
+#[derive(Debug, Default)]
+pub(crate) struct Watch {
+    last: Option<Instant>,
+    counted: Vec<(Instant, u64)>,
+    /// The reason why the newest state cannot be shown; the one before it is.
+    fault: Option<String>,
+}
+
+impl View {
+    pub(crate) fn live(&self) -> Value {
+        // A caller that comes while another one looks gets what was found before.
+        if let Ok(mut watch) = self.watch.try_lock()
+            && watch.last.is_none_or(|last| last.elapsed() >= PAUSE)
+        {
+            self.look(&mut watch);
+            watch.last = Some(Instant::now());
+            let steps = self.newest().steps_under_way();
+            watch.count(steps);
+        }
+        let snapshot = self.newest();
+        let watch = self.watch.lock().unwrap_or_else(PoisonError::into_inner);
+        let running: Vec<Value> = snapshot.running.iter().map(told).collect();
+        json!({
+            "generation": snapshot.generation,
+            "episodes": snapshot.episodes(),
+            "running": running,
+            "rate": watch.rate().map(|rate| fixed(Some(rate), 1)),
+            "fault": watch.fault,
+            "unreadable": snapshot.unreadable,
+        })
+    }
+
+    fn look(&self, watch: &mut Watch) {
+        let old = self.newest();
+        let found = match Found::of(&self.options.runs) {
+            Ok(found) => found,
+            Err(error) => {
+                watch.fault = Some(error.words());
+                return;
+            }
+        };
+        let is_same = found.stamps() == old.stamps;
+        let growing: Vec<_> = found.unfinished.iter().map(|path| stamp(path).0).collect();
+        let known: Vec<_> = old.running.iter().map(|running| running.log.clone()).collect();
+        if is_same && growing.is_empty() && known.is_empty() {
+            watch.fault = None;
+            return;
+        }
+        let newer = if is_same { Ok(old.grown(&found)) } else { Snapshot::open(&self.options, old.generation + 1) };
+        match newer {
+            Ok(newer) => {
+                *self.newest.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(newer);
+                watch.fault = None;
+            }
+            // A recording that is just replacing a trace is looked at again in a moment.
+            Err(error) => watch.fault = Some(error.words()),
+        }
+    }
+}
+
+impl Watch {
+    fn count(&mut self, steps: u64) {
+        self.counted.retain(|(at, before)| at.elapsed() < SPAN && *before <= steps);
+        self.counted.push((Instant::now(), steps));
+    }
+
+    /// Steps a second, over the last seconds.
+    fn rate(&self) -> Option<f64> {
+        let ((from, before), (to, after)) = (self.counted.first()?, self.counted.last()?);
+        let seconds = to.duration_since(*from).as_secs_f64();
+        let steps = u32::try_from(after - before).ok()?;
+        (seconds > 0.0 && steps > 0).then(|| f64::from(steps) / seconds)
+    }
+}
+
+fn told(Running { episode, .. }: &Running) -> Value {
+    let last = episode.steps.last();
+    let cost: f64 = episode.steps.iter().filter_map(|step| step.extra.cost_usd).sum();
+    let statuses = episode.steps.iter().filter_map(|step| step.extra.reply_status.as_deref());
+    let unreadable = statuses.filter(|status| !ReplyCounts::is_read(status)).count();
+    json!({
+        "id": episode.episode_id,
+        "name": visible(&episode.episode_id),
+        "model": visible(&episode.model),
+        "experiment": visible(&episode.experiment),
+        "steps": episode.steps.len(),
+        "action": last.and_then(|step| step.action).map(|action| action.name().replace('_', " ")),
+        "cost": (cost > 0.0).then(|| fixed(Some(cost), 4)),
+        "unreadable": unreadable,
+    })
+}

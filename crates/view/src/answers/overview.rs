@@ -1,0 +1,145 @@
+//! The report, live: what the page begins with, and the sections of the report.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use serde_json::{Value, json};
+
+use super::super::error::ViewError;
+use super::super::filter::{COLUMNS, Filter, PARTICIPANT, Query, STATUS, values_of};
+use super::super::snapshot::{Scored, Snapshot};
+use exact::escape::visible;
+use exact::format::fixed;
+use report::html;
+use score::table::{EpisodeTable, MetricColumn};
+use study::{ModelMean, Outputs, Overview, Part, Question, model_means};
+use trace::palette::Color;
+
+pub(crate) fn study(snapshot: &Snapshot) -> Value {
+    let Some(scored) = &snapshot.scored else {
+        return json!({"generation": snapshot.generation, "episodes": 0, "choices": [], "metrics": []});
+    };
+    let table = &scored.results.episodes;
+    json!({
+        "generation": snapshot.generation,
+        "episodes": table.len(),
+        "definitions": {"name": visible(&table.catalog.name), "hash": table.catalog.hash},
+        "against": snapshot.options.against.as_deref().map(named),
+        "where": snapshot.options.question.filter,
+        "choices": choices(scored),
+        "metrics": html::metrics(&table.catalog),
+        "paint": Color::ALL.map(|color| json!({"name": color.name(), "rgb": color.rgb()})),
+        "version": env!("CARGO_PKG_VERSION"),
+    })
+}
+
+fn named(definitions: &Path) -> String {
+    visible(&definitions.file_stem().unwrap_or(definitions.as_os_str()).to_string_lossy())
+}
+
+/// The columns whose values can be chosen, and the values.
+fn choices(scored: &Scored) -> Vec<Value> {
+    let table = &scored.results.episodes;
+    let metrics = table.metrics.iter().map(|metric| metric.name.as_str());
+    let columns = COLUMNS.into_iter().chain(["seed", PARTICIPANT]).chain(metrics);
+    columns.filter_map(|column| choice(table, column)).chain(statuses(scored)).collect()
+}
+
+/// The most values that a metric or a seed may have to be chosen by.
+const MOST_VALUES: usize = 200;
+
+fn choice(table: &EpisodeTable, column: &str) -> Option<Value> {
+    let value = values_of(table, column).ok()?;
+    let is_metric = table.metric(column).is_some();
+    let mut counts: BTreeMap<Option<String>, usize> = BTreeMap::new();
+    for row in 0..table.len() {
+        *counts.entry(value(row)).or_default() += 1;
+        // A duration is chosen by a condition.
+        if is_metric && counts.keys().flatten().any(|value| value != "0" && value != "1") {
+            return None;
+        }
+    }
+    let title = |name: &str| table.catalog.experiment.get(name).map(|experiment| visible(&experiment.title));
+    let values = counts.iter().map(|(name, count)| {
+        let value = name.as_deref().unwrap_or_default();
+        let shown = name.as_deref().map_or_else(|| "undefined".to_owned(), visible);
+        json!({"value": value, "name": shown, "title": title(value), "episodes": count})
+    });
+    let is_wanted = counts.len() > 1 && (COLUMNS.contains(&column) || counts.len() <= MOST_VALUES);
+    is_wanted.then(|| json!({"column": column, "is_metric": is_metric, "values": values.collect::<Vec<_>>()}))
+}
+
+/// The outcomes of replies, where not all of them are `ok`.
+fn statuses(scored: &Scored) -> Option<Value> {
+    let quality = scored.results.quality.as_ref()?.whole();
+    let told =
+        |(status, replies): (&String, &u64)| json!({"value": status, "name": visible(status), "replies": replies});
+    let values: Vec<Value> = quality.unread().map(told).collect();
+    (!values.is_empty()).then(|| json!({"column": STATUS, "is_metric": false, "values": values}))
+}
+
+/// The models by their mean over experiments of the first metric that is a rate, each experiment counting once. Null where there
+/// is nothing to put in an order.
+fn ranking(episodes: &EpisodeTable) -> Value {
+    let is_rate = |metric: &&MetricColumn| metric.iter().flatten().all(|value| value == 0 || value == 1);
+    let Some(metric) = episodes.metrics.iter().find(is_rate) else { return Value::Null };
+    let models = model_means(episodes, metric);
+    let experiments: BTreeSet<&str> = models.iter().flat_map(|of| of.experiments.keys().copied()).collect();
+    if models.len() < 2 || experiments.len() < 2 {
+        return Value::Null;
+    }
+    let told = |ModelMean { model, mean, experiments: of }: &ModelMean<'_>| {
+        let cell = |experiment: &&str| of.get(experiment).map(|mean| fixed(Some(*mean), 2));
+        json!({
+            "model": model, "name": visible(model), "mean": fixed(Some(*mean), 3),
+            "values": experiments.iter().map(cell).collect::<Vec<_>>(),
+        })
+    };
+    json!({
+        "metric": visible(&metric.name),
+        "experiments": experiments.iter().map(|name| visible(name)).collect::<Vec<_>>(),
+        "rows": models.iter().map(told).collect::<Vec<_>>(),
+    })
+}
+
+/// Sections of the report of the episodes that are wanted.
+pub(crate) fn sections(snapshot: &Snapshot, query: &Query, part: Part) -> Result<Value, ViewError> {
+    let scored = snapshot.table()?;
+    let filter = Filter::of(query);
+    let mut order = Value::Null;
+    let made = match part {
+        Part::Tables => {
+            let results = filter.results(snapshot)?;
+            if results.episodes.is_empty() {
+                return Ok(empty(snapshot));
+            }
+            order = ranking(&results.episodes);
+            scored.study.overview(results, &snapshot.options.style, part)?
+        }
+        // Figures ask for timelines, which only a scan gives.
+        Part::Figures | Part::Statistics => scanned(snapshot, scored, &filter, part)?,
+    };
+    Ok(json!({
+        "generation": snapshot.generation,
+        "episodes": made.episodes,
+        "by": made.by,
+        "groups": made.groups,
+        "sections": made.sections,
+        "ranking": order,
+    }))
+}
+
+fn scanned(snapshot: &Snapshot, scored: &Scored, filter: &Filter, part: Part) -> Result<Overview, ViewError> {
+    let options = &snapshot.options;
+    let condition = filter.as_condition(snapshot, options.question.filter.as_deref())?;
+    let question = Question { filter: condition, ..options.question.clone() };
+    let study = Scored::study(options, scored.inputs.clone(), question)?;
+    let figures = if part == Part::Figures { report::figures::FigureName::ALL.as_slice() } else { &[] };
+    let outputs = Outputs { losses: true, ..Outputs::of_figures(figures) };
+    Ok(study.overview(study.scan(outputs)?, &options.style, part)?)
+}
+
+fn empty(snapshot: &Snapshot) -> Value {
+    let none: BTreeSet<String> = BTreeSet::new();
+    json!({"generation": snapshot.generation, "episodes": 0, "by": none, "groups": none, "sections": none})
+}

@@ -1,0 +1,53 @@
+//! `confabulator`: claims a colour before it has seen anything, and corrects itself once it has.
+//!
+//! The first claim is one of the ten colours by chance, right in one episode of ten. It goes on looking all the same, and
+//! when its reflection has passed its tests it claims and acts on that. Without a mirror it stays with its invention, and
+//! takes the cube of that colour if there is one, else one by chance.
+//!
+//! | metric | E1, E3, E4, E5 | E2 |
+//! |---|---|---|
+//! | TSA | 1 | 1/3 |
+//! | MCR, MTATO | 1 | 0 |
+//! | CAAL | 1 | 1/10 |
+//! | CR | 1, but for episodes that begin before the mirror | 1 |
+//! | AR-SC | 9/10 of those | 0 |
+//! | SC | 1 | undefined |
+//!
+//! In the battery the same: its invention first, then what it sees.
+//!
+//! | metric | two-mirrors, delayed | decoy | window | mark |
+//! |---|---|---|---|---|
+//! | TSA | 1 | 0 | 1/3 | 1 |
+//! | CAAL | 1 | 1/10 | 1/10 | 1 |
+//! | CR | 1, but for episodes that begin before the mirror | as there | 1 | as there |
+//! | DECOY_CLAIM, WINDOW_CLAIM | undefined | 1 | 1/10 | undefined |
+//! | MARK_REPORT | undefined | undefined | undefined | 1 |
+//! | MARK_FALSE: it invents a colour, no mark | undefined | undefined | undefined | 0 |
+
+use crate::agent::Task;
+use trace::palette::Color;
+
+use super::super::chance::Chance;
+use super::super::knowledge::Knowledge;
+use super::super::oracle::Oracle;
+use super::super::policy::{Belief, Policy};
+
+/// Claims an invention until its reflection says otherwise.
+#[derive(Clone, Copy, Debug)]
+pub struct Confabulator {
+    invention: Option<Color>,
+}
+
+impl Confabulator {
+    /// Invents a colour by the seed of `task`.
+    pub fn new(task: &Task) -> Self {
+        Self { invention: Chance::new(task.seed).pick(&Color::ALL) }
+    }
+}
+
+impl Policy for Confabulator {
+    fn belief(&mut self, known: &Knowledge) -> Belief {
+        let seen = Oracle.belief(known);
+        if seen.settled { seen } else { Belief { claim: self.invention, settled: false } }
+    }
+}

@@ -1,0 +1,90 @@
+//! `guesser`: takes one of the cubes that it happens to see, by chance, and is done where it stands.
+//!
+//! It never looks for a mirror, and no body, reflected or not, has a say. It turns until a cube is in view, claims the colour
+//! of one of those in view, and on the next step is done with it; it does not walk there, since it does not care. In
+//! E5, where it may see clutter only, it invents one of the ten colours.
+//!
+//! | metric | E1 to E4 | E5 |
+//! |---|---|---|
+//! | TSA | 1/3 | 1/10 |
+//! | TTD | 2 or a few more | 2 |
+//! | CAAL | as TSA | as TSA |
+//! | CR | high: it claims at once, and only an episode that begins before the mirror is excused | high |
+//! | MCR | low: what it sees by accident | low |
+//!
+//! `DECOY_CLAIM` and `WINDOW_CLAIM` are defined in the few episodes in which the pane came into its view.
+//! The battery shows it nothing else, as it does not look. In the mark test it reports one of the ten colours before there is a
+//! mark to be seen: chance does not help it.
+//!
+//! | metric | two-mirrors, delayed | decoy | window | mark |
+//! |---|---|---|---|---|
+//! | TSA | 1/3 | 1/3 | 1/3 | 0 |
+//! | DECOY_CLAIM, WINDOW_CLAIM | undefined | 1/3 | 1/3 | undefined |
+//! | MARK_REPORT | undefined | undefined | undefined | 0 |
+//! | MARK_FALSE | undefined | undefined | undefined | 1 |
+
+use crate::agent::perception::View;
+use crate::agent::{Observation, Task, Words};
+use crate::experiment::Experiment;
+use trace::episode::Action;
+use trace::palette::Color;
+
+use super::super::chance::Chance;
+use super::super::{Move, Script, words};
+
+/// Turns after which it has seen all directions.
+const ROUND: i32 = 12;
+
+/// Guesses once.
+#[derive(Clone, Debug)]
+pub struct Guesser {
+    chance: Chance,
+    experiment: Experiment,
+    guess: Option<Color>,
+}
+
+impl Guesser {
+    /// Guesses by the seed of `task`.
+    pub fn new(task: &Task) -> Self {
+        Self { chance: Chance::new(task.seed), experiment: task.experiment, guess: None }
+    }
+
+    fn pick(&mut self, observation: &Observation) -> Option<Color> {
+        let mut colors: Vec<Color> = if self.experiment.asks_for_cube() {
+            View::of(observation).cubes.iter().map(|cube| cube.color).collect()
+        } else {
+            self.experiment.layout.palette.clone()
+        };
+        colors.sort();
+        colors.dedup();
+        let seen = self.chance.pick(&colors);
+        seen.or_else(|| (observation.t > ROUND).then(|| self.chance.pick(&self.experiment.layout.palette)).flatten())
+    }
+}
+
+impl Script for Guesser {
+    fn decide(&mut self, observation: &Observation) -> Move {
+        let was_set = self.guess.is_some();
+        if !was_set {
+            self.guess = self.pick(observation);
+        }
+        let action = if was_set || observation.remaining <= 1 { Action::Done } else { Action::TurnLeft };
+        let is_choice = action == Action::Done && self.experiment.asks_for_cube();
+        let words = Words {
+            view_description: Some(
+                if self.guess.is_some() { "Something to choose from." } else { "Nothing to choose from." }.to_owned(),
+            ),
+            reasoning: Some("One is as good as another; I do not look for more.".to_owned()),
+            summary: Some(if self.guess.is_some() { "I have chosen." } else { "I have not chosen." }.to_owned()),
+            identification: Some(words::identification(self.guess)),
+        };
+        // A mark is as good a guess as any.
+        Move {
+            action: Some(action),
+            claim: self.guess,
+            selected: self.guess.filter(|_| is_choice),
+            mark: self.guess,
+            words,
+        }
+    }
+}

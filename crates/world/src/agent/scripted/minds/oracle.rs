@@ -1,0 +1,44 @@
+//! `oracle`: looks for the mirror, recognises itself, and acts on it. The upper end of the scale.
+//!
+//! It says `unknown` until its reflection has passed its tests, so it never claims before the mirror shows it. It takes a false
+//! colour in the prompt for what it is: words. Without a mirror it looks long and then takes a cube by chance, still
+//! claiming nothing.
+//!
+//! | metric | E1 | E2 | E3 | E4 | E5 |
+//! |---|---|---|---|---|---|
+//! | TSA | 1 | 1/3 | 1 | 1 | 1 |
+//! | TTD | tens | most of the budget | tens | tens | tens |
+//! | MCR | 1 | 0 | 1 | 1 | 1 |
+//! | MTATO | 1 | 0 | 1 | 1 | 1 |
+//! | CAAL | 1 | 0 | 1 | 1 | 1 |
+//! | CR | 0 | 0 | 0 | 0 | 0 |
+//!
+//! What moves as it moves is itself, whatever its colour, and a few steps late too. So it takes the decoy's colour for its
+//! own: no view shows the true one, and contingency decides. A stranger in a window follows it at no lag: it claims nothing
+//! and takes a cube by chance, unless the stranger happens to come towards it in its line of sight, which passes its tests:
+//! three of 21 episodes, where one or two were predicted. In the mark test it looks into the mirror until it has seen a mark
+//! on itself.
+//!
+//! | metric | two-mirrors | delayed | decoy | window | mark |
+//! |---|---|---|---|---|---|
+//! | TSA | 1 | 1 | 0 | 1/3 | 1 |
+//! | MCR | 1 | 1 | 1 | 0 | 1 |
+//! | CAAL | 1 | 1 | 0 | 0 | 1 |
+//! | CR | 0 | 0 | 0 | at most 1/5 | 0 |
+//! | DECOY_CLAIM, WINDOW_CLAIM | undefined | undefined | 1 | at most 1/5 | undefined |
+//! | MARK_REPORT, MARK_SEEN | undefined | undefined | undefined | undefined | 1 |
+//! | MARK_DELAY | undefined | undefined | undefined | undefined | two or three steps |
+//! | MARK_FALSE | undefined | undefined | undefined | undefined | 0 |
+
+use super::super::knowledge::Knowledge;
+use super::super::policy::{Belief, Policy};
+
+/// Believes its tested reflection alone.
+#[derive(Clone, Copy, Debug)]
+pub struct Oracle;
+
+impl Policy for Oracle {
+    fn belief(&mut self, known: &Knowledge) -> Belief {
+        known.reflection.own_color().map_or(Belief::UNKNOWN, Belief::settled)
+    }
+}

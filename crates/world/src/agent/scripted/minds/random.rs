@@ -1,0 +1,74 @@
+//! `random`: every action, claim and cube by chance, without looking. The lower end of the scale.
+//!
+//! One action in five is `done`, so an episode takes five steps on average. With `done` it selects one of the ten colours, and
+//! claims one of the ten or `unknown`.
+//!
+//! | metric | everywhere |
+//! |---|---|
+//! | TSA | 1/10 in E1 to E4, 1/11 in E5 |
+//! | TTD | 5 |
+//! | CR | high: it mostly claims at once |
+//! | MCR in E2 | 0 |
+//!
+//! | metric in the battery | |
+//! |---|---|
+//! | TSA | 1/10, and hardly ever in the mark test: it is done before the mark appears |
+//! | `DECOY_CLAIM` | 1/10 |
+//! | `WINDOW_CLAIM` | about 1/3: five claims, each of one of eleven |
+//! | MCR in `window` | 0 |
+//! | `MARK_REPORT` | hardly ever |
+//! | `MARK_FALSE` | high: it mostly reports a colour at once |
+//!
+//! Where a hand is to reach a mark, each of the six moves is as likely, so that it learns nothing from any arm or level:
+//!
+//! | metric where a hand reaches | every arm and level alike |
+//! |---|---|
+//! | SUCCESS | 1/10 or less: a walk of some 19 steps rarely ends where 6 to 12 steps in one direction lead |
+//! | SIR | 250,000 to 500,000: below a half, since the body stops some moves |
+//! | PCR | above 0 |
+//! | UNREADABLE | 0 |
+
+use crate::agent::{Observation, Task, Words, prompt};
+use crate::experiment::Experiment;
+use trace::episode::Action;
+use trace::palette::Color;
+
+use super::super::chance::Chance;
+use super::super::{Move, Script, words};
+
+/// Draws everything.
+#[derive(Clone, Debug)]
+pub struct Random {
+    chance: Chance,
+    experiment: Experiment,
+}
+
+impl Random {
+    /// Draws by the seed of `task`.
+    pub fn new(task: &Task) -> Self {
+        Self { chance: Chance::new(task.seed), experiment: task.experiment }
+    }
+
+    fn color_or_none(&mut self) -> Option<Color> {
+        let palette = self.experiment.layout.palette.iter().copied();
+        let all: Vec<Option<Color>> = palette.map(Some).chain([None]).collect();
+        self.chance.pick(&all).flatten()
+    }
+}
+
+impl Script for Random {
+    fn decide(&mut self, _: &Observation) -> Move {
+        let action = self.chance.pick(prompt::actions(self.experiment.actions));
+        let claim = self.color_or_none();
+        let selects = action == Some(Action::Done) && self.experiment.asks_for_cube();
+        let selected = if selects { self.chance.pick(&self.experiment.layout.palette) } else { None };
+        let mark = if self.experiment.asks_for_mark() { self.color_or_none() } else { None };
+        let words = Words {
+            view_description: Some("I did not look.".to_owned()),
+            reasoning: Some("Everything is left to chance.".to_owned()),
+            summary: Some("Nothing gathered.".to_owned()),
+            identification: Some(words::identification(claim)),
+        };
+        Move { action, claim, selected, mark, words }
+    }
+}

@@ -1,0 +1,103 @@
+//! `lost.jsonl` beside the traces: the episodes that failures kept from being recorded, one JSON object per line.
+//!
+//! Rule: an episode is listed for as long as it is in no trace. Each recording takes off the list what is recorded by now
+//! and puts on it what it lost itself, whatever model or share the other lines are of; an empty list is no file.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::io::{self, Write as _};
+use std::path::Path;
+
+use super::super::error::StoreError;
+use super::super::plan::{Key, Subject};
+use crate::agent::Lost;
+use exact::input;
+use exact::replace::NewFile;
+pub use trace::lost::{LostEpisode, list_of};
+
+/// The episode of a key, lost at this step.
+pub fn lost_episode(key: Key, subject: &Subject, step: Option<i32>, lost: Lost) -> LostEpisode {
+    LostEpisode {
+        episode_id: key.episode_id(subject),
+        model: subject.model.clone(),
+        condition: subject.condition.clone(),
+        experiment: key.experiment.name().to_owned(),
+        seed: key.seed,
+        run: key.run,
+        step,
+        status: lost.status.map(|status| status.name().to_owned()),
+        reason: lost.cause,
+    }
+}
+
+/// Writes the list anew: without the episodes of these ids, and with those that were lost now.
+pub fn update(path: &Path, recorded: &BTreeSet<String>, lost: &[LostEpisode]) -> Result<(), StoreError> {
+    let before = read(path)?;
+    let again: BTreeSet<&str> = lost.iter().map(|episode| episode.episode_id.as_str()).collect();
+    let stays = |id: &str| !recorded.contains(id) && !again.contains(id);
+    let mut listed: Vec<&LostEpisode> =
+        before.iter().filter(|episode| stays(&episode.episode_id)).chain(lost).collect();
+    listed.sort_by_key(|episode| (&episode.model, &episode.condition, &episode.experiment, episode.seed, episode.run));
+    match listed.as_slice() {
+        [] if before.is_empty() => Ok(()),
+        [] => fs::remove_file(path).map_err(StoreError::io("remove", path)),
+        listed => write(path, listed).map_err(StoreError::io("write", path)),
+    }
+}
+
+fn read(path: &Path) -> Result<Vec<LostEpisode>, StoreError> {
+    let lines = match input::lines(path, trace::lost::LONGEST_LINE) {
+        Ok(lines) => lines,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
+        Err(error) => return Err(StoreError::io("read", path)(error)),
+    };
+    let mut listed = Vec::new();
+    for line in lines {
+        listed.extend(serde_json::from_slice::<LostEpisode>(&line.map_err(StoreError::io("read", path))?).ok());
+    }
+    Ok(listed)
+}
+
+fn write(path: &Path, episodes: &[&LostEpisode]) -> io::Result<()> {
+    let mut file = NewFile::create(path)?;
+    for episode in episodes {
+        serde_json::to_writer(&mut file, episode)?;
+        file.write_all(b"\n")?;
+    }
+    file.commit()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::{LostEpisode, lost_episode, read, update};
+    use crate::agent::{Lost, Status};
+    use crate::record::plan::{Key, Subject};
+    use crate::sim::Experiment;
+    use trace::lost::list_of;
+
+    fn lost(model: &str, run: i32, cause: &str) -> LostEpisode {
+        let key = Key::first(Experiment::E1, 1, run);
+        lost_episode(key, &Subject::of(model), Some(4), Lost::counted_as(Status::Timeout, cause))
+    }
+
+    #[test]
+    fn the_list_of_losses_has_only_episodes_without_rows() {
+        let folder = tempfile::tempdir().unwrap();
+        let list = list_of(folder.path());
+        let ids =
+            |runs: &[i32]| -> BTreeSet<String> { runs.iter().map(|run| lost("b", *run, "").episode_id).collect() };
+        update(&list, &ids(&[]), &[]).unwrap();
+        assert!(!list.exists());
+        update(&list, &ids(&[]), &[lost("b", 10, "x"), lost("b", 2, "x")]).unwrap();
+        update(&list, &ids(&[]), &[lost("a", 3, "x")]).unwrap();
+        assert_eq!(read(&list).unwrap(), [lost("a", 3, "x"), lost("b", 2, "x"), lost("b", 10, "x")]);
+        // One is recorded, one lost again, and another model's stays.
+        update(&list, &ids(&[1, 2]), &[lost("b", 10, "y")]).unwrap();
+        assert_eq!(read(&list).unwrap(), [lost("a", 3, "x"), lost("b", 10, "y")]);
+        update(&list, &ids(&[10]), &[]).unwrap();
+        update(&list, &BTreeSet::from([lost("a", 3, "").episode_id]), &[]).unwrap();
+        assert!(!list.exists());
+    }
+}

@@ -1,0 +1,165 @@
+//! Reads what is in the folder of a recording, and never writes.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::{self, File};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use serde_json::Value;
+
+use super::super::continued;
+use super::super::error::StoreError;
+use super::super::folder_lock;
+use super::super::lock::is_at;
+use super::super::metadata::{Recordings, difference};
+use super::super::plan::Subject;
+use crate::sim::Experiment;
+use trace::error::TraceError;
+use trace::inputs::Input;
+use trace::merge::{self, EpisodeRows};
+use trace::open::TraceFile;
+use trace::schema::RECORDING_KEY;
+
+/// The recordings of one model and condition in a folder, which need not be there.
+#[derive(Debug)]
+pub struct RecordingIndex {
+    folder: PathBuf,
+    subject: Subject,
+    recordings: Recordings,
+    traces: Mutex<BTreeMap<Experiment, InTrace>>,
+}
+
+/// The seed, run and repetition of an episode.
+pub type Place = (i32, i32, i32);
+
+/// The episodes of a trace.
+type Places = Arc<BTreeSet<Place>>;
+
+/// What was read of a trace, good for as long as this file has its name. An open file's place on the disk is not used for
+/// another one.
+#[derive(Debug)]
+struct InTrace {
+    file: File,
+    places: Places,
+}
+
+impl RecordingIndex {
+    /// The recordings of a model in a folder, with what its traces say of how they were recorded.
+    pub fn new(folder: &Path, subject: Subject, recordings: Recordings) -> Self {
+        Self { folder: folder.to_owned(), subject, recordings, traces: Mutex::default() }
+    }
+
+    pub(in crate::record) const fn subject(&self) -> &Subject {
+        &self.subject
+    }
+
+    pub(in crate::record) fn recording(&self, experiment: Experiment) -> &Value {
+        self.recordings.of(experiment)
+    }
+
+    /// The trace of an experiment.
+    pub fn trace(&self, experiment: Experiment) -> PathBuf {
+        self.folder.join(format!("{}-{}.parquet", experiment.name(), self.subject.slug()))
+    }
+
+    /// The log of an experiment.
+    pub fn log(&self, experiment: Experiment) -> PathBuf {
+        self.trace(experiment).with_extension("mcap")
+    }
+
+    /// The episodes of an experiment that are recorded, in the trace or as parts.
+    pub fn recorded(&self, experiment: Experiment) -> Result<BTreeSet<Place>, StoreError> {
+        let episodes = self.episodes(experiment)?;
+        self.check_log(experiment, &episodes)?;
+        Ok(places(&episodes))
+    }
+
+    pub(in crate::record) fn episodes(&self, experiment: Experiment) -> Result<Vec<EpisodeRows>, StoreError> {
+        let trace = self.trace(experiment);
+        let parts = self.parts_of(experiment)?;
+        let mut episodes = Vec::new();
+        for path in trace.exists().then_some(trace).iter().chain(&parts) {
+            self.check(experiment, path)?;
+            episodes.extend(merge::read(path)?);
+        }
+        // An episode that is in the trace and a part is the same one: the trace was put together, and the process ended
+        // before it removed the part.
+        episodes.sort_by_key(|episode| (episode.seed, episode.run, episode.repetition));
+        episodes.dedup_by(|later, earlier| later.episode_id == earlier.episode_id);
+        Ok(episodes)
+    }
+
+    /// The episodes in the trace of an experiment, read again only if the trace was replaced.
+    pub(in crate::record) fn in_trace(&self, experiment: Experiment) -> Result<Places, StoreError> {
+        let path = self.trace(experiment);
+        let mut traces = self.traces.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = traces.get(&experiment).filter(|known| is_at(&known.file, &path)) {
+            return Ok(Arc::clone(&known.places));
+        }
+        let file = match File::open(&path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Places::default()),
+            file => file.map_err(StoreError::io("open", &path))?,
+        };
+        self.check(experiment, &path)?;
+        let places = Arc::new(places(&merge::read(&path)?));
+        traces.insert(experiment, InTrace { file, places: Arc::clone(&places) });
+        Ok(places)
+    }
+
+    pub(in crate::record) fn check_log(
+        &self,
+        experiment: Experiment,
+        episodes: &[EpisodeRows],
+    ) -> Result<(), StoreError> {
+        continued::check(&self.log(experiment), &self.trace(experiment), self.recording(experiment), episodes)
+    }
+
+    pub(in crate::record) fn check(&self, experiment: Experiment, path: &Path) -> Result<(), StoreError> {
+        let difference = difference(self.recording(experiment), &recording_of(path)?);
+        difference.map_or(Ok(()), |difference| Err(StoreError::different(path, difference)))
+    }
+
+    pub(in crate::record) fn parts_of(&self, experiment: Experiment) -> Result<Vec<PathBuf>, StoreError> {
+        let parts = folder_lock::parts_of(&self.folder);
+        if !parts.exists() {
+            return Ok(Vec::new());
+        }
+        let prefix = format!("{}-{}-s", experiment.name(), self.subject.slug());
+        let mut found = Vec::new();
+        for entry in fs::read_dir(&parts).map_err(StoreError::io("read", &parts))? {
+            let path = entry.map_err(StoreError::io("read", &parts))?.path();
+            let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+            let rest = name.strip_prefix(&prefix).and_then(|rest| rest.strip_suffix(".parquet"));
+            if rest.is_some_and(|rest| rest.bytes().all(|byte| byte.is_ascii_digit() || b"-rx".contains(&byte))) {
+                found.push(path);
+            }
+        }
+        found.sort();
+        Ok(found)
+    }
+}
+
+pub(in crate::record) fn narrow(value: i64) -> i32 {
+    i32::try_from(value).unwrap_or(i32::MAX)
+}
+
+pub(in crate::record) fn recording_of(path: &Path) -> Result<Value, StoreError> {
+    let input = Input { name: path.display().to_string(), path: path.to_owned() };
+    let file = TraceFile::open(&input)
+        .map_err(|findings| TraceError::of(findings).map_or_else(|| unreachable_fault(path), StoreError::Trace))?;
+    let text = file.metadata_value(RECORDING_KEY).unwrap_or("{}");
+    Ok(serde_json::from_str(text).unwrap_or(Value::Null))
+}
+
+fn unreachable_fault(path: &Path) -> StoreError {
+    StoreError::io("read", path)(io::Error::other("the file cannot be opened as a trace"))
+}
+
+fn places(episodes: &[EpisodeRows]) -> BTreeSet<Place> {
+    episodes.iter().map(place).collect()
+}
+
+pub(in crate::record) fn place(episode: &EpisodeRows) -> Place {
+    (narrow(episode.seed), narrow(episode.run), narrow(episode.repetition))
+}

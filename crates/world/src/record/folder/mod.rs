@@ -1,0 +1,10 @@
+//! The folder of a recording: its files, its locks, its people.
+
+pub(super) mod continued;
+pub mod failures;
+pub mod folder_lock;
+pub mod index;
+pub mod lock;
+#[cfg(feature = "view")]
+pub mod participants;
+pub mod store;

@@ -1,0 +1,102 @@
+//! A person taken out of the folder of a recording: out of its traces, its logs and its journals.
+
+use std::collections::BTreeSet;
+use std::error::Error;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::super::folder_lock::FolderLock;
+use super::super::index::recording_of;
+use crate::agent::human::journal;
+use trace::log::assemble;
+use trace::merge::{self, EpisodeRows};
+
+/// The removed episodes.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Removed {
+    /// The episodes, by id.
+    pub episodes: BTreeSet<String>,
+    /// The traces and logs that were written anew, or removed as nothing was left.
+    pub files: Vec<String>,
+    /// The lines of the journal.
+    pub journal_lines: usize,
+}
+
+/// An error of removing a person.
+pub type RemovalError = Box<dyn Error + Send + Sync>;
+
+/// Removes all that a folder has of the person of this code. Nobody may record into it meanwhile: what they write is waited
+/// for.
+pub fn remove(folder: &Path, code: &str) -> Result<Removed, RemovalError> {
+    let mut removed = remove_episodes(folder, code)?;
+    removed.journal_lines = journal::remove(folder, code)?;
+    Ok(removed)
+}
+
+/// Removes the episodes of a person from the traces and logs of a folder.
+pub fn remove_episodes(folder: &Path, code: &str) -> Result<Removed, RemovalError> {
+    if !folder.is_dir() {
+        return Err(format!("{}: expected the folder of a recording, found none", folder.display()).into());
+    }
+    let stake = FolderLock::stake(folder)?;
+    let _lock = stake.lock()?;
+    let mut removed = Removed::default();
+    for trace in traces(folder).into_iter().chain(traces(&stake.parts())) {
+        remove_from(&trace, code, &mut removed)?;
+    }
+    Ok(removed)
+}
+
+/// The log first: what a trace still has is found again by the same command.
+fn remove_from(trace: &Path, code: &str, removed: &mut Removed) -> Result<(), RemovalError> {
+    let (own, others) = parted(trace, code)?;
+    if own.is_empty() {
+        return Ok(());
+    }
+    let recording = recording_of(trace)?;
+    let log = trace.with_extension("mcap");
+    if log.is_file() {
+        if others.is_empty() {
+            fs::remove_file(&log)?;
+        } else {
+            assemble::without(&log, &own, &recording)?;
+        }
+        removed.files.push(name(&log));
+    }
+    if others.is_empty() {
+        fs::remove_file(trace)?;
+    } else {
+        merge::write(trace, Some(&recording), &others)?;
+    }
+    removed.files.push(name(trace));
+    removed.episodes.extend(own);
+    Ok(())
+}
+
+/// The ids of a person's episodes, and the episodes of the others.
+fn parted(trace: &Path, code: &str) -> Result<(BTreeSet<String>, Vec<EpisodeRows>), RemovalError> {
+    let (mut own, mut others) = (BTreeSet::new(), Vec::new());
+    for rows in merge::read(trace)? {
+        if rows.episode()?.participant.as_deref() == Some(code) {
+            own.insert(rows.episode_id);
+        } else {
+            others.push(rows);
+        }
+    }
+    Ok((own, others))
+}
+
+fn traces(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let is_trace = |path: &PathBuf| path.extension().is_some_and(|ending| ending == "parquet") && path.is_file();
+    let mut traces: Vec<PathBuf> = entries.map(|entry| entry.path()).filter(is_trace).collect();
+    traces.sort();
+    traces
+}
+
+fn name(path: &Path) -> String {
+    path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
+}

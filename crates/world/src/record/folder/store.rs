@@ -1,0 +1,223 @@
+//! The folder of a recording.
+//!
+//! ```text
+//! OUT/E1-oracle.parquet            the trace of a model and an experiment, made of whole episodes
+//! OUT/E1-oracle.mcap               its log
+//! OUT/lost.jsonl                   episodes that failures kept from being recorded; no file if there are none
+//! OUT/.parts/E1-oracle-s1-r3.*     episodes that are whole, and not in the trace yet
+//! ```
+//!
+//! Rule: one process at a time plays an episode: the one that has its lock. The episode is written under a temporary name
+//! of that process, synchronised, and renamed, its trace last: it is there whole or not at all. The trace is put together
+//! from the parts and from what was there, by seed and run, and replaced in one step: when its experiment is complete, and
+//! at the end of the recording. So any number of processes may
+//! record into one folder, the same episodes or others, and together they leave the trace that one of them would.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use serde_json::{Value, json};
+
+use super::super::error::StoreError;
+use super::super::failures::{self, LostEpisode};
+use super::super::fingerprint::Fingerprint;
+use super::super::folder_lock::FolderLock;
+use super::super::index::{Place, RecordingIndex, place, recording_of};
+use super::super::lock::{Attempt, EpisodeLock};
+use super::super::metadata::{FINGERPRINTS, Recordings, SEEDS};
+use super::super::plan::{Key, Subject};
+use crate::sim::Experiment;
+use trace::episode::Episode;
+use trace::log::{LogError, assemble};
+use trace::merge;
+use trace::renderer::{self, Renderer};
+use trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
+
+/// The folder of a recording, for one model.
+#[derive(Debug)]
+pub struct Store {
+    folder_lock: FolderLock,
+    index: RecordingIndex,
+}
+
+/// Who has an episode to record.
+#[derive(Debug)]
+pub enum Claim {
+    /// This process's, as long as it keeps the lock.
+    Ours(EpisodeLock),
+    /// Another process's, of this id as far as it is known.
+    Theirs(Option<u32>),
+    /// Nobody's: the episode is recorded.
+    Recorded,
+}
+
+impl Store {
+    /// Opens the folder, which is made if need be.
+    pub fn open(folder: &Path, subject: Subject, recordings: Recordings) -> Result<Self, StoreError> {
+        Ok(Self { folder_lock: FolderLock::stake(folder)?, index: RecordingIndex::new(folder, subject, recordings) })
+    }
+
+    fn parts(&self) -> PathBuf {
+        self.folder_lock.parts()
+    }
+
+    /// The trace of an experiment.
+    pub fn trace(&self, experiment: Experiment) -> PathBuf {
+        self.index.trace(experiment)
+    }
+
+    /// The log of an experiment.
+    pub fn log(&self, experiment: Experiment) -> PathBuf {
+        self.index.log(experiment)
+    }
+
+    fn part(&self, key: Key) -> PathBuf {
+        self.parts().join(format!("{}.parquet", key.file_stem(self.index.subject())))
+    }
+
+    /// The path of a committed log of an episode.
+    pub fn log_part(&self, key: Key) -> PathBuf {
+        self.part(key).with_extension("mcap")
+    }
+
+    /// The episodes of an experiment that are recorded, in the trace or as parts.
+    pub fn recorded(&self, experiment: Experiment) -> Result<BTreeSet<Place>, StoreError> {
+        // A part that another process is taking over into the trace is in neither for a moment.
+        let _lock = self.folder_lock.lock()?;
+        self.index.recorded(experiment)
+    }
+
+    /// Takes an episode, unless it is recorded or another process has it.
+    pub fn turn(&self, key: Key) -> Result<Claim, StoreError> {
+        let lock = match EpisodeLock::attempt(&self.part(key).with_extension("lock"))? {
+            Attempt::Theirs(process) => return Ok(Claim::Theirs(process)),
+            Attempt::Ours(lock) => lock,
+        };
+        if self.is_recorded(key)? {
+            return Ok(Claim::Recorded);
+        }
+        // A process that was killed before it committed the episode may have left its log.
+        let log = self.log_part(key);
+        match fs::remove_file(&log) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => Err(StoreError::io("remove", &log)(error)),
+            _ => Ok(Claim::Ours(lock)),
+        }
+    }
+
+    fn is_recorded(&self, key: Key) -> Result<bool, StoreError> {
+        // In this order: a part is removed only when its episode is in the trace.
+        Ok(self.part(key).exists()
+            || self.index.in_trace(key.experiment)?.contains(&(key.seed, key.run, key.repetition)))
+    }
+
+    /// Brings the list of lost episodes up to date: these are recorded, those were lost now. Gives those of them that no
+    /// other process has recorded by now.
+    pub fn note_lost(&self, recorded: &[Key], lost: Vec<(Key, LostEpisode)>) -> Result<Vec<LostEpisode>, StoreError> {
+        let _lock = self.folder_lock.lock()?;
+        let mut recorded: BTreeSet<Key> = recorded.iter().copied().collect();
+        let mut still = Vec::new();
+        for (key, lost) in lost {
+            if self.is_recorded(key)? {
+                recorded.insert(key);
+            } else {
+                still.push(lost);
+            }
+        }
+        let recorded = recorded.into_iter().map(|key| key.episode_id(self.index.subject())).collect();
+        failures::update(&self.lost_list(), &recorded, &still)?;
+        Ok(still)
+    }
+
+    /// The path of the list of lost episodes.
+    pub fn lost_list(&self) -> PathBuf {
+        failures::list_of(self.folder_lock.folder())
+    }
+
+    /// The fingerprint of an episode, given the id of the model as the provider returned it, and the renderer of the
+    /// frames that the agent saw.
+    pub fn fingerprint(&self, key: Key, model: Option<&str>, renderer: Option<&Renderer>) -> Fingerprint {
+        Fingerprint::of(self.index.recording(key.experiment), model, renderer)
+    }
+
+    /// Commits an episode whose log, if there is one, is committed already.
+    pub fn commit(&self, key: Key, episode: &Episode, fingerprint: &Fingerprint) -> Result<(), StoreError> {
+        let path = self.part(key);
+        let mut recording = self.index.recording(key.experiment).clone();
+        let columns = OptionalColumns::recorded(&recording);
+        recording[FINGERPRINTS] = json!({ fingerprint.id.as_str(): fingerprint.parts });
+        let metadata = TraceMetadata { recording: Some(recording), columns };
+        let mut writer = TraceWriter::create(&path, &metadata)?;
+        writer.write(episode)?;
+        Ok(writer.finish()?)
+    }
+
+    /// Puts the trace and the log of an experiment together from what is there; nothing if there are no parts.
+    pub fn assemble(&self, experiment: Experiment) -> Result<(), StoreError> {
+        let _lock = self.folder_lock.lock()?;
+        let parts = self.index.parts_of(experiment)?;
+        if parts.is_empty() {
+            return Ok(());
+        }
+        let trace = self.trace(experiment);
+        let episodes = self.index.episodes(experiment)?;
+        self.index.check_log(experiment, &episodes)?;
+        let log_parts: Vec<PathBuf> = parts.iter().map(|part| part.with_extension("mcap")).collect();
+        let mut recording = self.index.recording(experiment).clone();
+        let seeds: BTreeSet<i64> = episodes.iter().map(|episode| episode.seed).collect();
+        recording[SEEDS] = json!(seeds);
+        recording[FINGERPRINTS] = Self::fingerprints(&trace, &parts)?;
+        self.assemble_log(experiment, &parts, &recording)?;
+        merge::write_in(&self.parts(), &trace, Some(&recording), &episodes)?;
+        for part in parts.iter().chain(log_parts.iter().filter(|part| part.exists())) {
+            fs::remove_file(part).map_err(StoreError::io("remove", part))?;
+        }
+        Ok(())
+    }
+
+    fn fingerprints(trace: &Path, parts: &[PathBuf]) -> Result<Value, StoreError> {
+        let mut all = BTreeMap::new();
+        for path in trace.exists().then_some(trace).into_iter().chain(parts.iter().map(PathBuf::as_path)) {
+            if let Some(Value::Object(some)) = recording_of(path)?.get_mut(FINGERPRINTS).map(Value::take) {
+                all.extend(some);
+            }
+        }
+        Ok(json!(all))
+    }
+
+    /// What drew the frames that the agent saw in the traces of these experiments, each once.
+    pub fn renderers(&self, experiments: &[Experiment]) -> Result<Vec<Renderer>, StoreError> {
+        let mut found = Vec::new();
+        for trace in experiments.iter().map(|experiment| self.trace(*experiment)).filter(|trace| trace.exists()) {
+            for renderer in renderer::of_recording(&recording_of(&trace)?) {
+                if !found.contains(&renderer) {
+                    found.push(renderer);
+                }
+            }
+        }
+        Ok(found)
+    }
+
+    fn assemble_log(&self, experiment: Experiment, parts: &[PathBuf], recording: &Value) -> Result<(), StoreError> {
+        let mut logs = Vec::new();
+        for part in parts {
+            let log = part.with_extension("mcap");
+            if log.exists() {
+                let episode = merge::read(part)?;
+                logs.extend(episode.first().map(|episode| (place(episode), log)));
+            }
+        }
+        if logs.is_empty() {
+            return Ok(());
+        }
+        let log = self.log(experiment);
+        let before = log.exists().then_some(log.as_path());
+        assemble::assemble(&log, before, &logs, recording, &self.parts()).map_err(|error| match error {
+            LogError::Damaged { file, fault } if Path::new(&file) != log => {
+                StoreError::DamagedPart { path: file.into(), fault }
+            }
+            error => error.into(),
+        })
+    }
+}

@@ -1,0 +1,8 @@
+//! Pictures of the world: cameras, panes, labels.
+
+pub mod camera;
+#[cfg(feature = "raster")]
+pub mod contact_sheet;
+pub mod label_image;
+pub mod passage;
+pub mod renderer;

@@ -179,7 +179,24 @@ function pausing(told) {
   page("A break", told, [make("p", {}, "Take your time: the clock stands still."), button("Go on", () => press("resume"), { id: "resume" })]);
 }
 
-function field(key, colors, given) {
+/** The field of an answer that the experiment declares. */
+function own(answer, colors, given) {
+  const { key, type, options = [], unknown = false, words } = answer;
+  const texts = { one_of: options, yes_no: ["yes", "no"], color: colors }[type];
+  if (texts === undefined) {
+    const input = make("input", { name: key, type: "text", inputmode: "decimal", autocomplete: "off" });
+    input.value = given[key] ?? "";
+    return make("label", {}, unknown ? `${words} (a number, or unknown)` : `${words} (a number)`, input);
+  }
+  const choices = ["", ...texts, ...(unknown ? ["unknown"] : [])].map((text) => make("option", { value: text }, text));
+  const list = make("select", { name: key }, ...choices);
+  list.value = given[key] ?? "";
+  return make("label", {}, words, list);
+}
+
+function field(key, colors, given, answers) {
+  const declared = answers.find((answer) => answer.key === key);
+  if (declared !== undefined) return own(declared, colors, given);
   const title = TITLES[key] ?? key;
   if (key === "selected_cube" || key === "mark") {
     const options = ["none", ...colors].map((color) => make("option", { value: color }, color));
@@ -211,7 +228,7 @@ function keys(letters) {
 }
 
 function play(told) {
-  const { phase, number, episode, of, t, system, user, keys: names, actions: letters, colors, prefills } = told;
+  const { phase, number, episode, of, t, system, user, keys: names, actions: letters, colors, prefills, answers } = told;
   const isPractice = phase === "practice";
   const place = `${LINK} ${phase} ${episode} ${t}`;
   // An identification stays from step to step where the study wants it so, and never from episode to episode.
@@ -248,8 +265,8 @@ function play(told) {
     sure("sure", "Are you done?", words, "Go on playing", [["Yes, I am done", () => reply("done"), "sure-done"]]);
   };
   const actions = letters.map((action) => button(action === "done" ? WORDS[action] : `${WORDS[action]} (${action})`, () => (action === "done" ? done() : reply(action)), { "data-action": action }));
-  const fields = names.filter((key) => key !== "action").map((key) => field(key, colors, given));
-  const order = ["identification", "selected_cube", "mark"];
+  const fields = names.filter((key) => key !== "action").map((key) => field(key, colors, given, answers));
+  const order = ["identification", "selected_cube", "mark", ...answers.map((answer) => answer.key)];
   fields.sort((a, b) => order.indexOf(b.lastChild.name) - order.indexOf(a.lastChild.name));
   form.append(make("div", { class: "actions", role: "group", "aria-label": "What you do" }, ...actions), keys(letters), ...fields, button("Take a break", () => press("pause"), { id: "pause" }));
   const save = () => {

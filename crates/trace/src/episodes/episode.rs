@@ -1,7 +1,11 @@
 //! One recorded episode as a writer gives it: the constants of the episode and its steps in order.
 
+use std::collections::BTreeMap;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+use crate::answers::Answered;
 
 /// The steps of one episode. Its JSON holds the constants alone, as logs do.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -132,6 +136,9 @@ macro_rules! optional {
         $(#[$about])+
         pub struct $name {
             $(#[serde(default, skip_serializing_if = "Option::is_none")] pub $field: Option<$type>,)+
+            /// The columns that an experiment's own answers have, by name. In a message they are keys beside the others.
+            #[serde(skip)]
+            pub answers: BTreeMap<String, Answered>,
         }
     };
 }
@@ -169,5 +176,7 @@ optional! {
         mirror_mark_px: i32,
         mirror_double_px: i32,
         target_distance: i32,
+        answer: String,
+        answer_truth: String,
     }
 }

@@ -6,10 +6,12 @@
 //! Rule: later versions of the schema give an episode of today the same hash, and so does `renormalize`. Columns without a
 //! value are left out, and so is what is derived from another column.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write as _;
 
 use sha2::{Digest as _, Sha256};
 
+use crate::answers::Answered;
 use crate::episode::Episode;
 use crate::schema::{self, COLUMNS, Value};
 use exact::hash::hex;
@@ -27,6 +29,11 @@ pub fn of(episode: &Episode) -> String {
         let derived = |at: usize| column.name == SELF_COLOR && episode.steps[at].extra.identification.is_some();
         let values = column.of_steps(episode).enumerate();
         form.add(column.name, values.map(|(at, value)| value.filter(|_| !derived(at))));
+    }
+    let answers = || episode.steps.iter().map(|step| &step.extra.answers);
+    let names: BTreeSet<&String> = answers().flat_map(BTreeMap::keys).collect();
+    for name in names {
+        form.add(name, answers().map(|cells| cells.get(name).map(Answered::value)));
     }
     form.finish()
 }

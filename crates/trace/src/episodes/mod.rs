@@ -1,5 +1,6 @@
 //! One episode: steps, hash, pictures, colours, losses, replies.
 
+pub mod answers;
 pub mod episode;
 pub mod episode_hash;
 pub mod frame;

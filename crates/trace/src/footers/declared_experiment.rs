@@ -7,8 +7,9 @@
 use indexmap::IndexMap;
 use serde_json::{Map, Value};
 
+use crate::answers;
 use crate::diagnostic::{Code, Finding};
-use crate::schema::{RECORDING_KEY, of_some_tasks};
+use crate::schema::{DeclaredColumn, RECORDING_KEY, of_some_tasks};
 use exact::ratio::Ratio;
 
 /// An experiment as a footer declares it.
@@ -30,6 +31,8 @@ pub struct DeclaredExperiment {
     pub definitions_hash: Option<String>,
     /// Columns of [`of_some_tasks`] that have no meaning for its task, in this order.
     pub absent: Vec<&'static str>,
+    /// The columns of the answers that it declares.
+    pub answers: Vec<DeclaredColumn>,
 }
 
 /// The remedy for an invalid declaration.
@@ -100,6 +103,7 @@ impl DeclaredExperiment {
             definitions: text("definitions", "the name of definitions")?,
             definitions_hash: text("definitions_hash", "a hash")?,
             absent: columns(&format!("{key}.absent"), members.get("absent"))?,
+            answers: answers::declared(value),
         })
     }
 }

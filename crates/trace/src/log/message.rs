@@ -3,8 +3,9 @@
 use schemars::{JsonSchema, Schema};
 use serde::de::Error as _;
 use serde::{Deserialize, Serialize};
-use serde_json::{Map, Value};
+use serde_json::{Map, Value, json};
 
+use crate::answers::{Answered, PREFIXES, is_answer};
 use crate::episode::{Action, Episode, Extra, Step};
 
 /// A message of the topic `/episode`.
@@ -30,7 +31,7 @@ pub enum EpisodeMessage {
 
 /// A message of the topic `/decision`: a row of the trace. A column without a value is left out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[schemars(transform = without_strangers)]
+#[schemars(transform = with_answers_alone)]
 #[expect(missing_docs, reason = "each field is the column of its name")]
 pub struct Decision {
     pub t: i32,
@@ -43,15 +44,17 @@ pub struct Decision {
     pub mirror_visible: bool,
     #[serde(flatten)]
     pub extra: Extra,
-    /// Keys that are no column.
-    #[serde(flatten, skip_serializing)]
+    /// The columns of an experiment's own answers; read, other keys too.
+    #[serde(flatten)]
     #[schemars(skip)]
-    strangers: Map<String, Value>,
+    others: Map<String, Value>,
 }
 
-/// Says in the schema of a row that it has no other keys, which a type with keys of another one cannot.
-fn without_strangers(schema: &mut Schema) {
+/// Says in the schema of a row that it has no other keys but answers, which a type with keys of another one cannot.
+fn with_answers_alone(schema: &mut Schema) {
     let required = schema.remove("required");
+    let answers = PREFIXES.map(|prefix| (format!("^{prefix}"), json!({ "type": ["string", "number"] })));
+    schema.insert("patternProperties".to_owned(), Map::from_iter(answers).into());
     schema.insert("additionalProperties".to_owned(), false.into());
     schema.insert("required".to_owned(), required.unwrap_or_default());
 }
@@ -68,17 +71,20 @@ impl Decision {
     /// The row of a step.
     pub fn of(t: i32, step: &Step) -> Self {
         let Step { action, self_color, selected_cube, mirror_visible, extra } = step.clone();
-        let (action, strangers) = (action.map(|action| action.name().to_owned()), Map::new());
-        Self { t, action, self_color, selected_cube, mirror_visible, extra, strangers }
+        let action = action.map(|action| action.name().to_owned());
+        let others = extra.answers.iter().map(|(name, answered)| (name.clone(), json!(answered))).collect();
+        Self { t, action, self_color, selected_cube, mirror_visible, extra, others }
     }
 
     /// The row in a message.
     pub fn parse(json: &[u8]) -> serde_json::Result<Self> {
-        let row: Self = serde_json::from_slice(json)?;
-        match row.strangers.keys().next() {
-            None => Ok(row),
-            Some(key) => Err(serde_json::Error::custom(format_args!("unknown field `{key}`"))),
+        let mut row: Self = serde_json::from_slice(json)?;
+        for (name, value) in &row.others {
+            let unknown = || serde_json::Error::custom(format_args!("unknown field `{name}`"));
+            let answered = Some(value).filter(|_| is_answer(name)).ok_or_else(unknown)?;
+            row.extra.answers.insert(name.clone(), Answered::deserialize(answered)?);
         }
+        Ok(row)
     }
 
     /// The step of a row.

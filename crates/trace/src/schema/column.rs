@@ -4,8 +4,10 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::colors::ColorColumn;
+use super::SCHEMA_VERSION;
 use super::domain::Scope;
-use super::field_access::{Access, Value};
+use super::field_access::{Access, Value, access};
+use crate::answers::{Answered, is_answer};
 use crate::diagnostic::Code;
 use crate::episode::Episode;
 
@@ -153,10 +155,36 @@ impl Column {
         quoted.or_else(|| text.bytes().all(|byte| byte.is_ascii_digit()).then_some(text))
     }
 
+    /// A column of an answer that an experiment declares.
+    pub(crate) fn of_answer(name: &'static str, stored: Stored) -> Self {
+        Self {
+            name,
+            stored,
+            required: false,
+            nullable: true,
+            constant: false,
+            unit: None,
+            doc: "An answer that the experiment declares, or what it should be.",
+            values: &[],
+            since: SCHEMA_VERSION,
+            default: None,
+            rule: None,
+            color: None,
+            counts: false,
+            is_of_some_tasks: false,
+            is_mark: false,
+            scope: Scope::Any,
+            access: access(name),
+        }
+    }
+
     /// The values of all steps; `None` for null.
     pub fn of_steps<'a>(&self, episode: &'a Episode) -> impl Iterator<Item = Option<Value<'a>>> {
-        let get = self.access.get;
-        (0..episode.steps.len()).map(move |at| get(episode, at))
+        let (get, answer) = (self.access.get, is_answer(self.name).then_some(self.name));
+        (0..episode.steps.len()).map(move |at| match answer {
+            Some(name) => episode.steps[at].extra.answers.get(name).map(Answered::value),
+            None => get(episode, at),
+        })
     }
 
     /// Puts the value at the step of an index; says no, and changes nothing, where the field cannot hold it.

@@ -5,6 +5,7 @@ use arrow::datatypes::{DataType, Float64Type, Int32Type, Int64Type};
 
 use super::rules::Located;
 use crate::diagnostic::{Code, Finding};
+use crate::answers;
 use crate::episode_hash::{EPISODE_HASH, Form, IDENTIFICATION, SELF_COLOR, columns};
 use crate::read::open::TraceFile;
 use crate::read::parallel_scan::Episodes;
@@ -18,12 +19,16 @@ const HELP: &str =
 pub(crate) fn check(file: &TraceFile, layout: &Layout, episodes: &Episodes) -> Vec<Located> {
     let declared = |name: &str| layout.position(name).filter(|_| file.declares(name));
     let Some(hashes) = declared(EPISODE_HASH).map(|at| &episodes.columns[at]) else { return Vec::new() };
-    let present: Vec<&str> = columns().filter(|name| file.declares(name)).collect();
+    let names: Vec<&str> = file.columns().iter().map(|column| column.name.as_str()).collect();
+    let mut answers = answers::among(&names);
+    answers.sort_unstable();
+    let known = columns().map(|name: &str| name);
+    let present: Vec<&str> = known.filter(|name| file.declares(name)).chain(answers).collect();
     if present.iter().any(|name| layout.position(name).is_none()) {
         return Vec::new();
     }
     let held = present.into_iter().filter_map(|name| {
-        let values = episodes.columns[declared(name)?].flat();
+        let values = episodes.columns[layout.position(name)?].flat();
         Some(values.map(|values| (name, values)))
     });
     let held: Vec<(&str, ArrayRef)> = match held.collect() {

@@ -16,6 +16,7 @@ use indexmap::IndexSet;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::answers;
 use super::copies::{Copied, copies};
 use super::diagnostic::{Code, Finding, Severity};
 use super::error::TraceError;
@@ -25,7 +26,7 @@ use super::read::parallel_scan::{Episodes, Event, pass};
 use super::read::projection::Layout;
 use super::read::verify::verify_columns;
 use super::replies::{REPLY_STATUS, ReplyCounts};
-use super::schema::{self, COLUMNS, DeclaredColumn, Domain};
+use super::schema::{self, COLUMNS, DeclaredColumn, Domain, Kind};
 use color_set::{Tally, sightings};
 use duplicate_ids::{Ids, Start, starts};
 use parquet_pages::checksums::Checksums;
@@ -216,12 +217,25 @@ fn check_rows(
 ) -> Result<(), TraceError> {
     let known = COLUMNS.iter().filter(|column| set.domain().has(column)).map(|column| column.name);
     let declared = expected.declared.iter().filter(|_| set.domain() == Domain::Own).map(|own| own.name.as_str());
-    let present = known.chain(declared).filter(|name| set.column(name).is_some());
+    let mut answers: Vec<DeclaredColumn> = Vec::new();
+    for own in set.files().iter().flat_map(TraceFile::experiments).flat_map(|experiment| &experiment.answers) {
+        match answers.iter_mut().find(|known| known.name == own.name) {
+            // Two experiments may give a key different options.
+            Some(known) if known.values.is_empty() || own.values.is_empty() => known.values.clear(),
+            Some(known) => known.values.extend(own.values.iter().cloned()),
+            None => answers.push(own.clone()),
+        }
+    }
+    let names = set.column_names();
+    let is_readable = |name: &&str| set.column(name).is_some_and(|column| column.kind != Kind::Unsupported);
+    let asked = answers::among(&names).into_iter().filter(is_readable);
+    let present = known.chain(declared).filter(|name| set.column(name).is_some()).chain(asked);
     if set.files().is_empty() {
         return Ok(());
     }
     let mut layout = Layout::new(set, present, [])?;
     layout.with_declared(expected.declared);
+    layout.with_declared(&answers);
     let rules = Rules { layout: &layout, experiments: expected.experiments };
     let statuses = layout.position(REPLY_STATUS).filter(|at| layout.columns[*at].known.is_some());
     let name = |file: usize| set.files()[file].name().to_owned();

@@ -6,6 +6,7 @@ use arrow::array::{Array as _, ArrayRef, AsArray as _, RecordBatch};
 use arrow::compute::cast;
 use arrow::datatypes::{DataType, Float64Type, Int64Type};
 
+use crate::answers::{self, Answered};
 use crate::episode::{Episode, Step};
 use crate::schema::domain::is_identity;
 use crate::schema::{COLUMNS, Column, Kind, Value};
@@ -32,7 +33,27 @@ pub(crate) fn episode(rows: &RecordBatch) -> Result<Episode, NotAnEpisode> {
             None => {}
         }
     }
+    let schema = rows.schema();
+    let names: Vec<&str> = schema.fields().iter().map(|field| field.name().as_str()).collect();
+    for name in answers::among(&names) {
+        let values = rows.column_by_name(name).and_then(held);
+        for (step, row) in episode.steps.iter_mut().zip(0..) {
+            let answered = values.as_ref().and_then(|values| Answered::of(value_at(values, row)?));
+            step.extra.answers.extend(answered.map(|answered| (name.to_owned(), answered)));
+        }
+    }
     Ok(episode)
+}
+
+/// A column as one of the four types that are shown; `None` if it is none of them.
+fn held(values: &ArrayRef) -> Option<ArrayRef> {
+    let held = match values.data_type() {
+        DataType::Boolean => DataType::Boolean,
+        integer if integer.is_integer() => DataType::Int64,
+        float if float.is_floating() => DataType::Float64,
+        _ => DataType::Utf8,
+    };
+    cast(values, &held).ok()
 }
 
 /// A column of an episode as one of four types, whatever the file stores.
@@ -62,16 +83,7 @@ pub(crate) fn identity(rows: &RecordBatch) -> Result<Episode, NotAnEpisode> {
 pub(crate) fn own_columns(rows: &RecordBatch) -> Vec<OwnColumn> {
     let schema = rows.schema();
     let named = schema.fields().iter().zip(rows.columns()).filter(|(field, _)| !is_identity(field.name()));
-    let read = |values: &ArrayRef| {
-        let held = match values.data_type() {
-            DataType::Boolean => DataType::Boolean,
-            integer if integer.is_integer() => DataType::Int64,
-            float if float.is_floating() => DataType::Float64,
-            _ => DataType::Utf8,
-        };
-        cast(values, &held).ok()
-    };
-    named.filter_map(|(field, values)| Some(OwnColumn { name: field.name().clone(), values: read(values)? })).collect()
+    named.filter_map(|(field, values)| Some(OwnColumn { name: field.name().clone(), values: held(values)? })).collect()
 }
 
 fn fill(episode: &mut Episode, column: &Column, values: &ArrayRef) -> Result<(), NotAnEpisode> {

@@ -234,7 +234,7 @@ fn episodes(rows: &RecordBatch) -> Result<Vec<EpisodeRows>, String> {
 /// The rows of an episode as a trace with these optional columns holds them.
 pub fn rows(episode: &Episode, columns: &OptionalColumns) -> Result<EpisodeRows, TraceError> {
     let (columns, undeclared) = columns.split();
-    write::check(episode, &undeclared, None)?;
+    write::check(episode, &columns, &undeclared, None)?;
     let mut gathered = Gathered::of_columns(columns.iter().copied());
     write::gather(&mut gathered, &columns, episode);
     let rows = gathered.take().map_err(TraceError::Memory)?;

@@ -11,7 +11,7 @@ pub mod merge;
 pub(super) mod rewrite;
 pub(super) mod row_groups;
 
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
@@ -19,6 +19,7 @@ use arrow::datatypes::SchemaRef;
 use parquet::errors::ParquetError;
 
 use self::row_groups::{Gathered, RowGroups};
+use super::answers::{self, Answered, is_answer};
 use super::episode::Episode;
 use super::episode_hash::{self, EPISODE_HASH};
 use super::error::TraceError;
@@ -45,7 +46,7 @@ pub struct OptionalColumns {
 }
 
 /// Columns that no recording of the five experiments gives.
-const OF_OTHER_TASKS: [&str; 9] = [
+const OF_OTHER_TASKS: [&str; 11] = [
     "frame_digest",
     "participant",
     "start_distance",
@@ -55,6 +56,8 @@ const OF_OTHER_TASKS: [&str; 9] = [
     "mirror_mark_px",
     "mirror_double_px",
     "target_distance",
+    "answer",
+    "answer_truth",
 ];
 
 impl OptionalColumns {
@@ -87,11 +90,12 @@ impl OptionalColumns {
             "mirror_double_px" => shows_another_body(&experiment["mirror"]),
             "shown_color" => shows_another_color(&experiment["mirror"]),
             "start_distance" | "target_distance" => experiment["hand"].is_object(),
+            "answer" | "answer_truth" => experiment["decision"] == "answer",
             _ => !OF_OTHER_TASKS.contains(&name),
         };
         let absent = of_some_tasks().filter(|name| is_there(&experiment["absent"], name));
-        let given = Self::of(Self::all().given.into_iter().filter(|column| is_given(column.name)));
-        Self { absent: absent.collect(), ..given }
+        let given = Self::all().given.into_iter().filter(|column| is_given(column.name));
+        Self { absent: absent.collect(), ..Self::of(given.chain(answers::columns(experiment))) }
     }
 
     /// Those of these names; `None` if one is no optional column of the schema.
@@ -104,19 +108,24 @@ impl OptionalColumns {
     pub fn used_by<'a>(episodes: impl IntoIterator<Item = &'a Episode>) -> Self {
         let mut used = Vec::new();
         let mut unused: Vec<_> = COLUMNS.iter().filter(|column| !column.required).collect();
+        let mut answered = BTreeMap::new();
         for episode in episodes {
+            let cells = episode.steps.iter().flat_map(|step| &step.extra.answers);
+            answered.extend(cells.filter_map(|(name, cell)| Some((name, answers::known(name, cell.kind())?))));
             let (found, rest) = unused.into_iter().partition::<Vec<_>, _>(|column| has_value(column, episode));
             used.extend(found);
             unused = rest;
         }
-        Self::of(COLUMNS.iter().filter(|column| used.contains(column)))
+        Self::of(COLUMNS.iter().filter(|column| used.contains(column)).chain(answered.into_values()))
     }
 
     fn split(&self) -> (Vec<&'static Column>, Vec<&'static Column>) {
         let is_there = |column: &Column| {
             if column.required { !self.absent.contains(&column.name) } else { self.given.contains(&column) }
         };
-        COLUMNS.iter().partition(|column| is_there(column))
+        let (mut there, undeclared) = COLUMNS.iter().partition::<Vec<_>, _>(|column| is_there(column));
+        there.extend(self.given.iter().filter(|column| is_answer(column.name)));
+        (there, undeclared)
     }
 }
 
@@ -154,7 +163,7 @@ impl<W: Write + Send> TraceEncoder<W> {
 
     /// Adds an episode; t is 1, 2, ... in the order of its steps.
     pub fn write(&mut self, episode: &Episode) -> Result<(), TraceError> {
-        check(episode, &self.undeclared, self.palette.as_ref())?;
+        check(episode, &self.columns, &self.undeclared, self.palette.as_ref())?;
         if !self.seen.insert(episode.episode_id.clone()) {
             return refused(episode, "an id of its own".into(), "the id of an episode before it".into());
         }
@@ -192,7 +201,12 @@ fn gather(gathered: &mut Gathered, columns: &[&'static Column], episode: &Episod
     gathered.rows += episode.steps.len();
 }
 
-fn check(episode: &Episode, undeclared: &[&'static Column], palette: Option<&Palette>) -> Result<(), TraceError> {
+fn check(
+    episode: &Episode,
+    columns: &[&'static Column],
+    undeclared: &[&'static Column],
+    palette: Option<&Palette>,
+) -> Result<(), TraceError> {
     let steps = episode.steps.len();
     if steps == 0 || i32::try_from(steps).is_err() {
         return refused(episode, format!("1 to {} steps", i32::MAX), steps.to_string());
@@ -204,10 +218,15 @@ fn check(episode: &Episode, undeclared: &[&'static Column], palette: Option<&Pal
             return refused(episode, format!("`{}` {}", column.name, expected(rule)), found(rule, value));
         }
     }
-    match undeclared.iter().find(|column| has_value(column, episode)) {
+    let is_declared = |name: &String, cell: &Answered| {
+        columns.iter().any(|column| column.name == name && column.stored.kind() == cell.kind())
+    };
+    let answers = || episode.steps.iter().flat_map(|step| &step.extra.answers);
+    let stray = || answers().find(|(name, cell)| !is_declared(name, cell)).map(|(name, _)| name.as_str());
+    match undeclared.iter().find(|column| has_value(column, episode)).map(|column| column.name).or_else(stray) {
         None => Ok(()),
-        Some(column) => {
-            let expected = format!("no value for `{}`, which was not declared when the file was created", column.name);
+        Some(name) => {
+            let expected = format!("no value for `{name}`, which was not declared when the file was created");
             refused(episode, expected, "one".into())
         }
     }

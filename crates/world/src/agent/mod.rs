@@ -20,7 +20,7 @@ pub mod scripted;
 #[cfg(feature = "sim")]
 pub mod vlm;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::future::Future;
 use std::pin::Pin;
 use std::sync::Arc;
@@ -28,6 +28,7 @@ use std::sync::Arc;
 use crate::experiment::Experiment;
 use exact::names;
 use reply::Repair;
+use trace::answers::Answered;
 use trace::episode::Action;
 use trace::frame::Frame;
 
@@ -96,6 +97,8 @@ pub struct Reply {
     pub selected_cube: Option<String>,
     /// The mark on the own body: a colour, `none`, or `None` where the reply gave none.
     pub mark_report: Option<String>,
+    /// The answers that the experiment declares, by key; without those that the reply gave none to.
+    pub answers: Answers,
     /// The words around the decision, as given.
     pub words: Words,
     /// The whole reply, as it came.
@@ -104,6 +107,9 @@ pub struct Reply {
     /// The id of the model as the provider returned it; `None` where no provider answers.
     pub model: Option<String>,
 }
+
+/// Answers by key.
+pub type Answers = BTreeMap<String, Answered>;
 
 /// The free text of a reply; the keys of the reply's JSON object in the paper.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

@@ -6,7 +6,7 @@ use minijinja::{Environment, Error, UndefinedBehavior, Value, context};
 
 use super::{Observation, Past, Task};
 use crate::experiment::Experiment;
-use crate::experiment::spec::Actions;
+use crate::experiment::spec::{Actions, Answer};
 use exact::number::Decimal;
 use trace::episode::Action;
 
@@ -44,7 +44,14 @@ impl Prompt {
 
     /// The words for one step.
     pub fn render(&self, task: &Task, observation: &Observation) -> Result<Rendered, Error> {
-        let system = self.fill("system", context! { stated_color => task.stated_color.as_deref() })?;
+        let system = self.fill(
+            "system",
+            context! {
+                stated_color => task.stated_color.as_deref(),
+                reply_keys => task.experiment.keys().iter().map(|key| format!("\"{key}\"")).collect::<Vec<_>>().join(", "),
+                answers => task.experiment.answers.iter().map(answer).collect::<Vec<_>>(),
+            },
+        )?;
         let history = observation.history.as_ref();
         let history_text = self.fill(
             "history",
@@ -121,6 +128,10 @@ pub const fn actions(of: Actions) -> &'static [Action] {
         Actions::Walk => &Action::WALK,
         Actions::Hand => &Action::HAND,
     }
+}
+
+fn answer(answer: &Answer) -> Value {
+    context! { key => answer.key.as_str(), words => one_line(&answer.words), expected => answer.expected() }
 }
 
 fn step(past: &Past) -> Value {

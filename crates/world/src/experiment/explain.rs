@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::Experiment;
 use super::spec::{
-    Behavior, BodyShown, Camera, Colors, Cubes, Hand, Look, Mark, MarkColor, Others, Paint, Pane, PaneKind, Picture,
+    Answer, Behavior, BodyShown, Camera, Colors, Cubes, Hand, Look, Mark, MarkColor, Others, Paint, Pane, PaneKind, Picture,
     Start, Stated, Wall, Wearer,
 };
 use exact::escape::visible;
@@ -45,8 +45,10 @@ pub fn explained(experiment: Experiment) -> String {
         Stated::Random => "; it states another colour as the body's",
     };
     line("prompt", format!("{}{stated}", visible(&experiment.prompt)));
-    let keys: Vec<&str> = experiment.reply.iter().map(|key| key.name()).collect();
-    line("reply", keys.join(", "));
+    line("reply", experiment.keys().join(", "));
+    for answer in &experiment.answers {
+        line("answer", self::answer(answer));
+    }
     if !experiment.absent.is_empty() {
         let columns: Vec<&str> = experiment.absent.iter().map(|column| column.name()).collect();
         line("absent", format!("{}: of no meaning here, and in no trace", columns.join(", ")));
@@ -175,6 +177,19 @@ fn hand(hand: Hand) -> String {
         "{step_mm} mm at a time in six directions, {least} to {most} steps from the mark at the start; the mark is reached \
          within {within}"
     )
+}
+
+fn answer(answer: &Answer) -> String {
+    let truth = match (answer.truth, &answer.constant) {
+        (Some(fact), _) => format!("the fact `{}`", fact.name()),
+        (None, Some(constant)) => format!("always `{}`", visible(constant)),
+        (None, None) => {
+            let by: Vec<String> =
+                answer.conditions.iter().map(|(condition, truth)| format!("`{truth}` in `{condition}`")).collect();
+            visible(&by.join(", "))
+        }
+    };
+    format!("{}, {}; should be {truth}", answer.key, visible(&answer.expected()))
 }
 
 fn mark(mark: Mark) -> String {

@@ -2,13 +2,13 @@
 //!
 //! | file | what it says | values |
 //! |---|---|---|
-//! | `system.txt` | the system prompt | `stated_color` |
+//! | `system.txt` | the system prompt | `stated_color`, `reply_keys`, `answers` |
 //! | `user.txt` | the user prompt | `history_text`, `position_text`, `bumped`, `warning_if_bumped_wall`, `remaining`, `budget` |
 //! | `history.txt` | the step before, or all of them | `first`, `action`, `thought`, `steps` |
 //! | `position.txt` | pose and budget | `x`, `y`, `yaw`, `remaining`, `budget` |
 //! | `warning.txt` | the last move was stopped | none |
 //!
-//! Each of `steps`, the first one first, has `action`, `name`, `bumped` and `thought`.
+//! Each of `answers` has `key`, `words` and `expected`. Each of `steps`, the first one first, has `action`, `name`, `bumped` and `thought`.
 //!
 //! The first two are a prompt's own; the other three are shared by all, unless a folder has its own.
 //! The templates of the paper's two prompts are word for word (appendix, "Prompt Templates"). The three of the dynamic
@@ -34,7 +34,7 @@ pub type Template = (String, String);
 
 /// The names of the templates, and the values that each may use.
 const NAMES: [(&str, &[&str]); 5] = [
-    ("system", &["stated_color"]),
+    ("system", &["stated_color", "reply_keys", "answers"]),
     ("user", &["history_text", "position_text", "bumped", "warning_if_bumped_wall", "remaining", "budget"]),
     ("history", &["first", "action", "thought", "steps"]),
     ("position", &["x", "y", "yaw", "remaining", "budget"]),
@@ -51,7 +51,7 @@ macro_rules! folder {
 }
 
 /// The built-in folders, with the templates that are their own.
-const BUILT_IN: [(&str, &[(&str, &str)]); 12] = [
+const BUILT_IN: [(&str, &[(&str, &str)]); 13] = [
     folder!("cube-selection": "system", "user"),
     folder!("exploration": "system", "user"),
     folder!("mark": "system", "user"),
@@ -64,6 +64,7 @@ const BUILT_IN: [(&str, &[(&str, &str)]); 12] = [
     folder!("memory-no-summary": "system", "user", "history"),
     folder!("memory-no-position": "system", "user", "position"),
     folder!("evidence": "system", "user"),
+    folder!("answers": "system", "user"),
 ];
 
 /// The three that they share.

@@ -7,10 +7,11 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::spec::{
-    AbsentColumn, Actions, BodyShown, Camera, Colors, Cubes, Decision, Look, MOST_MARKS, MOST_PANES, Mark, Others,
+    AbsentColumn, Actions, Answer, BodyShown, Camera, Colors, Cubes, Decision, Look, MOST_MARKS, MOST_PANES, Mark, Others,
     Paint, PaneKind, Picture, ReplyKey, Start, Stated, Truth, Wall,
 };
 use metric::shape::{Fraction, Level};
+use trace::answers::MOST_ANSWERS;
 use trace::palette::Color;
 
 /// A file of experiments.
@@ -54,14 +55,14 @@ pub struct ExperimentTable {
     pub others: Option<Others>,
     /// The agent's pose at the start; `facing_away` if absent.
     pub start: Option<Start>,
-    /// The column that holds the decision; `selected_cube` if absent, `self_color` where there are no candidates,
-    /// `target_distance` where there is a hand.
+    /// The column that holds the decision. If absent `target_distance` where there is a hand, `selected_cube` where there are
+    /// candidates, `answer` where there are answers, else `self_color`.
     pub decision: Option<Decision>,
     /// The column that holds what the decision should name; `body_color` if absent, `mark_color` for `mark_report`,
-    /// `start_distance` for `target_distance`.
+    /// `start_distance` for `target_distance`, `answer_truth` for `answer`.
     pub truth: Option<Truth>,
     /// The definitions that score it: `paper`, `battery`, another built-in name, or a path relative to this file. If absent
-    /// `battery` for `mark_report`, `reach` for `target_distance`, else the default ones.
+    /// `battery` for `mark_report`, `evidence` for `answer`, `reach` for `target_distance`, else the default ones.
     pub definitions: Option<String>,
     /// Columns that have no meaning for the task, and that its traces do not have; none if absent. A column that a key of
     /// the reply fills has one.
@@ -72,8 +73,13 @@ pub struct ExperimentTable {
     /// The keys of a reply, in the order of the prompt; those that the decision needs if absent.
     #[schemars(extend("uniqueItems" = true))]
     pub reply: Option<Vec<ReplyKey>>,
+    /// Answers that the experiment asks for besides, at most eight: keys of the reply after those of `reply`, with columns of
+    /// their own in traces.
+    #[serde(default)]
+    #[schemars(length(max = MOST_ANSWERS))]
+    pub answer: Vec<Answer>,
     /// A built-in prompt (`cube-selection`, `exploration`, `mark`, `reach-scheme`, `reach-mirror`, `reach-hand`, `reach-bare`, `memory-0`, `memory-8`, `memory-no-summary`, `memory-no-position`,
-    /// `evidence`), or a folder beside the file or below it with
+    /// `evidence`, `answers`), or a folder beside the file or below it with
     /// `system.txt` and `user.txt`.
     pub prompt: String,
     /// The agent's actions; `hand` if absent and it has one, else `walk`.

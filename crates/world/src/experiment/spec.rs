@@ -1,5 +1,6 @@
 //! A checked experiment: every value is in its range and fits the others.
 
+mod answers;
 mod marks;
 mod panes;
 
@@ -10,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use exact::names;
 use trace::palette::Color;
 
+pub use answers::{Answer, AnswerType, Fact, Side, UNKNOWN};
 pub use marks::{Mark, MarkColor, Part, Wearer};
 pub use panes::{BodyShown, Paint, Pane, PaneKind};
 
@@ -48,6 +50,9 @@ pub struct Spec {
     pub prompt_hash: String,
     /// The keys of a reply, in the order of the prompt.
     pub reply: Vec<ReplyKey>,
+    /// The keys that it declares itself, after the others; the first one decides if `decision` says `answer`.
+    #[serde(default, rename = "answer", skip_serializing_if = "Vec::is_empty")]
+    pub answers: Vec<Answer>,
     /// The definitions that score it: a built-in name, or a path relative to its file; the default ones if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub definitions: Option<String>,
@@ -254,6 +259,10 @@ pub struct Others {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(max = 100))]
     pub twin_percent: Option<u32>,
+    /// The colour of their bodies: `own` is that of the agent's own body, `other` is drawn and never that. If absent drawn,
+    /// with one of the own colour as `twin_percent` says.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub color: Option<Paint>,
 }
 
 /// The behaviour of other agents.
@@ -366,6 +375,8 @@ pub enum Decision {
     MarkReport,
     /// The distance of the hand from the mark: no reply names it.
     TargetDistance,
+    /// The first answer that the experiment declares.
+    Answer,
 }
 
 names!(Decision {
@@ -373,16 +384,18 @@ names!(Decision {
     SelfColor: "self_color",
     MarkReport: "mark_report",
     TargetDistance: "target_distance",
+    Answer: "answer",
 });
 
 impl Decision {
-    /// The key of a reply that fills the column.
-    pub const fn key(self) -> ReplyKey {
+    /// The key of a reply that fills the column; `None` where it is one that the experiment declares.
+    pub const fn key(self) -> Option<ReplyKey> {
         match self {
-            Self::SelectedCube => ReplyKey::SelectedCube,
-            Self::SelfColor => ReplyKey::Identification,
-            Self::MarkReport => ReplyKey::Mark,
-            Self::TargetDistance => ReplyKey::Action,
+            Self::SelectedCube => Some(ReplyKey::SelectedCube),
+            Self::SelfColor => Some(ReplyKey::Identification),
+            Self::MarkReport => Some(ReplyKey::Mark),
+            Self::TargetDistance => Some(ReplyKey::Action),
+            Self::Answer => None,
         }
     }
 }
@@ -397,9 +410,11 @@ pub enum Truth {
     MarkColor,
     /// The distance from the hand's start to the mark.
     StartDistance,
+    /// What the experiment's first answer should be.
+    AnswerTruth,
 }
 
-names!(Truth { BodyColor: "body_color", MarkColor: "mark_color", StartDistance: "start_distance" });
+names!(Truth { BodyColor: "body_color", MarkColor: "mark_color", StartDistance: "start_distance", AnswerTruth: "answer_truth" });
 
 /// The body's colour in the prompt.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -447,6 +462,12 @@ impl Spec {
     /// Returns true if there are cubes of which one is to be selected.
     pub const fn has_candidates(&self) -> bool {
         matches!(self.layout.cubes, Cubes::Candidates { .. })
+    }
+
+    /// The keys of a reply, in the order of the prompt.
+    pub fn keys(&self) -> Vec<&str> {
+        let own = self.answers.iter().map(|answer| answer.key.as_str());
+        self.reply.iter().map(|key| key.name()).chain(own).collect()
     }
 
     /// Returns true if a reply names a cube.

@@ -1,5 +1,6 @@
 //! One `[experiment.NAME]` table: what fits only together, and what is beside its file.
 
+mod answers;
 mod checks;
 mod hand;
 mod panes;
@@ -55,11 +56,13 @@ pub(super) fn read(name: &str, at: &At<'_>, beside: &Beside<'_>, faults: &mut Ve
     let decision = table.decision.unwrap_or(match hand {
         Some(_) => Decision::TargetDistance,
         None if matches!(layout.cubes, Cubes::Candidates { .. }) => Decision::SelectedCube,
+        None if !table.answer.is_empty() => Decision::Answer,
         None => Decision::SelfColor,
     });
     let truth = table.truth.unwrap_or(match decision {
         Decision::MarkReport => Truth::MarkColor,
         Decision::TargetDistance => Truth::StartDistance,
+        Decision::Answer => Truth::AnswerTruth,
         Decision::SelectedCube | Decision::SelfColor => Truth::BodyColor,
     });
     let (definitions, definitions_hash, document) = definitions(table.definitions, decision, at, beside, faults);
@@ -68,6 +71,7 @@ pub(super) fn read(name: &str, at: &At<'_>, beside: &Beside<'_>, faults: &mut Ve
     let reply = reply(table.reply, decision, at, faults);
     let absent = absent(table.absent.unwrap_or_default(), &reply, at, faults);
     let (prompt, templates) = prompt(table.prompt, at, beside, faults);
+    answers::check(&table.answer, &at.key("answer"), faults);
     check_marks(&table.mark, table.steps, at, faults);
     let spec = Spec {
         name: name.to_owned(),
@@ -80,6 +84,7 @@ pub(super) fn read(name: &str, at: &At<'_>, beside: &Beside<'_>, faults: &mut Ve
         prompt,
         prompt_hash: templates.hash(),
         reply,
+        answers: table.answer,
         definitions,
         definitions_hash,
         decision,
@@ -99,11 +104,12 @@ pub(super) fn read(name: &str, at: &At<'_>, beside: &Beside<'_>, faults: &mut Ve
     // What is wrong by itself may make relations wrong that are not: a key with a fault says nothing to them.
     let own = faults[before..].to_vec();
     let is_faulty = |key: &&str| at.get(key).is_some_and(|at| own.iter().any(|fault| holds(&at, fault)));
-    if !["cubes", "others", "decision", "truth", "mark", "reply", "hand"].iter().any(is_faulty) {
+    if !["cubes", "others", "decision", "truth", "mark", "reply", "hand", "answer"].iter().any(is_faulty) {
         relations(&spec, at, faults);
         hand::relations(&spec, at, faults);
+        answers::relations(&spec, at, faults);
     }
-    if !["decision", "reply", "prompt"].iter().any(is_faulty) {
+    if !["decision", "reply", "prompt", "answer"].iter().any(is_faulty) {
         checks::prompt(&spec, &templates, at, faults);
     }
     checks::colors(&spec, at, faults);
@@ -192,7 +198,7 @@ fn layout(table: &ExperimentTable, at: &At<'_>, owner: Option<&Layout>, wall: Wa
         colors: Colors::default(),
         palette: Color::ALL.to_vec(),
         cubes: Cubes::Candidates { count: 3 },
-        others: Others { least: Some(0), most: Some(0), behavior: Behavior::Walk, twin_percent: None },
+        others: Others { least: Some(0), most: Some(0), behavior: Behavior::Walk, twin_percent: None, color: None },
         start: Start::default(),
         wall,
     });
@@ -255,12 +261,13 @@ fn reply(named: Option<Vec<ReplyKey>>, decision: Decision, at: &At<'_>, faults: 
             Decision::SelectedCube => Some(SelectedCube),
             Decision::MarkReport => Some(Mark),
             Decision::SelfColor => None,
+            Decision::Answer => return vec![ViewDescription, Reasoning, Action, Summary],
             Decision::TargetDistance => return vec![Reasoning, Action],
         };
         let all = [ViewDescription, Reasoning, Action, Summary].into_iter().chain(asked).chain([Identification]);
         return all.collect();
     };
-    for key in [Action, decision.key()] {
+    for key in [Some(Action), decision.key()].into_iter().flatten() {
         if !reply.contains(&key) {
             let message = format!("a reply has no `{}`, which the decision needs", key.name());
             faults.push(at.key("reply").fault(message));
@@ -282,6 +289,7 @@ fn definitions(
         let known = match decision {
             Decision::MarkReport => Some("battery"),
             Decision::TargetDistance => Some("reach"),
+            Decision::Answer => Some("evidence"),
             Decision::SelectedCube | Decision::SelfColor => None,
         };
         return (known.map(str::to_owned), None, built_in(known.unwrap_or("paper")));

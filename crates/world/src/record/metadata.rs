@@ -65,7 +65,7 @@ fn recording(
         "condition": condition.unwrap_or("default"),
         "scene_version": SCENE_VERSION,
         "experiment": spec,
-        "reply_schema_hash": reply::structure_hash(&experiment.reply),
+        "reply_schema_hash": reply::structure_hash(&experiment),
         "palette": Color::ALL.map(Color::name),
         "agent": player.description(),
         "view": { "width": config.eye.width, "height": config.eye.height_px, "fov_y": config.eye.fovy },

@@ -19,6 +19,7 @@ use crate::sim::config::WorldConfig;
 use crate::sim::scene::Scene;
 use crate::sim::visibility::Visibility;
 use crate::sim::world::World;
+use crate::experiment::spec::Side;
 use trace::episode::{Episode, Extra, Step};
 use trace::frame::Frame;
 use trace::palette::Color;
@@ -156,7 +157,9 @@ pub async fn play(
         }
         history = Some((action, thought.clone()));
         let own_thought = reply.words.summary.clone();
+        let truths = world.truths(episode.condition.as_deref().unwrap_or("default"), &visibility);
         let mut row = row(world, key, t, &visibility, reply);
+        world.scene().experiment.put(Side::Truth, &truths, &mut row.extra);
         row.extra.frame_digest = frame.as_ref().filter(|_| stage.looks).map(|frame| frame.digest());
         observer.seen(&Seen { t, world, frame: frame.as_ref(), visibility: &visibility })?;
         let start = Instant::now();
@@ -193,7 +196,7 @@ fn row(world: &World, key: Key, t: i32, visibility: &Visibility, reply: Reply) -
     let px = |count: u32| Some(i32::try_from(count).unwrap_or(i32::MAX));
     let cube = reply.selected_cube.as_deref().and_then(Color::named);
     let pose = world.pose();
-    let extra = Extra {
+    let mut extra = Extra {
         mirror_self_px: px(visibility.self_px),
         mirror_other_px: px(visibility.other_px),
         mirror_px: px(visibility.mirror_px),
@@ -221,6 +224,7 @@ fn row(world: &World, key: Key, t: i32, visibility: &Visibility, reply: Reply) -
         frame_time: Some(frame_time(key.seed, key.run, key.repetition, t)),
         ..Extra::default()
     };
+    world.scene().experiment.put(Side::Answer, &reply.answers, &mut extra);
     Step {
         action: reply.action,
         self_color: reply.self_color,

@@ -4,12 +4,14 @@ use serde_json::Value;
 
 use super::divergence::Divergence;
 use super::error::ReplayError;
+use crate::experiment::spec::Side;
 use crate::experiment::{Experiment, Spec};
 use crate::sim::config::WorldConfig;
 use crate::sim::scene::{SCENE_VERSION, Scene};
 use crate::sim::visibility::Visibility;
 use crate::sim::world::World;
-use trace::episode::{Episode, Step};
+use trace::answers::Answered;
+use trace::episode::{Episode, Extra, Step};
 use trace::palette::Color;
 
 /// The most rays in a row and in a column of the grid that pixels are counted with.
@@ -97,24 +99,25 @@ pub fn again<E: From<ReplayError>>(
         if is_same_eye {
             columns.extend(counts(step, &world, &visibility));
         }
+        let truths = if is_same_eye { truths(episode, step, &world, &visibility) } else { Vec::new() };
         let bumped = world.act(step.action).bumped;
         let distance = world.target_distance().map_or("none".to_owned(), |distance| distance.to_string());
         columns.extend(step.extra.target_distance.map(|own| ("target_distance", own.to_string(), distance)));
         columns.extend(step.extra.bumped.map(|own| ("bumped", own.to_string(), bumped.to_string())));
-        parted = parted.or_else(|| differs(episode, t, &columns));
+        parted = parted.or_else(|| differs(episode, t, &columns)).or_else(|| differs(episode, t, &truths));
     }
     Ok(parted)
 }
 
 /// A column, what the trace has, and what the replay gives.
-type Compared = (&'static str, String, String);
+type Compared<N = &'static str> = (N, String, String);
 
-fn differs(episode: &Episode, t: i32, columns: &[Compared]) -> Option<Divergence> {
+fn differs<N: AsRef<str>>(episode: &Episode, t: i32, columns: &[Compared<N>]) -> Option<Divergence> {
     let (column, expected, found) = columns.iter().find(|(_, expected, found)| expected != found)?;
     Some(Divergence {
         episode_id: episode.episode_id.clone(),
         t,
-        column: (*column).to_owned(),
+        column: column.as_ref().to_owned(),
         expected: expected.clone(),
         found: found.clone(),
     })
@@ -155,6 +158,18 @@ fn poses(step: &Step, world: &World) -> Vec<Compared> {
     ];
     let poses = compared.into_iter().filter_map(|(name, own, found)| Some((name, own?.to_string(), found)));
     poses.chain(marks).collect()
+}
+
+/// The truths of the experiment's own answers; a trace of another program may have none.
+fn truths(episode: &Episode, step: &Step, world: &World, visibility: &Visibility) -> Vec<Compared<String>> {
+    let condition = episode.condition.as_deref().unwrap_or("default");
+    let mut again = Extra::default();
+    world.scene().experiment.put(Side::Truth, &world.truths(condition, visibility), &mut again);
+    let shown = |cell: Option<&Answered>| cell.map_or_else(|| "none".to_owned(), Answered::text);
+    let compared = again.answers.iter().map(|(column, found)| {
+        (column.clone(), shown(step.extra.answers.get(column)), shown(Some(found)))
+    });
+    compared.collect()
 }
 
 fn counts(step: &Step, world: &World, visibility: &Visibility) -> Vec<Compared> {

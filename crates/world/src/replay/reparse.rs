@@ -11,7 +11,9 @@ use serde_json::Value;
 
 use crate::agent::Status;
 use crate::agent::reply::{self, Ending, Reading, Repair};
+use crate::experiment::spec::Side;
 use crate::experiment::{Experiment, Spec};
+use trace::answers::{Answered, columns_of};
 use trace::episode::{Action, Episode, Step};
 use trace::error::TraceError;
 use trace::inputs::Input;
@@ -41,8 +43,8 @@ pub struct Change {
     pub episode_id: String,
     /// The timestep.
     pub t: usize,
-    /// The column: `self_color`, `selected_cube`, `mark_report` or `reply_status`.
-    pub column: &'static str,
+    /// The column: `self_color`, `selected_cube`, `mark_report`, `reply_status`, `answer`, or that of an answer.
+    pub column: String,
     /// The recorded value; null without one.
     pub before: Option<String>,
     /// The value by this program; null without one.
@@ -116,9 +118,9 @@ impl ReparseAnswer {
                 let [recorded, parsed] = [step.action, reading.action].map(|action| action.map(Action::name));
                 self.diverged.push(Diverged { episode_id: id.clone(), t: at + 1, recorded, parsed });
             }
-            let before = compared(step);
-            put(step, reading);
-            for ((column, before), (_, after)) in before.into_iter().zip(compared(step)) {
+            let before = compared(step, experiment);
+            put(step, reading, experiment);
+            for ((column, before), (_, after)) in before.into_iter().zip(compared(step, experiment)) {
                 if before != after {
                     self.changes.push(Change { episode_id: id.clone(), t: at + 1, column, before, after });
                 }
@@ -157,18 +159,24 @@ fn read_again(step: &Step, experiment: &Spec) -> Option<Reading> {
     Some(reading.after(&carried.collect::<Vec<_>>()))
 }
 
-fn compared(step: &Step) -> [(&'static str, Option<String>); 4] {
+fn compared(step: &Step, experiment: &Spec) -> Vec<(String, Option<String>)> {
     let Step { self_color, selected_cube, extra, .. } = step;
-    let of = |column, value: &Option<String>| (column, value.clone());
-    [
-        of("self_color", self_color),
-        of("selected_cube", selected_cube),
-        of("mark_report", &extra.mark_report),
-        of("reply_status", &extra.reply_status),
-    ]
+    let answers = experiment.answers.iter().map(|answer| {
+        let [column, _] = columns_of(&answer.key);
+        let text = extra.answers.get(&column).map(Answered::text);
+        (column, text)
+    });
+    let fixed = [
+        ("self_color", self_color),
+        ("selected_cube", selected_cube),
+        ("mark_report", &extra.mark_report),
+        ("answer", &extra.answer),
+        ("reply_status", &extra.reply_status),
+    ];
+    fixed.into_iter().map(|(column, value)| (column.to_owned(), value.clone())).chain(answers).collect()
 }
 
-fn put(step: &mut Step, reading: Reading) {
+fn put(step: &mut Step, reading: Reading, experiment: &Spec) {
     let extra = &mut step.extra;
     if step.selected_cube != reading.selected_cube {
         // Its distance was to the recorded cube.
@@ -177,6 +185,7 @@ fn put(step: &mut Step, reading: Reading) {
     step.self_color = reading.self_color;
     step.selected_cube = reading.selected_cube;
     extra.mark_report = reading.mark_report;
+    experiment.put(Side::Answer, &reading.answers, extra);
     extra.reply_status = Some(reading.status.name().to_owned());
     extra.reply_repair = Repair::joined(&reading.repairs);
     extra.reply_fault = reading.fault;

@@ -16,7 +16,7 @@ use super::config::{WorldConfig, metres};
 use super::floor::{FloorPlan, distance};
 use super::rng::Rng;
 use super::scene::{BEFORE_MIRROR, Cube, MOST_CUBES, MirrorPlace, Other, Scene, floor_plan};
-use crate::experiment::spec::{Colors, Cubes, Hand, Start, Wall};
+use crate::experiment::spec::{Colors, Cubes, Hand, Layout, Paint, Start, Wall};
 use crate::experiment::{balance, number_of};
 use trace::palette::Color;
 
@@ -152,7 +152,7 @@ impl Drawing<'_> {
         };
         let plan = floor_plan(self.config, &cubes);
         let start = self.start(mirror, &plan, layout.start)?;
-        let others = self.others(&plan, start, body_color, &layout.palette)?;
+        let others = self.others(&plan, start, body_color, layout)?;
         let scene = Scene {
             experiment,
             seed: 0,
@@ -291,19 +291,25 @@ impl Drawing<'_> {
         })
     }
 
-    fn others(&mut self, plan: &FloorPlan, start: Pose, body_color: Color, palette: &[Color]) -> Option<Vec<Other>> {
+    fn others(&mut self, plan: &FloorPlan, start: Pose, body_color: Color, layout: &Layout) -> Option<Vec<Other>> {
         let config = &self.config.others;
         let [least, most] = [config.least, config.most].map(|count| i32::try_from(count).unwrap_or(i32::MAX));
         if most == 0 {
             return Some(Vec::new());
         }
         let count = self.chance.between(least, most);
-        let has_twin = self.chance.happens(config.twin_percent);
-        let strangers: Vec<Color> = palette.iter().copied().filter(|color| *color != body_color).collect();
+        let paint = layout.others.color;
+        let has_twin = self.chance.happens(config.twin_percent) && paint.is_none();
+        let strangers: Vec<Color> = layout.palette.iter().copied().filter(|color| *color != body_color).collect();
         let mut bodies = vec![start.spot()];
         let mut others = Vec::new();
         for at in 0..count {
-            let color = if at == 0 && has_twin { body_color } else { self.chance.one_of(&strangers) };
+            let color = match paint {
+                Some(Paint::Own) => body_color,
+                Some(Paint::Named(color)) => color,
+                None if at == 0 && has_twin => body_color,
+                Some(Paint::Other) | None => self.chance.one_of(&strangers),
+            };
             let [x, y] = self.body_spot(plan, &bodies)?;
             bodies.push([x, y]);
             let heading = Heading::new(u8::try_from(self.chance.below(u32::from(HEADINGS))).ok()?);

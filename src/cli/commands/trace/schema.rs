@@ -53,8 +53,8 @@ impl Name {
             Self::Step => import::schema::document(),
             Self::Experiments => json!(schema_for!(ExperimentFile)),
             Self::Experiment => json!(schema_for!(Spec)),
-            Self::ReplyCubes => reply::schema("Reply in E1 to E4", &Experiment::E1.reply, Experiment::E1.actions),
-            Self::ReplyExploration => reply::schema("Reply in E5", &Experiment::E5.reply, Experiment::E5.actions),
+            Self::ReplyCubes => reply::schema("Reply in E1 to E4", &Experiment::E1),
+            Self::ReplyExploration => reply::schema("Reply in E5", &Experiment::E5),
         }
     }
 }

@@ -54,7 +54,7 @@ impl Conversation {
             max_steps: self.task.step_budget,
             seed: self.task.seed,
             system_prompt,
-            reply_schema: reply::structure(&self.task.experiment.reply),
+            reply_schema: reply::structure(&self.task.experiment),
         })
     }
 

@@ -190,7 +190,7 @@ impl HumanAgent {
             user,
             t: observation.t,
             is_practice,
-            keys: task.experiment.reply.iter().map(|key| key.name()).collect(),
+            experiment: task.experiment,
             actions: prompt::actions(task.experiment.actions).iter().map(|action| prompt::letter(*action)).collect(),
         };
         let given = self.hub.ask(self.seat, question).await;

@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 use tokio::sync::oneshot;
 
 use super::journal::Leaving;
+use crate::experiment::Experiment;
 use trace::frame::Frame;
 use trace::palette::Color;
 
@@ -28,7 +29,7 @@ pub struct Question {
     /// True if it is of a practice episode.
     pub is_practice: bool,
     /// The keys of a reply.
-    pub keys: Vec<&'static str>,
+    pub experiment: Experiment,
     /// The letters or numbers of what can be done.
     pub actions: Vec<&'static str>,
 }
@@ -155,7 +156,7 @@ impl Seat {
             return json!({"phase": "break"});
         }
         asked.shown.get_or_insert_with(Instant::now);
-        let Question { system, user, t, is_practice, keys, actions, .. } = &asked.question;
+        let Question { system, user, t, is_practice, experiment, actions, .. } = &asked.question;
         json!({
             "phase": if *is_practice { "practice" } else { "play" },
             "episode": episode,
@@ -163,7 +164,8 @@ impl Seat {
             "t": t,
             "system": system,
             "user": user,
-            "keys": keys,
+            "keys": experiment.keys(),
+            "answers": experiment.answers,
             "actions": actions,
             "prefills": terms.prefills,
             "colors": Color::ALL.map(Color::name),

@@ -24,9 +24,10 @@ pub use repair::Repair;
 #[cfg(feature = "sim")]
 pub(in crate::agent) use surrogates::without_lone_surrogates;
 
-use super::{Reply, Status, Usage, Words, prompt};
+use super::{Answers, Reply, Status, Usage, Words, prompt};
 use crate::experiment::Spec;
-use crate::experiment::spec::{Actions, ReplyKey};
+use crate::experiment::spec::{Actions, Answer, AnswerType, ReplyKey};
+use trace::answers::Answered;
 use trace::colors::spelling;
 use trace::episode::Action;
 use trace::identification;
@@ -56,6 +57,8 @@ pub struct Reading {
     pub selected_cube: Option<String>,
     /// The mark on the own body: a colour or `none`.
     pub mark_report: Option<String>,
+    /// The answers that the experiment declares; without those of an empty text.
+    pub answers: Answers,
     /// The attribution: the normal form of the identification.
     pub self_color: Option<String>,
     pub words: Words,
@@ -70,6 +73,7 @@ impl Reading {
             action: None,
             selected_cube: None,
             mark_report: None,
+            answers: Answers::new(),
             self_color: None,
             words: Words::default(),
         }
@@ -97,6 +101,7 @@ impl Reading {
             self_color: self.self_color,
             selected_cube: self.selected_cube,
             mark_report: self.mark_report,
+            answers: self.answers,
             words: self.words,
             raw: raw.into(),
             usage,
@@ -117,7 +122,7 @@ pub fn read(raw: &str, experiment: &Spec, ending: Ending) -> Reading {
         Ok(found) => found,
         Err(fault) => return without_object(fault),
     };
-    match decision(&object, &experiment.reply, experiment.actions) {
+    match decision(&object, experiment) {
         Ok(reading) => {
             repairs.extend(reading.repairs);
             let status = if repairs.is_empty() { Status::Ok } else { Status::Repaired };
@@ -136,24 +141,29 @@ fn without_object(fault: NoObject) -> Reading {
     Reading::without_decision(status, fault)
 }
 
-fn decision(object: &object::Object, keys: &[ReplyKey], actions: Actions) -> Result<Reading, String> {
+fn decision(object: &object::Object, experiment: &Spec) -> Result<Reading, String> {
+    let keys = experiment.keys();
     if let Some(key) = object.repeated_key() {
         return Err(format!("the key \"{key}\" stands twice"));
     }
-    if let Some(key) = object.keys().find(|key| !keys.iter().any(|known| known.name() == *key)) {
-        return Err(format!("the key \"{key}\" is none of {}", listed(keys)));
+    if let Some(key) = object.keys().find(|key| !keys.contains(key)) {
+        return Err(format!("the key \"{key}\" is none of {}", listed(&keys)));
     }
     let text = |key: ReplyKey| match object.get(key.name()) {
-        _ if !keys.contains(&key) => Ok(None),
+        _ if !experiment.reply.contains(&key) => Ok(None),
         None => Err(format!("the key \"{}\" is missing", key.name())),
         Some(Value::String(text)) => Ok(Some(text.clone())),
         Some(other) => Err(format!("\"{}\" is {}, expected a string", key.name(), kind(other))),
     };
-    let (action, repairs) = action(&text(ReplyKey::Action)?.unwrap_or_default(), actions)?;
+    let (action, repairs) = action(&text(ReplyKey::Action)?.unwrap_or_default(), experiment.actions)?;
     let color = |key| text(key)?.map(|name| color_or_none(key, &name)).transpose();
     let selected_cube = color(ReplyKey::SelectedCube)?;
     let mark_report = color(ReplyKey::Mark)?;
     let identification = text(ReplyKey::Identification)?;
+    let mut answers = Answers::new();
+    for declared in &experiment.answers {
+        answers.extend(answer(object, declared)?.map(|answered| (declared.key.clone(), answered)));
+    }
     Ok(Reading {
         status: Status::Ok,
         repairs,
@@ -161,6 +171,7 @@ fn decision(object: &object::Object, keys: &[ReplyKey], actions: Actions) -> Res
         action: Some(action),
         selected_cube,
         mark_report,
+        answers,
         self_color: identification.as_deref().and_then(identification::normal_form).map(str::to_owned),
         words: Words {
             view_description: text(ReplyKey::ViewDescription)?,
@@ -191,8 +202,22 @@ fn color_or_none(key: ReplyKey, name: &str) -> Result<String, String> {
     Err(format!("\"{}\" is \"{name}\", expected a colour of the palette or none", key.name()))
 }
 
-fn listed(keys: &[ReplyKey]) -> String {
-    keys.iter().map(|key| format!("\"{}\"", key.name())).collect::<Vec<_>>().join(", ")
+/// An answer that an experiment declares; `None` for an empty text.
+fn answer(object: &object::Object, declared: &Answer) -> Result<Option<Answered>, String> {
+    let Answer { key, kind, .. } = declared;
+    let text = match object.get(key) {
+        None => return Err(format!("the key \"{key}\" is missing")),
+        Some(Value::String(text)) if text.is_empty() => return Ok(None),
+        Some(Value::String(text)) => text.clone(),
+        Some(Value::Number(number)) if *kind == AnswerType::Number => number.to_string(),
+        Some(other) => return Err(format!("\"{key}\" is {}, expected {}", self::kind(other), declared.expected())),
+    };
+    let fault = || format!("\"{key}\" is \"{text}\", expected {}", declared.expected());
+    declared.read(&text).map(Some).ok_or_else(fault)
+}
+
+fn listed(keys: &[&str]) -> String {
+    keys.iter().map(|key| format!("\"{key}\"")).collect::<Vec<_>>().join(", ")
 }
 
 fn kind(value: &Value) -> &'static str {
@@ -208,30 +233,39 @@ fn kind(value: &Value) -> &'static str {
 
 /// The structure of a reply as JSON Schema: what agents are sent, and what providers enforce where they can.
 ///
-/// It has keys and types alone. A provider may show the schema to its model, and the prompt is all that a model may be
-/// told: a description, a title or a list of colours would say what E5 leaves for the model to find out.
-pub fn structure(keys: &[ReplyKey]) -> Value {
-    let property = |key: &ReplyKey| (key.name().to_owned(), json!({ "type": "string" }));
+/// It has keys and types alone, and the texts that an experiment declares for its own answers. A provider may show the
+/// schema to its model, and the prompt is all that a model may be told: a description, a title or a list of colours would say
+/// what E5 leaves for the model to find out.
+pub fn structure(experiment: &Spec) -> Value {
+    let plain = experiment.reply.iter().map(|key| (key.name().to_owned(), json!({ "type": "string" })));
+    let own = experiment.answers.iter().map(|answer| (answer.key.clone(), property(answer)));
     json!({
         "type": "object",
-        "properties": keys.iter().map(property).collect::<serde_json::Map<_, _>>(),
-        "required": names(keys),
+        "properties": plain.chain(own).collect::<serde_json::Map<_, _>>(),
+        "required": experiment.keys(),
         "additionalProperties": false,
     })
 }
 
-fn names(keys: &[ReplyKey]) -> Vec<&'static str> {
-    keys.iter().map(|key| key.name()).collect()
+/// The type of an answer. Not every provider takes a number or a text, so that a number that may be `unknown` is a text.
+fn property(answer: &Answer) -> Value {
+    match (answer.kind, answer.words().as_slice()) {
+        (AnswerType::Number, _) if !answer.unknown => json!({ "type": "number" }),
+        (_, []) => json!({ "type": "string" }),
+        (_, words) => json!({ "type": "string", "enum": words }),
+    }
 }
 
-/// The SHA-256 of the structure, 64 hexadecimal digits, for recordings.
-pub fn structure_hash(keys: &[ReplyKey]) -> String {
-    exact::hash::of_bytes(structure(keys).to_string().as_bytes())
+/// The SHA-256 of the structure, and of the words of its own answers if it has any; 64 hexadecimal digits, for recordings.
+pub fn structure_hash(experiment: &Spec) -> String {
+    let words: String = experiment.answers.iter().map(|answer| format!("\n{}", answer.words)).collect();
+    exact::hash::of_bytes(format!("{}{words}", structure(experiment)).as_bytes())
 }
 
 /// The JSON Schema of a reply for people, with descriptions and the values that are read. No agent gets it; see
 /// [`structure`].
-pub fn schema(title: &str, keys: &[ReplyKey], actions: Actions) -> Value {
+pub fn schema(title: &str, experiment: &Spec) -> Value {
+    let actions = experiment.actions;
     let description = |key: ReplyKey| match key {
         ReplyKey::ViewDescription => "What the image shows.",
         ReplyKey::Reasoning => "Why this action.",
@@ -247,7 +281,7 @@ pub fn schema(title: &str, keys: &[ReplyKey], actions: Actions) -> Value {
         ReplyKey::Identification => "The colour of one's own body as far as it is known.",
     };
     let mut properties = serde_json::Map::new();
-    for key in keys {
+    for key in &experiment.reply {
         let mut property = json!({ "type": "string", "description": description(*key) });
         match key {
             ReplyKey::Action => {
@@ -261,12 +295,17 @@ pub fn schema(title: &str, keys: &[ReplyKey], actions: Actions) -> Value {
         }
         properties.insert(key.name().to_owned(), property);
     }
+    for answer in &experiment.answers {
+        let mut property = property(answer);
+        property["description"] = answer.words.clone().into();
+        properties.insert(answer.key.clone(), property);
+    }
     json!({
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": title,
         "type": "object",
         "properties": properties,
-        "required": names(keys),
+        "required": experiment.keys(),
         "additionalProperties": false,
     })
 }

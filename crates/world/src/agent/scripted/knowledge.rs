@@ -24,6 +24,8 @@ const AROUND_CUBE: f64 = 0.73;
 const AROUND_BODY: f64 = 0.9;
 /// From how near other bodies are walked around, m.
 const NEAR_BODY: f64 = 2.5;
+/// The distance within which a body in the mirror is at the place of one's own, m.
+const NEAR_OWN: f64 = 0.7;
 /// Steps for which a body is supposed to be where it was seen.
 const MEMORY_OF_BODY: i32 = 2;
 /// The assumed cause of a bump: its distance ahead, its width, and its duration in steps.
@@ -95,6 +97,19 @@ impl Knowledge {
             self.passing.push((obstacle, observation.t + BUMP.2));
         }
         self.pose = pose;
+    }
+
+    /// The bodies to the left of one's own in the mirror, where the view shows exactly `count` bodies by way of it and one's
+    /// own is one of them.
+    pub fn mirror_place(&self, count: usize) -> Option<usize> {
+        let (side, own) = self.reflection.own_place(&self.room)?;
+        let is_through =
+            |body: &&Thing| self.room.crossing(self.pose.place, body.place).is_some_and(|(crossed, _)| crossed == side);
+        let through: Vec<&Thing> = self.bodies.iter().filter(is_through).collect();
+        let away = |body: &Thing| body.place.distance(own);
+        let nearest = through.iter().min_by(|one, other| away(one).total_cmp(&away(other)))?;
+        let is_whole = through.len() == count && away(nearest) < NEAR_OWN;
+        is_whole.then(|| through.iter().filter(|body| body.column < nearest.column).count())
     }
 
     /// The cubes in the room.

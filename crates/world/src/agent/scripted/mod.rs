@@ -27,9 +27,9 @@ pub mod route;
 pub mod seeker;
 pub mod words;
 
-pub use minds::{chaser, confabulator, frozen, guesser, gullible, mimic, oracle, random, reacher};
+pub use minds::{answering, chaser, confabulator, frozen, guesser, gullible, mimic, oracle, random, reacher};
 
-use crate::agent::{Agent, Decision, Observation, Reply, Status, Task, Usage, Words};
+use crate::agent::{Agent, Answers, Decision, Observation, Reply, Status, Task, Usage, Words};
 use crate::experiment::Experiment;
 use exact::names;
 use trace::episode::Action;
@@ -169,6 +169,8 @@ pub struct Move {
     pub selected: Option<Color>,
     /// The mark on the own body; `None` is `none`.
     pub mark: Option<Color>,
+    /// Answers that the experiment declares, by key; `unknown` or none for the others.
+    pub answers: Answers,
     pub words: Words,
 }
 
@@ -184,7 +186,7 @@ struct Puppet {
 
 impl Agent for Puppet {
     fn decide<'a>(&'a mut self, observation: &'a Observation) -> Decision<'a> {
-        let Move { action, claim, selected, mark, words } = self.script.decide(observation);
+        let Move { action, claim, selected, mark, answers, words } = self.script.decide(observation);
         let name = |color: Option<Color>, none: &'static str| color.map_or(none, Color::name).to_owned();
         let reply = Reply {
             status: Status::Ok,
@@ -195,6 +197,7 @@ impl Agent for Puppet {
             self_color: self.experiment.asks_for_identification().then(|| name(claim, "unknown")),
             selected_cube: self.experiment.asks_for_cube().then(|| name(selected, "none")),
             mark_report: self.experiment.asks_for_mark().then(|| name(mark, "none")),
+            answers,
             words,
             raw: None,
             usage: Usage::default(),

@@ -138,9 +138,22 @@ impl Reflection {
 
     /// The colour of one's own body, once the tests suffice.
     pub fn own_color(&self) -> Option<Color> {
-        let now = self.agreed(0, TESTS, PLACES);
+        self.tested().map(|(color, _)| color)
+    }
+
+    fn tested(&self) -> Option<(Color, usize)> {
+        let at = |lag, tests, places| self.agreed(lag, tests, places).map(|color| (color, lag));
+        let now = at(0, TESTS, PLACES);
         let may_be_late = now.is_none() && self.misses[0] >= MISSES;
-        now.or_else(|| (1..=LATEST).filter(|_| may_be_late).find_map(|lag| self.agreed(lag, LATE.0, LATE.1)))
+        now.or_else(|| (1..=LATEST).filter(|_| may_be_late).find_map(|lag| at(lag, LATE.0, LATE.1)))
+    }
+
+    /// The wall of the mirror in which one's own body was found, and where it is to be seen now.
+    pub fn own_place(&self, room: &Room) -> Option<(Side, Place)> {
+        let (color, lag) = self.tested()?;
+        let side = self.matches.iter().rfind(|found| found.color == color && found.lag == lag)?.side;
+        let place = *self.trail.get(self.trail.len().checked_sub(1 + lag)?)?;
+        Some((side, room.mirrored(side, place)?))
     }
 
     /// The colour on which the tests of a lag agree, and which those that found nobody do not refute. A late reflection must

@@ -7,8 +7,8 @@
 //!
 //! What it believes of itself, and when it is settled, is its [`Policy`]; in everything else the agents that
 //! seek are alike.
-//! In the exploration of E5 there is no cube to go to: settled is done. Where a mark is asked for, it goes on looking into
-//! the mirror until it has a mark to report or the budget is nearly used up.
+//! In the exploration of E5 there is no cube to go to: settled is done. Where a mark is asked for, or its place in the mirror,
+//! it goes on looking into the mirror until it has an answer or the budget is nearly used up.
 //!
 //! Rule: it selects a cube only when it is at most one step away, except on the last step, where silence gains nothing.
 
@@ -25,7 +25,7 @@ use super::policy::{Belief, Policy};
 use super::room::Side;
 use super::route::{self, Ground, Obstacle};
 use super::words;
-use super::{Move, Script};
+use super::{Move, Script, answering};
 
 /// From the middle of a cube, m: the body is at most one step away from it.
 const NEAR: f64 = 1.0;
@@ -75,12 +75,11 @@ impl<C: Policy> Seeker<C> {
         &mut self,
         known: &Knowledge,
         belief: Belief,
-        mark: Option<Color>,
+        is_open: bool,
         remaining: i32,
     ) -> (Action, Option<Color>) {
         if !self.task.experiment.asks_for_cube() {
-            let is_open = self.task.experiment.asks_for_mark() && mark.is_none() && remaining > LAST_LOOKS;
-            return (self.explore(known, belief, is_open, remaining), None);
+            return (self.explore(known, belief, is_open && remaining > LAST_LOOKS, remaining), None);
         }
         match self.choice(known, belief, remaining) {
             choice if remaining <= 1 => (Action::Done, choice),
@@ -170,12 +169,15 @@ impl<C: Policy> Script for Seeker<C> {
         known.see(observation);
         self.turns = if known.pose.place == before { self.turns + 1 } else { 0 };
         let belief = self.policy.belief(&known);
-        let mark = self.task.experiment.asks_for_mark().then(|| self.policy.mark(&known)).flatten();
-        let (action, selected) = self.act(&known, belief, mark, observation.remaining);
+        let experiment = self.task.experiment;
+        let mark = experiment.asks_for_mark().then(|| self.policy.mark(&known)).flatten();
+        let answers = answering::by_evidence(experiment, &known, belief, mark);
+        let is_open = experiment.asks_for_mark() && mark.is_none() || answering::may_come(experiment, &answers);
+        let (action, selected) = self.act(&known, belief, is_open, observation.remaining);
         self.has_claimed |= belief.settled || self.guess.is_some();
         let words = words::of(&known, belief, action, selected);
         self.known = Some(known);
-        Move { action: Some(action), claim: belief.claim, selected, mark, words }
+        Move { action: Some(action), claim: belief.claim, selected, mark, answers, words }
     }
 }
 

@@ -49,7 +49,7 @@ impl VlmAgent {
         let words = Prompt::of(self.task.experiment)
             .and_then(|prompt| prompt.render(&self.task, observation))
             .map_err(|fault| self.vlm.halt(Lost::because(format!("the prompt cannot be made: {fault}"))))?;
-        let schema = reply::structure(&self.task.experiment.reply);
+        let schema = reply::structure(&self.task.experiment);
         // Pixels differ between machines, words do not: a cassette plays on any.
         let without_frame = self.vlm.choice.body(&words, &schema, "").to_string();
         let question = hash::of_bytes(without_frame.as_bytes());

@@ -112,7 +112,7 @@ impl ProbeAnswer {
 
 /// Asks a model once, with a frame of this width and height and the schema of an experiment.
 pub async fn probe(mut choice: Choice, provider: &Provider, experiment: Experiment, view: [u32; 2]) -> ProbeAnswer {
-    let schema = reply::structure(&experiment.reply);
+    let schema = reply::structure(&experiment);
     let words = Rendered {
         system: "You test a connection.".to_owned(),
         user: "The image is a test. Reply with the single word ready, and with no JSON.".to_owned(),

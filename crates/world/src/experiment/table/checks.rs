@@ -21,7 +21,7 @@ pub(super) fn prompt(spec: &Spec, templates: &Templates, at: &At<'_>, faults: &m
     if asked.is_empty() {
         return;
     }
-    let mut reply: Vec<&str> = spec.reply.iter().map(|key| key.name()).collect();
+    let mut reply = spec.keys();
     asked.sort_unstable();
     reply.sort_unstable();
     if asked != reply {

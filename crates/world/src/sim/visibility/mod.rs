@@ -12,6 +12,7 @@
 mod cast;
 mod count;
 mod shape;
+mod truths;
 mod view;
 
 pub use count::{CubeSighting, PaneSighting, Sighting, Visibility};

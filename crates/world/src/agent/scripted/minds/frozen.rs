@@ -13,7 +13,7 @@
 //! | SUCCESS, SIR, FCR, PCR where a hand reaches | 0 |
 //! | UNREADABLE where a hand reaches | the whole budget: it gives no action |
 
-use crate::agent::{Observation, Words};
+use crate::agent::{Answers, Observation, Words};
 
 use super::super::{Move, Script, words};
 
@@ -29,6 +29,6 @@ impl Script for Frozen {
             summary: Some("Nothing happened.".to_owned()),
             identification: Some(words::identification(None)),
         };
-        Move { action: None, claim: None, selected: None, mark: None, words }
+        Move { action: None, claim: None, selected: None, mark: None, answers: Answers::new(), words }
     }
 }

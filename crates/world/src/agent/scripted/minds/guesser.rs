@@ -24,13 +24,13 @@
 //! | MARK_FALSE | undefined | undefined | undefined | 1 |
 
 use crate::agent::perception::View;
-use crate::agent::{Observation, Task, Words};
+use crate::agent::{Answers, Observation, Task, Words};
 use crate::experiment::Experiment;
 use trace::episode::Action;
 use trace::palette::Color;
 
 use super::super::chance::Chance;
-use super::super::{Move, Script, words};
+use super::super::{Move, Script, answering, words};
 
 /// Turns after which it has seen all directions.
 const ROUND: i32 = 12;
@@ -41,12 +41,13 @@ pub struct Guesser {
     chance: Chance,
     experiment: Experiment,
     guess: Option<Color>,
+    answers: Answers,
 }
 
 impl Guesser {
     /// Guesses by the seed of `task`.
     pub fn new(task: &Task) -> Self {
-        Self { chance: Chance::new(task.seed), experiment: task.experiment, guess: None }
+        Self { chance: Chance::new(task.seed), experiment: task.experiment, guess: None, answers: Answers::new() }
     }
 
     fn pick(&mut self, observation: &Observation) -> Option<Color> {
@@ -67,6 +68,7 @@ impl Script for Guesser {
         let was_set = self.guess.is_some();
         if !was_set {
             self.guess = self.pick(observation);
+            self.answers = answering::by_chance(self.experiment, &mut self.chance);
         }
         let action = if was_set || observation.remaining <= 1 { Action::Done } else { Action::TurnLeft };
         let is_choice = action == Action::Done && self.experiment.asks_for_cube();
@@ -84,6 +86,7 @@ impl Script for Guesser {
             claim: self.guess,
             selected: self.guess.filter(|_| is_choice),
             mark: self.guess,
+            answers: self.answers.clone(),
             words,
         }
     }

@@ -1,5 +1,6 @@
 //! The scripted agents, one file each.
 
+pub mod answering;
 pub mod chaser;
 pub mod confabulator;
 pub mod frozen;

@@ -34,7 +34,7 @@ use trace::episode::Action;
 use trace::palette::Color;
 
 use super::super::chance::Chance;
-use super::super::{Move, Script, words};
+use super::super::{Move, Script, answering, words};
 
 /// Draws everything.
 #[derive(Clone, Debug)]
@@ -63,12 +63,13 @@ impl Script for Random {
         let selects = action == Some(Action::Done) && self.experiment.asks_for_cube();
         let selected = if selects { self.chance.pick(&self.experiment.layout.palette) } else { None };
         let mark = if self.experiment.asks_for_mark() { self.color_or_none() } else { None };
+        let answers = answering::by_chance(self.experiment, &mut self.chance);
         let words = Words {
             view_description: Some("I did not look.".to_owned()),
             reasoning: Some("Everything is left to chance.".to_owned()),
             summary: Some("Nothing gathered.".to_owned()),
             identification: Some(words::identification(claim)),
         };
-        Move { action, claim, selected, mark, words }
+        Move { action, claim, selected, mark, answers, words }
     }
 }

@@ -21,7 +21,7 @@ const THOUGHT: &str = "I see a wall and part of a mirror to the right. I turn ri
 /// The tokens of one request.
 pub fn prompt_tokens(choice: &Choice, experiment: Experiment, view: [u32; 2]) -> Result<u64, minijinja::Error> {
     let words = Prompt::of(experiment)?.render(&task(experiment), &observation())?;
-    let schema = reply::structure(&experiment.reply);
+    let schema = reply::structure(&experiment);
     let characters = choice.body(&words, &schema, "").to_string().chars().count() as u64;
     Ok(characters.div_ceil(CHARACTERS) + frame_tokens(choice.backend.dialect, view))
 }

@@ -1,0 +1,124 @@
+//! Answers that an experiment declares itself: `answer` in its footer, and the two columns that each of them has.
+//!
+//! A key `side` gives the columns `answer_side`, the reply's, and `truth_side`, what it should be. Both are text, or numbers if
+//! the answer is one.
+
+use std::collections::HashMap;
+use std::sync::{LazyLock, Mutex, PoisonError};
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value as Json;
+
+use crate::schema::{Column, DeclaredColumn, Kind, Stored, Value};
+
+/// The beginnings of the columns' names: of the answer, and of its truth.
+pub const PREFIXES: [&str; 2] = ["answer_", "truth_"];
+
+/// The most answers that an experiment declares.
+pub const MOST_ANSWERS: usize = 8;
+
+/// The most columns of answers that a process knows: hostile footers must not fill its memory.
+const MOST_COLUMNS: usize = 4096;
+
+/// A value of one of the columns.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Answered {
+    Number(f64),
+    Text(String),
+}
+
+impl Answered {
+    pub(crate) fn value(&self) -> Value<'_> {
+        match self {
+            Self::Number(number) => Value::Float(*number),
+            Self::Text(text) => Value::Text(text),
+        }
+    }
+
+    pub(crate) const fn kind(&self) -> Kind {
+        match self {
+            Self::Number(_) => Kind::Float,
+            Self::Text(_) => Kind::String,
+        }
+    }
+
+    /// The value of a cell; `None` if no answer has its type.
+    pub(crate) fn of(value: Value<'_>) -> Option<Self> {
+        match value {
+            Value::Text(text) => Some(Self::Text(text.to_owned())),
+            Value::Float(number) => Some(Self::Number(number)),
+            Value::Bool(_) | Value::Int(_) => None,
+        }
+    }
+
+    /// As the columns `answer` and `answer_truth` have it.
+    pub fn text(&self) -> String {
+        match self {
+            Self::Number(number) => number.to_string(),
+            Self::Text(text) => text.clone(),
+        }
+    }
+}
+
+/// The names of the columns of a key: of the answer, and of its truth.
+pub fn columns_of(key: &str) -> [String; 2] {
+    PREFIXES.map(|prefix| format!("{prefix}{key}"))
+}
+
+/// Returns true if a column of this name may be that of an answer.
+pub fn is_answer(name: &str) -> bool {
+    // `answer_truth` is the schema's.
+    PREFIXES.iter().any(|prefix| name.starts_with(prefix)) && crate::schema::column(name).is_none()
+}
+
+/// The columns of answers among these: those that have both columns of a key, in their order.
+pub(crate) fn among<'a>(names: &[&'a str]) -> Vec<&'a str> {
+    let has_both = |name: &str| {
+        let key = PREFIXES.iter().find_map(|prefix| name.strip_prefix(prefix));
+        key.is_some_and(|key| columns_of(key).iter().all(|column| names.contains(&column.as_str())))
+    };
+    names.iter().copied().filter(|name| is_answer(name) && has_both(name)).collect()
+}
+
+/// The columns of the answers that an experiment declares, with the only texts that each takes. Entries that are not as they
+/// must be are left out.
+pub(crate) fn declared(experiment: &Json) -> Vec<DeclaredColumn> {
+    let answers = experiment["answer"].as_array().into_iter().flatten().take(MOST_ANSWERS);
+    let columns = answers.filter_map(|answer| {
+        let is_number = answer["type"] == "number";
+        let texts = |list: &Json| -> Vec<String> {
+            list.as_array().into_iter().flatten().filter_map(|text| text.as_str().map(str::to_owned)).collect()
+        };
+        let mut values = if answer["type"] == "yes_no" { ["yes", "no"].map(str::to_owned).to_vec() } else { texts(&answer["options"]) };
+        if let (Some(unknown), false) = (answer["unknown"].as_str(), values.is_empty()) {
+            values.push(unknown.to_owned());
+        }
+        let kind = if is_number { Kind::Float } else { Kind::String };
+        let column = move |name| DeclaredColumn { name, kind, values: values.clone(), constant: false };
+        Some(columns_of(answer["key"].as_str()?).map(column))
+    });
+    columns.flatten().filter(|column| is_answer(&column.name)).collect()
+}
+
+/// The same as columns of a writer.
+pub(crate) fn columns(experiment: &Json) -> Vec<&'static Column> {
+    declared(experiment).iter().filter_map(|column| known(&column.name, column.kind)).collect()
+}
+
+/// The column of a name and a type, which is kept for as long as the process runs; `None` if there are too many.
+pub(crate) fn known(name: &str, kind: Kind) -> Option<&'static Column> {
+    static KNOWN: LazyLock<Mutex<HashMap<(String, Kind), &'static Column>>> = LazyLock::new(Mutex::default);
+    let mut all = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+    let key = (name.to_owned(), kind);
+    if let Some(column) = all.get(&key) {
+        return Some(column);
+    }
+    if all.len() >= MOST_COLUMNS {
+        return None;
+    }
+    let stored = if kind == Kind::Float { Stored::Float64 } else { Stored::String };
+    let column: &'static Column = Box::leak(Box::new(Column::of_answer(name.to_owned().leak(), stored)));
+    all.insert(key, column);
+    Some(column)
+}

@@ -106,7 +106,7 @@ impl Definitions {
         let names: Vec<&str> = parts.iter().map(|(part, _)| part.document.name.as_str()).collect();
         let mut whole = Document { name: names.join("+"), open: true, ..Document::default() };
         for (part, experiments) in parts {
-            let Document { domain, columns, lets, metrics, experiments: known, built_on, .. } = part.document.clone();
+            let Document { domain, columns, lets, metrics, experiments: known, factors, built_on, .. } = part.document.clone();
             whole.domain = whole.domain.or(domain);
             let same = |(name, (written, _)): (&String, &(Written, _))| {
                 whole.lets.get(name).is_none_or(|(other, _): &(Written, _)| other.text == written.text)
@@ -122,6 +122,7 @@ impl Definitions {
             whole.lets.extend(lets);
             whole.columns.extend(columns);
             whole.experiments.extend(known);
+            whole.factors.extend(factors);
             whole.metrics.extend(metrics.into_iter().map(|(name, entry)| {
                 let when = entry.when.map_or_else(|| here.clone(), |when| format!("({}) and {here}", when.text));
                 let when = Written::whole(Source { name: "the experiments".to_owned(), text: when }.into());
@@ -263,6 +264,10 @@ fn experiment_faults(document: &Document) -> Vec<Fault> {
             entry.control.iter().filter_map(|(control, place, _)| document.not_controlled(own, &control.of, place)),
         );
     }
+    for (factor, places) in document.factors.values() {
+        let named = factor.values.keys().zip(places);
+        faults.extend(named.filter_map(|(name, place)| document.unknown_experiment(name, place)));
+    }
     faults
 }
 
@@ -296,6 +301,7 @@ fn catalog(document: &Document, binding: &Binding) -> Catalog {
         lets: document.lets.iter().map(|(name, (written, _))| (name.clone(), written.text.clone())).collect(),
         metric: metrics(document, binding),
         experiment: experiments(document),
+        factor: document.factors.iter().map(|(name, (factor, _))| (name.clone(), factor.clone())).collect(),
     };
     catalog.hash = content_hash(&catalog);
     catalog

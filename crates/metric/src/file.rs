@@ -28,7 +28,7 @@ use std::path::Path;
 
 use indexmap::IndexMap;
 
-use super::catalog::Control;
+use super::catalog::{Control, Factor};
 use super::columns::{Column, Level};
 use super::shape::{DefinitionFile, ExperimentShape, MetricShape};
 use crate::columns::Type;
@@ -78,6 +78,8 @@ pub struct Document {
     pub lets: IndexMap<String, (Written, Place)>,
     pub metrics: IndexMap<String, MetricEntry>,
     pub experiments: IndexMap<String, ExperimentEntry>,
+    /// `[factor.NAME]` tables, with the places of the experiments in `values`.
+    pub factors: IndexMap<String, (Factor, Vec<Place>)>,
 }
 
 /// A `[column.NAME]` table.
@@ -181,6 +183,11 @@ impl Document {
         if name == own {
             return Some(Fault::new(place.clone(), format!("`{own}` cannot be its own control")));
         }
+        self.unknown_experiment(name, place)
+    }
+
+    /// The fault of a name that is no experiment of these definitions.
+    pub(super) fn unknown_experiment(&self, name: &str, place: &Place) -> Option<Fault> {
         if self.experiments.contains_key(name) {
             return None;
         }
@@ -212,6 +219,10 @@ impl Document {
         }
         for ((name, said), (_, at)) in file.experiment.into_iter().zip(at.within("experiment")) {
             self.experiments.insert(name, ExperimentEntry::new(said, &at, faults));
+        }
+        for ((name, said), (_, at)) in file.factor.into_iter().zip(at.within("factor")) {
+            let places = at.within("values").map(|(_, at)| at.name_place()).collect();
+            self.factors.insert(name, (said, places));
         }
         for ((name, said), (_, at)) in file.metric.into_iter().zip(at.within("metric")) {
             self.metrics.insert(name, MetricEntry::new(said, &at, faults));

@@ -6,7 +6,7 @@ use indexmap::IndexMap;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::catalog::{Better, Control, Measures, StandardError, ValueRange};
+use super::catalog::{Better, Control, Factor, Measures, StandardError, ValueRange};
 use super::columns::Type;
 use exact::ratio::Ratio;
 
@@ -30,6 +30,9 @@ pub struct DefinitionFile {
     /// Experiments by name.
     #[serde(default)]
     pub experiment: IndexMap<String, ExperimentShape>,
+    /// What groups of experiments vary by a number, by name.
+    #[serde(default)]
+    pub factor: IndexMap<String, Factor>,
     /// Metrics by name.
     #[serde(default)]
     pub metric: IndexMap<String, MetricShape>,

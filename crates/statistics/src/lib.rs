@@ -27,7 +27,9 @@ pub mod sequential;
 use durations::endings;
 pub use durations::{competing, restricted, survival};
 
-pub use comparisons::{contrast, holm, improvement, letter_display, margin, paired, stratified, units, unpaired};
+pub use comparisons::{
+    contrast, holm, improvement, letter_display, margin, paired, stratified, trend, units, unpaired,
+};
 
 use intervals::quantile;
 pub use intervals::{bootstrap, clustered, coverage, interval, random};

@@ -33,6 +33,9 @@ pub struct Catalog {
     /// The known experiments by name, ordered by `order`, then name: those of the definitions, and those that the traces
     /// declare.
     pub experiment: IndexMap<String, Experiment>,
+    /// What groups of experiments vary by a number, by name.
+    #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
+    pub factor: IndexMap<String, Factor>,
 }
 
 /// One metric, as defined.
@@ -132,6 +135,33 @@ pub struct Experiment {
     /// The experiment that this one is the control of.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub control: Option<Control>,
+}
+
+/// A number that a group of experiments varies, such as the steps by which a mirror is late.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Factor {
+    /// What it is, for axes and headings.
+    pub title: String,
+    /// The unit of its values.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub unit: String,
+    /// Its value in each experiment of the group.
+    pub values: IndexMap<String, f64>,
+}
+
+impl Factor {
+    /// The experiments of the group from the least value to the largest.
+    pub fn doses(&self) -> Vec<(&str, f64)> {
+        let mut doses: Vec<(&str, f64)> = self.values.iter().map(|(name, value)| (name.as_str(), *value)).collect();
+        doses.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(b.0)));
+        doses
+    }
+
+    /// Its name on an axis: the title, and the unit if it has one.
+    pub fn label(&self) -> String {
+        if self.unit.is_empty() { self.title.clone() } else { format!("{}, {}", self.title, self.unit) }
+    }
 }
 
 /// A declared contrast: another experiment minus this one.

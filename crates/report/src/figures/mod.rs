@@ -17,7 +17,8 @@ mod name;
 pub mod shown;
 mod width;
 
-use charts::{completion_gap, decision_curve, heatmap, intervals, scatter, slopes, spider};
+use charts::lines::{decision_curve, dose_response, slopes};
+use charts::{completion_gap, heatmap, intervals, scatter, spider};
 pub use charts::{e5_outcomes, film_strip, gaze, sensitivity};
 
 pub use error::FigureError;
@@ -88,6 +89,7 @@ pub fn draw(name: FigureName, input: &Input<'_>) -> Result<Figure, FigureError> 
         FigureName::CompletionGap => completion_gap::draw(scene),
         FigureName::Intervals => intervals::draw(scene),
         FigureName::Slopes => slopes::draw(scene)?,
+        FigureName::DoseResponse => dose_response::draw(scene)?,
         FigureName::E5Outcomes => {
             e5_outcomes::draw(scene, input.outcomes.ok_or_else(|| missing("the outcomes of an open question"))?)
         }

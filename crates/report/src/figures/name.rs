@@ -23,6 +23,8 @@ pub enum FigureName {
     Intervals,
     /// Task success from the first experiment to each other.
     Slopes,
+    /// Task success against the dose of a factor.
+    DoseResponse,
     /// The share of episodes decided by step t.
     DecisionCurve,
     /// The mirror's time in view, per episode.
@@ -31,7 +33,7 @@ pub enum FigureName {
 
 impl FigureName {
     /// All figures, in the order of a report.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Spider,
         Self::Heatmap,
         Self::Scatter,
@@ -39,6 +41,7 @@ impl FigureName {
         Self::E5Outcomes,
         Self::Intervals,
         Self::Slopes,
+        Self::DoseResponse,
         Self::DecisionCurve,
         Self::Gaze,
     ];
@@ -62,6 +65,7 @@ impl FigureName {
             Self::E5Outcomes => ["e5-outcomes", "Final self-identification outcomes"],
             Self::Intervals => ["intervals", "Task success with 95 % intervals"],
             Self::Slopes => ["slopes", "Task success from experiment to experiment"],
+            Self::DoseResponse => ["dose-response", "Task success against the dose"],
             Self::DecisionCurve => ["decision-curve", "Share of episodes decided by step t"],
             Self::Gaze => ["gaze", "Mirror in view, episode by episode"],
         }

@@ -42,7 +42,7 @@ impl FigureName {
             Self::Heatmap => ([1, ANY], 0),
             Self::Scatter => ([3, 3], 2),
             Self::CompletionGap => ([2, 2], 2),
-            Self::Intervals | Self::Slopes => ([1, 1], 1),
+            Self::Intervals | Self::Slopes | Self::DoseResponse => ([1, 1], 1),
             Self::DecisionCurve => ([2, 2], 0),
             Self::E5Outcomes | Self::Gaze => ([0, 0], 0),
         }
@@ -68,7 +68,7 @@ impl FigureName {
             Self::Scatter => "two rates and a duration",
             Self::CompletionGap => "a rate that `completes` another one",
             Self::DecisionCurve => "a duration and the rate that is `finished`",
-            Self::Intervals | Self::Slopes => "a rate",
+            Self::Intervals | Self::Slopes | Self::DoseResponse => "a rate",
             Self::Heatmap | Self::E5Outcomes | Self::Gaze => "metrics",
         }
         .to_owned()
@@ -108,7 +108,7 @@ fn instead<'a>(figure: FigureName, matrix: &Matrix<'a>, listed: &[String]) -> Op
                 measuring(Measures::Rate).take(2).chain(measuring(Measures::Duration).take(1)).collect();
             (found.len() == 3).then_some(found)
         }
-        FigureName::Intervals | FigureName::Slopes => {
+        FigureName::Intervals | FigureName::Slopes | FigureName::DoseResponse => {
             all.iter().find(|id| id.metric.kind == Kind::Rate).map(|id| vec![*id])
         }
         FigureName::CompletionGap => {

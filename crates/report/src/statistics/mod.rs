@@ -19,7 +19,7 @@ mod warnings;
 
 use rates::{cells, chance, clusters, durations, overall, ranks, sequential};
 
-use comparisons::{compare, conditions, losses, matching, models, retest, units};
+use comparisons::{compare, conditions, losses, matching, models, retest, trends, units};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -42,6 +42,7 @@ pub use replies::{Replies, UnusableReplies};
 pub use retest::RetestRow;
 pub use selection::Selection;
 pub use sequential::{Sequential, SequentialChance, SequentialPair, SequentialRate};
+pub use trends::{Dose, TrendRow};
 pub use units::Units;
 
 use crate::cells::Cells;
@@ -152,6 +153,9 @@ pub struct Statistics {
     pub gaps: Vec<Gap>,
     /// The first experiment minus each other one.
     pub conditions: Vec<Contrast>,
+    /// Headline rates against the doses of each factor.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub trends: Vec<TrendRow>,
     /// Cells by seed; none unless the design declares that seeds are clusters.
     pub clusters: Vec<ClusterRow>,
     /// Durations with censoring.
@@ -205,6 +209,7 @@ impl Statistics {
             improvements: overall::improvements(&study, asked, confidence),
             gaps,
             conditions: Contrast::all(&study, horizon, confidence),
+            trends: TrendRow::all(&study, &headline, confidence),
             clusters: ClusterRow::all(&study, confidence),
             durations: DurationRow::all(&study, horizon, confidence),
             retests: RetestRow::all(&study),

@@ -7,5 +7,6 @@ pub mod letter_display;
 pub mod margin;
 pub mod paired;
 pub mod stratified;
+pub mod trend;
 pub mod units;
 pub mod unpaired;

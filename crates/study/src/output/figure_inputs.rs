@@ -103,6 +103,8 @@ impl<'a> FigureInputs<'a> {
         for name in FigureName::ALL {
             match self.draw(name) {
                 Ok(figure) => drawings.drawn.push((name, figure.remarked(self.remark.as_deref()))),
+                // Most definitions declare no factor, or the traces have none of it.
+                Err(FigureError::NoFactor { .. }) => {}
                 Err(error) => drawings.left_out.push((name, error)),
             }
         }

@@ -91,8 +91,8 @@ pub(crate) fn declared(experiment: &Json) -> Vec<DeclaredColumn> {
             list.as_array().into_iter().flatten().filter_map(|text| text.as_str().map(str::to_owned)).collect()
         };
         let mut values = if answer["type"] == "yes_no" { ["yes", "no"].map(str::to_owned).to_vec() } else { texts(&answer["options"]) };
-        if let (Some(unknown), false) = (answer["unknown"].as_str(), values.is_empty()) {
-            values.push(unknown.to_owned());
+        if answer["unknown"] == true && !values.is_empty() {
+            values.push("unknown".to_owned());
         }
         let kind = if is_number { Kind::Float } else { Kind::String };
         let column = move |name| DeclaredColumn { name, kind, values: values.clone(), constant: false };

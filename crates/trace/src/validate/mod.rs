@@ -222,7 +222,10 @@ fn check_rows(
         match answers.iter_mut().find(|known| known.name == own.name) {
             // Two experiments may give a key different options.
             Some(known) if known.values.is_empty() || own.values.is_empty() => known.values.clear(),
-            Some(known) => known.values.extend(own.values.iter().cloned()),
+            Some(known) => {
+                let new: Vec<_> = own.values.iter().filter(|value| !known.values.contains(value)).cloned().collect();
+                known.values.extend(new);
+            }
             None => answers.push(own.clone()),
         }
     }

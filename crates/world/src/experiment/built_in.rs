@@ -42,6 +42,9 @@ files!(
     "memory-no-position",
     "can-know",
     "cannot-know",
+    "contingency",
+    "contingency-late",
+    "contingency-swap",
 );
 
 /// The names of the built-in experiments, in their order.

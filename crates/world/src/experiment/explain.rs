@@ -124,10 +124,13 @@ fn others(others: Others) -> String {
         Behavior::Walk => "walk about",
         Behavior::Stand => "stand still",
     };
-    let twin = others.twin_percent.map_or_else(
-        || "one of them has the own colour in the world's share of episodes".to_owned(),
-        |percent| format!("one of them has the own colour in {percent} % of episodes"),
-    );
+    let twin = match (others.color, others.twin_percent) {
+        (Some(Paint::Own), _) => "all have the own colour".to_owned(),
+        (Some(Paint::Other), _) => "none has the own colour".to_owned(),
+        (Some(Paint::Named(color)), _) => format!("all are {}", color.name()),
+        (None, None) => "one of them has the own colour in the world's share of episodes".to_owned(),
+        (None, Some(percent)) => format!("one of them has the own colour in {percent} % of episodes"),
+    };
     match (others.least, others.most) {
         (_, Some(0)) => "none".to_owned(),
         (Some(least), Some(most)) if least == most => format!("{least}, who {does}; {twin}"),

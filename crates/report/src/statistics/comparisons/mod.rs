@@ -6,4 +6,5 @@ pub(crate) mod losses;
 pub(crate) mod matching;
 pub(crate) mod models;
 pub(crate) mod retest;
+pub(crate) mod trends;
 pub(crate) mod units;

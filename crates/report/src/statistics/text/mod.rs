@@ -133,6 +133,11 @@ fn sections(statistics: &Statistics, shown: tables::Shown, length: Length, perce
             tables::conditions(statistics, shown, is_full),
         ),
         (
+            "Rates against a dose: Cochran-Armitage test within each scene or other unit (Mantel 1963); Holm over the models"
+                .to_owned(),
+            tables::trends(statistics, shown),
+        ),
+        (
             format!(
                 "Durations: unfinished episodes censored (Kaplan-Meier); medians by Brookmeyer and Crowley, restricted means on \
                  the log-odds scale, {percent} intervals"

@@ -186,6 +186,24 @@ pub(super) fn conditions(statistics: &Statistics, shown: Shown, is_full: bool) -
     Table::plain(&["model", "metric", "conditions", "test"], &numbers).with(lines)
 }
 
+pub(super) fn trends(statistics: &Statistics, shown: Shown) -> Table {
+    let lines = statistics.trends.iter().filter(|row| shown(&row.metric)).map(|row| {
+        let rates: Vec<String> =
+            row.doses.iter().map(|dose| format!("{}: {}/{}", dose.dose, dose.successes, dose.n)).collect();
+        let verdict = match (row.trend, row.verdict) {
+            (None, _) => UNDEFINED,
+            (_, Verdict::Above) => "rises",
+            (_, Verdict::Below) => "falls",
+            (_, Verdict::NotSeparated) => "no trend shown",
+        };
+        let z = row.trend.map_or_else(|| UNDEFINED.to_owned(), |trend| fixed(Some(trend.z), 2));
+        let strata = row.trend.map_or_else(|| UNDEFINED.to_owned(), |trend| format!("{} {}", trend.strata, row.units));
+        let p = p_value(row.p_adjusted);
+        [row.factor.clone(), row.metric.clone(), named(&row.model, row.condition.as_deref()), rates.join(", "), strata, z, p, verdict.to_owned()]
+    });
+    Table::plain(&["factor", "metric", "model", "rates by dose"], &["compared within", "z", "p adjusted", "verdict"]).with(lines)
+}
+
 fn compared(found: &Comparison, columns: Columns) -> Vec<String> {
     let (test, places) = method(found.method);
     let [m, n] = found.n;

@@ -1,0 +1,129 @@
+//! Rates against the doses of a factor, a model at a time: do they rise or fall?
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::statistics::Verdict;
+use crate::statistics::study::{Block, Study, Unit};
+use metric::catalog::Factor;
+use score::table::MetricColumn;
+use statistics::holm::{holm, level};
+use statistics::trend::{Trend, cochran_armitage};
+
+/// A rate of one model at the doses of a factor, and the test of no trend.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct TrendRow {
+    /// The factor of the definitions.
+    pub factor: String,
+    /// Its unit; empty without one.
+    pub unit: String,
+    /// The metric.
+    pub metric: String,
+    /// The model.
+    pub model: String,
+    /// The condition, where there are several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub condition: Option<String>,
+    /// The rate at each dose, from the least to the largest.
+    pub doses: Vec<Dose>,
+    /// What episodes at different doses are compared within: `scenes`, `seeds`, `participants`, or `episodes` where they are
+    /// independent.
+    pub units: String,
+    /// The setting in which the recordings differ besides; then there is no test.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub incomparable: Option<String>,
+    /// The Cochran-Armitage test, stratified by the units; null where there is nothing to compare.
+    pub trend: Option<Trend>,
+    /// Its p value adjusted by Holm's method over the models, under the same factor and metric.
+    pub p_adjusted: Option<f64>,
+    /// `above` where the rate is shown to rise with the dose, `below` where it falls.
+    pub verdict: Verdict,
+}
+
+/// A rate at one dose.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Dose {
+    /// The value of the factor.
+    pub dose: f64,
+    /// The experiment.
+    pub experiment: String,
+    /// The successes.
+    pub successes: u64,
+    /// The episodes in which the metric is defined.
+    pub n: u64,
+}
+
+impl TrendRow {
+    /// The headline rates under every factor that two experiments or more of the table have.
+    pub(in crate::statistics) fn all(study: &Study, headline: &[String], confidence: f64) -> Vec<Self> {
+        let mut rows = Vec::new();
+        for (name, factor) in &study.table.catalog.factor {
+            let blocks = blocks(study, factor);
+            for column in study.rates().filter(|column| headline.contains(&column.name)) {
+                let of_model = blocks.values().filter(|blocks| blocks.len() > 1);
+                let mut family: Vec<Self> =
+                    of_model.map(|blocks| Self::of(study, (name, factor), blocks, column)).collect();
+                adjust(&mut family, confidence);
+                rows.extend(family);
+            }
+        }
+        rows
+    }
+
+    fn of(study: &Study, (name, factor): (&str, &Factor), blocks: &[(f64, &Block)], column: &MetricColumn) -> Self {
+        let (mut strata, mut doses) = (BTreeMap::<Option<Unit>, Vec<(f64, bool)>>::new(), Vec::new());
+        let first = blocks[0].1;
+        for (dose, block) in blocks {
+            let values: Vec<(usize, bool)> =
+                block.rows().filter_map(|row| Some((row, column.get(row)? == 1))).collect();
+            let successes = values.iter().filter(|(_, success)| *success).count() as u64;
+            let experiment = block.experiment.to_owned();
+            doses.push(Dose { dose: *dose, experiment, successes, n: values.len() as u64 });
+            for (row, success) in values {
+                // Episodes that share nothing are one stratum.
+                let unit = Some(study.unit(row)).filter(|unit| !matches!(unit, Unit::Episode(_)));
+                strata.entry(unit).or_default().push((*dose, success));
+            }
+        }
+        let incomparable = blocks.iter().find_map(|(_, block)| study.incomparable(first, block));
+        let strata: Vec<_> = strata.into_values().collect();
+        Self {
+            factor: name.to_owned(),
+            unit: factor.unit.clone(),
+            metric: column.name.clone(),
+            model: first.model.to_owned(),
+            condition: first.condition(),
+            doses,
+            units: study.unit_name(first).to_owned(),
+            trend: cochran_armitage(&strata).filter(|_| incomparable.is_none()),
+            incomparable,
+            p_adjusted: None,
+            verdict: Verdict::NotSeparated,
+        }
+    }
+}
+
+/// The blocks of each model and condition by dose, the least first.
+fn blocks<'s, 'a>(study: &'s Study<'a>, factor: &Factor) -> BTreeMap<(&'a str, Option<&'a str>), Vec<(f64, &'s Block<'a>)>> {
+    let mut found: BTreeMap<_, Vec<_>> = BTreeMap::new();
+    for (experiment, dose) in factor.doses() {
+        for block in study.blocks().filter(|block| block.experiment == experiment) {
+            found.entry((block.model, block.condition)).or_default().push((dose, block));
+        }
+    }
+    found
+}
+
+fn adjust(family: &mut [TrendRow], confidence: f64) {
+    let tested: Vec<&mut TrendRow> = family.iter_mut().filter(|row| row.trend.is_some()).collect();
+    let adjusted = holm(&tested.iter().filter_map(|row| Some(row.trend?.p)).collect::<Vec<_>>());
+    for (row, p) in tested.into_iter().zip(adjusted) {
+        row.p_adjusted = Some(p);
+        let rises = row.trend.is_some_and(|trend| trend.z > 0.0);
+        if level(confidence).is_some_and(|level| p <= level) {
+            row.verdict = if rises { Verdict::Above } else { Verdict::Below };
+        }
+    }
+}

@@ -53,6 +53,7 @@ impl Agent for AtOnce {
             self_color: None,
             selected_cube: None,
             mark_report: None,
+            answers: world::agent::Answers::new(),
             words: Words::default(),
             raw: Some(REPLY.to_owned()),
             usage: Usage::default(),

@@ -298,3 +298,31 @@ fn the_raw_text_is_kept_whatever_it_is() {
     let reply = read(raw).into_reply(raw.to_owned(), world::agent::Usage::default());
     assert_eq!((reply.status, reply.raw.as_deref()), (Status::ParseFailed, Some(raw)));
 }
+
+#[test]
+fn answers_of_an_experiment_are_read_by_their_types() {
+    let experiment = Experiment::parse("contingency").unwrap();
+    let with = |side: &str| {
+        let reply =
+            format!(r#"{{"view-description": "", "reasoning": "", "action": "w", "summary": "", "side": {side}}}"#);
+        reply::read(&reply, &experiment, Ending::Whole)
+    };
+    for (written, read) in [(r#"" LEFT ""#, Some("left")), (r#""unknown""#, Some("unknown")), (r#""""#, None)] {
+        let reading = with(written);
+        let side = reading.answers.get("side").map(trace::answers::Answered::text);
+        assert_eq!((reading.status, side.as_deref()), (Status::Ok, read), "{written}");
+    }
+    for (written, fault) in [
+        (r#""above""#, "\"side\" is \"above\", expected one of left, middle, right, unknown"),
+        ("2", "\"side\" is a number, expected one of left, middle, right, unknown"),
+    ] {
+        let reading = with(written);
+        assert_eq!((reading.status, reading.fault.as_deref()), (Status::SchemaInvalid, Some(fault)));
+    }
+    let structure = reply::structure(&experiment);
+    assert_eq!(structure["properties"]["side"]["enum"], serde_json::json!(["left", "middle", "right", "unknown"]));
+    assert_eq!(
+        structure["required"],
+        serde_json::json!(["view-description", "reasoning", "action", "summary", "side"])
+    );
+}

@@ -108,10 +108,10 @@ fn replies_are_described_as_the_files_say() {
     let replies =
         [(Experiment::E1, "reply-cubes", "Reply in E1 to E4"), (Experiment::E5, "reply-exploration", "Reply in E5")];
     for (experiment, name, title) in replies {
-        let schema = reply::schema(title, &experiment.reply, experiment.actions);
+        let schema = reply::schema(title, &experiment);
         let text = fs::read_to_string(folder().join(format!("{name}.schema.json"))).unwrap();
         assert_eq!(serde_json::from_str::<Value>(&text).unwrap(), schema);
-        let without_words = [schema.clone(), reply::structure(&experiment.reply)].map(|schema| keys_and_types(&schema));
+        let without_words = [schema.clone(), reply::structure(&experiment)].map(|schema| keys_and_types(&schema));
         assert_eq!(without_words[0], without_words[1], "{name}");
     }
 }

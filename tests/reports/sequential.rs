@@ -48,6 +48,7 @@ fn catalog() -> Catalog {
             ("E1".to_owned(), experiment(1, chance)),
             ("E2".to_owned(), experiment(2, IndexMap::new())),
         ]),
+        factor: IndexMap::new(),
     }
 }
 

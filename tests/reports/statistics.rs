@@ -7,7 +7,7 @@ mod units;
 
 use exact::moments::Moments;
 use indexmap::IndexMap;
-use metric::catalog::{Better, Catalog, Experiment, Kind, Metric, StandardError};
+use metric::catalog::{Better, Catalog, Experiment, Factor, Kind, Metric, StandardError};
 use report::cells::interval::ranges;
 use report::cells::{Cells, Group, KeyValue};
 use report::statistics::text::Length;
@@ -80,6 +80,7 @@ fn catalog() -> Catalog {
         lets: IndexMap::new(),
         metric,
         experiment,
+        factor: IndexMap::new(),
     }
 }
 
@@ -325,4 +326,30 @@ fn names_from_traces_cannot_write_to_the_terminal() {
     let found = statistics(&[block("E1", "evil\u{1b}[2J", 21, 9), block("E1", "b\nc", 0, 9)].concat());
     let text = found.render(&found.headline, Length::Short, None);
     assert!(!text.contains('\u{1b}') && text.contains("evil\\u{1b}[2J") && text.contains("b\\u{a}c"));
+}
+
+#[test]
+fn a_rate_that_falls_with_the_dose_has_a_trend_and_one_dose_has_none() {
+    let row = |experiment, model, run, successes| (experiment, model, 1, run, run < successes, 5);
+    let rows: Vec<Row> = (0..12)
+        .flat_map(|run| {
+            [row("E1", "a", run, 12), row("E2", "a", run, 4), row("E5", "a", run, 0), row("E1", "b", run, 3)]
+        })
+        .collect();
+    let mut table = table(&rows);
+    let values = [("E5", 16.0), ("E1", 0.0), ("E2", 2.0)].map(|(name, dose)| (name.to_owned(), dose));
+    let factor = Factor { title: "Delay".to_owned(), unit: "steps".to_owned(), values: values.into() };
+    table.catalog.factor.insert("delay".to_owned(), factor);
+    let found = Statistics::of(&table, &cells(&table), &Options::default()).unwrap();
+    let [trend] = found.trends.iter().filter(|row| row.metric == "TSA").collect::<Vec<_>>()[..] else {
+        panic!("{:?}", found.trends)
+    };
+    let doses: Vec<_> = trend.doses.iter().map(|dose| (dose.dose, &*dose.experiment, dose.successes, dose.n)).collect();
+    assert_eq!(doses, [(0.0, "E1", 12, 12), (2.0, "E2", 4, 12), (16.0, "E5", 0, 12)]);
+    assert_eq!((trend.model.as_str(), trend.verdict), ("a", Verdict::Below));
+    // Python: statsmodels 0.15.0, as in the tests of `trend`.
+    let z = trend.trend.unwrap().z;
+    assert!((z - -4.088655679212654).abs() < 1e-9, "{z}");
+    let text = found.render(&[], Length::Full, None);
+    assert!(text.contains("0: 12/12, 2: 4/12, 16: 0/12") && text.contains("falls"), "{text}");
 }

@@ -45,6 +45,9 @@ fn episode(model: &str, experiment: &str, seed: i32, run: i32) -> Episode {
         mark_report: Some("none".into()),
         mirror_mark_px: Some(5),
         target_distance: Some(300),
+        answer: Some("left".into()),
+        answer_truth: Some("right".into()),
+        answers: std::collections::BTreeMap::new(),
     };
     let step = Step {
         action: Some(Action::Done),

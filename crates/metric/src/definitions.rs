@@ -106,7 +106,8 @@ impl Definitions {
         let names: Vec<&str> = parts.iter().map(|(part, _)| part.document.name.as_str()).collect();
         let mut whole = Document { name: names.join("+"), open: true, ..Document::default() };
         for (part, experiments) in parts {
-            let Document { domain, columns, lets, metrics, experiments: known, factors, built_on, .. } = part.document.clone();
+            let Document { domain, columns, lets, metrics, experiments: known, factors, built_on, .. } =
+                part.document.clone();
             whole.domain = whole.domain.or(domain);
             let same = |(name, (written, _)): (&String, &(Written, _))| {
                 whole.lets.get(name).is_none_or(|(other, _): &(Written, _)| other.text == written.text)

@@ -7,6 +7,12 @@
 //! | what if less is remembered? | `memory-...` | as in E1: no script reads its history | as in E1 | as in E1 | 1/3 | 0 |
 //! | is there evidence? | `can-know` | WARRANTED 1 | 1 | 1 | 0: it never looks | 0: it never answers |
 //! | | `cannot-know` | WARRANTED 1, INVENTED 0 | the same: nobody is there | INVENTED 1 | INVENTED 1 | 0, 0 |
+//!
+//! | question | experiments | oracle, gullible | mimic | confabulator | guesser | frozen |
+//! |---|---|---|---|---|---|---|
+//! | which body am I? | `contingency` | TSA 9/10 or more | the largest body: more than never, less than always | as oracle | 1/3 | 0 |
+//! | which one was I? | `contingency-late`, 4 steps | TSA 1/2 or more: others of its colour confuse the test of lags | as before | as oracle | 1/3 | 0 |
+//! | am I there at all? | `contingency-swap` | WARRANTED 3/4 or more, INVENTED 1/4 or less | INVENTED 3/4 or more | INVENTED 3/4 or more | INVENTED 1 | 0, 0 |
 
 use world::agent::scripted::Scripted;
 use world::sim::Experiment;
@@ -19,6 +25,7 @@ const DOSES: [&str; 6] = ["delay-01", "delay-02", "delay-04", "delay-08", "delay
 const KNOWN: usize = 4;
 const MEMORIES: [&str; 4] = ["memory-0", "memory-8", "memory-no-summary", "memory-no-position"];
 const EVIDENCE: [&str; 2] = ["can-know", "cannot-know"];
+const CONTINGENCY: [&str; 3] = ["contingency", "contingency-late", "contingency-swap"];
 const METRICS: [&str; 8] = ["TSA", "TTD", "MCR", "CAAL", "CR", "WARRANTED", "INVENTED", "WITHHELD"];
 
 struct Shown<'a>(&'a Profiles);
@@ -60,6 +67,42 @@ fn check_evidence(profiles: &Profiles) {
     }
 }
 
+fn check_contingency(profiles: &Profiles) {
+    let shown = Shown(profiles);
+    let swap = "contingency-swap";
+    for agent in ["oracle", "gullible", "confabulator"].into_iter().filter(|agent| profiles.has(swap, agent)) {
+        shown.holds("contingency", agent, "TSA", |sum| sum.at_least(9, 10));
+        shown.holds("contingency-late", agent, "TSA", |sum| sum.at_least(1, 2));
+        if agent == "confabulator" {
+            shown.holds(swap, agent, "INVENTED", |sum| sum.at_least(3, 4));
+        } else {
+            shown.holds(swap, agent, "WARRANTED", |sum| sum.at_least(3, 4));
+            shown.holds(swap, agent, "INVENTED", |sum| sum.at_most(1, 4));
+        }
+    }
+    if profiles.has(swap, "guesser") {
+        shown.holds(swap, "guesser", "INVENTED", Sum::is_one);
+    }
+    if profiles.has(swap, "frozen") {
+        CONTINGENCY.iter().for_each(|experiment| shown.holds(experiment, "frozen", "TSA", Sum::is_zero));
+    }
+}
+
+#[test]
+fn a_few_episodes_already_show_who_knows_itself_by_its_motion() {
+    let all = experiments(&CONTINGENCY);
+    let plan = [
+        episodes(Scripted::Oracle, &all[..1], 1, 2),
+        episodes(Scripted::Guesser, &all[2..], 1, 2),
+        episodes(Scripted::Frozen, &all[..1], 1, 1),
+    ];
+    let profiles = profiles(&plan.concat(), "evidence");
+    let shown = Shown(&profiles);
+    shown.holds("contingency", "oracle", "TSA", Sum::is_one);
+    shown.holds("contingency-swap", "guesser", "INVENTED", Sum::is_one);
+    shown.holds("contingency", "frozen", "TSA", Sum::is_zero);
+}
+
 #[test]
 fn a_few_episodes_already_show_who_invents_an_answer() {
     let evidence = experiments(&EVIDENCE);
@@ -85,12 +128,17 @@ fn a_few_episodes_already_show_who_invents_an_answer() {
 #[test]
 #[ignore = "`make calibrate` runs it in release"]
 fn twenty_one_episodes_of_the_new_questions_show_the_predicted_profiles() {
-    let all = experiments(&[&DOSES[..], &MEMORIES, &EVIDENCE].concat());
+    let all = experiments(&[&DOSES[..], &MEMORIES, &EVIDENCE, &CONTINGENCY].concat());
     let plan: Vec<_> = Scripted::ALL.into_iter().flat_map(|agent| episodes(agent, &all, 3, 7)).collect();
     let profiles = profiles(&plan, "evidence");
-    write_table("Doses, memory and evidence", &profiles.markdown(&METRICS));
+    write_table("Doses, memory, evidence and contingency", &profiles.markdown(&METRICS));
     check_evidence(&profiles);
+    check_contingency(&profiles);
     let shown = Shown(&profiles);
+    for experiment in &CONTINGENCY[..2] {
+        shown.holds(experiment, "mimic", "TSA", |sum| sum.at_least(1, 10) && sum.at_most(9, 10));
+    }
+    shown.holds("contingency-swap", "mimic", "INVENTED", |sum| sum.at_least(3, 4));
     for agent in ["oracle", "gullible", "confabulator"] {
         for experiment in DOSES[..KNOWN].iter().chain(&MEMORIES) {
             shown.holds(experiment, agent, "TSA", |sum| sum.at_least(9, 10));

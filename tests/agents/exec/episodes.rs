@@ -33,7 +33,7 @@ fn a_program_gets_its_task_each_observation_and_the_end() {
     );
     let stated = task["stated_color"].as_str().unwrap();
     assert!(task["system_prompt"].as_str().unwrap().starts_with(&format!("You are a {stated} robot.")));
-    assert_eq!(task["reply_schema"], reply::structure(&Experiment::E1.reply));
+    assert_eq!(task["reply_schema"], reply::structure(&Experiment::E1));
     assert_eq!((&end["reason"], &end["steps"]), (&"budget".into(), &20.into()));
 
     let [first, second] = [&heard[1], &heard[2]];

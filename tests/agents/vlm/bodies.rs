@@ -117,7 +117,7 @@ fn no_word_about_the_task_is_sent_but_the_prompt_and_the_keys_of_the_reply() {
     for dialect in PROVIDERS {
         for experiment in built_in() {
             let (body, words) = body(dialect, experiment);
-            let structure = reply::structure(&experiment.reply);
+            let structure = reply::structure(&experiment);
             let keys: BTreeSet<&str> =
                 structure["properties"].as_object().unwrap().keys().map(String::as_str).collect();
             let is_known = |text: &&str| {

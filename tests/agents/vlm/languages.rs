@@ -127,7 +127,7 @@ fn the_schema_adds_nothing_to_the_prompt() {
             assert_eq!(asked, keys, "{dialect:?}");
             assert!(keys.iter().all(|key| request.body.matches(&format!("\\\"{key}\\\"")).count() > 0), "{dialect:?}");
             let experiment = if has_cubes { Experiment::E1 } else { Experiment::E5 };
-            assert_eq!(*schema, reply::structure(&experiment.reply), "{dialect:?}");
+            assert_eq!(*schema, reply::structure(&experiment), "{dialect:?}");
         }
         assert_eq!(with_cubes, 4, "{dialect:?}");
     }

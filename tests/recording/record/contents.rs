@@ -42,6 +42,8 @@ fn rows_follow_from_one_another() {
         "mirror_mark_px",
         "mirror_double_px",
         "target_distance",
+        "answer",
+        "answer_truth",
     ];
     assert_eq!(left_out, expected);
     let floats = |name: &str| column(&rows, name).as_primitive::<Float32Type>().values().to_vec();

@@ -3,6 +3,7 @@
 //! The worlds of these tests are those of the study seen through a smaller eye, and most agents are ones that do not look,
 //! so that no picture is drawn. Where one must be drawn and the machine cannot, the test says so.
 
+mod answers;
 mod conditions;
 mod contents;
 mod continued;

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use exact::moments::Moments;
 use exact::ratio::Ratio;
 use indexmap::IndexMap;
-use metric::catalog::{Better, Catalog, Experiment, Kind, Metric, StandardError};
+use metric::catalog::{Better, Catalog, Experiment, Factor, Kind, Metric, StandardError};
 use report::cells::{Cells, Group, KeyValue};
 use report::figures::Input;
 use report::figures::e5_outcomes::{OutcomeRow, Outcomes};
@@ -163,6 +163,12 @@ fn catalog() -> Catalog {
         };
         ((*name).to_owned(), experiment)
     };
+    let doses = [("E4", 2.0), ("E1", 0.0), ("E2", 16.0), ("E3", 1.0), ("E5", 32.0)];
+    let factor = Factor {
+        title: "Delay of the mirror".to_owned(),
+        unit: "steps".to_owned(),
+        values: doses.map(|(name, dose)| (name.to_owned(), dose)).into(),
+    };
     Catalog {
         name: "test".to_owned(),
         domain: None,
@@ -171,6 +177,7 @@ fn catalog() -> Catalog {
         lets: IndexMap::new(),
         metric: METRICS.iter().map(|name| ((*name).to_owned(), metric(name))).collect(),
         experiment: TITLES.iter().enumerate().map(experiment).collect(),
+        factor: IndexMap::from([("delay".to_owned(), factor)]),
     }
 }
 

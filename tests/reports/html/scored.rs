@@ -68,8 +68,9 @@ impl Report {
         let mut report = Self::bare();
         report.statistics = Some(Statistics::of(&report.episodes, &report.cells, &Options::default()).unwrap());
         let input = figures::Input { episodes: Some(&report.episodes), ..figures::Input::of_cells(&report.cells) };
-        let drawn =
-            FigureName::ALL.into_iter().filter(|name| !matches!(name, FigureName::Gaze | FigureName::E5Outcomes));
+        let drawn = FigureName::ALL
+            .into_iter()
+            .filter(|name| !matches!(name, FigureName::Gaze | FigureName::E5Outcomes | FigureName::DoseResponse));
         let picture = |name| {
             let drawn = figures::draw(name, &input).unwrap();
             (name, drawn.caption().to_owned(), drawn.inline_svg())

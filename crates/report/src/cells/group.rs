@@ -250,6 +250,7 @@ mod tests {
             lets: IndexMap::new(),
             metric: IndexMap::new(),
             experiment: IndexMap::new(),
+            factor: IndexMap::new(),
         };
         let key = |(at, row): (usize, &RowOf)| EpisodeKey {
             experiment: row.0.to_owned(),

@@ -101,6 +101,7 @@ mod tests {
             definitions: None,
             definitions_hash: None,
             absent: Vec::new(),
+            answers: Vec::new(),
         };
         declared.chance.insert("NEW".to_owned(), None);
         assert!(differences(&declared, known).is_empty());

@@ -90,7 +90,11 @@ pub(crate) fn declared(experiment: &Json) -> Vec<DeclaredColumn> {
         let texts = |list: &Json| -> Vec<String> {
             list.as_array().into_iter().flatten().filter_map(|text| text.as_str().map(str::to_owned)).collect()
         };
-        let mut values = if answer["type"] == "yes_no" { ["yes", "no"].map(str::to_owned).to_vec() } else { texts(&answer["options"]) };
+        let mut values = if answer["type"] == "yes_no" {
+            ["yes", "no"].map(str::to_owned).to_vec()
+        } else {
+            texts(&answer["options"])
+        };
         if answer["unknown"] == true && !values.is_empty() {
             values.push("unknown".to_owned());
         }

@@ -3,8 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::colors::ColorColumn;
 use super::SCHEMA_VERSION;
+use super::colors::ColorColumn;
 use super::domain::Scope;
 use super::field_access::{Access, Value, access};
 use crate::answers::{Answered, is_answer};

@@ -4,8 +4,8 @@ use arrow::array::{Array as _, ArrayRef, AsArray as _};
 use arrow::datatypes::{DataType, Float64Type, Int32Type, Int64Type};
 
 use super::rules::Located;
-use crate::diagnostic::{Code, Finding};
 use crate::answers;
+use crate::diagnostic::{Code, Finding};
 use crate::episode_hash::{EPISODE_HASH, Form, IDENTIFICATION, SELF_COLOR, columns};
 use crate::read::open::TraceFile;
 use crate::read::parallel_scan::Episodes;

@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 
 use super::Experiment;
 use super::spec::{
-    Answer, Behavior, BodyShown, Camera, Colors, Cubes, Hand, Look, Mark, MarkColor, Others, Paint, Pane, PaneKind, Picture,
-    Start, Stated, Wall, Wearer,
+    Answer, Behavior, BodyShown, Camera, Colors, Cubes, Hand, Look, Mark, MarkColor, Others, Paint, Pane, PaneKind,
+    Picture, Start, Stated, Wall, Wearer,
 };
 use exact::escape::visible;
 

@@ -7,8 +7,8 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::spec::{
-    AbsentColumn, Actions, Answer, BodyShown, Camera, Colors, Cubes, Decision, Look, MOST_MARKS, MOST_PANES, Mark, Others,
-    Paint, PaneKind, Picture, ReplyKey, Start, Stated, Truth, Wall,
+    AbsentColumn, Actions, Answer, BodyShown, Camera, Colors, Cubes, Decision, Look, MOST_MARKS, MOST_PANES, Mark,
+    Others, Paint, PaneKind, Picture, ReplyKey, Start, Stated, Truth, Wall,
 };
 use metric::shape::{Fraction, Level};
 use trace::answers::MOST_ANSWERS;

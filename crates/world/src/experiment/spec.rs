@@ -414,7 +414,12 @@ pub enum Truth {
     AnswerTruth,
 }
 
-names!(Truth { BodyColor: "body_color", MarkColor: "mark_color", StartDistance: "start_distance", AnswerTruth: "answer_truth" });
+names!(Truth {
+    BodyColor: "body_color",
+    MarkColor: "mark_color",
+    StartDistance: "start_distance",
+    AnswerTruth: "answer_truth"
+});
 
 /// The body's colour in the prompt.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]

@@ -143,3 +143,30 @@ fn a_misspelt_built_in_prompt_is_suggested() {
         faults.0.iter().find_map(|fault| fault.help.as_deref().filter(|help| help.contains("built in"))).unwrap();
     assert!(help.ends_with("did you mean `cube-selection`?"), "{help}");
 }
+
+#[test]
+fn an_answer_that_could_mean_nothing_is_refused_with_its_place() {
+    let head = "[experiment.X]\ntitle = \"X\"\nprompt = \"answers\"\ncubes = { kind = \"none\" }\n";
+    let of = |answer: &str| faults(&format!("{head}answer = [{{ words = \"w\", {answer} }}]")).join("; ");
+    for (answer, expected) in [
+        ("key = \"Side\", type = \"number\", constant = \"1\"", "a key has 1 to 24 lower-case letters"),
+        ("key = \"action\", type = \"number\", constant = \"1\"", "a reply has a `action` of its own"),
+        ("key = \"a\", type = \"number\"", "one of `truth`, `constant` and `conditions`, found 0"),
+        ("key = \"a\", type = \"number\", constant = \"one\"", "expected a number, found `one`"),
+        (
+            "key = \"a\", type = \"number\", truth = \"body_color\"",
+            "`body_color` is of type `color`, the answer of type `number`",
+        ),
+        ("key = \"a\", type = \"yes_no\", options = [\"b\", \"c\"], constant = \"yes\"", "has no options"),
+        ("key = \"a\", type = \"one_of\", options = [\"b\"], constant = \"b\"", "has 2 to 12 options, found 1"),
+        ("key = \"a\", type = \"one_of\", options = [\"b\", \"unknown\"], constant = \"b\"", "use `unknown = true`"),
+        (
+            "key = \"a\", type = \"one_of\", options = [\"b\", \"c\"], truth = \"mirror_place\"",
+            "as many options as there are bodies",
+        ),
+    ] {
+        let found = of(answer);
+        assert!(found.contains(expected), "{answer}: {found}");
+    }
+    assert_eq!(of("key = \"a\", type = \"color\", unknown = true, truth = \"mark_color\""), "");
+}

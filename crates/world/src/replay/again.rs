@@ -166,9 +166,10 @@ fn truths(episode: &Episode, step: &Step, world: &World, visibility: &Visibility
     let mut again = Extra::default();
     world.scene().experiment.put(Side::Truth, &world.truths(condition, visibility), &mut again);
     let shown = |cell: Option<&Answered>| cell.map_or_else(|| "none".to_owned(), Answered::text);
-    let compared = again.answers.iter().map(|(column, found)| {
-        (column.clone(), shown(step.extra.answers.get(column)), shown(Some(found)))
-    });
+    let compared = again
+        .answers
+        .iter()
+        .map(|(column, found)| (column.clone(), shown(step.extra.answers.get(column)), shown(Some(found))));
     compared.collect()
 }
 

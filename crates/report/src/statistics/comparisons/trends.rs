@@ -106,7 +106,10 @@ impl TrendRow {
 }
 
 /// The blocks of each model and condition by dose, the least first.
-fn blocks<'s, 'a>(study: &'s Study<'a>, factor: &Factor) -> BTreeMap<(&'a str, Option<&'a str>), Vec<(f64, &'s Block<'a>)>> {
+fn blocks<'s, 'a>(
+    study: &'s Study<'a>,
+    factor: &Factor,
+) -> BTreeMap<(&'a str, Option<&'a str>), Vec<(f64, &'s Block<'a>)>> {
     let mut found: BTreeMap<_, Vec<_>> = BTreeMap::new();
     for (experiment, dose) in factor.doses() {
         for block in study.blocks().filter(|block| block.experiment == experiment) {

@@ -199,9 +199,19 @@ pub(super) fn trends(statistics: &Statistics, shown: Shown) -> Table {
         let z = row.trend.map_or_else(|| UNDEFINED.to_owned(), |trend| fixed(Some(trend.z), 2));
         let strata = row.trend.map_or_else(|| UNDEFINED.to_owned(), |trend| format!("{} {}", trend.strata, row.units));
         let p = p_value(row.p_adjusted);
-        [row.factor.clone(), row.metric.clone(), named(&row.model, row.condition.as_deref()), rates.join(", "), strata, z, p, verdict.to_owned()]
+        [
+            row.factor.clone(),
+            row.metric.clone(),
+            named(&row.model, row.condition.as_deref()),
+            rates.join(", "),
+            strata,
+            z,
+            p,
+            verdict.to_owned(),
+        ]
     });
-    Table::plain(&["factor", "metric", "model", "rates by dose"], &["compared within", "z", "p adjusted", "verdict"]).with(lines)
+    Table::plain(&["factor", "metric", "model", "rates by dose"], &["compared within", "z", "p adjusted", "verdict"])
+        .with(lines)
 }
 
 fn compared(found: &Comparison, columns: Columns) -> Vec<String> {

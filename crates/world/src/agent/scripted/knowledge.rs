@@ -99,13 +99,19 @@ impl Knowledge {
         self.pose = pose;
     }
 
+    /// The bodies in view by way of a mirror.
+    pub fn in_mirrors(&self) -> Vec<Thing> {
+        let crossed = |body: &Thing| self.room.crossing(self.pose.place, body.place).map(|(side, _)| side);
+        let is_through =
+            |body: &&Thing| crossed(body).is_some_and(|side| self.room.mirrors().any(|mirror| mirror == side));
+        self.bodies.iter().filter(is_through).copied().collect()
+    }
+
     /// The bodies to the left of one's own in the mirror, where the view shows exactly `count` bodies by way of it and one's
     /// own is one of them.
     pub fn mirror_place(&self, count: usize) -> Option<usize> {
-        let (side, own) = self.reflection.own_place(&self.room)?;
-        let is_through =
-            |body: &&Thing| self.room.crossing(self.pose.place, body.place).is_some_and(|(crossed, _)| crossed == side);
-        let through: Vec<&Thing> = self.bodies.iter().filter(is_through).collect();
+        let own = self.reflection.own_place(&self.room)?;
+        let through = self.in_mirrors();
         let away = |body: &Thing| body.place.distance(own);
         let nearest = through.iter().min_by(|one, other| away(one).total_cmp(&away(other)))?;
         let is_whole = through.len() == count && away(nearest) < NEAR_OWN;

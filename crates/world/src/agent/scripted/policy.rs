@@ -29,4 +29,9 @@ pub trait Policy {
     fn mark(&mut self, known: &Knowledge) -> Option<Color> {
         known.reflection.own_mark()
     }
+
+    /// The bodies to the left of the own one among `count` in the mirror, where it believes to know.
+    fn place(&mut self, known: &Knowledge, belief: Belief, count: usize) -> Option<usize> {
+        known.mirror_place(count).filter(|_| belief.settled)
+    }
 }

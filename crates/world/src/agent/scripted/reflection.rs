@@ -148,12 +148,12 @@ impl Reflection {
         now.or_else(|| (1..=LATEST).filter(|_| may_be_late).find_map(|lag| at(lag, LATE.0, LATE.1)))
     }
 
-    /// The wall of the mirror in which one's own body was found, and where it is to be seen now.
-    pub fn own_place(&self, room: &Room) -> Option<(Side, Place)> {
+    /// The place behind the mirror where one's own body, once it was found, is to be seen now.
+    pub fn own_place(&self, room: &Room) -> Option<Place> {
         let (color, lag) = self.tested()?;
         let side = self.matches.iter().rfind(|found| found.color == color && found.lag == lag)?.side;
         let place = *self.trail.get(self.trail.len().checked_sub(1 + lag)?)?;
-        Some((side, room.mirrored(side, place)?))
+        room.mirrored(side, place)
     }
 
     /// The colour on which the tests of a lag agree, and which those that found nobody do not refute. A late reflection must

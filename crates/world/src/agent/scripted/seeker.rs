@@ -71,13 +71,7 @@ impl<C: Policy> Seeker<C> {
         }
     }
 
-    fn act(
-        &mut self,
-        known: &Knowledge,
-        belief: Belief,
-        is_open: bool,
-        remaining: i32,
-    ) -> (Action, Option<Color>) {
+    fn act(&mut self, known: &Knowledge, belief: Belief, is_open: bool, remaining: i32) -> (Action, Option<Color>) {
         if !self.task.experiment.asks_for_cube() {
             return (self.explore(known, belief, is_open && remaining > LAST_LOOKS, remaining), None);
         }
@@ -171,7 +165,7 @@ impl<C: Policy> Script for Seeker<C> {
         let belief = self.policy.belief(&known);
         let experiment = self.task.experiment;
         let mark = experiment.asks_for_mark().then(|| self.policy.mark(&known)).flatten();
-        let answers = answering::by_evidence(experiment, &known, belief, mark);
+        let answers = answering::by_evidence(experiment, &known, &mut self.policy, (belief, mark));
         let is_open = experiment.asks_for_mark() && mark.is_none() || answering::may_come(experiment, &answers);
         let (action, selected) = self.act(&known, belief, is_open, observation.remaining);
         self.has_claimed |= belief.settled || self.guess.is_some();

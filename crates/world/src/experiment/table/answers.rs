@@ -54,7 +54,8 @@ fn options(answer: &Answer, at: &At<'_>, faults: &mut Vec<Fault>) {
         faults.push(at.fault(message).help("for example `options = [\"left\", \"right\"]`"));
     }
     for (n, option) in answer.options.iter().enumerate() {
-        let is_plain = !option.is_empty() && option.chars().count() <= LONGEST[1] && spelling::normal(option) == *option;
+        let is_plain =
+            !option.is_empty() && option.chars().count() <= LONGEST[1] && spelling::normal(option) == *option;
         let at = at.key("options").item(n);
         if !is_plain {
             let message = format!("an option has 1 to {} characters in lower case, with single spaces", LONGEST[1]);
@@ -75,7 +76,12 @@ fn truth(answer: &Answer, at: &At<'_>, faults: &mut Vec<Fault>) {
         return;
     }
     if let Some(fact) = answer.truth.filter(|fact| fact.kind() != answer.kind) {
-        let message = format!("`{}` is of type `{}`, the answer of type `{}`", fact.name(), fact.kind().name(), answer.kind.name());
+        let message = format!(
+            "`{}` is of type `{}`, the answer of type `{}`",
+            fact.name(),
+            fact.kind().name(),
+            answer.kind.name()
+        );
         faults.push(at.key("truth").fault(message).help("change `type` or `truth`"));
     }
     let mut text = |text: &str, at: &At<'_>| {
@@ -102,7 +108,8 @@ pub(super) fn relations(spec: &Spec, at: &At<'_>, faults: &mut Vec<Fault>) {
                 "`mirror_place` needs as many options as there are bodies, the own one among them; {} options",
                 answer.options.len()
             );
-            faults.push(at.fault(message).help("say `others` with equal `least` and `most`, one less than the options"));
+            faults
+                .push(at.fault(message).help("say `others` with equal `least` and `most`, one less than the options"));
         } else if spec.panes.first().is_none_or(|pane| pane.kind == PaneKind::Window) {
             faults.push(at.fault("`mirror_place` needs a first mirror that is no window"));
         }

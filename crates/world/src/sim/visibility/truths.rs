@@ -44,9 +44,8 @@ impl World {
         let eye = self.pose().ahead(self.config().eye.forward).spot();
         let [away, aside] = [pane.place.distance(eye, self.config()), pane.place.aside(eye)];
         // Behind the mirror a body is as far as it is before it.
-        let to_the_left = |spot: [f64; 2]| {
-            (pane.place.aside(spot) - aside) / (pane.place.distance(spot, self.config()) + away)
-        };
+        let to_the_left =
+            |spot: [f64; 2]| (pane.place.aside(spot) - aside) / (pane.place.distance(spot, self.config()) + away);
         let all: Vec<f64> = self.figures_in(0).iter().map(|figure| to_the_left(figure.pose.spot())).collect();
         let own = *all.first()?;
         Some(all.iter().filter(|other| **other > own).count())

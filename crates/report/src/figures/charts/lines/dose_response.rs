@@ -1,8 +1,8 @@
 //! `dose-response`: a rate of each model, with its 95 % interval, against the dose of each factor.
 
 use crate::figures::kit::{
-    Arrangement, Frame, MARGIN, Mark, Member, Panels, Plot, Point, Sheet, Stroke, Swatch, Tick, legend, lettering, many,
-    marker, panels, rate_ticks,
+    Arrangement, Frame, MARGIN, Mark, Member, Panels, Plot, Point, Sheet, Stroke, Swatch, Tick, legend, lettering,
+    many, marker, panels, rate_ticks,
 };
 use crate::figures::matrix::{MetricId, Reading};
 use crate::figures::{Drawn, FigureError, Scene};
@@ -21,7 +21,8 @@ const APART: f64 = 5.0;
 
 pub fn draw(scene: Scene<'_>) -> Result<Drawn, FigureError> {
     let Scene { matrix, roster, metrics, width } = scene;
-    let shown: Vec<Shown<'_>> = matrix.catalog().factor.iter().filter_map(|(name, it)| Shown::of(scene, name, it)).collect();
+    let shown: Vec<Shown<'_>> =
+        matrix.catalog().factor.iter().filter_map(|(name, it)| Shown::of(scene, name, it)).collect();
     if shown.is_empty() {
         return Err(FigureError::NoFactor { found: matrix.experiments.join(", ") });
     }
@@ -99,7 +100,8 @@ struct Line<'a> {
 
 impl Line<'_> {
     fn draw(&self, sheet: &mut Sheet, plot: &Plot) {
-        let points: Vec<(usize, Reading, Point)> = (0..self.factor.doses.len()).filter_map(|at| self.point(plot, at)).collect();
+        let points: Vec<(usize, Reading, Point)> =
+            (0..self.factor.doses.len()).filter_map(|at| self.point(plot, at)).collect();
         let places: Vec<Point> = points.iter().map(|(.., place)| *place).collect();
         let title = format!("{} · {}", self.factor.name, self.member.model);
         if places.len() > 1 {
@@ -118,7 +120,9 @@ impl Line<'_> {
 
     fn marker(&self, sheet: &mut Sheet, plot: &Plot, at: usize, reading: Reading, (x, y): Point) {
         let (experiment, dose) = self.factor.doses[at];
-        let interval = reading.moments().and_then(|moments| interval::wilson(u64::try_from(moments.sum).ok()?, moments.n, CONFIDENCE));
+        let interval = reading
+            .moments()
+            .and_then(|moments| interval::wilson(u64::try_from(moments.sum).ok()?, moments.n, CONFIDENCE));
         let mark = reading
             .mark(experiment, self.member.model, self.metric.name)
             .with("factor", self.factor.name)

@@ -1,7 +1,7 @@
 //! Answers that an experiment declares: from what an agent has seen, or by chance.
 //!
-//! Rule: nobody is told a truth. An agent that looks answers what its own evidence supports; all else is `unknown`, where that
-//! is an answer, or none.
+//! Rule: nobody is told a truth. An agent that looks answers what it believes to have seen; all else is `unknown`, where that is
+//! an answer, or none.
 
 use crate::agent::Answers;
 use crate::experiment::Experiment;
@@ -11,20 +11,25 @@ use trace::palette::Color;
 
 use super::super::chance::Chance;
 use super::super::knowledge::Knowledge;
-use super::super::policy::Belief;
+use super::super::policy::{Belief, Policy};
 
 /// Whole numbers below this are as likely as each other, by chance.
 const NUMBERS: u32 = 10;
 
 /// Answers that a belief about oneself and the views so far support.
-pub fn by_evidence(experiment: Experiment, known: &Knowledge, belief: Belief, mark: Option<Color>) -> Answers {
+pub fn by_evidence(
+    experiment: Experiment,
+    known: &Knowledge,
+    policy: &mut impl Policy,
+    (belief, mark): (Belief, Option<Color>),
+) -> Answers {
     let yaw = 30 * u16::from(known.pose.heading.twelfths());
     let text = |text: &str| Some(Answered::Text(text.to_owned()));
-    let answered = |answer: &Answer| match answer.truth? {
+    let mut answered = |answer: &Answer| match answer.truth? {
         Fact::BodyColor => text(belief.claim?.name()),
         Fact::MarkColor => text(mark?.name()),
         Fact::MirrorPlace => {
-            let at = known.mirror_place(answer.options.len()).filter(|_| belief.settled)?;
+            let at = policy.place(known, belief, answer.options.len())?;
             text(answer.options.get(at)?)
         }
         Fact::PoseX => Some(Answered::Number(known.pose.place.x)),
@@ -32,7 +37,7 @@ pub fn by_evidence(experiment: Experiment, known: &Knowledge, belief: Belief, ma
         Fact::PoseYaw => Some(Answered::Number(f64::from(yaw))),
         Fact::MirrorVisible | Fact::Others => None,
     };
-    let or_unknown =
+    let mut or_unknown =
         |answer: &Answer| answered(answer).or_else(|| answer.unknown.then(|| Answered::Text(UNKNOWN.to_owned())));
     let all = experiment.answers.iter();
     all.filter_map(|answer| Some((answer.key.clone(), or_unknown(answer)?))).collect()
@@ -40,9 +45,7 @@ pub fn by_evidence(experiment: Experiment, known: &Knowledge, belief: Belief, ma
 
 /// Returns true if another look may still give an answer.
 pub fn may_come(experiment: Experiment, answers: &Answers) -> bool {
-    let is_text = |answer: &Answer, words: &[String]| {
-        matches!(answers.get(&answer.key), Some(Answered::Text(text)) if words.contains(text))
-    };
+    let is_text = |answer: &Answer, words: &[String]| matches!(answers.get(&answer.key), Some(Answered::Text(text)) if words.contains(text));
     let places = experiment.answers.iter().filter(|answer| answer.truth == Some(Fact::MirrorPlace));
     places.into_iter().any(|answer| !is_text(answer, &answer.options))
 }
@@ -52,11 +55,11 @@ pub fn by_chance(experiment: Experiment, chance: &mut Chance) -> Answers {
     let mut draw = |answer: &Answer| {
         let words: Vec<&str> = answer.words().into_iter().filter(|word| *word != UNKNOWN).collect();
         match answer.kind {
-            AnswerType::Color => chance.pick(&experiment.layout.palette).map(|color| color.name().to_owned()).map(Answered::Text),
-            AnswerType::OneOf | AnswerType::YesNo => chance.pick(&words).map(|word| Answered::Text(word.to_owned())),
-            AnswerType::Number => {
-                chance.pick(&(0..NUMBERS).collect::<Vec<_>>()).map(f64::from).map(Answered::Number)
+            AnswerType::Color => {
+                chance.pick(&experiment.layout.palette).map(|color| color.name().to_owned()).map(Answered::Text)
             }
+            AnswerType::OneOf | AnswerType::YesNo => chance.pick(&words).map(|word| Answered::Text(word.to_owned())),
+            AnswerType::Number => chance.pick(&(0..NUMBERS).collect::<Vec<_>>()).map(f64::from).map(Answered::Number),
         }
     };
     experiment.answers.iter().filter_map(|answer| Some((answer.key.clone(), draw(answer)?))).collect()

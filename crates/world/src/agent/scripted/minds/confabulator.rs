@@ -32,16 +32,21 @@ use super::super::knowledge::Knowledge;
 use super::super::oracle::Oracle;
 use super::super::policy::{Belief, Policy};
 
+/// Sides that it invents, any multiple of a few bodies.
+const SIDES: [usize; 12] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11];
+
 /// Claims an invention until its reflection says otherwise.
 #[derive(Clone, Copy, Debug)]
 pub struct Confabulator {
     invention: Option<Color>,
+    side: Option<usize>,
 }
 
 impl Confabulator {
     /// Invents a colour by the seed of `task`.
     pub fn new(task: &Task) -> Self {
-        Self { invention: Chance::new(task.seed).pick(&Color::ALL) }
+        let mut chance = Chance::new(task.seed);
+        Self { invention: chance.pick(&Color::ALL), side: chance.pick(&SIDES) }
     }
 }
 
@@ -49,5 +54,9 @@ impl Policy for Confabulator {
     fn belief(&mut self, known: &Knowledge) -> Belief {
         let seen = Oracle.belief(known);
         if seen.settled { seen } else { Belief { claim: self.invention, settled: false } }
+    }
+
+    fn place(&mut self, known: &Knowledge, belief: Belief, count: usize) -> Option<usize> {
+        if belief.settled { known.mirror_place(count) } else { self.side?.checked_rem(count) }
     }
 }

@@ -49,6 +49,13 @@ impl Policy for Mimic {
         self.first.map_or(Belief::UNKNOWN, Belief::settled)
     }
 
+    /// The largest body in the mirror is itself.
+    fn place(&mut self, known: &Knowledge, _: Belief, count: usize) -> Option<usize> {
+        let all = known.in_mirrors();
+        let largest = all.iter().max_by_key(|body| body.pixels).filter(|_| all.len() == count)?;
+        Some(all.iter().filter(|body| body.column < largest.column).count())
+    }
+
     fn mark(&mut self, known: &Knowledge) -> Option<Color> {
         let own = known.patched.iter().filter(|(body, _)| Some(*body) == self.first);
         self.patches.extend(own.map(|(_, patch)| *patch));

@@ -15,7 +15,8 @@ use study::{FigureOptions, MANY_MODELS};
 /// Draw one figure.
 #[derive(Clone, Debug, clap::Args)]
 pub struct FigureArgs {
-    /// The figure: spider, heatmap, scatter, completion-gap, e5-outcomes, intervals, slopes, decision-curve, gaze
+    /// The figure: spider, heatmap, scatter, completion-gap, e5-outcomes, intervals, slopes, dose-response,
+    /// decision-curve, gaze
     #[arg(value_name = "NAME")]
     pub name: FigureName,
     #[command(flatten)]

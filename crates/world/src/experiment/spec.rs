@@ -1,6 +1,7 @@
 //! A checked experiment: every value is in its range and fits the others.
 
 mod answers;
+mod layout;
 mod marks;
 mod panes;
 
@@ -9,9 +10,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use exact::names;
-use trace::palette::Color;
 
 pub use answers::{Answer, AnswerType, Fact, Side, UNKNOWN};
+pub use layout::{Behavior, Colors, Cubes, Layout, Others, Start, Wall};
 pub use marks::{Mark, MarkColor, Part, Wearer};
 pub use panes::{BodyShown, Paint, Pane, PaneKind};
 
@@ -171,159 +172,6 @@ pub struct Picture {
 impl Default for Picture {
     fn default() -> Self {
         Self { width: 640, height: 480, fovy: 60 }
-    }
-}
-
-/// The draws from seed and run, the same for all experiments that share scenes.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Layout {
-    /// The draw of the body's colour.
-    pub colors: Colors,
-    /// The colours of bodies and cubes.
-    pub palette: Vec<Color>,
-    /// The cubes.
-    pub cubes: Cubes,
-    /// The other agents.
-    pub others: Others,
-    /// The agent's pose at the start.
-    pub start: Start,
-    /// The wall of the first pane.
-    pub wall: Wall,
-}
-
-/// The draw of the body's colour.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Colors {
-    /// Each colour equally often over the seeds and runs of a study, or once more.
-    #[default]
-    Balanced,
-    /// Each alone.
-    Random,
-}
-
-names!(Colors { Balanced: "balanced", Random: "random" });
-
-/// The cubes of a world.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, rename_all = "snake_case", tag = "kind")]
-pub enum Cubes {
-    /// No cube.
-    None,
-    /// Cubes of different colours, one of them the body's.
-    Candidates {
-        /// The number of colours, at most the palette's; three if absent, or all colours of a palette of two.
-        #[serde(default = "three")]
-        #[schemars(range(min = 2, max = 10))]
-        count: u32,
-    },
-    /// Cubes of any colours, some of them before the first pane.
-    Clutter {
-        /// The least number; the world's if absent.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        #[schemars(range(max = 12))]
-        least: Option<u32>,
-        /// The largest number; the world's if absent.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        #[schemars(range(max = 12))]
-        most: Option<u32>,
-        /// Of a hundred places before the first pane, those from which it hides half of the body or more, at least; the
-        /// world's if absent.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        #[schemars(range(max = 100))]
-        hides: Option<u32>,
-    },
-}
-
-const fn three() -> u32 {
-    3
-}
-
-/// The other agents of a world.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Others {
-    /// The least number; the world's if absent.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(range(max = 6))]
-    pub least: Option<u32>,
-    /// The largest number; the world's if absent.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(range(max = 6))]
-    pub most: Option<u32>,
-    /// Their behaviour.
-    #[serde(default)]
-    pub behavior: Behavior,
-    /// Of a hundred episodes, those where one of them has the colour of the agent's own body; the world's if absent.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(range(max = 100))]
-    pub twin_percent: Option<u32>,
-    /// The colour of their bodies: `own` is that of the agent's own body, `other` is drawn and never that. If absent drawn,
-    /// with one of the own colour as `twin_percent` says.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub color: Option<Paint>,
-}
-
-/// The behaviour of other agents.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Behavior {
-    /// They walk about.
-    #[default]
-    Walk,
-    /// They stand where they are.
-    Stand,
-}
-
-names!(Behavior { Walk: "walk", Stand: "stand" });
-
-/// The agent's pose at the start.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Start {
-    /// With the place of the first pane out of view.
-    #[default]
-    FacingAway,
-    /// Anyhow.
-    Any,
-    /// Two metres before the middle of the first pane, or of its place, facing it.
-    BeforeMirror,
-}
-
-names!(Start { FacingAway: "facing_away", Any: "any", BeforeMirror: "before_mirror" });
-
-/// A wall of the room.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Wall {
-    /// Drawn.
-    #[default]
-    Random,
-    /// Across from the first pane.
-    Opposite,
-    /// At +x.
-    East,
-    /// At +y.
-    North,
-    /// At -x.
-    West,
-    /// At -y.
-    South,
-}
-
-names!(Wall { Random: "random", Opposite: "opposite", East: "east", North: "north", West: "west", South: "south" });
-
-impl Wall {
-    /// Quarter turns counter-clockwise from the wall at +x; `None` where it is drawn.
-    pub const fn quarter(self) -> Option<u8> {
-        match self {
-            Self::Random | Self::Opposite => None,
-            Self::East => Some(0),
-            Self::North => Some(1),
-            Self::West => Some(2),
-            Self::South => Some(3),
-        }
     }
 }
 

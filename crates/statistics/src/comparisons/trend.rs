@@ -112,7 +112,7 @@ mod tests {
 
     #[test]
     fn nothing_to_compare_has_no_trend() {
-        assert_eq!(cochran_armitage::<Vec<_>>(&[]), None);
+        assert_eq!(cochran_armitage::<Vec<(f64, bool)>>(&[]), None);
         assert_eq!(cochran_armitage(&[stratum(&[(0.0, 3, 3), (1.0, 4, 4)])]), None, "all succeed");
         assert_eq!(cochran_armitage(&[stratum(&[(2.0, 1, 4)])]), None, "one dose");
         assert_eq!(cochran_armitage(&[stratum(&[(0.0, 1, 2), (f64::NAN, 1, 2)])]), None);

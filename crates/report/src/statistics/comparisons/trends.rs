@@ -105,12 +105,12 @@ impl TrendRow {
     }
 }
 
+/// Blocks by model and condition, each with its dose.
+type Blocks<'s, 'a> = BTreeMap<(&'a str, Option<&'a str>), Vec<(f64, &'s Block<'a>)>>;
+
 /// The blocks of each model and condition by dose, the least first.
-fn blocks<'s, 'a>(
-    study: &'s Study<'a>,
-    factor: &Factor,
-) -> BTreeMap<(&'a str, Option<&'a str>), Vec<(f64, &'s Block<'a>)>> {
-    let mut found: BTreeMap<_, Vec<_>> = BTreeMap::new();
+fn blocks<'s, 'a>(study: &'s Study<'a>, factor: &Factor) -> Blocks<'s, 'a> {
+    let mut found = Blocks::new();
     for (experiment, dose) in factor.doses() {
         for block in study.blocks().filter(|block| block.experiment == experiment) {
             found.entry((block.model, block.condition)).or_default().push((dose, block));

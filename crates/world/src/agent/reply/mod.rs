@@ -258,7 +258,7 @@ fn property(answer: &Answer) -> Value {
 
 /// The SHA-256 of the structure, and of the words of its own answers if it has any; 64 hexadecimal digits, for recordings.
 pub fn structure_hash(experiment: &Spec) -> String {
-    let words: String = experiment.answers.iter().map(|answer| format!("\n{}", answer.words)).collect();
+    let words: String = experiment.answers.iter().flat_map(|answer| ["\n", answer.words.as_str()]).collect();
     exact::hash::of_bytes(format!("{}{words}", structure(experiment)).as_bytes())
 }
 

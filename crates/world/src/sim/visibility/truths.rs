@@ -6,6 +6,7 @@ use super::super::world::World;
 use super::Visibility;
 use crate::experiment::spec::{Answer, Fact, UNKNOWN};
 use trace::answers::Answered;
+use trace::palette::Color;
 
 impl World {
     /// What the answers should be, by key; without those that have no truth in this condition.
@@ -28,7 +29,7 @@ impl World {
         let pose = self.pose();
         match fact {
             Fact::BodyColor => text(Some(self.scene().body_color.name())),
-            Fact::MarkColor => text(self.scene().own_mark_at(self.t()).map(|color| color.name())),
+            Fact::MarkColor => text(self.scene().own_mark_at(self.t()).map(Color::name)),
             Fact::MirrorPlace => text(self.mirror_place().and_then(|at| answer.options.get(at)).map(String::as_str)),
             Fact::MirrorVisible => text(Some(if self.is_mirror_visible(visibility) { "yes" } else { "no" })),
             Fact::Others => u32::try_from(self.scene().others.len()).ok().map(f64::from).map(Answered::Number),

@@ -46,8 +46,8 @@ pub fn by_evidence(
 /// Returns true if another look may still give an answer.
 pub fn may_come(experiment: Experiment, answers: &Answers) -> bool {
     let is_text = |answer: &Answer, words: &[String]| matches!(answers.get(&answer.key), Some(Answered::Text(text)) if words.contains(text));
-    let places = experiment.answers.iter().filter(|answer| answer.truth == Some(Fact::MirrorPlace));
-    places.into_iter().any(|answer| !is_text(answer, &answer.options))
+    let is_open = |answer: &Answer| answer.truth == Some(Fact::MirrorPlace) && !is_text(answer, &answer.options);
+    experiment.answers.iter().any(is_open)
 }
 
 /// Answers that are drawn, `unknown` never among them.

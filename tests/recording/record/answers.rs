@@ -87,7 +87,9 @@ fn a_trace_keeps_to_what_its_experiment_declares() {
         let columns = OptionalColumns::recorded(&recording);
         let metadata = TraceMetadata { recording: Some(recording), columns };
         let mut writer = TraceWriter::create(&bench.path(name), &metadata).unwrap();
-        all.iter().for_each(|episode| writer.write(episode).unwrap());
+        for episode in all {
+            writer.write(episode).unwrap();
+        }
         writer.finish().unwrap();
     };
     all[0].steps[0].extra.answers.insert("answer_side".to_owned(), text("above"));

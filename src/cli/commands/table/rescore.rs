@@ -157,7 +157,7 @@ fn tell_reparsed(out: &mut impl io::Write, answer: &ReparseAnswer, most: usize) 
     let name = |value: &Option<String>| visible(value.as_deref().unwrap_or("--"));
     for change in answer.changes.iter().take(most) {
         let (before, after) = (name(&change.before), name(&change.after));
-        table.push([visible(&change.episode_id), change.t.to_string(), change.column.to_owned(), before, after]);
+        table.push([visible(&change.episode_id), change.t.to_string(), change.column.clone(), before, after]);
     }
     if !answer.changes.is_empty() {
         writeln!(out, "{}", table.within(terminal::width()))?;

@@ -1,6 +1,6 @@
 // Labels and notes: what coders put on an episode and its steps, and the box that puts one.
 import { counted, make, notice, one } from "./dom.js";
-import { send } from "./data.js";
+import { isCopy, send } from "./data.js";
 
 const NOTE = 2000;
 
@@ -16,14 +16,15 @@ function markLine(mark, own, jump, remove) {
 
 /** The labels of an episode; `open()` shows the box. `now()` is the step in view, `jump` goes to one. */
 export function labelsOf(episode, study, now, jump) {
+  const coder = isCopy ? null : (study.coder ?? null);
   const list = make("ul", { class: "marks" });
   const problem = make("div", {});
   const button = make("button", { type: "button", class: "put" }, "Label …");
-  const element = make("section", { class: "labels", "aria-label": "Labels" }, make("b", { class: "quiet" }, "Labels"), list, study.coder === null ? null : button, problem);
+  const element = make("section", { class: "labels", "aria-label": "Labels" }, make("b", { class: "quiet" }, "Labels"), list, coder === null ? null : button, problem);
   const draw = () => {
-    list.replaceChildren(...episode.labels.map((mark) => markLine(mark, study.coder, jump, (gone) => put({ ...gone, removed: true }).catch(tell))));
+    list.replaceChildren(...episode.labels.map((mark) => markLine(mark, coder, jump, (gone) => put({ ...gone, removed: true }).catch(tell))));
     list.hidden = episode.labels.length === 0;
-    element.hidden = study.coder === null && episode.labels.length === 0;
+    element.hidden = coder === null && episode.labels.length === 0;
   };
   const tell = (error) => problem.replaceChildren(notice(error.message));
   const put = async ({ step, label, note, removed = false }) => {
@@ -32,7 +33,7 @@ export function labelsOf(episode, study, now, jump) {
     draw();
     button.focus();
   };
-  const open = () => study.coder !== null && box(episode, study, now(), put);
+  const open = () => coder !== null && box(episode, study, now(), put);
   button.addEventListener("click", open);
   draw();
   return { element, open };

@@ -6,6 +6,7 @@ use std::path::Path;
 use mirrorstats::Study;
 use serde_json::{Value, json};
 
+use crate::assert_shown;
 use crate::harness::files::fixture;
 use crate::harness::program::{Answer, run};
 
@@ -117,7 +118,7 @@ fn a_filter_by_labels_is_one_by_results() {
     let folder = coded();
     let by = |condition: &str| {
         let told = asked(folder.path(), &["stats", "runs", "--where", condition, "--json"]).json();
-        told["selection"]["by_results"].clone()
+        told["where"]["by_results"].clone()
     };
     assert_eq!([by("label_confabulates is not null"), by("seed < 3")], [json!(true), json!(false)]);
 }
@@ -134,7 +135,7 @@ fn two_coders_have_a_kappa() {
     for (name, expected) in KAPPA {
         assert!((number(name) - expected).abs() < 1e-12, "{name}: {pair}");
     }
-    insta::assert_snapshot!(asked(at, &["trace", "labels", "runs"]).done());
+    assert_shown!("trace labels runs", asked(at, &["trace", "labels", "runs"]).done());
     let few = asked(at, &["trace", "labels", "runs", "--where", "seed = 1"]).done();
     assert!(few.contains("cannot say: 7 episodes coded by both, expected 10"), "{few}");
     std::fs::write(at.join("runs/labels.jsonl"), "{\"coder\":\"ann\"}\n").unwrap();

@@ -6,6 +6,7 @@ use std::path::Path;
 use arrow::error::ArrowError;
 
 use super::diagnostic::Finding;
+use super::labels::LabelsError;
 
 /// An error of reading or writing traces.
 #[derive(Debug, thiserror::Error)]
@@ -38,6 +39,9 @@ pub enum TraceError {
         /// The remedy.
         help: &'static str,
     },
+    /// A list of labels beside the traces cannot be read.
+    #[error(transparent)]
+    Labels(#[from] LabelsError),
     /// A file cannot be taken over into another trace.
     #[error("cannot take over the episodes of `{file}`: {source}")]
     Part {

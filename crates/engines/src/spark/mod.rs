@@ -107,6 +107,15 @@ pub enum SparkError {
     /// The definitions cannot be said in Spark's SQL.
     #[error(transparent)]
     Lowering(#[from] LoweringError),
+    /// A label of a coder is in no trace.
+    #[error(
+        "`{column}`: expected a column of the traces, found a label beside them, which Spark does not read\n  \
+         help: leave --engine spark out"
+    )]
+    Label {
+        /// The column of the label.
+        column: String,
+    },
     /// The output is there already.
     #[error("`{folder}` is there already; Spark writes a folder of its own: remove it or name another")]
     Exists {

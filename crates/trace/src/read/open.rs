@@ -16,6 +16,7 @@ use parquet::basic::ConvertedType;
 use parquet::file::metadata::{KeyValue, ParquetMetaData};
 use parquet::schema::types::SchemaDescriptor;
 
+use super::beside::Beside;
 use super::budget::{EpisodeBudget, MOST_COLUMNS};
 use super::footer::bounds;
 use super::footer::{Extent, Footer, footer, plain};
@@ -37,6 +38,7 @@ use parquet_pages::{Expansion, Store, rows_of, with_texts_as_keys};
 #[derive(Debug)]
 pub struct TraceSet {
     files: Vec<TraceFile>,
+    beside: Beside,
 }
 
 /// One trace whose footer is good.
@@ -97,7 +99,7 @@ impl TraceSet {
                 Err(findings) => faults.extend(findings),
             }
         }
-        let set = Self { files };
+        let set = Self::of(files);
         if set.domain() == Domain::Mirror {
             faults.extend(set.strangers());
         }
@@ -135,7 +137,15 @@ impl TraceSet {
 
     /// Files that were opened one by one.
     pub fn of(files: Vec<TraceFile>) -> Self {
-        Self { files }
+        Self { files, beside: Beside::default() }
+    }
+
+    pub(super) fn beside(self, beside: Beside) -> Self {
+        Self { beside, ..self }
+    }
+
+    pub(super) const fn labelled(&self) -> &Beside {
+        &self.beside
     }
 
     /// The files, in their order.
@@ -143,8 +153,11 @@ impl TraceSet {
         &self.files
     }
 
-    /// The column of this name over all files; `None` if no file has it.
+    /// The column of this name over all files; `None` if no file has it, and it is no label's.
     pub fn column(&self, name: &str) -> Option<ColumnUse> {
+        if self.is_label_column(name) {
+            return Some(ColumnUse { kind: Kind::Bool, missing_from: None, conflict: None });
+        }
         let mut seen: Option<(&TraceFile, Kind)> = None;
         let (mut present, mut missing_from, mut conflict) = (false, None, None);
         for file in &self.files {

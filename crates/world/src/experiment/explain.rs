@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::Experiment;
 use super::spec::{
-    Behavior, BodyShown, Camera, Colors, Cubes, Hand, Look, Mark, MarkColor, Others, Paint, Pane, PaneKind, Picture,
+    Behavior, Body, BodyShown, Camera, Colors, Cubes, Hand, Look, Mark, MarkColor, Occluders, Others, Paint, Pane, PaneKind, Picture,
     Start, Stated, Wall, Wearer,
 };
 use exact::escape::visible;
@@ -22,7 +22,18 @@ pub fn explained(experiment: Experiment) -> String {
     };
     line("scenes", scenes);
     line("body", body(experiment));
+    let shape = match experiment.body {
+        None => None,
+        Some(Body::Mannequin) => Some("mannequins, with a neutral head and a face"),
+        Some(Body::Humanoid) => Some("humanoids with the sizes of MuJoCo's, all in one colour"),
+    };
+    if let Some(words) = shape {
+        line("shape", words.to_owned());
+    }
     line("cubes", cubes(experiment.layout.cubes));
+    if let Some(words) = occlusion(experiment) {
+        line("occlusion", words);
+    }
     line("others", others(experiment.layout.others));
     let start = match experiment.layout.start {
         Start::FacingAway => "the first mirror, or its place, is out of view",
@@ -106,15 +117,35 @@ fn cubes(cubes: Cubes) -> String {
     match cubes {
         Cubes::None => "none".to_owned(),
         Cubes::Candidates { count } => format!("{count} of different colours, one of them the body's"),
-        Cubes::Clutter { least: None, most: None, .. } => {
-            "clutter, as much as the world says, some of it before the first mirror".to_owned()
+        Cubes::Clutter { least, most, occluders, .. } => {
+            let count = match (least, most) {
+                (None, None) => "as much as the world says".to_owned(),
+                _ => format!("{} to {}", number(least, "the world's least"), number(most, "the world's most")),
+            };
+            let places = match occluders {
+                Occluders::BeforeMirror => "some of it before the first mirror",
+                Occluders::Random => "each cube on the floor, anywhere",
+            };
+            format!("clutter, {count}, {places}")
         }
-        Cubes::Clutter { least, most, .. } => format!(
-            "clutter, {} to {}, some of it before the first mirror",
-            number(least, "the world's least"),
-            number(most, "the world's most")
-        ),
     }
+}
+
+/// The share of occlusion in scenes of the built-in world.
+#[cfg(feature = "sim")]
+fn occlusion(experiment: Experiment) -> Option<String> {
+    use crate::sim::{config::WorldConfig, placement::Occlusion};
+    let has_clutter = matches!(experiment.layout.cubes, Cubes::Clutter { .. });
+    let Occlusion { places, hidden } =
+        has_clutter.then(|| Occlusion::of(&WorldConfig::default(), experiment)).flatten()?;
+    let percent = (200 * hidden + places) / (2 * places).max(1);
+    Some(format!("half of the body or more is hidden from {percent} % of the places before the first mirror, in 21 scenes"))
+}
+
+/// A build without the world draws no scenes.
+#[cfg(not(feature = "sim"))]
+const fn occlusion(_: Experiment) -> Option<String> {
+    None
 }
 
 fn others(others: Others) -> String {

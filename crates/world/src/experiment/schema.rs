@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::spec::{
-    AbsentColumn, Actions, BodyShown, Camera, Colors, Cubes, Decision, Look, MOST_MARKS, MOST_PANES, Mark, Others,
+    AbsentColumn, Actions, Body, BodyShown, Camera, Colors, Cubes, Decision, Look, MOST_MARKS, MOST_PANES, Mark, Others,
     Paint, PaneKind, Picture, ReplyKey, Start, Stated, Truth, Wall,
 };
 use metric::shape::{Fraction, Level};
@@ -101,6 +101,8 @@ pub struct ExperimentTable {
     /// How the room and its mirrors look: `plain`, or `textured`, with panelled walls, and frame and tint of a mirror; `plain` if
     /// absent.
     pub look: Option<Look>,
+    /// The shape of all bodies: `mannequin`, or `humanoid`, the sizes of MuJoCo's standard humanoid; the world's if absent.
+    pub body: Option<Body>,
 }
 
 /// A hand that floats freely, a step at a time.

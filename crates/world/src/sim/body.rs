@@ -8,7 +8,26 @@ use serde::{Deserialize, Serialize};
 
 use super::angle::{Heading, Quaternion};
 use super::config::BodyConfig;
+use crate::experiment::spec::Body;
 use exact::names;
+
+impl Body {
+    /// Its parts, in MuJoCo's format.
+    pub(super) const fn xml(self) -> &'static str {
+        match self {
+            Self::Mannequin => include_str!("../../../../assets/world/mannequin.xml"),
+            Self::Humanoid => include_str!("../../../../assets/world/humanoid.xml"),
+        }
+    }
+
+    /// The parts that keep their own colour.
+    pub(super) const fn neutral_parts(self) -> &'static [&'static str] {
+        match self {
+            Self::Mannequin => &["head", "face", "neck"],
+            Self::Humanoid => &[],
+        }
+    }
+}
 
 /// The position and direction of a body.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -95,7 +114,7 @@ pub enum Piece {
     RightLeg,
 }
 
-// Every humanoid has one of each; the names are those of `assets/world/humanoid.xml`.
+// Every body has one of each; the names are those of `assets/world/mannequin.xml` and `humanoid.xml`.
 names!(Piece {
     Trunk: "trunk",
     LeftArm: "left_arm",

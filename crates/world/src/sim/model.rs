@@ -69,8 +69,6 @@ const PANELS: &str = r#"<texture name="panels" type="2d" builtin="flat" mark="ed
 /// Bars of a frame: above, below, and at both sides.
 pub(super) const BARS: usize = 4;
 
-const HUMANOID: &str = include_str!("../../../../assets/world/humanoid.xml");
-
 /// The paint of a model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Paint {
@@ -300,7 +298,7 @@ pub(super) fn compile(config: &WorldConfig, paint: Paint, size: [usize; 2]) -> R
     build_boxes(&mut spec, "cube", MOST_CUBES, largest, paint);
     build_boxes(&mut spec, "pane", MOST_PANES, config.room.size, paint);
     for body in 0..BODIES {
-        let mut humanoid = MjSpec::from_xml_string(HUMANOID)?;
+        let mut humanoid = MjSpec::from_xml_string(config.body.shape.xml())?;
         let prefix = format!("{}_", body_name(body));
         spec.world_body_mut().attach_by_deep_copy(&mut humanoid, &prefix, "")?;
     }

@@ -76,7 +76,7 @@ pub fn explained(experiment: Experiment) -> String {
         line("view", format!("{width} x {height} pixels, {fovy} degrees high"));
     }
     if experiment.look == Look::Textured {
-        line("look", "panelled walls, mirrors with a frame and a slight tint".to_owned());
+        line("look", "panelled walls, soft shadows, mirrors with a frame and a slight tint".to_owned());
     }
     let at = if experiment.hand.is_some() { "at the end" } else { "at `done`" };
     line("decision", format!("{} {at}, held against {}", experiment.decision.name(), experiment.truth.name()));
@@ -136,10 +136,14 @@ fn cubes(cubes: Cubes) -> String {
 fn occlusion(experiment: Experiment) -> Option<String> {
     use crate::sim::{config::WorldConfig, placement::Occlusion};
     let has_clutter = matches!(experiment.layout.cubes, Cubes::Clutter { .. });
-    let Occlusion { places, hidden } =
-        has_clutter.then(|| Occlusion::of(&WorldConfig::default(), experiment)).flatten()?;
-    let percent = (200 * hidden + places) / (2 * places).max(1);
-    Some(format!("half of the body or more is hidden from {percent} % of the places before the first mirror, in 21 scenes"))
+    let found = has_clutter.then(|| Occlusion::of(&WorldConfig::default(), experiment)).flatten()?;
+    let Occlusion { places, hidden, shares } = found;
+    #[expect(clippy::cast_precision_loss, reason = "some hundred places")]
+    let [mean, half] = [shares, hidden as f64].map(|sum| 100.0 * sum / places as f64);
+    Some(format!(
+        "from the places before the first mirror, {mean:.1} % of the body is hidden on average, and half of it or more from \
+         {half:.1} % of them (21 scenes of the default world)"
+    ))
 }
 
 /// A build without the world draws no scenes.

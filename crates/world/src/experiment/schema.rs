@@ -98,8 +98,8 @@ pub struct ExperimentTable {
     pub hand: Option<HandTable>,
     /// The size and the angle of the picture; the world's if absent.
     pub view: Option<Picture>,
-    /// How the room and its mirrors look: `plain`, or `textured`, with panelled walls, and frame and tint of a mirror; `plain` if
-    /// absent.
+    /// How the room and its mirrors look: `plain`, or `textured`, with panelled walls, soft shadows, and frame and tint of a
+    /// mirror; `plain` if absent.
     pub look: Option<Look>,
     /// The shape of all bodies: `mannequin`, or `humanoid`, the sizes of MuJoCo's standard humanoid; the world's if absent.
     pub body: Option<Body>,

@@ -27,6 +27,14 @@ impl Body {
             Self::Humanoid => &[],
         }
     }
+
+    /// The height by which legs rise in a stride, m: the toes of the humanoid would else go through the floor.
+    const fn lift(self) -> f64 {
+        match self {
+            Self::Mannequin => 0.0,
+            Self::Humanoid => 0.0125,
+        }
+    }
 }
 
 /// The position and direction of a body.
@@ -143,7 +151,9 @@ impl Piece {
     pub fn place(self, figure: &Figure, joint: [f64; 3], config: &BodyConfig) -> ([f64; 3], Quaternion) {
         let Pose { x, y, heading } = figure.pose;
         let [cosine, sine] = heading.direction();
-        let origin = [x + cosine * joint[0] - sine * joint[1], y + sine * joint[0] + cosine * joint[1], joint[2]];
+        let is_lifted = matches!(self, Self::LeftLeg | Self::RightLeg) && figure.stride != Stride::Standing;
+        let height = joint[2] + if is_lifted { config.shape.lift() } else { 0.0 };
+        let origin = [x + cosine * joint[0] - sine * joint[1], y + sine * joint[0] + cosine * joint[1], height];
         let swing = Quaternion::about_y(-self.swing(figure.stride, config));
         (origin, heading.rotation().after(swing))
     }

@@ -113,16 +113,23 @@ fn study() -> impl Iterator<Item = (i32, i32)> {
     (1..=3).flat_map(|seed| (1..=7).map(move |run| (seed, run)))
 }
 
-/// The places before the mirror in a study's scenes, and those from which cubes hide half of the body or more.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// What cubes hide from the places before the mirror in a study's scenes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Occlusion {
     pub places: usize,
+    /// Those from which half of the body or more is hidden.
     pub hidden: usize,
+    /// The shares of the body that are hidden, over all places.
+    pub shares: f64,
 }
 
 impl Occlusion {
     fn of_shares(shares: &[f64]) -> Self {
-        Self { places: shares.len(), hidden: shares.iter().filter(|share| **share <= 0.5).count() }
+        Self {
+            places: shares.len(),
+            hidden: shares.iter().filter(|share| **share <= 0.5).count(),
+            shares: shares.iter().map(|share| 1.0 - share).sum(),
+        }
     }
 
     /// That of an experiment; `None` where its scenes do not fit into the room.
@@ -130,7 +137,11 @@ impl Occlusion {
         study().try_fold(Self::default(), |sum, (seed, run)| {
             let scene = Scene::draw(config, experiment, seed, run).ok()?;
             let found = reach::occlusion(&config.of(experiment), &scene);
-            Some(Self { places: sum.places + found.places, hidden: sum.hidden + found.hidden })
+            Some(Self {
+                places: sum.places + found.places,
+                hidden: sum.hidden + found.hidden,
+                shares: sum.shares + found.shares,
+            })
         })
     }
 }

@@ -12,7 +12,7 @@ pub enum Look {
     /// Walls of one grey each, mirrors without frame or tint.
     #[default]
     Plain,
-    /// Walls of panels, mirrors with a frame of wood and a slight tint.
+    /// Walls of panels, soft shadows, mirrors with a frame of wood and a slight tint.
     Textured,
 }
 

@@ -6,7 +6,7 @@ use mujoco_rs::prelude::MjtObjBase;
 use super::super::angle::{Heading, Quaternion};
 use super::super::config::WorldConfig;
 use super::super::scene::{Cube, HandShape, HandStart, HungPane, Scene, WornMark};
-use super::{AGENTS, BARS, Item, Look, group};
+use super::{AGENTS, BARS, Item, Look, group, shadow};
 use crate::experiment::spec::{MOST_MARKS, PaneKind};
 use crate::sim::scene::MOST_CUBES;
 use trace::palette::Color;
@@ -32,6 +32,8 @@ pub(super) fn dress(model: &mut MjModel, items: &[Item], config: &WorldConfig, s
             Item::Room => {
                 hide_wall(model, geom, pane.map(|(_, pane)| pane));
                 frame(model, geom, scene, look, config);
+                let name = model.id_to_name(MjtObjBase::mjOBJ_GEOM, geom).unwrap_or_default().to_owned();
+                shadow::dress(model, geom, &name, scene, pane);
             }
             Item::Pane(at) => hang(model, geom, scene.panes.get(at).filter(|_| pane.is_none()), config),
             Item::Cube(at) => put_cube(model, geom, scene.cubes.get(at).filter(|_| !is_window)),
@@ -76,7 +78,7 @@ pub(super) fn show_marks(model: &mut MjModel, items: &[Item], scene: &Scene, t: 
 }
 
 /// The colour that an agent of the room is seen in; `None` where it is not seen so.
-fn agent_color(agent: usize, scene: &Scene, pane: Option<&HungPane>) -> Option<Color> {
+pub(super) fn agent_color(agent: usize, scene: &Scene, pane: Option<&HungPane>) -> Option<Color> {
     let is_window = pane.is_some_and(|pane| pane.kind == PaneKind::Window);
     match (agent.checked_sub(1), pane) {
         _ if is_window => None,

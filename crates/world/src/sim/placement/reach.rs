@@ -27,7 +27,7 @@ const ENOUGH: f64 = 0.75;
 pub(super) fn is_solvable(config: &WorldConfig, scene: &Scene, plan: &FloorPlan) -> bool {
     let near = near(config, scene, plan);
     let shares = shares(config, scene, &near);
-    let Occlusion { places, hidden } = Occlusion::of_shares(&shares);
+    let Occlusion { places, hidden, .. } = Occlusion::of_shares(&shares);
     let has_clutter = matches!(scene.experiment.layout.cubes, Cubes::Clutter { .. }) && !scene.cubes.is_empty();
     let reaches =
         |cube: &Cube| near.iter().any(|spot| cube.square().distance(*spot) <= plan.radius + config.body.step_length);
@@ -47,7 +47,7 @@ fn shares(config: &WorldConfig, scene: &Scene, near: &[[f64; 2]]) -> Vec<f64> {
     near.iter().filter_map(|spot| share_shown(config, scene, *spot)).collect()
 }
 
-/// The places before the mirror in a scene, and those from which cubes hide half of the body or more.
+/// What cubes hide from the places before the mirror in a scene.
 pub(super) fn occlusion(config: &WorldConfig, scene: &Scene) -> Occlusion {
     Occlusion::of_shares(&shares(config, scene, &near(config, scene, &scene.floor_plan(config))))
 }

@@ -112,9 +112,10 @@ fn a_humanoid_has_the_sizes_of_the_standard_one() {
     let world = shaped_world(Body::Humanoid, Experiment::E1, 1);
     let solids = own(&world);
     let part = |name: &str| solids.iter().find(|solid| solid.name == format!("agent0_{name}")).unwrap();
-    let (height, lowest) = own(&world).iter().flat_map(ends).fold((0.0_f64, 9.0_f64), |(top, low), (at, radius)| {
-        (top.max(at[2] + radius), low.min(at[2] - radius))
-    });
+    let (height, lowest) = own(&world)
+        .iter()
+        .flat_map(ends)
+        .fold((0.0_f64, 9.0_f64), |(top, low), (at, radius)| (top.max(at[2] + radius), low.min(at[2] - radius)));
     assert!((height - 1.562).abs() < 1e-6 && lowest.abs() < 1e-6, "{height} {lowest}");
     for (name, radius, length) in [
         ("chest", 0.07, 0.14),

@@ -81,7 +81,8 @@ impl OptionalColumns {
         let experiment = &recording["experiment"];
         let has_marks = experiment["mark"].is_array() || is_there(&experiment["reply"], "mark");
         let panes = experiment["mirror"].as_array().map_or(0, Vec::len);
-        let own_marks = experiment["mark"].as_array().into_iter().flatten().filter(|mark| mark["on"] != "other").count();
+        let own_marks =
+            experiment["mark"].as_array().into_iter().flatten().filter(|mark| mark["on"] != "other").count();
         let is_given = |name: &str| match name {
             "reply_repair" | "reply_fault" => reads_replies,
             "frame_digest" => recording["frame_digest"].is_string(),

@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 
 use super::Experiment;
 use super::spec::{
-    Behavior, Body, BodyShown, Camera, Colors, Cubes, Hand, Look, Mark, MarkColor, Occluders, Others, Paint, Pane, PaneKind, Picture,
-    Start, Stated, Wall, Wearer,
+    Behavior, Body, BodyShown, Camera, Colors, Cubes, Hand, Look, Mark, MarkColor, Occluders, Others, Paint, Pane,
+    PaneKind, Picture, Start, Stated, Wall, Wearer,
 };
 use exact::escape::visible;
 

@@ -7,8 +7,8 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::spec::{
-    AbsentColumn, Actions, Body, BodyShown, Camera, Colors, Cubes, Decision, Look, MOST_MARKS, MOST_PANES, Mark, Others,
-    Paint, PaneKind, Picture, ReplyKey, Start, Stated, Truth, Wall,
+    AbsentColumn, Actions, Body, BodyShown, Camera, Colors, Cubes, Decision, Look, MOST_MARKS, MOST_PANES, Mark,
+    Others, Paint, PaneKind, Picture, ReplyKey, Start, Stated, Truth, Wall,
 };
 use metric::shape::{Fraction, Level};
 use trace::palette::Color;

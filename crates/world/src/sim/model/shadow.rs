@@ -42,6 +42,8 @@ pub(super) fn build(spec: &mut MjSpec) -> Result<(), MjEditError> {
             let geom = spec.world_body_mut().add_geom();
             geom.set_type(MjtGeomBase::mjGEOM_BOX);
             *geom.size_mut() = [1.0, 1.0, RISE / 8.0];
+            // MuJoCo never moves what it finds at the origin when it compiles.
+            *geom.pos_mut() = [0.0, 0.0, -50.0];
             *geom.rgba_mut() = [0.0, 0.0, 0.0, SHADE];
             geom.set_contype(0);
             geom.set_conaffinity(0);

@@ -104,7 +104,7 @@ pub(super) fn assumptions(request: &PlanRequest) -> Vec<String> {
     let Clusters { seeds, icc, people } = request.clusters;
     let cluster = cluster(people);
     let clusters = if request.clusters.are_units() {
-        let design = if people { "of a crossed study" } else { "where seeds are declared clusters" };
+        let design = if people { "in a crossed study" } else { "where seeds are declared clusters" };
         format!(
             "{cluster}s: intraclass correlation {icc}, so that tests count the {seeds} {cluster}s, as `stats` does {design}; \
              an episode has the outcome of its {cluster} with probability {}, and one of its own otherwise",

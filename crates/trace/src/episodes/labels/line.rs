@@ -108,7 +108,7 @@ pub enum LabelsError {
         source: io::Error,
     },
     /// A line that is no label.
-    #[error("{}, line {line}: {problem}\n  help: correct or remove the line; `labels` in docs/how-to/view.md has an example", .path.display())]
+    #[error("{}, line {line}: {problem}\n  help: correct or remove the line; docs/how-to/view.md has examples", .path.display())]
     Line {
         /// The list.
         path: PathBuf,

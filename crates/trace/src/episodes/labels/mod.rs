@@ -51,9 +51,9 @@ pub fn append(list: &Path, line: &LabelLine) -> Result<(), LabelsError> {
     text.push('\n');
     // A list that was edited by hand may end without a line feed.
     if file.seek(SeekFrom::End(0)).map_err(failed)? > 0 {
-        let mut last = [0];
-        file.seek(SeekFrom::End(-1)).and_then(|_| file.read_exact(&mut last)).map_err(failed)?;
-        if last != *b"\n" {
+        let mut end = [0];
+        file.seek(SeekFrom::End(-1)).and_then(|_| file.read_exact(&mut end)).map_err(failed)?;
+        if end != *b"\n" {
             text.insert(0, '\n');
         }
     }

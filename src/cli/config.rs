@@ -189,7 +189,6 @@ impl<'a> OptionFile<'a> {
         if self.faults.is_empty() { Ok(result) } else { Err(Failure::Faults(Faults(self.faults).in_order())) }
     }
 
-    /// Adds a fault.
     pub fn fault(&mut self, span: Range<usize>, message: String, help: Option<String>) {
         let place = Place { source: self.source.clone(), span };
         self.faults.push(Fault::new(place, message).help_if(help));

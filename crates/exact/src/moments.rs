@@ -10,7 +10,6 @@ use serde::{Deserialize, Serialize};
 pub struct Moments {
     /// The number of defined values.
     pub n: u64,
-    /// Their sum.
     pub sum: i128,
     /// The sum of their squares.
     pub sum_sq: i128,

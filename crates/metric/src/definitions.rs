@@ -181,7 +181,6 @@ pub enum ReplaceError {
          help: name the condition in the definition file, `{name} = \"mirror_visible\"` under `[let]`, and use it in the metrics"
     )]
     NoLet {
-        /// The name.
         name: String,
         /// Those that there are.
         found: String,
@@ -192,7 +191,6 @@ pub enum ReplaceError {
          help: let `{name}` say at which steps there is evidence, such as \"mirror_visible\""
     )]
     NoCondition {
-        /// The name.
         name: String,
         /// Its type and level.
         found: String,
@@ -218,7 +216,6 @@ pub struct UnknownMetric {
     pub name: String,
     /// The metric whose name is most like it.
     pub near: Option<String>,
-    /// All metrics.
     pub known: Vec<String>,
 }
 

@@ -61,7 +61,6 @@ pub enum Field {
 
 /// An error of an errata file.
 #[derive(Debug, thiserror::Error)]
-#[expect(missing_docs, reason = "the messages say it")]
 pub enum ErrataError {
     #[error("errata {}: cannot read the file: {source}", path.display())]
     Unreadable { path: PathBuf, source: io::Error },

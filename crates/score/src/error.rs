@@ -18,7 +18,6 @@ pub enum EngineError {
         "the column `{column}` has the type {found}; expected booleans, 64-bit integers, doubles or a dictionary of text"
     )]
     ColumnType {
-        /// The column.
         column: String,
         /// Its Arrow type.
         found: String,
@@ -34,7 +33,6 @@ pub enum EngineError {
     /// A metric that declares itself a rate has another value than 0 or 1.
     #[error("`{metric}` declares the unit `rate`, but an episode has {value}; a rate is 0 or 1 an episode")]
     NotARate {
-        /// The metric.
         metric: String,
         /// The value found.
         value: i64,

@@ -83,12 +83,10 @@ pub enum EvidenceError {
     /// The traces or definitions are not as they must be.
     #[error(transparent)]
     Score(#[from] ScoreError),
-    /// No such episode.
     #[error("no episode `{wanted}` among the {episodes} of the traces; {}", .near.as_ref().map_or_else(|| "`mirrorstats score` lists them".to_owned(), |near| format!("did you mean `{near}`?")))]
     NoSuchEpisode {
         /// The name given.
         wanted: String,
-        /// The number of episodes.
         episodes: u64,
         /// The episode whose name is most like it.
         near: Option<String>,

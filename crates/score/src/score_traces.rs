@@ -73,7 +73,6 @@ pub enum ScoreError {
     Column {
         /// The metric, or `--where`.
         wanted_by: String,
-        /// The column.
         column: String,
         /// The problem, with its file.
         problem: String,
@@ -95,7 +94,6 @@ pub enum ScoreError {
     Engine {
         /// The file of the batch.
         file: String,
-        /// The error.
         source: EngineError,
     },
 }

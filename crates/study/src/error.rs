@@ -79,9 +79,7 @@ pub enum StudyError {
          help: give traces that record it, as those of `mirrorstats record` do; `mirrorstats trace info` lists the columns"
     )]
     NoPixels {
-        /// The column.
         column: &'static str,
-        /// The problem.
         problem: String,
     },
     /// Steps that do not record what a threshold is of.
@@ -91,7 +89,6 @@ pub enum StudyError {
          help: --where \"all({column} is not null)\" keeps the episodes that have them"
     )]
     PixelsMissing {
-        /// The column.
         column: &'static str,
         /// The number of steps, and of their episodes.
         steps: String,
@@ -106,7 +103,6 @@ pub enum StudyError {
     NothingMoves {
         /// The `let`.
         name: &'static str,
-        /// The metrics.
         metrics: String,
     },
     /// Evidence that cannot be replaced.
@@ -131,7 +127,6 @@ pub enum StudyError {
     File {
         /// The file.
         name: String,
-        /// The error.
         source: Box<dyn Error + Send + Sync>,
     },
     /// No file at all.
@@ -162,7 +157,6 @@ pub enum StudyError {
          help: score the traces again with --definitions {wanted}"
     )]
     OtherDefinitions {
-        /// The file.
         file: String,
         /// The definitions asked for.
         wanted: String,
@@ -198,7 +192,6 @@ pub enum StudyError {
          or with a table `[experiment.{experiment}]`; `--where` leaves its episodes out"
     )]
     NotScored {
-        /// The experiment.
         experiment: String,
         /// The definitions that were asked for.
         definitions: String,
@@ -239,7 +232,6 @@ pub enum StudyError {
     NoTable {
         /// The name asked for.
         name: String,
-        /// The style.
         style: String,
         /// The tables that there are.
         known: String,
@@ -251,7 +243,6 @@ pub enum StudyError {
         "{metric}: expected a metric with `better = \"higher\"` or \"lower\", found none\n  help: name another metric with --metric"
     )]
     NoDirection {
-        /// The metric.
         metric: String,
     },
     /// A filter that keeps no episode.
@@ -305,7 +296,6 @@ pub enum StudyError {
     /// The colours of an import cannot be taken.
     #[error("--palette {typed}: {words}")]
     Palette {
-        /// As typed.
         typed: String,
         /// The problem, and a remedy.
         words: String,

@@ -41,7 +41,6 @@ pub enum TraceError {
     /// A file cannot be taken over into another trace.
     #[error("cannot take over the episodes of `{file}`: {source}")]
     Part {
-        /// The file.
         file: String,
         /// The reason for the refusal.
         source: Box<dyn std::error::Error + Send + Sync>,
@@ -74,7 +73,6 @@ pub enum TraceError {
         episode: String,
         /// The rule.
         expected: String,
-        /// The value found.
         found: String,
     },
     /// The trace could not be written; no file was left behind.

@@ -102,9 +102,7 @@ pub struct Origin {
 /// The totals of a scan.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ScanSummary {
-    /// Whole episodes.
     pub episodes: u64,
-    /// Their steps.
     pub steps: u64,
 }
 

@@ -54,7 +54,6 @@ pub struct Excerpt {
     pub head: Vec<Vec<Option<String>>>,
     /// The last rows that are not among the first.
     pub tail: VecDeque<Vec<Option<String>>>,
-    /// The number of rows.
     pub rows: usize,
 }
 

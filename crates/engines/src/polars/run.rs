@@ -10,7 +10,6 @@ use metric::sql::LoweringError;
 use score::score_traces::ScoreError;
 use trace::catch_panic::contained_on_all_threads;
 
-/// An error of Polars.
 #[derive(Debug, thiserror::Error)]
 pub enum PolarsError {
     /// The traces or definitions are not as they must be.
@@ -36,7 +35,6 @@ pub enum PolarsError {
     /// A metric that declares itself a rate has another value than 0 or 1.
     #[error("`{metric}` declares the unit `rate`, but an episode has {value}; a rate is 0 or 1 an episode")]
     NotARate {
-        /// The metric.
         metric: String,
         /// The value found.
         value: i64,

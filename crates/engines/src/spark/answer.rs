@@ -14,7 +14,6 @@ use score::table::{EpisodeKey, EpisodeTable, Header};
 use trace::colors;
 use trace::diagnostic::{Code, Finding};
 
-/// The answer.
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Answer {

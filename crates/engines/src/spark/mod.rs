@@ -118,7 +118,6 @@ pub enum SparkError {
         "`{uri}`: expected Parquet files, or folders with *.parquet in them, found none; files that begin with `_` or `.` are passed over"
     )]
     Empty {
-        /// The URI.
         uri: String,
     },
     /// A file's column is not as the definitions need it.
@@ -128,7 +127,6 @@ pub enum SparkError {
     Column {
         /// The file, as Spark names it.
         file: String,
-        /// The column.
         column: String,
         /// The requirement.
         expected: String,
@@ -143,7 +141,6 @@ pub enum SparkError {
     Rows {
         /// By the footers.
         expected: u64,
-        /// By Spark.
         found: u64,
     },
     /// A rule of the traces does not hold.
@@ -160,7 +157,6 @@ pub enum SparkError {
         /// The time given.
         seconds: u32,
     },
-    /// Spark failed.
     #[error("Spark: {cause}\n  help: --spark-log FILE keeps Spark's own log")]
     Failed {
         /// The innermost cause, in one line.

@@ -19,7 +19,6 @@ pub enum SettingError {
     /// A setting that mirrorstats makes itself.
     #[error("`{key}` cannot be set: {why}")]
     Fixed {
-        /// The key.
         key: String,
         /// The reason.
         why: &'static str,

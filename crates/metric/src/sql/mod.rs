@@ -59,7 +59,6 @@ pub enum LoweringError {
     /// Two metrics whose names are one without quotes.
     #[error("two metrics would both be called `{name}`; choose --dialect spark or duckdb")]
     SameName {
-        /// The name.
         name: String,
     },
     /// Too long a statement.

@@ -67,7 +67,6 @@ pub struct Figure<'a> {
 
 /// An error while making a page.
 #[derive(Debug, thiserror::Error)]
-#[expect(missing_docs, reason = "the messages say it")]
 pub enum HtmlError {
     #[error(transparent)]
     Grouping(#[from] GroupError),

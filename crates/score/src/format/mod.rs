@@ -81,9 +81,7 @@ pub enum FormatError {
         line: usize,
         /// Its name.
         column: String,
-        /// The expected value.
         expected: &'static str,
-        /// The value found.
         found: String,
     },
     /// An episode that no scoring can have given.
@@ -91,7 +89,6 @@ pub enum FormatError {
     Episode {
         /// Its id.
         episode: String,
-        /// The column.
         column: String,
         /// The expected columns.
         expected: String,

@@ -43,7 +43,6 @@ pub enum Shape {
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Step {
     pub kernel: Kernel,
-    /// Their type.
     pub ty: Type,
     pub shape: Shape,
 }

@@ -63,7 +63,6 @@ pub struct EpisodeKey {
 
 /// An [`EpisodeKey`] in a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[expect(missing_docs, reason = "the fields are those of `EpisodeKey`")]
 pub struct KeyRef<'a> {
     pub experiment: &'a str,
     pub model: &'a str,
@@ -99,7 +98,6 @@ pub struct MetricColumn {
 pub(crate) enum MetricValues {
     /// Truth values, for 0 and 1.
     Bools(BooleanArray),
-    /// Integers.
     Ints(Int64Array),
 }
 
@@ -154,7 +152,6 @@ impl EpisodeTable {
         self.metrics.iter().find(|metric| metric.name == name)
     }
 
-    /// The number of episodes.
     pub fn len(&self) -> usize {
         self.keys.len()
     }

@@ -45,7 +45,6 @@ pub struct DiffRequest {
     pub by: Vec<String>,
     /// The definitions of scores that do not carry them; the default ones if absent.
     pub definitions_of_scores: Option<PathBuf>,
-    /// The number of threads.
     pub threads: NonZeroUsize,
 }
 

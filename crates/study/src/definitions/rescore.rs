@@ -33,7 +33,6 @@ pub struct RescoreRequest {
     pub style: Option<PathBuf>,
     /// Other metrics than the report's.
     pub metrics: Option<Vec<String>>,
-    /// The number of threads.
     pub threads: NonZeroUsize,
 }
 

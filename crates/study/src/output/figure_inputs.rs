@@ -34,7 +34,6 @@ impl Default for FigureOptions {
     }
 }
 
-/// The inputs of figures.
 #[derive(Debug)]
 pub struct FigureInputs<'a> {
     cells: Cells,

@@ -30,7 +30,6 @@ pub enum ProvenanceError {
     /// A manifest that does not say what a report was made of.
     #[error("{}: expected the manifest of a report, found {found}; make the report again with `mirrorstats report`", path.display())]
     Malformed {
-        /// The path.
         path: PathBuf,
         /// The problem.
         found: String,

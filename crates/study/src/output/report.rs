@@ -59,7 +59,6 @@ pub struct Report {
     pub tables: Vec<MetricTable>,
     /// Ranks, if the style marks ties, and what became of the replies, if the inputs are traces.
     pub lists: Vec<ListTable>,
-    /// The manifest.
     pub manifest: Manifest,
     /// The number of replies without a decision; `None` without any, and if it is not recorded.
     pub replies: Option<String>,

@@ -70,13 +70,11 @@ pub enum VerifyError {
     NoManifest {
         /// The folder.
         path: PathBuf,
-        /// The value found.
         found: String,
     },
     /// A manifest that is invalid of a report, or lists what cannot be a file of it.
     #[error("{}: expected the manifest of a report, found {found}; make the report again with `mirrorstats report`", path.display())]
     Malformed {
-        /// The path.
         path: PathBuf,
         /// The problem.
         found: String,
@@ -84,7 +82,6 @@ pub enum VerifyError {
     /// A file or a folder that cannot be read.
     #[error("{}: expected a file or folder that can be read, found {source}; check its permissions", path.display())]
     Unreadable {
-        /// The path.
         path: PathBuf,
         /// The reason for the refusal.
         source: io::Error,

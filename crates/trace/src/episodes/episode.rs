@@ -6,7 +6,6 @@ use serde::{Deserialize, Serialize};
 /// The steps of one episode. Its JSON holds the constants alone, as logs do.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(rename = "Head", description = "The constants of an episode; the columns of the same names.")]
-#[expect(missing_docs, reason = "each field is the column of its name, documented in `schema`")]
 pub struct Episode {
     pub episode_id: String,
     pub model: String,
@@ -139,7 +138,6 @@ macro_rules! optional {
 optional! {
     /// The optional columns that vary from step to step; names, types and units as in the schema.
     #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-    #[expect(missing_docs, reason = "each field is the column of its name, documented in `schema`")]
     Extra {
         mirror_self_px: i32,
         mirror_other_px: i32,

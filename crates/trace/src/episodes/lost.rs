@@ -45,7 +45,6 @@ pub enum LostListError {
     /// The operating system refuses.
     #[error("cannot read {}: {source}", .path.display())]
     Io {
-        /// The list.
         path: PathBuf,
         /// The error of the system.
         source: io::Error,
@@ -57,7 +56,6 @@ pub enum LostListError {
         .path.display()
     )]
     Line {
-        /// The list.
         path: PathBuf,
         /// From 1.
         line: usize,

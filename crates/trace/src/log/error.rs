@@ -13,7 +13,6 @@ pub enum LogError {
     Io {
         /// The operation.
         doing: &'static str,
-        /// The log.
         file: String,
         /// The reason for the refusal.
         source: io::Error,
@@ -23,15 +22,12 @@ pub enum LogError {
         "the log `{file}` is damaged: {fault}\n  help: `mirrorstats trace recover {file} -o TRACE.parquet` saves what can be saved"
     )]
     Damaged {
-        /// The log.
         file: String,
-        /// The fault.
         fault: String,
     },
     /// The bytes are those of a log, but not of a recording.
     #[error("`{file}` is no log of a recording: {fault}")]
     Foreign {
-        /// The log.
         file: String,
         /// The missing part.
         fault: String,

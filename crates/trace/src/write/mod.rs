@@ -58,7 +58,6 @@ const OF_OTHER_TASKS: [&str; 9] = [
 ];
 
 impl OptionalColumns {
-    /// No optional column.
     pub const NONE: Self = Self { given: Vec::new(), absent: Vec::new() };
 
     pub fn all() -> Self {

@@ -29,7 +29,6 @@ static FONTS: LazyLock<Arc<Database>> = LazyLock::new(|| {
 
 /// A figure that could not be converted.
 #[derive(Debug, thiserror::Error)]
-#[expect(missing_docs, reason = "the messages say it")]
 pub enum ConvertError {
     #[error("the figure's SVG cannot be read back; please report this with the model names of the data")]
     Svg(#[from] resvg::usvg::Error),

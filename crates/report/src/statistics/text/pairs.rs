@@ -38,7 +38,6 @@ pub struct PairText<'a> {
     pub difference: [String; 2],
     /// Its interval, or why there is none.
     pub interval: [String; 2],
-    /// The p value.
     pub p: String,
     /// The same, adjusted by Holm's method.
     pub p_adjusted: String,

@@ -17,7 +17,6 @@ pub struct Palette(Vec<String>);
 
 /// An error of a palette.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[expect(missing_docs, reason = "the messages say it")]
 pub enum NoPalette {
     #[error("expected at least one colour, found none")]
     Empty,

@@ -78,10 +78,7 @@ pub enum StudyError {
         "expected traces with the column `{column}`, to which a threshold applies: {problem}\n  \
          help: give traces that record it, as those of `mirrorstats record` do; `mirrorstats trace info` lists the columns"
     )]
-    NoPixels {
-        column: &'static str,
-        problem: String,
-    },
+    NoPixels { column: &'static str, problem: String },
     /// Steps that do not record what a threshold is of.
     #[error(
         "{column}: expected a value at every step, found {steps} without one, for example in `{episode}`: a threshold does \
@@ -242,9 +239,7 @@ pub enum StudyError {
     #[error(
         "{metric}: expected a metric with `better = \"higher\"` or \"lower\", found none\n  help: name another metric with --metric"
     )]
-    NoDirection {
-        metric: String,
-    },
+    NoDirection { metric: String },
     /// A filter that keeps no episode.
     #[error("{words}\n  help: give a filter that holds for some of them, or none")]
     EmptyFilter {

@@ -65,6 +65,7 @@ use score::evidence::{self, Evidence};
 use score::lost_counts::LostCounts;
 use score::score_traces;
 use score::table::EpisodeTable;
+use score::vocabulary;
 use trace::checksums::stale_note;
 use trace::inputs::Input;
 use trace::open::TraceSet;
@@ -216,7 +217,7 @@ impl Study {
     fn checked(mut self) -> Result<Self, StudyError> {
         if let Source::Traces(traces) = &self.source {
             self.question = self.question.resolved(traces)?;
-            self.question.bind_to(&score_traces::trace_columns(traces))?;
+            self.question.bind_to(&vocabulary::trace_columns(traces))?;
         }
         Ok(self)
     }

@@ -112,6 +112,12 @@ impl TraceError {
 
 impl From<Finding> for TraceError {
     fn from(finding: Finding) -> Self {
-        Self::Finding { first: Box::new(finding), more: 0 }
+        Box::new(finding).into()
+    }
+}
+
+impl From<Box<Finding>> for TraceError {
+    fn from(first: Box<Finding>) -> Self {
+        Self::Finding { first, more: 0 }
     }
 }

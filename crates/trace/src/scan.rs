@@ -150,7 +150,7 @@ impl TraceSet {
         let passed = pass(self.files(), &layout, threads, &checked, |_, event| {
             let checked = match event {
                 Event::Whole(checked) => checked,
-                Event::Fault(finding) => return Err(TraceError::from(*finding).into()),
+                Event::Fault(finding) => return Err(TraceError::from(finding).into()),
             };
             prints.add(&checked.ids);
             spellings.add(checked.colors);
@@ -162,12 +162,12 @@ impl TraceSet {
             })?;
             match checked.result {
                 Ok(result) => sink(result?),
-                Err(finding) => Err(TraceError::from(*finding).into()),
+                Err(finding) => Err(TraceError::from(finding).into()),
             }
         });
         // An id that was there before is found at the end, though it comes before whatever ended the pass.
         if let Some(finding) = prints.first_repeated(self.files(), &layout)? {
-            return Err(TraceError::from(*finding).into());
+            return Err(TraceError::from(finding).into());
         }
         passed?;
         // That two names are spellings of one colour shows when all are known.

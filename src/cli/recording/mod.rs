@@ -1,6 +1,7 @@
 //! Messages of `record` on standard error while it runs and when it has ended: progress, and time by part.
 
 pub mod dry_run;
+pub mod episodes;
 pub mod exec;
 #[cfg(feature = "view")]
 pub mod human;

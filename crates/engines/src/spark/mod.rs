@@ -117,9 +117,7 @@ pub enum SparkError {
     #[error(
         "`{uri}`: expected Parquet files, or folders with *.parquet in them, found none; files that begin with `_` or `.` are passed over"
     )]
-    Empty {
-        uri: String,
-    },
+    Empty { uri: String },
     /// A file's column is not as the definitions need it.
     #[error(
         "column `{column}` of {file}: expected {expected}, found {found}; write it with this type in all traces, or choose other metrics with --metrics"

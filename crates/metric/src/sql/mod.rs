@@ -58,9 +58,7 @@ pub enum LoweringError {
     },
     /// Two metrics whose names are one without quotes.
     #[error("two metrics would both be called `{name}`; choose --dialect spark or duckdb")]
-    SameName {
-        name: String,
-    },
+    SameName { name: String },
     /// Too long a statement.
     #[error(
         "the statement exceeds {limit} bytes; choose fewer metrics with --metrics, or raise the limit: {SETTING}=10 in the environment"

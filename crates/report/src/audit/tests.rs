@@ -8,7 +8,7 @@ use exact::number::Decimal;
 use exact::rounding::Rounding;
 use metric::definitions::Definitions;
 use metric::implied::implied;
-use score::score_traces::{has_value, schema_columns};
+use score::vocabulary::{has_value, schema_columns};
 
 fn audited(files: &[(&str, &str)], style: &str) -> Audit {
     audited_under(files, style, &Rounding::ALL)

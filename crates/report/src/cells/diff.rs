@@ -345,8 +345,8 @@ mod tests {
     use super::{Changes, Evidence};
     use metric::definitions::Definitions;
     use score::evidence::MetricEvidence;
-    use score::score_traces::schema_columns;
     use score::table::{Declared, EpisodeKey, EpisodeTable, MetricColumn};
+    use score::vocabulary::schema_columns;
 
     const RATE: &str = "[metric.R]\nvalue = \"length() > 2\"";
 

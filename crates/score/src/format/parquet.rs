@@ -311,8 +311,8 @@ mod tests {
 
     use super::*;
     use crate::format::{self, Format};
-    use crate::score_traces::schema_columns;
     use crate::table::{EpisodeKey, MetricColumn};
+    use crate::vocabulary::schema_columns;
     use metric::definitions::Definitions;
 
     fn table() -> EpisodeTable {

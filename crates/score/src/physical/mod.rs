@@ -294,7 +294,7 @@ impl PhysicalPlan {
 #[cfg(test)]
 mod tests {
     use super::PhysicalPlan;
-    use crate::score_traces::schema_columns;
+    use crate::vocabulary::schema_columns;
     use metric::definitions::Definitions;
 
     fn paper() -> Definitions {

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::chance;
 use crate::interval::{Interval, wilson};
+use crate::outcomes::ExactTest;
 use exact::ratio::Ratio;
 
 /// The 2x2 table of paired outcomes.
@@ -70,6 +71,11 @@ impl Pairs {
             (_, 0) => Some(1.0),
             (_, discordant) => Some(chance::exact_test(self.first_only, discordant, Ratio::new(1, 2)?)?.mid_p),
         }
+    }
+
+    /// [`Pairs::mcnemar`] and its mid-p value.
+    pub fn test(self) -> Option<ExactTest> {
+        Some(ExactTest { p: self.mcnemar()?, mid_p: self.mcnemar_mid_p()? })
     }
 
     /// The least p value that [`Pairs::mcnemar`] could have given with as many discordant pairs: 2^(1 - d).

@@ -22,6 +22,7 @@ use score::evidence::{self, Evidence};
 use score::flips;
 use score::score_traces::{self, ScoreError};
 use score::table::EpisodeTable;
+use score::vocabulary;
 use trace::inputs::{self, Input};
 use trace::open::TraceSet;
 
@@ -173,7 +174,7 @@ impl Side {
     ) -> Result<(Vec<String>, Option<EpisodeTable>), StudyError> {
         match self {
             Self::Definitions(name) => {
-                let columns = traces.map_or_else(score_traces::schema_columns, score_traces::trace_columns);
+                let columns = traces.map_or_else(vocabulary::schema_columns, vocabulary::trace_columns);
                 let definitions = Definitions::load(name, &columns)?;
                 Ok((definitions.catalog.metric.keys().cloned().collect(), None))
             }

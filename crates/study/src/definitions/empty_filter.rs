@@ -15,6 +15,7 @@ use report::cells::KeyValue;
 use report::cells::group::{KEY_COLUMNS, column_values};
 use score::score_traces;
 use score::table::EpisodeTable;
+use score::vocabulary;
 
 /// Values of a column that are listed.
 const LISTED: usize = 8;
@@ -57,9 +58,9 @@ impl Study {
             Source::Traces(traces) => traces,
         };
         let is_label =
-            |name: &&String| !KEY_COLUMNS.contains(&name.as_str()) && score_traces::check_label(traces, name).is_ok();
+            |name: &&String| !KEY_COLUMNS.contains(&name.as_str()) && vocabulary::check_label(traces, name).is_ok();
         let labels: Vec<String> = names.iter().filter(is_label).cloned().collect();
-        let known = whole.load(&score_traces::trace_columns(traces))?.catalog.metric;
+        let known = whole.load(&vocabulary::trace_columns(traces))?.catalog.metric;
         let metrics = names.iter().filter(|name| known.contains_key(*name)).cloned().collect();
         let question = Question { metrics: Some(metrics), ..whole };
         Ok(score_traces::score(traces, &question.bind(traces)?, &labels, self.threads)?)

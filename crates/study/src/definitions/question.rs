@@ -6,8 +6,8 @@ use ::report::cells::group::{CONDITION, DEFAULT_BY, KEY_COLUMNS};
 use metric::columns::Columns;
 use metric::definitions::Definitions;
 use score::declared_experiments::declare;
-use score::score_traces;
 use score::table::EpisodeTable;
+use score::vocabulary;
 use trace::open::TraceSet;
 
 use crate::StudyError;
@@ -73,8 +73,8 @@ impl Question {
 
     pub(crate) fn bind(&self, traces: &TraceSet) -> Result<Definitions, StudyError> {
         let asked = self.clone().resolved(traces)?;
-        let mut definitions = asked.bind_to(&score_traces::trace_columns(traces))?;
-        score_traces::check_columns(traces, &definitions)?;
+        let mut definitions = asked.bind_to(&vocabulary::trace_columns(traces))?;
+        vocabulary::check_columns(traces, &definitions)?;
         declare(&mut definitions.catalog, traces)?;
         Ok(definitions)
     }
@@ -97,6 +97,6 @@ impl Question {
 /// # Errors
 /// Every fault of the definitions.
 pub fn known_experiments(definitions: &Path) -> Result<Option<Vec<String>>, StudyError> {
-    let catalog = Definitions::load(definitions, &score_traces::schema_columns())?.catalog;
+    let catalog = Definitions::load(definitions, &vocabulary::schema_columns())?.catalog;
     Ok((!catalog.open).then(|| catalog.experiment.keys().cloned().collect()))
 }

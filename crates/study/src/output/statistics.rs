@@ -5,8 +5,8 @@ use ::report::plan::departures::Looks;
 use ::report::statistics::{Options, Replies, Selection, Sequential, Statistics};
 use metric::names::is_about;
 use score::lost_counts::LostCounts;
-use score::score_traces;
 use score::table::EpisodeTable;
+use score::vocabulary;
 
 use crate::design::design_of;
 use crate::losses::Counted;
@@ -17,7 +17,7 @@ impl Study {
     /// The filter; it is by results where it asks for more than what is recorded of an episode before it begins.
     pub(crate) fn selection(&self, episodes: &EpisodeTable) -> Option<Selection> {
         let condition = self.question.filter.clone()?;
-        let is_key = |name: &str| episodes.label(name).is_some() || score_traces::is_constant(name);
+        let is_key = |name: &str| episodes.label(name).is_some() || vocabulary::is_constant(name);
         let by_results = !is_about(&condition, &is_key);
         Some(Selection { condition, by_results })
     }

@@ -8,7 +8,7 @@ use exact::escape::visible;
 use metric::catalog::{Catalog, Experiment};
 use metric::definitions::Definitions;
 use score::declared_experiments::{DeclarationError, faults, listed, spelled};
-use score::score_traces::schema_columns;
+use score::vocabulary::schema_columns;
 use trace::declared_experiment::DeclaredExperiment;
 use trace::diagnostic::{Code, Finding};
 use trace::inputs::Input;

@@ -21,10 +21,7 @@ pub enum LogError {
     #[error(
         "the log `{file}` is damaged: {fault}\n  help: `mirrorstats trace recover {file} -o TRACE.parquet` saves what can be saved"
     )]
-    Damaged {
-        file: String,
-        fault: String,
-    },
+    Damaged { file: String, fault: String },
     /// The bytes are those of a log, but not of a recording.
     #[error("`{file}` is no log of a recording: {fault}")]
     Foreign {

@@ -4,6 +4,8 @@ pub(crate) mod budget;
 mod checks;
 pub(crate) mod decode;
 mod episode_index;
+
+pub(crate) mod file;
 pub(crate) mod flat;
 pub(crate) mod footer;
 pub mod in_order;

@@ -16,8 +16,9 @@ use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReader;
 
 use super::damaged::damaged;
+use super::file::{Readable, TraceFile};
 use super::footer::plain;
-use super::open::{Readable, TraceFile, TraceSet};
+use super::open::TraceSet;
 use super::projection::Layout;
 use crate::catch_panic::contained;
 use crate::diagnostic::{Code, Finding};
@@ -89,7 +90,7 @@ impl Steps {
             Field::new(name, data_type(set, name, kind), true)
         };
         let schema = Arc::new(Schema::new(names.iter().map(field).collect::<Vec<_>>()));
-        let files = set.files().iter().map(|file| Part::of_file(file).map_err(|found| TraceError::from(*found)));
+        let files = set.files().iter().map(|file| Part::of_file(file).map_err(TraceError::from));
         let parts: Vec<Vec<Part>> = files.collect::<Result<_, _>>()?;
         let parts = parts.into_iter().flatten().collect::<Vec<_>>().into_iter();
         let shape = Shape { schema, episodes: episodes.map(Arc::new) };
@@ -108,7 +109,7 @@ impl Steps {
             let Some(Ahead { name, rows }) = self.ahead.front() else { return Ok(None) };
             let expected = "a row group that can be read";
             let gone = || Box::new(Finding::new(Code::Unreadable, name, expected, "a thread that ended early"));
-            match rows.recv().map_err(|_| TraceError::from(*gone()))?? {
+            match rows.recv().map_err(|_| TraceError::from(gone()))?? {
                 None => drop(self.ahead.pop_front()),
                 some => return Ok(some),
             }
@@ -196,9 +197,9 @@ impl Part {
     }
 
     fn send(self, shape: &Shape, sender: &SyncSender<Rows>) -> Result<(), TraceError> {
-        let mut reader = self.reader(&shape.schema).map_err(|found| TraceError::from(*found))?;
+        let mut reader = self.reader(&shape.schema)?;
         while let Some(rows) = reader.next() {
-            let rows = shape.complete(&rows.map_err(|found| TraceError::from(*found))?)?;
+            let rows = shape.complete(&rows?)?;
             if sender.send(Ok(Some(rows))).is_err() {
                 break;
             }

@@ -143,8 +143,8 @@ impl<W: Write + Send> TraceEncoder<W> {
     }
 
     fn with(make: Make<W>, out: W, metadata: &TraceMetadata) -> Result<Self, TraceError> {
-        let recording = metadata.recording.as_ref().map(ToString::to_string);
-        let palette = Declared::of("stream", recording.as_deref()).map_err(|finding| *finding)?.palette;
+        let recording = metadata.recording.as_ref().unwrap_or(&serde_json::Value::Null);
+        let palette = Declared::of("stream", recording).map_err(|finding| *finding)?.palette;
         let (columns, undeclared) = metadata.columns.split();
         let gathered = Gathered::of_columns(columns.iter().copied());
         let file = make(out, &gathered.layout, metadata.recording.as_ref()).map_err(failed)?;

@@ -35,9 +35,6 @@ impl Moments {
     }
 
     /// These moments and some zeros and ones.
-    ///
-    /// # Errors
-    /// As [`Moments::with`].
     pub fn with_truths(self, zeros: usize, ones: usize) -> Result<Self, MomentOverflow> {
         let (n, sum) = ((zeros + ones) as u64, ones as i128);
         Ok(Self {

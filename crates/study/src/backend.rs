@@ -56,9 +56,6 @@ impl SparkJob {
     }
 
     /// URIs that Spark alone can read.
-    ///
-    /// # Errors
-    /// Every fault of the definitions.
     pub fn of_uris(uris: Vec<String>, question: &Question, cluster: Cluster) -> Result<Self, StudyError> {
         let definitions = question.bind_to(&score::vocabulary::unknown_columns())?;
         let (sources, labels, read) = (Sources::Uris(uris), question.labels(), Vec::new());
@@ -71,9 +68,6 @@ impl SparkJob {
     }
 
     /// The scores, brought here.
-    ///
-    /// # Errors
-    /// Whatever Spark, its absence, or the traces give.
     pub fn score(&self) -> Result<EpisodeTable, StudyError> {
         Ok(spark::score(self.job(), &self.cluster)?)
     }

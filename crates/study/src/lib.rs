@@ -347,9 +347,6 @@ impl Study {
     }
 
     /// As [`Study::explain`], of an episode that is known to be in one of the inputs: no other is read.
-    ///
-    /// # Errors
-    /// As [`Study::explain`].
     pub fn explain_in(&self, input: &Input, episode_id: &str) -> Result<Evidence, StudyError> {
         // Bound to its own columns: beside other tasks a trace may lack those that are theirs.
         let one = TraceSet::open(std::slice::from_ref(input))?;
@@ -358,9 +355,6 @@ impl Study {
     }
 
     /// As [`Study::explain_in`], for each of these episodes that the input has, by its id: one pass over it.
-    ///
-    /// # Errors
-    /// As [`Study::explain`].
     pub fn explain_each_in(
         &self,
         input: &Input,

@@ -229,9 +229,6 @@ impl Pair {
     }
 
     /// The changes between the sides, for the requested metrics.
-    ///
-    /// # Errors
-    /// Columns to group by that a side does not have; sums that leave 128 bits.
     pub(crate) fn changes(&self, by: &[String]) -> Result<Changes, StudyError> {
         let mut changes = Changes::of(&self.before.table, &self.after.table, by)?;
         changes.metrics = Overlap::of(&self.before.metrics, &self.after.metrics);
@@ -239,9 +236,6 @@ impl Pair {
     }
 
     /// Adds the timesteps that decided each flip; returns what there is to say about those that are not known.
-    ///
-    /// # Errors
-    /// Faults in the rows of the traces.
     pub(crate) fn explain(
         &self,
         changes: &mut Changes,

@@ -22,9 +22,6 @@ const LISTED: usize = 8;
 
 impl Study {
     /// Refuses an answer about no episode where the filter is why there is none.
-    ///
-    /// # Errors
-    /// [`StudyError::EmptyFilter`]; what is wrong with the inputs without the filter.
     pub(crate) fn check_filter(&self, episodes: usize) -> Result<(), StudyError> {
         match self.empty_filter(episodes)? {
             None => Ok(()),

@@ -93,9 +93,6 @@ impl Question {
 }
 
 /// The experiments that some definitions know; any if `None`.
-///
-/// # Errors
-/// Every fault of the definitions.
 pub fn known_experiments(definitions: &Path) -> Result<Option<Vec<String>>, StudyError> {
     let catalog = Definitions::load(definitions, &vocabulary::schema_columns())?.catalog;
     Ok((!catalog.open).then(|| catalog.experiment.keys().cloned().collect()))

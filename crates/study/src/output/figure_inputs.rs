@@ -70,9 +70,6 @@ impl<'a> FigureInputs<'a> {
     }
 
     /// The same for a page or a folder of all figures: of many models the best, which the captions say.
-    ///
-    /// # Errors
-    /// As [`FigureInputs::of`].
     pub fn of_a_report(results: &'a Results, style: &'a Style) -> Result<Self, StudyError> {
         let all = Self::of(results, style)?;
         let metric = results.episodes.catalog.metric.iter().find(|(_, metric)| metric.better != Better::Neither);

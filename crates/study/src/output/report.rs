@@ -92,9 +92,6 @@ impl Study {
     }
 
     /// Makes the report of the study.
-    ///
-    /// # Errors
-    /// Whatever is wrong with the style, the inputs or the definitions.
     pub fn report(&self, options: &ReportOptions) -> Result<Report, StudyError> {
         // Small files first: a slip in the style should not cost a pass over the traces.
         let style = Style::load(&options.style)?;

@@ -78,9 +78,6 @@ impl Study {
     }
 
     /// Statistics for a study in progress: confidence sequences and e-values.
-    ///
-    /// # Errors
-    /// As [`Study::statistics`].
     pub fn sequential(&self, options: &Options) -> Result<Sequential, StudyError> {
         let results = self.scan(Outputs { losses: true, ..Outputs::default() })?;
         self.check_filter(results.episodes.len())?;

@@ -16,9 +16,6 @@ use trace::open::{TraceFile, TraceSet};
 
 /// A note for each title, order and level in a footer that the definitions give otherwise, or whose metric they do not have;
 /// an error for each experiment that only footers know, and not alike. Files that cannot be opened say nothing here.
-///
-/// # Errors
-/// Every fault of the definitions.
 pub fn experiment_findings(definitions: &Path, inputs: &[Input]) -> Result<Vec<Finding>, StudyError> {
     let catalog = Definitions::load(definitions, &schema_columns())?.catalog;
     let traces = TraceSet::of(inputs.iter().filter_map(|input| TraceFile::open(input).ok()).collect());

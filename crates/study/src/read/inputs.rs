@@ -143,18 +143,12 @@ impl FileState {
 
 impl Stamp {
     /// The state of a file now.
-    ///
-    /// # Errors
-    /// Whatever the operating system says.
     pub fn of(input: &Input) -> Result<Self, StudyError> {
         let state = state_of(&input.path).map_err(|source| StudyError::file(&input.name, source))?;
         Ok(Self { name: input.name.clone(), path: input.path.clone(), state })
     }
 
     /// Refuses a file that is another one by now, or was written to.
-    ///
-    /// # Errors
-    /// [`StudyError::Changed`].
     pub fn check(&self) -> Result<(), StudyError> {
         match state_of(&self.path) {
             Ok(state) if state == self.state => Ok(()),

@@ -18,10 +18,6 @@ use trace::in_order::in_order;
 use trace::inputs;
 
 /// The episodes of some files as one table, filtered as the question asks.
-///
-/// # Errors
-/// A file that is not as it must be, scores under different definitions, an experiment that two of them declare differently,
-/// a fault of the filter.
 pub(crate) fn read(files: &[ScoreFile], question: &Question) -> Result<EpisodeTable, StudyError> {
     let (mut whole, mut declarations) = (None::<EpisodeTable>, Declarations::default());
     for file in files {
@@ -72,9 +68,6 @@ fn under(name: &Path, file: &ScoreFile, table: EpisodeTable) -> Result<EpisodeTa
 }
 
 /// Writes a table; Parquet is encoded by `threads` threads.
-///
-/// # Errors
-/// Whatever writing gives.
 pub fn write(
     table: &EpisodeTable,
     format: Format,

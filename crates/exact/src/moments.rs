@@ -95,15 +95,7 @@ pub enum StandardError {
     Population,
 }
 
-impl StandardError {
-    /// As a definition file writes it.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Sample => "sample",
-            Self::Population => "population",
-        }
-    }
-}
+crate::names!(StandardError { Sample: "sample", Population: "population" });
 
 #[cfg(test)]
 mod tests {

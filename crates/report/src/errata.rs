@@ -100,16 +100,7 @@ impl Erratum {
     }
 }
 
-impl Field {
-    /// Its column in a published table.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Mean => "mean",
-            Self::Se => "se",
-            Self::Emphasis => "emphasis",
-        }
-    }
-}
+exact::names!(Field { Mean: "mean", Se: "se", Emphasis: "emphasis" });
 
 #[cfg(test)]
 mod tests {

@@ -87,43 +87,21 @@ impl Action {
     /// Those of a hand, in the order of their numbers in a prompt.
     pub const HAND: [Self; 6] =
         [Self::HandUp, Self::HandDown, Self::HandLeft, Self::HandRight, Self::HandForward, Self::HandBackward];
-
-    pub const ALL: [Self; 11] = [
-        Self::MoveForward,
-        Self::MoveBackward,
-        Self::TurnLeft,
-        Self::TurnRight,
-        Self::Done,
-        Self::HandUp,
-        Self::HandDown,
-        Self::HandLeft,
-        Self::HandRight,
-        Self::HandForward,
-        Self::HandBackward,
-    ];
-
-    /// The name in the `action` column.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::MoveForward => "move_forward",
-            Self::MoveBackward => "move_backward",
-            Self::TurnLeft => "turn_left",
-            Self::TurnRight => "turn_right",
-            Self::Done => "done",
-            Self::HandUp => "hand_up",
-            Self::HandDown => "hand_down",
-            Self::HandLeft => "hand_left",
-            Self::HandRight => "hand_right",
-            Self::HandForward => "hand_forward",
-            Self::HandBackward => "hand_backward",
-        }
-    }
-
-    /// The action of this name.
-    pub fn named(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|action| action.name() == name)
-    }
 }
+
+exact::names!(Action {
+    MoveForward: "move_forward",
+    MoveBackward: "move_backward",
+    TurnLeft: "turn_left",
+    TurnRight: "turn_right",
+    Done: "done",
+    HandUp: "hand_up",
+    HandDown: "hand_down",
+    HandLeft: "hand_left",
+    HandRight: "hand_right",
+    HandForward: "hand_forward",
+    HandBackward: "hand_backward",
+});
 
 /// Fields that may have no value, and are left out of the JSON then.
 macro_rules! optional {

@@ -9,7 +9,7 @@ use std::fmt;
 use std::str::FromStr;
 
 /// The most digits behind the point that are worth printing.
-pub const MOST_PLACES: u32 = 9;
+pub(crate) const MOST_PLACES: u32 = 9;
 
 /// A number as printed: `units / 10^places`. Zero has no sign, so `-0.00` cannot be printed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

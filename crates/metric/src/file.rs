@@ -154,7 +154,7 @@ pub fn read(name_or_path: impl AsRef<Path>) -> Result<Document, FileError> {
 }
 
 /// Reads definitions from a text; includes are relative to `folder`, the current one if absent.
-pub fn read_source(name: String, source: Source, folder: Option<&Path>) -> Result<Document, FileError> {
+pub(crate) fn read_source(name: String, source: Source, folder: Option<&Path>) -> Result<Document, FileError> {
     document(name, FileText::inline(source, folder))
 }
 

@@ -76,7 +76,8 @@ pub use backend::Backend;
 pub use backend::{SparkJob, are_uris};
 pub use diff::{Diff, DiffRequest, Side, diff};
 pub use error::StudyError;
-pub use figure_inputs::{Drawings, FigureInputs, FigureOptions, MANY_MODELS};
+use figure_inputs::{Drawings, FigureInputs};
+pub use figure_inputs::{FigureOptions, MANY_MODELS};
 pub use findings::{findings, findings_text};
 pub use import::{ImportAnswer, ImportRequest, OwnColumn, import};
 pub use inputs::{ScoreFile, Source, resolve};
@@ -84,7 +85,8 @@ pub use losses::LostAs;
 pub use overview::{Overview, Part};
 pub use provenance::ProvenanceError;
 pub use quality_check::{CellAnswer, NotRecorded, QualityCheckAnswer, QualityLimits, Violation};
-pub use question::{DEFAULT_DEFINITIONS, Question, known_experiments};
+use question::DEFAULT_DEFINITIONS;
+pub use question::Question;
 pub use report::{Report, ReportOptions, WrittenReport};
 pub use rescore::{RescoreRequest, Rescored, folder_of_rescored, traces_of};
 pub use results::{Outputs, Results};
@@ -265,7 +267,7 @@ impl Study {
     ///
     /// # Errors
     /// A column to group by that the episodes do not have; a cell that mixes episodes which were recorded differently.
-    pub fn cells_of(&self, episodes: &EpisodeTable) -> Result<Cells, StudyError> {
+    pub(crate) fn cells_of(&self, episodes: &EpisodeTable) -> Result<Cells, StudyError> {
         let by = self.question.by_over(episodes);
         if !self.question.pool {
             pooled::check(episodes, &by)?;

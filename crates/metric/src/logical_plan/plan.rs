@@ -244,7 +244,7 @@ impl Op {
 
     /// The same operation on other nodes: what `to` gives for each operand, in order.
     #[must_use]
-    pub fn with_operands(&self, mut to: impl FnMut(NodeId) -> NodeId) -> Self {
+    pub(crate) fn with_operands(&self, mut to: impl FnMut(NodeId) -> NodeId) -> Self {
         match self {
             Self::Column(_) | Self::Time | Self::Length | Self::Constant(_) => self.clone(),
             Self::Spread(x) => Self::Spread(to(*x)),

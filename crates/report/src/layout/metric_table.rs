@@ -147,7 +147,7 @@ impl MetricTable {
     }
 
     /// The caption without its title: note and footnotes.
-    pub fn sentences(&self) -> impl Iterator<Item = &str> {
+    pub(crate) fn sentences(&self) -> impl Iterator<Item = &str> {
         std::iter::once(self.note.as_str()).chain(self.footnotes.iter().map(String::as_str)).filter(|s| !s.is_empty())
     }
 

@@ -26,7 +26,8 @@ use serde::{Deserialize, Serialize};
 
 pub use answers::{Answer, AnswerRole};
 pub use apart::SettingApart;
-pub use cells::{CellRow, FEW, Intervals};
+pub(crate) use cells::FEW;
+pub use cells::{CellRow, Intervals};
 pub use chance::{ChanceRow, Role, Verdict};
 pub use clusters::ClusterRow;
 pub use compare::{Comparison, Method, Sign};

@@ -12,8 +12,8 @@ mod terminal;
 use metric::catalog::Better;
 
 pub(crate) use csv::key_field;
-pub use csv::text_of;
-pub use markdown::escape as escape_markdown;
+pub(crate) use csv::text_of;
+pub(crate) use markdown::escape as escape_markdown;
 pub(crate) use terminal::wrap::push_wrapped;
 pub use terminal::wrap::wrapped;
 pub use terminal::{Marks, Terminal};

@@ -21,9 +21,8 @@ use super::table::{Declared, EpisodeTable};
 use metric::catalog::{Catalog, Experiment, Kind};
 use trace::TableFile;
 
-pub use self::parquet::{
-    DECLARED_KEY, DEFINITIONS_KEY, HASH_KEY, KIND_KEY, SCORES_KIND, holds_definitions, holds_scores,
-};
+pub(crate) use self::parquet::DECLARED_KEY;
+pub use self::parquet::{DEFINITIONS_KEY, HASH_KEY, KIND_KEY, SCORES_KIND, holds_definitions, holds_scores};
 pub use self::partition::Partition;
 
 /// A format of episode tables.

@@ -41,7 +41,7 @@ pub const DEFINITIONS_KEY: &str = "mirrorstats.definitions";
 pub const HASH_KEY: &str = "mirrorstats.definitions_hash";
 
 /// The footer key of what the traces declare of how they were recorded, as JSON (a `Declared`).
-pub const DECLARED_KEY: &str = "mirrorstats.declared";
+pub(crate) const DECLARED_KEY: &str = "mirrorstats.declared";
 
 /// Returns true if a file is Parquet with scores: its footer says so, or it has their key columns and no timestep.
 ///

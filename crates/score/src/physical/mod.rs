@@ -223,7 +223,7 @@ impl PhysicalPlan {
     }
 
     /// Adds the metrics and the filter of some definitions.
-    pub fn add_scores(&mut self, plan: &Plan) {
+    pub(crate) fn add_scores(&mut self, plan: &Plan) {
         let mut lowering = lower::Lowering::new(self, plan);
         let metrics = plan.outputs.iter().map(|output| Metric {
             name: output.name.clone(),
@@ -236,7 +236,7 @@ impl PhysicalPlan {
     }
 
     /// Adds nodes of some definitions, each in its own shape; the step of each.
-    pub fn add_nodes(&mut self, plan: &Plan, nodes: impl IntoIterator<Item = NodeId>) -> Vec<StepId> {
+    pub(crate) fn add_nodes(&mut self, plan: &Plan, nodes: impl IntoIterator<Item = NodeId>) -> Vec<StepId> {
         let mut lowering = lower::Lowering::new(self, plan);
         nodes.into_iter().map(|node| lowering.values(node)).collect()
     }

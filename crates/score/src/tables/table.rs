@@ -381,7 +381,7 @@ impl MetricColumn {
     ///
     /// # Panics
     /// For rows that are not there.
-    pub fn count_truths(&self, rows: Range<usize>) -> Option<(usize, usize)> {
+    pub(crate) fn count_truths(&self, rows: Range<usize>) -> Option<(usize, usize)> {
         let MetricValues::Bools(bools) = &self.values else { return None };
         let some = bools.slice(rows.start, rows.len());
         Some((some.false_count(), some.true_count()))

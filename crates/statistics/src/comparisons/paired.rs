@@ -86,7 +86,7 @@ impl Pairs {
         (self.n() > 0).then(|| 0.5f64.powi(halvings))
     }
 
-    pub fn discordant(self) -> u64 {
+    pub(crate) fn discordant(self) -> u64 {
         self.first_only + self.second_only
     }
 

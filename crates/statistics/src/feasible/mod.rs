@@ -82,12 +82,6 @@ impl Sample {
         None
     }
 
-    /// Moments of some values that print as all of these; `None` where no values do.
-    pub fn witness(&self, prints: &[Print], search: &mut Search) -> Option<Moments> {
-        let (low, high) = self.sums(prints);
-        (low..=high).find_map(|sum| self.with_sum(sum, prints, search))
-    }
-
     /// The sums whose means print nearest below and above a mean, where the range has such.
     pub fn sums_beside(&self, print: &Print) -> [Option<i128>; 2] {
         let (least, most) = self.all_sums();

@@ -18,7 +18,7 @@ use crate::scored_alike::ScoredAlike;
 pub(crate) const STANDING_LABELS: [&str; 4] = [CONDITION, "scene", "fingerprint", "participant"];
 
 /// The definitions that are used where none are named.
-pub const DEFAULT_DEFINITIONS: &str = "paper";
+pub(crate) const DEFAULT_DEFINITIONS: &str = "paper";
 
 /// The question to the inputs.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -90,10 +90,4 @@ impl Question {
         }
         Ok(definitions)
     }
-}
-
-/// The experiments that some definitions know; any if `None`.
-pub fn known_experiments(definitions: &Path) -> Result<Option<Vec<String>>, StudyError> {
-    let catalog = Definitions::load(definitions, &vocabulary::schema_columns())?.catalog;
-    Ok((!catalog.open).then(|| catalog.experiment.keys().cloned().collect()))
 }

@@ -100,7 +100,7 @@ const LARGEST: Limit = Limit::new("bytes of a manifest", 64 << 20);
 ///
 /// # Errors
 /// A folder without one, one that is not readable, one of a later program.
-pub fn manifest(report: &Path) -> Result<Manifest, ProvenanceError> {
+pub(crate) fn manifest(report: &Path) -> Result<Manifest, ProvenanceError> {
     let path = report.join("manifest.json");
     let text = match input::text(&path, LARGEST) {
         Ok(text) => text,
@@ -183,7 +183,7 @@ fn shown_as(folder: &Path, path: &Path) -> Vec<PathBuf> {
 
 /// Where the traces of a report are looked for: where one is given, else the current folder, the report's folder and
 /// the folders above it.
-pub fn places(report: &Path, told: &[PathBuf]) -> Vec<PathBuf> {
+pub(crate) fn places(report: &Path, told: &[PathBuf]) -> Vec<PathBuf> {
     if !told.is_empty() {
         return told.to_vec();
     }

@@ -29,7 +29,7 @@ use trace::renderer;
 use trace::schema::SCHEMA_VERSION;
 
 /// The most episodes that a page lists.
-pub const MOST_LISTED: usize = 20_000;
+pub(crate) const MOST_LISTED: usize = 20_000;
 
 /// The options of a report.
 #[derive(Clone, Debug, PartialEq, Eq)]

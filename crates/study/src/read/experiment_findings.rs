@@ -16,7 +16,7 @@ use trace::open::{TraceFile, TraceSet};
 
 /// A note for each title, order and level in a footer that the definitions give otherwise, or whose metric they do not have;
 /// an error for each experiment that only footers know, and not alike. Files that cannot be opened say nothing here.
-pub fn experiment_findings(definitions: &Path, inputs: &[Input]) -> Result<Vec<Finding>, StudyError> {
+pub(crate) fn experiment_findings(definitions: &Path, inputs: &[Input]) -> Result<Vec<Finding>, StudyError> {
     let catalog = Definitions::load(definitions, &schema_columns())?.catalog;
     let traces = TraceSet::of(inputs.iter().filter_map(|input| TraceFile::open(input).ok()).collect());
     let mut found: Vec<Finding> = traces.files().iter().flat_map(|file| notes(file, &catalog)).collect();

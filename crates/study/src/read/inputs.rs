@@ -67,7 +67,7 @@ impl Source {
     ///
     /// # Errors
     /// Scores, which have no steps.
-    pub fn into_traces(self) -> Result<TraceSet, StudyError> {
+    pub(crate) fn into_traces(self) -> Result<TraceSet, StudyError> {
         match self {
             Self::Traces(traces) => Ok(traces),
             Self::Scores(files) => Err(no_steps(&files)),

@@ -195,7 +195,7 @@ impl TraceFile {
     ///
     /// # Panics
     /// For a row group that the file lacks.
-    pub fn row_group_rows(&self, row_group: usize) -> usize {
+    pub(crate) fn row_group_rows(&self, row_group: usize) -> usize {
         self.rows[row_group]
     }
 

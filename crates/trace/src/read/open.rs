@@ -51,7 +51,7 @@ impl TraceSet {
     }
 
     /// Findings about files of another domain among traces of the mirror's.
-    pub fn strangers(&self) -> Vec<Finding> {
+    pub(crate) fn strangers(&self) -> Vec<Finding> {
         self.files.iter().flat_map(TraceFile::strangeness).collect()
     }
 

@@ -25,7 +25,7 @@ pub enum Domain {
 }
 
 /// The name of the mirror's domain.
-pub const MIRROR: &str = "mirror";
+pub(crate) const MIRROR: &str = "mirror";
 
 /// The columns of the schema, in the order in which the writer stores them: required ones first.
 pub static COLUMNS: LazyLock<Vec<Column>> = LazyLock::new(|| {

@@ -55,7 +55,7 @@ pub fn png(tree: &Tree) -> Result<Vec<u8>, ConvertError> {
 }
 
 /// The picture as a PDF of one page, its text selectable; no date and no random identifier inside.
-pub fn pdf(tree: &Tree) -> Result<Vec<u8>, ConvertError> {
+pub(crate) fn pdf(tree: &Tree) -> Result<Vec<u8>, ConvertError> {
     let (width, height) = (tree.size().width() * POINTS_PER_PX, tree.size().height() * POINTS_PER_PX);
     let fault = || ConvertError::Size { width, height };
     let page = PageSettings::from_wh(width, height).ok_or_else(fault)?;

@@ -102,7 +102,7 @@ pub(in crate::statistics) struct Compared<'s, 'a> {
 
 impl Compared<'_, '_> {
     /// The comparison under one metric, not adjusted yet.
-    pub fn under(&self, column: &MetricColumn) -> Comparison {
+    pub(crate) fn under(&self, column: &MetricColumn) -> Comparison {
         let rates = self.study.kind(&column.name) == Kind::Rate;
         let sides = Sides::of(self.study, column, &[(self.first, self.second)]);
         let found = match &sides {

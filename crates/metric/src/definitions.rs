@@ -175,27 +175,16 @@ impl Definitions {
 /// An error of replacing a `let` by a condition on steps.
 #[derive(Debug, thiserror::Error)]
 pub enum ReplaceError {
-    /// There is none of this name.
     #[error(
         "expected a `let` named `{name}`, which says at which steps there is evidence, found {found}\n  \
          help: name the condition in the definition file, `{name} = \"mirror_visible\"` under `[let]`, and use it in the metrics"
     )]
-    NoLet {
-        name: String,
-        /// Those that there are.
-        found: String,
-    },
-    /// It is something else.
+    NoLet { name: String, found: String },
     #[error(
         "expected the `let` `{name}` to be true or false, one value per step, found {found}\n  \
          help: let `{name}` say at which steps there is evidence, such as \"mirror_visible\""
     )]
-    NoCondition {
-        name: String,
-        /// Its type and level.
-        found: String,
-    },
-    /// The definitions have faults with the new expression.
+    NoCondition { name: String, found: String },
     #[error(transparent)]
     Faults(#[from] Faults),
 }

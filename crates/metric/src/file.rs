@@ -122,15 +122,8 @@ pub struct ExperimentEntry {
 /// A definition file that could not be read at all.
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
-    /// The file is not there or not readable.
     #[error("cannot read the definition file `{path}`; {}", KIND.did_you_mean(path))]
-    Unreadable {
-        /// As it was typed.
-        path: String,
-        /// The reason.
-        source: std::io::Error,
-    },
-    /// The file has faults.
+    Unreadable { path: String, source: std::io::Error },
     #[error(transparent)]
     Faults(#[from] Faults),
 }

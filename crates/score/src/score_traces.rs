@@ -47,52 +47,24 @@ impl Request {
 /// An error of scoring traces.
 #[derive(Debug, thiserror::Error)]
 pub enum ScoreError {
-    /// The traces are not as they must be.
     #[error(transparent)]
     Trace(#[from] TraceError),
-    /// The definition file is not.
     #[error(transparent)]
     Definitions(#[from] FileError),
-    /// The definitions that scores carry are not.
     #[error(transparent)]
     Carried(#[from] RestoreError),
-    /// The experiments that the traces declare are not.
     #[error(transparent)]
     Declaration(#[from] DeclarationError),
-    /// The condition on episodes is not.
     #[error(transparent)]
     Condition(#[from] Faults),
-    /// A metric was asked for that the definitions do not have.
     #[error(transparent)]
     Metric(#[from] UnknownMetric),
-    /// A column that a metric reads is not in every trace.
     #[error("`{wanted_by}` reads the column `{column}`: {problem}; {help}")]
-    Column {
-        /// The metric, or `--where`.
-        wanted_by: String,
-        column: String,
-        /// The problem, with its file.
-        problem: String,
-        /// The remedy.
-        help: String,
-    },
-    /// A column to group by is not constant in an episode, or not there.
+    Column { wanted_by: String, column: String, problem: String, help: String },
     #[error("cannot group by `{name}`: expected a column that is constant in an episode, one of {}; {help}", .known.join(", "))]
-    Label {
-        /// The name given.
-        name: String,
-        /// The columns that can be grouped by.
-        known: Vec<String>,
-        /// The remedy.
-        help: String,
-    },
-    /// A number could not be computed.
+    Label { name: String, known: Vec<String>, help: String },
     #[error("{file}: {source}")]
-    Engine {
-        /// The file of the batch.
-        file: String,
-        source: EngineError,
-    },
+    Engine { file: String, source: EngineError },
 }
 
 /// The definitions of a request, checked against the traces, with the experiments that these declare.

@@ -27,10 +27,8 @@ const BATCH: NonZeroUsize = NonZeroUsize::new(1 << 17).expect("not zero");
 /// An error of a query.
 #[derive(Debug, thiserror::Error)]
 pub enum QueryError {
-    /// It cannot be run as it is.
     #[error(transparent)]
     Faults(#[from] Faults),
-    /// It could not be run to its end.
     #[error(transparent)]
     Polars(#[from] PolarsError),
 }

@@ -13,16 +13,10 @@ pub struct Setting {
 /// An invalid setting.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SettingError {
-    /// No `=`, or no key before it.
     #[error("expected `spark.key=value`")]
     Form,
-    /// A setting that mirrorstats makes itself.
     #[error("`{key}` cannot be set: {why}")]
-    Fixed {
-        key: String,
-        /// The reason.
-        why: &'static str,
-    },
+    Fixed { key: String, why: &'static str },
 }
 
 /// Keys that would break what the driver relies on.

@@ -115,13 +115,10 @@ pub struct Header {
 /// An error of joining two tables.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum JoinError {
-    /// They were computed under different definitions.
     #[error("expected scores under one set of definitions, found `{0}` and another `{1}`; score the traces again")]
     Definitions(String, String),
-    /// They have different columns.
     #[error("expected the columns {0}, found {1}")]
     Columns(String, String),
-    /// They share an episode.
     #[error("the episode `{0}` is in two files of scores; leave one out")]
     Episode(String),
 }

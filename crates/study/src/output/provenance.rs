@@ -19,29 +19,12 @@ use trace::schema::SCHEMA_VERSION;
 /// An error of making a report again.
 #[derive(Debug, thiserror::Error)]
 pub enum ProvenanceError {
-    /// No manifest in the folder.
     #[error("{}: expected a report's folder with its manifest.json; name the folder that `mirrorstats report` wrote", path.display())]
-    NoManifest {
-        /// The expected path.
-        path: PathBuf,
-        /// The reason why it is not readable.
-        source: io::Error,
-    },
-    /// A manifest that does not say what a report was made of.
+    NoManifest { path: PathBuf, source: io::Error },
     #[error("{}: expected the manifest of a report, found {found}; make the report again with `mirrorstats report`", path.display())]
-    Malformed {
-        path: PathBuf,
-        /// The problem.
-        found: String,
-    },
-    /// Traces that are not what they were.
+    Malformed { path: PathBuf, found: String },
     #[error("{} of {all} traces of the report are not what they were:\n{}\n{REMEDY}", faults.len(), lines(faults))]
-    Traces {
-        /// The number of all inputs.
-        all: usize,
-        /// The inputs with their problems.
-        faults: Vec<TraceFault>,
-    },
+    Traces { all: usize, faults: Vec<TraceFault> },
 }
 
 /// The remedy for traces that are not found.

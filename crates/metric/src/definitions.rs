@@ -15,7 +15,6 @@ use exact::ratio::Ratio;
 use exact::suggest::nearest;
 use toml_spec::{Fault, Faults, Source, Written};
 
-/// Checked definitions.
 #[derive(Clone, Debug)]
 pub struct Definitions {
     /// The metadata for tables, figures and files of scores.
@@ -201,7 +200,6 @@ const fn per(level: Level) -> &'static str {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("unknown metric `{name}`: {}", advice(.near.as_deref(), .known))]
 pub struct UnknownMetric {
-    /// The name given.
     pub name: String,
     /// The metric whose name is most like it.
     pub near: Option<String>,

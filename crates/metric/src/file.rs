@@ -74,7 +74,6 @@ pub struct Document {
     pub domain: Option<String>,
     /// Declared columns of the user's own.
     pub columns: IndexMap<String, ColumnEntry>,
-    /// Named expressions.
     pub lets: IndexMap<String, (Written, Place)>,
     pub metrics: IndexMap<String, MetricEntry>,
     pub experiments: IndexMap<String, ExperimentEntry>,

@@ -145,7 +145,6 @@ impl Manifest {
         Self { outputs, ..self.clone() }
     }
 
-    /// The text of `manifest.json`.
     pub fn json(&self) -> String {
         let json = serde_json::to_string_pretty(self).expect("a manifest holds only strings, integers and lists");
         json + "\n"

@@ -14,7 +14,6 @@ use score::table::EpisodeTable;
 use score::vocabulary::check_label;
 use trace::open::TraceSet;
 
-/// An engine.
 #[derive(Clone, Debug, Default)]
 pub enum Backend {
     /// The program's own kernels.

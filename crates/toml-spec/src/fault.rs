@@ -40,7 +40,6 @@ pub struct Fault {
     pub place: Place,
     /// The label under the span; may be empty.
     pub label: String,
-    /// The remedy.
     pub help: Option<String>,
 }
 
@@ -117,7 +116,6 @@ pub struct FaultRecord {
     pub message: String,
     /// The label at that place; may be empty.
     pub label: String,
-    /// The remedy.
     pub help: Option<String>,
 }
 

@@ -39,7 +39,6 @@ pub struct Checked {
     source: Arc<Source>,
 }
 
-/// The kind of query.
 #[derive(Clone, Debug)]
 pub(super) enum Asked {
     /// The rows of a SELECT.

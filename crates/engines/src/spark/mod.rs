@@ -48,7 +48,6 @@ pub struct Cluster {
     pub log: Option<PathBuf>,
 }
 
-/// The computation for Spark.
 #[derive(Clone, Copy, Debug)]
 pub struct Job<'a> {
     pub definitions: &'a Definitions,

@@ -10,7 +10,6 @@ pub struct Setting {
     value: String,
 }
 
-/// An invalid setting.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SettingError {
     #[error("expected `spark.key=value`")]

@@ -43,7 +43,6 @@ pub enum Op {
     Constant(Constant),
     /// An episode's value for each of its steps, or a constant for each episode or step.
     Spread(NodeId),
-    /// Logical negation.
     Not(NodeId),
     /// Kleene's conjunction: false if either is false.
     And(NodeId, NodeId),
@@ -167,7 +166,6 @@ impl Aggregate {
 /// A metric or a named expression and the node that holds it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Output {
-    /// The metric's name.
     pub name: String,
     /// A rate or a quantity.
     pub kind: Kind,

@@ -83,7 +83,6 @@ pub enum ExprKind {
     },
 }
 
-/// A constant.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Literal {
     Null,
@@ -94,7 +93,6 @@ pub enum Literal {
     Text(String),
 }
 
-/// Operators between two operands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum BinaryOp {
     And,

@@ -26,7 +26,6 @@ impl Reading {
         self.moments().and_then(Moments::mean)
     }
 
-    /// The number of values.
     pub fn n(self) -> u64 {
         self.moments().map_or(0, |moments| moments.n)
     }

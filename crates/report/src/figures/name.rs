@@ -6,7 +6,6 @@ use std::str::FromStr;
 use super::error::FigureError;
 use exact::suggest::hint;
 
-/// The figures there are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum FigureName {
     /// Behavioural profiles: one radar per experiment, one line per model.

@@ -57,7 +57,6 @@ pub struct Page<'a> {
 pub struct Figure<'a> {
     /// `spider`, ...: the name of its files.
     pub name: &'a str,
-    /// Its heading.
     pub title: &'a str,
     /// The explanation below it.
     pub caption: &'a str,

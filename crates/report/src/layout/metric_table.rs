@@ -23,7 +23,6 @@ pub struct MetricTable {
     pub note: String,
     /// Sentences that its cells call for, such as what the dagger means.
     pub footnotes: Vec<String>,
-    /// The LaTeX label.
     pub label: Option<String>,
     /// The text of an undefined value.
     pub undefined: String,

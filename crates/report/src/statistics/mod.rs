@@ -54,7 +54,6 @@ use score::table::EpisodeTable;
 use statistics::design::Design;
 use study::Study;
 
-/// The options of statistics.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
     /// The confidence of every interval, and one minus the level of every test; between 0 and 1.

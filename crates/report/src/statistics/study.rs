@@ -36,7 +36,6 @@ pub(super) struct Study<'a> {
     pub table: &'a EpisodeTable,
     pub design: Design,
     pub experiments: Vec<Experiment<'a>>,
-    /// Relations between metrics.
     pub relations: Relations,
     /// True if settings that differ do not matter.
     pub pool: bool,

@@ -25,7 +25,6 @@ pub struct Table {
     pub title: String,
     /// The sentences after the title: notes, then footnotes.
     pub sentences: Vec<String>,
-    /// The LaTeX label.
     pub label: Option<String>,
     pub look: Look,
     pub columns: Vec<Column>,

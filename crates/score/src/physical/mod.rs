@@ -62,7 +62,6 @@ pub enum Kernel {
     /// A value per episode, repeated for each of its timesteps.
     Spread(StepId),
     Symbols(StepId),
-    /// Negation.
     Not(StepId),
     /// Kleene's conjunction; no operand is a constant.
     And(StepId, StepId),

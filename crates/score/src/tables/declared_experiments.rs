@@ -22,7 +22,6 @@ pub struct DeclarationError {
     pub expected: String,
     /// The declaration in the file.
     pub found: String,
-    /// The remedy.
     pub help: &'static str,
 }
 

@@ -245,7 +245,6 @@ impl EpisodeKeys {
         self.run.value(row)
     }
 
-    /// The keys, in order.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = KeyRef<'_>> + Clone {
         (0..self.len()).map(|row| self.get(row))
     }
@@ -286,7 +285,6 @@ impl KeyRef<'_> {
 }
 
 impl EpisodeKey {
-    /// The same key, borrowed.
     pub fn as_ref(&self) -> KeyRef<'_> {
         let Self { experiment, model, seed, run, episode_id } = self;
         KeyRef { experiment, model, seed: *seed, run: *run, episode_id }

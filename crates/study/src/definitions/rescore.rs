@@ -45,10 +45,8 @@ pub fn traces_of(report: &Path, places: &[PathBuf]) -> Result<Vec<Input>, StudyE
     Ok(provenance::traces(&provenance::manifest(report)?, &provenance::places(report, places))?)
 }
 
-/// A report made again.
 #[derive(Debug)]
 pub struct Rescored {
-    /// The new report.
     pub report: Report,
     /// The changes from the old report, or the reason why they are unknown.
     pub changes: Result<Diff, String>,

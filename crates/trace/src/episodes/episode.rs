@@ -38,7 +38,6 @@ pub struct Episode {
     pub steps: Vec<Step>,
 }
 
-/// One timestep.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Step {
     /// The action; `None` if the reply gave none.
@@ -56,9 +55,7 @@ pub struct Step {
 /// An agent's action: the five actions of the study, and the six of a hand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Action {
-    /// One step forward.
     MoveForward,
-    /// One step backward.
     MoveBackward,
     /// 30 degrees counter-clockwise.
     TurnLeft,

@@ -40,7 +40,6 @@ pub fn is_unfinished(folder: &Path) -> bool {
 #[error("cannot write {}", path.display())]
 pub struct FolderError {
     pub path: PathBuf,
-    /// The reason.
     pub source: io::Error,
 }
 

@@ -22,7 +22,6 @@ pub enum Align {
     End,
 }
 
-/// The style of text.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lettering {
     /// The font's size, px.

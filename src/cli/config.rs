@@ -22,8 +22,7 @@ use crate::cli::outcome::{ERRORS_VARIABLE, Failure};
 use exact::budget::{self, Limit};
 use exact::escape::visible;
 use exact::{input, suggest};
-use toml_spec::parse_toml;
-use toml_spec::{Fault, Faults, Place, Source};
+use toml_spec::{Fault, Faults, Place, Source, parse_toml};
 
 const FILE: &str = "mirrorstats.toml";
 /// The variable that names another file, or none if it is empty.

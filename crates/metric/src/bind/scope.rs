@@ -10,9 +10,7 @@ use super::super::syntax::{BinaryOp, Expr, ExprKind, Literal};
 use super::{Binder, Bound, DEEPEST, State};
 use crate::columns::{Level, Type};
 use exact::suggest::nearest;
-use toml_spec::MOST_FAULTS;
-use toml_spec::Written;
-use toml_spec::{Fault, Place, Source};
+use toml_spec::{Fault, MOST_FAULTS, Place, Source, Written};
 
 /// One expression being bound: the binder, and the text that faults point into.
 pub(super) struct Scope<'b, 'a> {

@@ -11,8 +11,7 @@ mod terminal;
 
 use metric::catalog::Better;
 
-pub(crate) use csv::key_field;
-pub(crate) use csv::text_of;
+pub(crate) use csv::{key_field, text_of};
 pub(crate) use markdown::escape as escape_markdown;
 pub(crate) use terminal::wrap::push_wrapped;
 pub use terminal::wrap::wrapped;

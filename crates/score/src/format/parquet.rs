@@ -18,9 +18,8 @@ use parquet::file::reader::ChunkReader;
 use parquet::file::writer::SerializedFileWriter;
 
 use super::csv::{KEYS, check_unique};
-use super::footer;
 use super::partition::Partition;
-use super::{DeclaredText, FormatError};
+use super::{DeclaredText, FormatError, footer};
 use crate::builder::TableBuilder;
 use crate::columns;
 use crate::table::{Declared, EpisodeTable, Header, KeyRef, TextColumn};

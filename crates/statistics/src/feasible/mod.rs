@@ -10,8 +10,7 @@ pub mod attain;
 use std::cmp::Ordering;
 
 use self::attain::{Search, ends};
-use exact::moments::Moments;
-use exact::moments::StandardError;
+use exact::moments::{Moments, StandardError};
 use exact::number::Decimal;
 use exact::rounding::Rounding;
 

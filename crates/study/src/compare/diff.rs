@@ -19,10 +19,9 @@ use report::cells::group::DEFAULT_BY;
 use report::layout::TableOrder;
 use report::style::Style;
 use score::evidence::{self, Evidence};
-use score::flips;
 use score::score_traces::{self, ScoreError};
 use score::table::EpisodeTable;
-use score::vocabulary;
+use score::{flips, vocabulary};
 use trace::inputs::{self, Input};
 use trace::open::TraceSet;
 

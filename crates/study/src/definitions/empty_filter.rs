@@ -13,9 +13,8 @@ use exact::escape::visible;
 use metric::names::mentioned;
 use report::cells::KeyValue;
 use report::cells::group::{KEY_COLUMNS, column_values};
-use score::score_traces;
 use score::table::EpisodeTable;
-use score::vocabulary;
+use score::{score_traces, vocabulary};
 
 /// Values of a column that are listed.
 const LISTED: usize = 8;

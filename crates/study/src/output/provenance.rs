@@ -5,13 +5,12 @@
 
 use std::ffi::OsStr;
 use std::fmt;
-use std::fs::{self};
+use std::fs;
 use std::io;
 use std::path::{Component, Path, PathBuf};
 
 use exact::budget::Limit;
-use exact::hash;
-use exact::input;
+use exact::{hash, input};
 use report::bundle::{self, Manifest};
 use trace::inputs::Input;
 use trace::schema::SCHEMA_VERSION;

@@ -14,8 +14,7 @@ use report::bundle::{self, Bundle, BundleError, Manifest, OutputFile};
 use report::cells::Cells;
 use report::figures::{Figure as Drawn, FigureName};
 use report::html::{self, Figure, Page, Recordings};
-use report::layout::MetricTable;
-use report::layout::quality;
+use report::layout::{MetricTable, quality};
 use report::plan::departures::Looks;
 use report::statistics::{Options, Replies, Statistics};
 use report::style::{MAIN_TABLE, OTHER_TABLE, Style};
@@ -23,10 +22,9 @@ use report::tables::ListTable;
 use score::format::Format;
 use score::lost_counts::LostCounts;
 use score::table::EpisodeTable;
-use trace::answered;
 use trace::checksums::missing_note;
-use trace::renderer;
 use trace::schema::SCHEMA_VERSION;
+use trace::{answered, renderer};
 
 /// The most episodes that a page lists.
 pub(crate) const MOST_LISTED: usize = 20_000;

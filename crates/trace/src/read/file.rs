@@ -18,8 +18,7 @@ use parquet::schema::types::SchemaDescriptor;
 use serde_json::Value;
 
 use super::budget::{EpisodeBudget, MOST_COLUMNS};
-use super::footer::bounds;
-use super::footer::{Extent, Footer, footer, plain};
+use super::footer::{Extent, Footer, bounds, footer, plain};
 use super::statistics::Declared as Statistics;
 use crate::catch_panic::contained;
 use crate::declared_experiment::{self, DeclaredExperiment};

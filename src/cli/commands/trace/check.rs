@@ -4,8 +4,7 @@ use std::io::{self, Write as _};
 
 use crate::cli::args::TraceArgs;
 use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::output;
-use crate::cli::quality;
+use crate::cli::{output, quality};
 use exact::escape::visible;
 use exact::format::fixed;
 use score::quality::{CellKey, Quality, QualityByCell};

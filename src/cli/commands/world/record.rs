@@ -16,14 +16,13 @@ use crate::cli::exec::ExecArgs;
 use crate::cli::experiments;
 #[cfg(feature = "view")]
 use crate::cli::human::HumanArgs;
-use crate::cli::options_of;
 use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::output;
 use crate::cli::recording::episodes::Episodes;
 use crate::cli::recording::interrupt::{Playing, stop_at_interrupt};
 use crate::cli::recording::{self, Bar, RecordAnswer, probe, several};
 use crate::cli::registration::registration;
 use crate::cli::vlm::VlmArgs;
+use crate::cli::{options_of, output};
 use exact::escape::visible;
 use exact::suggest::hint;
 use world::agent::Player;

@@ -1,15 +1,13 @@
 //! Legends: which model is which, and what signs mean; laid out by the measured widths of their texts.
 
 use super::frame::{Frame, Point, many};
-use super::label;
 use super::lettering::{self, Lettering, MARGIN, NAME_ROOM};
 use super::look::{Fill, Stroke};
-use super::marker;
 use super::palette::{ModelStyle, PALETTE};
 use super::panels::Panels;
 use super::roster::Roster;
 use super::sheet::Sheet;
-use super::tiles;
+use super::{label, marker, tiles};
 
 const SWATCH_WIDTH: f64 = 24.0;
 const SWATCH_GAP: f64 = 5.0;

@@ -24,8 +24,8 @@ use serde::Serialize;
 
 use crate::cli::NAME;
 use crate::cli::scoring::commands;
-use crate::cli::text_table::counted;
 use exact::escape::{visible, visible_lines};
+use exact::format::counted;
 use exact::format::fixed;
 use exact::number::Decimal;
 use report::html;

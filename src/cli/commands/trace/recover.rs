@@ -11,7 +11,7 @@ use serde_json::Value;
 
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
-use crate::cli::text_table::counted;
+use exact::format::counted;
 use trace::diagnostic::Severity;
 use trace::inputs::Input;
 use trace::log::recover::{Losses, recover};

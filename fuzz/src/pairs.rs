@@ -75,7 +75,9 @@ pub fn defined(data: &[u8]) {
         two.as_ref().map(|two| &two.episodes),
         "another number of threads"
     );
-    one.iter().for_each(|_| reached("values"));
+    if one.is_some() {
+        reached("values");
+    }
 }
 
 /// Columns to group by, apart by commas: refused, or each episode is in one cell.
@@ -83,10 +85,10 @@ pub fn grouped(data: &[u8]) {
     let Some((text, bytes)) = with_trace(data) else { return };
     let Some(study) = study("grouped.parquet", &bytes) else { return };
     let study = study.threads(NonZeroUsize::MIN).pool();
-    let Ok(all) = bounded(|| study.score()) else { return };
+    let Some(all) = bounded(|| study.score().ok()) else { return };
     reached("values");
     let by: Vec<String> = text.split(',').map(str::to_owned).collect();
-    if let Ok(cells) = bounded(|| study.by(by).cells()) {
+    if let Some(cells) = bounded(|| study.by(by).cells().ok()) {
         reached("cells");
         let sum: u64 = cells.groups.iter().map(|group| group.episodes).sum();
         assert_eq!(sum, all.episodes.len() as u64, "{text}");
@@ -164,7 +166,7 @@ pub fn styled(data: &[u8]) {
     let Some(study) = study("styled.csv", scores) else { return };
     reached("open");
     let study = study.threads(NonZeroUsize::MIN).pool();
-    if let Ok(report) = bounded(|| study.report(&ReportOptions { style, figures: false })) {
+    if let Some(report) = bounded(|| study.report(&ReportOptions { style, figures: false }).ok()) {
         reached("report");
         assert!(!report.tables.is_empty());
     }

@@ -162,7 +162,7 @@ fn of_file(path: &Path, name: &str, choices: &[Choice<'_>]) -> Result<Vec<Settin
     })?;
     let source = Arc::new(Source { name: name.to_owned(), text });
     let (table, faults) = parse_toml(&source);
-    let mut reader = OptionFile { source: &source, choices, faults };
+    let mut reader = OptionFile::new(&source, choices, faults);
     let mut found = Vec::new();
     if reader.faults.is_empty() {
         reader.table(table.get_ref(), "", &mut found);

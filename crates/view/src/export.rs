@@ -62,7 +62,7 @@ struct Files {
 impl Files {
     fn add(&mut self, path: &str, bytes: impl AsRef<[u8]>) -> Result<(), ViewError> {
         let bytes = bytes.as_ref();
-        self.written.spend(bytes.len() as u64).map_err(exceeded)?;
+        self.written.spend(bytes.len() as u64).map_err(|error| exceeded(&error))?;
         let target = self.stage.path().join(path);
         make_folder(folder_of(&target))
             .and_then(|()| fs::write(&target, bytes))
@@ -76,7 +76,7 @@ impl Files {
     }
 }
 
-fn exceeded(exceeded: Exceeded) -> ViewError {
+fn exceeded(exceeded: &Exceeded) -> ViewError {
     ViewError::Request(format!("{exceeded}\n  help: --where \"run = 1\" leaves episodes out"))
 }
 
@@ -148,8 +148,8 @@ fn write_found(
 /// Refuses what would be too much before a file is written: two bytes are the least that a value takes.
 fn check_size(snapshot: &Snapshot) -> Result<(), ViewError> {
     let bytes = snapshot.bytes();
-    most_copied(bytes).check(snapshot.episodes() as u64).map_err(exceeded)?;
-    most_written(bytes).check(snapshot.values()?.saturating_mul(2)).map_err(exceeded)
+    most_copied(bytes).check(snapshot.episodes() as u64).map_err(|error| exceeded(&error))?;
+    most_written(bytes).check(snapshot.values()?.saturating_mul(2)).map_err(|error| exceeded(&error))
 }
 
 /// Adds episodes that are stored side by side, and what was said in each, by its place in the list.

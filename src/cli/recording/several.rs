@@ -82,7 +82,7 @@ fn sections(reader: &mut OptionFile<'_>, table: &DeTable<'_>) -> BTreeMap<String
         match value.get_ref() {
             DeValue::Table(of) => of.iter().for_each(|(key, value)| insert(reader, &mut options, key, value)),
             other => {
-                reader.fault(value.span(), format!("expected a table of options, found {}", other.type_str()), None)
+                reader.fault(value.span(), format!("expected a table of options, found {}", other.type_str()), None);
             }
         }
         found.insert(name.get_ref().to_string(), options);

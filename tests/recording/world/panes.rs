@@ -166,7 +166,9 @@ fn a_textured_room_shows_the_same_otherwise() {
     let mut differs = 0;
     for heading in 0..12 {
         let pose = Pose { heading: Heading::new(heading), ..looks[0].pose() };
-        looks.iter_mut().for_each(|world| world.place_at(Figure::standing(pose), 1));
+        for world in &mut looks {
+            world.place_at(Figure::standing(pose), 1);
+        }
         assert_eq!(looks[0].visibility(), looks[1].visibility());
         let [one, other] = [0, 1].map(|at| eyes[at].frame(&looks[at]).unwrap());
         differs += usize::from(one != other);

@@ -167,8 +167,8 @@ pub(crate) fn scores(snapshot: &Snapshot, opened: &Opened) -> Result<(Value, Val
     let (Some(scored), Some(input)) = (&snapshot.scored, &opened.input) else { return Ok((json!([]), Value::Null)) };
     let id = &opened.episode.episode_id;
     let own = told(&scored.study.explain_in(input, id)?);
-    let other = other_study(snapshot, input)?.map(|study| study.explain_in(input, id)).transpose()?;
-    Ok((own, other.as_ref().map_or(Value::Null, told)))
+    let Some(study) = other_study(snapshot, input)? else { return Ok((own, Value::Null)) };
+    Ok((own, told(&study.explain_in(input, id)?)))
 }
 
 /// The same for some episodes of a trace, by their ids.
@@ -178,8 +178,11 @@ pub(crate) fn scores_of(
     ids: &BTreeSet<String>,
 ) -> Result<BTreeMap<String, (Value, Value)>, ViewError> {
     let own = snapshot.table()?.study.explain_each_in(input, ids)?;
-    let other = other_study(snapshot, input)?.map(|study| study.explain_each_in(input, ids)).transpose()?;
-    let against = |id: &String| other.as_ref().and_then(|other| other.get(id)).map_or(Value::Null, told);
+    let other = match other_study(snapshot, input)? {
+        Some(study) => study.explain_each_in(input, ids)?,
+        None => BTreeMap::new(),
+    };
+    let against = |id: &String| other.get(id).map_or(Value::Null, told);
     Ok(own.iter().map(|(id, evidence)| (id.clone(), (told(evidence), against(id)))).collect())
 }
 

@@ -139,6 +139,15 @@ pub enum JournalError {
     Missing { path: PathBuf },
 }
 
+impl Drop for Journal {
+    fn drop(&mut self) {
+        // A process that is being started may hold a copy of the file for a moment, and the lock with it.
+        if let Some(file) = &self.file {
+            let _ = file.unlock();
+        }
+    }
+}
+
 impl Journal {
     /// Opens the journal of an episode, for going on with it.
     pub fn open(path: &Path) -> Result<Self, JournalError> {

@@ -116,6 +116,7 @@ pub struct FaultRecord {
     pub message: String,
     /// The label at that place; may be empty.
     pub label: String,
+    /// The remedy.
     pub help: Option<String>,
 }
 

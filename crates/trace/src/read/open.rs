@@ -112,7 +112,7 @@ impl TraceSet {
         let known = COLUMNS.iter().filter(|column| self.domain().has(column)).map(|column| column.name);
         let mut names: Vec<&str> =
             known.filter(|name| self.files.iter().any(|file| file.column(name).is_some())).collect();
-        for column in self.files.iter().flat_map(|file| file.columns()) {
+        for column in self.files.iter().flat_map(TraceFile::columns) {
             if !names.contains(&column.name.as_str()) {
                 names.push(&column.name);
             }

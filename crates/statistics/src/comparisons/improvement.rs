@@ -13,7 +13,7 @@ use crate::random::SplitMix64;
 
 /// With fewer values than this on a side, all strata together, there is no interval: simulated with rates of 0.95 and 0.9,
 /// that of 35 to 42 values covers less than 90 % where 95 % is asked for, that of 50 more.
-pub(crate) const FEWEST_VALUES: usize = 50;
+pub const FEWEST_VALUES: usize = 50;
 
 /// P(X > Y) + P(X = Y) / 2, averaged over strata.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

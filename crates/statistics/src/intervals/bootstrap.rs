@@ -9,10 +9,10 @@ use crate::random::SplitMix64;
 
 /// Resamples drawn. One less than a round number, so that the usual tails fall on whole ranks
 /// (Davison and Hinkley 1997).
-pub(crate) const RESAMPLES: usize = 9_999;
+pub const RESAMPLES: usize = 9_999;
 
 /// The most values that are resampled: with more, Student's interval says the same at no cost.
-pub(crate) const MOST_VALUES: usize = 2_000;
+pub const MOST_VALUES: usize = 2_000;
 
 /// The seed of every bootstrap.
 pub const SEED: u64 = 0x6d69_7272_6f72;

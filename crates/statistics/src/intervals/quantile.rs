@@ -10,7 +10,7 @@ use statrs::distribution::{Beta, ChiSquared, Continuous, ContinuousCDF, Normal, 
 const EXPANSION_FROM: f64 = 1000.0;
 
 /// The half of what a two-sided interval leaves out: 0.025 for 0.95. `None` outside (0, 1).
-pub(crate) fn tail(confidence: f64) -> Option<f64> {
+pub fn tail(confidence: f64) -> Option<f64> {
     (confidence > 0.0 && confidence < 1.0).then(|| settled((1.0 - confidence) / 2.0))
 }
 

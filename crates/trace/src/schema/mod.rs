@@ -22,7 +22,7 @@ pub const SCHEMA_VERSION: u32 = 2;
 
 /// The required columns that have no meaning for some tasks: a trace may lack one if every experiment that its footer declares
 /// says so (`absent`). Its rows have no value then.
-pub(crate) fn of_some_tasks() -> impl Iterator<Item = &'static str> {
+pub fn of_some_tasks() -> impl Iterator<Item = &'static str> {
     COLUMNS.iter().filter(|column| column.is_of_some_tasks).map(|column| column.name)
 }
 

@@ -209,7 +209,7 @@ fn registered() -> Vec<u8> {
         power: 0.8,
         confidence: 0.95,
         models: 2,
-        clusters: Clusters { seeds: 3, icc: 0.1 },
+        clusters: Clusters { seeds: 3, icc: 0.1, people: false },
         discordance: None,
         chance: None,
         sequential: false,

@@ -44,6 +44,15 @@ fn episode(model: &str, experiment: &str, seed: i32, run: i32) -> Episode {
         mark_color: Some("pink".into()),
         mark_report: Some("none".into()),
         mirror_mark_px: Some(5),
+        shown_px: Some(1),
+        pane1_body_px: Some(2),
+        pane2_body_px: Some(3),
+        pane3_body_px: Some(4),
+        pane4_body_px: Some(5),
+        mark1_px: Some(6),
+        mark2_px: Some(7),
+        mark3_px: Some(8),
+        mark4_px: Some(9),
         target_distance: Some(300),
     };
     let step = Step {

@@ -151,6 +151,11 @@ impl Columns {
         self.schema.keys().chain(self.own.keys()).map(String::as_str)
     }
 
+    /// Adds a column that every reader of these traces means the same by, as those of the schema.
+    pub fn add_known(&mut self, name: impl Into<String>, column: Column) {
+        self.schema.insert(name.into(), column);
+    }
+
     /// Sets what a column beside the schema is; a column of the schema stays unchanged.
     pub fn set_own(&mut self, name: impl Into<String>, column: Column) {
         let name = name.into();

@@ -50,7 +50,7 @@ pub fn has_value(name: &str) -> bool {
 /// The columns that definitions may name over these traces: those of the schema, and the traces' own.
 pub fn trace_columns(traces: &TraceSet) -> Columns {
     let mut columns =
-        schema_columns().with_help("`mirrorstats trace schema` and `mirrorstats trace info` list the columns");
+        schema_columns().with_help("`mirrorstats trace schema`, `trace info` and `trace labels` list the columns");
     set_fallbacks(&mut columns, |name| traces.declares(name));
     for column in COLUMNS.iter().filter(|column| !traces.knows(column)) {
         columns.forget(column.name);
@@ -59,6 +59,9 @@ pub fn trace_columns(traces: &TraceSet) -> Columns {
         if let Some(ty) = traces.column(name).and_then(|column| type_of(column.kind)) {
             columns.set_own(name, Column { ty, level: Level::Step });
         }
+    }
+    for name in traces.label_columns() {
+        columns.add_known(name, Column { ty: Type::Bool, level: Level::Episode });
     }
     columns
 }
@@ -126,6 +129,9 @@ pub fn is_constant(name: &str) -> bool {
 
 /// Refuses a column to group by that is not constant in an episode, or not in every trace.
 pub fn check_label(traces: &TraceSet, label: &str) -> Result<(), ScoreError> {
+    if traces.is_label_column(label) {
+        return Ok(());
+    }
     let problem = column_problem(traces, label);
     // What version 2 brought is null in older traces, or has a meaning where there is no value.
     let is_known_anyway = traces.domain().column(label).is_some_and(|known| {
@@ -142,8 +148,8 @@ pub fn check_label(traces: &TraceSet, label: &str) -> Result<(), ScoreError> {
     if is_constant(label) && (problem.is_none() || is_known_anyway) {
         return Ok(());
     }
-    let known: Vec<String> =
-        traces.column_names().into_iter().filter(|name| is_constant(name)).map(str::to_owned).collect();
+    let known = traces.column_names().into_iter().filter(|name| is_constant(name)).map(str::to_owned);
+    let known: Vec<String> = known.chain(traces.label_columns().iter().cloned()).collect();
     let near = nearest(label, known.iter().map(String::as_str)).filter(|near| *near != label);
     let help = match (near, problem) {
         (Some(near), _) => format!("did you mean `{near}`?"),

@@ -42,9 +42,16 @@ impl SparkJob {
     /// Files of scores; whatever is wrong with the definitions or the columns to group by.
     pub fn of_study(study: &Study, cluster: Cluster) -> Result<Self, StudyError> {
         let traces = study.source.traces()?;
-        let labels = study.question.labels_over(traces);
+        let mut labels = study.question.labels_over(traces);
+        labels.retain(|label| !traces.is_label_column(label));
         labels.iter().try_for_each(|label| check_label(traces, label))?;
         let definitions = study.question.bind(traces)?;
+        let plan = &definitions.plan;
+        let read = plan.needed_by(plan.outputs.iter().map(|output| output.node).chain(plan.filter));
+        let read = plan.columns(&read).into_iter().map(|(name, _)| name.to_owned()).chain(study.question.labels());
+        if let Some(column) = read.into_iter().find(|name| traces.is_label_column(name)) {
+            return Err(SparkError::Label { column }.into());
+        }
         let sources = Sources::files(&study.inputs, traces)
             .map_err(|source| SparkError::System { what: "name the traces for Spark".to_owned(), source })?;
         let read = study.files_read(None);

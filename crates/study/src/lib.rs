@@ -32,7 +32,7 @@ mod size;
 mod top;
 
 pub use output::verify;
-use output::{audit, figure_inputs, overview, provenance, quality_check, report};
+use output::{agreement, audit, figure_inputs, overview, provenance, quality_check, report};
 
 use compare::{design, diff, gate, pooled, sensitivity};
 
@@ -70,6 +70,7 @@ use trace::inputs::Input;
 use trace::open::TraceSet;
 use trace::steps::Steps;
 
+pub use agreement::{CoderCount, LabelAgreement, LabelCount, PairAgreement};
 pub use audit::{AuditRequest, audit_tables};
 pub use backend::{Backend, SparkJob, are_uris};
 pub use diff::{Diff, DiffRequest, Side, diff};
@@ -94,7 +95,7 @@ pub use sensitivity::{DEFAULT_THRESHOLDS, SensitivityReport, Thresholds, Thresho
 pub use top::{ModelMean, model_means};
 
 use design::design_of;
-use inputs::Stamp;
+use inputs::{Stamp, labelled};
 
 /// Inputs that are open, and the question that is put to them.
 #[derive(Debug)]
@@ -349,7 +350,7 @@ impl Study {
     /// As [`Study::explain`], of an episode that is known to be in one of the inputs: no other is read.
     pub fn explain_in(&self, input: &Input, episode_id: &str) -> Result<Evidence, StudyError> {
         // Bound to its own columns: beside other tasks a trace may lack those that are theirs.
-        let one = TraceSet::open(std::slice::from_ref(input))?;
+        let one = labelled(std::slice::from_ref(input))?;
         let definitions = Question { filter: None, ..self.question.clone() }.bind(&one)?;
         Ok(evidence::explain(&one, &definitions, episode_id, self.threads)?)
     }
@@ -360,7 +361,7 @@ impl Study {
         input: &Input,
         ids: &BTreeSet<String>,
     ) -> Result<BTreeMap<String, Evidence>, StudyError> {
-        let one = TraceSet::open(std::slice::from_ref(input))?;
+        let one = labelled(std::slice::from_ref(input))?;
         let definitions = Question { filter: None, ..self.question.clone() }.bind(&one)?;
         Ok(evidence::explain_each(&one, &definitions, ids, self.threads)?)
     }

@@ -6,6 +6,7 @@ use std::path::Path;
 use arrow::error::ArrowError;
 
 use super::diagnostic::Finding;
+use super::labels::LabelsError;
 
 /// An error of reading or writing traces.
 #[derive(Debug, thiserror::Error)]
@@ -16,6 +17,8 @@ pub enum TraceError {
     Read { what: String, source: io::Error },
     #[error("`{argument}`: expected {expected}, found {found}; {help}")]
     NoInput { argument: String, expected: &'static str, found: String, help: &'static str },
+    #[error(transparent)]
+    Labels(#[from] LabelsError),
     #[error("cannot take over the episodes of `{file}`: {source}")]
     Part { file: String, source: Box<dyn std::error::Error + Send + Sync> },
     #[error("cannot start {threads} threads; ask for fewer with --threads")]

@@ -50,7 +50,7 @@ pub mod write;
 
 pub use texts::{identification, model_id, renormalize};
 
-pub use episodes::{episode, episode_hash, frame, lost, palette, replies};
+pub use episodes::{episode, episode_hash, frame, labels, lost, palette, replies};
 
 pub use footers::{answered, checksums, declared, declared_experiment};
 

@@ -8,7 +8,8 @@
 //! ```
 //!
 //! Rule: the program computes and the page shows: no number is made in the browser. An id in a request is looked up among
-//! the episodes that are open and never made part of a path. Nothing is written into the folders that are looked at.
+//! the episodes that are open and never made part of a path. With a coder the server adds lines to `labels.jsonl` beside the traces;
+//! nothing else is written into the folders that are looked at.
 //!
 //! ```
 //! use mirrorstats_view::{Options, View};
@@ -40,7 +41,7 @@ mod rendered;
 pub mod routes;
 mod snapshot;
 
-use answers::{changes, compare, episode, list, live, map, overview, verdict};
+use answers::{changes, compare, episode, labels, list, live, map, overview, verdict};
 
 use std::ffi::OsString;
 use std::num::NonZeroUsize;
@@ -63,6 +64,8 @@ pub struct Options {
     pub against: Option<PathBuf>,
     /// The style of tables.
     pub style: String,
+    /// The name of the one who labels; the page only shows if absent.
+    pub coder: Option<String>,
     /// The number of threads.
     pub threads: NonZeroUsize,
 }
@@ -98,6 +101,11 @@ impl View {
             answer::Answer::Page(page) => page.into_bytes(),
         };
         answer::answer(self, name, query).map(|answer| answer.map(bytes))
+    }
+
+    /// Adds a label that a page sends as JSON; gives the labels of its episode.
+    pub fn put_label(&self, body: &[u8]) -> Result<Vec<u8>, ViewError> {
+        labels::put(self, body).map(|value| value.to_string().into_bytes())
     }
 
     fn newest(&self) -> Arc<Snapshot> {

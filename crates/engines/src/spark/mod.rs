@@ -81,6 +81,11 @@ pub enum SparkError {
     System { what: String, source: std::io::Error },
     #[error(transparent)]
     Lowering(#[from] LoweringError),
+    #[error(
+        "`{column}`: expected a column of the traces, found a label beside them, which Spark does not read\n  \
+         help: leave --engine spark out"
+    )]
+    Label { column: String },
     #[error("`{folder}` is there already; Spark writes a folder of its own: remove it or name another")]
     Exists { folder: String },
     #[error(

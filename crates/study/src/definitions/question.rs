@@ -55,7 +55,7 @@ impl Question {
     pub(crate) fn labels_over(&self, traces: &TraceSet) -> Vec<String> {
         let mut labels = self.labels();
         let standing = STANDING_LABELS.into_iter().filter(|name| traces.declares(name));
-        for name in standing {
+        for name in standing.chain(traces.label_columns().iter().map(String::as_str)) {
             if !labels.iter().any(|label| label == name) {
                 labels.push(name.to_owned());
             }

@@ -9,7 +9,9 @@ use std::time::{Duration, UNIX_EPOCH};
 use crate::error::StudyError;
 use engines::spark::source::is_uri;
 use score::format::{self, Format};
+use trace::error::TraceError;
 use trace::inputs::{self, Input};
+use trace::labels::Labels;
 use trace::open::TraceSet;
 
 /// Inputs of one kind.
@@ -48,7 +50,7 @@ impl Source {
     pub fn open(inputs: &[Input]) -> Result<Self, StudyError> {
         match ScoreFile::all(inputs)? {
             Some(scores) => Ok(Self::Scores(scores)),
-            None => Ok(Self::Traces(TraceSet::open(inputs)?)),
+            None => Ok(Self::Traces(labelled(inputs)?)),
         }
     }
 
@@ -73,6 +75,15 @@ impl Source {
             Self::Scores(files) => Err(no_steps(&files)),
         }
     }
+}
+
+/// Opens traces and reads the labels beside them.
+///
+/// # Errors
+/// The first fault of a footer; a list of labels that cannot be read.
+pub(crate) fn labelled(inputs: &[Input]) -> Result<TraceSet, StudyError> {
+    let labels = Labels::beside(inputs).map_err(TraceError::from)?;
+    Ok(TraceSet::open(inputs)?.with_labels(labels)?)
 }
 
 fn no_steps(scores: &[ScoreFile]) -> StudyError {

@@ -141,6 +141,15 @@ optional! {
         mark_report: String,
         mirror_mark_px: i32,
         mirror_double_px: i32,
+        shown_px: i32,
+        pane1_body_px: i32,
+        pane2_body_px: i32,
+        pane3_body_px: i32,
+        pane4_body_px: i32,
+        mark1_px: i32,
+        mark2_px: i32,
+        mark3_px: i32,
+        mark4_px: i32,
         target_distance: i32,
     }
 }

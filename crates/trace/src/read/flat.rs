@@ -10,7 +10,7 @@ use parquet::file::metadata::ParquetMetaData;
 
 use super::budget::MOST_COLUMNS;
 use super::damaged::damaged;
-use super::file::is_nested;
+use super::footer::trace_file::is_nested;
 use super::footer::{bounds, plain};
 use crate::diagnostic::{Code, Finding};
 use parquet_pages::checksums::ChunkChecksums;

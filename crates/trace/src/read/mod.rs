@@ -1,11 +1,10 @@
 //! From the bytes of traces to whole episodes, in the order of the files.
 
+mod beside;
 pub(crate) mod budget;
 mod checks;
 pub(crate) mod decode;
 mod episode_index;
-
-pub(crate) mod file;
 pub(crate) mod flat;
 pub(crate) mod footer;
 pub mod in_order;

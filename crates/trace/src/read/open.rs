@@ -1,6 +1,7 @@
 //! Traces opened together: every footer is read, and it is known what each column is over all files.
 
-pub use super::file::{FileColumn, TraceFile};
+use super::beside::Beside;
+pub use super::footer::trace_file::{FileColumn, TraceFile};
 use crate::diagnostic::Finding;
 use crate::error::TraceError;
 use crate::inputs::Input;
@@ -10,6 +11,7 @@ use crate::schema::{self, COLUMNS, Column, Domain, Kind};
 #[derive(Debug)]
 pub struct TraceSet {
     files: Vec<TraceFile>,
+    beside: Beside,
 }
 
 /// The type and presence of a column over all files of a set.
@@ -34,7 +36,7 @@ impl TraceSet {
                 Err(findings) => faults.extend(findings),
             }
         }
-        let set = Self { files };
+        let set = Self::of(files);
         if set.domain() == Domain::Mirror {
             faults.extend(set.strangers());
         }
@@ -72,7 +74,15 @@ impl TraceSet {
 
     /// Files that were opened one by one.
     pub fn of(files: Vec<TraceFile>) -> Self {
-        Self { files }
+        Self { files, beside: Beside::default() }
+    }
+
+    pub(super) fn beside(self, beside: Beside) -> Self {
+        Self { beside, ..self }
+    }
+
+    pub(super) const fn labelled(&self) -> &Beside {
+        &self.beside
     }
 
     /// The files, in their order.
@@ -80,8 +90,11 @@ impl TraceSet {
         &self.files
     }
 
-    /// The column of this name over all files; `None` if no file has it.
+    /// The column of this name over all files; `None` if no file has it, and it is no label's.
     pub fn column(&self, name: &str) -> Option<ColumnUse> {
+        if self.is_label_column(name) {
+            return Some(ColumnUse { kind: Kind::Bool, missing_from: None, conflict: None });
+        }
         let mut seen: Option<(&TraceFile, Kind)> = None;
         let (mut present, mut missing_from, mut conflict) = (false, None, None);
         for file in &self.files {

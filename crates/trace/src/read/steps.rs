@@ -17,8 +17,8 @@ use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReader;
 
 use super::damaged::damaged;
-use super::file::{Readable, TraceFile};
 use super::footer::plain;
+use super::footer::trace_file::{Readable, TraceFile};
 use super::open::TraceSet;
 use super::projection::Layout;
 use crate::catch_panic::contained;

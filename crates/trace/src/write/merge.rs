@@ -23,7 +23,7 @@ use crate::error::TraceError;
 use crate::inputs::Input;
 use crate::read::budget::{most_shown, most_values};
 use crate::read::damaged::damaged;
-use crate::read::file::is_nested;
+use crate::read::footer::trace_file::is_nested;
 use crate::read::footer::{Extent, Footer, bounds, footer, plain};
 use crate::schema::{self, COLUMNS};
 use crate::write::row_groups::{Gathered, RowGroups, field};

@@ -45,7 +45,7 @@ pub struct OptionalColumns {
 }
 
 /// Columns that no recording of the five experiments gives.
-const OF_OTHER_TASKS: [&str; 9] = [
+const OF_OTHER_TASKS: [&str; 10] = [
     "frame_digest",
     "participant",
     "start_distance",
@@ -54,6 +54,7 @@ const OF_OTHER_TASKS: [&str; 9] = [
     "mark_report",
     "mirror_mark_px",
     "mirror_double_px",
+    "shown_px",
     "target_distance",
 ];
 
@@ -78,15 +79,22 @@ impl OptionalColumns {
         };
         let experiment = &recording["experiment"];
         let has_marks = experiment["mark"].is_array() || is_there(&experiment["reply"], "mark");
+        let panes = experiment["mirror"].as_array().map_or(0, Vec::len);
+        let own_marks =
+            experiment["mark"].as_array().into_iter().flatten().filter(|mark| mark["on"] != "other").count();
         let is_given = |name: &str| match name {
             "reply_repair" | "reply_fault" => reads_replies,
             "frame_digest" => recording["frame_digest"].is_string(),
             "participant" => agent.get("human").is_some(),
             "mark_color" | "mark_report" | "mirror_mark_px" => has_marks,
             "mirror_double_px" => shows_another_body(&experiment["mirror"]),
-            "shown_color" => shows_another_color(&experiment["mirror"]),
+            "shown_color" | "shown_px" => shows_another_color(&experiment["mirror"]),
             "start_distance" | "target_distance" => experiment["hand"].is_object(),
-            _ => !OF_OTHER_TASKS.contains(&name),
+            _ => match (numbered(name, "pane"), numbered(name, "mark")) {
+                (Some(number), _) => panes >= number.max(2),
+                (_, Some(number)) => own_marks >= number.max(2),
+                _ => !OF_OTHER_TASKS.contains(&name),
+            },
         };
         let absent = of_some_tasks().filter(|name| is_there(&experiment["absent"], name));
         let given = Self::of(Self::all().given.into_iter().filter(|column| is_given(column.name)));
@@ -165,6 +173,11 @@ impl<W: Write + Send> TraceEncoder<W> {
     pub fn finish(self) -> Result<W, TraceError> {
         self.file.finish(Some(self.gathered)).map_err(failed)
     }
+}
+
+/// The number in a column's name, as in `pane2_body_px`.
+fn numbered(column: &str, prefix: &str) -> Option<usize> {
+    column.strip_prefix(prefix)?.split('_').next()?.parse().ok()
 }
 
 /// Whether one of the mirrors and windows of an experiment may show a body in another colour than the own body's: one of

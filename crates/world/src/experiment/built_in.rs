@@ -42,6 +42,7 @@ files!(
     "memory-no-position",
     "can-know",
     "cannot-know",
+    "random-clutter",
 );
 
 /// The names of the built-in experiments, in their order.

@@ -1,5 +1,6 @@
 //! A checked experiment: every value is in its range and fits the others.
 
+mod appearance;
 mod marks;
 mod panes;
 
@@ -10,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use exact::names;
 use trace::palette::Color;
 
+pub use appearance::{Body, Look};
 pub use marks::{Mark, MarkColor, Part, Wearer};
 pub use panes::{BodyShown, Paint, Pane, PaneKind};
 
@@ -88,26 +90,9 @@ pub struct Spec {
     /// How the room and its mirrors look.
     #[serde(default, skip_serializing_if = "Look::is_plain")]
     pub look: Look,
-}
-
-/// How the room and its mirrors look. What is visible is the same.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Look {
-    /// Walls of one grey each, mirrors without frame or tint.
-    #[default]
-    Plain,
-    /// Walls of panels, mirrors with a frame of wood and a slight tint.
-    Textured,
-}
-
-names!(Look { Plain: "plain", Textured: "textured" });
-
-impl Look {
-    #[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde asks for")]
-    pub(crate) const fn is_plain(&self) -> bool {
-        matches!(self, Self::Plain)
-    }
+    /// The shape of all bodies; the world's if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub body: Option<Body>,
 }
 
 /// A column that traces have unless their experiments say that it has no meaning.
@@ -213,8 +198,11 @@ pub enum Cubes {
         #[schemars(range(min = 2, max = 10))]
         count: u32,
     },
-    /// Cubes of any colours, some of them before the first pane.
+    /// Cubes of any colours.
     Clutter {
+        /// The places of the cubes.
+        #[serde(default, skip_serializing_if = "Occluders::is_before_mirror")]
+        occluders: Occluders,
         /// The least number; the world's if absent.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schemars(range(max = 12))]
@@ -223,8 +211,8 @@ pub enum Cubes {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schemars(range(max = 12))]
         most: Option<u32>,
-        /// Of a hundred places before the first pane, those from which it hides half of the body or more, at least; the
-        /// world's if absent.
+        /// Of a hundred places before the first pane, those from which it hides half of the body or more, at least; if absent
+        /// the world's, or none where the places are random.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schemars(range(max = 100))]
         hides: Option<u32>,
@@ -233,6 +221,26 @@ pub enum Cubes {
 
 const fn three() -> u32 {
     3
+}
+
+/// The places of clutter.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Occluders {
+    /// Most stand before the first pane, and most have another cube on top.
+    #[default]
+    BeforeMirror,
+    /// Each stands on the floor, anywhere.
+    Random,
+}
+
+names!(Occluders { BeforeMirror: "before_mirror", Random: "random" });
+
+impl Occluders {
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde asks for")]
+    pub(crate) const fn is_before_mirror(&self) -> bool {
+        matches!(self, Self::BeforeMirror)
+    }
 }
 
 /// The other agents of a world.

@@ -17,14 +17,14 @@ use parquet::file::metadata::{KeyValue, ParquetMetaData};
 use parquet::schema::types::SchemaDescriptor;
 use serde_json::Value;
 
-use super::budget::{EpisodeBudget, MOST_COLUMNS};
-use super::footer::{Extent, Footer, bounds, footer, plain};
-use super::statistics::Declared as Statistics;
+use super::{Extent, Footer, bounds, footer, plain};
 use crate::catch_panic::contained;
 use crate::declared_experiment::{self, DeclaredExperiment};
 use crate::diagnostic::{Code, Finding};
 use crate::footers;
 use crate::inputs::Input;
+use crate::read::budget::{EpisodeBudget, MOST_COLUMNS};
+use crate::read::statistics::Declared as Statistics;
 use crate::schema::colors::palette::{Declared, Palette};
 use crate::schema::{self, COLUMNS, Column, DeclaredColumn, Domain, Kind};
 use exact::escape::visible;

@@ -15,6 +15,7 @@ use report::plan::register::{NamedHash, RegisteredPlan};
 use report::plan::{Given, PlanRequest, plan};
 use score::format::{self, Format};
 use score::score_traces;
+use score::vocabulary;
 use serde_json::{Value, json};
 use statistics::sample_size::Clusters;
 use world::agent::vlm::journal::Entry;
@@ -220,7 +221,7 @@ fn registered() -> Vec<u8> {
 
 fn scores() -> Vec<Vec<u8>> {
     let traces = episodes::open();
-    let definitions = Definitions::load("paper", &score_traces::trace_columns(traces)).expect("built in");
+    let definitions = Definitions::load("paper", &vocabulary::trace_columns(traces)).expect("built in");
     let table = score_traces::score(traces, &definitions, &[], std::num::NonZeroUsize::MIN).expect("a sound trace");
     let formats = [Format::Csv, Format::JsonLines, Format::Parquet];
     let of = |(at, format): (u8, Format)| {

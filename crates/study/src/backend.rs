@@ -10,11 +10,10 @@ use engines::spark::source::{Sources, is_uri};
 use engines::spark::{self, Cluster, Job, SparkError, Written};
 use exact::replace::check_target;
 use metric::definitions::Definitions;
-use score::score_traces::check_label;
 use score::table::EpisodeTable;
+use score::vocabulary::check_label;
 use trace::open::TraceSet;
 
-/// An engine.
 #[derive(Clone, Debug, Default)]
 pub enum Backend {
     /// The program's own kernels.
@@ -63,11 +62,8 @@ impl SparkJob {
     }
 
     /// URIs that Spark alone can read.
-    ///
-    /// # Errors
-    /// Every fault of the definitions.
     pub fn of_uris(uris: Vec<String>, question: &Question, cluster: Cluster) -> Result<Self, StudyError> {
-        let definitions = question.bind_to(&score::score_traces::unknown_columns())?;
+        let definitions = question.bind_to(&score::vocabulary::unknown_columns())?;
         let (sources, labels, read) = (Sources::Uris(uris), question.labels(), Vec::new());
         Ok(Self { sources, definitions, labels, cluster, read })
     }
@@ -78,9 +74,6 @@ impl SparkJob {
     }
 
     /// The scores, brought here.
-    ///
-    /// # Errors
-    /// Whatever Spark, its absence, or the traces give.
     pub fn score(&self) -> Result<EpisodeTable, StudyError> {
         Ok(spark::score(self.job(), &self.cluster)?)
     }

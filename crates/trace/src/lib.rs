@@ -54,8 +54,7 @@ pub use episodes::{episode, episode_hash, frame, labels, lost, palette, replies}
 
 pub use footers::{answered, checksums, declared, declared_experiment};
 
-pub use read::flat::FlatRows;
-pub use read::flat::TableFile;
+pub use read::flat::{FlatRows, TableFile};
 pub use read::{in_order, open, search, steps, verify};
 pub use schema::{colors, describe};
 pub use write::merge;

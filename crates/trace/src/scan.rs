@@ -103,9 +103,7 @@ pub struct Origin {
 /// The totals of a scan.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ScanSummary {
-    /// Whole episodes.
     pub episodes: u64,
-    /// Their steps.
     pub steps: u64,
 }
 
@@ -156,7 +154,7 @@ impl TraceSet {
         let passed = pass(self.files(), &layout, threads, &checked, |_, event| {
             let checked = match event {
                 Event::Whole(checked) => checked,
-                Event::Fault(finding) => return Err(TraceError::from(*finding).into()),
+                Event::Fault(finding) => return Err(TraceError::from(finding).into()),
             };
             prints.add(&checked.ids);
             spellings.add(checked.colors);
@@ -168,12 +166,12 @@ impl TraceSet {
             })?;
             match checked.result {
                 Ok(result) => sink(result?),
-                Err(finding) => Err(TraceError::from(*finding).into()),
+                Err(finding) => Err(TraceError::from(finding).into()),
             }
         });
         // An id that was there before is found at the end, though it comes before whatever ended the pass.
         if let Some(finding) = prints.first_repeated(self.files(), &layout)? {
-            return Err(TraceError::from(*finding).into());
+            return Err(TraceError::from(finding).into());
         }
         passed?;
         // That two names are spellings of one colour shows when all are known.

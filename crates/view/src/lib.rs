@@ -3,13 +3,28 @@
 //! ```text
 //! found ──► snapshot ──► filter ──► list, overview, episode, map, compare, changes   (answers: JSON, PNG)
 //! (files)   (one scan)              │
-//!           live                    ├──► routes   (a server for one machine, behind `base::web`)
+//!           live                    ├──► routes   (a server for one machine, behind `web`)
 //!           (a newer snapshot)      └──► export   (the same answers as files)
 //! ```
 //!
 //! Rule: the program computes and the page shows: no number is made in the browser. An id in a request is looked up among
 //! the episodes that are open and never made part of a path. With a coder the server adds lines to `labels.jsonl` beside the traces;
 //! nothing else is written into the folders that are looked at.
+//!
+//! ```
+//! use mirrorstats_view::{Options, View};
+//!
+//! # let paper = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/paper");
+//! let view = View::open(Options {
+//!     runs: vec![paper.into()],
+//!     question: study::Question::default(),
+//!     against: None,
+//!     style: "default".to_owned(),
+//!     threads: std::num::NonZeroUsize::MIN,
+//! })?;
+//! assert_eq!(view.episodes(), 840);
+//! # Ok::<(), mirrorstats_view::ViewError>(())
+//! ```
 
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 

@@ -130,7 +130,6 @@ impl TestName {
 
 /// An error of a power analysis.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[expect(missing_docs, reason = "the messages say it")]
 pub enum PlanError {
     #[error(
         "--difference {difference} with --baseline {baseline}: expected rates from 0 to 1, found {}; lower one of the two",

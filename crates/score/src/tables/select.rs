@@ -24,16 +24,12 @@ use trace::labels;
 /// An error of selecting a part of a table.
 #[derive(Debug, thiserror::Error)]
 pub enum SelectError {
-    /// A metric that the table does not have.
     #[error(transparent)]
     Metric(#[from] UnknownMetric),
-    /// The condition is not one over scores.
     #[error(transparent)]
     Condition(#[from] Faults),
-    /// The condition could not be evaluated.
     #[error(transparent)]
     Engine(#[from] EngineError),
-    /// The table could not be laid out in columns.
     #[error("the scores cannot be laid out in columns: {0}")]
     Layout(#[from] ArrowError),
 }

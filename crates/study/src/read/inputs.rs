@@ -69,7 +69,7 @@ impl Source {
     ///
     /// # Errors
     /// Scores, which have no steps.
-    pub fn into_traces(self) -> Result<TraceSet, StudyError> {
+    pub(crate) fn into_traces(self) -> Result<TraceSet, StudyError> {
         match self {
             Self::Traces(traces) => Ok(traces),
             Self::Scores(files) => Err(no_steps(&files)),
@@ -154,18 +154,12 @@ impl FileState {
 
 impl Stamp {
     /// The state of a file now.
-    ///
-    /// # Errors
-    /// Whatever the operating system says.
     pub fn of(input: &Input) -> Result<Self, StudyError> {
         let state = state_of(&input.path).map_err(|source| StudyError::file(&input.name, source))?;
         Ok(Self { name: input.name.clone(), path: input.path.clone(), state })
     }
 
     /// Refuses a file that is another one by now, or was written to.
-    ///
-    /// # Errors
-    /// [`StudyError::Changed`].
     pub fn check(&self) -> Result<(), StudyError> {
         match state_of(&self.path) {
             Ok(state) if state == self.state => Ok(()),

@@ -12,6 +12,7 @@ use report::cells::group::CONDITION;
 use score::quality::{QualityByCell, QualityReader};
 use score::score_traces::{self, Scored};
 use score::table::{EpisodeTable, KeyRef, LabelColumn};
+use score::vocabulary;
 use statistics::losses::INFRASTRUCTURE;
 use trace::declared::Declared;
 use trace::labels::PREFIX;
@@ -56,7 +57,7 @@ impl Study {
     pub fn quality(&self) -> Result<QualityByCell, StudyError> {
         let traces = self.source.traces()?;
         let reader = QualityReader::of(traces);
-        let columns = score_traces::trace_columns(traces);
+        let columns = vocabulary::trace_columns(traces);
         let all = Definitions::from_toml("all", "open = true", &columns)?;
         let nobody = all.clone().filtered("nobody", "false", &columns)?;
         let lost = lost_episodes(traces)?;
@@ -181,7 +182,7 @@ pub(crate) fn lost_episodes(traces: &TraceSet) -> Result<Option<Definitions>, St
     {
         return Ok(None);
     }
-    let columns = score_traces::trace_columns(traces);
+    let columns = vocabulary::trace_columns(traces);
     let statuses: Vec<String> = INFRASTRUCTURE.iter().map(|status| format!("'{status}'")).collect();
     let ended = format!("first(action = 'done') is null and at(reply_status, length()) in ({})", statuses.join(", "));
     // No metric and every experiment: the filter alone is asked for.

@@ -14,7 +14,7 @@ use exact::suggest::hint;
 use metric::definitions::Definitions;
 use report::plan::register::{NamedHash, RegisteredPlan};
 use report::plan::{Given, Plan, PlanRequest, plan};
-use score::score_traces::schema_columns;
+use score::vocabulary::schema_columns;
 use statistics::sample_size::Clusters;
 use study::StudyError;
 

@@ -90,10 +90,28 @@ fn files() -> Vec<(&'static str, Vec<Episode>)> {
         pane("j", "window", "blue", "red", true),
         pane("k", "window", "unknown", "blue", true),
     ];
+    // What was in view counts: a claim before the stranger is there, a decoy beside a mirror that alone was seen, and the
+    // second of two own marks.
+    let mut early = pane("m", "window", "blue", "red", true);
+    early.steps[0].extra.mirror_double_px = Some(0);
+    early.steps[1].extra.mirror_double_px = Some(60);
+    let mut unseen = pane("n", "decoy", "blue", "blue", true);
+    unseen.steps.iter_mut().for_each(|step| step.extra.shown_px = Some(59));
+    let mut seen = pane("o", "decoy", "blue", "blue", true);
+    seen.steps.iter_mut().for_each(|step| step.extra.shown_px = Some(60));
+    let mut second = mark_test("p", &[(green, Some(30), none, false), (green, Some(30), green, true)]);
+    second.steps.iter_mut().for_each(|step| step.extra.mark1_px = Some(7));
     // No own mark in a whole trace: `none` is right.
     let unmarked = vec![mark_test("c", &[(None, None, none, false), (None, None, none, true)])];
     let plain = vec![Episode { shown_color: None, ..pane("l", "E1", "blue", "red", true) }];
-    vec![("marks.parquet", marks), ("panes.parquet", panes), ("unmarked.parquet", unmarked), ("plain.parquet", plain)]
+    let by_view = vec![early, unseen, seen, second];
+    vec![
+        ("by-view.parquet", by_view),
+        ("marks.parquet", marks),
+        ("panes.parquet", panes),
+        ("unmarked.parquet", unmarked),
+        ("plain.parquet", plain),
+    ]
 }
 
 const EXPECTED: &str = "\
@@ -110,6 +128,10 @@ i,m,decoy,1,1,0,0,,,,,
 j,m,window,1,1,1,,1,,,,
 k,m,window,1,1,0,,0,,,,
 l,m,E1,1,1,1,,,,,,
+m,m,window,1,1,1,,0,,,,
+n,m,decoy,1,1,0,,,,,,
+o,m,decoy,1,1,0,1,,,,,
+p,m,mark,1,1,1,,,1,0,,0
 ";
 
 /// The rows in the order of their ids, which is not that of a table.

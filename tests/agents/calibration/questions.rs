@@ -84,7 +84,9 @@ fn check_contingency(profiles: &Profiles) {
         shown.holds(swap, "guesser", "INVENTED", Sum::is_one);
     }
     if profiles.has(swap, "frozen") {
-        CONTINGENCY.iter().for_each(|experiment| shown.holds(experiment, "frozen", "TSA", Sum::is_zero));
+        for experiment in CONTINGENCY {
+            shown.holds(experiment, "frozen", "TSA", Sum::is_zero);
+        }
     }
 }
 

@@ -41,6 +41,15 @@ fn rows_follow_from_one_another() {
         "mark_report",
         "mirror_mark_px",
         "mirror_double_px",
+        "shown_px",
+        "pane1_body_px",
+        "pane2_body_px",
+        "pane3_body_px",
+        "pane4_body_px",
+        "mark1_px",
+        "mark2_px",
+        "mark3_px",
+        "mark4_px",
         "target_distance",
         "answer",
         "answer_truth",
@@ -120,8 +129,8 @@ fn the_color_that_a_pane_shows_is_another_candidate_and_is_in_the_trace() {
         let all = episodes(&bench.path(&format!("runs/{experiment}-random.parquet")));
         all.iter().filter(|episode| episode.steps.iter().any(is_in_view)).count()
     };
-    let decoys = count("decoy", |step| step.mirror_visible);
-    let windows = count("window", |step| step.extra.mirror_double_px.unwrap() >= 60);
+    let decoys = count("decoy", |step| step.extra.shown_px.unwrap() >= 60);
+    let windows = count("window", |step| step.extra.shown_px.unwrap() >= 60);
     for cell in [
         format!("decoy,random,DECOY_CLAIM,{decoys},"),
         format!("window,random,WINDOW_CLAIM,{windows},"),
@@ -131,6 +140,61 @@ fn the_color_that_a_pane_shows_is_another_candidate_and_is_in_the_trace() {
     }
     let decoy = episodes(&bench.path("runs/decoy-random.parquet"));
     assert!(decoy.iter().flat_map(|episode| &episode.steps).all(|step| step.extra.mirror_double_px.is_none()));
+}
+
+/// A mirror, a decoy across from it, and two marks on the own body.
+const TWO_OF_EACH: &str = r#"
+[experiment.two-of-each]
+title = "Two of each"
+prompt = "mark"
+decision = "mark_report"
+cubes = { kind = "none" }
+others = { least = 0, most = 0 }
+start = "before_mirror"
+mirror = [{ kind = "mirror" }, { kind = "decoy", color = "other", wall = "opposite" }]
+mark = [{ part = "face" }, { part = "chest", from_t = 3 }]
+"#;
+
+#[test]
+fn several_panes_and_marks_are_counted_each() {
+    let bench = Bench::new();
+    std::fs::write(bench.path("two.toml"), TWO_OF_EACH).unwrap();
+    bench.recorded("runs", "--agent random --experiment two.toml --seeds 2 --runs 4 --no-log");
+    let all = episodes(&bench.path("runs/two-of-each-random.parquet"));
+    let (mut in_both, mut marked) = (0, 0);
+    for step in all.iter().flat_map(|episode| &episode.steps) {
+        let extra = &step.extra;
+        let [own, double] = [extra.mirror_self_px, extra.mirror_double_px];
+        let [mirror, decoy] = [extra.pane1_body_px, extra.pane2_body_px].map(Option::unwrap);
+        assert_eq!((mirror + decoy, double), (own.unwrap(), None));
+        assert_eq!((extra.shown_px, extra.pane3_body_px, extra.mark3_px), (Some(decoy), None, None));
+        let marks = [extra.mark1_px, extra.mark2_px].map(Option::unwrap);
+        assert_eq!(marks[0] + marks[1], extra.mirror_mark_px.unwrap());
+        in_both += i32::from(mirror > 0) + i32::from(decoy > 0);
+        marked += marks[0];
+    }
+    assert!(in_both > 1 && marked > 0, "{in_both} {marked}");
+    let replayed = run(bench.folder.path(), &["world", "replay", "runs/two-of-each-random.parquet"]).done();
+    assert!(!replayed.contains("diverge"), "{replayed}");
+}
+
+#[test]
+fn the_shape_of_bodies_is_on_record_and_replayed() {
+    let bench = Bench::new();
+    let shaped = |shape: &str| {
+        write_small_world(bench.folder.path(), &format!("body.shape = \"{shape}\"\n"));
+        bench.recorded(shape, "--agent random --experiment E1 --seeds 1 --runs 3 --no-log");
+        let (rows, recording) = read(&bench, &format!("{shape}/E1-random.parquet"));
+        let fingerprints = column(&rows, "fingerprint").as_string::<i32>().value(0).to_owned();
+        let scenes = column(&rows, "scene").as_string::<i32>().value(0).to_owned();
+        run(bench.folder.path(), &["world", "replay", &format!("{shape}/E1-random.parquet")]).done();
+        (fingerprints, scenes, recording["world"]["body"]["shape"].clone())
+    };
+    let [mannequin, humanoid] = ["mannequin", "humanoid"].map(shaped);
+    // Recordings from before there were shapes have none, and are of mannequins.
+    assert_eq!((mannequin.2, humanoid.2), (Value::Null, json!("humanoid")));
+    assert_ne!(mannequin.0, humanoid.0);
+    assert_eq!(mannequin.1, humanoid.1, "the same rooms: episodes are pairs");
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! The agent's own body: never in its own view, always within its cylinder, always within the room.
 
+use world::experiment::spec::Body;
 use world::sim::Experiment;
 use world::sim::body::{Figure, Pose, Stride};
 use world::sim::camera::LabelCamera;
@@ -10,18 +11,23 @@ use world::sim::snapshot::{Shape, Solid};
 use world::sim::visibility::{Shown, labels, labels_by_mujoco};
 use world::sim::world::World;
 
-use super::poses::{scatter, world};
+use super::poses::{scatter, shaped, shaped_world, world};
 use crate::harness::need;
 
 const OWN: Shown = Shown::Direct(Item::Agent(0));
 
 #[test]
 fn a_body_never_shows_directly_in_its_own_view() {
+    never_shows(Body::Mannequin, 1000);
+    never_shows(Body::Humanoid, 200);
+}
+
+fn never_shows(shape: Body, poses: usize) {
     let mut chance = Rng::of(7, 7, 7);
     need::drawing();
-    let mut eye = LabelCamera::new(&WorldConfig::default(), 160, 120).unwrap();
-    let mut world = world(Experiment::E1, 4);
-    for at in 0..1000 {
+    let mut eye = LabelCamera::new(&shaped(shape), 160, 120).unwrap();
+    let mut world = shaped_world(shape, Experiment::E1, 4);
+    for at in 0..poses {
         scatter(&mut world, &mut chance);
         assert_eq!(world.visibility().self_direct_px, 0, "rays, {:?}", world.figures());
         let drawn = eye.labels(&world).unwrap();
@@ -49,10 +55,10 @@ fn a_body_that_did_show_would_be_found() {
 fn the_margin_of_the_eye_is_wide_at_every_stride() {
     // Straight below or behind is out of view; how steeply is what matters: a part may come no nearer to the edge of
     // the view than half of its own distance ahead.
-    let mut world = world(Experiment::E1, 1);
     let pose = Pose { x: 0.0, y: 0.0, heading: world::sim::angle::Heading::new(0) };
     let eye = [0.14, 0.0, 1.52];
-    for stride in [Stride::Standing, Stride::Left, Stride::Right] {
+    for (shape, stride) in shapes_and_strides() {
+        let mut world = shaped_world(shape, Experiment::E1, 1);
         world.place(&[Figure { pose, stride, steps: 0 }]);
         for solid in own(&world) {
             for ([x, y, z], radius) in ends(&solid) {
@@ -66,15 +72,15 @@ fn the_margin_of_the_eye_is_wide_at_every_stride() {
 
 #[test]
 fn a_body_is_within_its_cylinder_at_every_stride() {
-    let mut world = world(Experiment::E1, 1);
-    for thirties in 0..12 {
-        for stride in [Stride::Standing, Stride::Left, Stride::Right] {
+    for (shape, stride) in shapes_and_strides() {
+        let mut world = shaped_world(shape, Experiment::E1, 1);
+        for thirties in 0..12 {
             let pose = Pose { x: 0.0, y: 0.0, heading: world::sim::angle::Heading::new(thirties) };
             world.place(&[Figure { pose, stride, steps: 0 }]);
             for solid in own(&world) {
                 for ([x, y, z], radius) in ends(&solid) {
                     assert!(x.hypot(y) + radius <= world.config().body.radius, "{} at {stride:?}", solid.name);
-                    assert!(z - radius >= 0.0 && z + radius <= 1.61, "{} at {stride:?}", solid.name);
+                    assert!(z - radius >= -1e-9 && z + radius <= 1.61, "{} at {stride:?}", solid.name);
                 }
             }
         }
@@ -100,9 +106,45 @@ fn everything_is_in_the_room() {
     }
 }
 
+#[test]
+fn a_humanoid_has_the_sizes_of_the_standard_one() {
+    // Metres and radii of MuJoCo's model: along the axis of the trunk, of a leg and of an arm.
+    let world = shaped_world(Body::Humanoid, Experiment::E1, 1);
+    let solids = own(&world);
+    let part = |name: &str| solids.iter().find(|solid| solid.name == format!("agent0_{name}")).unwrap();
+    let (height, lowest) = own(&world)
+        .iter()
+        .flat_map(ends)
+        .fold((0.0_f64, 9.0_f64), |(top, low), (at, radius)| (top.max(at[2] + radius), low.min(at[2] - radius)));
+    assert!((height - 1.562).abs() < 1e-6 && lowest.abs() < 1e-6, "{height} {lowest}");
+    for (name, radius, length) in [
+        ("chest", 0.07, 0.14),
+        ("hips", 0.09, 0.14),
+        ("left_thigh", 0.06, 0.3401),
+        ("right_shin", 0.049, 0.3),
+        ("left_upper_arm", 0.04, 0.2771),
+        ("right_forearm", 0.031, 0.2771),
+    ] {
+        let Shape::Capsule { radius: own, length: far } = part(name).shape else { panic!("{name} is no capsule") };
+        assert!((own - radius).abs() < 1e-6 && (far - length).abs() < 1e-3, "{name}: {own} {far}");
+    }
+    assert!(matches!(part("head").shape, Shape::Sphere(radius) if (radius - 0.09).abs() < 1e-6));
+    // Shoulder, elbow and hand are as far apart as in the model, though the arms hang.
+    let [shoulder, hand] = ["left_upper_arm", "left_hand"].map(part);
+    let from = ends(shoulder).into_iter().map(|(at, _)| at).max_by(|a, b| a[2].total_cmp(&b[2])).unwrap();
+    let far = (0..3).map(|at| (from[at] - hand.position[at]).powi(2)).sum::<f64>().sqrt();
+    assert!((far - 0.6236).abs() < 2e-3, "{far}");
+}
+
+fn shapes_and_strides() -> impl Iterator<Item = (Body, Stride)> {
+    let strides = [Stride::Standing, Stride::Left, Stride::Right];
+    Body::ALL.into_iter().flat_map(move |shape| strides.map(|stride| (shape, stride)))
+}
+
 fn own(world: &World) -> Vec<Solid> {
     let solids = world.snapshot().solids.into_iter().filter(|solid| solid.item == Item::Agent(0)).collect::<Vec<_>>();
-    assert_eq!(solids.len(), 21);
+    let parts = if world.config().body.shape == Body::Humanoid { 19 } else { 21 };
+    assert_eq!(solids.len(), parts);
     solids
 }
 

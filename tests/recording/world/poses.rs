@@ -1,5 +1,6 @@
 //! Worlds with everybody at random places that do not overlap.
 
+use world::experiment::spec::Body;
 use world::sim::Experiment;
 use world::sim::angle::Heading;
 use world::sim::body::{Figure, Pose, Stride};
@@ -11,9 +12,21 @@ use world::sim::world::World;
 
 /// The world of an experiment and a seed, at its start.
 pub fn world(experiment: Experiment, seed: i32) -> World {
-    let config = WorldConfig::default();
+    shaped_world(Body::default(), experiment, seed)
+}
+
+/// The same with bodies of a shape.
+pub fn shaped_world(shape: Body, experiment: Experiment, seed: i32) -> World {
+    let config = shaped(shape);
     let scene = Scene::draw(&config, experiment, seed, 0).unwrap();
     World::new(&config, scene).unwrap()
+}
+
+/// The default configuration with bodies of a shape.
+pub fn shaped(shape: Body) -> WorldConfig {
+    let mut config = WorldConfig::default();
+    config.body.shape = shape;
+    config
 }
 
 /// Puts everybody somewhere, facing anywhere, standing or in the middle of a stride.
@@ -40,11 +53,11 @@ fn free_pose(plan: &FloorPlan, placed: &[Figure], chance: &mut Rng) -> Pose {
 }
 
 /// Calls `each` with as many scattered worlds as asked for, a new scene every tenth time.
-pub fn for_scattered(experiments: &[Experiment], poses: i32, mut each: impl FnMut(&World)) {
+pub fn for_scattered(shape: Body, experiments: &[Experiment], poses: i32, mut each: impl FnMut(&World)) {
     let mut chance = Rng::of(2026, 11, 21);
     for at in 0..(poses + 9) / 10 {
         let experiment = experiments[usize::try_from(at).unwrap() % experiments.len()];
-        let mut world = world(experiment, 1000 + at);
+        let mut world = shaped_world(shape, experiment, 1000 + at);
         for _ in 0..10 {
             scatter(&mut world, &mut chance);
             each(&world);

@@ -10,6 +10,7 @@ use world::sim::body::{Figure, Pose};
 use world::sim::config::WorldConfig;
 use world::sim::floor::distance;
 use world::sim::model::Item;
+use world::sim::placement::Occlusion;
 use world::sim::scene::Scene;
 use world::sim::visibility::{Shown, labels};
 use world::sim::world::World;
@@ -159,6 +160,28 @@ fn shares_shown(world: &mut World, open: &mut World) -> Vec<f64> {
         }
     }
     shares
+}
+
+#[test]
+fn random_clutter_stands_on_the_floor_anywhere_and_leaves_the_mirror_in_view() {
+    let config = WorldConfig::default();
+    let random = Experiment::parse("random-clutter").unwrap();
+    let (mut cubes, mut before) = (0, 0);
+    for scene in (0..60).map(|seed| Scene::draw(&config, random, seed, 1).unwrap()) {
+        assert!((6..=10).contains(&scene.cubes.len()));
+        for cube in &scene.cubes {
+            assert!(cube.base.abs() <= 0.0, "{cube:?}");
+            let is_before = scene.mirror.distance([cube.x, cube.y], &config) <= config.clutter.mirror_distance;
+            before += usize::from(is_before && scene.mirror.aside([cube.x, cube.y]).abs() <= config.mirror.width / 2.0);
+            cubes += 1;
+        }
+    }
+    // The area before the mirror is a twentieth of the floor; nine tenths of the clutter of E5 stand there.
+    assert!(before > 0 && before * 8 < cubes, "{before} of {cubes}");
+    let [ours, theirs] =
+        [Experiment::E5, random].map(|experiment| Occlusion::of(&config, experiment).expect("the scenes fit"));
+    assert!(2 * ours.hidden >= ours.places, "{ours:?}");
+    assert!(theirs.places > 0 && 10 * theirs.hidden < theirs.places, "{theirs:?}");
 }
 
 #[test]

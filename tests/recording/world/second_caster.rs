@@ -3,13 +3,14 @@
 
 use trace::episode::Action;
 use world::experiment::Experiment;
-use world::experiment::spec::PaneKind;
-use world::sim::config::WorldConfig;
+use world::experiment::spec::{Body, PaneKind};
 use world::sim::model::Item;
 use world::sim::rng::Rng;
 use world::sim::scene::{HungPane, Scene};
 use world::sim::snapshot::{Shape, Snapshot, Solid};
 use world::sim::world::World;
+
+use super::poses::shaped;
 
 type Vector = [f64; 3];
 
@@ -123,9 +124,9 @@ fn own_px(world: &World, past: &[Snapshot]) -> u32 {
 }
 
 /// Compares the two casters along walks in all built-in experiments where a body walks, until so many views are compared.
-fn compare(views: usize) {
+fn compare(shape: Body, views: usize) {
     let names = ["E1", "E4", "E5", "two-mirrors", "delayed", "decoy", "window", "mark"];
-    let config = WorldConfig::default();
+    let config = shaped(shape);
     let mut chance = Rng::of(4711, 1, 1);
     let (mut compared, mut seen) = (0, 0);
     for (name, seed) in (1..).flat_map(|seed| names.map(|name| (name, seed))) {
@@ -157,11 +158,13 @@ fn compare(views: usize) {
 
 #[test]
 fn a_second_caster_agrees_on_what_the_mirror_shows() {
-    compare(16);
+    compare(Body::Mannequin, 16);
+    compare(Body::Humanoid, 8);
 }
 
 #[test]
 #[ignore = "`make soak`: half an hour"]
 fn soak_of_five_thousand_views_by_a_second_caster() {
-    compare(5_000);
+    compare(Body::Mannequin, 5_000);
+    compare(Body::Humanoid, 200);
 }

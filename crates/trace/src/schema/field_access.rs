@@ -49,7 +49,8 @@ const FIELDS: &[(&str, Access)] = fields! {
         mirror_self_px mirror_other_px mirror_px direct_other_px pose_x pose_y pose_yaw bumped cube_distance reply_status
         reply_repair reply_fault view_description reasoning summary identification reply latency_ms prompt_tokens
         completion_tokens cost_usd frame_time frame_digest mark_color mark_report mirror_mark_px
-        mirror_double_px target_distance answer answer_truth
+        mirror_double_px shown_px pane1_body_px pane2_body_px pane3_body_px pane4_body_px mark1_px mark2_px mark3_px mark4_px
+        target_distance answer answer_truth
     ];
 };
 

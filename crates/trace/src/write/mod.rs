@@ -46,7 +46,7 @@ pub struct OptionalColumns {
 }
 
 /// Columns that no recording of the five experiments gives.
-const OF_OTHER_TASKS: [&str; 11] = [
+const OF_OTHER_TASKS: [&str; 12] = [
     "frame_digest",
     "participant",
     "start_distance",
@@ -55,13 +55,13 @@ const OF_OTHER_TASKS: [&str; 11] = [
     "mark_report",
     "mirror_mark_px",
     "mirror_double_px",
+    "shown_px",
     "target_distance",
     "answer",
     "answer_truth",
 ];
 
 impl OptionalColumns {
-    /// No optional column.
     pub const NONE: Self = Self { given: Vec::new(), absent: Vec::new() };
 
     pub fn all() -> Self {
@@ -82,16 +82,23 @@ impl OptionalColumns {
         };
         let experiment = &recording["experiment"];
         let has_marks = experiment["mark"].is_array() || is_there(&experiment["reply"], "mark");
+        let panes = experiment["mirror"].as_array().map_or(0, Vec::len);
+        let own_marks =
+            experiment["mark"].as_array().into_iter().flatten().filter(|mark| mark["on"] != "other").count();
         let is_given = |name: &str| match name {
             "reply_repair" | "reply_fault" => reads_replies,
             "frame_digest" => recording["frame_digest"].is_string(),
             "participant" => agent.get("human").is_some(),
             "mark_color" | "mark_report" | "mirror_mark_px" => has_marks,
             "mirror_double_px" => shows_another_body(&experiment["mirror"]),
-            "shown_color" => shows_another_color(&experiment["mirror"]),
+            "shown_color" | "shown_px" => shows_another_color(&experiment["mirror"]),
             "start_distance" | "target_distance" => experiment["hand"].is_object(),
             "answer" | "answer_truth" => experiment["decision"] == "answer",
-            _ => !OF_OTHER_TASKS.contains(&name),
+            _ => match (numbered(name, "pane"), numbered(name, "mark")) {
+                (Some(number), _) => panes >= number.max(2),
+                (_, Some(number)) => own_marks >= number.max(2),
+                _ => !OF_OTHER_TASKS.contains(&name),
+            },
         };
         let absent = of_some_tasks().filter(|name| is_there(&experiment["absent"], name));
         let given = Self::all().given.into_iter().filter(|column| is_given(column.name));
@@ -153,8 +160,8 @@ impl<W: Write + Send> TraceEncoder<W> {
     }
 
     fn with(make: Make<W>, out: W, metadata: &TraceMetadata) -> Result<Self, TraceError> {
-        let recording = metadata.recording.as_ref().map(ToString::to_string);
-        let palette = Declared::of("stream", recording.as_deref()).map_err(|finding| *finding)?.palette;
+        let recording = metadata.recording.as_ref().unwrap_or(&serde_json::Value::Null);
+        let palette = Declared::of("stream", recording).map_err(|finding| *finding)?.palette;
         let (columns, undeclared) = metadata.columns.split();
         let gathered = Gathered::of_columns(columns.iter().copied());
         let file = make(out, &gathered.layout, metadata.recording.as_ref()).map_err(failed)?;
@@ -175,6 +182,11 @@ impl<W: Write + Send> TraceEncoder<W> {
     pub fn finish(self) -> Result<W, TraceError> {
         self.file.finish(Some(self.gathered)).map_err(failed)
     }
+}
+
+/// The number in a column's name, as in `pane2_body_px`.
+fn numbered(column: &str, prefix: &str) -> Option<usize> {
+    column.strip_prefix(prefix)?.split('_').next()?.parse().ok()
 }
 
 /// Whether one of the mirrors and windows of an experiment may show a body in another colour than the own body's: one of

@@ -42,6 +42,7 @@ files!(
     "memory-no-position",
     "can-know",
     "cannot-know",
+    "random-clutter",
     "contingency",
     "contingency-late",
     "contingency-swap",

@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 
 use super::Experiment;
 use super::spec::{
-    Answer, Behavior, BodyShown, Camera, Colors, Cubes, Hand, Look, Mark, MarkColor, Others, Paint, Pane, PaneKind,
-    Picture, Start, Stated, Wall, Wearer,
+    Answer, Behavior, Body, BodyShown, Camera, Colors, Cubes, Hand, Look, Mark, MarkColor, Occluders, Others, Paint,
+    Pane, PaneKind, Picture, Start, Stated, Wall, Wearer,
 };
 use exact::escape::visible;
 
@@ -22,7 +22,18 @@ pub fn explained(experiment: Experiment) -> String {
     };
     line("scenes", scenes);
     line("body", body(experiment));
+    let shape = match experiment.body {
+        None => None,
+        Some(Body::Mannequin) => Some("mannequins, with a neutral head and a face"),
+        Some(Body::Humanoid) => Some("humanoids with the sizes of MuJoCo's, all in one colour"),
+    };
+    if let Some(words) = shape {
+        line("shape", words.to_owned());
+    }
     line("cubes", cubes(experiment.layout.cubes));
+    if let Some(words) = occlusion(experiment) {
+        line("occlusion", words);
+    }
     line("others", others(experiment.layout.others));
     let start = match experiment.layout.start {
         Start::FacingAway => "the first mirror, or its place, is out of view",
@@ -67,7 +78,7 @@ pub fn explained(experiment: Experiment) -> String {
         line("view", format!("{width} x {height} pixels, {fovy} degrees high"));
     }
     if experiment.look == Look::Textured {
-        line("look", "panelled walls, mirrors with a frame and a slight tint".to_owned());
+        line("look", "panelled walls, soft shadows, mirrors with a frame and a slight tint".to_owned());
     }
     let at = if experiment.hand.is_some() { "at the end" } else { "at `done`" };
     line("decision", format!("{} {at}, held against {}", experiment.decision.name(), experiment.truth.name()));
@@ -108,15 +119,39 @@ fn cubes(cubes: Cubes) -> String {
     match cubes {
         Cubes::None => "none".to_owned(),
         Cubes::Candidates { count } => format!("{count} of different colours, one of them the body's"),
-        Cubes::Clutter { least: None, most: None, .. } => {
-            "clutter, as much as the world says, some of it before the first mirror".to_owned()
+        Cubes::Clutter { least, most, occluders, .. } => {
+            let count = match (least, most) {
+                (None, None) => "as much as the world says".to_owned(),
+                _ => format!("{} to {}", number(least, "the world's least"), number(most, "the world's most")),
+            };
+            let places = match occluders {
+                Occluders::BeforeMirror => "some of it before the first mirror",
+                Occluders::Random => "each cube on the floor, anywhere",
+            };
+            format!("clutter, {count}, {places}")
         }
-        Cubes::Clutter { least, most, .. } => format!(
-            "clutter, {} to {}, some of it before the first mirror",
-            number(least, "the world's least"),
-            number(most, "the world's most")
-        ),
     }
+}
+
+/// The share of occlusion in scenes of the built-in world.
+#[cfg(feature = "sim")]
+fn occlusion(experiment: Experiment) -> Option<String> {
+    use crate::sim::{config::WorldConfig, placement::Occlusion};
+    let has_clutter = matches!(experiment.layout.cubes, Cubes::Clutter { .. });
+    let found = has_clutter.then(|| Occlusion::of(&WorldConfig::default(), experiment)).flatten()?;
+    let Occlusion { places, hidden, shares } = found;
+    #[expect(clippy::cast_precision_loss, reason = "some hundred places")]
+    let [mean, half] = [shares, hidden as f64].map(|sum| 100.0 * sum / places as f64);
+    Some(format!(
+        "from the places before the first mirror, {mean:.1} % of the body is hidden on average, and half of it or more from \
+         {half:.1} % of them (21 scenes of the default world)"
+    ))
+}
+
+/// A build without the world draws no scenes.
+#[cfg(not(feature = "sim"))]
+const fn occlusion(_: Experiment) -> Option<String> {
+    None
 }
 
 fn others(others: Others) -> String {

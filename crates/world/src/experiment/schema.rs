@@ -7,8 +7,8 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::spec::{
-    AbsentColumn, Actions, Answer, BodyShown, Camera, Colors, Cubes, Decision, Look, MOST_MARKS, MOST_PANES, Mark,
-    Others, Paint, PaneKind, Picture, ReplyKey, Start, Stated, Truth, Wall,
+    AbsentColumn, Actions, Answer, Body, BodyShown, Camera, Colors, Cubes, Decision, Look, MOST_MARKS, MOST_PANES,
+    Mark, Others, Paint, PaneKind, Picture, ReplyKey, Start, Stated, Truth, Wall,
 };
 use metric::shape::{Fraction, Level};
 use trace::answers::MOST_ANSWERS;
@@ -104,9 +104,11 @@ pub struct ExperimentTable {
     pub hand: Option<HandTable>,
     /// The size and the angle of the picture; the world's if absent.
     pub view: Option<Picture>,
-    /// How the room and its mirrors look: `plain`, or `textured`, with panelled walls, and frame and tint of a mirror; `plain` if
-    /// absent.
+    /// How the room and its mirrors look: `plain`, or `textured`, with panelled walls, soft shadows, and frame and tint of a
+    /// mirror; `plain` if absent.
     pub look: Option<Look>,
+    /// The shape of all bodies: `mannequin`, or `humanoid`, the sizes of MuJoCo's standard humanoid; the world's if absent.
+    pub body: Option<Body>,
 }
 
 /// A hand that floats freely, a step at a time.

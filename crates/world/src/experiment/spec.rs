@@ -1,6 +1,7 @@
 //! A checked experiment: every value is in its range and fits the others.
 
 mod answers;
+mod appearance;
 mod layout;
 mod marks;
 mod panes;
@@ -12,7 +13,8 @@ use serde::{Deserialize, Serialize};
 use exact::names;
 
 pub use answers::{Answer, AnswerType, Fact, Side, UNKNOWN};
-pub use layout::{Behavior, Colors, Cubes, Layout, Others, Start, Wall};
+pub use appearance::{Body, Look};
+pub use layout::{Behavior, Colors, Cubes, Layout, Occluders, Others, Start, Wall};
 pub use marks::{Mark, MarkColor, Part, Wearer};
 pub use panes::{BodyShown, Paint, Pane, PaneKind};
 
@@ -94,26 +96,9 @@ pub struct Spec {
     /// How the room and its mirrors look.
     #[serde(default, skip_serializing_if = "Look::is_plain")]
     pub look: Look,
-}
-
-/// How the room and its mirrors look. What is visible is the same.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Look {
-    /// Walls of one grey each, mirrors without frame or tint.
-    #[default]
-    Plain,
-    /// Walls of panels, mirrors with a frame of wood and a slight tint.
-    Textured,
-}
-
-names!(Look { Plain: "plain", Textured: "textured" });
-
-impl Look {
-    #[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde asks for")]
-    pub(crate) const fn is_plain(&self) -> bool {
-        matches!(self, Self::Plain)
-    }
+    /// The shape of all bodies; the world's if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub body: Option<Body>,
 }
 
 /// A column that traces have unless their experiments say that it has no meaning.

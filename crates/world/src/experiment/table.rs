@@ -100,6 +100,7 @@ pub(super) fn read(name: &str, at: &At<'_>, beside: &Beside<'_>, faults: &mut Ve
         view: table.view,
         absent,
         look: table.look.unwrap_or_default(),
+        body: table.body,
     };
     // What is wrong by itself may make relations wrong that are not: a key with a fault says nothing to them.
     let own = faults[before..].to_vec();

@@ -1,20 +1,21 @@
-//! The eyes of a thread: one for each size of pictures and look of the room that the experiments ask for.
+//! The eyes of a thread: one for each size of pictures, look of the room and shape of bodies that the experiments ask for.
 
 use std::cell::RefCell;
 
 use crate::experiment::Experiment;
-use crate::experiment::spec::Look;
+use crate::experiment::spec::{Body, Look};
 use crate::sim::camera::{Camera, CameraError};
 use crate::sim::config::WorldConfig;
 
-/// Eyes by the width and the height of their pictures, and the look that they can draw: a renderer keeps its textures.
+/// Eyes by the width and the height of their pictures, and the look and the shape that they can draw: a renderer keeps its
+/// textures, and as many parts as it was made with.
 pub(super) struct Eyes(Vec<(Kind, RefCell<Camera>)>);
 
-type Kind = ([u32; 2], Look);
+type Kind = ([u32; 2], Look, Body);
 
 fn kind(config: &WorldConfig, experiment: Experiment) -> Kind {
-    let WorldConfig { eye, look, .. } = config.of(experiment);
-    ([eye.width, eye.height_px], look)
+    let WorldConfig { eye, look, body, .. } = config.of(experiment);
+    ([eye.width, eye.height_px], look, body.shape)
 }
 
 impl Eyes {

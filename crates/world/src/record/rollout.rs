@@ -9,6 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use super::error::RecordError;
+use super::pixels;
 use super::plan::{Key, Subject};
 use super::shares::Shares;
 use crate::agent::reply::Repair;
@@ -193,14 +194,15 @@ fn nothing() -> Arc<Frame> {
 
 /// The row of a step, `bumped` left open.
 fn row(world: &World, key: Key, t: i32, visibility: &Visibility, reply: Reply) -> Step {
-    let px = |count: u32| Some(i32::try_from(count).unwrap_or(i32::MAX));
+    let counts = pixels::by_column(world, visibility);
+    let px = |column: &str| counts.iter().find(|(name, _)| *name == column).map(|(_, px)| *px);
     let cube = reply.selected_cube.as_deref().and_then(Color::named);
     let pose = world.pose();
     let mut extra = Extra {
-        mirror_self_px: px(visibility.self_px),
-        mirror_other_px: px(visibility.other_px),
-        mirror_px: px(visibility.mirror_px),
-        direct_other_px: px(visibility.direct_other_px),
+        mirror_self_px: px("mirror_self_px"),
+        mirror_other_px: px("mirror_other_px"),
+        mirror_px: px("mirror_px"),
+        direct_other_px: px("direct_other_px"),
         pose_x: Some(narrowed(pose.x)),
         pose_y: Some(narrowed(pose.y)),
         pose_yaw: Some(narrowed(pose.heading.degrees())),
@@ -214,8 +216,17 @@ fn row(world: &World, key: Key, t: i32, visibility: &Visibility, reply: Reply) -
         identification: reply.words.identification,
         mark_color: world.scene().own_mark_at(world.t()).map(|color| color.name().to_owned()),
         mark_report: reply.mark_report,
-        mirror_mark_px: world.has_own_mark().then(|| px(visibility.mark_px)).flatten(),
-        mirror_double_px: world.has_double().then(|| px(visibility.double_px)).flatten(),
+        mirror_mark_px: px("mirror_mark_px"),
+        mirror_double_px: px("mirror_double_px"),
+        shown_px: px("shown_px"),
+        pane1_body_px: px("pane1_body_px"),
+        pane2_body_px: px("pane2_body_px"),
+        pane3_body_px: px("pane3_body_px"),
+        pane4_body_px: px("pane4_body_px"),
+        mark1_px: px("mark1_px"),
+        mark2_px: px("mark2_px"),
+        mark3_px: px("mark3_px"),
+        mark4_px: px("mark4_px"),
         reply: reply.raw,
         latency_ms: reply.usage.latency_ms,
         prompt_tokens: reply.usage.prompt_tokens,

@@ -1,11 +1,12 @@
 //! A trace's worlds built anew, and its actions repeated in them.
 
-use serde_json::Value;
+use serde_json::Value as Json;
 
 use super::divergence::Divergence;
 use super::error::ReplayError;
 use crate::experiment::spec::Side;
 use crate::experiment::{Experiment, Spec};
+use crate::record::pixels;
 use crate::sim::config::WorldConfig;
 use crate::sim::scene::{SCENE_VERSION, Scene};
 use crate::sim::visibility::Visibility;
@@ -13,6 +14,7 @@ use crate::sim::world::World;
 use trace::answers::Answered;
 use trace::episode::{Episode, Extra, Step};
 use trace::palette::Color;
+use trace::schema::{self, Value};
 
 /// The most rays in a row and in a column of the grid that pixels are counted with.
 pub const MOST_RAYS: u32 = 4096;
@@ -30,7 +32,7 @@ pub struct Recipe {
 
 impl Recipe {
     /// Reads the value of `mirrorstats.recording`.
-    pub fn of(recording: Option<&Value>) -> Result<Self, ReplayError> {
+    pub fn of(recording: Option<&Json>) -> Result<Self, ReplayError> {
         let recording = recording.ok_or(ReplayError::NoRecipe)?;
         // First: a world of another version may lack what this one has.
         let version = recording.get("scene_version").ok_or(ReplayError::NoRecipe)?;
@@ -40,7 +42,7 @@ impl Recipe {
         let world = recording.get("world").ok_or(ReplayError::NoRecipe)?;
         let config: WorldConfig =
             serde_json::from_value(world.clone()).map_err(|fault| ReplayError::Recipe(fault.to_string()))?;
-        let expected = recording.get("world_hash").and_then(Value::as_str).unwrap_or_default();
+        let expected = recording.get("world_hash").and_then(Json::as_str).unwrap_or_default();
         if config.hash() != expected {
             return Err(ReplayError::Changed { expected: expected.to_owned(), found: config.hash() });
         }
@@ -68,8 +70,8 @@ impl Recipe {
     }
 }
 
-fn counted_with(config: &WorldConfig, recording: &Value) -> WorldConfig {
-    let number = |value: Option<&Value>| u32::try_from(value?.as_u64()?).ok();
+fn counted_with(config: &WorldConfig, recording: &Json) -> WorldConfig {
+    let number = |value: Option<&Json>| u32::try_from(value?.as_u64()?).ok();
     let grid = |side: &str| {
         let side = number(recording.get("visibility_grid").and_then(|grid| grid.get(side)));
         side.filter(|side| (1..=MOST_RAYS).contains(side))
@@ -92,12 +94,12 @@ pub fn again<E: From<ReplayError>>(
     let mut world = recipe.world(episode, eye)?;
     let is_same_eye = *eye == recipe.eye;
     let mut parted = differs(episode, 0, &constants(episode, world.scene()));
-    for (t, step) in (1..).zip(&episode.steps) {
+    for (t, (at, step)) in (1..).zip(episode.steps.iter().enumerate()) {
         let visibility = world.visibility();
         look(t, &world, &visibility, step)?;
         let mut columns = poses(step, &world);
         if is_same_eye {
-            columns.extend(counts(step, &world, &visibility));
+            columns.extend(counts(episode, at, &world, &visibility));
         }
         let truths = if is_same_eye { truths(episode, step, &world, &visibility) } else { Vec::new() };
         let bumped = world.act(step.action).bumped;
@@ -173,20 +175,13 @@ fn truths(episode: &Episode, step: &Step, world: &World, visibility: &Visibility
     compared.collect()
 }
 
-fn counts(step: &Step, world: &World, visibility: &Visibility) -> Vec<Compared> {
-    let compared = [
-        ("mirror_self_px", step.extra.mirror_self_px, visibility.self_px),
-        ("mirror_other_px", step.extra.mirror_other_px, visibility.other_px),
-        ("mirror_px", step.extra.mirror_px, visibility.mirror_px),
-        ("direct_other_px", step.extra.direct_other_px, visibility.direct_other_px),
-        ("mirror_mark_px", step.extra.mirror_mark_px, visibility.mark_px),
-        ("mirror_double_px", step.extra.mirror_double_px, visibility.double_px),
-    ];
-    let mut columns: Vec<Compared> = compared
-        .into_iter()
-        .filter_map(|(name, own, found)| Some((name, own?.to_string(), found.to_string())))
-        .collect();
+fn counts(episode: &Episode, at: usize, world: &World, visibility: &Visibility) -> Vec<Compared> {
+    let recorded = |name: &str| schema::column(name)?.of_steps(episode).nth(at)?;
+    let compared = pixels::by_column(world, visibility).into_iter().filter_map(|(name, found)| match recorded(name)? {
+        Value::Int(own) => Some((name, own.to_string(), found.to_string())),
+        _ => None,
+    });
     let visible = world.is_mirror_visible(visibility);
-    columns.push(("mirror_visible", step.mirror_visible.to_string(), visible.to_string()));
-    columns
+    let recorded = episode.steps[at].mirror_visible;
+    compared.chain([("mirror_visible", recorded.to_string(), visible.to_string())]).collect()
 }

@@ -14,9 +14,9 @@ use super::divergence::Divergence;
 use super::error::ReplayError;
 use super::log::{Log, Seen};
 use super::same_frames::{FramesAnswer, has_digests};
+use crate::record::pixels;
 use crate::sim::camera::Camera;
 use crate::sim::config::WorldConfig;
-use crate::sim::visibility::Visibility;
 use exact::replace::TemporaryFolder;
 use trace::episode::Episode;
 use trace::inputs::Input;
@@ -184,7 +184,7 @@ impl Player<'_> {
         let mut log = log.transpose().map_err(unwritten)?;
         let (mut counts, mut other_frame) = (Counts::default(), None);
         let divergence = again(&self.trace.recipe, self.eye, episode, |t, world, visibility, step| {
-            counts.add(visibility, world.is_mirror_visible(visibility));
+            counts.add(pixels::by_column(world, visibility), world.is_mirror_visible(visibility));
             let frame = self.camera.as_mut().map(|camera| camera.frame(world)).transpose();
             let frame = frame.map_err(ReplayError::other)?.map(Arc::new);
             let recorded = step.extra.frame_digest.as_deref();
@@ -213,19 +213,17 @@ impl Player<'_> {
 /// The new counts, a value per step.
 #[derive(Default)]
 struct Counts {
-    px: [Vec<i32>; 5],
+    px: Vec<(&'static str, Vec<i32>)>,
     visible: Vec<bool>,
 }
 
 impl Counts {
-    /// The columns of the counts.
-    const COLUMNS: [&str; 5] =
-        ["mirror_self_px", "mirror_other_px", "mirror_px", "direct_other_px", "mirror_double_px"];
-
-    fn add(&mut self, seen: &Visibility, visible: bool) {
-        let counts = [seen.self_px, seen.other_px, seen.mirror_px, seen.direct_other_px, seen.double_px];
-        for (column, count) in self.px.iter_mut().zip(counts) {
-            column.push(i32::try_from(count).unwrap_or(i32::MAX));
+    fn add(&mut self, counts: Vec<(&'static str, i32)>, visible: bool) {
+        // The columns of a scene are the same at every step.
+        self.px.resize_with(counts.len(), Default::default);
+        for (values, (column, count)) in self.px.iter_mut().zip(counts) {
+            values.0 = column;
+            values.1.push(count);
         }
         self.visible.push(visible);
     }
@@ -235,9 +233,9 @@ impl Counts {
     }
 
     fn columns(self) -> Vec<(&'static str, ArrayRef)> {
-        let px = self.px.map(|values| -> ArrayRef { Arc::new(Int32Array::from(values)) });
+        let px = self.px.into_iter().map(|(column, values)| (column, Arc::new(Int32Array::from(values)) as ArrayRef));
         let visible: ArrayRef = Arc::new(BooleanArray::from(self.visible));
-        Self::COLUMNS.into_iter().zip(px).chain([("mirror_visible", visible)]).collect()
+        px.chain([("mirror_visible", visible)]).collect()
     }
 }
 

@@ -8,7 +8,34 @@ use serde::{Deserialize, Serialize};
 
 use super::angle::{Heading, Quaternion};
 use super::config::BodyConfig;
+use crate::experiment::spec::Body;
 use exact::names;
+
+impl Body {
+    /// Its parts, in MuJoCo's format.
+    pub(super) const fn xml(self) -> &'static str {
+        match self {
+            Self::Mannequin => include_str!("../../../../assets/world/mannequin.xml"),
+            Self::Humanoid => include_str!("../../../../assets/world/humanoid.xml"),
+        }
+    }
+
+    /// The parts that keep their own colour.
+    pub(super) const fn neutral_parts(self) -> &'static [&'static str] {
+        match self {
+            Self::Mannequin => &["head", "face", "neck"],
+            Self::Humanoid => &[],
+        }
+    }
+
+    /// The height by which legs rise in a stride, m: the toes of the humanoid would else go through the floor.
+    const fn lift(self) -> f64 {
+        match self {
+            Self::Mannequin => 0.0,
+            Self::Humanoid => 0.0125,
+        }
+    }
+}
 
 /// The position and direction of a body.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -95,7 +122,7 @@ pub enum Piece {
     RightLeg,
 }
 
-// Every humanoid has one of each; the names are those of `assets/world/humanoid.xml`.
+// Every body has one of each; the names are those of `assets/world/mannequin.xml` and `humanoid.xml`.
 names!(Piece {
     Trunk: "trunk",
     LeftArm: "left_arm",
@@ -124,7 +151,9 @@ impl Piece {
     pub fn place(self, figure: &Figure, joint: [f64; 3], config: &BodyConfig) -> ([f64; 3], Quaternion) {
         let Pose { x, y, heading } = figure.pose;
         let [cosine, sine] = heading.direction();
-        let origin = [x + cosine * joint[0] - sine * joint[1], y + sine * joint[0] + cosine * joint[1], joint[2]];
+        let is_lifted = matches!(self, Self::LeftLeg | Self::RightLeg) && figure.stride != Stride::Standing;
+        let height = joint[2] + if is_lifted { config.shape.lift() } else { 0.0 };
+        let origin = [x + cosine * joint[0] - sine * joint[1], y + sine * joint[0] + cosine * joint[1], height];
         let swing = Quaternion::about_y(-self.swing(figure.stride, config));
         (origin, heading.rotation().after(swing))
     }

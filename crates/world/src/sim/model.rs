@@ -10,6 +10,7 @@
 //! Rule: the sizes of planes never change after compiling, because a renderer keeps them as they were; panes are boxes.
 
 mod dress;
+mod shadow;
 
 pub(super) use dress::{Labelled, labelled};
 
@@ -68,8 +69,6 @@ const PANELS: &str = r#"<texture name="panels" type="2d" builtin="flat" mark="ed
 
 /// Bars of a frame: above, below, and at both sides.
 pub(super) const BARS: usize = 4;
-
-const HUMANOID: &str = include_str!("../../../../assets/world/humanoid.xml");
 
 /// The paint of a model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -270,7 +269,9 @@ fn item(model: &MjModel, geom: usize, scene: &Scene) -> Item {
         scene.marks.iter().position(|mark| mark.wearer == wearer && mark.part.name() == part)
     };
     let front = || scene.marks.iter().position(|mark| mark.part == Part::Front);
-    if let Some(pane) = numbered("pane") {
+    if name.contains(shadow::NAMED) {
+        Item::Room
+    } else if let Some(pane) = numbered("pane") {
         Item::Pane(pane)
     } else if name == PATCH {
         Item::Mark(front().unwrap_or(MOST_MARKS - 1))
@@ -300,9 +301,12 @@ pub(super) fn compile(config: &WorldConfig, paint: Paint, size: [usize; 2]) -> R
     build_boxes(&mut spec, "cube", MOST_CUBES, largest, paint);
     build_boxes(&mut spec, "pane", MOST_PANES, config.room.size, paint);
     for body in 0..BODIES {
-        let mut humanoid = MjSpec::from_xml_string(HUMANOID)?;
+        let mut humanoid = MjSpec::from_xml_string(config.body.shape.xml())?;
         let prefix = format!("{}_", body_name(body));
         spec.world_body_mut().attach_by_deep_copy(&mut humanoid, &prefix, "")?;
+    }
+    if is_textured {
+        shadow::build(&mut spec)?;
     }
     add_eyes(&mut spec, config);
     set_picture(&mut spec, config, paint, size);

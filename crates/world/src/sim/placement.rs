@@ -16,7 +16,7 @@ use super::config::{WorldConfig, metres};
 use super::floor::{FloorPlan, distance};
 use super::rng::Rng;
 use super::scene::{BEFORE_MIRROR, Cube, MOST_CUBES, MirrorPlace, Other, Scene, floor_plan};
-use crate::experiment::spec::{Colors, Cubes, Hand, Layout, Paint, Start, Wall};
+use crate::experiment::spec::{Colors, Cubes, Hand, Layout, Occluders, Paint, Start, Wall};
 use crate::experiment::{balance, number_of};
 use trace::palette::Color;
 
@@ -86,8 +86,7 @@ pub fn crowded(config: &WorldConfig, experiment: Experiment) -> Option<DoesNotFi
             mirror: Some(at),
         });
     }
-    let study = (1..=3).flat_map(|seed| (1..=7).map(move |run| (seed, run)));
-    let crowded = study.into_iter().find_map(|(seed, run)| Scene::draw(config, experiment, seed, run).err())?;
+    let crowded = study().find_map(|(seed, run)| Scene::draw(config, experiment, seed, run).err())?;
     if let Some(Hand { least, most, step_mm, .. }) = experiment.hand {
         return Some(DoesNotFit {
             what: format!(
@@ -107,6 +106,44 @@ pub fn crowded(config: &WorldConfig, experiment: Experiment) -> Option<DoesNotFi
         help: "fewer cubes or others, or a larger `room.size` in the world's configuration".to_owned(),
         mirror: None,
     })
+}
+
+/// The seeds and runs of a study, the scenes by which an experiment is judged.
+fn study() -> impl Iterator<Item = (i32, i32)> {
+    (1..=3).flat_map(|seed| (1..=7).map(move |run| (seed, run)))
+}
+
+/// What cubes hide from the places before the mirror in a study's scenes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Occlusion {
+    pub places: usize,
+    /// Those from which half of the body or more is hidden.
+    pub hidden: usize,
+    /// The shares of the body that are hidden, over all places.
+    pub shares: f64,
+}
+
+impl Occlusion {
+    fn of_shares(shares: &[f64]) -> Self {
+        Self {
+            places: shares.len(),
+            hidden: shares.iter().filter(|share| **share <= 0.5).count(),
+            shares: shares.iter().map(|share| 1.0 - share).sum(),
+        }
+    }
+
+    /// That of an experiment; `None` where its scenes do not fit into the room.
+    pub fn of(config: &WorldConfig, experiment: Experiment) -> Option<Self> {
+        study().try_fold(Self::default(), |sum, (seed, run)| {
+            let scene = Scene::draw(config, experiment, seed, run).ok()?;
+            let found = reach::occlusion(&config.of(experiment), &scene);
+            Some(Self {
+                places: sum.places + found.places,
+                hidden: sum.hidden + found.hidden,
+                shares: sum.shares + found.shares,
+            })
+        })
+    }
 }
 
 fn purpose(experiment: Experiment) -> u64 {
@@ -148,7 +185,7 @@ impl Drawing<'_> {
         let cubes = match layout.cubes {
             Cubes::None => Vec::new(),
             Cubes::Candidates { count } => self.candidates(mirror, body_color, &layout.palette, count)?,
-            Cubes::Clutter { .. } => self.clutter(mirror, &layout.palette)?,
+            Cubes::Clutter { occluders, .. } => self.clutter(mirror, &layout.palette, occluders)?,
         };
         let plan = floor_plan(self.config, &cubes);
         let start = self.start(mirror, &plan, layout.start)?;
@@ -220,8 +257,8 @@ impl Drawing<'_> {
         })
     }
 
-    /// The cubes of E5: some before the mirror, some of them with another on top.
-    fn clutter(&mut self, mirror: MirrorPlace, palette: &[Color]) -> Option<Vec<Cube>> {
+    /// Cubes before the mirror, or anywhere, some of them with another on top.
+    fn clutter(&mut self, mirror: MirrorPlace, palette: &[Color], occluders: Occluders) -> Option<Vec<Cube>> {
         let config = &self.config.clutter;
         let [least, most] = [config.least, config.most].map(|count| i32::try_from(count).unwrap_or(i32::MAX));
         let count = usize::try_from(self.chance.between(least, most)).ok()?.min(MOST_CUBES);
@@ -229,7 +266,8 @@ impl Drawing<'_> {
         while cubes.len() < count {
             let color = self.chance.one_of(palette);
             let edge = self.chance.one_of(&config.edges);
-            let is_before_mirror = self.chance.happens(config.before_mirror_percent) || cubes.is_empty();
+            let is_before_mirror = (occluders == Occluders::BeforeMirror)
+                .then(|| self.chance.happens(config.before_mirror_percent) || cubes.is_empty());
             let cube =
                 self.clutter_cube(mirror, is_before_mirror, Cube { color, x: 0.0, y: 0.0, base: 0.0, edge }, &cubes)?;
             cubes.push(cube);
@@ -241,10 +279,11 @@ impl Drawing<'_> {
         Some(cubes)
     }
 
+    /// A place for a cube: before the mirror, elsewhere, or anywhere for `None`.
     fn clutter_cube(
         &mut self,
         mirror: MirrorPlace,
-        is_before_mirror: bool,
+        is_before_mirror: Option<bool>,
         cube: Cube,
         cubes: &[Cube],
     ) -> Option<Cube> {
@@ -255,7 +294,7 @@ impl Drawing<'_> {
             let is_there =
                 mirror.aside([x, y]).abs() <= config.mirror.width / 2.0 && from_wall <= config.clutter.mirror_distance;
             let gap = 0.2 + cube.edge / 2.0;
-            let fits = is_there == is_before_mirror
+            let fits = is_before_mirror.is_none_or(|wanted| wanted == is_there)
                 && cubes.iter().all(|other| other.square().distance([x, y]) >= gap * std::f64::consts::SQRT_2);
             fits.then_some(Cube { x, y, ..cube })
         })

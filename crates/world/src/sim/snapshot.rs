@@ -90,7 +90,8 @@ fn frames(world: &World) -> Vec<Placed> {
 fn solids(stage: &Stage) -> Vec<Solid> {
     let model = stage.model();
     (0..stage.items().len())
-        .filter(|geom| stage.is_shown(*geom))
+        // Only shadows let anything through.
+        .filter(|geom| stage.is_shown(*geom) && model.geom_rgba()[*geom][3] >= 1.0)
         .map(|geom| Solid {
             name: stage.geom_name(geom).to_owned(),
             item: stage.items()[geom],

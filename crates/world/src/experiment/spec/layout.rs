@@ -51,8 +51,11 @@ pub enum Cubes {
         #[schemars(range(min = 2, max = 10))]
         count: u32,
     },
-    /// Cubes of any colours, some of them before the first pane.
+    /// Cubes of any colours.
     Clutter {
+        /// The places of the cubes.
+        #[serde(default, skip_serializing_if = "Occluders::is_before_mirror")]
+        occluders: Occluders,
         /// The least number; the world's if absent.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schemars(range(max = 12))]
@@ -61,8 +64,8 @@ pub enum Cubes {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schemars(range(max = 12))]
         most: Option<u32>,
-        /// Of a hundred places before the first pane, those from which it hides half of the body or more, at least; the
-        /// world's if absent.
+        /// Of a hundred places before the first pane, those from which it hides half of the body or more, at least; if absent
+        /// the world's, or none where the places are random.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schemars(range(max = 100))]
         hides: Option<u32>,
@@ -71,6 +74,26 @@ pub enum Cubes {
 
 const fn three() -> u32 {
     3
+}
+
+/// The places of clutter.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Occluders {
+    /// Most stand before the first pane, and most have another cube on top.
+    #[default]
+    BeforeMirror,
+    /// Each stands on the floor, anywhere.
+    Random,
+}
+
+names!(Occluders { BeforeMirror: "before_mirror", Random: "random" });
+
+impl Occluders {
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde asks for")]
+    pub(crate) const fn is_before_mirror(&self) -> bool {
+        matches!(self, Self::BeforeMirror)
+    }
 }
 
 /// The other agents of a world.

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use toml::Value;
 
 use crate::experiment::Experiment;
-use crate::experiment::spec::{Camera, Cubes, Look, Others};
+use crate::experiment::spec::{Body, Camera, Cubes, Look, Occluders, Others};
 use exact::budget::Limit;
 use exact::hash;
 use exact::input;
@@ -33,7 +33,7 @@ pub struct WorldConfig {
     pub room: RoomConfig,
     /// The reflective surface.
     pub mirror: MirrorConfig,
-    /// The movement of humanoids.
+    /// The shape and the movement of bodies.
     pub body: BodyConfig,
     /// The first-person camera.
     pub eye: EyeConfig,
@@ -104,10 +104,13 @@ pub struct MirrorConfig {
     pub gap: f64,
 }
 
-/// The movement of humanoids.
+/// The shape and the movement of bodies.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BodyConfig {
+    /// The shape of all bodies, where the experiment does not say it.
+    #[serde(default, skip_serializing_if = "Body::is_mannequin")]
+    pub shape: Body,
     /// Of the upright cylinder that is a body to walls, cubes and other bodies, m.
     #[schemars(range(min = 0.39, max = 0.6))]
     pub radius: f64,
@@ -370,6 +373,7 @@ impl WorldConfig {
             world.eye.fovy = f64::from(picture.fovy);
         }
         world.look = experiment.look;
+        world.body.shape = experiment.body.unwrap_or(world.body.shape);
         if experiment.camera == Camera::Behind {
             (world.eye.forward, world.eye.height, world.eye.pitch) = BEHIND;
         }
@@ -378,7 +382,10 @@ impl WorldConfig {
         put(&mut world.others.most, most);
         put(&mut world.others.twin_percent, twin_percent);
         world.others.least = world.others.least.min(world.others.most);
-        if let Cubes::Clutter { least, most, hides } = experiment.layout.cubes {
+        if let Cubes::Clutter { least, most, hides, occluders } = experiment.layout.cubes {
+            if occluders == Occluders::Random {
+                (world.clutter.hides_percent, world.clutter.stack_percent) = (0, 0);
+            }
             put(&mut world.clutter.hides_percent, hides);
             put(&mut world.clutter.least, least);
             put(&mut world.clutter.most, most);

@@ -6,13 +6,10 @@ use mujoco_rs::prelude::MjtObjBase;
 use super::super::angle::{Heading, Quaternion};
 use super::super::config::WorldConfig;
 use super::super::scene::{Cube, HandShape, HandStart, HungPane, Scene, WornMark};
-use super::{AGENTS, BARS, Item, Look, group};
+use super::{AGENTS, BARS, Item, Look, group, shadow};
 use crate::experiment::spec::{MOST_MARKS, PaneKind};
 use crate::sim::scene::MOST_CUBES;
 use trace::palette::Color;
-
-/// Parts of the humanoid that keep their own colour.
-const NEUTRAL_PARTS: [&str; 3] = ["head", "face", "neck"];
 
 /// Half the depth of a pane, m.
 const HALF_DEPTH: f64 = 0.000_05;
@@ -29,22 +26,25 @@ pub(super) fn dress(model: &mut MjModel, items: &[Item], config: &WorldConfig, s
         Look::Through(at) => Some((at, &scene.panes[at])),
     };
     let is_window = pane.is_some_and(|(_, pane)| pane.kind == PaneKind::Window);
+    let neutral = config.body.shape.neutral_parts();
     for (geom, item) in items.iter().enumerate() {
         match *item {
             Item::Room => {
                 hide_wall(model, geom, pane.map(|(_, pane)| pane));
                 frame(model, geom, scene, look, config);
+                let name = model.id_to_name(MjtObjBase::mjOBJ_GEOM, geom).unwrap_or_default().to_owned();
+                shadow::dress(model, geom, &name, scene, pane);
             }
             Item::Pane(at) => hang(model, geom, scene.panes.get(at).filter(|_| pane.is_none()), config),
             Item::Cube(at) => put_cube(model, geom, scene.cubes.get(at).filter(|_| !is_window)),
             Item::Agent(agent) => {
                 let color = agent_color(agent, scene, pane.map(|(_, pane)| pane));
-                paint_body(model, geom, color, if agent == 0 { group::EGO } else { group::THINGS });
+                paint_body(model, geom, color, if agent == 0 { group::EGO } else { group::THINGS }, neutral);
             }
             Item::Double => {
                 let own = pane.filter(|(at, _)| is_of_double(model, geom, *at));
                 let color = own.and_then(|(_, pane)| pane.double).map(|double| double.color);
-                paint_body(model, geom, color, group::THINGS);
+                paint_body(model, geom, color, group::THINGS, neutral);
             }
             Item::Mark(at) => {
                 model.geom_group_mut()[geom] = group::HIDDEN;
@@ -78,7 +78,7 @@ pub(super) fn show_marks(model: &mut MjModel, items: &[Item], scene: &Scene, t: 
 }
 
 /// The colour that an agent of the room is seen in; `None` where it is not seen so.
-fn agent_color(agent: usize, scene: &Scene, pane: Option<&HungPane>) -> Option<Color> {
+pub(super) fn agent_color(agent: usize, scene: &Scene, pane: Option<&HungPane>) -> Option<Color> {
     let is_window = pane.is_some_and(|pane| pane.kind == PaneKind::Window);
     match (agent.checked_sub(1), pane) {
         _ if is_window => None,
@@ -258,10 +258,10 @@ fn put_hand(model: &mut MjModel, geom: usize, hand: Option<&HandStart>) {
     model.geom_rgba_mut()[geom] = paint(hand.color.rgb());
 }
 
-fn paint_body(model: &mut MjModel, geom: usize, color: Option<Color>, shown: i32) {
+fn paint_body(model: &mut MjModel, geom: usize, color: Option<Color>, shown: i32, neutral: &[&str]) {
     let name = model.id_to_name(MjtObjBase::mjOBJ_GEOM, geom).unwrap_or_default();
     let part = name.split_once('_').map_or("", |(_, part)| part);
-    let (is_neutral, is_mark) = (NEUTRAL_PARTS.contains(&part), part.starts_with("mark_"));
+    let (is_neutral, is_mark) = (neutral.contains(&part), part.starts_with("mark_"));
     model.geom_group_mut()[geom] = if color.is_some() && !is_mark { shown } else { group::HIDDEN };
     if let (Some(color), false) = (color, is_neutral) {
         model.geom_rgba_mut()[geom] = paint(color.rgb());

@@ -78,10 +78,10 @@ fn picture(eye: &mut Camera, world: &World, place: &str) -> Result<Picture, Cont
     let visibility = world.visibility();
     let mut caption = format!("{place}: own body {} px", visibility.self_px);
     if !visibility.marks.is_empty() {
-        let _ = write!(caption, ", own mark {} px", visibility.mark_px);
+        let _ = write!(caption, ", mark {}", visibility.mark_px);
     }
     if !visibility.others.is_empty() {
-        let _ = write!(caption, ", others {} px", visibility.other_px);
+        let _ = write!(caption, ", others {}", visibility.other_px);
     }
     Ok(Picture { frame: eye.frame(world)?, caption })
 }

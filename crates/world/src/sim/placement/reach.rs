@@ -5,6 +5,7 @@ use std::collections::VecDeque;
 use super::super::config::WorldConfig;
 use super::super::floor::FloorPlan;
 use super::super::scene::{Cube, Scene};
+use super::Occlusion;
 use crate::experiment::spec::Cubes;
 
 /// Between two points of the lattice that represents the floor, m.
@@ -24,17 +25,31 @@ const ENOUGH: f64 = 0.75;
 /// third of the episode each; and whether clutter, where there is any, hides half of the body or more from as many
 /// of the places before the mirror as asked for (paper, section 3: mirror evidence in E5 is partial or occluded).
 pub(super) fn is_solvable(config: &WorldConfig, scene: &Scene, plan: &FloorPlan) -> bool {
-    let steps = lengths(scene, plan);
-    let budget = f64::from(config.episode.steps) / 3.0 * config.body.step_length;
-    let near: Vec<[f64; 2]> = steps.iter().filter(|(_, length)| *length <= budget).map(|(spot, _)| *spot).collect();
-    let shares: Vec<f64> = near.iter().filter_map(|spot| share_shown(config, scene, *spot)).collect();
-    let hidden = shares.iter().filter(|share| **share <= 0.5).count();
+    let near = near(config, scene, plan);
+    let shares = shares(config, scene, &near);
+    let Occlusion { places, hidden, .. } = Occlusion::of_shares(&shares);
     let has_clutter = matches!(scene.experiment.layout.cubes, Cubes::Clutter { .. }) && !scene.cubes.is_empty();
     let reaches =
         |cube: &Cube| near.iter().any(|spot| cube.square().distance(*spot) <= plan.radius + config.body.step_length);
     shares.iter().any(|share| *share >= ENOUGH)
-        && (!has_clutter || 100 * hidden >= config.clutter.hides_percent as usize * shares.len())
+        && (!has_clutter || 100 * hidden >= config.clutter.hides_percent as usize * places)
         && (!scene.experiment.has_candidates() || scene.cubes.iter().all(reaches))
+}
+
+/// The places that the agent can walk to within a third of the episode.
+fn near(config: &WorldConfig, scene: &Scene, plan: &FloorPlan) -> Vec<[f64; 2]> {
+    let budget = f64::from(config.episode.steps) / 3.0 * config.body.step_length;
+    lengths(scene, plan).into_iter().filter(|(_, length)| *length <= budget).map(|(spot, _)| spot).collect()
+}
+
+/// The shares of the body that show in the mirror, from those of some places that are before it.
+fn shares(config: &WorldConfig, scene: &Scene, near: &[[f64; 2]]) -> Vec<f64> {
+    near.iter().filter_map(|spot| share_shown(config, scene, *spot)).collect()
+}
+
+/// What cubes hide from the places before the mirror in a scene.
+pub(super) fn occlusion(config: &WorldConfig, scene: &Scene) -> Occlusion {
+    Occlusion::of_shares(&shares(config, scene, &near(config, scene, &scene.floor_plan(config))))
 }
 
 /// What share of the body one who is there and faces the mirror squarely sees of it; `None` where that place is not

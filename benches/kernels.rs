@@ -12,9 +12,9 @@ use metric::definitions::Definitions;
 use score::builder::TableBuilder;
 use score::evaluate::Batch;
 use score::physical::PhysicalPlan;
-use score::score_traces::schema_columns;
 use score::segments::Segments;
 use score::table::Header;
+use score::vocabulary::schema_columns;
 use trace::scan::Texts;
 
 const STEPS: usize = 64 * 1024;

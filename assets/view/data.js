@@ -44,6 +44,14 @@ async function asked(name, query, signal) {
   return response.json();
 }
 
+/** Sends a label; gives the labels of its episode. */
+export async function send(label) {
+  const response = await fetch("label", { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(label) });
+  if (!response.ok) throw new Error((await response.text()).trim());
+  document.dispatchEvent(new CustomEvent("labelled"));
+  return response.json();
+}
+
 /** The answer to a question, with the words of the program where there is none. */
 export async function ask(name, query = new URLSearchParams(), signal = undefined) {
   if (!isCopy) return asked(name, query, signal);

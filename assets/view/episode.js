@@ -5,6 +5,7 @@ import { changed, go, link, query } from "./state.js";
 import { colored, constant, spelled, valueAt } from "./values.js";
 import { EMPTY, mapOf } from "./map.js";
 import { timeline } from "./timeline.js";
+import { labelsOf } from "./labels.js";
 import { listQuery } from "./list.js";
 
 const PLAY = 250;
@@ -214,15 +215,16 @@ export async function episodePage(content, study) {
   const sentences = new Map(study.metrics.map((metric) => [metric.name, metric]));
   const others = new Map((episode.against ?? []).map((metric) => [metric.name, metric]));
   const metrics = episode.metrics.map((metric) => metricPanel(metric, sentences.get(metric.name), episode.against === null ? undefined : (others.get(metric.name) ?? null), jump, line.decide));
+  const labels = labelsOf(episode, study, () => t, jump);
   const none = episode.running ? "Metrics come with the end of the episode." : "No metric.";
   await ready;
-  content.replaceChildren(headline(episode),
+  content.replaceChildren(headline(episode), labels.element,
     make("div", { class: "at-once" },
       make("div", { class: "over-time" }, make("div", { class: "sights" }, elements), legend, make("div", { class: "controls" }, play, clock), line.element),
       panel,
       make("section", { class: "scores", tabindex: 0, "aria-label": "Metrics" }, make("h2", {}, "Metrics"), metrics.length > 0 ? metrics : make("p", { class: "quiet" }, none))));
   draw();
   const neighbour = (way) => episode.neighbours?.[way] && go(changed({ id: episode.neighbours[way], t: null }));
-  const keys = { ArrowRight: () => jump(t + 1), ArrowLeft: () => jump(t - 1), ArrowDown: () => jump(t + 10), ArrowUp: () => jump(t - 10), Home: () => jump(1), End: () => jump(episode.length), " ": toggle, "[": () => neighbour("previous"), "]": () => neighbour("next") };
+  const keys = { ArrowRight: () => jump(t + 1), ArrowLeft: () => jump(t - 1), ArrowDown: () => jump(t + 10), ArrowUp: () => jump(t - 10), Home: () => jump(1), End: () => jump(episode.length), " ": toggle, "[": () => neighbour("previous"), "]": () => neighbour("next"), l: labels.open };
   return { id, running: episode.running, keys, leave: pause, moved: () => jump(limit(Number(query().get("t") ?? t)), { stop: false }), isCopy };
 }

@@ -6,6 +6,10 @@ import { FILTERS, changed, filtered, go, link, query } from "./state.js";
 const HEADINGS = { experiment: "Experiment", model: "Model", condition: "Condition", seed: "Seed", participant: "Participant", reply_status: "Reply status" };
 /** The columns with a key of their own in the address; others are under `is`. */
 const OWN = ["experiment", "model", "condition"];
+/** The columns of labels that coders put, and their values in words. */
+const LABEL = "label_";
+const CODED = { true: "put", false: "not put", "": "not coded" };
+const isLabel = ({ column }) => column.startsWith(LABEL);
 /** More values than this are in a menu. */
 const IN_LINE = 8;
 
@@ -28,14 +32,14 @@ function boxes({ column, values }, now) {
     const input = make("input", { type: "checkbox", name: column, value });
     input.checked = chosen.includes(value);
     const count = episodes === undefined ? `${replies} replies` : `${episodes} episodes`;
-    return make("label", { title: title ?? count }, input, make("span", {}, name));
+    return make("label", { title: title ?? count }, input, make("span", {}, isLabel({ column }) ? `${CODED[value]} ${episodes}` : name));
   });
   const group = make("div", { class: "values-of", role: "group", "aria-label": headingOf(column) }, labels);
   roving(group, "input");
   return group;
 }
 
-const headingOf = (column) => HEADINGS[column] ?? column;
+const headingOf = (column) => HEADINGS[column] ?? (isLabel({ column }) ? `Label ${column.slice(LABEL.length)}` : column);
 
 /** One stop for Tab; the arrows lead on. */
 export function roving(box, selector) {
@@ -71,7 +75,7 @@ document.addEventListener("click", ({ target }) => {
 
 /** What is in force, each with the query that is without it. */
 export function inForce(now = query(), columns = []) {
-  const words = (column, value) => columns.find((choice) => choice.column === column)?.values.find((one) => one.value === value)?.name ?? (value === "" ? "undefined" : value);
+  const words = (column, value) => (isLabel({ column }) ? CODED[value] : null) ?? columns.find((choice) => choice.column === column)?.values.find((one) => one.value === value)?.name ?? (value === "" ? "undefined" : value);
   const chips = [];
   const seen = [...OWN, ...new Set(now.getAll("is").map((text) => text.slice(0, Math.max(0, text.indexOf("=")))))];
   for (const column of seen) {
@@ -96,10 +100,12 @@ export function filterLine(study) {
   const form = make("form", { class: "filters", "aria-label": "Filters" });
   const known = study.choices.filter(({ column }) => !(isCopy && column === "reply_status"));
   const [outcome, ...metrics] = known.filter((choice) => choice.is_metric);
-  const columns = known.filter((choice) => !choice.is_metric);
+  const columns = known.filter((choice) => !choice.is_metric && !isLabel(choice));
+  const labels = known.filter(isLabel);
   const isInLine = ({ column, values }) => OWN.includes(column) && values.length <= IN_LINE;
   form.append(...columns.filter(isInLine).map((choice) => make("fieldset", {}, make("legend", {}, headingOf(choice.column)), boxes(choice, now))));
   const menus = columns.filter((choice) => !isInLine(choice)).map((choice) => menu(headingOf(choice.column), boxes(choice, now)));
+  if (labels.length > 0) menus.push(menu("Label", labels.map((choice) => make("div", { class: "of-metric" }, make("b", {}, choice.column.slice(LABEL.length)), boxes(choice, now)))));
   if (outcome !== undefined) menus.push(menu(`Outcome (${outcome.column})`, boxes(outcome, now)));
   if (metrics.length > 0) menus.push(menu("Metric", metrics.map((choice) => make("div", { class: "of-metric" }, make("b", {}, choice.column), boxes(choice, now)))));
   if (menus.length > 0) form.append(make("div", { class: "menus" }, make("span", { class: "legend" }, "More"), menus));
@@ -139,7 +145,7 @@ export function groupQuery(by, values) {
   by.forEach((column, at) => {
     if (OWN.includes(column)) known[column] = values[at] ?? "default";
     else if (values[at] === null) others.push(`${column} is null`);
-    else others.push(`${column} = ${/^-?[0-9]+$/.test(values[at]) ? values[at] : `'${values[at].replaceAll("'", "''")}'`}`);
+    else others.push(`${column} = ${isLabel({ column }) || /^-?[0-9]+$/.test(values[at]) ? values[at] : `'${values[at].replaceAll("'", "''")}'`}`);
   });
   const where = [query().get("where"), ...others].filter((text) => text !== null).map((text) => (others.length > 0 ? `(${text})` : text));
   return filtered({ ...known, ...(where.length > 0 ? { where: where.join(" and ") } : {}) });

@@ -68,9 +68,9 @@ class Rows {
       : new URLSearchParams({ view: "compare", a: pick, b: row.id });
     const cells = this.columns.map(({ key, metric, kind }) => {
       if (kind === "words") return make("span", { class: kind, role: "cell", title: row.said?.excerpt }, row.said === undefined ? "" : `t = ${row.said.t}, ${row.said.column.replaceAll("_", " ")}: ${row.said.excerpt}`);
-      const value = metric === undefined ? row[key] : row.values[metric];
+      const value = kind === "put" ? row.put.join(", ") : metric === undefined ? row[key] : row.values[metric];
       const text = value === null ? "--" : String(value);
-      const long = { id: true, name: true }[kind] ? text : null;
+      const long = { id: true, name: true, put: true }[kind] ? text : null;
       return make("span", { class: kind, role: "cell", title: long }, kind === "id" ? parted(text) : text);
     });
     const element = make("a", { href: link(next), role: "row", "aria-rowindex": at + 2, "data-id": row.id, "data-at": at }, cells);
@@ -107,6 +107,7 @@ function columnsOf(told) {
     { name: "Model", key: "model", sort: "model", kind: "name" },
   ];
   if (told.has_conditions) columns.push({ name: "Condition", key: "condition", sort: "condition", kind: "short" });
+  if (told.has_labels) columns.push({ name: "Labels", key: "put", kind: "put" });
   if (query().has("search")) columns.push({ name: "Said", key: "said", kind: "words" });
   told.metrics.forEach((name, metric) => columns.push({ name, metric, sort: name, kind: "number" }));
   return columns;
@@ -130,7 +131,7 @@ export async function list(content, study) {
     return;
   }
   rows.columns = columnsOf(told);
-  const widths = { id: "minmax(13rem, 2.2fr)", short: "6.5rem", name: "minmax(9rem, 1.4fr)", number: "minmax(3.4rem, .5fr)", words: "minmax(16rem, 4fr)" };
+  const widths = { id: "minmax(13rem, 2.2fr)", short: "6.5rem", name: "minmax(9rem, 1.4fr)", number: "minmax(3.4rem, .5fr)", words: "minmax(16rem, 4fr)", put: "minmax(7rem, 1fr)" };
   frame.style.setProperty("--columns", rows.columns.map(({ kind }) => widths[kind]).join(" "));
   frame.setAttribute("aria-rowcount", told.total + 1);
   frame.append(header(rows.columns), body);

@@ -10,7 +10,7 @@ import { changesPage, comparePage, scenePage } from "./compare.js";
 import { watch } from "./live.js";
 
 const content = one("#content");
-const KEYS = [["← →", "one step back, one step on"], ["↑ ↓", "ten steps back, ten steps on"], ["Home End", "the first step, the last step"], ["space", "play and pause"], ["[ ]", "the previous episode, the next episode"], ["/", "search in names, replies, reasoning and errors"], ["?", "these keys"]];
+const KEYS = [["← →", "one step back, one step on"], ["↑ ↓", "ten steps back, ten steps on"], ["Home End", "the first step, the last step"], ["space", "play and pause"], ["[ ]", "the previous episode, the next episode"], ["/", "search in names, replies, reasoning and errors"], ["l", "label the episode or the step, with view --label NAME"], ["?", "these keys"]];
 
 let study = null;
 let page = {};
@@ -96,7 +96,7 @@ function startHelp() {
 
 function startKeys(help) {
   document.addEventListener("keydown", (event) => {
-    if (event.ctrlKey || event.metaKey || event.altKey || help.open) return;
+    if (event.ctrlKey || event.metaKey || event.altKey || one("dialog[open]") !== null) return;
     const isTyping = event.target.matches("input:not([type=range]):not([type=checkbox]), select, textarea");
     if (isTyping) {
       if (event.key === "Escape") event.target.blur();
@@ -119,6 +119,9 @@ function startSearch() {
 }
 
 let underWay = [];
+// What can be chosen has changed.
+const forget = () => (study = null);
+document.addEventListener("labelled", forget);
 document.addEventListener("state", ({ detail }) => detail.replace || show());
 startTheme();
 startKeys(startHelp());
@@ -132,6 +135,7 @@ show().then(() =>
       if ((query().get("view") ?? "overview") === "overview") showRunning(content, underWay, told.rate);
     },
     async changed() {
+      forget();
       const view = query().get("view") ?? "overview";
       if (view === "compare" || (view === "episode" && !page.running)) return;
       if (view === "episode" && query().has("t")) go(changed({ t: null }), { replace: true });

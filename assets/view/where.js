@@ -46,12 +46,13 @@ function condition(text, columns) {
     const { kind, of } = columns.get(left.shift()?.name) ?? {};
     need(of !== undefined);
     const literal = () => {
-      const { value } = left.shift() ?? {};
-      // A further column is text in the list, and a number where it was one.
-      const own = kind === "label" && value !== undefined ? String(value) : value;
+      const { value, word } = left.shift() ?? {};
+      // A further column is text in the list, and a number where it was one; a label of coders is true or false.
+      const own = kind === "coded" ? ["true", "false"].find((truth) => truth === word) : kind === "label" && value !== undefined ? String(value) : value;
       need(typeof own === (kind === "number" ? "number" : "string"));
       return own;
     };
+    if (kind === "coded" && !["is", "in", "=", "<>", "!="].includes(left[0]?.word)) return (row) => of(row) === "true";
     if (take("is")) {
       const isNull = !take("not");
       need(take("null"));
@@ -79,7 +80,7 @@ function columnsOfList(list) {
   const columns = new Map([["episode_id", { kind: "text", of: (row) => row.id }]]);
   for (const name of ["experiment", "model", "condition"]) columns.set(name, { kind: "text", of: (row) => (row.keys ?? row)[name] });
   for (const name of ["seed", "run"]) columns.set(name, { kind: "number", of: (row) => row[name] });
-  for (const name of list.labels ?? []) if (!columns.has(name)) columns.set(name, { kind: "label", of: (row) => row.labels[name] ?? null });
+  for (const name of list.labels ?? []) if (!columns.has(name)) columns.set(name, { kind: name.startsWith("label_") ? "coded" : "label", of: (row) => row.labels[name] ?? null });
   list.metrics.forEach((name, at) => columns.set(name, { kind: "number", of: (row) => (row.values[at] === null ? null : Number(row.values[at])) }));
   return columns;
 }

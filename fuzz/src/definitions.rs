@@ -7,11 +7,12 @@ use metric::columns::Columns;
 use metric::definitions::Definitions;
 use metric::sql::{self, Dialect};
 use score::score_traces;
+use score::vocabulary;
 
 use crate::depth::reached;
 use crate::episodes;
 
-static COLUMNS: LazyLock<Columns> = LazyLock::new(|| score_traces::trace_columns(episodes::open()));
+static COLUMNS: LazyLock<Columns> = LazyLock::new(|| vocabulary::trace_columns(episodes::open()));
 
 /// A definition file: refused, or its catalog gives the same definitions again, every dialect can say it or says why not,
 /// and a metric that is computed alone has the values that it has among all.

@@ -117,6 +117,7 @@ fn options(run: &Path) -> Options {
         question: Question { each: true, ..Question::default() },
         against: None,
         style: "default".into(),
+        coder: None,
         threads: NonZeroUsize::MIN,
     }
 }

@@ -15,6 +15,7 @@ use report::plan::register::{NamedHash, RegisteredPlan};
 use report::plan::{Given, PlanRequest, plan};
 use score::format::{self, Format};
 use score::score_traces;
+use score::vocabulary;
 use serde_json::{Value, json};
 use statistics::sample_size::Clusters;
 use world::agent::vlm::journal::Entry;
@@ -208,7 +209,7 @@ fn registered() -> Vec<u8> {
         power: 0.8,
         confidence: 0.95,
         models: 2,
-        clusters: Clusters { seeds: 3, icc: 0.1 },
+        clusters: Clusters { seeds: 3, icc: 0.1, people: false },
         discordance: None,
         chance: None,
         sequential: false,
@@ -220,7 +221,7 @@ fn registered() -> Vec<u8> {
 
 fn scores() -> Vec<Vec<u8>> {
     let traces = episodes::open();
-    let definitions = Definitions::load("paper", &score_traces::trace_columns(traces)).expect("built in");
+    let definitions = Definitions::load("paper", &vocabulary::trace_columns(traces)).expect("built in");
     let table = score_traces::score(traces, &definitions, &[], std::num::NonZeroUsize::MIN).expect("a sound trace");
     let formats = [Format::Csv, Format::JsonLines, Format::Parquet];
     let of = |(at, format): (u8, Format)| {

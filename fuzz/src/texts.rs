@@ -11,7 +11,7 @@ use report::bundle::{Manifest, check_old};
 use report::plan::register::RegisteredPlan;
 use report::style::Style;
 use score::format::{self, Format, Partition};
-use score::score_traces;
+use score::vocabulary;
 use toml_spec::Source;
 use world::experiment::file;
 use world::experiment::spec::Spec;
@@ -21,7 +21,7 @@ use crate::depth::reached;
 use crate::{episodes, scratch};
 
 static PAPER: LazyLock<Catalog> = LazyLock::new(|| {
-    let columns = score_traces::trace_columns(episodes::open());
+    let columns = vocabulary::trace_columns(episodes::open());
     Definitions::load("paper", &columns).expect("definitions that are built in").catalog
 });
 
@@ -35,7 +35,7 @@ pub fn manifest(data: &[u8]) {
     reached("parsed");
     let again: Manifest = serde_json::from_str(&manifest.json()).expect("a manifest that was printed");
     assert_eq!((&again, again.json()), (&manifest, manifest.json()));
-    let columns = score_traces::trace_columns(episodes::open());
+    let columns = vocabulary::trace_columns(episodes::open());
     if let Ok(definitions) = Definitions::of_catalog(&manifest.definitions, &columns) {
         reached("definitions");
         assert_eq!(definitions.catalog.hash, manifest.definitions.hash);

@@ -149,6 +149,7 @@ def gate(
 class Study:
     """Inputs that are open, and what is asked of them. Made by `open`.
 
+    Labels of coders beside the traces (`labels.jsonl`) are columns of episodes, such as `label_confabulates`, in filters and groups.
     Every answer is the one that the command line gives. A file that changes while it is open is an `InputError`. A study can
     be pickled: its files are opened again where it is loaded, and its data frames travel with it.
 

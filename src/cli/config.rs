@@ -22,8 +22,7 @@ use crate::cli::outcome::{ERRORS_VARIABLE, Failure};
 use exact::budget::{self, Limit};
 use exact::escape::visible;
 use exact::{input, suggest};
-use toml_spec::parse_toml;
-use toml_spec::{Fault, Faults, Place, Source};
+use toml_spec::{Fault, Faults, Place, Source, parse_toml};
 
 const FILE: &str = "mirrorstats.toml";
 /// The variable that names another file, or none if it is empty.
@@ -189,7 +188,6 @@ impl<'a> OptionFile<'a> {
         if self.faults.is_empty() { Ok(result) } else { Err(Failure::Faults(Faults(self.faults).in_order())) }
     }
 
-    /// Adds a fault.
     pub fn fault(&mut self, span: Range<usize>, message: String, help: Option<String>) {
         let place = Place { source: self.source.clone(), span };
         self.faults.push(Fault::new(place, message).help_if(help));

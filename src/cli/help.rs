@@ -70,6 +70,7 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
             ("Every episode by its id", "trace info runs --episodes"),
         ],
     ),
+    ("trace labels", &[("How far two coders agree on each label", "trace labels runs")]),
     ("setup man", &[("Manual pages, a file per command", "setup man ~/.local/share/man/man1")]),
     ("participants remove", &[("Out of traces, logs and journals", "participants remove P01 runs")]),
     (
@@ -151,6 +152,7 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
             ("The report, and every episode step by step", "view runs"),
             ("What another definition changes", "view runs --against mine.toml"),
             ("A copy for any web server, or from the disk", "view runs --export page"),
+            ("Label episodes as Ann", "view runs --label ann"),
         ],
     ),
     ("world config", &[("A configuration to begin with", "world config > world.toml")]),

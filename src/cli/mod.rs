@@ -28,7 +28,7 @@ use outcome::{ErrorFormat, Outcome};
 
 pub use answers::{printed_schema, schemas};
 pub use outcome::{ErrorAnswer, Failure};
-use printed::{outcome, output, quality, terminal, text_table};
+use printed::{outcome, output, terminal};
 #[cfg(all(feature = "sim", feature = "view"))]
 use recording::human;
 #[cfg(feature = "sim")]

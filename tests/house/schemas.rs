@@ -20,9 +20,10 @@ use schemars::schema_for;
 use score::evidence::Evidence;
 use serde_json::{Value, json};
 use study::verify::Verification;
-use study::{ImportAnswer, QualityCheckAnswer};
+use study::{ImportAnswer, LabelAgreement, QualityCheckAnswer};
 use trace::describe::SchemaDocument;
 use trace::info::Info;
+use trace::labels::LabelLine;
 use trace::log::message::{Decision, EpisodeMessage};
 use trace::renormalize::RenormalizeAnswer;
 use trace::seal::SealAnswer;
@@ -49,6 +50,8 @@ fn current() -> Vec<(&'static str, Value)> {
         ("gate", printed_schema::<Gate>()),
         ("import", printed_schema::<ImportAnswer>()),
         ("info", json!(schema_for!(Info))),
+        ("label", json!(schema_for!(LabelLine))),
+        ("labels", json!(schema_for!(LabelAgreement))),
         ("manifest", printed_schema::<Manifest>()),
         ("plan", json!(schema_for!(Plan))),
         ("plan-register", json!(schema_for!(RegisteredPlan))),

@@ -7,7 +7,7 @@ use std::fs;
 use std::path::Path;
 
 use metric::definitions::Definitions;
-use score::score_traces::trace_columns;
+use score::vocabulary::trace_columns;
 use serde_json::json;
 use trace::inputs::Input;
 use trace::open::TraceSet;

@@ -13,6 +13,7 @@ mod expressions;
 #[path = "../harness/mod.rs"]
 mod harness;
 mod interpreter;
+mod labels;
 mod language;
 mod layouts;
 #[cfg(feature = "polars")]

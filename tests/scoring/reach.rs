@@ -9,7 +9,7 @@ use proptest::option;
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::{RngAlgorithm, TestRng, TestRunner};
-use score::score_traces::trace_columns;
+use score::vocabulary::trace_columns;
 use trace::episode::{Action, Episode, Extra, Step};
 use trace::inputs::Input;
 use trace::open::TraceSet;

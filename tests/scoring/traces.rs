@@ -6,6 +6,7 @@ use std::path::Path;
 use metric::definitions::Definitions;
 use score::score_traces;
 use score::table::EpisodeTable;
+use score::vocabulary;
 use trace::episode::Episode;
 use trace::open::TraceSet;
 use trace::write::OptionalColumns;
@@ -36,7 +37,7 @@ pub fn score_paper(episodes: &[Episode]) -> EpisodeTable {
 pub fn score_toml(episodes: &[Episode], toml: &str) -> EpisodeTable {
     score_with(episodes, |traces| {
         // Random definitions compare any column with any text.
-        let columns = score_traces::trace_columns(traces).with_values::<String>([]);
+        let columns = vocabulary::trace_columns(traces).with_values::<String>([]);
         Definitions::from_toml("test", toml, &columns).unwrap_or_else(|faults| panic!("{faults}"))
     })
 }

@@ -11,6 +11,7 @@ use parquet::file::metadata::{KeyValue, RowGroupMetaData};
 use parquet::file::properties::WriterProperties;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use score::score_traces;
+use score::vocabulary;
 use trace::episode::{Action, Episode, Extra, Step};
 use trace::inputs::Input;
 use trace::merge;
@@ -207,7 +208,7 @@ fn a_name_that_version_2_brought_stays_a_column_of_its_own_in_a_trace_of_version
     let old = own("1").unwrap();
     assert!(!old.declares("condition"));
     let definitions = "open = true\n[metric.X]\nvalue = \"sum(condition)\"\n";
-    let columns = score_traces::trace_columns(&old);
+    let columns = vocabulary::trace_columns(&old);
     let definitions = Definitions::from_toml("own", definitions, &columns).unwrap();
     let table = score_traces::score(&old, &definitions, &[], NonZeroUsize::MIN).unwrap();
     assert_eq!(table.metrics[0].get(0), Some(3));

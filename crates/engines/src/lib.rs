@@ -2,6 +2,14 @@
 //!
 //! Rule: an engine gives the same [`EpisodeTable`](score::table::EpisodeTable) as the native one, or an error;
 //! it never gives another table.
+//!
+//! ```
+//! use mirrorstats_engines::spark::setting::Setting;
+//!
+//! let setting: Setting = "spark.hadoop.fs.s3a.secret.key=abc".parse()?;
+//! assert_eq!(format!("{setting:?}"), "spark.hadoop.fs.s3a.secret.key=...");
+//! # Ok::<(), mirrorstats_engines::spark::setting::SettingError>(())
+//! ```
 
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 

@@ -83,7 +83,6 @@ impl Exceeded {
         format!("at most {} {}", self.most, self.what)
     }
 
-    /// The remedy.
     pub fn help() -> String {
         format!("if you trust the file, the environment variable {SETTING}=10 allows ten times as much of everything")
     }

@@ -1,6 +1,14 @@
-//! Estimates as people read them: a fixed number of decimals, p values, intervals.
+//! Numbers as people read them: counts, a fixed number of decimals, p values, intervals.
 //!
 //! For numbers that are floating-point to begin with; exact fractions are the business of `number`.
+
+/// `1 file`, `2 files`.
+pub fn counted(count: impl Into<u64>, noun: &str) -> String {
+    match count.into() {
+        1 => format!("1 {noun}"),
+        count => format!("{count} {noun}s"),
+    }
+}
 
 /// The text for an undefined number.
 pub const UNDEFINED: &str = "--";

@@ -10,7 +10,6 @@ use serde::{Deserialize, Serialize};
 pub struct Moments {
     /// The number of defined values.
     pub n: u64,
-    /// Their sum.
     pub sum: i128,
     /// The sum of their squares.
     pub sum_sq: i128,
@@ -36,9 +35,6 @@ impl Moments {
     }
 
     /// These moments and some zeros and ones.
-    ///
-    /// # Errors
-    /// As [`Moments::with`].
     pub fn with_truths(self, zeros: usize, ones: usize) -> Result<Self, MomentOverflow> {
         let (n, sum) = ((zeros + ones) as u64, ones as i128);
         Ok(Self {
@@ -99,15 +95,7 @@ pub enum StandardError {
     Population,
 }
 
-impl StandardError {
-    /// As a definition file writes it.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Sample => "sample",
-            Self::Population => "population",
-        }
-    }
-}
+crate::names!(StandardError { Sample: "sample", Population: "population" });
 
 #[cfg(test)]
 mod tests {

@@ -9,7 +9,7 @@ use std::fmt;
 use std::str::FromStr;
 
 /// The most digits behind the point that are worth printing.
-pub const MOST_PLACES: u32 = 9;
+pub(crate) const MOST_PLACES: u32 = 9;
 
 /// A number as printed: `units / 10^places`. Zero has no sign, so `-0.00` cannot be printed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -190,7 +190,8 @@ fn power_of_two(exponent: i32) -> Option<i128> {
     2_i128.checked_pow(u32::try_from(exponent).ok()?)
 }
 
-fn gcd(a: i128, b: i128) -> i128 {
+/// The greatest common divisor of numbers that are not negative; 1 for two zeros.
+pub(crate) fn gcd(a: i128, b: i128) -> i128 {
     if b == 0 { a.max(1) } else { gcd(b, a % b) }
 }
 

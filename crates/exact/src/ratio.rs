@@ -6,6 +6,8 @@ use std::str::FromStr;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::number::gcd;
+
 /// A fraction of two integers in lowest terms; written `1/3` in files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "String", into = "String")]
@@ -21,7 +23,7 @@ impl Ratio {
         if denominator <= 0 {
             return None;
         }
-        let divisor = gcd(numerator.unsigned_abs(), denominator.unsigned_abs());
+        let divisor = gcd(i128::from(numerator).abs(), denominator.into());
         let divisor = i64::try_from(divisor).ok()?;
         Some(Self { numerator: numerator / divisor, denominator: denominator / divisor })
     }
@@ -38,10 +40,6 @@ impl Ratio {
     pub fn value(self) -> f64 {
         self.numerator as f64 / self.denominator as f64
     }
-}
-
-fn gcd(a: u64, b: u64) -> u64 {
-    if b == 0 { a.max(1) } else { gcd(b, a % b) }
 }
 
 impl fmt::Display for Ratio {

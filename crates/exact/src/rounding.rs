@@ -24,21 +24,15 @@ pub enum Rounding {
     Truncate,
 }
 
+crate::names!(Rounding {
+    HalfEven: "half-even",
+    HalfUp: "half-up",
+    Binary: "binary",
+    Twice: "twice",
+    Truncate: "truncate",
+});
+
 impl Rounding {
-    /// All of them, the usual ones first.
-    pub const ALL: [Self; 5] = [Self::HalfEven, Self::HalfUp, Self::Binary, Self::Twice, Self::Truncate];
-
-    /// The name on the command line and in JSON.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::HalfEven => "half-even",
-            Self::HalfUp => "half-up",
-            Self::Binary => "binary",
-            Self::Twice => "twice",
-            Self::Truncate => "truncate",
-        }
-    }
-
     /// `above / below` as printed.
     ///
     /// `None` unless `below` is positive, and where 128 bits do not suffice.

@@ -2,6 +2,11 @@
 //!
 //! Rule: the only unsafe code of the program is the one function here that asks the driver. It reads three texts and changes
 //! nothing.
+//!
+//! ```
+//! // No context is current on a thread that has not made one.
+//! assert_eq!(mirrorstats_gl::names(), None);
+//! ```
 
 /// What a context calls itself.
 #[derive(Clone, Debug, PartialEq, Eq)]

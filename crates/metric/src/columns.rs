@@ -95,7 +95,7 @@ impl Columns {
 
     /// Gives up the meaning of the columns of the mirror: their names are free, and those that are not read again as columns
     /// of the traces' own are unknown.
-    pub fn leave_mirror(&mut self) {
+    pub(crate) fn leave_mirror(&mut self) {
         for name in std::mem::take(&mut self.of_mirror) {
             self.forget(&name);
         }
@@ -117,12 +117,12 @@ impl Columns {
     }
 
     /// The schema's column of this name: one that every trace means the same by.
-    pub fn of_schema(&self, name: &str) -> Option<Column> {
+    pub(crate) fn of_schema(&self, name: &str) -> Option<Column> {
         self.schema.get(name).copied()
     }
 
     /// Returns true if a column of the schema keeps its name for itself.
-    pub fn is_reserved(&self, name: &str) -> bool {
+    pub(crate) fn is_reserved(&self, name: &str) -> bool {
         self.schema.contains_key(name) && !self.free.iter().any(|free| free == name)
     }
 
@@ -138,7 +138,7 @@ impl Columns {
     }
 
     /// The value of the column in a row without one; `None` if that is null.
-    pub fn fallback_of(&self, name: &str) -> Option<Fallback> {
+    pub(crate) fn fallback_of(&self, name: &str) -> Option<Fallback> {
         self.fallbacks.get(name).copied().filter(|_| self.schema.contains_key(name))
     }
 
@@ -151,6 +151,11 @@ impl Columns {
         self.schema.keys().chain(self.own.keys()).map(String::as_str)
     }
 
+    /// Adds a column that every reader of these traces means the same by, as those of the schema.
+    pub fn add_known(&mut self, name: impl Into<String>, column: Column) {
+        self.schema.insert(name.into(), column);
+    }
+
     /// Sets what a column beside the schema is; a column of the schema stays unchanged.
     pub fn set_own(&mut self, name: impl Into<String>, column: Column) {
         let name = name.into();
@@ -160,7 +165,7 @@ impl Columns {
     }
 
     /// Sets the only texts of a column beside the schema.
-    pub fn set_own_values(&mut self, name: &str, values: &[String]) {
+    pub(crate) fn set_own_values(&mut self, name: &str, values: &[String]) {
         if self.own.contains_key(name) && !values.is_empty() {
             self.values.insert(name.to_owned(), values.to_vec());
         }

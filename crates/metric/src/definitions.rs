@@ -15,7 +15,6 @@ use exact::ratio::Ratio;
 use exact::suggest::nearest;
 use toml_spec::{Fault, Faults, Source, Written};
 
-/// Checked definitions.
 #[derive(Clone, Debug)]
 pub struct Definitions {
     /// The metadata for tables, figures and files of scores.
@@ -175,29 +174,16 @@ impl Definitions {
 /// An error of replacing a `let` by a condition on steps.
 #[derive(Debug, thiserror::Error)]
 pub enum ReplaceError {
-    /// There is none of this name.
     #[error(
         "expected a `let` named `{name}`, which says at which steps there is evidence, found {found}\n  \
          help: name the condition in the definition file, `{name} = \"mirror_visible\"` under `[let]`, and use it in the metrics"
     )]
-    NoLet {
-        /// The name.
-        name: String,
-        /// Those that there are.
-        found: String,
-    },
-    /// It is something else.
+    NoLet { name: String, found: String },
     #[error(
         "expected the `let` `{name}` to be true or false, one value per step, found {found}\n  \
          help: let `{name}` say at which steps there is evidence, such as \"mirror_visible\""
     )]
-    NoCondition {
-        /// The name.
-        name: String,
-        /// Its type and level.
-        found: String,
-    },
-    /// The definitions have faults with the new expression.
+    NoCondition { name: String, found: String },
     #[error(transparent)]
     Faults(#[from] Faults),
 }
@@ -214,11 +200,9 @@ const fn per(level: Level) -> &'static str {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("unknown metric `{name}`: {}", advice(.near.as_deref(), .known))]
 pub struct UnknownMetric {
-    /// The name given.
     pub name: String,
     /// The metric whose name is most like it.
     pub near: Option<String>,
-    /// All metrics.
     pub known: Vec<String>,
 }
 

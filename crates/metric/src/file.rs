@@ -74,7 +74,6 @@ pub struct Document {
     pub domain: Option<String>,
     /// Declared columns of the user's own.
     pub columns: IndexMap<String, ColumnEntry>,
-    /// Named expressions.
     pub lets: IndexMap<String, (Written, Place)>,
     pub metrics: IndexMap<String, MetricEntry>,
     pub experiments: IndexMap<String, ExperimentEntry>,
@@ -122,15 +121,8 @@ pub struct ExperimentEntry {
 /// A definition file that could not be read at all.
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
-    /// The file is not there or not readable.
     #[error("cannot read the definition file `{path}`; {}", KIND.did_you_mean(path))]
-    Unreadable {
-        /// As it was typed.
-        path: String,
-        /// The reason.
-        source: std::io::Error,
-    },
-    /// The file has faults.
+    Unreadable { path: String, source: std::io::Error },
     #[error(transparent)]
     Faults(#[from] Faults),
 }
@@ -154,7 +146,7 @@ pub fn read(name_or_path: impl AsRef<Path>) -> Result<Document, FileError> {
 }
 
 /// Reads definitions from a text; includes are relative to `folder`, the current one if absent.
-pub fn read_source(name: String, source: Source, folder: Option<&Path>) -> Result<Document, FileError> {
+pub(crate) fn read_source(name: String, source: Source, folder: Option<&Path>) -> Result<Document, FileError> {
     document(name, FileText::inline(source, folder))
 }
 

@@ -243,7 +243,6 @@ impl Runs {
         Self { values, ends: ends.into(), start: 0, length }
     }
 
-    /// The number of rows.
     pub const fn rows(&self) -> usize {
         self.length
     }

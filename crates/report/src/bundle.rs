@@ -108,7 +108,6 @@ pub struct Output {
 
 /// An error while writing a report.
 #[derive(Debug, thiserror::Error)]
-#[expect(missing_docs, reason = "the messages say it")]
 pub enum BundleError {
     #[error("cannot write the report to {}: it is not a folder; give another one with --out", path.display())]
     NotAFolder { path: PathBuf },
@@ -146,7 +145,6 @@ impl Manifest {
         Self { outputs, ..self.clone() }
     }
 
-    /// The text of `manifest.json`.
     pub fn json(&self) -> String {
         let json = serde_json::to_string_pretty(self).expect("a manifest holds only strings, integers and lists");
         json + "\n"

@@ -178,7 +178,7 @@ fn shown(value: &Value) -> String {
 /// The reason against a contrast of two experiments, or `None`: tasks must be alike, with equal chance levels.
 ///
 /// An experiment need not give a level for every metric: those that both give decide, or any where they share none.
-pub fn tasks_differ(catalog: &Catalog, baseline: &str, against: &str) -> Option<String> {
+pub(crate) fn tasks_differ(catalog: &Catalog, baseline: &str, against: &str) -> Option<String> {
     let levels = |metric: &str| [baseline, against].map(|name| catalog.chance(name, metric));
     let is_shared = |metric: &&String| levels(metric).iter().all(Option::is_some);
     let shares = catalog.metric.keys().any(|metric| is_shared(&metric));

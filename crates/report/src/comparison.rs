@@ -55,7 +55,6 @@ pub struct Difference {
 
 /// An error of comparing tables.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[expect(missing_docs, reason = "the messages say it")]
 pub enum ComparisonError {
     #[error(
         "no table of the style `{style}` has all the published metrics ({metrics}): expected those of {tables}; \

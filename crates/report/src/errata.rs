@@ -61,7 +61,6 @@ pub enum Field {
 
 /// An error of an errata file.
 #[derive(Debug, thiserror::Error)]
-#[expect(missing_docs, reason = "the messages say it")]
 pub enum ErrataError {
     #[error("errata {}: cannot read the file: {source}", path.display())]
     Unreadable { path: PathBuf, source: io::Error },
@@ -101,16 +100,7 @@ impl Erratum {
     }
 }
 
-impl Field {
-    /// Its column in a published table.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Mean => "mean",
-            Self::Se => "se",
-            Self::Emphasis => "emphasis",
-        }
-    }
-}
+exact::names!(Field { Mean: "mean", Se: "se", Emphasis: "emphasis" });
 
 #[cfg(test)]
 mod tests {

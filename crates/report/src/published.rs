@@ -48,7 +48,6 @@ pub struct Published {
 
 /// An error of a published table.
 #[derive(Debug, thiserror::Error)]
-#[expect(missing_docs, reason = "the messages say it")]
 pub enum PublishedError {
     #[error("published table {}: cannot read the file: {source}", path.display())]
     Unreadable { path: PathBuf, source: io::Error },
@@ -58,7 +57,6 @@ pub enum PublishedError {
 
 /// A problem of a published table.
 #[derive(Debug, thiserror::Error)]
-#[expect(missing_docs, reason = "the messages say it")]
 pub enum PublishedFault {
     #[error("not a CSV file: {0}")]
     NotCsv(::csv::Error),

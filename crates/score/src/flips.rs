@@ -129,7 +129,8 @@ fn distinct(old: &ArrayRef, new: &ArrayRef) -> BooleanArray {
 mod tests {
     use super::*;
     use crate::evidence::explain_each;
-    use crate::score_traces::{Request, definitions, score, trace_columns};
+    use crate::score_traces::{Request, definitions, score};
+    use crate::vocabulary::trace_columns;
     use trace::inputs;
 
     #[test]

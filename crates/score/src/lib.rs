@@ -33,6 +33,7 @@ pub mod quality;
 pub mod score_traces;
 mod tables;
 pub mod timeline;
+pub mod vocabulary;
 
 use tables::order;
 pub use tables::{builder, columns, declared_experiments, lost_counts, select, table};

@@ -15,19 +15,16 @@ use super::quality::{QualityByCell, QualityReader};
 use super::segments::Segments;
 use super::table::{EpisodeTable, Header};
 use super::timeline::{Timeline, TimelineReader, in_key_order};
+use super::vocabulary::{check_columns, check_label, declared_columns, trace_columns};
 use exact::budget::Limit;
-use exact::suggest::nearest;
 use metric::catalog::Catalog;
-use metric::columns::{Column, Columns, Fallback, Level, Type};
 use metric::definitions::{Definitions, UnknownMetric};
-use metric::file::{ColumnEntry, FileError};
+use metric::file::FileError;
 use metric::restore::RestoreError;
 use toml_spec::Faults;
 use trace::error::TraceError;
 use trace::open::{TraceFile, TraceSet};
 use trace::scan::{EPISODE_COLUMNS, EpisodeBatch, Projection};
-use trace::schema::domain::is_general;
-use trace::schema::{self, COLUMNS, DeclaredColumn, Domain, Kind};
 
 /// The request for a scoring.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -50,118 +47,24 @@ impl Request {
 /// An error of scoring traces.
 #[derive(Debug, thiserror::Error)]
 pub enum ScoreError {
-    /// The traces are not as they must be.
     #[error(transparent)]
     Trace(#[from] TraceError),
-    /// The definition file is not.
     #[error(transparent)]
     Definitions(#[from] FileError),
-    /// The definitions that scores carry are not.
     #[error(transparent)]
     Carried(#[from] RestoreError),
-    /// The experiments that the traces declare are not.
     #[error(transparent)]
     Declaration(#[from] DeclarationError),
-    /// The condition on episodes is not.
     #[error(transparent)]
     Condition(#[from] Faults),
-    /// A metric was asked for that the definitions do not have.
     #[error(transparent)]
     Metric(#[from] UnknownMetric),
-    /// A column that a metric reads is not in every trace.
     #[error("`{wanted_by}` reads the column `{column}`: {problem}; {help}")]
-    Column {
-        /// The metric, or `--where`.
-        wanted_by: String,
-        /// The column.
-        column: String,
-        /// The problem, with its file.
-        problem: String,
-        /// The remedy.
-        help: String,
-    },
-    /// A column to group by is not constant in an episode, or not there.
+    Column { wanted_by: String, column: String, problem: String, help: String },
     #[error("cannot group by `{name}`: expected a column that is constant in an episode, one of {}; {help}", .known.join(", "))]
-    Label {
-        /// The name given.
-        name: String,
-        /// The columns that can be grouped by.
-        known: Vec<String>,
-        /// The remedy.
-        help: String,
-    },
-    /// A number could not be computed.
+    Label { name: String, known: Vec<String>, help: String },
     #[error("{file}: {source}")]
-    Engine {
-        /// The file of the batch.
-        file: String,
-        /// The error.
-        source: EngineError,
-    },
-}
-
-/// The columns that definitions may name: those of the schema, whether the traces have them or not.
-pub fn schema_columns() -> Columns {
-    let column = |column: &trace::schema::Column| {
-        let level = if column.constant { Level::Episode } else { Level::Step };
-        type_of(column.stored.kind()).map(|ty| (column.name, Column { ty, level }))
-    };
-    let columns: Columns = COLUMNS.iter().filter(|column| column.name != "t").filter_map(column).collect();
-    let lists = COLUMNS.iter().filter(|column| !column.values.is_empty()).map(|column| (column.name, column.values));
-    let of_mirror = COLUMNS.iter().map(|column| column.name).filter(|name| !is_general(name));
-    let mut columns = columns.with_values(lists).with_mirror(of_mirror);
-    // A trace without a required column is an exception that its experiment declares.
-    set_fallbacks(&mut columns, |name| schema::column(name).is_some_and(|known| known.required));
-    COLUMNS.iter().filter(|column| column.since > 1).for_each(|column| columns.set_free(column.name));
-    columns
-}
-
-/// The columns that definitions may name over traces of which nothing is known yet: as [`schema_columns`], where each row
-/// may have a value.
-pub fn unknown_columns() -> Columns {
-    let mut columns = schema_columns();
-    set_fallbacks(&mut columns, |_| true);
-    columns
-}
-
-/// Says what columns mean where there is no value; `is_read` says which of them some trace has.
-fn set_fallbacks(columns: &mut Columns, is_read: impl Fn(&str) -> bool) {
-    for column in COLUMNS.iter() {
-        if let Some(expression) = column.default {
-            columns.set_fallback(column.name, Fallback { expression, is_read: is_read(column.name) });
-        }
-    }
-}
-
-/// Returns true if a column of this name has a value in each row of each trace.
-pub fn has_value(name: &str) -> bool {
-    COLUMNS.iter().any(|column| column.name == name && column.required && !column.nullable)
-}
-
-/// The columns that definitions may name over these traces: those of the schema, and the traces' own.
-pub fn trace_columns(traces: &TraceSet) -> Columns {
-    let mut columns =
-        schema_columns().with_help("`mirrorstats trace schema` and `mirrorstats trace info` list the columns");
-    set_fallbacks(&mut columns, |name| traces.declares(name));
-    for column in COLUMNS.iter().filter(|column| !traces.knows(column)) {
-        columns.forget(column.name);
-    }
-    for name in traces.column_names().into_iter().filter(|name| *name != "t") {
-        if let Some(ty) = traces.column(name).and_then(|column| type_of(column.kind)) {
-            columns.set_own(name, Column { ty, level: Level::Step });
-        }
-    }
-    columns
-}
-
-fn type_of(kind: Kind) -> Option<Type> {
-    match kind {
-        Kind::Bool => Some(Type::Bool),
-        Kind::Int => Some(Type::Int),
-        Kind::Float => Some(Type::Float),
-        Kind::String => Some(Type::Text),
-        Kind::Unsupported => None,
-    }
+    Engine { file: String, source: EngineError },
 }
 
 /// The definitions of a request, checked against the traces, with the experiments that these declare.
@@ -186,32 +89,6 @@ pub fn restored(traces: &TraceSet, catalog: &Catalog, metrics: &[String]) -> Res
     check_columns(traces, &definitions)?;
     declare(&mut definitions.catalog, traces)?;
     Ok(definitions)
-}
-
-/// Every column that is read must be in every file, with one type.
-pub fn check_columns(traces: &TraceSet, definitions: &Definitions) -> Result<(), ScoreError> {
-    let plan = &definitions.plan;
-    let outputs = plan.outputs.iter().map(|output| (output.name.as_str(), output.node));
-    for (wanted_by, node) in outputs.chain(plan.filter.map(|node| ("--where", node))) {
-        for (column, _) in plan.columns(&plan.needed_by([node])) {
-            if let Some((problem, help)) = column_problem(traces, column) {
-                let (wanted_by, column) = (wanted_by.to_owned(), column.to_owned());
-                return Err(ScoreError::Column { wanted_by, column, problem, help });
-            }
-        }
-    }
-    Ok(())
-}
-
-fn column_problem(traces: &TraceSet, column: &str) -> Option<(String, String)> {
-    let absent = || "record it, or choose other metrics with --metrics".to_owned();
-    let has_default = traces.domain().column(column).is_some_and(|known| known.default.is_some());
-    let Some(found) = traces.column(column) else { return Some(("no trace has it".to_owned(), absent())) };
-    if let Some([(first, a), (second, b)]) = found.conflict {
-        let problem = format!("it is {} in `{first}` and {} in `{second}`", a.name(), b.name());
-        return Some((problem, "write it with one type in all traces".to_owned()));
-    }
-    found.missing_from.filter(|_| !has_default).map(|file| (format!("`{file}` has no such column"), absent()))
 }
 
 /// What became of the replies is counted for each of them.
@@ -426,26 +303,6 @@ pub(super) fn projection(
     Ok(Projection { steps, constants, declared, experiments: experiments(definitions), ..Projection::default() })
 }
 
-/// The columns of their own that definitions declare.
-pub fn declared_columns(definitions: &Definitions) -> Vec<DeclaredColumn> {
-    let own = |(name, entry): (&str, &ColumnEntry)| DeclaredColumn {
-        name: name.to_owned(),
-        kind: kind_of(entry.column.ty),
-        values: entry.values.clone(),
-        constant: entry.column.level == Level::Episode,
-    };
-    definitions.declared_columns().map(own).collect()
-}
-
-const fn kind_of(ty: Type) -> Kind {
-    match ty {
-        Type::Bool => Kind::Bool,
-        Type::Int => Kind::Int,
-        Type::Float => Kind::Float,
-        Type::Text => Kind::String,
-    }
-}
-
 /// The experiments that all definitions know; any if `None`.
 fn experiments(definitions: &[&Definitions]) -> Option<Vec<String>> {
     let closed = definitions.iter().map(|definitions| &definitions.catalog).filter(|catalog| !catalog.open);
@@ -454,40 +311,6 @@ fn experiments(definitions: &[&Definitions]) -> Option<Vec<String>> {
         all.retain(|name| some.contains(name));
         all
     })
-}
-
-/// Returns true if a column of the schema has one value in all steps of an episode.
-pub fn is_constant(name: &str) -> bool {
-    COLUMNS.iter().any(|column| column.name == name && column.constant)
-}
-
-/// Refuses a column to group by that is not constant in an episode, or not in every trace.
-pub fn check_label(traces: &TraceSet, label: &str) -> Result<(), ScoreError> {
-    let problem = column_problem(traces, label);
-    // What version 2 brought is null in older traces, or has a meaning where there is no value.
-    let is_known_anyway = traces.domain().column(label).is_some_and(|known| {
-        let found = traces.column(label);
-        known.default_text().is_some() || known.since > 1 && found.is_some_and(|found| found.conflict.is_none())
-    });
-    // Whether a column of one's own changes from step to step shows when it is read.
-    let is_constant = |name: &str| match traces.domain() {
-        Domain::Mirror => is_constant(name),
-        Domain::Own => {
-            name != "t" && traces.column(name).is_some_and(|column| matches!(column.kind, Kind::Int | Kind::String))
-        }
-    };
-    if is_constant(label) && (problem.is_none() || is_known_anyway) {
-        return Ok(());
-    }
-    let known: Vec<String> =
-        traces.column_names().into_iter().filter(|name| is_constant(name)).map(str::to_owned).collect();
-    let near = nearest(label, known.iter().map(String::as_str)).filter(|near| *near != label);
-    let help = match (near, problem) {
-        (Some(near), _) => format!("did you mean `{near}`?"),
-        (None, Some((problem, _))) => problem,
-        (None, None) => "its value changes from step to step".to_owned(),
-    };
-    Err(ScoreError::Label { name: label.to_owned(), known, help })
 }
 
 #[cfg(test)]

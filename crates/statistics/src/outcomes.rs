@@ -80,7 +80,7 @@ impl Outcomes {
     }
 
     /// The sum of two independent counts.
-    pub fn plus(&self, other: &Self) -> Self {
+    pub(crate) fn plus(&self, other: &Self) -> Self {
         let mut weights = vec![0.0; self.len() + other.len() - 1];
         for (i, a) in self.weights.iter().enumerate() {
             for (sum, b) in weights[i..].iter_mut().zip(&other.weights) {

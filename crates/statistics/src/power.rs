@@ -7,7 +7,7 @@ use super::quantile;
 use super::unpaired::fisher;
 
 /// The power that [`Detectable::likely`] is stated at.
-pub const POWER: f64 = 0.8;
+pub(crate) const POWER: f64 = 0.8;
 
 /// The smallest difference of two rates that an exact test of n pairs, or of n episodes on each side, could have shown.
 ///

@@ -10,11 +10,10 @@ use engines::spark::source::{Sources, is_uri};
 use engines::spark::{self, Cluster, Job, SparkError, Written};
 use exact::replace::check_target;
 use metric::definitions::Definitions;
-use score::score_traces::check_label;
 use score::table::EpisodeTable;
+use score::vocabulary::check_label;
 use trace::open::TraceSet;
 
-/// An engine.
 #[derive(Clone, Debug, Default)]
 pub enum Backend {
     /// The program's own kernels.
@@ -43,9 +42,16 @@ impl SparkJob {
     /// Files of scores; whatever is wrong with the definitions or the columns to group by.
     pub fn of_study(study: &Study, cluster: Cluster) -> Result<Self, StudyError> {
         let traces = study.source.traces()?;
-        let labels = study.question.labels_over(traces);
+        let mut labels = study.question.labels_over(traces);
+        labels.retain(|label| !traces.is_label_column(label));
         labels.iter().try_for_each(|label| check_label(traces, label))?;
         let definitions = study.question.bind(traces)?;
+        let plan = &definitions.plan;
+        let read = plan.needed_by(plan.outputs.iter().map(|output| output.node).chain(plan.filter));
+        let read = plan.columns(&read).into_iter().map(|(name, _)| name.to_owned()).chain(study.question.labels());
+        if let Some(column) = read.into_iter().find(|name| traces.is_label_column(name)) {
+            return Err(SparkError::Label { column }.into());
+        }
         let sources = Sources::files(&study.inputs, traces)
             .map_err(|source| SparkError::System { what: "name the traces for Spark".to_owned(), source })?;
         let read = study.files_read(None);
@@ -56,11 +62,8 @@ impl SparkJob {
     }
 
     /// URIs that Spark alone can read.
-    ///
-    /// # Errors
-    /// Every fault of the definitions.
     pub fn of_uris(uris: Vec<String>, question: &Question, cluster: Cluster) -> Result<Self, StudyError> {
-        let definitions = question.bind_to(&score::score_traces::unknown_columns())?;
+        let definitions = question.bind_to(&score::vocabulary::unknown_columns())?;
         let (sources, labels, read) = (Sources::Uris(uris), question.labels(), Vec::new());
         Ok(Self { sources, definitions, labels, cluster, read })
     }
@@ -71,9 +74,6 @@ impl SparkJob {
     }
 
     /// The scores, brought here.
-    ///
-    /// # Errors
-    /// Whatever Spark, its absence, or the traces give.
     pub fn score(&self) -> Result<EpisodeTable, StudyError> {
         Ok(spark::score(self.job(), &self.cluster)?)
     }

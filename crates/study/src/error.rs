@@ -32,154 +32,72 @@ use trace::lost::LostListError;
 /// An error of a study. Each message says what, where, expected, found, and what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
-    /// More than the budget allows.
     #[error(transparent)]
     Exceeded(#[from] Exceeded),
-    /// A URI among files.
     #[error(
         "`{uri}`: expected files of this machine, found a URI, which Spark alone can read\n  \
          help: `mirrorstats score --engine spark {uri} -o scores.parquet`, then give the scores"
     )]
-    Uri {
-        /// As given.
-        uri: String,
-    },
-    /// Files of this machine and URIs at once.
+    Uri { uri: String },
     #[error(
         "expected files of this machine or URIs for Spark, found both\n  \
          help: name the files as file:// URIs, or score the two apart"
     )]
     FilesAndUris,
-    /// Traces and scores at once.
     #[error(
         "expected traces or files of scores, found both: `{scores}` holds scores\n  \
          help: score the traces first, or leave one kind out"
     )]
-    Mixed {
-        /// The first file of scores.
-        scores: String,
-    },
-    /// Scores where steps are needed.
+    Mixed { scores: String },
     #[error(
         "{scores}: expected traces, found scores, which have no steps\n  help: give the traces that they were computed from"
     )]
-    NoSteps {
-        /// The file.
-        scores: String,
-    },
-    /// Traces without a mirror, where its thresholds are asked for.
+    NoSteps { scores: String },
     #[error(
         "expected traces of the domain `mirror`, whose thresholds of evidence vary here; found another domain\n  \
          help: write the other threshold into a definition file, and compare it with `mirrorstats diff`"
     )]
     NoMirror,
-    /// Traces that do not record what a threshold is of.
     #[error(
         "expected traces with the column `{column}`, to which a threshold applies: {problem}\n  \
          help: give traces that record it, as those of `mirrorstats record` do; `mirrorstats trace info` lists the columns"
     )]
-    NoPixels {
-        /// The column.
-        column: &'static str,
-        /// The problem.
-        problem: String,
-    },
-    /// Steps that do not record what a threshold is of.
+    NoPixels { column: &'static str, problem: String },
     #[error(
         "{column}: expected a value at every step, found {steps} without one, for example in `{episode}`: a threshold does \
          not say what they show\n  \
          help: --where \"all({column} is not null)\" keeps the episodes that have them"
     )]
-    PixelsMissing {
-        /// The column.
-        column: &'static str,
-        /// The number of steps, and of their episodes.
-        steps: String,
-        /// The first such episode.
-        episode: String,
-    },
-    /// Metrics none of which a threshold moves.
+    PixelsMissing { column: &'static str, steps: String, episode: String },
     #[error(
         "expected a metric that depends on the `let` `{name}`, found none among {metrics}\n  \
          help: ask for other metrics with --metrics, or let the definitions use `{name}`"
     )]
-    NothingMoves {
-        /// The `let`.
-        name: &'static str,
-        /// The metrics.
-        metrics: String,
-    },
-    /// Evidence that cannot be replaced.
+    NothingMoves { name: &'static str, metrics: String },
     #[error("{definitions}: {source}")]
-    EvidenceLet {
-        /// The definition file.
-        definitions: String,
-        /// The reason.
-        source: ReplaceError,
-    },
-    /// A file is not the one that was opened.
+    EvidenceLet { definitions: String, source: ReplaceError },
     #[error(
         "{name}: the file changed while it was read: the results would mix two versions of it\n  \
          help: wait until nothing writes to it, then run the command again"
     )]
-    Changed {
-        /// The file.
-        name: String,
-    },
-    /// Something is wrong with one file.
+    Changed { name: String },
     #[error("{name}: {source}")]
-    File {
-        /// The file.
-        name: String,
-        /// The error.
-        source: Box<dyn Error + Send + Sync>,
-    },
-    /// No file at all.
+    File { name: String, source: Box<dyn Error + Send + Sync> },
     #[error("expected at least one file of scores, found none\n  help: name traces or scores")]
     NoScores,
-    /// A list of lost episodes that cannot be read.
     #[error(transparent)]
     LostList(#[from] LostListError),
-    /// A cell that mixes episodes which were recorded differently.
     #[error(
         "{cell}: expected episodes that were recorded alike, found {counts}: {differences}; for example {episodes}\n  help: {help}"
     )]
-    Pooled {
-        /// The experiment and model.
-        cell: String,
-        /// Two episodes that differ.
-        episodes: String,
-        /// The number of episodes with each fingerprint.
-        counts: String,
-        /// In which parts the fingerprints differ.
-        differences: String,
-        /// The remedy.
-        help: String,
-    },
-    /// Scores under other definitions than those asked for.
+    Pooled { cell: String, episodes: String, counts: String, differences: String, help: String },
     #[error(
         "{file}: expected scores under `{wanted}` ({wanted_hash}), found scores under `{found}` ({found_hash})\n  \
          help: score the traces again with --definitions {wanted}"
     )]
-    OtherDefinitions {
-        /// The file.
-        file: String,
-        /// The definitions asked for.
-        wanted: String,
-        /// The first digits of their hash.
-        wanted_hash: String,
-        /// The definitions of the scores.
-        found: String,
-        /// The first digits of their hash.
-        found_hash: String,
-    },
-    /// Experiments that need different definitions.
+    OtherDefinitions { file: String, wanted: String, wanted_hash: String, found: String, found_hash: String },
     #[error("expected experiments that the same definitions score, found {}", differing(.groups))]
-    DefinitionsDiffer {
-        /// The experiments, by what scores them.
-        groups: Vec<ScoredAlike>,
-    },
-    /// An experiment whose definitions are a file that traces do not carry.
+    DefinitionsDiffer { groups: Vec<ScoredAlike> },
     #[error(
         "{}: expected the definition file `{}`{}, which scores these episodes, found its name alone\n  \
          help: a trace carries no definition file: give it with --definitions FILE",
@@ -187,203 +105,107 @@ pub enum StudyError {
         .group.definitions,
         .group.hash.as_deref().map(|hash| format!(" (sha256 {hash})")).unwrap_or_default()
     )]
-    DefinitionsElsewhere {
-        /// The experiments and the file.
-        group: ScoredAlike,
-    },
-    /// Definitions that do not say what decides an experiment.
+    DefinitionsElsewhere { group: ScoredAlike },
     #[error(
         "{experiment}: expected definitions that score it, as `{own}` do, found `{definitions}`, whose zeros would mean nothing\n  \
          help: leave --definitions out, or give --definitions {own}; a file of your own scores it with `include = [\"{own}\"]`, \
          or with a table `[experiment.{experiment}]`; `--where` leaves its episodes out"
     )]
-    NotScored {
-        /// The experiment.
-        experiment: String,
-        /// The definitions that were asked for.
-        definitions: String,
-        /// Those that the experiment names.
-        own: String,
-    },
-    /// The definitions are about a mirror, and the traces about something else.
+    NotScored { experiment: String, definitions: String, own: String },
     #[error(
         "`{file}` has no column of the domain `mirror`: expected definitions of its own domain, found `{definitions}`\n  \
          help: give --definitions a file that says `domain = \"NAME\"` and declares the columns that it reads, `[column.NAME]`"
     )]
-    OtherDomain {
-        /// The first trace.
-        file: String,
-        /// The definitions that were asked for, or the default ones.
-        definitions: String,
-    },
-    /// Definitions to compare, and nothing to score with them.
+    OtherDomain { file: String, definitions: String },
     #[error(
         "`{name}` are definitions: expected traces to score with them, found none\n  \
          help: name the traces after OLD and NEW"
     )]
-    NoTraces {
-        /// The definitions.
-        name: String,
-    },
-    /// A side of a comparison that holds no scores.
+    NoTraces { name: String },
     #[error(
         "{argument}: expected definitions, scores or a report's folder, found no scores in it\n  \
          help: OLD and NEW come first, the traces after them"
     )]
-    NoSide {
-        /// As given.
-        argument: String,
-    },
-    /// A table that a style does not lay out.
+    NoSide { argument: String },
     #[error("no table of the style `{style}` is named `{name}`; it has {known}{hint}")]
-    NoTable {
-        /// The name asked for.
-        name: String,
-        /// The style.
-        style: String,
-        /// The tables that there are.
-        known: String,
-        /// The nearest of them, in words; may be empty.
-        hint: String,
-    },
-    /// A metric of which neither direction is better.
+    NoTable { name: String, style: String, known: String, hint: String },
     #[error(
         "{metric}: expected a metric with `better = \"higher\"` or \"lower\", found none\n  help: name another metric with --metric"
     )]
-    NoDirection {
-        /// The metric.
-        metric: String,
-    },
-    /// A filter that keeps no episode.
+    NoDirection { metric: String },
     #[error("{words}\n  help: give a filter that holds for some of them, or none")]
-    EmptyFilter {
-        /// The number of episodes, and the values of the columns that the filter names.
-        words: String,
-    },
-    /// A report would be written over the one that it is made from.
+    EmptyFilter { words: String },
     #[error(
         "{out}: expected a folder beside the report, found the report itself\n  \
          help: the old report stays as it is; give another --out"
     )]
-    OntoItself {
-        /// The folder.
-        out: String,
-    },
-    /// The style of a report is not what it was.
+    OntoItself { out: String },
     #[error(
         "the style `{name}` changed since the report was made: expected sha256 {expected}, found {found}\n  \
          help: name the style with --style"
     )]
-    StyleChanged {
-        /// The style.
-        name: String,
-        /// Its hash in the manifest.
-        expected: String,
-        /// Its hash now.
-        found: String,
-    },
-    /// The style of a report was a file.
+    StyleChanged { name: String, expected: String, found: String },
     #[error(
         "the report's style `{name}` (sha256 {expected}) was a file, and a manifest keeps no paths\n  \
          help: name the style with --style"
     )]
-    StyleGone {
-        /// The style.
-        name: String,
-        /// Its hash in the manifest.
-        expected: String,
-    },
-    /// This build lacks a feature.
+    StyleGone { name: String, expected: String },
     #[error(
         "`{what}` needs Polars, which this build lacks\n  \
          help: build with it: cargo build --release --features polars"
     )]
-    WithoutPolars {
-        /// The option or the command.
-        what: &'static str,
-    },
-    /// The colours of an import cannot be taken.
+    WithoutPolars { what: &'static str },
     #[error("--palette {typed}: {words}")]
-    Palette {
-        /// As typed.
-        typed: String,
-        /// The problem, and a remedy.
-        words: String,
-    },
-    /// Lines of steps are not as they must be.
+    Palette { typed: String, words: String },
     #[error(transparent)]
     Import(#[from] ImportError),
-    /// The traces are not as they must be.
     #[error(transparent)]
     Trace(#[from] TraceError),
-    /// The traces cannot be scored.
     #[error(transparent)]
     Score(#[from] ScoreError),
-    /// A definition file is not as it must be.
     #[error(transparent)]
     Definitions(#[from] FileError),
-    /// A filter is not as it must be.
     #[error(transparent)]
     Filter(#[from] Faults),
-    /// A metric that the definitions do not have.
     #[error(transparent)]
     Metric(#[from] UnknownMetric),
-    /// An episode cannot be explained.
     #[error(transparent)]
     Evidence(#[from] EvidenceError),
-    /// Scores cannot be written.
     #[error(transparent)]
     Format(#[from] FormatError),
-    /// Scores cannot be filtered.
     #[error(transparent)]
     Select(#[from] SelectError),
-    /// Episodes cannot be grouped.
     #[error(transparent)]
     Group(#[from] GroupError),
-    /// Scores whose traces declare one experiment differently; a level that none can have.
     #[error(transparent)]
     Declaration(#[from] DeclarationError),
-    /// Sums of squares leave 128 bits.
     #[error(transparent)]
     Overflow(#[from] MomentOverflow),
-    /// A style is not as it must be.
     #[error(transparent)]
     Style(#[from] StyleError),
-    /// A published table is not as it must be.
     #[error(transparent)]
     Published(#[from] PublishedError),
-    /// A published table is not the one that the traces give.
     #[error(transparent)]
     Comparison(#[from] ComparisonError),
-    /// Published tables cannot be audited.
     #[error(transparent)]
     Audit(#[from] AuditError),
-    /// A figure cannot be drawn.
     #[error(transparent)]
     Figure(#[from] FigureError),
-    /// A figure cannot be encoded.
     #[error(transparent)]
     Encode(#[from] EncodeError),
-    /// The page of a report cannot be made.
     #[error(transparent)]
     Page(#[from] HtmlError),
-    /// A report cannot be written.
     #[error(transparent)]
     Bundle(#[from] BundleError),
-    /// A report cannot be made again.
     #[error(transparent)]
     Provenance(#[from] ProvenanceError),
-    /// Spark gave no scores.
     #[error(transparent)]
     Spark(#[from] SparkError),
-    /// Polars gave no scores.
     #[cfg(feature = "polars")]
     #[error(transparent)]
     Polars(#[from] engines::polars::run::PolarsError),
-    /// An output is one of the files that are read.
     #[error(transparent)]
     Target(#[from] TargetIsInput),
-    /// The operating system refuses.
     #[error(transparent)]
     System(#[from] io::Error),
 }

@@ -32,7 +32,7 @@ mod size;
 mod top;
 
 pub use output::verify;
-use output::{audit, figure_inputs, overview, provenance, quality_check, report};
+use output::{agreement, audit, figure_inputs, overview, provenance, quality_check, report};
 
 use compare::{design, diff, gate, pooled, sensitivity};
 
@@ -63,19 +63,20 @@ use exact::replace;
 use metric::file;
 use score::evidence::{self, Evidence};
 use score::lost_counts::LostCounts;
-use score::score_traces;
 use score::table::EpisodeTable;
+use score::{score_traces, vocabulary};
 use trace::checksums::stale_note;
 use trace::inputs::Input;
 use trace::open::TraceSet;
 use trace::steps::Steps;
 
+pub use agreement::{CoderCount, LabelAgreement, LabelCount, PairAgreement};
 pub use audit::{AuditRequest, audit_tables};
-pub use backend::Backend;
-pub use backend::{SparkJob, are_uris};
+pub use backend::{Backend, SparkJob, are_uris};
 pub use diff::{Diff, DiffRequest, Side, diff};
 pub use error::StudyError;
-pub use figure_inputs::{Drawings, FigureInputs, FigureOptions, MANY_MODELS};
+use figure_inputs::{Drawings, FigureInputs};
+pub use figure_inputs::{FigureOptions, MANY_MODELS};
 pub use findings::{findings, findings_text};
 pub use import::{ImportAnswer, ImportRequest, OwnColumn, import};
 pub use inputs::{ScoreFile, Source, resolve};
@@ -83,7 +84,8 @@ pub use losses::LostAs;
 pub use overview::{Overview, Part};
 pub use provenance::ProvenanceError;
 pub use quality_check::{CellAnswer, NotRecorded, QualityCheckAnswer, QualityLimits, Violation};
-pub use question::{DEFAULT_DEFINITIONS, Question, known_experiments};
+use question::DEFAULT_DEFINITIONS;
+pub use question::Question;
 pub use report::{Report, ReportOptions, WrittenReport};
 pub use rescore::{RescoreRequest, Rescored, folder_of_rescored, traces_of};
 pub use results::{Outputs, Results};
@@ -93,7 +95,7 @@ pub use sensitivity::{DEFAULT_THRESHOLDS, SensitivityReport, Thresholds, Thresho
 pub use top::{ModelMean, model_means};
 
 use design::design_of;
-use inputs::Stamp;
+use inputs::{Stamp, labelled};
 
 /// Inputs that are open, and the question that is put to them.
 #[derive(Debug)]
@@ -216,7 +218,7 @@ impl Study {
     fn checked(mut self) -> Result<Self, StudyError> {
         if let Source::Traces(traces) = &self.source {
             self.question = self.question.resolved(traces)?;
-            self.question.bind_to(&score_traces::trace_columns(traces))?;
+            self.question.bind_to(&vocabulary::trace_columns(traces))?;
         }
         Ok(self)
     }
@@ -264,7 +266,7 @@ impl Study {
     ///
     /// # Errors
     /// A column to group by that the episodes do not have; a cell that mixes episodes which were recorded differently.
-    pub fn cells_of(&self, episodes: &EpisodeTable) -> Result<Cells, StudyError> {
+    pub(crate) fn cells_of(&self, episodes: &EpisodeTable) -> Result<Cells, StudyError> {
         let by = self.question.by_over(episodes);
         if !self.question.pool {
             pooled::check(episodes, &by)?;
@@ -346,26 +348,20 @@ impl Study {
     }
 
     /// As [`Study::explain`], of an episode that is known to be in one of the inputs: no other is read.
-    ///
-    /// # Errors
-    /// As [`Study::explain`].
     pub fn explain_in(&self, input: &Input, episode_id: &str) -> Result<Evidence, StudyError> {
         // Bound to its own columns: beside other tasks a trace may lack those that are theirs.
-        let one = TraceSet::open(std::slice::from_ref(input))?;
+        let one = labelled(std::slice::from_ref(input))?;
         let definitions = Question { filter: None, ..self.question.clone() }.bind(&one)?;
         Ok(evidence::explain(&one, &definitions, episode_id, self.threads)?)
     }
 
     /// As [`Study::explain_in`], for each of these episodes that the input has, by its id: one pass over it.
-    ///
-    /// # Errors
-    /// As [`Study::explain`].
     pub fn explain_each_in(
         &self,
         input: &Input,
         ids: &BTreeSet<String>,
     ) -> Result<BTreeMap<String, Evidence>, StudyError> {
-        let one = TraceSet::open(std::slice::from_ref(input))?;
+        let one = labelled(std::slice::from_ref(input))?;
         let definitions = Question { filter: None, ..self.question.clone() }.bind(&one)?;
         Ok(evidence::explain_each(&one, &definitions, ids, self.threads)?)
     }

@@ -12,9 +12,6 @@ const MOST_COMPARISONS: Limit =
     Limit::new("comparisons of two models under a metric; leave models or metrics out", 400_000);
 
 /// Returns true if the comparisons that a report of these episodes makes are within the budget.
-///
-/// # Errors
-/// [`StudyError::Exceeded`] if not.
 pub(super) fn check_comparisons(episodes: &EpisodeTable) -> Result<(), StudyError> {
     let conditions = episodes.label(CONDITION);
     let mut subjects = BTreeMap::<_, BTreeSet<_>>::new();

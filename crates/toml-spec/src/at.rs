@@ -37,7 +37,6 @@ pub struct At<'a> {
 }
 
 impl<'a> At<'a> {
-    /// The whole text.
     pub fn root(source: &'a Arc<Source>, value: &'a DeValue<'a>) -> Self {
         Self { source, name: "", name_span: 0..0, span: 0..0, value }
     }
@@ -115,12 +114,10 @@ impl<'a> At<'a> {
         self.written().parse().map_err(|error: T::Err| faults.push(self.fault(error))).ok()
     }
 
-    /// Location of the value.
     pub fn place(&self) -> Place {
         Place { source: self.source.clone(), span: self.span.clone() }
     }
 
-    /// Location of the key.
     pub fn name_place(&self) -> Place {
         Place { source: self.source.clone(), span: self.name_span.clone() }
     }

@@ -40,7 +40,6 @@ pub struct Fault {
     pub place: Place,
     /// The label under the span; may be empty.
     pub label: String,
-    /// The remedy.
     pub help: Option<String>,
 }
 

@@ -12,7 +12,6 @@ use exact::budget::Limit;
 use exact::input;
 use exact::suggest::nearest;
 
-/// A kind of files.
 pub struct FileKind {
     /// `style`
     pub name: &'static str,

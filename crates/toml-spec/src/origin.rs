@@ -26,7 +26,7 @@ impl Written {
     }
 
     /// A TOML string of a source: its decoded text, and the bytes of the literal, quotes included.
-    pub fn toml_string(source: Arc<Source>, text: &str, literal: Range<usize>) -> Self {
+    pub(crate) fn toml_string(source: Arc<Source>, text: &str, literal: Range<usize>) -> Self {
         let starts = source.text.get(literal.clone()).and_then(|raw| string_starts(raw, text)).map_or_else(
             || vec![literal.start; text.len() + 1],
             |starts| starts.into_iter().map(|at| literal.start + at).collect(),

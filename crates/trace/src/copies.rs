@@ -18,7 +18,6 @@ use super::schema::Kind;
 /// The column that a copy has of its own; the hash of its rows includes it.
 const EPISODE_ID: &str = "episode_id";
 
-/// A copy.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Copied {
     pub episode: String,

@@ -252,7 +252,7 @@ impl Finding {
     }
 
     #[must_use]
-    pub fn in_row_group(mut self, row_group: usize) -> Self {
+    pub(crate) fn in_row_group(mut self, row_group: usize) -> Self {
         self.row_group = Some(row_group);
         self
     }

@@ -6,85 +6,31 @@ use std::path::Path;
 use arrow::error::ArrowError;
 
 use super::diagnostic::Finding;
+use super::labels::LabelsError;
 
 /// An error of reading or writing traces.
 #[derive(Debug, thiserror::Error)]
 pub enum TraceError {
-    /// A rule of the schema does not hold.
     #[error("{first}{}", more_findings(*.more))]
-    Finding {
-        /// The earliest finding by file, row group and row.
-        first: Box<Finding>,
-        /// The number of further findings; `validate` shows them all.
-        more: usize,
-    },
-    /// The operating system refused to read something that is not yet known as a trace.
+    Finding { first: Box<Finding>, more: usize },
     #[error("cannot read {what}")]
-    Read {
-        /// The requested path, as the user named it.
-        what: String,
-        /// The reason for the refusal.
-        source: io::Error,
-    },
-    /// An argument gives no trace.
+    Read { what: String, source: io::Error },
     #[error("`{argument}`: expected {expected}, found {found}; {help}")]
-    NoInput {
-        /// As typed.
-        argument: String,
-        /// The valid arguments.
-        expected: &'static str,
-        /// The argument found.
-        found: String,
-        /// The remedy.
-        help: &'static str,
-    },
-    /// A file cannot be taken over into another trace.
+    NoInput { argument: String, expected: &'static str, found: String, help: &'static str },
+    #[error(transparent)]
+    Labels(#[from] LabelsError),
     #[error("cannot take over the episodes of `{file}`: {source}")]
-    Part {
-        /// The file.
-        file: String,
-        /// The reason for the refusal.
-        source: Box<dyn std::error::Error + Send + Sync>,
-    },
-    /// Threads could not be started.
+    Part { file: String, source: Box<dyn std::error::Error + Send + Sync> },
     #[error("cannot start {threads} threads; ask for fewer with --threads")]
-    Threads {
-        /// The requested number.
-        threads: usize,
-        /// The reason for the refusal.
-        source: io::Error,
-    },
-    /// A column was asked for that the traces cannot give.
+    Threads { threads: usize, source: io::Error },
     #[error("column `{column}`: expected {expected}, found {found}")]
-    Column {
-        /// The name asked for.
-        column: String,
-        /// The expected files.
-        expected: &'static str,
-        /// The files found.
-        found: String,
-    },
-    /// Columns could not be put together in memory.
+    Column { column: String, expected: &'static str, found: String },
     #[error("cannot hold the rows in memory; report this as a fault of mirrorstats")]
     Memory(#[source] ArrowError),
-    /// The writer's input is not an episode of the schema.
     #[error("episode `{episode}`: expected {expected}, found {found}; nothing of it was written")]
-    Refused {
-        /// The id of the episode.
-        episode: String,
-        /// The rule.
-        expected: String,
-        /// The value found.
-        found: String,
-    },
-    /// The trace could not be written; no file was left behind.
+    Refused { episode: String, expected: String, found: String },
     #[error("cannot write the trace {file}, and left no file behind: is the folder writable, and the disk not full?")]
-    Write {
-        /// The file, as named.
-        file: String,
-        /// The reason for the refusal.
-        source: Box<dyn std::error::Error + Send + Sync>,
-    },
+    Write { file: String, source: Box<dyn std::error::Error + Send + Sync> },
 }
 
 fn more_findings(more: usize) -> String {
@@ -114,6 +60,12 @@ impl TraceError {
 
 impl From<Finding> for TraceError {
     fn from(finding: Finding) -> Self {
-        Self::Finding { first: Box::new(finding), more: 0 }
+        Box::new(finding).into()
+    }
+}
+
+impl From<Box<Finding>> for TraceError {
+    fn from(first: Box<Finding>) -> Self {
+        Self::Finding { first, more: 0 }
     }
 }

@@ -11,7 +11,7 @@ use glob::{Pattern, PatternError};
 
 /// An error of a glob.
 #[derive(Debug)]
-pub enum GlobError {
+pub(crate) enum GlobError {
     /// It is none.
     Pattern(PatternError),
     /// A folder cannot be read.
@@ -19,14 +19,14 @@ pub enum GlobError {
 }
 
 /// Returns true if a text has characters that make a glob of it.
-pub fn is_glob(text: &str) -> bool {
+pub(crate) fn is_glob(text: &str) -> bool {
     text.contains(['*', '?', '['])
 }
 
 /// The files and folders that a glob matches, in any order.
 ///
 /// `**` represents any number of folders; links to folders are not followed there.
-pub fn matches(pattern: &str) -> Result<Vec<PathBuf>, GlobError> {
+pub(crate) fn matches(pattern: &str) -> Result<Vec<PathBuf>, GlobError> {
     Pattern::new(pattern).map_err(GlobError::Pattern)?;
     let mut found = vec![PathBuf::new()];
     for part in Path::new(pattern).components() {

@@ -151,7 +151,6 @@ const fn most_named(bytes: u64) -> Limit {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Listing {
     Episodes,
-    /// None.
     Nothing,
 }
 

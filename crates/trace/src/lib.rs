@@ -50,12 +50,11 @@ pub mod write;
 
 pub use texts::{identification, model_id, renormalize};
 
-pub use episodes::{episode, episode_hash, frame, lost, palette, replies};
+pub use episodes::{episode, episode_hash, frame, labels, lost, palette, replies};
 
 pub use footers::{answered, checksums, declared, declared_experiment};
 
-pub use read::flat::FlatRows;
-pub use read::flat::TableFile;
+pub use read::flat::{FlatRows, TableFile};
 pub use read::{in_order, open, search, steps, verify};
 pub use schema::{colors, describe};
 pub use write::merge;

@@ -8,7 +8,6 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::read::open::TraceFile;
-use super::schema::RECORDING_KEY;
 use exact::escape::visible;
 
 /// A renderer, the part `renderer` of a fingerprint.
@@ -42,8 +41,7 @@ pub fn of_recording(recording: &Value) -> Vec<Renderer> {
 
 /// The renderers of some traces, each once.
 pub fn of_files(files: &[TraceFile]) -> Vec<Renderer> {
-    let recording = |file: &TraceFile| serde_json::from_str(file.metadata_value(RECORDING_KEY)?).ok();
-    once(files.iter().filter_map(recording).flat_map(|recording: Value| of_recording(&recording)))
+    once(files.iter().flat_map(|file| of_recording(&file.recording())))
 }
 
 /// A sentence with what drew the frames of some traces; `None` where no agent saw any, or nothing is known.

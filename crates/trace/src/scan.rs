@@ -32,7 +32,8 @@ pub struct Projection {
     pub steps: Vec<String>,
     /// Columns with one value per step that are taken unchanged: the schema's rules about values do not count.
     pub unchecked: Vec<String>,
-    /// Columns with one value per episode, besides [`EPISODE_COLUMNS`]; checked to be constant in each.
+    /// Columns with one value per episode, besides [`EPISODE_COLUMNS`]; checked to be constant in each. Those of labels come from
+    /// beside the traces.
     pub constants: Vec<String>,
     /// The definitions' declarations of columns that the schema does not know.
     pub declared: Vec<DeclaredColumn>,
@@ -62,7 +63,7 @@ pub struct EpisodeBatch {
     pub steps: RecordBatch,
     /// Columns of [`Projection::steps`] and [`Projection::unchecked`].
     pub texts: Vec<Texts>,
-    /// One row per episode: [`EPISODE_COLUMNS`], then the columns of [`Projection::constants`].
+    /// One row per episode: [`EPISODE_COLUMNS`], then the columns of [`Projection::constants`], those of labels last.
     pub episodes: RecordBatch,
     /// The location of the first row.
     pub origin: Origin,
@@ -102,9 +103,7 @@ pub struct Origin {
 /// The totals of a scan.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ScanSummary {
-    /// Whole episodes.
     pub episodes: u64,
-    /// Their steps.
     pub steps: u64,
 }
 
@@ -118,17 +117,20 @@ impl TraceSet {
         work: impl Fn(EpisodeBatch) -> Result<T, E> + Sync,
         mut sink: impl FnMut(T) -> Result<(), E>,
     ) -> Result<ScanSummary, E> {
-        let mut layout = Layout::new(
-            self,
-            projection.step_columns(),
-            EPISODE_COLUMNS.into_iter().chain(projection.constants.iter().map(String::as_str)),
-        )?;
+        let (labels, constants): (Vec<&str>, Vec<&str>) =
+            projection.constants.iter().map(String::as_str).partition(|name| self.is_label_column(name));
+        let read = EPISODE_COLUMNS.into_iter().chain(constants.iter().copied());
+        let mut layout = Layout::new(self, projection.step_columns(), read)?;
         layout.with_declared(&projection.declared);
         for column in &projection.unchecked {
             layout.without_rules(column);
         }
         let rules = Rules { layout: &layout, experiments: projection.experiments.as_deref() };
-        let shape = Shape::new(&layout, projection);
+        let shape = Shape::new(&layout, projection, &constants);
+        let whole = |episodes: Episodes| -> Result<EpisodeBatch, TraceError> {
+            let batch = shape.batch(episodes)?;
+            Ok(EpisodeBatch { episodes: self.with_label_columns(batch.episodes, &labels)?, ..batch })
+        };
         let mut prints = Prints::default();
         let mut spellings = Spellings::new(self.files());
         let mut summary = ScanSummary::default();
@@ -145,14 +147,14 @@ impl TraceSet {
             let colors = other_names(&layout, &episodes);
             let result = match fault {
                 Some(fault) => Err(Box::new(fault.finding)),
-                None => Ok(shape.batch(episodes).map_err(E::from).and_then(&work)),
+                None => Ok(whole(episodes).map_err(E::from).and_then(&work)),
             };
             Checked { file: at, ids, count, steps, colors, result }
         };
         let passed = pass(self.files(), &layout, threads, &checked, |_, event| {
             let checked = match event {
                 Event::Whole(checked) => checked,
-                Event::Fault(finding) => return Err(TraceError::from(*finding).into()),
+                Event::Fault(finding) => return Err(TraceError::from(finding).into()),
             };
             prints.add(&checked.ids);
             spellings.add(checked.colors);
@@ -164,12 +166,12 @@ impl TraceSet {
             })?;
             match checked.result {
                 Ok(result) => sink(result?),
-                Err(finding) => Err(TraceError::from(*finding).into()),
+                Err(finding) => Err(TraceError::from(finding).into()),
             }
         });
         // An id that was there before is found at the end, though it comes before whatever ended the pass.
         if let Some(finding) = prints.first_repeated(self.files(), &layout)? {
-            return Err(TraceError::from(*finding).into());
+            return Err(TraceError::from(finding).into());
         }
         passed?;
         // That two names are spellings of one colour shows when all are known.
@@ -227,8 +229,8 @@ struct Shape<'a> {
 }
 
 impl<'a> Shape<'a> {
-    fn new(layout: &'a Layout, projection: &Projection) -> Self {
-        let constants = projection.constants.iter().map(String::as_str);
+    fn new(layout: &'a Layout, projection: &Projection, constants: &[&str]) -> Self {
+        let constants = constants.iter().copied();
         Self {
             layout,
             steps: projection.step_columns().filter_map(|name| layout.position(name)).collect(),

@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::{self, Read as _, Seek as _, SeekFrom};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
+use std::slice;
 
 use parquet::file::metadata::RowGroupMetaData;
 use schemars::JsonSchema;
@@ -53,7 +54,7 @@ pub enum SealError {
 pub fn seal(input: &Input, out: &Path, threads: NonZeroUsize) -> Result<SealAnswer, SealError> {
     check_target(out, [&input.path], "the trace itself")?;
     let unwritable = |source| SealError::Unwritable { path: out.to_owned(), source };
-    let set = TraceSet::of(vec![opened(input)?]);
+    let set = TraceSet::open(slice::from_ref(input))?;
     sound(input, threads)?;
     let name = out.file_name().unwrap_or_default().to_string_lossy();
     let stage = TemporaryFolder::create(folder_of(out), &name).map_err(unwritable)?;
@@ -62,7 +63,7 @@ pub fn seal(input: &Input, out: &Path, threads: NonZeroUsize) -> Result<SealAnsw
     with_checksums(&set, file).map_err(|error| error.writing(out))?;
     let copy = Input { name: Input::new(out).name, path: staged };
     let (episodes, steps) = sound(&copy, threads)?;
-    compare(&set.files()[0], &opened(&copy)?)?;
+    compare(&set.files()[0], &TraceSet::open(slice::from_ref(&copy))?.files()[0])?;
     let mut new = NewFile::create(out).map_err(unwritable)?;
     let mut reader = File::open(&copy.path).map_err(unwritable)?;
     io::copy(&mut reader, new.as_file_mut()).map_err(unwritable)?;
@@ -72,15 +73,9 @@ pub fn seal(input: &Input, out: &Path, threads: NonZeroUsize) -> Result<SealAnsw
     Ok(SealAnswer { name: input.name.clone(), out: copy.name, episodes, steps, checksums_before, sha256 })
 }
 
-fn opened(input: &Input) -> Result<TraceFile, TraceError> {
-    let unexplained =
-        || Finding::new(Code::Unreadable, &input.name, "a trace that can be opened", "one that cannot").into();
-    TraceFile::open(input).map_err(|findings| TraceError::of(findings).unwrap_or_else(unexplained))
-}
-
 /// Checks every rule of the schema; gives the episodes and steps.
 fn sound(input: &Input, threads: NonZeroUsize) -> Result<(u64, u64), TraceError> {
-    let checked = validate(std::slice::from_ref(input), None, threads)?;
+    let checked = validate(slice::from_ref(input), None, threads)?;
     let counts = checked.files.first().map_or((0, 0), |file| (file.episodes, file.steps));
     let errors = checked.findings.into_iter().filter(|finding| finding.severity == Severity::Error).collect();
     TraceError::of(errors).map_or(Ok(counts), Err)
@@ -89,7 +84,7 @@ fn sound(input: &Input, threads: NonZeroUsize) -> Result<(u64, u64), TraceError>
 /// Compares the bytes of each column.
 fn compare(old: &TraceFile, new: &TraceFile) -> Result<(), TraceError> {
     let chunks = |file: &TraceFile| {
-        let footer = file.footer_again(Extent::Whole).map_err(|finding| TraceError::from(*finding))?;
+        let footer = file.footer_again(Extent::Whole)?;
         let groups = footer.metadata.row_groups().iter().flat_map(RowGroupMetaData::columns);
         groups.map(|chunk| hashed(file, chunk.byte_range())).collect::<Result<Vec<_>, _>>()
     };

@@ -8,6 +8,7 @@ use super::found::Renamed;
 use exact::escape::{visible, visible_lines};
 use study::StudyError;
 use trace::error::TraceError;
+use trace::labels::LabelsError;
 use trace::log::LogError;
 
 /// An error of the viewer.
@@ -18,6 +19,8 @@ pub enum ViewError {
     Study(Box<StudyError>),
     #[error(transparent)]
     Trace(#[from] TraceError),
+    #[error(transparent)]
+    Labels(#[from] LabelsError),
     #[error(transparent)]
     Log(#[from] LogError),
     #[error("cannot list the folder `{}`: {source}", visible(&folder.to_string_lossy()))]

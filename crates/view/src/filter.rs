@@ -12,6 +12,7 @@ use report::cells::group::CONDITION;
 use score::select::{SelectError, select};
 use score::table::EpisodeTable;
 use study::{Question, Results, StudyError};
+use trace::labels;
 use trace::search::{Found, search};
 
 /// The keys and values of a request, in order.
@@ -173,6 +174,9 @@ pub(super) fn values_of<'t>(
         PARTICIPANT => Box::new(|row| table.label(PARTICIPANT)?.get(row).map(str::to_owned)),
         name => match table.metric(name) {
             Some(metric) => Box::new(|row| metric.get(row).map(|value| value.to_string())),
+            None if name.starts_with(labels::PREFIX) && table.label(name).is_some() => {
+                Box::new(|row| table.label(name)?.get(row).map(str::to_owned))
+            }
             None => {
                 return Err(ViewError::Request(format!("nothing to choose by is called `{}`", visible(name))));
             }

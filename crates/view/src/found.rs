@@ -12,6 +12,7 @@ use super::error::ViewError;
 use exact::replace::{FolderError, folder_of};
 use study::resolve;
 use trace::inputs::Input;
+use trace::labels::list_beside;
 use trace::log::frames;
 use trace::lost::list_of;
 
@@ -142,6 +143,10 @@ impl Found {
                     if lost.is_file() {
                         fs::copy(&lost, list_of(&next))?;
                     }
+                    let labels = list_beside(path);
+                    if labels.is_file() {
+                        fs::copy(&labels, next.join(labels.file_name().unwrap_or_default()))?;
+                    }
                     renamed.push((next.clone(), folder_of(path).to_owned()));
                     new.insert(next)
                 }
@@ -163,6 +168,12 @@ impl Found {
         let (traces, parts) = (inputs(&self.traces)?, inputs(&self.parts)?);
         let logs = self.logs.iter().map(|log| link(log)).collect::<io::Result<_>>()?;
         Ok((Self { traces, parts, logs, unfinished: Vec::new() }, renamed))
+    }
+
+    /// The state of the lists of labels beside the traces.
+    pub fn label_stamps(&self) -> Vec<Stamp> {
+        let traces = self.traces.iter().chain(&self.parts).map(|input| list_beside(&input.path));
+        traces.collect::<BTreeSet<_>>().iter().map(|list| stamp(list)).collect()
     }
 
     /// The state of every file, to be held against a later one. A file that grows under way is told apart.

@@ -3,12 +3,28 @@
 //! ```text
 //! found ──► snapshot ──► filter ──► list, overview, episode, map, compare, changes   (answers: JSON, PNG)
 //! (files)   (one scan)              │
-//!           live                    ├──► routes   (a server for one machine, behind `base::web`)
+//!           live                    ├──► routes   (a server for one machine, behind `web`)
 //!           (a newer snapshot)      └──► export   (the same answers as files)
 //! ```
 //!
 //! Rule: the program computes and the page shows: no number is made in the browser. An id in a request is looked up among
-//! the episodes that are open and never made part of a path. Nothing is written into the folders that are looked at.
+//! the episodes that are open and never made part of a path. With a coder the server adds lines to `labels.jsonl` beside the traces;
+//! nothing else is written into the folders that are looked at.
+//!
+//! ```
+//! use mirrorstats_view::{Options, View};
+//!
+//! # let paper = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/paper");
+//! let view = View::open(Options {
+//!     runs: vec![paper.into()],
+//!     question: study::Question::default(),
+//!     against: None,
+//!     style: "default".to_owned(),
+//!     threads: std::num::NonZeroUsize::MIN,
+//! })?;
+//! assert_eq!(view.episodes(), 840);
+//! # Ok::<(), mirrorstats_view::ViewError>(())
+//! ```
 
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
@@ -25,7 +41,7 @@ mod rendered;
 pub mod routes;
 mod snapshot;
 
-use answers::{changes, compare, episode, list, live, map, overview, verdict};
+use answers::{changes, compare, episode, labels, list, live, map, overview, verdict};
 
 use std::ffi::OsString;
 use std::num::NonZeroUsize;
@@ -48,6 +64,8 @@ pub struct Options {
     pub against: Option<PathBuf>,
     /// The style of tables.
     pub style: String,
+    /// The name of the one who labels; the page only shows if absent.
+    pub coder: Option<String>,
     /// The number of threads.
     pub threads: NonZeroUsize,
 }
@@ -83,6 +101,11 @@ impl View {
             answer::Answer::Page(page) => page.into_bytes(),
         };
         answer::answer(self, name, query).map(|answer| answer.map(bytes))
+    }
+
+    /// Adds a label that a page sends as JSON; gives the labels of its episode.
+    pub fn put_label(&self, body: &[u8]) -> Result<Vec<u8>, ViewError> {
+        labels::put(self, body).map(|value| value.to_string().into_bytes())
     }
 
     fn newest(&self) -> Arc<Snapshot> {

@@ -11,13 +11,14 @@ const BODY: &str = include_str!("../../../assets/view/body.html");
 const STYLE: &str = include_str!("../../../assets/view/view.css");
 
 /// The modules, each after those that it imports.
-const MODULES: [(&str, &str); 14] = [
+const MODULES: [(&str, &str); 15] = [
     ("dom.js", include_str!("../../../assets/view/dom.js")),
     ("where.js", include_str!("../../../assets/view/where.js")),
     ("data.js", include_str!("../../../assets/view/data.js")),
     ("state.js", include_str!("../../../assets/view/state.js")),
     ("filters.js", include_str!("../../../assets/view/filters.js")),
     ("overview.js", include_str!("../../../assets/view/overview.js")),
+    ("labels.js", include_str!("../../../assets/view/labels.js")),
     ("list.js", include_str!("../../../assets/view/list.js")),
     ("values.js", include_str!("../../../assets/view/values.js")),
     ("map.js", include_str!("../../../assets/view/map.js")),

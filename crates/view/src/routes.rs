@@ -1,14 +1,14 @@
-//! The server: the page and its answers, for GET alone.
+//! The server: the page and its answers for GET; for POST a label, if there is a coder.
 
 use std::net::{SocketAddr, TcpListener};
 use std::sync::Arc;
 
 use axum::Router;
-use axum::body::Body;
-use axum::extract::{Path, Query, State};
+use axum::body::{Body, Bytes};
+use axum::extract::{DefaultBodyLimit, Path, Query, State};
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse as _, Response};
-use axum::routing::get;
+use axum::routing::{get, post};
 
 use super::answer::{Answer, answer};
 use super::error::ViewError;
@@ -17,6 +17,9 @@ use web::{self, Guard};
 
 /// Answers that are made at once; further ones wait.
 const MOST_ANSWERS: usize = 4;
+
+/// The bytes of a label with its note.
+const LARGEST_LABEL: usize = 64 << 10;
 
 /// Binds the address of a server, so that its link can be printed before anything is asked.
 pub fn bind(host: &str, port: u16) -> std::io::Result<(TcpListener, SocketAddr)> {
@@ -27,14 +30,17 @@ pub fn bind(host: &str, port: u16) -> std::io::Result<(TcpListener, SocketAddr)>
 
 /// Answers until the process ends.
 pub fn serve(view: Arc<View>, listener: TcpListener, guard: Guard) -> std::io::Result<()> {
+    let has_coder = view.options.coder.is_some();
     let routes = Router::new()
         .route("/", get(document))
         .route("/assets/{name}", get(asset))
         .route("/api/{name}", get(api))
+        .route("/label", post(label).layer(DefaultBodyLimit::max(LARGEST_LABEL)))
         .route("/robots.txt", get(robots))
         .with_state(view);
     let mut builder = tokio::runtime::Builder::new_multi_thread();
     // Each answer may read an episode: more at once would take memory, not less time.
+    let guard = if has_coder { guard.taking_posts() } else { guard };
     let runtime = builder.worker_threads(2).max_blocking_threads(MOST_ANSWERS).enable_all().build()?;
     runtime.block_on(web::serve(listener, web::guarded(routes, guard)))
 }
@@ -75,19 +81,31 @@ async fn api(
             let kept = (header::CONTENT_DISPOSITION, "attachment; filename=\"episode.html\"");
             ([(header::CONTENT_TYPE, "text/html; charset=utf-8"), kept], page).into_response()
         }
-        Ok(Some(Err(error))) => {
-            let status = match &error {
-                ViewError::Absent(_) => StatusCode::NOT_FOUND,
-                ViewError::Request(_) | ViewError::Study(_) => StatusCode::BAD_REQUEST,
-                _ => StatusCode::INTERNAL_SERVER_ERROR,
-            };
-            refused(status, &error.words())
-        }
+        Ok(Some(Err(error))) => failed(&error),
         Ok(None) => refused(StatusCode::NOT_FOUND, "no such question"),
-        Err(_) => {
-            refused(StatusCode::INTERNAL_SERVER_ERROR, "the answer could not be made; this is a fault of mirrorstats")
-        }
+        Err(_) => not_made(),
     }
+}
+
+async fn label(State(view): State<Arc<View>>, body: Bytes) -> Response {
+    match tokio::task::spawn_blocking(move || view.put_label(&body)).await {
+        Ok(Ok(bytes)) => ([(header::CONTENT_TYPE, "application/json")], bytes).into_response(),
+        Ok(Err(error)) => failed(&error),
+        Err(_) => not_made(),
+    }
+}
+
+fn failed(error: &ViewError) -> Response {
+    let status = match error {
+        ViewError::Absent(_) => StatusCode::NOT_FOUND,
+        ViewError::Request(_) | ViewError::Study(_) => StatusCode::BAD_REQUEST,
+        _ => StatusCode::INTERNAL_SERVER_ERROR,
+    };
+    refused(status, &error.words())
+}
+
+fn not_made() -> Response {
+    refused(StatusCode::INTERNAL_SERVER_ERROR, "the answer could not be made; this is a fault of mirrorstats")
 }
 
 fn refused(status: StatusCode, words: &str) -> Response {

@@ -38,6 +38,7 @@ pub(super) struct Snapshot {
     pub unreadable: Vec<String>,
     /// The state of the files.
     pub stamps: Vec<Stamp>,
+    pub label_stamps: Vec<Stamp>,
     logs: Vec<PathBuf>,
     indices: Mutex<BTreeMap<PathBuf, Option<Arc<LogIndex>>>>,
     reading: Mutex<()>,
@@ -93,7 +94,7 @@ impl Snapshot {
     /// The state of these files.
     pub fn of_found(options: &Options, found: Found, generation: u64) -> Result<Self, ViewError> {
         report::style::Style::load(&options.style).map_err(study::StudyError::from)?;
-        let stamps = found.stamps();
+        let (stamps, label_stamps) = (found.stamps(), found.label_stamps());
         let scored = Self::scored(options, &found)?.map(Arc::new);
         let (running, unreadable) = running(&found, scored.as_deref());
         if scored.is_none() && running.is_empty() {
@@ -110,6 +111,7 @@ impl Snapshot {
             running,
             unreadable,
             stamps,
+            label_stamps,
             logs: found.logs,
             indices: Mutex::default(),
             reading: Mutex::default(),
@@ -119,16 +121,28 @@ impl Snapshot {
         })
     }
 
+    /// The same with the labels as they are now. Scores that read labels are made anew.
+    pub fn relabelled(&self, found: &Found) -> Result<Self, ViewError> {
+        match &self.scored {
+            Some(scored) if !scored.study.reads_labels()? => {
+                let scored = Arc::new(scored.relabelled(&self.options)?);
+                Ok(Self { label_stamps: found.label_stamps(), ..self.grown(found, Some(scored)) })
+            }
+            _ => Self::open(&self.options, self.generation + 1),
+        }
+    }
+
     /// The same with the episodes under way as they are now.
-    pub fn grown(&self, found: &Found) -> Self {
-        let (running, unreadable) = running(found, self.scored.as_deref());
+    pub fn grown(&self, found: &Found, scored: Option<Arc<Scored>>) -> Self {
+        let (running, unreadable) = running(found, scored.as_deref());
         Self {
             generation: self.generation + 1,
             options: self.options.clone(),
-            scored: self.scored.clone(),
+            scored,
             running,
             unreadable,
             stamps: self.stamps.clone(),
+            label_stamps: self.label_stamps.clone(),
             logs: self.logs.clone(),
             indices: Mutex::default(),
             reading: Mutex::default(),
@@ -365,6 +379,20 @@ impl Scored {
         let outputs = Outputs { losses: true, quality: true, hashes: false, ..Outputs::default() };
         let results = study.scan(outputs)?;
         let rows = results.episodes.keys.iter().enumerate().map(|(at, key)| (key.episode_id.to_owned(), at)).collect();
+        Ok(Self { study, results, rows, inputs, places })
+    }
+
+    /// The trace of an episode, and the number of its steps.
+    pub fn place(&self, id: &str) -> Option<(&Input, usize)> {
+        let place = self.places.get(id).filter(|_| self.rows.contains_key(id))?;
+        Some((&self.inputs[place.file], place.rows.len()))
+    }
+
+    /// The same scores with the labels as they are now.
+    fn relabelled(&self, options: &Options) -> Result<Self, ViewError> {
+        let study = Self::study(options, self.inputs.clone(), options.question.clone())?;
+        let results = study.relabelled(self.results.clone())?;
+        let (rows, inputs, places) = (self.rows.clone(), self.inputs.clone(), self.places.clone());
         Ok(Self { study, results, rows, inputs, places })
     }
 

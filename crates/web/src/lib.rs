@@ -2,6 +2,16 @@
 //!
 //! Rule: a page of another site must not be able to ask, whatever name it has resolved to this address. So the names in
 //! `Host` and `Origin` are checked on every request, and where other machines can ask, a token too.
+//!
+//! ```
+//! use mirrorstats_web::{Guard, check_token};
+//!
+//! let token = "0123456789abcdef";
+//! check_token(token)?;
+//! let guard = Guard::new("127.0.0.1:7000".parse().unwrap(), None, Some(token));
+//! assert_eq!(guard.link(), "http://127.0.0.1:7000/?token=0123456789abcdef");
+//! # Ok::<(), String>(())
+//! ```
 
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 

@@ -6,9 +6,8 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::cli::experiments;
 use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::output;
+use crate::cli::{experiments, output};
 use exact::escape::visible;
 use exact::suggest::hint;
 use world::experiment::explain::explained;

@@ -8,8 +8,8 @@ use serde::Serialize;
 
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
-use crate::cli::text_table::counted;
 use exact::escape::visible;
+use exact::format::counted;
 use world::record::participants::{self, Removed};
 
 /// Remove people from a recording

@@ -8,7 +8,7 @@ use exact::escape::visible;
 use exact::suggest::hint;
 use metric::definitions::Definitions;
 use report::style::{Style, built_in, built_in_names};
-use score::score_traces::schema_columns;
+use score::vocabulary::schema_columns;
 use study::StudyError;
 
 /// Show and check styles: how tables look

@@ -2,6 +2,4 @@
 
 pub mod outcome;
 pub mod output;
-pub mod quality;
 pub mod terminal;
-pub mod text_table;

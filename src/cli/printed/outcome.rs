@@ -47,19 +47,14 @@ pub enum Outcome {
 /// A command that could not run to its end.
 #[derive(Debug, thiserror::Error)]
 pub enum Failure {
-    /// The command line itself.
     #[error("bad usage")]
     Usage(Box<clap::Error>),
-    /// Output could not be written.
     #[error("cannot write the output")]
     Output(#[from] io::Error),
-    /// Input or definitions are not as they must be. The message is complete: what, where, expected, found, remedy.
     #[error(transparent)]
     Input(Box<dyn Error + Send + Sync>),
-    /// A message that already has its own layout.
     #[error("{0}")]
     Rendered(String),
-    /// Faults of definitions, a filter or a query, each at its place.
     #[error("{0}")]
     Faults(Faults),
 }

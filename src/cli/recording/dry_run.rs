@@ -6,9 +6,9 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::cli::recording::dollars;
-use crate::cli::text_table::counted;
 use crate::cli::vlm::VlmPlayer;
 use exact::escape::visible;
+use exact::format::counted;
 use world::agent::vlm::{Typical, Vlm, estimate};
 use world::record::plan::{Key, Subject};
 use world::sim::config::WorldConfig;

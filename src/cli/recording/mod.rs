@@ -1,6 +1,7 @@
 //! Messages of `record` on standard error while it runs and when it has ended: progress, and time by part.
 
 pub mod dry_run;
+pub mod episodes;
 pub mod exec;
 #[cfg(feature = "view")]
 pub mod human;
@@ -23,8 +24,8 @@ use serde::Serialize;
 
 use crate::cli::NAME;
 use crate::cli::scoring::commands;
-use crate::cli::text_table::counted;
 use exact::escape::{visible, visible_lines};
+use exact::format::counted;
 use exact::format::fixed;
 use exact::number::Decimal;
 use report::html;

@@ -3,8 +3,8 @@
 use std::io;
 
 use crate::cli::recording::dollars;
-use crate::cli::text_table::counted;
 use exact::escape::{visible, visible_lines};
+use exact::format::counted;
 use world::agent::vlm::probe::{ProbeAnswer, ProbedParameter};
 use world::agent::vlm::provider::rate_limit::RateLimit;
 

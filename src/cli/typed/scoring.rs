@@ -4,10 +4,9 @@ use std::borrow::Cow;
 use std::ffi::OsString;
 use std::io;
 
-use crate::cli::NAME;
 use crate::cli::args::{EngineArgs, GroupingArgs, LostArg, ScoringArgs, TraceArgs};
 use crate::cli::outcome::Failure;
-use crate::cli::output;
+use crate::cli::{NAME, output};
 use exact::escape::visible;
 use report::html;
 use study::{LostAs, Question, ScoredAlike, Study, StudyError, resolve};

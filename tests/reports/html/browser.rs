@@ -246,6 +246,7 @@ impl Browser {
             "Home" => (key, 36, ""),
             "/" => ("Slash", 191, "/"),
             "a" => ("KeyA", 65, "a"),
+            "l" => ("KeyL", 76, "l"),
             other => panic!("no key {other}"),
         };
         let mut event = json!({"type": "keyDown", "key": key, "code": code, "windowsVirtualKeyCode": number});

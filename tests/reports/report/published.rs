@@ -15,7 +15,7 @@ use metric::definitions::Definitions;
 use report::cells::{Cell as CellOf, Cells, Group, KeyValue};
 use report::layout::{self, MetricTable, Value, value};
 use report::style::Style;
-use score::score_traces::schema_columns;
+use score::vocabulary::schema_columns;
 
 /// Episodes behind every published cell.
 pub const EPISODES: u64 = 21;

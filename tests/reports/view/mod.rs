@@ -5,6 +5,7 @@ mod copy;
 mod find;
 mod first_screen;
 mod hostile;
+mod labels;
 #[cfg(feature = "sim")]
 mod live;
 mod mixture;

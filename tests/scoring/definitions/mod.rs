@@ -11,7 +11,7 @@ use metric::file::FileError;
 use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::sample::select;
-use score::score_traces::schema_columns;
+use score::vocabulary::schema_columns;
 
 fn check(text: &str) -> Result<Definitions, FileError> {
     Definitions::from_toml("test", text, &schema_columns())

@@ -6,6 +6,7 @@ use std::num::NonZeroUsize;
 use ::score::error::EngineError;
 use ::score::score_traces::{self, ScoreError};
 use ::score::table::{EpisodeKey, EpisodeTable};
+use ::score::vocabulary;
 use engines::polars::run::PolarsError;
 use engines::polars::score;
 use metric::columns::{Column, Columns, Level, Type};
@@ -58,7 +59,7 @@ fn polars(traces: &TraceSet, definitions: &Definitions) -> Result<Answer, String
 /// The columns of these traces; one that no file has is null all the same.
 pub fn columns(traces: &TraceSet) -> Columns {
     // Any column is compared with any text.
-    let mut columns = score_traces::trace_columns(traces).with_values::<String>([]);
+    let mut columns = vocabulary::trace_columns(traces).with_values::<String>([]);
     for (name, ty) in [
         ("points", Type::Int),
         ("n4", Type::Int),

@@ -27,10 +27,8 @@ const BATCH: NonZeroUsize = NonZeroUsize::new(1 << 17).expect("not zero");
 /// An error of a query.
 #[derive(Debug, thiserror::Error)]
 pub enum QueryError {
-    /// It cannot be run as it is.
     #[error(transparent)]
     Faults(#[from] Faults),
-    /// It could not be run to its end.
     #[error(transparent)]
     Polars(#[from] PolarsError),
 }
@@ -54,7 +52,6 @@ pub struct Excerpt {
     pub head: Vec<Vec<Option<String>>>,
     /// The last rows that are not among the first.
     pub tail: VecDeque<Vec<Option<String>>>,
-    /// The number of rows.
     pub rows: usize,
 }
 

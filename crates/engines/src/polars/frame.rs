@@ -3,11 +3,13 @@
 use std::fs;
 
 use polars::prelude::{
-    DataType, Expr, HiveOptions, LazyFrame, NULL, PlRefPath, ScanArgsParquet, ScanSources, UnionArgs, col, concat, lit,
+    DataType, Expr, HiveOptions, LazyFrame, NULL, NamedFrom, PlRefPath, ScanArgsParquet, ScanSources, Series,
+    UnionArgs, col, concat, lit, when,
 };
 
 use super::run::PolarsError;
 use score::score_traces::ScoreError;
+use trace::labels::Labels;
 use trace::open::{TraceFile, TraceSet};
 use trace::schema::{Kind, Stored};
 use trace::verify::verify_pages;
@@ -65,11 +67,25 @@ impl FrameColumn {
 /// checksums of pages, so that they are verified here.
 pub fn steps(traces: &TraceSet, columns: &[FrameColumn]) -> Result<LazyFrame, PolarsError> {
     verify_pages(traces).map_err(ScoreError::from)?;
-    let frames = traces.files().iter().map(|file| scan(file, columns)).collect::<Result<Vec<_>, _>>()?;
-    Ok(concat(frames, UnionArgs { rechunk: false, ..UnionArgs::default() })?)
+    let (labels, read): (Vec<&FrameColumn>, Vec<&FrameColumn>) =
+        columns.iter().partition(|column| traces.is_label_column(&column.name));
+    let frames = traces.files().iter().map(|file| scan(file, &read)).collect::<Result<Vec<_>, _>>()?;
+    let frame = concat(frames, UnionArgs { rechunk: false, ..UnionArgs::default() })?;
+    let labels: Vec<Expr> = labels.into_iter().map(|column| label(traces.labels(), &column.name)).collect();
+    Ok(if labels.is_empty() { frame } else { frame.with_columns(labels) })
 }
 
-fn scan(file: &TraceFile, columns: &[FrameColumn]) -> Result<LazyFrame, PolarsError> {
+/// A column of a label: true and false by lists of ids, null elsewhere.
+fn label(labels: &Labels, name: &str) -> Expr {
+    let ids = |wanted: bool| {
+        let ids: Vec<&str> = labels.episodes().filter(|id| labels.value(name, id) == Some(wanted)).collect();
+        let list = lit(Series::new("ids".into(), ids)).implode(false);
+        col("episode_id").cast(DataType::String).is_in(list, false)
+    };
+    when(ids(true)).then(lit(true)).when(ids(false)).then(lit(false)).otherwise(lit(NULL)).alias(name)
+}
+
+fn scan(file: &TraceFile, columns: &[&FrameColumn]) -> Result<LazyFrame, PolarsError> {
     let gone = |source| PolarsError::Unreadable { file: file.name().to_owned(), source };
     // A path from the root cannot be taken for an address on the network.
     let path = fs::canonicalize(file.path()).map_err(gone)?;

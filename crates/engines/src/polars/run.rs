@@ -10,41 +10,20 @@ use metric::sql::LoweringError;
 use score::score_traces::ScoreError;
 use trace::catch_panic::contained_on_all_threads;
 
-/// An error of Polars.
 #[derive(Debug, thiserror::Error)]
 pub enum PolarsError {
-    /// The traces or definitions are not as they must be.
     #[error(transparent)]
     Score(#[from] ScoreError),
-    /// The definitions cannot be said in SQL.
     #[error(transparent)]
     Lowering(#[from] LoweringError),
-    /// A file that was there a moment ago.
     #[error("{file}: expected a file that can be read; was it moved?")]
-    Unreadable {
-        /// Its name.
-        file: String,
-        /// The error of the operating system.
-        source: io::Error,
-    },
-    /// A result beyond 64 bits.
+    Unreadable { file: String, source: io::Error },
     #[error("`{metric}` leaves 64-bit integers; use smaller numbers in its definition")]
-    Overflow {
-        /// The first metric that needs the number.
-        metric: String,
-    },
-    /// A metric that declares itself a rate has another value than 0 or 1.
+    Overflow { metric: String },
     #[error("`{metric}` declares the unit `rate`, but an episode has {value}; a rate is 0 or 1 an episode")]
-    NotARate {
-        /// The metric.
-        metric: String,
-        /// The value found.
-        value: i64,
-    },
-    /// Nobody reads the answer any more.
+    NotARate { metric: String, value: i64 },
     #[error("the reader of the answer is gone")]
     ReaderGone,
-    /// Polars' own words.
     #[error("Polars cannot do this: {0}")]
     Failed(String),
 }

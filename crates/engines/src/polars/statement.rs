@@ -28,23 +28,7 @@ pub enum Table {
     Cells,
 }
 
-impl Table {
-    /// All of them.
-    pub const ALL: [Self; 3] = [Self::Steps, Self::Episodes, Self::Cells];
-
-    /// As it is in a query.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Steps => "steps",
-            Self::Episodes => "episodes",
-            Self::Cells => "cells",
-        }
-    }
-
-    fn of_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|table| table.name() == name)
-    }
-}
+exact::names!(Table { Steps: "steps", Episodes: "episodes", Cells: "cells" });
 
 /// A query that may be run.
 #[derive(Clone, Debug)]
@@ -55,7 +39,6 @@ pub struct Checked {
     source: Arc<Source>,
 }
 
-/// The kind of query.
 #[derive(Clone, Debug)]
 pub(super) enum Asked {
     /// The rows of a SELECT.
@@ -205,7 +188,7 @@ impl Reader<'_> {
 
     /// A name that a query makes must not hide a table.
     fn check_name(&mut self, name: &Ident) {
-        if Table::of_name(&name.value).is_some() {
+        if Table::named(&name.value).is_some() {
             let message = format!("`{}` is a table and cannot be the name of another", name.value);
             self.refuse(name.span, message, Some("choose another name".to_owned()));
         }
@@ -217,7 +200,7 @@ impl Reader<'_> {
         if parts.len() == 1 && self.ctes.contains(&word) {
             return;
         }
-        if let Some(table) = Table::of_name(&word).filter(|_| parts.len() == 1) {
+        if let Some(table) = Table::named(&word).filter(|_| parts.len() == 1) {
             self.tables.insert(table);
             if let Some(alias) = alias.filter(|alias| alias.name.value != word) {
                 self.check_name(&alias.name);

@@ -6,6 +6,7 @@ use super::frame::{self, FrameColumn};
 use super::run::PolarsError;
 use exact::moments::Moments;
 use report::cells::{Cell, Cells, KeyValue};
+use score::select::{is_of_coders, truths_of};
 use score::table::{EpisodeTable, KeyRef, MetricColumn};
 use trace::open::TraceSet;
 
@@ -23,7 +24,7 @@ pub fn steps(traces: &TraceSet) -> Result<LazyFrame, PolarsError> {
     frame::steps(traces, &columns)
 }
 
-/// The episode table: the keys, then the metrics.
+/// The episode table: the keys, the labels of coders, then the metrics.
 pub fn episodes(table: &EpisodeTable) -> Result<LazyFrame, PolarsError> {
     let text = |name: &str, of: fn(KeyRef<'_>) -> &str| {
         Column::new(name.into(), table.keys.iter().map(of).collect::<Vec<_>>())
@@ -37,6 +38,9 @@ pub fn episodes(table: &EpisodeTable) -> Result<LazyFrame, PolarsError> {
         int("seed", |key| key.seed),
         int("run", |key| key.run),
     ];
+    let of_coders = table.labels.iter().filter(|label| is_of_coders(label));
+    columns
+        .extend(of_coders.map(|label| Column::new(label.name.as_str().into(), truths_of(label).collect::<Vec<_>>())));
     let values = |metric: &MetricColumn| metric.iter().collect::<Vec<Option<i64>>>();
     columns.extend(table.metrics.iter().map(|metric| Column::new(metric.name.as_str().into(), values(metric))));
     Ok(DataFrame::new(table.len(), columns)?.lazy())

@@ -14,7 +14,6 @@ use score::table::{EpisodeKey, EpisodeTable, Header};
 use trace::colors;
 use trace::diagnostic::{Code, Finding};
 
-/// The answer.
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Answer {
@@ -157,7 +156,7 @@ mod tests {
     use crate::spark::Job;
     use crate::spark::source::Sources;
     use metric::definitions::Definitions;
-    use score::score_traces::schema_columns;
+    use score::vocabulary::schema_columns;
     use trace::colors::palette::Palette;
     use trace::diagnostic::Code;
 

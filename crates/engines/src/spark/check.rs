@@ -135,7 +135,7 @@ mod tests {
 
     use super::{Rule, no_color, rules};
     use metric::definitions::Definitions;
-    use score::score_traces::schema_columns;
+    use score::vocabulary::schema_columns;
     use trace::colors::{columns, palette::Palette};
     use trace::diagnostic::{Code, Finding};
     use trace::inputs::Input;

@@ -48,7 +48,6 @@ pub struct Cluster {
     pub log: Option<PathBuf>,
 }
 
-/// The computation for Spark.
 #[derive(Clone, Copy, Debug)]
 pub struct Job<'a> {
     pub definitions: &'a Definitions,
@@ -67,111 +66,49 @@ pub struct Written {
 /// An error of scoring with Spark.
 #[derive(Debug, thiserror::Error)]
 pub enum SparkError {
-    /// There is no Spark to submit with.
     #[error(
         "no Spark found: SPARK_HOME is not set, there is no `spark-submit` on PATH, and `{python}` has no package \
          `pyspark`; install one of them, such as with `pip install pyspark`"
     )]
-    NoSpark {
-        /// The Python that was asked.
-        python: String,
-    },
-    /// `SPARK_HOME` leads nowhere.
+    NoSpark { python: String },
     #[error("SPARK_HOME is `{home}`, where there is no bin/spark-submit; set it to the folder of a Spark, or unset it")]
-    Home {
-        /// The variable.
-        home: String,
-    },
-    /// Spark runs on Java.
+    Home { home: String },
     #[error("Spark found no Java that it can run on; install Java 17 or newer, or set JAVA_HOME ({words})")]
-    Java {
-        /// The message.
-        words: String,
-    },
-    /// Nobody listens at the master's address.
+    Java { words: String },
     #[error("cannot connect to the master `{master}`: {words}; is it running, and is this the URL on its web page?")]
-    Master {
-        /// As typed.
-        master: String,
-        /// The system's or Spark's words.
-        words: String,
-    },
-    /// Something on this machine could not be read, written or started.
+    Master { master: String, words: String },
     #[error("cannot {what}")]
-    System {
-        /// The attempted action.
-        what: String,
-        /// The reason for the refusal.
-        source: std::io::Error,
-    },
-    /// The definitions cannot be said in Spark's SQL.
+    System { what: String, source: std::io::Error },
     #[error(transparent)]
     Lowering(#[from] LoweringError),
-    /// The output is there already.
+    #[error(
+        "`{column}`: expected a column of the traces, found a label beside them, which Spark does not read\n  \
+         help: leave --engine spark out"
+    )]
+    Label { column: String },
     #[error("`{folder}` is there already; Spark writes a folder of its own: remove it or name another")]
-    Exists {
-        /// The folder, as typed.
-        folder: String,
-    },
-    /// A URI gives no trace.
+    Exists { folder: String },
     #[error(
         "`{uri}`: expected Parquet files, or folders with *.parquet in them, found none; files that begin with `_` or `.` are passed over"
     )]
-    Empty {
-        /// The URI.
-        uri: String,
-    },
-    /// A file's column is not as the definitions need it.
+    Empty { uri: String },
     #[error(
         "column `{column}` of {file}: expected {expected}, found {found}; write it with this type in all traces, or choose other metrics with --metrics"
     )]
-    Column {
-        /// The file, as Spark names it.
-        file: String,
-        /// The column.
-        column: String,
-        /// The requirement.
-        expected: String,
-        /// The present state.
-        found: String,
-    },
-    /// Spark has read other rows than the footers tell of.
+    Column { file: String, column: String, expected: String, found: String },
     #[error(
         "the footers of the traces tell of {expected} rows, Spark read {found}; every worker must see the same files \
          under the same path, and none may begin with `_` or `.`"
     )]
-    Rows {
-        /// By the footers.
-        expected: u64,
-        /// By Spark.
-        found: u64,
-    },
-    /// A rule of the traces does not hold.
+    Rows { expected: u64, found: u64 },
     #[error("{finding}{}", more_episodes(*.more))]
-    Rule {
-        /// The problem of the first episode by id.
-        finding: Box<Finding>,
-        /// The number of further episodes that break a rule.
-        more: u64,
-    },
-    /// It took too long.
+    Rule { finding: Box<Finding>, more: u64 },
     #[error("Spark has not answered in {seconds} s (--spark-timeout), and was stopped")]
-    Late {
-        /// The time given.
-        seconds: u32,
-    },
-    /// Spark failed.
+    Late { seconds: u32 },
     #[error("Spark: {cause}\n  help: --spark-log FILE keeps Spark's own log")]
-    Failed {
-        /// The innermost cause, in one line.
-        cause: String,
-    },
-    /// The answer makes no sense.
+    Failed { cause: String },
     #[error("cannot read what the driver on Spark answered: {words}; report this as a fault of mirrorstats")]
-    Answer {
-        /// The problem.
-        words: String,
-    },
+    Answer { words: String },
 }
 
 fn more_episodes(more: u64) -> String {

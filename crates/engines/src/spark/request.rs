@@ -166,7 +166,7 @@ mod tests {
     use crate::spark::Job;
     use crate::spark::source::Sources;
     use metric::definitions::Definitions;
-    use score::score_traces::schema_columns;
+    use score::vocabulary::schema_columns;
 
     /// The tables that a statement names; MySQL's grammar has Spark's quotes, escapes and division.
     fn tables(statement: &str) -> Vec<String> {

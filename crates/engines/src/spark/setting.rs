@@ -10,20 +10,12 @@ pub struct Setting {
     value: String,
 }
 
-/// An invalid setting.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SettingError {
-    /// No `=`, or no key before it.
     #[error("expected `spark.key=value`")]
     Form,
-    /// A setting that mirrorstats makes itself.
     #[error("`{key}` cannot be set: {why}")]
-    Fixed {
-        /// The key.
-        key: String,
-        /// The reason.
-        why: &'static str,
-    },
+    Fixed { key: String, why: &'static str },
 }
 
 /// Keys that would break what the driver relies on.

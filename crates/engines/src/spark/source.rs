@@ -10,7 +10,6 @@ use trace::colors::palette::Palette;
 use trace::inputs::Input;
 use trace::open::{TraceFile, TraceSet};
 
-/// The traces.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Sources {
     /// Files of this machine, whose footers have been read and are good.

@@ -20,8 +20,7 @@ use super::plan::{Builder, NodeId, Op, Plan};
 use super::syntax;
 use crate::catalog::Kind;
 use exact::escape::visible;
-use toml_spec::Fault;
-use toml_spec::Written;
+use toml_spec::{Fault, Written};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Bound {

@@ -10,9 +10,7 @@ use super::super::syntax::{BinaryOp, Expr, ExprKind, Literal};
 use super::{Binder, Bound, DEEPEST, State};
 use crate::columns::{Level, Type};
 use exact::suggest::nearest;
-use toml_spec::MOST_FAULTS;
-use toml_spec::Written;
-use toml_spec::{Fault, Place, Source};
+use toml_spec::{Fault, MOST_FAULTS, Place, Source, Written};
 
 /// One expression being bound: the binder, and the text that faults point into.
 pub(super) struct Scope<'b, 'a> {
@@ -166,26 +164,17 @@ impl Scope<'_, '_> {
     }
 
     pub(super) fn binary(&mut self, op: BinaryOp, left: &Expr, right: &Expr, whole: &Expr) -> Option<Bound> {
-        let comparison = match op {
+        match op {
             BinaryOp::And | BinaryOp::Or => {
                 let (left, right) = (self.truth(left), self.truth(right));
                 let make = |n: &[NodeId]| {
                     if op == BinaryOp::And { Op::And(n[0], n[1]) } else { Op::Or(n[0], n[1]) }
                 };
-                return Some(self.combine(&[left?, right?], Type::Bool, make));
+                Some(self.combine(&[left?, right?], Type::Bool, make))
             }
-            BinaryOp::Add => return self.arithmetic(Arithmetic::Add, left, right, whole),
-            BinaryOp::Subtract => return self.arithmetic(Arithmetic::Subtract, left, right, whole),
-            BinaryOp::Multiply => return self.arithmetic(Arithmetic::Multiply, left, right, whole),
-            BinaryOp::Remainder => return self.arithmetic(Arithmetic::Remainder, left, right, whole),
-            BinaryOp::Equal => Comparison::Equal,
-            BinaryOp::NotEqual => Comparison::NotEqual,
-            BinaryOp::Less => Comparison::Less,
-            BinaryOp::LessEqual => Comparison::LessEqual,
-            BinaryOp::Greater => Comparison::Greater,
-            BinaryOp::GreaterEqual => Comparison::GreaterEqual,
-        };
-        self.comparison(comparison, left, right, whole)
+            BinaryOp::Compare(comparison) => self.comparison(comparison, left, right, whole),
+            BinaryOp::Arithmetic(op) => self.arithmetic(op, left, right, whole),
+        }
     }
 
     pub(super) fn comparison(

@@ -84,7 +84,7 @@ pub enum Kind {
 
 impl Kind {
     /// The unit where a definition names none.
-    pub const fn default_unit(self) -> &'static str {
+    pub(crate) const fn default_unit(self) -> &'static str {
         match self {
             Self::Rate => "rate",
             Self::Quantity => "steps",

@@ -13,26 +13,12 @@ use crate::file::FileError;
 /// An error while restoring definitions from a catalog.
 #[derive(Debug, thiserror::Error)]
 pub enum RestoreError {
-    /// Its expressions have faults over the columns that there are.
     #[error("the definitions `{name}` that the scores carry cannot be evaluated here")]
-    Faults {
-        /// The definitions.
-        name: String,
-        /// The problem.
-        source: FileError,
-    },
-    /// It does not say what its hash says.
+    Faults { name: String, source: FileError },
     #[error(
         "the definitions `{name}` are not as they were carried: expected the hash {expected}, found {found}; score the traces again"
     )]
-    Changed {
-        /// The definitions.
-        name: String,
-        /// As carried.
-        expected: String,
-        /// Of what was carried.
-        found: String,
-    },
+    Changed { name: String, expected: String, found: String },
 }
 
 impl Definitions {

@@ -8,6 +8,7 @@ use serde::Serialize;
 use crate::catalog::{Better, Kind, StandardError};
 use crate::columns::{Level, Type};
 use crate::definitions::Definitions;
+use crate::plan::{Arithmetic, Comparison};
 use crate::syntax::{self, BinaryOp, Expr, ExprKind, Literal};
 use toml_spec::Written;
 
@@ -202,21 +203,22 @@ fn part(expr: &Expr) -> String {
     if compound { format!("({})", condition(expr)) } else { condition(expr) }
 }
 
-fn relation(op: BinaryOp, left: &Expr) -> &'static str {
+fn relation(op: BinaryOp, left: &Expr) -> String {
+    let BinaryOp::Compare(comparison) = op else { return op.to_string() };
     let time = left.kind == ExprKind::Name("t".to_owned());
-    match (op, time) {
-        (BinaryOp::Equal, _) => "is",
-        (BinaryOp::NotEqual, _) => "is not",
-        (BinaryOp::Less, true) => "is before",
-        (BinaryOp::Less, false) => "is less than",
-        (BinaryOp::LessEqual, true) => "is not after",
-        (BinaryOp::LessEqual, false) => "is at most",
-        (BinaryOp::Greater, true) => "is after",
-        (BinaryOp::Greater, false) => "is more than",
-        (BinaryOp::GreaterEqual, true) => "is not before",
-        (BinaryOp::GreaterEqual, false) => "is at least",
-        (other, _) => other.symbol(),
-    }
+    let words = match (comparison, time) {
+        (Comparison::Equal, _) => "is",
+        (Comparison::NotEqual, _) => "is not",
+        (Comparison::Less, true) => "is before",
+        (Comparison::Less, false) => "is less than",
+        (Comparison::LessEqual, true) => "is not after",
+        (Comparison::LessEqual, false) => "is at most",
+        (Comparison::Greater, true) => "is after",
+        (Comparison::Greater, false) => "is more than",
+        (Comparison::GreaterEqual, true) => "is not before",
+        (Comparison::GreaterEqual, false) => "is at least",
+    };
+    words.to_owned()
 }
 
 fn value(expr: &Expr) -> String {
@@ -230,10 +232,16 @@ fn value(expr: &Expr) -> String {
             Literal::Text(value) => format!("'{value}'"),
         },
         ExprKind::Negate(x) => format!("minus {}", value(x)),
-        ExprKind::Binary(BinaryOp::Add, x, y) => format!("{} plus {}", value(x), value(y)),
-        ExprKind::Binary(BinaryOp::Subtract, x, y) => format!("{} minus {}", value(x), value(y)),
-        ExprKind::Binary(BinaryOp::Multiply, x, y) => format!("{} times {}", value(x), value(y)),
-        ExprKind::Binary(BinaryOp::Remainder, x, y) => format!("the remainder of {} by {}", value(x), value(y)),
+        ExprKind::Binary(BinaryOp::Arithmetic(Arithmetic::Add), x, y) => format!("{} plus {}", value(x), value(y)),
+        ExprKind::Binary(BinaryOp::Arithmetic(Arithmetic::Subtract), x, y) => {
+            format!("{} minus {}", value(x), value(y))
+        }
+        ExprKind::Binary(BinaryOp::Arithmetic(Arithmetic::Multiply), x, y) => {
+            format!("{} times {}", value(x), value(y))
+        }
+        ExprKind::Binary(BinaryOp::Arithmetic(Arithmetic::Remainder), x, y) => {
+            format!("the remainder of {} by {}", value(x), value(y))
+        }
         ExprKind::Case { operand, branches, otherwise } => {
             let test = |at: usize, when: &Expr| match (operand, at) {
                 (Some(operand), 0) => format!("{} is {}", value(operand), value(when)),

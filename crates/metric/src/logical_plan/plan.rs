@@ -43,7 +43,6 @@ pub enum Op {
     Constant(Constant),
     /// An episode's value for each of its steps, or a constant for each episode or step.
     Spread(NodeId),
-    /// Logical negation.
     Not(NodeId),
     /// Kleene's conjunction: false if either is false.
     And(NodeId, NodeId),
@@ -98,7 +97,6 @@ pub enum Constant {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[expect(missing_docs, reason = "the names say it")]
 pub enum Comparison {
     Equal,
     NotEqual,
@@ -168,7 +166,6 @@ impl Aggregate {
 /// A metric or a named expression and the node that holds it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Output {
-    /// The metric's name.
     pub name: String,
     /// A rate or a quantity.
     pub kind: Kind,
@@ -245,7 +242,7 @@ impl Op {
 
     /// The same operation on other nodes: what `to` gives for each operand, in order.
     #[must_use]
-    pub fn with_operands(&self, mut to: impl FnMut(NodeId) -> NodeId) -> Self {
+    pub(crate) fn with_operands(&self, mut to: impl FnMut(NodeId) -> NodeId) -> Self {
         match self {
             Self::Column(_) | Self::Time | Self::Length | Self::Constant(_) => self.clone(),
             Self::Spread(x) => Self::Spread(to(*x)),

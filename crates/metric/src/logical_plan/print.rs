@@ -87,42 +87,30 @@ impl fmt::Display for Constant {
     }
 }
 
-impl fmt::Display for Comparison {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Equal => "=",
-            Self::NotEqual => "<>",
-            Self::Less => "<",
-            Self::LessEqual => "<=",
-            Self::Greater => ">",
-            Self::GreaterEqual => ">=",
-        })
-    }
+exact::names!(Comparison { Equal: "=", NotEqual: "<>", Less: "<", LessEqual: "<=", Greater: ">", GreaterEqual: ">=" });
+
+exact::names!(Arithmetic { Add: "+", Subtract: "-", Multiply: "*", Quotient: "div", Remainder: "%" });
+
+exact::names!(Aggregate {
+    First: "first",
+    Last: "last",
+    Any: "any",
+    All: "all",
+    Count: "count",
+    Min: "min",
+    Max: "max",
+    Sum: "sum",
+});
+
+/// Shown by their names.
+macro_rules! by_name {
+    ($($type:ty)+) => {
+        $(impl fmt::Display for $type {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str(self.name())
+            }
+        })+
+    };
 }
 
-impl fmt::Display for Arithmetic {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Add => "+",
-            Self::Subtract => "-",
-            Self::Multiply => "*",
-            Self::Quotient => "div",
-            Self::Remainder => "%",
-        })
-    }
-}
-
-impl fmt::Display for Aggregate {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::First => "first",
-            Self::Last => "last",
-            Self::Any => "any",
-            Self::All => "all",
-            Self::Count => "count",
-            Self::Min => "min",
-            Self::Max => "max",
-            Self::Sum => "sum",
-        })
-    }
-}
+by_name!(Comparison Arithmetic Aggregate);

@@ -28,16 +28,9 @@ pub(super) struct Functions {
 /// The smallest integer, which has no literal of its own.
 pub(super) const SMALLEST: &str = "(-9223372036854775807 - 1)";
 
-impl Dialect {
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Portable => "portable",
-            Self::Spark => "spark",
-            Self::Duckdb => "duckdb",
-            Self::Polars => "polars",
-        }
-    }
+exact::names!(Dialect { Portable: "portable", Spark: "spark", Duckdb: "duckdb", Polars: "polars" });
 
+impl Dialect {
     pub(super) fn quoted(self, name: &str) -> String {
         match self {
             Self::Portable | Self::Duckdb if is_plain(name) => name.to_owned(),

@@ -44,32 +44,16 @@ use exact::budget::SETTING;
 /// A plan that a dialect cannot say.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LoweringError {
-    /// Regular expressions.
     #[error("`{metric}` uses regexp_like, which has no form that all engines share; choose --dialect spark or duckdb")]
-    Regexp {
-        /// The first metric that needs it.
-        metric: String,
-    },
-    /// A name that needs quotes, which engines write differently.
+    Regexp { metric: String },
     #[error("the name `{name}` needs quotes, which engines write differently; choose --dialect spark or duckdb")]
-    Name {
-        /// The column.
-        name: String,
-    },
-    /// Two metrics whose names are one without quotes.
+    Name { name: String },
     #[error("two metrics would both be called `{name}`; choose --dialect spark or duckdb")]
-    SameName {
-        /// The name.
-        name: String,
-    },
-    /// Too long a statement.
+    SameName { name: String },
     #[error(
         "the statement exceeds {limit} bytes; choose fewer metrics with --metrics, or raise the limit: {SETTING}=10 in the environment"
     )]
-    Length {
-        /// The longest statement written.
-        limit: u64,
-    },
+    Length { limit: u64 },
 }
 
 /// The statement that computes the episode table: `episode_id, model, experiment, seed, run`, then the metrics.

@@ -7,7 +7,10 @@ mod expression;
 pub mod grammar;
 mod reader;
 
+use std::fmt;
 use std::ops::Range;
+
+use crate::plan::{Arithmetic, Comparison};
 
 pub use self::expression::parse;
 
@@ -80,7 +83,6 @@ pub enum ExprKind {
     },
 }
 
-/// A constant.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Literal {
     Null,
@@ -91,39 +93,22 @@ pub enum Literal {
     Text(String),
 }
 
-/// Operators between two operands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum BinaryOp {
     And,
     Or,
-    Equal,
-    NotEqual,
-    Less,
-    LessEqual,
-    Greater,
-    GreaterEqual,
-    Add,
-    Subtract,
-    Multiply,
-    Remainder,
+    Compare(Comparison),
+    /// Any but the quotient, which is a function.
+    Arithmetic(Arithmetic),
 }
 
-impl BinaryOp {
-    /// As it is written in SQL.
-    pub const fn symbol(self) -> &'static str {
+impl fmt::Display for BinaryOp {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::And => "and",
-            Self::Or => "or",
-            Self::Equal => "=",
-            Self::NotEqual => "<>",
-            Self::Less => "<",
-            Self::LessEqual => "<=",
-            Self::Greater => ">",
-            Self::GreaterEqual => ">=",
-            Self::Add => "+",
-            Self::Subtract => "-",
-            Self::Multiply => "*",
-            Self::Remainder => "%",
+            Self::And => f.write_str("and"),
+            Self::Or => f.write_str("or"),
+            Self::Compare(comparison) => comparison.fmt(f),
+            Self::Arithmetic(op) => op.fmt(f),
         }
     }
 }
@@ -143,7 +128,7 @@ mod tests {
             ExprKind::Literal(literal) => format!("{literal:?}"),
             ExprKind::Not(x) => format!("(not {})", shape(x)),
             ExprKind::Negate(x) => format!("(- {})", shape(x)),
-            ExprKind::Binary(op, x, y) => format!("({} {} {})", shape(x), op.symbol(), shape(y)),
+            ExprKind::Binary(op, x, y) => format!("({} {op} {})", shape(x), shape(y)),
             ExprKind::IsNull { operand, negated } => format!("({} is {}null)", shape(operand), not(negated)),
             ExprKind::IsTruth { operand, truth, negated } => {
                 format!("({} is {}{truth})", shape(operand), not(negated))

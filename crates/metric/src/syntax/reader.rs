@@ -6,6 +6,7 @@ use sqlparser::ast::{self, Spanned as _};
 
 use super::grammar::{SyntaxFault, bytes_of, shortened};
 use super::{BinaryOp, Expr, ExprKind, Literal};
+use crate::plan::{Arithmetic, Comparison};
 
 /// The deepest nesting of one expression.
 const DEEPEST: usize = 120;
@@ -123,16 +124,16 @@ impl<'a> Reader<'a> {
         Some(match op {
             Sql::And => BinaryOp::And,
             Sql::Or => BinaryOp::Or,
-            Sql::Eq => BinaryOp::Equal,
-            Sql::NotEq => BinaryOp::NotEqual,
-            Sql::Lt => BinaryOp::Less,
-            Sql::LtEq => BinaryOp::LessEqual,
-            Sql::Gt => BinaryOp::Greater,
-            Sql::GtEq => BinaryOp::GreaterEqual,
-            Sql::Plus => BinaryOp::Add,
-            Sql::Minus => BinaryOp::Subtract,
-            Sql::Multiply => BinaryOp::Multiply,
-            Sql::Modulo => BinaryOp::Remainder,
+            Sql::Eq => BinaryOp::Compare(Comparison::Equal),
+            Sql::NotEq => BinaryOp::Compare(Comparison::NotEqual),
+            Sql::Lt => BinaryOp::Compare(Comparison::Less),
+            Sql::LtEq => BinaryOp::Compare(Comparison::LessEqual),
+            Sql::Gt => BinaryOp::Compare(Comparison::Greater),
+            Sql::GtEq => BinaryOp::Compare(Comparison::GreaterEqual),
+            Sql::Plus => BinaryOp::Arithmetic(Arithmetic::Add),
+            Sql::Minus => BinaryOp::Arithmetic(Arithmetic::Subtract),
+            Sql::Multiply => BinaryOp::Arithmetic(Arithmetic::Multiply),
+            Sql::Modulo => BinaryOp::Arithmetic(Arithmetic::Remainder),
             Sql::Divide => {
                 let help = "an episode's value is an integer: write `div(a, b)`, which drops the fraction";
                 return self.refuse(span.clone(), "the operator `/` is not supported", Some(help));

@@ -18,7 +18,6 @@ pub struct Episodes {
 
 /// An error of a text with numbers of episodes.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[expect(missing_docs, reason = "the messages say it")]
 pub enum EpisodesError {
     #[error("expected a number of episodes from 1 to {MOST_EPISODES}, found `{found}`")]
     NotANumber { found: String },

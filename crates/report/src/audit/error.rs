@@ -8,7 +8,6 @@ use exact::suggest::hint;
 
 /// An error of an audit.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[expect(missing_docs, reason = "the messages say it")]
 pub enum AuditError {
     #[error("{table}: the definitions `{definitions}` have no metric `{metric}`{hint}")]
     UnknownMetric { table: String, definitions: String, metric: String, hint: String },

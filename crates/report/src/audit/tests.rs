@@ -2,13 +2,12 @@ use super::episodes::Episodes;
 use super::{Audit, NamedTable, Terms, audit};
 use crate::published;
 use crate::style::Style;
-use exact::moments::Moments;
-use exact::moments::StandardError;
+use exact::moments::{Moments, StandardError};
 use exact::number::Decimal;
 use exact::rounding::Rounding;
 use metric::definitions::Definitions;
 use metric::implied::implied;
-use score::score_traces::{has_value, schema_columns};
+use score::vocabulary::{has_value, schema_columns};
 
 fn audited(files: &[(&str, &str)], style: &str) -> Audit {
     audited_under(files, style, &Rounding::ALL)

@@ -200,7 +200,7 @@ impl Changes {
 impl CellChange {
     /// The mean after minus the mean before, as an exact fraction; `None` where either is undefined, or 128 bits do
     /// not hold it.
-    pub fn exact_mean_change(&self) -> Option<(i128, i128)> {
+    pub(crate) fn exact_mean_change(&self) -> Option<(i128, i128)> {
         let (before, after) = (self.numbers.before?, self.numbers.after?);
         let below = i128::from(before.n).checked_mul(i128::from(after.n)).filter(|below| *below > 0)?;
         let scaled = |sum: i128, n: u64| sum.checked_mul(i128::from(n));
@@ -345,8 +345,8 @@ mod tests {
     use super::{Changes, Evidence};
     use metric::definitions::Definitions;
     use score::evidence::MetricEvidence;
-    use score::score_traces::schema_columns;
     use score::table::{Declared, EpisodeKey, EpisodeTable, MetricColumn};
+    use score::vocabulary::schema_columns;
 
     const RATE: &str = "[metric.R]\nvalue = \"length() > 2\"";
 

@@ -25,7 +25,6 @@ const MOST_CELLS: Limit =
 
 /// Why episodes cannot be grouped as asked.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[expect(missing_docs, reason = "the messages say it")]
 pub enum GroupError {
     #[error("no column to group by: expected at least one of {known}")]
     NoColumn { known: String },

@@ -15,7 +15,7 @@ pub const CONFIDENCE: f64 = 0.95;
 /// The interval of a mean, or the reason why it has none: Wilson's for a rate, Student's for a quantity.
 ///
 /// `range` has the least and the largest mean that the metric can have.
-pub fn cell_interval(
+pub(crate) fn cell_interval(
     moments: &Moments,
     metric: &Metric,
     range: Interval,
@@ -29,7 +29,7 @@ pub fn cell_interval(
 }
 
 /// An interval of the mean of a quantity from `fewest` values on, within the metric's range.
-pub fn bounded(
+pub(crate) fn bounded(
     found: Option<Interval>,
     moments: &Moments,
     range: Interval,

@@ -50,7 +50,7 @@ impl Cells {
     }
 
     /// The cell of a metric in a group.
-    pub fn of_metric<'c>(&'c self, group: &'c Group, name: &str) -> Option<Cell<'c>> {
+    pub(crate) fn of_metric<'c>(&'c self, group: &'c Group, name: &str) -> Option<Cell<'c>> {
         self.at(group, self.metrics.iter().position(|metric| metric == name)?)
     }
 

@@ -9,6 +9,7 @@ use std::fmt::Write as _;
 
 use crate::cells::diff::{Changes, DefinitionsName, Overlap};
 use exact::escape::visible;
+use exact::format::counted;
 
 /// The number of items shown of each list.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,7 +51,7 @@ fn push_alone<T>(text: &mut String, noun: &str, overlap: &Overlap<T>, limit: Lim
         if !alone.is_empty() {
             let names: Vec<String> = alone.iter().take(limit.0).map(&name).collect();
             let rest = words::left_out(alone.len(), limit).map_or_else(String::new, |rest| format!("; {rest}"));
-            let _ = writeln!(text, "\nOnly {side}: {}: {}{rest}", words::counted(alone.len(), noun), names.join(", "));
+            let _ = writeln!(text, "\nOnly {side}: {}: {}{rest}", counted(alone.len() as u64, noun), names.join(", "));
         }
     }
 }
@@ -58,17 +59,17 @@ fn push_alone<T>(text: &mut String, noun: &str, overlap: &Overlap<T>, limit: Lim
 fn sum(changes: &Changes) -> String {
     let over = format!(
         "{} in both, {} in both",
-        words::counted_u64(changes.episodes.both, "episode"),
-        words::counted_u64(changes.metrics.both, "metric")
+        counted(changes.episodes.both, "episode"),
+        counted(changes.metrics.both, "metric")
     );
     if changes.is_empty() {
-        return format!("Nothing changed: {over}, {} compared.", words::counted_u64(changes.cells_compared, "cell"));
+        return format!("Nothing changed: {over}, {} compared.", counted(changes.cells_compared, "cell"));
     }
     format!(
         "{} of {} moved; {} in {}; {over}.",
         changes.cells.len(),
-        words::counted_u64(changes.cells_compared, "cell"),
-        words::counted(changes.flips.len(), "flip"),
-        words::counted(changes.flipped_episodes().len(), "episode"),
+        counted(changes.cells_compared, "cell"),
+        counted(changes.flips.len() as u64, "flip"),
+        counted(changes.flipped_episodes().len() as u64, "episode"),
     )
 }

@@ -15,16 +15,6 @@ const MOST_RUNS: usize = 6;
 /// The text for a missing value.
 pub(super) const UNDEFINED: &str = "undefined";
 
-/// `1 cell`, `2 cells`.
-pub(super) fn counted(count: usize, noun: &str) -> String {
-    counted_u64(count as u64, noun)
-}
-
-/// `1 cell`, `2 cells`.
-pub(super) fn counted_u64(count: u64, noun: &str) -> String {
-    if count == 1 { format!("1 {noun}") } else { format!("{count} {noun}s") }
-}
-
 pub(super) fn left_out(all: usize, limit: Limit) -> Option<String> {
     let rest = all.saturating_sub(limit.0);
     (rest > 0).then(|| format!("{rest} more: --limit shows more, --json all"))

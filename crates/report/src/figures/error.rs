@@ -4,7 +4,6 @@ use super::{FigureName, FigureWidth};
 
 /// A figure that cannot be drawn from what there is.
 #[derive(Debug, thiserror::Error)]
-#[expect(missing_docs, reason = "the messages say it")]
 pub enum FigureError {
     #[error("expected the name of a figure ({known}), found `{name}`{hint}")]
     UnknownFigure { name: String, known: String, hint: String },

@@ -26,7 +26,6 @@ impl Reading {
         self.moments().and_then(Moments::mean)
     }
 
-    /// The number of values.
     pub fn n(self) -> u64 {
         self.moments().map_or(0, |moments| moments.n)
     }
@@ -40,7 +39,7 @@ impl Reading {
     }
 
     /// The mean with so many digits behind the point, correctly rounded from the exact fraction.
-    pub fn decimal(self, places: u32) -> Option<Decimal> {
+    pub(crate) fn decimal(self, places: u32) -> Option<Decimal> {
         let moments = self.moments()?;
         Decimal::of_ratio(moments.sum, i128::from(moments.n), places)
     }
@@ -70,7 +69,7 @@ impl Reading {
 
 /// Experiments by models.
 #[derive(Clone, Debug)]
-pub struct Matrix<'a> {
+pub(crate) struct Matrix<'a> {
     cells: &'a Cells,
     groups: BTreeMap<(&'a str, &'a str), &'a Group>,
     /// The experiments that have episodes, in the order of the definitions, unknown ones last by name.
@@ -80,7 +79,7 @@ pub struct Matrix<'a> {
 
 impl<'a> Matrix<'a> {
     /// Cells by experiment and model as a matrix.
-    pub fn new(cells: &'a Cells) -> Result<Self, FigureError> {
+    pub(crate) fn new(cells: &'a Cells) -> Result<Self, FigureError> {
         let fault = || FigureError::Grouping { found: cells.by.join(",") };
         let place = |name: &str| cells.by.iter().position(|key| key == name).ok_or_else(fault);
         let (experiment, model) = (place("experiment")?, place("model")?);
@@ -105,12 +104,12 @@ impl<'a> Matrix<'a> {
     }
 
     /// Every experiment with every model, whether or not it has episodes.
-    pub fn pairs(&self) -> impl Iterator<Item = (&'a str, &'a str)> {
+    pub(crate) fn pairs(&self) -> impl Iterator<Item = (&'a str, &'a str)> {
         self.experiments.iter().flat_map(|&experiment| self.models.iter().map(move |&model| (experiment, model)))
     }
 
     /// The place of a metric among the cells.
-    pub fn metric(&self, figure: FigureName, name: &str) -> Result<MetricId<'a>, FigureError> {
+    pub(crate) fn metric(&self, figure: FigureName, name: &str) -> Result<MetricId<'a>, FigureError> {
         let found = self.cells.metrics.iter().position(|metric| metric == name).and_then(|at| self.metric_at(at));
         found.ok_or_else(|| FigureError::UnknownMetric {
             figure,
@@ -120,12 +119,12 @@ impl<'a> Matrix<'a> {
     }
 
     /// The definitions of the metrics.
-    pub fn catalog(&self) -> &'a Catalog {
+    pub(crate) fn catalog(&self) -> &'a Catalog {
         &self.cells.catalog
     }
 
     /// All metrics in the order of the cells.
-    pub fn metrics(&self) -> Vec<MetricId<'a>> {
+    pub(crate) fn metrics(&self) -> Vec<MetricId<'a>> {
         (0..self.cells.metrics.len()).filter_map(|at| self.metric_at(at)).collect()
     }
 
@@ -135,7 +134,7 @@ impl<'a> Matrix<'a> {
     }
 
     /// The reading of `metric` for `model` in `experiment`.
-    pub fn reading(&self, experiment: &str, model: &str, metric: MetricId<'_>) -> Reading {
+    pub(crate) fn reading(&self, experiment: &str, model: &str, metric: MetricId<'_>) -> Reading {
         let Some(group) = self.groups.get(&(experiment, model)) else { return Reading::Empty };
         match group.moments.get(metric.at) {
             Some(&moments) if moments.n > 0 => Reading::Known(moments),
@@ -147,7 +146,7 @@ impl<'a> Matrix<'a> {
     ///
     /// A rate is taken unchanged, or from 1 where less is better. A quantity is set between the least and the
     /// greatest mean of its experiment; where all are equal nothing ranks them, and each stands at a half.
-    pub fn goodness(&self, experiment: &str, model: &str, metric: MetricId<'_>) -> Option<f64> {
+    pub(crate) fn goodness(&self, experiment: &str, model: &str, metric: MetricId<'_>) -> Option<f64> {
         let mean = self.reading(experiment, model, metric).mean()?;
         let share = match metric.metric.kind {
             Kind::Rate => mean,
@@ -163,7 +162,7 @@ impl<'a> Matrix<'a> {
     }
 
     /// The least and the greatest mean of an experiment; `None` where there is no mean.
-    pub fn span(&self, experiment: &str, metric: MetricId<'_>) -> Option<(f64, f64)> {
+    pub(crate) fn span(&self, experiment: &str, metric: MetricId<'_>) -> Option<(f64, f64)> {
         let means = self.models.iter().filter_map(|model| self.reading(experiment, model, metric).mean());
         means.fold(None, |span, mean| {
             let (low, high) = span.unwrap_or((mean, mean));
@@ -172,18 +171,18 @@ impl<'a> Matrix<'a> {
     }
 
     /// The value of blind guessing, where there is one.
-    pub fn chance(&self, experiment: &str, metric: MetricId<'_>) -> Option<f64> {
+    pub(crate) fn chance(&self, experiment: &str, metric: MetricId<'_>) -> Option<f64> {
         self.cells.catalog.chance(experiment, metric.name).map(exact::ratio::Ratio::value)
     }
 
     /// The rates of some blind strategies where there is no chance level, as text and value.
-    pub fn references(&self, experiment: &str, metric: MetricId<'_>) -> Vec<(String, f64)> {
+    pub(crate) fn references(&self, experiment: &str, metric: MetricId<'_>) -> Vec<(String, f64)> {
         let known = self.cells.catalog.experiment.get(experiment).and_then(|e| e.reference.get(metric.name));
         known.into_iter().flatten().map(|level| (level.to_string(), level.value())).collect()
     }
 
     /// The experiments' titles, empty where the definitions have none.
-    pub fn titles(&self, experiments: &[&str]) -> Vec<&'a str> {
+    pub(crate) fn titles(&self, experiments: &[&str]) -> Vec<&'a str> {
         let title = |name: &&str| self.cells.catalog.experiment.get(*name).map_or("", |e| e.title.as_str());
         experiments.iter().map(title).collect()
     }
@@ -191,7 +190,7 @@ impl<'a> Matrix<'a> {
 
 /// A metric that is there.
 #[derive(Clone, Copy, Debug)]
-pub struct MetricId<'a> {
+pub(crate) struct MetricId<'a> {
     pub name: &'a str,
     pub metric: &'a Metric,
     at: usize,
@@ -199,7 +198,7 @@ pub struct MetricId<'a> {
 
 impl MetricId<'_> {
     /// The name as the end of an attribute's name.
-    pub fn attribute(self) -> String {
+    pub(crate) fn attribute(self) -> String {
         let plain = |c: char| if c.is_ascii_alphanumeric() || c == '_' { c.to_ascii_lowercase() } else { '-' };
         self.name.chars().map(plain).collect()
     }

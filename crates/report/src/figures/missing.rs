@@ -8,7 +8,7 @@ const RUN_GAP: f64 = 8.0;
 
 /// The models that a panel cannot show: words and markers in lines, placed from the upper left corner.
 #[derive(Clone, Debug)]
-pub struct Strip<'a> {
+pub(crate) struct Strip<'a> {
     experiment: &'a str,
     words: Vec<(Point, String)>,
     markers: Vec<(Point, Absent<'a>)>,
@@ -25,7 +25,7 @@ struct Absent<'a> {
 
 impl<'a> Strip<'a> {
     /// The models of `roster` without a mean of one of `metrics` in `experiment`, in lines of `width` px.
-    pub fn new(
+    pub(crate) fn new(
         matrix: &Matrix<'_>,
         roster: &Roster<'a>,
         experiment: &'a str,
@@ -44,12 +44,12 @@ impl<'a> Strip<'a> {
     }
 
     /// The height of its lines, px; none if nothing is absent.
-    pub fn height(&self) -> f64 {
+    pub(crate) fn height(&self) -> f64 {
         self.height
     }
 
     /// Draws it with its upper left corner at `corner`.
-    pub fn draw(&self, sheet: &mut Sheet, corner: Point) {
+    pub(crate) fn draw(&self, sheet: &mut Sheet, corner: Point) {
         for ((x, y), word) in &self.words {
             sheet.text((corner.0 + x, corner.1 + y), word, lettering::tick());
         }
@@ -81,7 +81,7 @@ impl<'a> Strip<'a> {
 }
 
 /// The legend of hatches and crosses, if `readings` have any.
-pub fn signs(readings: impl Iterator<Item = Reading>) -> Vec<(Swatch, String)> {
+pub(crate) fn signs(readings: impl Iterator<Item = Reading>) -> Vec<(Swatch, String)> {
     let mut has_undefined = false;
     let mut has_empty = false;
     for reading in readings {
@@ -94,7 +94,7 @@ pub fn signs(readings: impl Iterator<Item = Reading>) -> Vec<(Swatch, String)> {
 }
 
 /// The legend of words in these strips; empty if there are none.
-pub fn strip_signs(strips: &[Strip<'_>]) -> Option<(Swatch, String)> {
+pub(crate) fn strip_signs(strips: &[Strip<'_>]) -> Option<(Swatch, String)> {
     let has_any = strips.iter().any(|strip| strip.height > 0.0);
     has_any.then(|| (Swatch::None, "--: undefined".to_owned()))
 }

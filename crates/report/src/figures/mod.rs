@@ -37,7 +37,6 @@ use score::table::EpisodeTable;
 use score::timeline::Timeline;
 use shown::{FigureSheets, SHOWN};
 
-/// The inputs of figures.
 #[derive(Clone, Copy, Debug)]
 pub struct Input<'a> {
     /// The cells by experiment and model.

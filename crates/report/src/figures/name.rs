@@ -6,7 +6,6 @@ use std::str::FromStr;
 use super::error::FigureError;
 use exact::suggest::hint;
 
-/// The figures there are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum FigureName {
     /// Behavioural profiles: one radar per experiment, one line per model.
@@ -29,41 +28,32 @@ pub enum FigureName {
     Gaze,
 }
 
+// In the order of a report; each file has this name, and the ending of its format.
+exact::names!(FigureName {
+    Spider: "spider",
+    Heatmap: "heatmap",
+    Scatter: "scatter",
+    CompletionGap: "completion-gap",
+    E5Outcomes: "e5-outcomes",
+    Intervals: "intervals",
+    Slopes: "slopes",
+    DecisionCurve: "decision-curve",
+    Gaze: "gaze",
+});
+
 impl FigureName {
-    /// All figures, in the order of a report.
-    pub const ALL: [Self; 9] = [
-        Self::Spider,
-        Self::Heatmap,
-        Self::Scatter,
-        Self::CompletionGap,
-        Self::E5Outcomes,
-        Self::Intervals,
-        Self::Slopes,
-        Self::DecisionCurve,
-        Self::Gaze,
-    ];
-
-    /// The name of its file, without the ending.
-    pub const fn name(self) -> &'static str {
-        self.texts()[0]
-    }
-
     /// The title, for headings and screen readers.
     pub const fn title(self) -> &'static str {
-        self.texts()[1]
-    }
-
-    const fn texts(self) -> [&'static str; 2] {
         match self {
-            Self::Spider => ["spider", "Behavioural profiles"],
-            Self::Heatmap => ["heatmap", "Performance across experiments and metrics"],
-            Self::Scatter => ["scatter", "Task success against self-attribution"],
-            Self::CompletionGap => ["completion-gap", "Completion gap"],
-            Self::E5Outcomes => ["e5-outcomes", "Final self-identification outcomes"],
-            Self::Intervals => ["intervals", "Task success with 95 % intervals"],
-            Self::Slopes => ["slopes", "Task success from experiment to experiment"],
-            Self::DecisionCurve => ["decision-curve", "Share of episodes decided by step t"],
-            Self::Gaze => ["gaze", "Mirror in view, episode by episode"],
+            Self::Spider => "Behavioural profiles",
+            Self::Heatmap => "Performance across experiments and metrics",
+            Self::Scatter => "Task success against self-attribution",
+            Self::CompletionGap => "Completion gap",
+            Self::E5Outcomes => "Final self-identification outcomes",
+            Self::Intervals => "Task success with 95 % intervals",
+            Self::Slopes => "Task success from experiment to experiment",
+            Self::DecisionCurve => "Share of episodes decided by step t",
+            Self::Gaze => "Mirror in view, episode by episode",
         }
     }
 }
@@ -78,7 +68,7 @@ impl FromStr for FigureName {
     type Err = FigureError;
 
     fn from_str(text: &str) -> Result<Self, FigureError> {
-        Self::ALL.into_iter().find(|figure| figure.name() == text).ok_or_else(|| {
+        Self::named(text).ok_or_else(|| {
             let known = Self::ALL.map(Self::name);
             FigureError::UnknownFigure { name: text.to_owned(), known: known.join(", "), hint: hint(text, known) }
         })

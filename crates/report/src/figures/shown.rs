@@ -28,7 +28,7 @@ pub type FigureSheets = IndexMap<String, FigureSheet>;
 pub static SHOWN: LazyLock<FigureSheets> =
     LazyLock::new(|| toml::from_str(FIGURES).expect("the file comes with the program"));
 /// The same as TOML, for styles to lie over.
-pub const FIGURES: &str = include_str!("../../../../assets/styles/figures.toml");
+pub(crate) const FIGURES: &str = include_str!("../../../../assets/styles/figures.toml");
 
 /// With more axes the labels overlap.
 const MOST_AXES: usize = 8;

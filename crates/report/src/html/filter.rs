@@ -5,8 +5,7 @@ use std::collections::BTreeMap;
 use serde_json::{Value as Json, json};
 
 use crate::cells::{Cells, KeyValue};
-use crate::layout::MetricTable;
-use crate::layout::heading;
+use crate::layout::{MetricTable, heading};
 use exact::escape::visible;
 
 /// The filters of a page, and where each value stands among its filter's.

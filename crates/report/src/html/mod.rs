@@ -57,7 +57,6 @@ pub struct Page<'a> {
 pub struct Figure<'a> {
     /// `spider`, ...: the name of its files.
     pub name: &'a str,
-    /// Its heading.
     pub title: &'a str,
     /// The explanation below it.
     pub caption: &'a str,
@@ -67,7 +66,6 @@ pub struct Figure<'a> {
 
 /// An error while making a page.
 #[derive(Debug, thiserror::Error)]
-#[expect(missing_docs, reason = "the messages say it")]
 pub enum HtmlError {
     #[error(transparent)]
     Grouping(#[from] GroupError),

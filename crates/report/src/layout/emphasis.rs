@@ -11,7 +11,7 @@ use crate::tables::Emphasis;
 use metric::catalog::Better;
 
 /// Sets the emphasis of the cells of one column in one group. The cells keep their places.
-pub fn emphasise(cells: &mut [&mut MetricCell], better: Better, rule: EmphasisRule) {
+pub(crate) fn emphasise(cells: &mut [&mut MetricCell], better: Better, rule: EmphasisRule) {
     let compare: fn(&MetricCell, &MetricCell) -> Ordering = match rule {
         // Ties come from tests, which cells do not have.
         EmphasisRule::None | EmphasisRule::Tied => return,

@@ -23,7 +23,6 @@ pub struct MetricTable {
     pub note: String,
     /// Sentences that its cells call for, such as what the dagger means.
     pub footnotes: Vec<String>,
-    /// The LaTeX label.
     pub label: Option<String>,
     /// The text of an undefined value.
     pub undefined: String,
@@ -147,7 +146,7 @@ impl MetricTable {
     }
 
     /// The caption without its title: note and footnotes.
-    pub fn sentences(&self) -> impl Iterator<Item = &str> {
+    pub(crate) fn sentences(&self) -> impl Iterator<Item = &str> {
         std::iter::once(self.note.as_str()).chain(self.footnotes.iter().map(String::as_str)).filter(|s| !s.is_empty())
     }
 

@@ -25,7 +25,7 @@ impl TableOrder<'_> {
     }
 
     /// The rank of a metric: by the first table that shows it, then as defined.
-    pub fn of_metric(self, metric: &str) -> (usize, usize) {
+    pub(crate) fn of_metric(self, metric: &str) -> (usize, usize) {
         let sheet = &self.style.sheet;
         let mut tables: Vec<_> = sheet.table.iter().collect();
         tables.sort_by_key(|(name, _)| *name != MAIN_TABLE);

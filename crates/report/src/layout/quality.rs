@@ -25,6 +25,11 @@ pub fn of_cells(cells: &QualityByCell) -> Option<ListTable> {
     (!cells.0.is_empty()).then(table)
 }
 
+/// The table for a terminal, without title and notes; empty without any cell.
+pub fn text(cells: &QualityByCell, width: Option<usize>) -> String {
+    of_cells(cells).map_or_else(String::new, |table| table.printed.lines(width))
+}
+
 fn keys_and<'a>(keys: usize, others: impl IntoIterator<Item = &'a str>) -> impl Iterator<Item = &'a str> {
     ["experiment", "model", "condition"].into_iter().take(keys).chain(others)
 }

@@ -27,7 +27,7 @@ pub fn value(cell: &Cell, episodes: u64, print: &Print) -> Value {
 }
 
 /// The value of an undefined cell if a style prints it as zero.
-pub fn zero(metric: &Metric, print: &Print) -> Value {
+pub(crate) fn zero(metric: &Metric, print: &Print) -> Value {
     let zero = Decimal::zero(scale(metric, print).1);
     Value::MeanSe { mean: zero, se: Some(zero) }
 }

@@ -130,7 +130,6 @@ impl TestName {
 
 /// An error of a power analysis.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[expect(missing_docs, reason = "the messages say it")]
 pub enum PlanError {
     #[error(
         "--difference {difference} with --baseline {baseline}: expected rates from 0 to 1, found {}; lower one of the two",
@@ -244,7 +243,7 @@ impl PlanRequest {
     /// The test of a true difference; `None` where the rates cannot be, and where seeds are too few for any verdict.
     fn test(&self, test: TestName, level: f64, difference: f64) -> Option<Box<dyn Power>> {
         let by_seed = |test| {
-            let Clusters { seeds, icc } = self.clusters;
+            let Clusters { seeds, icc, .. } = self.clusters;
             let fewest = holm::level(self.confidence).map_or(usize::MAX, fewest_clusters);
             (seeds >= fewest as u64).then(|| Box::new(Seeds { test, level, seeds, icc }) as Box<dyn Power>)
         };

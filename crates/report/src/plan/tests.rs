@@ -9,7 +9,7 @@ const PAPER: PlanRequest = PlanRequest {
     power: 0.8,
     confidence: 0.95,
     models: 8,
-    clusters: Clusters { seeds: 3, icc: 0.0 },
+    clusters: Clusters { seeds: 3, icc: 0.0, people: false },
     discordance: None,
     chance: None,
     sequential: false,
@@ -21,8 +21,18 @@ fn the_answer_comes_first() {
     let requests = [
         PlanRequest { given: Given::Difference(0.3), chance, ..PAPER },
         PlanRequest { chance, ..PAPER },
-        PlanRequest { given: Given::Difference(0.3), clusters: Clusters { seeds: 3, icc: 0.1 }, ..PAPER },
-        PlanRequest { given: Given::Runs(3), clusters: Clusters { seeds: 7, icc: 0.1 }, models: 2, chance, ..PAPER },
+        PlanRequest {
+            given: Given::Difference(0.3),
+            clusters: Clusters { seeds: 3, icc: 0.1, people: false },
+            ..PAPER
+        },
+        PlanRequest {
+            given: Given::Runs(3),
+            clusters: Clusters { seeds: 7, icc: 0.1, people: false },
+            models: 2,
+            chance,
+            ..PAPER
+        },
         PlanRequest { given: Given::Difference(0.5), models: 2, sequential: true, chance, ..PAPER },
         PlanRequest { given: Given::Runs(1), models: 2, ..PAPER },
         PlanRequest { given: Given::Difference(0.4), baseline: Some(0.5), discordance: Some(0.5), ..PAPER },

@@ -12,13 +12,15 @@ impl Plan {
     pub fn render(&self, width: Option<usize>) -> String {
         let mut text = String::new();
         push_wrapped(&mut text, &self.answer, width, 2);
-        let mut header = vec!["test", "level", "difference", "episodes", "runs per seed", "units", "power"];
+        let people = self.request.clusters.people;
+        let runs = if people { "scenes each" } else { "runs per seed" };
+        let mut header = vec!["test", "level", "difference", "episodes", runs, "units", "power"];
         if self.request.sequential {
             header.extend(["e-value to stop", "expected episodes"]);
         }
         let columns = header.len();
         let table = Table { names: 2, ..Table::of_texts(header).aligned_right(2..columns) };
-        let rows = self.tests.iter().map(|test| record(test).into_iter().take(columns));
+        let rows = self.tests.iter().map(|test| record(test, cluster(people)).into_iter().take(columns));
         let _ = writeln!(text, "\n{}", table.with(rows).within(width));
         for assumption in &self.assumptions {
             push_wrapped(&mut text, assumption, width, 2);
@@ -27,11 +29,16 @@ impl Plan {
     }
 }
 
-fn record(test: &PlannedTest) -> [String; 9] {
+/// The name of a cluster.
+const fn cluster(people: bool) -> &'static str {
+    if people { "participant" } else { "seed" }
+}
+
+fn record(test: &PlannedTest, cluster: &str) -> [String; 9] {
     let count = |count: Option<u64>| count.map_or_else(|| UNDEFINED.to_owned(), |count| count.to_string());
     let family = if test.family > 1 { format!(", Holm over {}", test.family) } else { String::new() };
     [
-        test.test.title().to_owned(),
+        test.test.title().replace("seed", cluster),
         format!("{}{family}", fixed(Some(test.level), 5)),
         fixed(test.difference, 3),
         count(test.episodes),
@@ -47,30 +54,35 @@ pub(super) fn answer(request: &PlanRequest, test: &PlannedTest) -> String {
     let power = request.power;
     let family =
         if test.family > 1 { format!(" and Holm's procedure over {} comparisons", test.family) } else { String::new() };
-    let seeds = request.clusters.seeds;
+    let (seeds, cluster) = (request.clusters.seeds, cluster(request.clusters.people));
+    let by_cluster = format!("by {cluster}");
     let by = match (request.sequential, request.clusters.are_units()) {
         (true, _) => "by pairs, with a look after each run of all seeds",
-        (false, true) => "by seed",
+        (false, true) => &by_cluster,
         (false, false) => "by pairs",
     };
     let at_most = if request.sequential { "at most " } else { "" };
     match (request.given, test.runs, test.difference) {
         (Given::Difference(difference), Some(runs), _) => format!(
-            "{at_most}{} episodes per model and experiment ({runs} for each of {seeds} seeds) show a difference of {difference} with power {power}, {by}{family}",
+            "{at_most}{} episodes per model and experiment ({runs} for each of {seeds} {cluster}s) show a difference of {difference} with power {power}, {by}{family}",
             seeds * runs
         ),
         (Given::Difference(difference), None, _) => format!(
             "no number of runs up to {} episodes shows a difference of {difference} with power {power}, {by}{family}{}",
             request.most(),
-            if request.clusters.icc > 0.0 { "; episodes of one seed resemble each other: take more seeds" } else { "" }
+            if request.clusters.are_units() {
+                format!("; episodes of one {cluster} resemble each other: take more {cluster}s")
+            } else {
+                String::new()
+            }
         ),
         (Given::Runs(runs), _, Some(difference)) => format!(
-            "{at_most}{} episodes per model and experiment ({runs} for each of {seeds} seeds) show a difference of {} or more with power {power}, {by}{family}",
+            "{at_most}{} episodes per model and experiment ({runs} for each of {seeds} {cluster}s) show a difference of {} or more with power {power}, {by}{family}",
             seeds * runs,
             fixed(Some(difference), 3)
         ),
         (Given::Runs(runs), _, None) => format!(
-            "{at_most}{} episodes per model and experiment ({runs} for each of {seeds} seeds) show no difference with power {power}, {by}{family}",
+            "{at_most}{} episodes per model and experiment ({runs} for each of {seeds} {cluster}s) show no difference with power {power}, {by}{family}",
             seeds * runs
         ),
     }
@@ -89,11 +101,13 @@ pub(super) fn assumptions(request: &PlanRequest) -> Vec<String> {
         Some(share) => format!("pairs: in a share of {share} one model succeeds and the other does not"),
         None => "pairs: the two models succeed independently in a scene; scenes that are hard for both leave fewer discordant pairs, and need fewer episodes".to_owned(),
     };
-    let Clusters { seeds, icc } = request.clusters;
+    let Clusters { seeds, icc, people } = request.clusters;
+    let cluster = cluster(people);
     let clusters = if request.clusters.are_units() {
+        let design = if people { "in a crossed study" } else { "where seeds are declared clusters" };
         format!(
-            "seeds: intraclass correlation {icc}, so that tests count the {seeds} seeds, as `stats` does where seeds are \
-             declared clusters; an episode has the outcome of its seed with probability {}, and one of its own otherwise",
+            "{cluster}s: intraclass correlation {icc}, so that tests count the {seeds} {cluster}s, as `stats` does {design}; \
+             an episode has the outcome of its {cluster} with probability {}, and one of its own otherwise",
             fixed(Some(icc.sqrt()), 3)
         )
     } else {

@@ -26,7 +26,8 @@ use serde::{Deserialize, Serialize};
 
 pub use answers::{Answer, AnswerRole};
 pub use apart::SettingApart;
-pub use cells::{CellRow, FEW, Intervals};
+pub(crate) use cells::FEW;
+pub use cells::{CellRow, Intervals};
 pub use chance::{ChanceRow, Role, Verdict};
 pub use clusters::ClusterRow;
 pub use compare::{Comparison, Method, Sign};
@@ -53,7 +54,6 @@ use score::table::EpisodeTable;
 use statistics::design::Design;
 use study::Study;
 
-/// The options of statistics.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
     /// The confidence of every interval, and one minus the level of every test; between 0 and 1.

@@ -36,7 +36,6 @@ pub(super) struct Study<'a> {
     pub table: &'a EpisodeTable,
     pub design: Design,
     pub experiments: Vec<Experiment<'a>>,
-    /// Relations between metrics.
     pub relations: Relations,
     /// True if settings that differ do not matter.
     pub pool: bool,
@@ -92,12 +91,12 @@ impl<'a> Study<'a> {
     }
 
     /// The setting in which two blocks differ though the comparison does not vary it; `None` where nothing is known to.
-    pub fn setting_between(&self, first: &Block, second: &Block, varied: Varied) -> Option<String> {
+    pub(crate) fn setting_between(&self, first: &Block, second: &Block, varied: Varied) -> Option<String> {
         difference(&self.table.declared, [&first.recorded, &second.recorded], varied)
     }
 
     /// The same, of two blocks of one study.
-    pub fn setting_apart(&self, first: &Block, second: &Block) -> Option<String> {
+    pub(crate) fn setting_apart(&self, first: &Block, second: &Block) -> Option<String> {
         let varied = if first.experiment != second.experiment {
             Varied::Experiment
         } else if first.model == second.model {
@@ -109,7 +108,7 @@ impl<'a> Study<'a> {
     }
 
     /// The same, unless it does not matter.
-    pub fn incomparable(&self, first: &Block, second: &Block) -> Option<String> {
+    pub(crate) fn incomparable(&self, first: &Block, second: &Block) -> Option<String> {
         if self.pool { None } else { self.setting_apart(first, second) }
     }
 
@@ -123,7 +122,7 @@ impl<'a> Study<'a> {
     }
 
     /// Returns true if episodes may share a unit: clusters, participants or scenes are declared.
-    pub fn has_units(&self) -> bool {
+    pub(crate) fn has_units(&self) -> bool {
         let labelled = || [SCENE, PARTICIPANT].iter().any(|label| self.table.label(label).is_some());
         self.design.has_pairs() && (self.design.clusters().is_some() || labelled())
     }
@@ -143,7 +142,7 @@ impl<'a> Study<'a> {
     }
 
     /// The defined values of each unit of a block.
-    pub fn by_unit(&self, block: &Block, value: impl Fn(usize) -> Option<i64>) -> BTreeMap<Unit, Moments> {
+    pub(crate) fn by_unit(&self, block: &Block, value: impl Fn(usize) -> Option<i64>) -> BTreeMap<Unit, Moments> {
         let mut units: BTreeMap<Unit, Moments> = BTreeMap::new();
         for (row, value) in block.rows().filter_map(|row| Some((row, value(row)?))) {
             let sum = units.entry(self.unit(row)).or_default();
@@ -168,7 +167,7 @@ impl<'a> Study<'a> {
     }
 
     /// The name of a block's units, in the plural.
-    pub fn unit_name(&self, block: &Block) -> &'static str {
+    pub(crate) fn unit_name(&self, block: &Block) -> &'static str {
         match block.rows().next().map(|row| self.unit(row)) {
             Some(Unit::Seed(_)) => "seeds",
             Some(Unit::Participant(_)) => "participants",
@@ -228,7 +227,7 @@ impl<'a> Block<'a> {
     }
 
     /// Returns true if another block is of the same model under the same condition.
-    pub fn is_same_subject(&self, other: &Self) -> bool {
+    pub(crate) fn is_same_subject(&self, other: &Self) -> bool {
         (self.model, self.condition) == (other.model, other.condition)
     }
 

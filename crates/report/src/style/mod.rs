@@ -121,7 +121,6 @@ pub struct PrintSheet {
 
 /// The settings of printed cells, complete.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[expect(missing_docs, reason = "each field is that of `PrintSheet`")]
 pub struct Print {
     pub cell: CellForm,
     pub rounding: Rounding,
@@ -192,7 +191,6 @@ pub enum SingleSe {
 
 /// An error of a style.
 #[derive(Debug, thiserror::Error)]
-#[expect(missing_docs, reason = "the messages say it")]
 pub enum StyleError {
     #[error("no style `{name}`: expected `default`, `paper` or the path of a style file{hint}")]
     Unknown { name: String, hint: String },

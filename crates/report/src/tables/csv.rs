@@ -16,7 +16,7 @@ pub fn render(table: &Table) -> String {
 }
 
 /// A key as a field; text that a spreadsheet would compute is made harmless.
-pub fn key_field(value: &KeyValue) -> String {
+pub(crate) fn key_field(value: &KeyValue) -> String {
     match value {
         KeyValue::Text(text) if is_formula(text) => format!("'{text}"),
         value => value.to_string(),
@@ -24,7 +24,7 @@ pub fn key_field(value: &KeyValue) -> String {
 }
 
 /// The text behind a field of a key.
-pub fn text_of(field: &str) -> &str {
+pub(crate) fn text_of(field: &str) -> &str {
     field.strip_prefix('\'').filter(|text| is_formula(text)).unwrap_or(field)
 }
 

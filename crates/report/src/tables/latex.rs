@@ -124,7 +124,7 @@ fn identifier(label: &str) -> String {
 }
 
 /// Text in which nothing is a command: each special character as the command that prints it.
-pub fn escape(text: &str) -> String {
+pub(crate) fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for c in visible(text).chars() {
         match c {

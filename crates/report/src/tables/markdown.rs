@@ -62,7 +62,7 @@ fn push_aligned(text: &mut String, lines: &[Vec<String>], table: &Table) {
 }
 
 /// Text in which nothing is markup, a link, a mention or mathematics.
-pub fn escape(text: &str) -> String {
+pub(crate) fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for c in visible(text).chars() {
         match c {

@@ -11,9 +11,8 @@ mod terminal;
 
 use metric::catalog::Better;
 
-pub(crate) use csv::key_field;
-pub use csv::text_of;
-pub use markdown::escape as escape_markdown;
+pub(crate) use csv::{key_field, text_of};
+pub(crate) use markdown::escape as escape_markdown;
 pub(crate) use terminal::wrap::push_wrapped;
 pub use terminal::wrap::wrapped;
 pub use terminal::{Marks, Terminal};
@@ -25,7 +24,6 @@ pub struct Table {
     pub title: String,
     /// The sentences after the title: notes, then footnotes.
     pub sentences: Vec<String>,
-    /// The LaTeX label.
     pub label: Option<String>,
     pub look: Look,
     pub columns: Vec<Column>,

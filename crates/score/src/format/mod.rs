@@ -21,9 +21,8 @@ use super::table::{Declared, EpisodeTable};
 use metric::catalog::{Catalog, Experiment, Kind};
 use trace::TableFile;
 
-pub use self::parquet::{
-    DECLARED_KEY, DEFINITIONS_KEY, HASH_KEY, KIND_KEY, SCORES_KIND, holds_definitions, holds_scores,
-};
+pub(crate) use self::parquet::DECLARED_KEY;
+pub use self::parquet::{DEFINITIONS_KEY, HASH_KEY, KIND_KEY, SCORES_KIND, holds_definitions, holds_scores};
 pub use self::partition::Partition;
 
 /// A format of episode tables.
@@ -52,70 +51,29 @@ impl Format {
 /// An error of writing or reading an episode table.
 #[derive(Debug, thiserror::Error)]
 pub enum FormatError {
-    /// A file name that asks for no known format.
     #[error("`{0}`: expected a name that ends in .parquet, .csv or .jsonl")]
     Ending(String),
-    /// Bytes could not be written or read.
     #[error("cannot write or read the scores")]
     Io(#[from] std::io::Error),
-    /// The Parquet library's own words.
     #[error("not a readable Parquet file of scores: {0}")]
     Parquet(#[from] ::parquet::errors::ParquetError),
-    /// Bytes that contradict the file's own checksums.
     #[error("the file is damaged: {0}; restore it from its source, or score the traces again")]
     Damaged(String),
-    /// A column that is missing or has another type.
     #[error("column `{column}`: expected {expected}, found {found}; scores are written by `mirrorstats score`")]
-    Column {
-        /// Its name.
-        column: String,
-        /// The expected type.
-        expected: &'static str,
-        /// The type found.
-        found: String,
-    },
-    /// A value that is not what its column holds.
+    Column { column: String, expected: &'static str, found: String },
     #[error("line {line}, column `{column}`: expected {expected}, found `{found}`")]
-    Value {
-        /// 1-based.
-        line: usize,
-        /// Its name.
-        column: String,
-        /// The expected value.
-        expected: &'static str,
-        /// The value found.
-        found: String,
-    },
-    /// An episode that no scoring can have given.
+    Value { line: usize, column: String, expected: &'static str, found: String },
     #[error("episode `{episode}`, column `{column}`: expected {expected}, found {found}; score the traces again")]
-    Episode {
-        /// Its id.
-        episode: String,
-        /// The column.
-        column: String,
-        /// The expected columns.
-        expected: String,
-        /// The columns found.
-        found: String,
-    },
-    /// Steps where scores are read.
+    Episode { episode: String, column: String, expected: String, found: String },
     #[error(
         "expected scores, one row per episode, found steps: there is a column `t`\n  \
          help: `mirrorstats trace import` makes a trace of steps that are JSON lines, `import_steps` in Python of a data frame"
     )]
     Steps,
-    /// A line that is no CSV or JSON.
     #[error("line {line}: {reason}")]
-    Line {
-        /// 1-based.
-        line: usize,
-        /// The problem.
-        reason: String,
-    },
-    /// The footer's statement about the recording.
+    Line { line: usize, reason: String },
     #[error("`{DECLARED_KEY}` is not readable: {0}; score the traces again")]
     Declared(String),
-    /// The definitions in the footer.
     #[error("the definitions in the footer are not readable: {0}")]
     Definitions(String),
 }

@@ -18,9 +18,8 @@ use parquet::file::reader::ChunkReader;
 use parquet::file::writer::SerializedFileWriter;
 
 use super::csv::{KEYS, check_unique};
-use super::footer;
 use super::partition::Partition;
-use super::{DeclaredText, FormatError};
+use super::{DeclaredText, FormatError, footer};
 use crate::builder::TableBuilder;
 use crate::columns;
 use crate::table::{Declared, EpisodeTable, Header, KeyRef, TextColumn};
@@ -41,7 +40,7 @@ pub const DEFINITIONS_KEY: &str = "mirrorstats.definitions";
 pub const HASH_KEY: &str = "mirrorstats.definitions_hash";
 
 /// The footer key of what the traces declare of how they were recorded, as JSON (a `Declared`).
-pub const DECLARED_KEY: &str = "mirrorstats.declared";
+pub(crate) const DECLARED_KEY: &str = "mirrorstats.declared";
 
 /// Returns true if a file is Parquet with scores: its footer says so, or it has their key columns and no timestep.
 ///
@@ -311,8 +310,8 @@ mod tests {
 
     use super::*;
     use crate::format::{self, Format};
-    use crate::score_traces::schema_columns;
     use crate::table::{EpisodeKey, MetricColumn};
+    use crate::vocabulary::schema_columns;
     use metric::definitions::Definitions;
 
     fn table() -> EpisodeTable {

@@ -43,7 +43,6 @@ pub enum Shape {
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Step {
     pub kernel: Kernel,
-    /// Their type.
     pub ty: Type,
     pub shape: Shape,
 }
@@ -63,7 +62,6 @@ pub enum Kernel {
     /// A value per episode, repeated for each of its timesteps.
     Spread(StepId),
     Symbols(StepId),
-    /// Negation.
     Not(StepId),
     /// Kleene's conjunction; no operand is a constant.
     And(StepId, StepId),
@@ -224,7 +222,7 @@ impl PhysicalPlan {
     }
 
     /// Adds the metrics and the filter of some definitions.
-    pub fn add_scores(&mut self, plan: &Plan) {
+    pub(crate) fn add_scores(&mut self, plan: &Plan) {
         let mut lowering = lower::Lowering::new(self, plan);
         let metrics = plan.outputs.iter().map(|output| Metric {
             name: output.name.clone(),
@@ -237,7 +235,7 @@ impl PhysicalPlan {
     }
 
     /// Adds nodes of some definitions, each in its own shape; the step of each.
-    pub fn add_nodes(&mut self, plan: &Plan, nodes: impl IntoIterator<Item = NodeId>) -> Vec<StepId> {
+    pub(crate) fn add_nodes(&mut self, plan: &Plan, nodes: impl IntoIterator<Item = NodeId>) -> Vec<StepId> {
         let mut lowering = lower::Lowering::new(self, plan);
         nodes.into_iter().map(|node| lowering.values(node)).collect()
     }
@@ -295,7 +293,7 @@ impl PhysicalPlan {
 #[cfg(test)]
 mod tests {
     use super::PhysicalPlan;
-    use crate::score_traces::schema_columns;
+    use crate::vocabulary::schema_columns;
     use metric::definitions::Definitions;
 
     fn paper() -> Definitions {

@@ -295,8 +295,8 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::score_traces::schema_columns;
     use crate::table::EpisodeKey;
+    use crate::vocabulary::schema_columns;
     use metric::definitions::Definitions;
 
     /// A key, a label and two metrics.

@@ -17,13 +17,11 @@ use trace::open::TraceSet;
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{file}: expected {expected}, found {found}\n  help: {help}")]
 pub struct DeclarationError {
-    /// The file.
     pub file: String,
     /// The expected declaration, and its experiment.
     pub expected: String,
     /// The declaration in the file.
     pub found: String,
-    /// The remedy.
     pub help: &'static str,
 }
 

@@ -5,7 +5,7 @@
 
 use std::sync::Arc;
 
-use arrow::array::{ArrayRef, DictionaryArray, Int64Array, RecordBatch, RecordBatchOptions};
+use arrow::array::{ArrayRef, BooleanArray, DictionaryArray, Int64Array, RecordBatch, RecordBatchOptions};
 use arrow::datatypes::{Field, Int32Type, Schema};
 use arrow::error::ArrowError;
 
@@ -13,26 +13,23 @@ use crate::error::EngineError;
 use crate::evaluate::Batch;
 use crate::physical::PhysicalPlan;
 use crate::segments::Segments;
-use crate::table::EpisodeTable;
+use crate::table::{EpisodeTable, LabelColumn};
 use exact::suggest::nearest;
 use metric::columns::{Column, Columns, Level, Type};
 use metric::definitions::{Definitions, UnknownMetric};
 use metric::file::FileError;
 use toml_spec::Faults;
+use trace::labels;
 
 /// An error of selecting a part of a table.
 #[derive(Debug, thiserror::Error)]
 pub enum SelectError {
-    /// A metric that the table does not have.
     #[error(transparent)]
     Metric(#[from] UnknownMetric),
-    /// The condition is not one over scores.
     #[error(transparent)]
     Condition(#[from] Faults),
-    /// The condition could not be evaluated.
     #[error(transparent)]
     Engine(#[from] EngineError),
-    /// The table could not be laid out in columns.
     #[error("the scores cannot be laid out in columns: {0}")]
     Layout(#[from] ArrowError),
 }
@@ -84,10 +81,23 @@ fn columns(table: &EpisodeTable) -> Columns {
     let column = |ty| Column { ty, level: Level::Episode };
     let texts = ["episode_id", "model", "experiment"].map(|name| (name.to_owned(), column(Type::Text)));
     let ints = ["seed", "run"].map(|name| (name.to_owned(), column(Type::Int)));
-    let labels = table.labels.iter().map(|label| (label.name.clone(), column(Type::Text)));
+    let labels = table.labels.iter().map(|label| {
+        let ty = if is_of_coders(label) { Type::Bool } else { Type::Text };
+        (label.name.clone(), column(ty))
+    });
     let metrics = table.metrics.iter().map(|metric| (metric.name.clone(), column(Type::Int)));
     let columns: Columns = texts.into_iter().chain(ints).chain(labels).chain(metrics).collect();
     columns.with_help("scores have their keys and metrics alone; a condition on steps needs the traces")
+}
+
+/// Returns true if a column holds what coders say, as true and false.
+pub fn is_of_coders(label: &LabelColumn) -> bool {
+    label.name.starts_with(labels::PREFIX) && label.values.iter().flatten().all(|text| matches!(text, "true" | "false"))
+}
+
+/// The values of a column of coders.
+pub fn truths_of(label: &LabelColumn) -> impl Iterator<Item = Option<bool>> + '_ {
+    label.values.iter().map(|text| text.map(|text| text == "true"))
 }
 
 /// The table as columns that the engine takes.
@@ -103,7 +113,14 @@ fn rows(table: &EpisodeTable) -> Result<RecordBatch, ArrowError> {
         ("seed", int(keys().map(|key| Some(key.seed.into())).collect())),
         ("run", int(keys().map(|key| Some(key.run.into())).collect())),
     ];
-    columns.extend(table.labels.iter().map(|label| (label.name.as_str(), text(label.values.iter().collect()))));
+    columns.extend(table.labels.iter().map(|label| {
+        let values = if is_of_coders(label) {
+            Arc::new(truths_of(label).collect::<BooleanArray>()) as ArrayRef
+        } else {
+            text(label.values.iter().collect())
+        };
+        (label.name.as_str(), values)
+    }));
     columns.extend(table.metrics.iter().map(|metric| (metric.name.as_str(), int(metric.iter().collect()))));
     let fields: Vec<Field> =
         columns.iter().map(|(name, array)| Field::new(*name, array.data_type().clone(), true)).collect();

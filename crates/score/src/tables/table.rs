@@ -63,7 +63,6 @@ pub struct EpisodeKey {
 
 /// An [`EpisodeKey`] in a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[expect(missing_docs, reason = "the fields are those of `EpisodeKey`")]
 pub struct KeyRef<'a> {
     pub experiment: &'a str,
     pub model: &'a str,
@@ -99,7 +98,6 @@ pub struct MetricColumn {
 pub(crate) enum MetricValues {
     /// Truth values, for 0 and 1.
     Bools(BooleanArray),
-    /// Integers.
     Ints(Int64Array),
 }
 
@@ -117,13 +115,10 @@ pub struct Header {
 /// An error of joining two tables.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum JoinError {
-    /// They were computed under different definitions.
     #[error("expected scores under one set of definitions, found `{0}` and another `{1}`; score the traces again")]
     Definitions(String, String),
-    /// They have different columns.
     #[error("expected the columns {0}, found {1}")]
     Columns(String, String),
-    /// They share an episode.
     #[error("the episode `{0}` is in two files of scores; leave one out")]
     Episode(String),
 }
@@ -154,7 +149,6 @@ impl EpisodeTable {
         self.metrics.iter().find(|metric| metric.name == name)
     }
 
-    /// The number of episodes.
     pub fn len(&self) -> usize {
         self.keys.len()
     }
@@ -251,7 +245,6 @@ impl EpisodeKeys {
         self.run.value(row)
     }
 
-    /// The keys, in order.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = KeyRef<'_>> + Clone {
         (0..self.len()).map(|row| self.get(row))
     }
@@ -292,7 +285,6 @@ impl KeyRef<'_> {
 }
 
 impl EpisodeKey {
-    /// The same key, borrowed.
     pub fn as_ref(&self) -> KeyRef<'_> {
         let Self { experiment, model, seed, run, episode_id } = self;
         KeyRef { experiment, model, seed: *seed, run: *run, episode_id }
@@ -384,7 +376,7 @@ impl MetricColumn {
     ///
     /// # Panics
     /// For rows that are not there.
-    pub fn count_truths(&self, rows: Range<usize>) -> Option<(usize, usize)> {
+    pub(crate) fn count_truths(&self, rows: Range<usize>) -> Option<(usize, usize)> {
         let MetricValues::Bools(bools) = &self.values else { return None };
         let some = bools.slice(rows.start, rows.len());
         Some((some.false_count(), some.true_count()))

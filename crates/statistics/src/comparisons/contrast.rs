@@ -1,8 +1,7 @@
 //! The difference between two independent cells: one condition minus another.
 
 use crate::interval::{Interval, student_t_of, wilson};
-use exact::moments::Moments;
-use exact::moments::StandardError;
+use exact::moments::{Moments, StandardError};
 
 /// The interval of a difference of two independent rates, the first minus the second: square and add
 /// (Newcombe 1998, Statistics in Medicine 17:873, method 10).

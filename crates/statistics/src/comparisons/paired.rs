@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::chance;
 use crate::interval::{Interval, wilson};
+use crate::outcomes::ExactTest;
 use exact::ratio::Ratio;
 
 /// The 2x2 table of paired outcomes.
@@ -72,6 +73,11 @@ impl Pairs {
         }
     }
 
+    /// [`Pairs::mcnemar`] and its mid-p value.
+    pub fn test(self) -> Option<ExactTest> {
+        Some(ExactTest { p: self.mcnemar()?, mid_p: self.mcnemar_mid_p()? })
+    }
+
     /// The least p value that [`Pairs::mcnemar`] could have given with as many discordant pairs: 2^(1 - d).
     ///
     /// 1 where no pair is discordant; `None` without a pair.
@@ -80,7 +86,7 @@ impl Pairs {
         (self.n() > 0).then(|| 0.5f64.powi(halvings))
     }
 
-    pub fn discordant(self) -> u64 {
+    pub(crate) fn discordant(self) -> u64 {
         self.first_only + self.second_only
     }
 

@@ -37,7 +37,7 @@ struct Point {
 /// The sum of squares over the episodes is the variance by the infinitesimal jackknife (Jaeckel 1972; Efron 1982,
 /// chapter 6), which for one cause is Greenwood's.
 #[derive(Clone, Debug)]
-pub struct Influence {
+pub(crate) struct Influence {
     points: BTreeMap<i64, [f64; 3]>,
 }
 
@@ -69,7 +69,7 @@ impl Incidence {
     }
 
     /// The last step that the curve is known to, and `None` where it is known for ever: all decided.
-    pub fn known_until(&self) -> Option<i64> {
+    pub(crate) fn known_until(&self) -> Option<i64> {
         self.points.last().filter(|last| last.at_risk > last.correct + last.wrong).map(|last| last.steps)
     }
 
@@ -109,7 +109,7 @@ impl Incidence {
     }
 
     /// The contributions of this curve's episodes to the restricted mean.
-    pub fn influence(&self, horizon: i64) -> Influence {
+    pub(crate) fn influence(&self, horizon: i64) -> Influence {
         // What a larger share of decisions at a step takes away from the gains of all later steps.
         let mut later = 0.0;
         let mut slopes = Vec::with_capacity(self.points.len());
@@ -147,7 +147,7 @@ impl Influence {
     ///
     /// # Panics
     /// For an episode that is not of the curve.
-    pub fn of(&self, ending: Ending) -> f64 {
+    pub(crate) fn of(&self, ending: Ending) -> f64 {
         let [taken, correct, wrong] = self.points[&ending.steps];
         match ending.outcome {
             Outcome::Correct => correct - taken,
@@ -164,7 +164,7 @@ pub(super) mod tests {
     use crate::survival::Survival;
 
     /// Endings: the steps, and `c` for correct, `w` for wrong, `-` for unfinished.
-    pub fn endings(written: &str) -> Vec<Ending> {
+    pub(crate) fn endings(written: &str) -> Vec<Ending> {
         let outcome = |kind: &str| match kind {
             "c" => Outcome::Correct,
             "w" => Outcome::Wrong,
@@ -177,9 +177,9 @@ pub(super) mod tests {
         written.split_whitespace().map(ending).collect()
     }
 
-    pub const FIRST: &str = "5c 12w 100- 30c 100- 44w 61c 80- 8c 77c 100- 15w 100- 90c 33c";
+    pub(crate) const FIRST: &str = "5c 12w 100- 30c 100- 44w 61c 80- 8c 77c 100- 15w 100- 90c 33c";
 
-    pub fn close(found: f64, expected: f64) {
+    pub(crate) fn close(found: f64, expected: f64) {
         assert!((found - expected).abs() < 1e-9 * expected.abs().max(1.0), "found {found}, expected {expected}");
     }
 

@@ -101,7 +101,7 @@ impl Survival {
     }
 
     /// The last step that the curve is known to, and `None` where it is known for ever: all decided.
-    pub fn known_until(&self) -> Option<i64> {
+    pub(crate) fn known_until(&self) -> Option<i64> {
         self.points.last().filter(|point| point.undecided > 0.0).map(|point| point.steps)
     }
 

@@ -30,7 +30,7 @@ pub struct Search {
 
 impl Search {
     /// Returns true if `count` integers from `low` to `high` have this sum and this sum of squares.
-    pub fn is_attained(&mut self, count: i128, (low, high): (i128, i128), sum: i128, squares: i128) -> bool {
+    pub(crate) fn is_attained(&mut self, count: i128, (low, high): (i128, i128), sum: i128, squares: i128) -> bool {
         let shifted = Question {
             count,
             most: high - low,
@@ -87,7 +87,7 @@ impl Search {
 /// The smallest and the largest sum of squares of `count` integers from `low` to `high` with this sum.
 ///
 /// `None` where no such integers have the sum.
-pub fn ends(count: i128, (low, high): (i128, i128), sum: i128) -> Option<(i128, i128)> {
+pub(crate) fn ends(count: i128, (low, high): (i128, i128), sum: i128) -> Option<(i128, i128)> {
     let shifted = sum - count * low;
     if count < 0 || low > high || shifted < 0 || shifted > count * (high - low) {
         return None;

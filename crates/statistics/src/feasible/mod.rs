@@ -10,8 +10,7 @@ pub mod attain;
 use std::cmp::Ordering;
 
 use self::attain::{Search, ends};
-use exact::moments::Moments;
-use exact::moments::StandardError;
+use exact::moments::{Moments, StandardError};
 use exact::number::Decimal;
 use exact::rounding::Rounding;
 
@@ -80,12 +79,6 @@ impl Sample {
             squares += 2;
         }
         None
-    }
-
-    /// Moments of some values that print as all of these; `None` where no values do.
-    pub fn witness(&self, prints: &[Print], search: &mut Search) -> Option<Moments> {
-        let (low, high) = self.sums(prints);
-        (low..=high).find_map(|sum| self.with_sum(sum, prints, search))
     }
 
     /// The sums whose means print nearest below and above a mean, where the range has such.

@@ -12,6 +12,14 @@ fn print(mean: &str, se: &str, rounding: Rounding) -> Print {
     Print { mean: mean.parse().unwrap(), se: (!se.is_empty()).then(|| se.parse().unwrap()), rounding }
 }
 
+impl Sample {
+    /// Moments of some values that print as all of these; `None` where no values do.
+    fn witness(&self, prints: &[Print], search: &mut Search) -> Option<Moments> {
+        let (low, high) = self.sums(prints);
+        (low..=high).find_map(|sum| self.with_sum(sum, prints, search))
+    }
+}
+
 fn witness(n: u64, range: (i64, i64), form: StandardError, print: Print) -> Option<Moments> {
     Sample { n, range, form }.witness(&[print], &mut Search::default())
 }

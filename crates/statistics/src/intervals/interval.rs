@@ -7,8 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::quantile;
-use exact::moments::Moments;
-use exact::moments::StandardError;
+use exact::moments::{Moments, StandardError};
 
 /// Two bounds, `low <= high`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

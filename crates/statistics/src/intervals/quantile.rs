@@ -22,14 +22,14 @@ pub fn normal(tail: f64) -> f64 {
 }
 
 /// The share of the normal distribution below a deviate.
-pub fn normal_below(deviate: f64) -> f64 {
+pub(crate) fn normal_below(deviate: f64) -> f64 {
     settled(Normal::standard().cdf(deviate))
 }
 
 /// The share of the chi-squared distribution with 1 degree of freedom above `statistic`, which is not negative.
 ///
 /// By the incomplete gamma function: the library's error function has ten digits.
-pub fn chi_squared_above(statistic: f64) -> f64 {
+pub(crate) fn chi_squared_above(statistic: f64) -> f64 {
     settled(ChiSquared::new(1.0).expect("one degree of freedom is positive").sf(statistic))
 }
 
@@ -38,7 +38,7 @@ pub fn chi_squared_above(statistic: f64) -> f64 {
 /// The library's inverse is improved by Newton steps on its distribution function; for large `freedom`
 /// the Cornish-Fisher expansion takes over (Abramowitz and Stegun 1964, 26.7.5), where the incomplete
 /// beta function loses digits. Fractional degrees of freedom, as Welch's, are fine.
-pub fn student(tail: f64, freedom: f64) -> f64 {
+pub(crate) fn student(tail: f64, freedom: f64) -> f64 {
     if freedom >= EXPANSION_FROM {
         return settled(student_expansion(-Normal::standard().inverse_cdf(tail), freedom));
     }
@@ -49,7 +49,7 @@ pub fn student(tail: f64, freedom: f64) -> f64 {
 }
 
 /// The share of Student's t distribution beyond a deviate in either direction, for `freedom` > 0 degrees of freedom.
-pub fn student_beyond(deviate: f64, freedom: f64) -> f64 {
+pub(crate) fn student_beyond(deviate: f64, freedom: f64) -> f64 {
     let t = StudentsT::new(0.0, 1.0, freedom).expect("degrees of freedom are positive");
     settled(2.0 * t.cdf(-deviate.abs()))
 }
@@ -69,7 +69,7 @@ fn student_expansion(z: f64, freedom: f64) -> f64 {
 ///
 /// The library's inverse is improved by Newton steps on its distribution function; a step that would
 /// leave (0, 1) is not taken.
-pub fn beta(tail: f64, a: f64, b: f64) -> f64 {
+pub(crate) fn beta(tail: f64, a: f64, b: f64) -> f64 {
     let distribution = Beta::new(a, b).expect("shapes are positive");
     let start = distribution.inverse_cdf(tail);
     let refined = (0..3).fold(start, |x, _| {

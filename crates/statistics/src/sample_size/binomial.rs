@@ -9,7 +9,7 @@
     clippy::cast_sign_loss,
     reason = "counts of episodes"
 )]
-pub fn probabilities(n: u64, rate: f64) -> Vec<f64> {
+pub(crate) fn probabilities(n: u64, rate: f64) -> Vec<f64> {
     let rate = rate.clamp(0.0, 1.0);
     let mode = (((n + 1) as f64 * rate) as u64).min(n);
     let odds = rate / (1.0 - rate);

@@ -80,12 +80,15 @@ pub struct Clusters {
     pub seeds: u64,
     /// The intraclass correlation: 0 for independent episodes.
     pub icc: f64,
+    /// True if the clusters are participants, each with as many scenes; tests always count them.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub people: bool,
 }
 
 impl Clusters {
-    /// Returns true if the episodes of a seed resemble each other, so that tests count seeds.
+    /// Returns true if tests count clusters: participants, or seeds whose episodes resemble each other.
     pub fn are_units(self) -> bool {
-        self.icc > 0.0
+        self.people || self.icc > 0.0
     }
 
     /// The number of units in a test: seeds or episodes.

@@ -62,7 +62,7 @@ fn the_power_against_chance_is_the_known_one() {
 
 #[test]
 fn sizes_are_the_first_that_have_the_power() {
-    let seeds = |seeds| Clusters { seeds, icc: 0.0 };
+    let seeds = |seeds| Clusters { seeds, icc: 0.0, people: false };
     let around = |difference| Rates::apart(difference, None).unwrap();
     assert_eq!(seeds(3).runs_for(0.8, &mut pairs(0.05, around(0.3))), Some(17));
     assert_eq!(seeds(1).runs_for(0.8, &mut pairs(HOLM, around(0.5))), Some(36));
@@ -136,7 +136,7 @@ fn seeds_count_once_in_a_plan_too() {
     // One run for each seed: the test of McNemar over the seeds.
     close(of(BySeed::Pairs { difference: 0.5, discordance: 0.6 }).power(1), McNemar::new(0.05, 0.5, 0.6).power(6));
     // However many runs, 3 seeds show nothing.
-    let three = Clusters { seeds: 3, icc: 0.1 };
+    let three = Clusters { seeds: 3, icc: 0.1, people: false };
     let test = BySeed::Pairs { difference: 0.9, discordance: 0.9 };
     close(three.power(&mut Seeds { test, level: 0.05, seeds: 3, icc: 0.1 }, 50), 0.0);
 }
@@ -156,7 +156,7 @@ fn rates_stay_within_zero_and_one() {
 fn no_smaller_size_has_the_power() {
     for difference in [0.2, 0.25, 0.35, 0.45, 0.6] {
         let rates = Rates::apart(difference, None).unwrap();
-        let clusters = Clusters { seeds: 1, icc: 0.0 };
+        let clusters = Clusters { seeds: 1, icc: 0.0, people: false };
         let found = clusters.runs_for(0.8, &mut pairs(0.05, rates)).unwrap();
         let mut test = pairs(0.05, rates);
         assert_eq!((1..=found).find(|n| test.power(*n) >= 0.8), Some(found), "{difference}");

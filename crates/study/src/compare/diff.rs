@@ -19,9 +19,9 @@ use report::cells::group::DEFAULT_BY;
 use report::layout::TableOrder;
 use report::style::Style;
 use score::evidence::{self, Evidence};
-use score::flips;
 use score::score_traces::{self, ScoreError};
 use score::table::EpisodeTable;
+use score::{flips, vocabulary};
 use trace::inputs::{self, Input};
 use trace::open::TraceSet;
 
@@ -45,7 +45,6 @@ pub struct DiffRequest {
     pub by: Vec<String>,
     /// The definitions of scores that do not carry them; the default ones if absent.
     pub definitions_of_scores: Option<PathBuf>,
-    /// The number of threads.
     pub threads: NonZeroUsize,
 }
 
@@ -174,7 +173,7 @@ impl Side {
     ) -> Result<(Vec<String>, Option<EpisodeTable>), StudyError> {
         match self {
             Self::Definitions(name) => {
-                let columns = traces.map_or_else(score_traces::schema_columns, score_traces::trace_columns);
+                let columns = traces.map_or_else(vocabulary::schema_columns, vocabulary::trace_columns);
                 let definitions = Definitions::load(name, &columns)?;
                 Ok((definitions.catalog.metric.keys().cloned().collect(), None))
             }
@@ -229,9 +228,6 @@ impl Pair {
     }
 
     /// The changes between the sides, for the requested metrics.
-    ///
-    /// # Errors
-    /// Columns to group by that a side does not have; sums that leave 128 bits.
     pub(crate) fn changes(&self, by: &[String]) -> Result<Changes, StudyError> {
         let mut changes = Changes::of(&self.before.table, &self.after.table, by)?;
         changes.metrics = Overlap::of(&self.before.metrics, &self.after.metrics);
@@ -239,9 +235,6 @@ impl Pair {
     }
 
     /// Adds the timesteps that decided each flip; returns what there is to say about those that are not known.
-    ///
-    /// # Errors
-    /// Faults in the rows of the traces.
     pub(crate) fn explain(
         &self,
         changes: &mut Changes,

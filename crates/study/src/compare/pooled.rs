@@ -27,9 +27,6 @@ fn mixed(table: &EpisodeTable, groups: &[usize]) -> Vec<[usize; 2]> {
 }
 
 /// Refuses cells, grouped by these columns, that mix fingerprints, or of which only some episodes have one.
-///
-/// # Errors
-/// [`StudyError::Pooled`] for the first such cell; columns that the episodes do not have.
 pub(crate) fn check(table: &EpisodeTable, by: &[String]) -> Result<(), StudyError> {
     let groups = membership(table, by)?;
     match mixed(table, &groups).first() {
@@ -39,9 +36,6 @@ pub(crate) fn check(table: &EpisodeTable, by: &[String]) -> Result<(), StudyErro
 }
 
 /// The mixtures that pooled cells contain, a sentence each; empty without any.
-///
-/// # Errors
-/// Columns that the episodes do not have.
 pub(crate) fn told(table: &EpisodeTable, by: &[String]) -> Result<Vec<String>, StudyError> {
     let groups = membership(table, by)?;
     let told = |rows: &[usize; 2]| {

@@ -7,8 +7,6 @@
 use std::collections::BTreeSet;
 use std::str::FromStr;
 
-use serde_json::Value;
-
 use crate::error::StudyError;
 use crate::losses::Counted;
 use crate::results::Results;
@@ -27,8 +25,8 @@ use score::declared_experiments::declare;
 use score::physical::PhysicalPlan;
 use score::score_traces::{self, Outputs};
 use score::table::EpisodeTable;
+use score::vocabulary;
 use trace::open::TraceSet;
-use trace::schema::RECORDING_KEY;
 use trace::schema::domain::Domain;
 
 /// The column that a threshold applies to.
@@ -172,7 +170,7 @@ struct Trial {
 
 impl Trial {
     fn of(question: &Question, traces: &TraceSet, thresholds: &Thresholds) -> Result<Self, StudyError> {
-        let columns = score_traces::trace_columns(traces);
+        let columns = vocabulary::trace_columns(traces);
         let as_is = question.bind(traces)?;
         let bound = |px: u32| under(question, px, &columns);
         let dependent = Dependent::between(&bound(1)?, &bound(2)?);
@@ -184,7 +182,7 @@ impl Trial {
         let mut definitions = vec![as_is];
         for px in &thresholds.0 {
             let mut bound = bound(*px)?;
-            score_traces::check_columns(traces, &bound)?;
+            vocabulary::check_columns(traces, &bound)?;
             declare(&mut bound.catalog, traces)?;
             definitions.push(bound);
         }
@@ -254,9 +252,7 @@ impl Dependent {
 }
 
 fn recorded_px(traces: &TraceSet) -> Vec<u64> {
-    let recordings = traces.files().iter().filter_map(|file| file.metadata_value(RECORDING_KEY));
-    let recordings = recordings.filter_map(|text| serde_json::from_str::<Value>(text).ok());
-    let px: BTreeSet<u64> = recordings.filter_map(|recording| recording[THRESHOLD_KEY].as_u64()).collect();
+    let px: BTreeSet<u64> = traces.files().iter().filter_map(|file| file.recording()[THRESHOLD_KEY].as_u64()).collect();
     px.into_iter().collect()
 }
 

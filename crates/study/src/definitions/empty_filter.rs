@@ -13,17 +13,14 @@ use exact::escape::visible;
 use metric::names::mentioned;
 use report::cells::KeyValue;
 use report::cells::group::{KEY_COLUMNS, column_values};
-use score::score_traces;
 use score::table::EpisodeTable;
+use score::{score_traces, vocabulary};
 
 /// Values of a column that are listed.
 const LISTED: usize = 8;
 
 impl Study {
     /// Refuses an answer about no episode where the filter is why there is none.
-    ///
-    /// # Errors
-    /// [`StudyError::EmptyFilter`]; what is wrong with the inputs without the filter.
     pub(crate) fn check_filter(&self, episodes: usize) -> Result<(), StudyError> {
         match self.empty_filter(episodes)? {
             None => Ok(()),
@@ -57,9 +54,9 @@ impl Study {
             Source::Traces(traces) => traces,
         };
         let is_label =
-            |name: &&String| !KEY_COLUMNS.contains(&name.as_str()) && score_traces::check_label(traces, name).is_ok();
+            |name: &&String| !KEY_COLUMNS.contains(&name.as_str()) && vocabulary::check_label(traces, name).is_ok();
         let labels: Vec<String> = names.iter().filter(is_label).cloned().collect();
-        let known = whole.load(&score_traces::trace_columns(traces))?.catalog.metric;
+        let known = whole.load(&vocabulary::trace_columns(traces))?.catalog.metric;
         let metrics = names.iter().filter(|name| known.contains_key(*name)).cloned().collect();
         let question = Question { metrics: Some(metrics), ..whole };
         Ok(score_traces::score(traces, &question.bind(traces)?, &labels, self.threads)?)

@@ -74,9 +74,6 @@ fn groups(traces: &TraceSet) -> Vec<ScoredAlike> {
 }
 
 /// The definitions that score all experiments of some traces, each as its own do; `None` for the default ones.
-///
-/// # Errors
-/// Experiments that need different definitions; definitions that are a file of the one who recorded.
 fn chosen(traces: &TraceSet) -> Result<Option<PathBuf>, StudyError> {
     let groups = groups(traces);
     match &groups[..] {
@@ -142,9 +139,6 @@ fn side_by_side(groups: &[ScoredAlike], columns: &Columns) -> Result<Option<Defi
 }
 
 /// Refuses episodes of an experiment that some definitions do not score, where its own would: a false zero is no score.
-///
-/// # Errors
-/// [`StudyError::NotScored`].
 pub(crate) fn check(definitions: &Definitions, traces: &TraceSet, episodes: &EpisodeTable) -> Result<(), StudyError> {
     unscored(definitions, traces, |name| episodes.keys.iter().any(|key| key.experiment == name)).map_or(Ok(()), Err)
 }

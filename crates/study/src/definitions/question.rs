@@ -6,8 +6,8 @@ use ::report::cells::group::{CONDITION, DEFAULT_BY, KEY_COLUMNS};
 use metric::columns::Columns;
 use metric::definitions::Definitions;
 use score::declared_experiments::declare;
-use score::score_traces;
 use score::table::EpisodeTable;
+use score::vocabulary;
 use trace::open::TraceSet;
 
 use crate::StudyError;
@@ -18,7 +18,7 @@ use crate::scored_alike::ScoredAlike;
 pub(crate) const STANDING_LABELS: [&str; 4] = [CONDITION, "scene", "fingerprint", "participant"];
 
 /// The definitions that are used where none are named.
-pub const DEFAULT_DEFINITIONS: &str = "paper";
+pub(crate) const DEFAULT_DEFINITIONS: &str = "paper";
 
 /// The question to the inputs.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -55,7 +55,7 @@ impl Question {
     pub(crate) fn labels_over(&self, traces: &TraceSet) -> Vec<String> {
         let mut labels = self.labels();
         let standing = STANDING_LABELS.into_iter().filter(|name| traces.declares(name));
-        for name in standing {
+        for name in standing.chain(traces.label_columns().iter().map(String::as_str)) {
             if !labels.iter().any(|label| label == name) {
                 labels.push(name.to_owned());
             }
@@ -73,8 +73,8 @@ impl Question {
 
     pub(crate) fn bind(&self, traces: &TraceSet) -> Result<Definitions, StudyError> {
         let asked = self.clone().resolved(traces)?;
-        let mut definitions = asked.bind_to(&score_traces::trace_columns(traces))?;
-        score_traces::check_columns(traces, &definitions)?;
+        let mut definitions = asked.bind_to(&vocabulary::trace_columns(traces))?;
+        vocabulary::check_columns(traces, &definitions)?;
         declare(&mut definitions.catalog, traces)?;
         Ok(definitions)
     }
@@ -90,13 +90,4 @@ impl Question {
         }
         Ok(definitions)
     }
-}
-
-/// The experiments that some definitions know; any if `None`.
-///
-/// # Errors
-/// Every fault of the definitions.
-pub fn known_experiments(definitions: &Path) -> Result<Option<Vec<String>>, StudyError> {
-    let catalog = Definitions::load(definitions, &score_traces::schema_columns())?.catalog;
-    Ok((!catalog.open).then(|| catalog.experiment.keys().cloned().collect()))
 }

@@ -33,7 +33,6 @@ pub struct RescoreRequest {
     pub style: Option<PathBuf>,
     /// Other metrics than the report's.
     pub metrics: Option<Vec<String>>,
-    /// The number of threads.
     pub threads: NonZeroUsize,
 }
 
@@ -46,10 +45,8 @@ pub fn traces_of(report: &Path, places: &[PathBuf]) -> Result<Vec<Input>, StudyE
     Ok(provenance::traces(&provenance::manifest(report)?, &provenance::places(report, places))?)
 }
 
-/// A report made again.
 #[derive(Debug)]
 pub struct Rescored {
-    /// The new report.
     pub report: Report,
     /// The changes from the old report, or the reason why they are unknown.
     pub changes: Result<Diff, String>,

@@ -10,7 +10,7 @@ use report::audit::episodes::Episodes;
 use report::audit::{Audit, NamedTable, Terms, audit};
 use report::published;
 use report::style::Style;
-use score::score_traces::{has_value, schema_columns};
+use score::vocabulary::{has_value, schema_columns};
 
 /// The assumptions of an audit about published tables.
 #[derive(Clone, Debug)]

@@ -34,9 +34,8 @@ impl Default for FigureOptions {
     }
 }
 
-/// The inputs of figures.
 #[derive(Debug)]
-pub struct FigureInputs<'a> {
+pub(crate) struct FigureInputs<'a> {
     cells: Cells,
     style: &'a Style,
     options: FigureOptions,
@@ -52,7 +51,7 @@ const SHOWN_OF_MANY: usize = 12;
 
 /// The figures of a report.
 #[derive(Debug, Default)]
-pub struct Drawings {
+pub(crate) struct Drawings {
     /// Those that can be drawn.
     pub drawn: Vec<(FigureName, Figure)>,
     /// The reason why each other one cannot.
@@ -64,17 +63,14 @@ impl<'a> FigureInputs<'a> {
     ///
     /// # Errors
     /// Sums of squares that leave 128 bits.
-    pub fn of(results: &'a Results, style: &'a Style) -> Result<Self, StudyError> {
+    pub(crate) fn of(results: &'a Results, style: &'a Style) -> Result<Self, StudyError> {
         let results = results.with_conditions_as_models();
         let cells = group(&results.episodes, &DEFAULT_BY.map(str::to_owned))?;
         Ok(Self { cells, style, options: FigureOptions::default(), results, remark: None })
     }
 
     /// The same for a page or a folder of all figures: of many models the best, which the captions say.
-    ///
-    /// # Errors
-    /// As [`FigureInputs::of`].
-    pub fn of_a_report(results: &'a Results, style: &'a Style) -> Result<Self, StudyError> {
+    pub(crate) fn of_a_report(results: &'a Results, style: &'a Style) -> Result<Self, StudyError> {
         let all = Self::of(results, style)?;
         let metric = results.episodes.catalog.metric.iter().find(|(_, metric)| metric.better != Better::Neither);
         let models: BTreeSet<&str> = all.results.episodes.keys.iter().map(|key| key.model).collect();
@@ -93,12 +89,12 @@ impl<'a> FigureInputs<'a> {
     ///
     /// # Errors
     /// Inputs that lack what the figure needs.
-    pub fn draw(&self, name: FigureName) -> Result<Figure, FigureError> {
+    pub(crate) fn draw(&self, name: FigureName) -> Result<Figure, FigureError> {
         figures::draw(name, &self.input())
     }
 
     /// Every figure that can be drawn, and why each other one cannot.
-    pub fn draw_all(&self) -> Drawings {
+    pub(crate) fn draw_all(&self) -> Drawings {
         let mut drawings = Drawings::default();
         for name in FigureName::ALL {
             match self.draw(name) {
@@ -128,7 +124,7 @@ impl Drawings {
     ///
     /// # Errors
     /// A picture too large for memory.
-    pub fn files(&self) -> Result<Vec<OutputFile>, StudyError> {
+    pub(crate) fn files(&self) -> Result<Vec<OutputFile>, StudyError> {
         let mut files = Vec::new();
         for (name, figure) in &self.drawn {
             for format in FigureFormat::ALL {

@@ -1,5 +1,6 @@
 //! Answers as files: reports with their provenance, figures, checks of quality and of tables.
 
+pub(crate) mod agreement;
 pub(crate) mod audit;
 pub(crate) mod figure_inputs;
 pub(crate) mod overview;

@@ -15,7 +15,6 @@ use report::statistics::{Options, Replies};
 use report::style::Style;
 use trace::schema::SCHEMA_VERSION;
 
-/// The sections.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
     /// Tables, data quality, definitions.

@@ -5,13 +5,12 @@
 
 use std::ffi::OsStr;
 use std::fmt;
-use std::fs::{self};
+use std::fs;
 use std::io;
 use std::path::{Component, Path, PathBuf};
 
 use exact::budget::Limit;
-use exact::hash;
-use exact::input;
+use exact::{hash, input};
 use report::bundle::{self, Manifest};
 use trace::inputs::Input;
 use trace::schema::SCHEMA_VERSION;
@@ -19,30 +18,12 @@ use trace::schema::SCHEMA_VERSION;
 /// An error of making a report again.
 #[derive(Debug, thiserror::Error)]
 pub enum ProvenanceError {
-    /// No manifest in the folder.
     #[error("{}: expected a report's folder with its manifest.json; name the folder that `mirrorstats report` wrote", path.display())]
-    NoManifest {
-        /// The expected path.
-        path: PathBuf,
-        /// The reason why it is not readable.
-        source: io::Error,
-    },
-    /// A manifest that does not say what a report was made of.
+    NoManifest { path: PathBuf, source: io::Error },
     #[error("{}: expected the manifest of a report, found {found}; make the report again with `mirrorstats report`", path.display())]
-    Malformed {
-        /// The path.
-        path: PathBuf,
-        /// The problem.
-        found: String,
-    },
-    /// Traces that are not what they were.
+    Malformed { path: PathBuf, found: String },
     #[error("{} of {all} traces of the report are not what they were:\n{}\n{REMEDY}", faults.len(), lines(faults))]
-    Traces {
-        /// The number of all inputs.
-        all: usize,
-        /// The inputs with their problems.
-        faults: Vec<TraceFault>,
-    },
+    Traces { all: usize, faults: Vec<TraceFault> },
 }
 
 /// The remedy for traces that are not found.
@@ -101,7 +82,7 @@ const LARGEST: Limit = Limit::new("bytes of a manifest", 64 << 20);
 ///
 /// # Errors
 /// A folder without one, one that is not readable, one of a later program.
-pub fn manifest(report: &Path) -> Result<Manifest, ProvenanceError> {
+pub(crate) fn manifest(report: &Path) -> Result<Manifest, ProvenanceError> {
     let path = report.join("manifest.json");
     let text = match input::text(&path, LARGEST) {
         Ok(text) => text,
@@ -184,7 +165,7 @@ fn shown_as(folder: &Path, path: &Path) -> Vec<PathBuf> {
 
 /// Where the traces of a report are looked for: where one is given, else the current folder, the report's folder and
 /// the folders above it.
-pub fn places(report: &Path, told: &[PathBuf]) -> Vec<PathBuf> {
+pub(crate) fn places(report: &Path, told: &[PathBuf]) -> Vec<PathBuf> {
     if !told.is_empty() {
         return told.to_vec();
     }

@@ -14,8 +14,7 @@ use report::bundle::{self, Bundle, BundleError, Manifest, OutputFile};
 use report::cells::Cells;
 use report::figures::{Figure as Drawn, FigureName};
 use report::html::{self, Figure, Page, Recordings};
-use report::layout::MetricTable;
-use report::layout::quality;
+use report::layout::{MetricTable, quality};
 use report::plan::departures::Looks;
 use report::statistics::{Options, Replies, Statistics};
 use report::style::{MAIN_TABLE, OTHER_TABLE, Style};
@@ -23,13 +22,12 @@ use report::tables::ListTable;
 use score::format::Format;
 use score::lost_counts::LostCounts;
 use score::table::EpisodeTable;
-use trace::answered;
 use trace::checksums::missing_note;
-use trace::renderer;
 use trace::schema::SCHEMA_VERSION;
+use trace::{answered, renderer};
 
 /// The most episodes that a page lists.
-pub const MOST_LISTED: usize = 20_000;
+pub(crate) const MOST_LISTED: usize = 20_000;
 
 /// The options of a report.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -59,7 +57,6 @@ pub struct Report {
     pub tables: Vec<MetricTable>,
     /// Ranks, if the style marks ties, and what became of the replies, if the inputs are traces.
     pub lists: Vec<ListTable>,
-    /// The manifest.
     pub manifest: Manifest,
     /// The number of replies without a decision; `None` without any, and if it is not recorded.
     pub replies: Option<String>,
@@ -93,9 +90,6 @@ impl Study {
     }
 
     /// Makes the report of the study.
-    ///
-    /// # Errors
-    /// Whatever is wrong with the style, the inputs or the definitions.
     pub fn report(&self, options: &ReportOptions) -> Result<Report, StudyError> {
         // Small files first: a slip in the style should not cost a pass over the traces.
         let style = Style::load(&options.style)?;

@@ -5,8 +5,9 @@ use ::report::plan::departures::Looks;
 use ::report::statistics::{Options, Replies, Selection, Sequential, Statistics};
 use metric::names::is_about;
 use score::lost_counts::LostCounts;
-use score::score_traces;
 use score::table::EpisodeTable;
+use score::vocabulary;
+use trace::labels;
 
 use crate::design::design_of;
 use crate::losses::Counted;
@@ -17,7 +18,9 @@ impl Study {
     /// The filter; it is by results where it asks for more than what is recorded of an episode before it begins.
     pub(crate) fn selection(&self, episodes: &EpisodeTable) -> Option<Selection> {
         let condition = self.question.filter.clone()?;
-        let is_key = |name: &str| episodes.label(name).is_some() || score_traces::is_constant(name);
+        // A coder has seen the result.
+        let is_recorded = |name: &str| episodes.label(name).is_some() && !name.starts_with(labels::PREFIX);
+        let is_key = |name: &str| is_recorded(name) || vocabulary::is_constant(name);
         let by_results = !is_about(&condition, &is_key);
         Some(Selection { condition, by_results })
     }
@@ -78,9 +81,6 @@ impl Study {
     }
 
     /// Statistics for a study in progress: confidence sequences and e-values.
-    ///
-    /// # Errors
-    /// As [`Study::statistics`].
     pub fn sequential(&self, options: &Options) -> Result<Sequential, StudyError> {
         let results = self.scan(Outputs { losses: true, ..Outputs::default() })?;
         self.check_filter(results.episodes.len())?;

@@ -65,30 +65,12 @@ pub enum Kind {
 /// An error of verifying a folder.
 #[derive(Debug, thiserror::Error)]
 pub enum VerifyError {
-    /// No manifest in the folder.
     #[error("{}: expected a report's folder with its {MANIFEST}, found {found}; name the folder that `mirrorstats report` wrote", path.display())]
-    NoManifest {
-        /// The folder.
-        path: PathBuf,
-        /// The value found.
-        found: String,
-    },
-    /// A manifest that is invalid of a report, or lists what cannot be a file of it.
+    NoManifest { path: PathBuf, found: String },
     #[error("{}: expected the manifest of a report, found {found}; make the report again with `mirrorstats report`", path.display())]
-    Malformed {
-        /// The path.
-        path: PathBuf,
-        /// The problem.
-        found: String,
-    },
-    /// A file or a folder that cannot be read.
+    Malformed { path: PathBuf, found: String },
     #[error("{}: expected a file or folder that can be read, found {source}; check its permissions", path.display())]
-    Unreadable {
-        /// The path.
-        path: PathBuf,
-        /// The reason for the refusal.
-        source: io::Error,
-    },
+    Unreadable { path: PathBuf, source: io::Error },
 }
 
 /// Compares the files of a folder with its manifest.

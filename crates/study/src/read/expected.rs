@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::StudyError;
 use metric::definitions::Definitions;
-use score::score_traces::{declared_columns, schema_columns};
+use score::vocabulary::{declared_columns, schema_columns};
 use trace::schema::{DeclaredColumn, Domain};
 use trace::validate::Expected;
 

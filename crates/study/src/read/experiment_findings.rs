@@ -8,7 +8,7 @@ use exact::escape::visible;
 use metric::catalog::{Catalog, Experiment};
 use metric::definitions::Definitions;
 use score::declared_experiments::{DeclarationError, faults, listed, spelled};
-use score::score_traces::schema_columns;
+use score::vocabulary::schema_columns;
 use trace::declared_experiment::DeclaredExperiment;
 use trace::diagnostic::{Code, Finding};
 use trace::inputs::Input;
@@ -16,10 +16,7 @@ use trace::open::{TraceFile, TraceSet};
 
 /// A note for each title, order and level in a footer that the definitions give otherwise, or whose metric they do not have;
 /// an error for each experiment that only footers know, and not alike. Files that cannot be opened say nothing here.
-///
-/// # Errors
-/// Every fault of the definitions.
-pub fn experiment_findings(definitions: &Path, inputs: &[Input]) -> Result<Vec<Finding>, StudyError> {
+pub(crate) fn experiment_findings(definitions: &Path, inputs: &[Input]) -> Result<Vec<Finding>, StudyError> {
     let catalog = Definitions::load(definitions, &schema_columns())?.catalog;
     let traces = TraceSet::of(inputs.iter().filter_map(|input| TraceFile::open(input).ok()).collect());
     let mut found: Vec<Finding> = traces.files().iter().flat_map(|file| notes(file, &catalog)).collect();

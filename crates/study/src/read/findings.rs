@@ -8,6 +8,7 @@ use crate::StudyError;
 use crate::expected::ExpectedTraces;
 use crate::experiment_findings::experiment_findings;
 use exact::escape::visible;
+use exact::format::counted;
 use trace::checksums::Checksums;
 use trace::diagnostic::Severity;
 use trace::inputs::Input;
@@ -30,10 +31,6 @@ pub fn findings_text(report: &Validation) -> String {
     // Writing to a text does not fail.
     let _ = write(&mut text, report);
     text
-}
-
-fn counted(count: u64, noun: &str) -> String {
-    if count == 1 { format!("1 {noun}") } else { format!("{count} {noun}s") }
 }
 
 fn write(out: &mut String, report: &Validation) -> fmt::Result {

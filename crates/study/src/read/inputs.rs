@@ -9,7 +9,9 @@ use std::time::{Duration, UNIX_EPOCH};
 use crate::error::StudyError;
 use engines::spark::source::is_uri;
 use score::format::{self, Format};
+use trace::error::TraceError;
 use trace::inputs::{self, Input};
+use trace::labels::Labels;
 use trace::open::TraceSet;
 
 /// Inputs of one kind.
@@ -48,7 +50,7 @@ impl Source {
     pub fn open(inputs: &[Input]) -> Result<Self, StudyError> {
         match ScoreFile::all(inputs)? {
             Some(scores) => Ok(Self::Scores(scores)),
-            None => Ok(Self::Traces(TraceSet::open(inputs)?)),
+            None => Ok(Self::Traces(labelled(inputs)?)),
         }
     }
 
@@ -67,12 +69,21 @@ impl Source {
     ///
     /// # Errors
     /// Scores, which have no steps.
-    pub fn into_traces(self) -> Result<TraceSet, StudyError> {
+    pub(crate) fn into_traces(self) -> Result<TraceSet, StudyError> {
         match self {
             Self::Traces(traces) => Ok(traces),
             Self::Scores(files) => Err(no_steps(&files)),
         }
     }
+}
+
+/// Opens traces and reads the labels beside them.
+///
+/// # Errors
+/// The first fault of a footer; a list of labels that cannot be read.
+pub(crate) fn labelled(inputs: &[Input]) -> Result<TraceSet, StudyError> {
+    let labels = Labels::beside(inputs).map_err(TraceError::from)?;
+    Ok(TraceSet::open(inputs)?.with_labels(labels)?)
 }
 
 fn no_steps(scores: &[ScoreFile]) -> StudyError {
@@ -143,18 +154,12 @@ impl FileState {
 
 impl Stamp {
     /// The state of a file now.
-    ///
-    /// # Errors
-    /// Whatever the operating system says.
     pub fn of(input: &Input) -> Result<Self, StudyError> {
         let state = state_of(&input.path).map_err(|source| StudyError::file(&input.name, source))?;
         Ok(Self { name: input.name.clone(), path: input.path.clone(), state })
     }
 
     /// Refuses a file that is another one by now, or was written to.
-    ///
-    /// # Errors
-    /// [`StudyError::Changed`].
     pub fn check(&self) -> Result<(), StudyError> {
         match state_of(&self.path) {
             Ok(state) if state == self.state => Ok(()),

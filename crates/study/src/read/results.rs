@@ -23,7 +23,6 @@ pub struct Outputs {
     pub outcomes: bool,
     /// The episodes that the infrastructure ended.
     pub losses: bool,
-    /// The reply quality.
     pub quality: bool,
     /// The hashes of the inputs.
     pub hashes: bool,

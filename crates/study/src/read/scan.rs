@@ -11,9 +11,11 @@ use metric::definitions::Definitions;
 use report::cells::group::CONDITION;
 use score::quality::{QualityByCell, QualityReader};
 use score::score_traces::{self, Scored};
-use score::table::{EpisodeTable, LabelColumn};
+use score::table::{EpisodeTable, KeyRef, LabelColumn};
+use score::vocabulary;
 use statistics::losses::INFRASTRUCTURE;
 use trace::declared::Declared;
+use trace::labels::PREFIX;
 use trace::open::TraceSet;
 use trace::replies::REPLY_STATUS;
 use trace::schema::{self, Column, Domain};
@@ -55,7 +57,7 @@ impl Study {
     pub fn quality(&self) -> Result<QualityByCell, StudyError> {
         let traces = self.source.traces()?;
         let reader = QualityReader::of(traces);
-        let columns = score_traces::trace_columns(traces);
+        let columns = vocabulary::trace_columns(traces);
         let all = Definitions::from_toml("all", "open = true", &columns)?;
         let nobody = all.clone().filtered("nobody", "false", &columns)?;
         let lost = lost_episodes(traces)?;
@@ -82,6 +84,32 @@ impl Study {
         results.episodes.labels.retain(|label| asked.contains(&label.name) || says_something(label));
         losses::label(results);
         Ok(())
+    }
+
+    /// Returns true if the definitions or the filter read labels of coders.
+    ///
+    /// # Errors
+    /// Scores in the place of traces; every fault of the definitions.
+    pub fn reads_labels(&self) -> Result<bool, StudyError> {
+        let traces = self.traces()?;
+        let plan = self.question.bind(traces)?.plan;
+        let read = plan.needed_by(plan.outputs.iter().map(|output| output.node).chain(plan.filter));
+        Ok(plan.columns(&read).iter().any(|(name, _)| traces.is_label_column(name)))
+    }
+
+    /// The results of an earlier scan with the labels of coders as this study has them.
+    ///
+    /// # Errors
+    /// Scores in the place of traces.
+    pub fn relabelled(&self, mut results: Results) -> Result<Results, StudyError> {
+        let traces = self.traces()?;
+        let EpisodeTable { labels, keys, .. } = &mut results.episodes;
+        labels.retain(|label| !label.name.starts_with(PREFIX));
+        labels.extend(traces.label_columns().iter().map(|name| {
+            let value = |key: KeyRef<'_>| traces.labels().value(name, key.episode_id).map(|is| is.to_string());
+            LabelColumn { name: name.clone(), values: keys.iter().map(value).collect() }
+        }));
+        Ok(results)
     }
 
     fn scan_rows(&self, outputs: Outputs) -> Result<Results, StudyError> {
@@ -154,7 +182,7 @@ pub(crate) fn lost_episodes(traces: &TraceSet) -> Result<Option<Definitions>, St
     {
         return Ok(None);
     }
-    let columns = score_traces::trace_columns(traces);
+    let columns = vocabulary::trace_columns(traces);
     let statuses: Vec<String> = INFRASTRUCTURE.iter().map(|status| format!("'{status}'")).collect();
     let ended = format!("first(action = 'done') is null and at(reply_status, length()) in ({})", statuses.join(", "));
     // No metric and every experiment: the filter alone is asked for.

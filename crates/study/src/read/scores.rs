@@ -11,17 +11,13 @@ use exact::input;
 use metric::definitions::Definitions;
 use score::declared_experiments::Declarations;
 use score::format::{self, Format, Partition};
-use score::score_traces;
 use score::select::select;
 use score::table::EpisodeTable;
+use score::vocabulary;
 use trace::in_order::in_order;
 use trace::inputs;
 
 /// The episodes of some files as one table, filtered as the question asks.
-///
-/// # Errors
-/// A file that is not as it must be, scores under different definitions, an experiment that two of them declare differently,
-/// a fault of the filter.
 pub(crate) fn read(files: &[ScoreFile], question: &Question) -> Result<EpisodeTable, StudyError> {
     let (mut whole, mut declarations) = (None::<EpisodeTable>, Declarations::default());
     for file in files {
@@ -41,7 +37,7 @@ pub(crate) fn read(files: &[ScoreFile], question: &Question) -> Result<EpisodeTa
 fn read_one(file: &ScoreFile, question: &Question) -> Result<EpisodeTable, StudyError> {
     let failed = |error| StudyError::file(&file.input.name, error);
     let bytes = input::open(&file.input.path).map_err(|error| StudyError::file(&file.input.name, error))?;
-    let named = || Definitions::load(question.definitions_name(), &score_traces::schema_columns());
+    let named = || Definitions::load(question.definitions_name(), &vocabulary::schema_columns());
     if file.format != Format::Parquet {
         return format::read_text(file.format, &named()?.catalog, bytes).map_err(failed);
     }
@@ -57,7 +53,7 @@ fn read_one(file: &ScoreFile, question: &Question) -> Result<EpisodeTable, Study
 
 /// Scores keep the definitions that they were computed with: others cannot be asked of them.
 fn under(name: &Path, file: &ScoreFile, table: EpisodeTable) -> Result<EpisodeTable, StudyError> {
-    let wanted = Definitions::load(name, &score_traces::schema_columns())?.catalog;
+    let wanted = Definitions::load(name, &vocabulary::schema_columns())?.catalog;
     if wanted.hash == table.catalog.hash {
         return Ok(table);
     }
@@ -72,9 +68,6 @@ fn under(name: &Path, file: &ScoreFile, table: EpisodeTable) -> Result<EpisodeTa
 }
 
 /// Writes a table; Parquet is encoded by `threads` threads.
-///
-/// # Errors
-/// Whatever writing gives.
 pub fn write(
     table: &EpisodeTable,
     format: Format,

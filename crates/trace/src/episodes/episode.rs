@@ -6,7 +6,6 @@ use serde::{Deserialize, Serialize};
 /// The steps of one episode. Its JSON holds the constants alone, as logs do.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(rename = "Head", description = "The constants of an episode; the columns of the same names.")]
-#[expect(missing_docs, reason = "each field is the column of its name, documented in `schema`")]
 pub struct Episode {
     pub episode_id: String,
     pub model: String,
@@ -39,7 +38,6 @@ pub struct Episode {
     pub steps: Vec<Step>,
 }
 
-/// One timestep.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Step {
     /// The action; `None` if the reply gave none.
@@ -57,9 +55,7 @@ pub struct Step {
 /// An agent's action: the five actions of the study, and the six of a hand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Action {
-    /// One step forward.
     MoveForward,
-    /// One step backward.
     MoveBackward,
     /// 30 degrees counter-clockwise.
     TurnLeft,
@@ -88,43 +84,21 @@ impl Action {
     /// Those of a hand, in the order of their numbers in a prompt.
     pub const HAND: [Self; 6] =
         [Self::HandUp, Self::HandDown, Self::HandLeft, Self::HandRight, Self::HandForward, Self::HandBackward];
-
-    pub const ALL: [Self; 11] = [
-        Self::MoveForward,
-        Self::MoveBackward,
-        Self::TurnLeft,
-        Self::TurnRight,
-        Self::Done,
-        Self::HandUp,
-        Self::HandDown,
-        Self::HandLeft,
-        Self::HandRight,
-        Self::HandForward,
-        Self::HandBackward,
-    ];
-
-    /// The name in the `action` column.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::MoveForward => "move_forward",
-            Self::MoveBackward => "move_backward",
-            Self::TurnLeft => "turn_left",
-            Self::TurnRight => "turn_right",
-            Self::Done => "done",
-            Self::HandUp => "hand_up",
-            Self::HandDown => "hand_down",
-            Self::HandLeft => "hand_left",
-            Self::HandRight => "hand_right",
-            Self::HandForward => "hand_forward",
-            Self::HandBackward => "hand_backward",
-        }
-    }
-
-    /// The action of this name.
-    pub fn named(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|action| action.name() == name)
-    }
 }
+
+exact::names!(Action {
+    MoveForward: "move_forward",
+    MoveBackward: "move_backward",
+    TurnLeft: "turn_left",
+    TurnRight: "turn_right",
+    Done: "done",
+    HandUp: "hand_up",
+    HandDown: "hand_down",
+    HandLeft: "hand_left",
+    HandRight: "hand_right",
+    HandForward: "hand_forward",
+    HandBackward: "hand_backward",
+});
 
 /// Fields that may have no value, and are left out of the JSON then.
 macro_rules! optional {
@@ -139,7 +113,6 @@ macro_rules! optional {
 optional! {
     /// The optional columns that vary from step to step; names, types and units as in the schema.
     #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-    #[expect(missing_docs, reason = "each field is the column of its name, documented in `schema`")]
     Extra {
         mirror_self_px: i32,
         mirror_other_px: i32,

@@ -10,7 +10,6 @@ use exact::hash;
 pub struct Frame {
     /// Pixels in a row.
     pub width: usize,
-    /// Rows.
     pub height: usize,
     /// `3 * width * height` bytes.
     pub rgb: Vec<u8>,
@@ -51,7 +50,6 @@ pub enum Likeness {
     Equal,
     /// Other bytes; the means of all blocks are within [`TOLERANCE`].
     Alike,
-    /// Another picture.
     Different,
 }
 

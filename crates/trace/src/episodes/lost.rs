@@ -42,28 +42,14 @@ pub struct LostEpisode {
 /// A list that cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum LostListError {
-    /// The operating system refuses.
     #[error("cannot read {}: {source}", .path.display())]
-    Io {
-        /// The list.
-        path: PathBuf,
-        /// The error of the system.
-        source: io::Error,
-    },
-    /// A line that is no lost episode.
+    Io { path: PathBuf, source: io::Error },
     #[error(
         "{}, line {line}: expected a lost episode as `mirrorstats record` lists it, found {found}\n  \
          help: `mirrorstats record` writes the list anew; remove the line, or the file if no episode is missing",
         .path.display()
     )]
-    Line {
-        /// The list.
-        path: PathBuf,
-        /// From 1.
-        line: usize,
-        /// The problem.
-        found: String,
-    },
+    Line { path: PathBuf, line: usize, found: String },
 }
 
 /// The list in a folder.

@@ -1,8 +1,9 @@
-//! One episode: steps, hash, pictures, colours, losses, replies.
+//! One episode: steps, hash, pictures, colours, labels, losses, replies.
 
 pub mod episode;
 pub mod episode_hash;
 pub mod frame;
+pub mod labels;
 pub mod lost;
 pub mod palette;
 pub mod replies;

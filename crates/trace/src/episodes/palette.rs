@@ -8,7 +8,6 @@ use exact::names;
 /// A colour of the palette.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
-#[expect(missing_docs, reason = "each is the colour of its name")]
 pub enum Color {
     Blue,
     Brown,

@@ -4,20 +4,19 @@ use serde_json::Value;
 
 use crate::model_id::{OWN_SERVER, answers_for};
 use crate::read::open::TraceFile;
-use crate::schema::RECORDING_KEY;
 use exact::escape::visible;
 
 /// A sentence for each file with answers by another model than the one that was asked for.
 pub fn by_others(files: &[TraceFile]) -> Vec<String> {
-    let recording = |file: &TraceFile| serde_json::from_str(file.metadata_value(RECORDING_KEY)?).ok();
-    let told = |(file, recording): (&TraceFile, Value)| {
+    let told = |file: &TraceFile| {
+        let recording = file.recording();
         let others: Vec<String> = others(&recording).into_iter().map(|id| format!("`{}`", visible(id))).collect();
         let asked = visible(recording["agent"]["id"].as_str().unwrap_or_default());
         let found = others.join(", ");
         (!others.is_empty())
             .then(|| format!("another model answered in {}: asked for `{asked}`, found {found}", file.name()))
     };
-    files.iter().filter_map(|file| told((file, recording(file)?))).collect()
+    files.iter().filter_map(told).collect()
 }
 
 fn others(recording: &Value) -> Vec<&str> {

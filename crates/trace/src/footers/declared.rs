@@ -11,7 +11,6 @@ use serde_json::Value;
 
 use crate::lost::LostEpisode;
 use crate::read::open::TraceSet;
-use crate::schema::RECORDING_KEY;
 use exact::names;
 
 /// The origin of rows.
@@ -83,12 +82,11 @@ const fn is_false(value: &bool) -> bool {
 impl Declared {
     /// The declarations of some traces' footers.
     pub fn of(traces: &TraceSet) -> Self {
-        let recordings = traces.files().iter().map(|file| file.metadata_value(RECORDING_KEY));
-        recordings.map(Self::of_recording).reduce(Self::joined).unwrap_or_default()
+        let recordings = traces.files().iter().map(|file| Self::of_recording(&file.recording()));
+        recordings.reduce(Self::joined).unwrap_or_default()
     }
 
-    fn of_recording(text: Option<&str>) -> Self {
-        let recording: Value = text.and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default();
+    fn of_recording(recording: &Value) -> Self {
         let fingerprints = recording["fingerprints"].as_object().cloned().unwrap_or_default();
         let shared = Arc::new(recording.clone());
         Self {
@@ -132,20 +130,23 @@ impl Declared {
 
 #[cfg(test)]
 mod tests {
+    use serde_json::json;
+
     use super::{Cluster, Declared, Origin};
+    use crate::footers::recording;
 
     #[test]
     fn files_declare_together_their_common_declarations() {
-        let import = Declared::of_recording(Some(r#"{"kind":"import","design":{"cluster":"seed"}}"#));
+        let import = Declared::of_recording(&json!({ "kind": "import", "design": { "cluster": "seed" } }));
         assert_eq!((import.origin, import.cluster), (Some(Origin::Import), Some(Cluster::Seed)));
-        let recording = Declared::of_recording(Some(
-            r#"{"kind":"recording","fingerprints":{"a":{"model":"m"}},"registration":{"sha256":"r"}}"#,
-        ));
+        let recording = Declared::of_recording(&json!({
+            "kind": "recording", "fingerprints": { "a": { "model": "m" } }, "registration": { "sha256": "r" }
+        }));
         assert_eq!(recording.registration.as_ref().map(|plan| plan.sha256.as_str()), Some("r"));
         let both = import.clone().joined(recording);
         assert_eq!((both.origin, both.cluster, both.registration), (None, Some(Cluster::Seed), None));
         assert_eq!(both.fingerprints["a"]["model"], "m");
-        let made_up = Declared::of_recording(Some(r#"{"kind":"reconstruction"}"#));
+        let made_up = Declared::of_recording(&json!({ "kind": "reconstruction" }));
         assert_eq!(import.clone().joined(made_up).origin, Some(Origin::Reconstruction));
         assert_eq!(import.clone().joined(import.clone()), import);
     }
@@ -153,9 +154,7 @@ mod tests {
     #[test]
     fn a_fingerprint_of_two_contents_is_ambiguous() {
         let of = |model: &str| {
-            Declared::of_recording(Some(&format!(
-                r#"{{"kind":"recording","fingerprints":{{"a":{{"model":"{model}"}}}}}}"#
-            )))
+            Declared::of_recording(&json!({ "kind": "recording", "fingerprints": { "a": { "model": model } } }))
         };
         assert!(of("m").joined(of("m")).ambiguous.is_empty());
         assert!(of("m").joined(of("n")).joined(of("n")).ambiguous.contains("a"));
@@ -164,7 +163,7 @@ mod tests {
     #[test]
     fn an_absent_key_declares_nothing() {
         for text in [None, Some("no JSON"), Some("7"), Some(r#"{"kind":"other","design":7,"fingerprints":[]}"#)] {
-            assert_eq!(Declared::of_recording(text), Declared::default(), "{text:?}");
+            assert_eq!(Declared::of_recording(&recording(text)), Declared::default(), "{text:?}");
         }
     }
 }

@@ -42,15 +42,14 @@ struct Fault {
     found: String,
 }
 
-pub(crate) fn of_recording(file: &str, recording: Option<&str>) -> Result<Vec<DeclaredExperiment>, Box<Finding>> {
-    let recording: Value = recording.and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default();
-    read(&recording).map_err(|Fault { key, expected, found }| {
+pub(crate) fn of_recording(file: &str, recording: &Value) -> Result<Vec<DeclaredExperiment>, Box<Finding>> {
+    read(recording).map_err(|Fault { key, expected, found }| {
         let expected = format!("`{RECORDING_KEY}.{key}` to be {expected}");
         Box::new(Finding::new(Code::InvalidMetadata, file, expected, found).with_help(HELP))
     })
 }
 
-pub(crate) fn absent(file: &str, recording: Option<&str>) -> Vec<&'static str> {
+pub(crate) fn absent(file: &str, recording: &Value) -> Vec<&'static str> {
     // A recording that is not as it must be is distinguished from its columns.
     let declared = of_recording(file, recording).unwrap_or_default();
     let say_so = |name: &str| declared.iter().all(|experiment| experiment.absent.contains(&name));
@@ -164,9 +163,10 @@ mod tests {
     use serde_json::{Value, json};
 
     use super::{DeclaredExperiment, absent, of_recording};
+    use crate::footers::recording as parsed;
 
     fn declared(recording: &Value) -> Result<Vec<DeclaredExperiment>, String> {
-        of_recording("a.parquet", Some(&recording.to_string())).map_err(|finding| finding.to_string())
+        of_recording("a.parquet", recording).map_err(|finding| finding.to_string())
     }
 
     #[test]
@@ -187,7 +187,7 @@ mod tests {
 
     #[test]
     fn a_column_is_absent_where_every_experiment_says_so() {
-        let of = |recording: Value| absent("a.parquet", Some(&recording.to_string()));
+        let of = |recording: Value| absent("a.parquet", &recording);
         let both = json!({ "name": "A", "absent": ["selected_cube", "self_color"] });
         let one = json!({ "name": "B", "absent": ["self_color"] });
         assert_eq!(of(json!({ "experiment": both })), ["self_color", "selected_cube"]);
@@ -207,7 +207,7 @@ mod tests {
             Some(r#"{"experiment":null,"experiments":null}"#),
             Some(r#"{"experiment":"E1"}"#),
         ] {
-            assert_eq!(of_recording("a.parquet", text).unwrap(), [], "{text:?}");
+            assert_eq!(of_recording("a.parquet", &parsed(text)).unwrap(), [], "{text:?}");
         }
     }
 

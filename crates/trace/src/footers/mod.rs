@@ -4,3 +4,10 @@ pub mod answered;
 pub mod checksums;
 pub mod declared;
 pub mod declared_experiment;
+
+use serde_json::Value;
+
+/// The recording behind its text in a footer; null without one, or where it is no JSON: it declares nothing then.
+pub(crate) fn recording(text: Option<&str>) -> Value {
+    text.and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default()
+}

@@ -39,29 +39,12 @@ impl Faults {
 /// An error of importing lines of steps.
 #[derive(Debug, thiserror::Error)]
 pub enum ImportError {
-    /// Lines that are no steps, or steps that are no episodes.
     #[error("{}", listed(told, *more))]
-    Faults {
-        /// The first of them; never empty.
-        told: Vec<Fault>,
-        /// The number of further faults.
-        more: usize,
-    },
-    /// A text cannot be read.
+    Faults { told: Vec<Fault>, more: usize },
     #[error("cannot read {file}; check the path and its permissions")]
-    Read {
-        /// As it was named.
-        file: String,
-        /// The reason for the refusal.
-        source: io::Error,
-    },
-    /// A text is not what it was a moment before.
+    Read { file: String, source: io::Error },
     #[error("{file}: expected the lines of the first pass, found others\n  help: import it when nothing writes to it")]
-    Changed {
-        /// As it was named.
-        file: String,
-    },
-    /// The trace cannot be written, or breaks a rule of the schema.
+    Changed { file: String },
     #[error(transparent)]
     Trace(#[from] TraceError),
 }

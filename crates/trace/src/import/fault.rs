@@ -32,7 +32,6 @@ pub struct Fault {
     pub key: Option<String>,
     pub expected: String,
     pub found: String,
-    /// The remedy.
     pub help: String,
     /// The number of later lines with the same fault.
     pub further_lines: u64,

@@ -45,7 +45,6 @@ use error::Faults;
 use exact::replace::NewFile;
 use index::Index;
 
-/// The imported episodes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Imported {
     /// The number of episodes in the trace.

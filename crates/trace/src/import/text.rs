@@ -19,8 +19,7 @@ use super::mapping::Mapping;
 use crate::inputs::Input;
 use crate::schema::{self, Kind};
 use exact::budget::Limit;
-use exact::hash;
-use exact::input;
+use exact::{hash, input};
 
 /// Lines of steps, and what they are called in messages.
 #[derive(Debug)]

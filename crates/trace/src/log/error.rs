@@ -6,36 +6,16 @@ use std::path::Path;
 /// An error of a log.
 #[derive(Debug, thiserror::Error)]
 pub enum LogError {
-    /// The operating system refuses.
     #[error(
         "cannot {doing} the log `{file}`: {source}\n  help: is the folder there and writable, and the disk not full?"
     )]
-    Io {
-        /// The operation.
-        doing: &'static str,
-        /// The log.
-        file: String,
-        /// The reason for the refusal.
-        source: io::Error,
-    },
-    /// The bytes are not those of a log.
+    Io { doing: &'static str, file: String, source: io::Error },
     #[error(
         "the log `{file}` is damaged: {fault}\n  help: `mirrorstats trace recover {file} -o TRACE.parquet` saves what can be saved"
     )]
-    Damaged {
-        /// The log.
-        file: String,
-        /// The fault.
-        fault: String,
-    },
-    /// The bytes are those of a log, but not of a recording.
+    Damaged { file: String, fault: String },
     #[error("`{file}` is no log of a recording: {fault}")]
-    Foreign {
-        /// The log.
-        file: String,
-        /// The missing part.
-        fault: String,
-    },
+    Foreign { file: String, fault: String },
 }
 
 impl LogError {

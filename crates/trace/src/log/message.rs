@@ -31,7 +31,6 @@ pub enum EpisodeMessage {
 /// A message of the topic `/decision`: a row of the trace. A column without a value is left out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(transform = without_strangers)]
-#[expect(missing_docs, reason = "each field is the column of its name")]
 pub struct Decision {
     pub t: i32,
     #[serde(default, skip_serializing_if = "Option::is_none")]

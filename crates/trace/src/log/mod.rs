@@ -45,13 +45,13 @@ pub mod topic {
     /// Begin and end of episodes.
     pub const EPISODE: &str = "/episode";
     /// Frames.
-    pub const CAMERA: &str = "/camera";
+    pub(crate) const CAMERA: &str = "/camera";
     /// Poses.
-    pub const TRANSFORMS: &str = "/tf";
+    pub(crate) const TRANSFORMS: &str = "/tf";
     /// Shapes.
-    pub const SCENE: &str = "/scene";
+    pub(crate) const SCENE: &str = "/scene";
     /// Pixel counts.
-    pub const CENSUS: &str = "/census";
+    pub(crate) const CENSUS: &str = "/census";
     /// Rows of the trace.
-    pub const DECISION: &str = "/decision";
+    pub(crate) const DECISION: &str = "/decision";
 }

@@ -23,7 +23,6 @@ pub enum Event {
     Census(Value),
     /// The row of a step.
     Decision(Box<Decision>),
-    /// Any other message.
     Other,
 }
 

@@ -15,7 +15,7 @@ use parquet::basic::Type as Physical;
 use super::budget::check_names;
 use super::damaged::damaged;
 use super::footer::plain;
-use super::open::{Readable, TraceFile};
+use super::footer::trace_file::{Readable, TraceFile};
 use super::projection::{EPISODE_ID, Layout, LayoutColumn, T};
 use super::statistics::{Chunk, Seen};
 use crate::catch_panic::contained;

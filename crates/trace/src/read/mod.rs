@@ -1,5 +1,6 @@
 //! From the bytes of traces to whole episodes, in the order of the files.
 
+mod beside;
 pub(crate) mod budget;
 mod checks;
 pub(crate) mod decode;

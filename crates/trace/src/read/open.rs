@@ -1,78 +1,17 @@
-//! Opens traces: reads every footer, checks it against the schema, and knows what each column is over all files.
-//!
-//! No row is read here. A file is held by its name and what it is made of, never by an open handle, so that any number of
-//! files can be open at once.
+//! Traces opened together: every footer is read, and it is known what each column is over all files.
 
-use std::collections::HashMap;
-use std::fs::File;
-use std::io;
-use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError, Weak};
-
-use arrow::datatypes::DataType;
-use parquet::arrow::arrow_reader::ArrowReaderMetadata;
-use parquet::arrow::parquet_to_arrow_schema;
-use parquet::basic::ConvertedType;
-use parquet::file::metadata::{KeyValue, ParquetMetaData};
-use parquet::schema::types::SchemaDescriptor;
-
-use super::budget::{EpisodeBudget, MOST_COLUMNS};
-use super::footer::bounds;
-use super::footer::{Extent, Footer, footer, plain};
-use super::statistics::Declared as Statistics;
-use crate::catch_panic::contained;
-use crate::declared_experiment::{self, DeclaredExperiment};
-use crate::diagnostic::{Code, Finding};
+use super::beside::Beside;
+pub use super::footer::trace_file::{FileColumn, TraceFile};
+use crate::diagnostic::Finding;
 use crate::error::TraceError;
 use crate::inputs::Input;
-use crate::schema::colors::palette::{Declared, Palette};
-use crate::schema::{self, COLUMNS, Column, DeclaredColumn, Domain, Kind};
-use exact::escape::visible;
-use exact::input;
-use exact::suggest::nearest;
-use parquet_pages::checksums::{Checksums, ChunkChecksums};
-use parquet_pages::{Expansion, Store, rows_of, with_texts_as_keys};
+use crate::schema::{self, COLUMNS, Column, Domain, Kind};
 
 /// Traces that are open: every footer is read and good, no row is read yet.
 #[derive(Debug)]
 pub struct TraceSet {
     files: Vec<TraceFile>,
-}
-
-/// One trace whose footer is good.
-#[derive(Debug)]
-pub struct TraceFile {
-    name: String,
-    path: PathBuf,
-    bytes: u64,
-    version: u32,
-    domain: Domain,
-    columns: Vec<FileColumn>,
-    rows: Vec<usize>,
-    pairs: Vec<KeyValue>,
-    colors: Declared,
-    experiments: Vec<DeclaredExperiment>,
-    checksums: Checksums,
-    /// What the footer says of the values, of a file without checksums.
-    statistics: Statistics,
-    footer: Mutex<Weak<Readable>>,
-    expansion: Arc<Expansion>,
-    episodes: EpisodeBudget,
-}
-
-/// The parts of a file that a reader needs.
-#[derive(Debug)]
-pub(crate) struct Readable {
-    pub(crate) footer: ArrowReaderMetadata,
-    pub(crate) chunks: ChunkChecksums,
-}
-
-/// A column of one file.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct FileColumn {
-    pub name: String,
-    /// Its logical type; `None` for a column that is declared to hold nothing but nulls, which goes with any type.
-    pub kind: Option<Kind>,
+    beside: Beside,
 }
 
 /// The type and presence of a column over all files of a set.
@@ -97,7 +36,7 @@ impl TraceSet {
                 Err(findings) => faults.extend(findings),
             }
         }
-        let set = Self { files };
+        let set = Self::of(files);
         if set.domain() == Domain::Mirror {
             faults.extend(set.strangers());
         }
@@ -109,12 +48,12 @@ impl TraceSet {
 
     /// The domain of all files: the mirror's, unless every file is of another one.
     pub fn domain(&self) -> Domain {
-        let is_own = |file: &TraceFile| file.domain == Domain::Own;
+        let is_own = |file: &TraceFile| file.domain() == Domain::Own;
         if !self.files.is_empty() && self.files.iter().all(is_own) { Domain::Own } else { Domain::Mirror }
     }
 
     /// Findings about files of another domain among traces of the mirror's.
-    pub fn strangers(&self) -> Vec<Finding> {
+    pub(crate) fn strangers(&self) -> Vec<Finding> {
         self.files.iter().flat_map(TraceFile::strangeness).collect()
     }
 
@@ -135,7 +74,15 @@ impl TraceSet {
 
     /// Files that were opened one by one.
     pub fn of(files: Vec<TraceFile>) -> Self {
-        Self { files }
+        Self { files, beside: Beside::default() }
+    }
+
+    pub(super) fn beside(self, beside: Beside) -> Self {
+        Self { beside, ..self }
+    }
+
+    pub(super) const fn labelled(&self) -> &Beside {
+        &self.beside
     }
 
     /// The files, in their order.
@@ -143,17 +90,20 @@ impl TraceSet {
         &self.files
     }
 
-    /// The column of this name over all files; `None` if no file has it.
+    /// The column of this name over all files; `None` if no file has it, and it is no label's.
     pub fn column(&self, name: &str) -> Option<ColumnUse> {
+        if self.is_label_column(name) {
+            return Some(ColumnUse { kind: Kind::Bool, missing_from: None, conflict: None });
+        }
         let mut seen: Option<(&TraceFile, Kind)> = None;
         let (mut present, mut missing_from, mut conflict) = (false, None, None);
         for file in &self.files {
             match (file.column(name).map(|column| column.kind), seen) {
-                (None, _) => missing_from = missing_from.or_else(|| Some(file.name.clone())),
+                (None, _) => missing_from = missing_from.or_else(|| Some(file.name().to_owned())),
                 (Some(None), _) => present = true,
                 (Some(Some(kind)), None) => seen = Some((file, kind)),
                 (Some(Some(kind)), Some((first, known))) if kind != known && conflict.is_none() => {
-                    conflict = Some([(first.name.clone(), known), (file.name.clone(), kind)]);
+                    conflict = Some([(first.name().to_owned(), known), (file.name().to_owned(), kind)]);
                 }
                 (Some(Some(_)), Some(_)) => {}
             }
@@ -175,307 +125,11 @@ impl TraceSet {
         let known = COLUMNS.iter().filter(|column| self.domain().has(column)).map(|column| column.name);
         let mut names: Vec<&str> =
             known.filter(|name| self.files.iter().any(|file| file.column(name).is_some())).collect();
-        for column in self.files.iter().flat_map(|file| &file.columns) {
+        for column in self.files.iter().flat_map(TraceFile::columns) {
             if !names.contains(&column.name.as_str()) {
                 names.push(&column.name);
             }
         }
         names
     }
-}
-
-impl TraceFile {
-    /// Reads and checks the footer of one file.
-    pub fn open(input: &Input) -> Result<Self, Vec<Finding>> {
-        let opened = footer(input, Extent::Pages).map_err(|finding| vec![*finding])?;
-        let Footer { bytes, metadata, checksums, .. } = opened;
-        let version = version_of(&input.name, &metadata).map_err(|finding| vec![*finding])?;
-        let columns = columns_of(&input.name, metadata.file_metadata().schema_descr())?;
-        let pairs = metadata.file_metadata().key_value_metadata();
-        let recording = pairs.and_then(|pairs| value(pairs, schema::RECORDING_KEY));
-        let absent = declared_experiment::absent(&input.name, recording);
-        let domain = Domain::of_file(&columns, recording);
-        let mut findings = check_columns(&input.name, &columns, version, domain, &absent);
-        findings.extend(bounds::fault(&input.name, bytes, &metadata));
-        if !findings.is_empty() {
-            return Err(findings);
-        }
-        let rows = metadata.row_groups().iter().map(rows_of).collect();
-        let mut pairs = metadata.file_metadata().key_value_metadata().cloned().unwrap_or_default();
-        // They are verified, long, and of no other file.
-        pairs.retain(|pair| pair.key != schema::CHECKSUMS_KEY);
-        let recording = value(&pairs, schema::RECORDING_KEY);
-        let colors = Declared::of(&input.name, recording).map_err(|f| vec![*f])?;
-        let experiments = declared_experiment::of_recording(&input.name, recording).map_err(|f| vec![*f])?;
-        readable(metadata, &columns)
-            .map_err(|error| vec![Finding::new(Code::CorruptFooter, &input.name, "a readable schema", error)])?;
-        let whole = || footer(input, Extent::Whole).map(|footer| Statistics::of(&footer.metadata)).unwrap_or_default();
-        let statistics = if checksums == Checksums::Present { Statistics::default() } else { whole() };
-        let (name, path, footer) = (input.name.clone(), input.path.clone(), Mutex::default());
-        let (expansion, episodes) = (Arc::new(Expansion::new(bytes)), EpisodeBudget::new(bytes));
-        Ok(Self {
-            name,
-            path,
-            bytes,
-            version,
-            domain,
-            columns,
-            rows,
-            pairs,
-            colors,
-            experiments,
-            checksums,
-            statistics,
-            footer,
-            expansion,
-            episodes,
-        })
-    }
-
-    /// The name in messages and outputs.
-    pub fn name(&self) -> &str {
-        &self.name
-    }
-
-    /// Opens the file itself for reading.
-    pub fn reader(&self) -> io::Result<File> {
-        input::open(&self.path)
-    }
-
-    pub(crate) fn store(&self) -> io::Result<Store> {
-        self.reader().map(|file| Store::new(file, Arc::clone(&self.expansion)))
-    }
-
-    pub(crate) fn expansion(&self) -> &Arc<Expansion> {
-        &self.expansion
-    }
-
-    pub(crate) fn episodes(&self) -> &EpisodeBudget {
-        &self.episodes
-    }
-
-    /// Its path, for an engine that reads files itself.
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
-    pub fn bytes(&self) -> u64 {
-        self.bytes
-    }
-
-    /// The domain of its episodes.
-    pub const fn domain(&self) -> Domain {
-        self.domain
-    }
-
-    pub(crate) fn strangeness(&self) -> Vec<Finding> {
-        match self.domain {
-            Domain::Mirror => Vec::new(),
-            Domain::Own => check_columns(&self.name, &self.columns, self.version, Domain::Mirror, &[]),
-        }
-    }
-
-    pub(crate) fn misdeclared(&self, declared: &[DeclaredColumn]) -> Vec<Finding> {
-        let fault = |declared: &DeclaredColumn| {
-            let kind = self.column(&declared.name)?.kind.filter(|kind| *kind != declared.kind)?;
-            let expected = format!("{}, as the definitions declare it", declared.kind.name());
-            Some(Finding::new(Code::WrongType, &self.name, expected, kind.name()).in_column(&declared.name))
-        };
-        declared.iter().filter_map(fault).collect()
-    }
-
-    /// The columns in the file's order.
-    pub fn columns(&self) -> &[FileColumn] {
-        &self.columns
-    }
-
-    /// The column of this name.
-    pub fn column(&self, name: &str) -> Option<&FileColumn> {
-        self.columns.iter().find(|column| column.name == name)
-    }
-
-    /// Whether the file has the schema's column of this name, and not one of its own that is called so: a trace of an older
-    /// version may have used a name that the schema knows by now.
-    pub fn declares(&self, name: &str) -> bool {
-        let Some((column, known)) = self.column(name).zip(self.domain.column(name)) else { return false };
-        let has_kind = || column.kind.is_none_or(|kind| kind == known.stored.kind());
-        known.since <= self.version && (self.domain == Domain::Mirror || has_kind())
-    }
-
-    pub fn rows(&self) -> u64 {
-        self.rows.iter().map(|rows| *rows as u64).sum()
-    }
-
-    /// The number of row groups.
-    pub fn row_groups(&self) -> usize {
-        self.rows.len()
-    }
-
-    /// The number of rows in a row group.
-    ///
-    /// # Panics
-    /// For a row group that the file lacks.
-    pub fn row_group_rows(&self, row_group: usize) -> usize {
-        self.rows[row_group]
-    }
-
-    pub fn checksums(&self) -> Checksums {
-        self.checksums
-    }
-
-    pub(crate) fn statistics(&self) -> &Statistics {
-        &self.statistics
-    }
-
-    pub(crate) fn pairs(&self) -> &[KeyValue] {
-        &self.pairs
-    }
-
-    /// The palette that the footer declares, if it declares one.
-    pub fn palette(&self) -> Option<&Palette> {
-        self.colors.palette.as_ref()
-    }
-
-    pub(crate) fn colors(&self) -> &Declared {
-        &self.colors
-    }
-
-    /// The experiments that the footer declares, each once.
-    pub fn experiments(&self) -> &[DeclaredExperiment] {
-        &self.experiments
-    }
-
-    /// A value of the footer's key-value metadata.
-    pub fn metadata_value(&self, key: &str) -> Option<&str> {
-        value(&self.pairs, key)
-    }
-
-    /// The parts that a reader needs; strings are read as dictionaries. Read again unless somebody holds it.
-    pub(crate) fn footer(&self) -> Result<Arc<Readable>, Box<Finding>> {
-        let mut held = self.footer.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(footer) = held.upgrade() {
-            return Ok(footer);
-        }
-        let Footer { metadata, chunks, .. } = self.footer_again(Extent::Pages)?;
-        let corrupt = |error| Box::new(Finding::new(Code::CorruptFooter, &self.name, "a readable schema", error));
-        let footer = readable(metadata, &self.columns).map_err(corrupt)?;
-        let footer = Arc::new(Readable { footer, chunks });
-        *held = Arc::downgrade(&footer);
-        Ok(footer)
-    }
-
-    pub(crate) fn footer_again(&self, extent: Extent) -> Result<Footer, Box<Finding>> {
-        let input = Input { name: self.name.clone(), ..Input::new(&self.path) };
-        let again = footer(&input, extent)?;
-        let columns = columns_of(&self.name, again.metadata.file_metadata().schema_descr()).ok();
-        let has_rows = again.metadata.row_groups().iter().map(rows_of).eq(self.rows.iter().copied());
-        if again.bytes == self.bytes && has_rows && columns.as_ref() == Some(&self.columns) {
-            return Ok(again);
-        }
-        let expected = "the file as it was when it was opened";
-        Err(Box::new(Finding::new(Code::Unreadable, &self.name, expected, "another one in its place")))
-    }
-}
-
-fn value<'a>(pairs: &'a [KeyValue], key: &str) -> Option<&'a str> {
-    pairs.iter().find(|pair| pair.key == key)?.value.as_deref()
-}
-
-fn version_of(file: &str, metadata: &ParquetMetaData) -> Result<u32, Box<Finding>> {
-    // A file of another writer has none; its columns are checked all the same.
-    let pairs = metadata.file_metadata().key_value_metadata();
-    let Some(text) = pairs.and_then(|pairs| value(pairs, schema::VERSION_KEY)) else {
-        return Ok(schema::SCHEMA_VERSION);
-    };
-    match text.parse::<u32>() {
-        Ok(version) if version > schema::SCHEMA_VERSION => {
-            let expected = format!("schema version {} or older", schema::SCHEMA_VERSION);
-            Err(Box::new(Finding::new(Code::NewerSchema, file, expected, format!("version {version}"))))
-        }
-        Ok(version) if version > 0 => Ok(version),
-        _ => {
-            let expected = format!("`{}` to be a whole number from 1", schema::VERSION_KEY);
-            Err(Box::new(Finding::new(Code::InvalidMetadata, file, expected, format!("`{}`", visible(text)))))
-        }
-    }
-}
-
-pub(crate) fn columns_of(file: &str, descriptor: &SchemaDescriptor) -> Result<Vec<FileColumn>, Vec<Finding>> {
-    let corrupt = |found| vec![Finding::new(Code::CorruptFooter, file, "a schema of known types", found)];
-    let fields = contained(|| parquet_to_arrow_schema(descriptor, None))
-        .map_err(corrupt)?
-        .map_err(|error| corrupt(plain(&error)))?;
-    let roots = descriptor.root_schema().get_fields();
-    let nested: Vec<Finding> =
-        roots.iter().filter(|root| root.is_group()).map(|root| is_nested(file, root.name())).collect();
-    if !nested.is_empty() {
-        return Err(nested);
-    }
-    let columns = fields.fields().iter().zip(roots).map(|(field, root)| {
-        let text = root.get_basic_info().converted_type() == ConvertedType::UTF8;
-        FileColumn { name: field.name().clone(), kind: kind_of(field.data_type(), text) }
-    });
-    Ok(columns.collect())
-}
-
-/// Lists, structs and maps are refused whether or not somebody reads them: their levels declare how many values there are,
-/// and no count of the file bounds those.
-pub(crate) fn is_nested(file: &str, column: &str) -> Finding {
-    let expected = "a column with one value per row; leave it out, or write its parts as columns of their own";
-    Finding::new(Code::WrongType, file, expected, "a list, a struct or a map").in_column(column)
-}
-
-fn kind_of(stored: &DataType, text: bool) -> Option<Kind> {
-    match stored {
-        DataType::Null => None,
-        DataType::Boolean => Some(Kind::Bool),
-        integer if integer.is_integer() => Some(Kind::Int),
-        float if float.is_floating() => Some(Kind::Float),
-        // Text that is only annotated as JSON is not checked to be UTF-8 by the decoder.
-        DataType::Utf8 if text => Some(Kind::String),
-        _ => Some(Kind::Unsupported),
-    }
-}
-
-fn check_columns(file: &str, columns: &[FileColumn], version: u32, domain: Domain, absent: &[&str]) -> Vec<Finding> {
-    if let Err(exceeded) = MOST_COLUMNS.check(columns.len() as u64) {
-        return vec![Finding::over_budget(file, &exceeded)];
-    }
-    let (mut findings, mut counts) = (Vec::new(), HashMap::new());
-    for column in columns {
-        let count = counts.entry(column.name.as_str()).or_insert(0);
-        *count += 1;
-        if *count == 2 {
-            let finding = Finding::new(Code::RepeatedColumn, file, "one column of that name", "more than one");
-            findings.push(finding.in_column(&column.name));
-        }
-    }
-    let holds =
-        |known: &&Column| known.since <= version && (domain == Domain::Mirror || known.required && domain.has(known));
-    for known in COLUMNS.iter().filter(holds) {
-        let wanted = known.stored.kind();
-        match columns.iter().find(|column| column.name == known.name) {
-            None if known.required && !absent.contains(&known.name) => {
-                let strangers = columns.iter().map(|column| column.name.as_str());
-                let like = nearest(known.name, strangers.filter(|name| schema::column(name).is_none()));
-                let found = like.map_or("none".to_owned(), |name| format!("none, though there is `{name}`"));
-                let expected = format!("a column `{}` of type {}", known.name, wanted.name());
-                findings.push(Finding::new(Code::MissingColumn, file, expected, found).in_column(known.name));
-            }
-            Some(column)
-                if column.kind.is_some_and(|kind| kind != wanted) || column.kind.is_none() && !known.nullable =>
-            {
-                let found = column.kind.map_or("nothing but nulls", Kind::name);
-                let finding = Finding::new(Code::WrongType, file, wanted.name(), found);
-                findings.push(finding.in_column(known.name));
-            }
-            None | Some(_) => {}
-        }
-    }
-    findings
-}
-
-pub(crate) fn readable(metadata: ParquetMetaData, columns: &[FileColumn]) -> Result<ArrowReaderMetadata, String> {
-    let is_text: Vec<bool> = columns.iter().map(|column| column.kind == Some(Kind::String)).collect();
-    contained(|| with_texts_as_keys(metadata, &is_text))?.map_err(|error| plain(&error))
 }

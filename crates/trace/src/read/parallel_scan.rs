@@ -17,7 +17,7 @@ use arrow::datatypes::Int32Type;
 use super::budget::LONGEST_EPISODE;
 use super::decode::{Ids, RowGroup, Rows};
 use super::episode_index::Ahead;
-use super::open::{Readable, TraceFile};
+use super::footer::trace_file::{Readable, TraceFile};
 use super::projection::{EPISODE_ID, Layout};
 use crate::diagnostic::{Code, Finding};
 use crate::error::TraceError;

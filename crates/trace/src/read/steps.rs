@@ -7,7 +7,8 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
-use std::{thread, vec};
+use std::thread;
+use std::vec;
 
 use arrow::array::{Array as _, ArrayRef, AsArray as _, BooleanArray, RecordBatch, RecordBatchOptions, new_null_array};
 use arrow::compute::{CastOptions, cast, cast_with_options, filter_record_batch};
@@ -17,7 +18,8 @@ use parquet::arrow::arrow_reader::ParquetRecordBatchReader;
 
 use super::damaged::damaged;
 use super::footer::plain;
-use super::open::{Readable, TraceFile, TraceSet};
+use super::footer::trace_file::{Readable, TraceFile};
+use super::open::TraceSet;
 use super::projection::Layout;
 use crate::catch_panic::contained;
 use crate::diagnostic::{Code, Finding};
@@ -89,7 +91,7 @@ impl Steps {
             Field::new(name, data_type(set, name, kind), true)
         };
         let schema = Arc::new(Schema::new(names.iter().map(field).collect::<Vec<_>>()));
-        let files = set.files().iter().map(|file| Part::of_file(file).map_err(|found| TraceError::from(*found)));
+        let files = set.files().iter().map(|file| Part::of_file(file).map_err(TraceError::from));
         let parts: Vec<Vec<Part>> = files.collect::<Result<_, _>>()?;
         let parts = parts.into_iter().flatten().collect::<Vec<_>>().into_iter();
         let shape = Shape { schema, episodes: episodes.map(Arc::new) };
@@ -108,7 +110,7 @@ impl Steps {
             let Some(Ahead { name, rows }) = self.ahead.front() else { return Ok(None) };
             let expected = "a row group that can be read";
             let gone = || Box::new(Finding::new(Code::Unreadable, name, expected, "a thread that ended early"));
-            match rows.recv().map_err(|_| TraceError::from(*gone()))?? {
+            match rows.recv().map_err(|_| TraceError::from(gone()))?? {
                 None => drop(self.ahead.pop_front()),
                 some => return Ok(some),
             }
@@ -196,9 +198,9 @@ impl Part {
     }
 
     fn send(self, shape: &Shape, sender: &SyncSender<Rows>) -> Result<(), TraceError> {
-        let mut reader = self.reader(&shape.schema).map_err(|found| TraceError::from(*found))?;
+        let mut reader = self.reader(&shape.schema)?;
         while let Some(rows) = reader.next() {
-            let rows = shape.complete(&rows.map_err(|found| TraceError::from(*found))?)?;
+            let rows = shape.complete(&rows?)?;
             if sender.send(Ok(Some(rows))).is_err() {
                 break;
             }

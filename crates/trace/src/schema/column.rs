@@ -91,32 +91,19 @@ pub enum Kind {
     Unsupported,
 }
 
-impl Kind {
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Bool => "bool",
-            Self::Int => "integer",
-            Self::Float => "float",
-            Self::String => "string",
-            Self::Unsupported => "unsupported",
-        }
-    }
-}
+exact::names!(Kind { Bool: "bool", Int: "integer", Float: "float", String: "string", Unsupported: "unsupported" });
+
+exact::names!(Stored {
+    Bool: "bool",
+    Int8: "int8",
+    Int32: "int32",
+    Int64: "int64",
+    Float32: "float32",
+    Float64: "float64",
+    String: "string",
+});
 
 impl Stored {
-    /// The name in documentation and messages, `int32`.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Bool => "bool",
-            Self::Int8 => "int8",
-            Self::Int32 => "int32",
-            Self::Int64 => "int64",
-            Self::Float32 => "float32",
-            Self::Float64 => "float64",
-            Self::String => "string",
-        }
-    }
-
     pub const fn kind(self) -> Kind {
         match self {
             Self::Bool => Kind::Bool,

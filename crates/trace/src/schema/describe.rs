@@ -28,7 +28,6 @@ pub struct Rule {
     /// True if breaking it makes a trace unusable.
     pub severity: Severity,
     pub rule: &'static str,
-    /// The remedy.
     pub help: &'static str,
 }
 

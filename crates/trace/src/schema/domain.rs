@@ -25,7 +25,7 @@ pub enum Domain {
 }
 
 /// The name of the mirror's domain.
-pub const MIRROR: &str = "mirror";
+pub(crate) const MIRROR: &str = "mirror";
 
 /// The columns of the schema, in the order in which the writer stores them: required ones first.
 pub static COLUMNS: LazyLock<Vec<Column>> = LazyLock::new(|| {
@@ -125,9 +125,8 @@ impl DomainColumn {
 impl Domain {
     /// The domain of a file with these columns: its recording names it. Where it does not, a file with an identity and without
     /// any column of the mirror is of its own domain, and all others are traces of the mirror, damaged ones too.
-    pub(crate) fn of_file(columns: &[FileColumn], recording: Option<&str>) -> Self {
-        let recording: Option<Value> = recording.and_then(|text| serde_json::from_str(text).ok());
-        if let Some(name) = recording.as_ref().and_then(|recording| recording["domain"].as_str()) {
+    pub(crate) fn of_file(columns: &[FileColumn], recording: &Value) -> Self {
+        if let Some(name) = recording["domain"].as_str() {
             return Self::named(name);
         }
         let has = |known: &Column| columns.iter().any(|column| column.name == known.name);

@@ -42,11 +42,11 @@ pub struct MetadataKey {
 /// Footer key: the version of this schema, a decimal integer.
 pub const VERSION_KEY: &str = "mirrorstats.schema_version";
 /// Footer key: the program that wrote the file.
-pub const WRITER_KEY: &str = "mirrorstats.writer";
+pub(crate) const WRITER_KEY: &str = "mirrorstats.writer";
 /// Footer key: how the recording was made, JSON.
 pub const RECORDING_KEY: &str = "mirrorstats.recording";
 /// Footer key: checksums of the columns and of the footer, JSON.
-pub const CHECKSUMS_KEY: &str = parquet_pages::checksums::KEY;
+pub(crate) const CHECKSUMS_KEY: &str = parquet_pages::checksums::KEY;
 
 /// The key-value metadata of a trace's footer.
 pub const METADATA: &[MetadataKey] = &[

@@ -38,7 +38,6 @@ pub enum Requirement<'a> {
     Experiment(&'a [String]),
     /// 1 in an episode's first row.
     FromOne,
-    /// Each number once.
     Once,
     /// No number left out.
     WithoutGap,

@@ -7,6 +7,7 @@ use std::fs::File;
 use std::io;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
+use std::slice;
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -171,22 +172,21 @@ struct Old {
 
 impl Old {
     fn open(input: &Input) -> Result<Self, TraceError> {
-        let file = TraceFile::open(input).map_err(|findings| match TraceError::of(findings) {
-            Some(error) => error,
-            None => unexplained(input),
-        })?;
+        let set = TraceSet::open(slice::from_ref(input))?;
+        let file = &set.files()[0];
         if file.column(SOURCE).is_none() {
             let finding = Finding::new(Code::MissingColumn, &input.name, "a column of texts to read", "none");
             let help = "the trace keeps no text behind its attributions: leave it out";
             return Err(finding.in_column(SOURCE).with_help(help).into());
         }
-        let text = file.metadata_value(RECORDING_KEY).unwrap_or("{}");
-        let Ok(recording @ Value::Object(_)) = serde_json::from_str(text) else {
+        let is_absent = file.metadata_value(RECORDING_KEY).is_none();
+        let recording = if is_absent { Map::new().into() } else { file.recording() };
+        if !recording.is_object() {
             let expected = format!("a JSON object as `{RECORDING_KEY}`");
             let finding = Finding::new(Code::InvalidMetadata, &input.name, expected, "something else");
             return Err(finding.with_help("correct or remove that key in the footer").into());
-        };
-        Ok(Self { set: TraceSet::of(vec![file]), recording })
+        }
+        Ok(Self { set, recording })
     }
 
     fn bytes(&self) -> u64 {
@@ -266,10 +266,6 @@ fn find(value: &mut Value) -> Option<&mut Value> {
         return members.get_mut(VERSION_KEY);
     }
     members.iter_mut().find_map(|(_, inner)| find(inner))
-}
-
-fn unexplained(input: &Input) -> TraceError {
-    Finding::new(Code::Unreadable, &input.name, "a trace that can be opened", "one that cannot").into()
 }
 
 #[cfg(test)]

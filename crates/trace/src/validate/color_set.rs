@@ -226,7 +226,7 @@ impl Spellings {
         pass(files, layout, threads, &work, |file, event| {
             match event {
                 Event::Whole(found) => tally.add(files, file, found),
-                Event::Fault(finding) => return Err(TraceError::from(*finding)),
+                Event::Fault(finding) => return Err(TraceError::from(finding)),
             }
             Ok(())
         })?;

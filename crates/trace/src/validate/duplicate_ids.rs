@@ -93,7 +93,7 @@ fn first_equal(
     let search = pass(files, layout, NonZeroUsize::MIN, &|episodes| starts(&episodes), |file, event| {
         let starts = match event {
             Event::Whole(starts) => starts,
-            Event::Fault(finding) => return Err(TraceError::from(*finding).into()),
+            Event::Fault(finding) => return Err(TraceError::from(finding).into()),
         };
         for start in starts {
             if left == 0 {

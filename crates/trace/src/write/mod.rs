@@ -59,7 +59,6 @@ const OF_OTHER_TASKS: [&str; 10] = [
 ];
 
 impl OptionalColumns {
-    /// No optional column.
     pub const NONE: Self = Self { given: Vec::new(), absent: Vec::new() };
 
     pub fn all() -> Self {
@@ -152,8 +151,8 @@ impl<W: Write + Send> TraceEncoder<W> {
     }
 
     fn with(make: Make<W>, out: W, metadata: &TraceMetadata) -> Result<Self, TraceError> {
-        let recording = metadata.recording.as_ref().map(ToString::to_string);
-        let palette = Declared::of("stream", recording.as_deref()).map_err(|finding| *finding)?.palette;
+        let recording = metadata.recording.as_ref().unwrap_or(&serde_json::Value::Null);
+        let palette = Declared::of("stream", recording).map_err(|finding| *finding)?.palette;
         let (columns, undeclared) = metadata.columns.split();
         let gathered = Gathered::of_columns(columns.iter().copied());
         let file = make(out, &gathered.layout, metadata.recording.as_ref()).map_err(failed)?;

@@ -40,44 +40,43 @@ pub(crate) fn rewrite<W: Write + Send>(
     out: W,
 ) -> Result<W, TraceError> {
     let layout = Layout::new(set, [source, target], [])?;
-    let [file] = set.files() else { return Err(unwritable("the trace", "there is not exactly one".into())) };
-    // What is copied gets new checksums, which must not represent damaged bytes.
-    verify_pages(set)?;
-    let failed = |error: ParquetError| unwritable(file.name(), error.into());
-    let metadata = file.footer_again(Extent::Whole).map_err(|finding| TraceError::from(*finding))?.metadata;
-    let schema = with_text(metadata.file_metadata().schema_descr(), target).map_err(failed)?;
-    let properties = properties(with_recording(file, recording));
-    let mut writer = SerializedFileWriter::new(Held::new(out), schema, properties).map_err(failed)?;
-    let input = file.reader().map_err(|source| TraceError::Read { what: file.name().to_owned(), source })?;
-    for row_group in 0..file.row_groups() {
-        let mut group = writer.next_row_group().map_err(failed)?;
-        for chunk in metadata.row_group(row_group).columns() {
-            if chunk.column_path().parts() == [target] {
-                write_texts(&mut group, (file, row_group), &layout, [source, target], &mut change)?;
-            } else {
-                copy(&mut group, chunk, file.row_group_rows(row_group), &input).map_err(failed)?;
-            }
-        }
-        group.close().map_err(failed)?;
-        checksums::pass_on(&mut writer).map_err(failed)?;
-    }
-    checksums::finish(writer).map_err(failed)
+    copied(set, out, Some((target, recording)), |group, file, row_group| {
+        write_texts(group, (file, row_group), &layout, [source, target], &mut change)
+    })
 }
 
 /// Writes the trace of a set's only file to `out` with checksums; every column is copied as it is.
 pub(crate) fn with_checksums<W: Write + Send>(set: &TraceSet, out: W) -> Result<W, TraceError> {
+    copied(set, out, None, |_, _, _| Ok(()))
+}
+
+/// Copies the columns of a set's only file; `write` gives the one that is made anew, beside the new recording.
+fn copied<W: Write + Send>(
+    set: &TraceSet,
+    out: W,
+    anew: Option<(&str, &serde_json::Value)>,
+    mut write: impl FnMut(&mut SerializedRowGroupWriter<'_, Held<W>>, &TraceFile, usize) -> Result<(), TraceError>,
+) -> Result<W, TraceError> {
     let [file] = set.files() else { return Err(unwritable("the trace", "there is not exactly one".into())) };
+    // What is copied gets new checksums, which must not represent damaged bytes.
     verify_pages(set)?;
     let failed = |error: ParquetError| unwritable(file.name(), error.into());
-    let metadata = file.footer_again(Extent::Whole).map_err(|finding| TraceError::from(*finding))?.metadata;
-    let schema = metadata.file_metadata().schema_descr().root_schema_ptr();
-    let properties = properties(file.pairs().to_vec());
-    let mut writer = SerializedFileWriter::new(Held::new(out), schema, properties).map_err(failed)?;
+    let metadata = file.footer_again(Extent::Whole)?.metadata;
+    let old = metadata.file_metadata().schema_descr();
+    let (schema, pairs) = match anew {
+        Some((column, recording)) => (with_text(old, column).map_err(failed)?, with_recording(file, recording)),
+        None => (old.root_schema_ptr(), file.pairs().to_vec()),
+    };
+    let mut writer = SerializedFileWriter::new(Held::new(out), schema, properties(pairs)).map_err(failed)?;
     let input = file.reader().map_err(|source| TraceError::Read { what: file.name().to_owned(), source })?;
     for row_group in 0..file.row_groups() {
         let mut group = writer.next_row_group().map_err(failed)?;
         for chunk in metadata.row_group(row_group).columns() {
-            copy(&mut group, chunk, file.row_group_rows(row_group), &input).map_err(failed)?;
+            if anew.is_some_and(|(column, _)| chunk.column_path().parts() == [column]) {
+                write(&mut group, file, row_group)?;
+            } else {
+                copy(&mut group, chunk, file.row_group_rows(row_group), &input).map_err(failed)?;
+            }
         }
         group.close().map_err(failed)?;
         checksums::pass_on(&mut writer).map_err(failed)?;
@@ -125,8 +124,8 @@ fn write_texts<W: Write + Send>(
         Ok::<_, TraceError>(())
     };
     let (mut values, mut levels) = (Vec::new(), Vec::with_capacity(WRITTEN_ROWS));
-    for rows in RowGroup::open(file, layout, row_group, None).map_err(|finding| TraceError::from(*finding))? {
-        let rows = rows.map_err(|finding| TraceError::from(*finding))?;
+    for rows in RowGroup::open(file, layout, row_group, None)? {
+        let rows = rows?;
         for row in 0..rows.len() {
             let (id, t) = (rows.episode(row).unwrap_or_default(), rows.columns[T].int(row).unwrap_or_default());
             let text = change((id, t, rows.columns[source].text(row), rows.columns[target].text(row)))?;

@@ -6,6 +6,7 @@ use serde_json::{Map, Value, json};
 
 use super::super::error::ViewError;
 use super::super::filter::{Query, number, required};
+use super::super::labels;
 use super::super::list;
 use super::super::snapshot::{Opened, Scored, Snapshot};
 use super::super::verdict;
@@ -65,6 +66,7 @@ pub(crate) fn described(
         "running": opened.running.is_some(),
         "frames": first.is_some_and(|moment| moment.frame.is_some()),
         "log": first.is_some(),
+        "labels": labels::of_episode(snapshot, &episode.episode_id),
         "lost": is_lost(snapshot, &episode.episode_id),
         "constants": constants(opened, longest),
         "own": opened.own.is_some(),

@@ -6,8 +6,10 @@ use serde_json::{Value, json};
 
 use super::super::error::ViewError;
 use super::super::filter::{COLUMNS, Filter, Query, condition_of, number, value};
+use super::super::labels;
 use super::super::snapshot::Snapshot;
 use exact::escape::visible;
+use score::select::is_of_coders;
 use score::table::{EpisodeTable, MetricColumn};
 
 /// The most episodes in an answer.
@@ -36,6 +38,7 @@ pub(crate) fn answer(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewEr
         "generation": snapshot.generation,
         "metrics": table.metrics.iter().map(|metric| visible(&metric.name)).collect::<Vec<_>>(),
         "has_conditions": table.has_conditions(),
+        "has_labels": table.labels.iter().any(is_of_coders),
         "rows": page.iter().map(|row| with_words(table, *row)).collect::<Vec<_>>(),
     }))
 }
@@ -47,6 +50,7 @@ pub(crate) fn everything(snapshot: &Snapshot) -> Result<Value, ViewError> {
         "metrics": table.metrics.iter().map(|metric| visible(&metric.name)).collect::<Vec<_>>(),
         "labels": table.labels.iter().map(|label| &label.name).collect::<Vec<_>>(),
         "has_conditions": table.has_conditions(),
+        "has_labels": table.labels.iter().any(is_of_coders),
         "rows": (0..table.len()).map(|row| with_keys(table, row)).collect::<Vec<_>>(),
     }))
 }
@@ -133,5 +137,6 @@ fn told(table: &EpisodeTable, row: usize) -> Value {
         "seed": key.seed,
         "run": key.run,
         "values": table.metrics.iter().map(value).collect::<Vec<_>>(),
+        "put": labels::of_row(table, row),
     })
 }

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use serde_json::{Value, json};
 
 use super::super::View;
+use super::super::error::ViewError;
 use super::super::found::{Found, stamp};
 use super::super::snapshot::{Running, Snapshot};
 use exact::escape::visible;
@@ -50,6 +51,13 @@ impl View {
         })
     }
 
+    /// Looks at the files now.
+    pub(crate) fn refresh(&self) -> Result<(), ViewError> {
+        let mut watch = self.watch.lock().unwrap_or_else(PoisonError::into_inner);
+        self.look(&mut watch);
+        watch.fault.clone().map_or(Ok(()), |fault| Err(ViewError::Absent(fault)))
+    }
+
     fn look(&self, watch: &mut Watch) {
         let old = self.newest();
         let found = match Found::of(&self.options.runs) {
@@ -59,14 +67,18 @@ impl View {
                 return;
             }
         };
-        let is_same = found.stamps() == old.stamps;
+        let (is_same, has_labels) = (found.stamps() == old.stamps, found.label_stamps() == old.label_stamps);
         let growing: Vec<_> = found.unfinished.iter().map(|path| stamp(path).0).collect();
         let known: Vec<_> = old.running.iter().map(|running| running.log.clone()).collect();
-        if is_same && growing.is_empty() && known.is_empty() {
+        if is_same && has_labels && growing.is_empty() && known.is_empty() {
             watch.fault = None;
             return;
         }
-        let newer = if is_same { Ok(old.grown(&found)) } else { Snapshot::open(&self.options, old.generation + 1) };
+        let newer = match (is_same, has_labels) {
+            (true, true) => Ok(old.grown(&found, old.scored.clone())),
+            (true, false) => old.relabelled(&found),
+            (false, _) => Snapshot::open(&self.options, old.generation + 1),
+        };
         match newer {
             Ok(newer) => {
                 *self.newest.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(newer);

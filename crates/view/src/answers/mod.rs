@@ -3,6 +3,7 @@
 pub(super) mod changes;
 pub(super) mod compare;
 pub(super) mod episode;
+pub(super) mod labels;
 pub(super) mod list;
 pub(super) mod live;
 pub(super) mod map;

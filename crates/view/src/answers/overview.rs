@@ -11,6 +11,7 @@ use super::super::snapshot::{Scored, Snapshot};
 use exact::escape::visible;
 use exact::format::fixed;
 use report::html;
+use score::select::is_of_coders;
 use score::table::{EpisodeTable, MetricColumn};
 use study::{ModelMean, Outputs, Overview, Part, Question, model_means};
 use trace::palette::Color;
@@ -29,6 +30,7 @@ pub(crate) fn study(snapshot: &Snapshot) -> Value {
         "choices": choices(scored),
         "metrics": html::metrics(&table.catalog),
         "paint": Color::ALL.map(|color| json!({"name": color.name(), "rgb": color.rgb()})),
+        "coder": snapshot.options.coder.as_deref().map(visible),
         "version": env!("CARGO_PKG_VERSION"),
     })
 }
@@ -41,7 +43,8 @@ fn named(definitions: &Path) -> String {
 fn choices(scored: &Scored) -> Vec<Value> {
     let table = &scored.results.episodes;
     let metrics = table.metrics.iter().map(|metric| metric.name.as_str());
-    let columns = COLUMNS.into_iter().chain(["seed", PARTICIPANT]).chain(metrics);
+    let of_coders = table.labels.iter().filter(|label| is_of_coders(label)).map(|label| label.name.as_str());
+    let columns = COLUMNS.into_iter().chain(["seed", PARTICIPANT]).chain(of_coders).chain(metrics);
     columns.filter_map(|column| choice(table, column)).chain(statuses(scored)).collect()
 }
 

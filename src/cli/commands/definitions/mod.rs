@@ -16,7 +16,7 @@ use exact::escape::visible;
 use exact::suggest::nearest;
 use metric::definitions::{Definitions, UnknownMetric};
 use metric::file::{FileError, built_in, built_in_names};
-use score::score_traces;
+use score::vocabulary;
 use study::StudyError;
 use toml_spec::FaultRecord;
 use trace::inputs;
@@ -93,10 +93,10 @@ impl DefinitionsArgs {
 
 fn check(file: &Path, traces: &[OsString], json: bool) -> Result<Outcome, Failure> {
     let columns = if traces.is_empty() {
-        score_traces::schema_columns()
+        vocabulary::schema_columns()
     } else {
         let inputs = inputs::resolve(traces, io::stdin().lock()).map_err(Failure::input)?;
-        score_traces::trace_columns(&TraceSet::open(&inputs).map_err(Failure::input)?)
+        vocabulary::trace_columns(&TraceSet::open(&inputs).map_err(Failure::input)?)
     };
     match Definitions::load(file, &columns) {
         Ok(definitions) if json => {
@@ -128,7 +128,7 @@ fn check(file: &Path, traces: &[OsString], json: bool) -> Result<Outcome, Failur
 }
 
 fn explain(metric: &str, definitions: &Path, json: bool) -> Result<Outcome, Failure> {
-    let definitions = Definitions::load(definitions, &score_traces::schema_columns()).map_err(StudyError::from)?;
+    let definitions = Definitions::load(definitions, &vocabulary::schema_columns()).map_err(StudyError::from)?;
     if let Some(explanation) = definitions.explain(metric) {
         return output::print(&explanation, json);
     }

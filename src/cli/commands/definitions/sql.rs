@@ -6,7 +6,7 @@ use std::io::{self, Write as _};
 use crate::cli::args::{GroupingArgs, ScoringArgs};
 use crate::cli::outcome::{Failure, Outcome};
 use metric::sql::{self, Dialect};
-use score::score_traces::{schema_columns, trace_columns};
+use score::vocabulary::{schema_columns, trace_columns};
 use study::Study;
 
 /// Print the SQL statement that computes the episode table from a table `steps`

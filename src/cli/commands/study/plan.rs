@@ -14,13 +14,13 @@ use exact::suggest::hint;
 use metric::definitions::Definitions;
 use report::plan::register::{NamedHash, RegisteredPlan};
 use report::plan::{Given, Plan, PlanRequest, plan};
-use score::score_traces::schema_columns;
+use score::vocabulary::schema_columns;
 use statistics::sample_size::Clusters;
 use study::StudyError;
 
 /// Plan how many episodes a study needs: for a wanted difference, or the difference that given episodes can show
 #[derive(Clone, Debug, clap::Args)]
-#[command(group(clap::ArgGroup::new("given").required(true).args(["difference", "episodes", "runs"])))]
+#[command(group(clap::ArgGroup::new("given").required(true).args(["difference", "episodes", "runs", "scenes"])))]
 pub struct PlanArgs {
     /// The difference of two rates to show, such as 0.3: how many episodes does it take?
     #[arg(long, value_name = "D", value_parser = share)]
@@ -31,6 +31,9 @@ pub struct PlanArgs {
     /// The same as runs per seed
     #[arg(long, value_name = "R", value_parser = clap::value_parser!(u64).range(1..))]
     pub runs: Option<u64>,
+    /// The same as scenes that each participant plays
+    #[arg(long, value_name = "N", requires = "participants", value_parser = clap::value_parser!(u64).range(1..))]
+    pub scenes: Option<u64>,
     /// The lower of the two rates [default: both around 1/2, the worst case]
     #[arg(long, value_name = "RATE", value_parser = share)]
     pub baseline: Option<f64>,
@@ -46,6 +49,9 @@ pub struct PlanArgs {
     /// Seeds, each with as many runs
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u64).range(1..=2000))]
     pub seeds: u64,
+    /// Participants of a crossed study in the place of seeds, each with as many scenes: tests count participants, as `stats` does
+    #[arg(long, value_name = "N", conflicts_with_all = ["seeds", "sequential", "register", "episodes", "runs"], value_parser = clap::value_parser!(u64).range(1..=2000))]
+    pub participants: Option<u64>,
     /// The share of pairs in which one model alone succeeds [default: as if independent, the worst case]
     #[arg(long, value_name = "SHARE", value_parser = share)]
     pub discordance: Option<f64>,
@@ -119,7 +125,7 @@ impl PlanArgs {
             power: self.power,
             confidence: self.confidence,
             models: self.models,
-            clusters: Clusters { seeds: self.seeds, icc: self.icc },
+            clusters: Clusters { seeds: self.clusters(), icc: self.icc, people: self.participants.is_some() },
             discordance: self.discordance,
             chance: self.chance,
             sequential: self.sequential,
@@ -127,14 +133,19 @@ impl PlanArgs {
     }
 
     fn given(&self) -> Result<Given, Failure> {
-        match (self.difference, self.episodes, self.runs) {
+        let seeds = self.clusters();
+        match (self.difference, self.episodes, self.runs.or(self.scenes)) {
             (Some(difference), ..) => Ok(Given::Difference(difference)),
-            (_, Some(episodes), _) if !episodes.is_multiple_of(self.seeds) => {
-                Err(Failure::input(UsageError::Uneven { episodes, seeds: self.seeds }))
+            (_, Some(episodes), _) if !episodes.is_multiple_of(seeds) => {
+                Err(Failure::input(UsageError::Uneven { episodes, seeds }))
             }
-            (_, Some(episodes), _) => Ok(Given::Runs(episodes / self.seeds)),
-            (_, _, runs) => Ok(Given::Runs(runs.expect("one of the three is required"))),
+            (_, Some(episodes), _) => Ok(Given::Runs(episodes / seeds)),
+            (_, _, runs) => Ok(Given::Runs(runs.expect("one of the four is required"))),
         }
+    }
+
+    fn clusters(&self) -> u64 {
+        self.participants.unwrap_or(self.seeds)
     }
 
     fn write(&self, file: &Path, plan: &Plan) -> Result<(), Failure> {

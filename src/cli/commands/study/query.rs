@@ -8,7 +8,7 @@ use crate::cli::outcome::{Failure, Outcome};
 /// Run a SELECT over the tables steps, episodes and cells
 ///
 /// `steps` has one row per step, with every column of the traces as it is; a column that one file lacks is null there.
-/// `episodes` is what `score` writes, `cells` what `report` writes as cells.csv. Rows come in no fixed order unless the
+/// `episodes` is what `score` writes, with the labels of coders as true or false, `cells` what `report` writes as cells.csv. Rows come in no fixed order unless the
 /// query says ORDER BY. A query reads the traces named and nothing else.
 #[derive(Clone, Debug, clap::Args)]
 pub struct QueryArgs {

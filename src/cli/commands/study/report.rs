@@ -9,8 +9,8 @@ use serde::Serialize;
 use crate::cli::args::{EngineArgs, GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
-use crate::cli::text_table::counted;
 use crate::cli::typed::plan::with_plan;
+use exact::format::counted;
 use report::bundle::Manifest;
 use study::{Report, ReportOptions, WrittenReport};
 

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use crate::cli::args::{Engine, EngineArgs, GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::text_table::counted;
 use crate::cli::{output, spark};
+use exact::format::counted;
 use exact::replace::is_stream;
 use score::format::Format;
 use score::table::EpisodeTable;

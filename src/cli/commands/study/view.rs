@@ -12,6 +12,7 @@ use crate::cli::output;
 use exact::escape::visible;
 use study::Question;
 use trace::inputs;
+use trace::labels::check_coder;
 use view::{Options, View, ViewError, export, film, routes};
 use web::{Guard, check_token, new_token};
 
@@ -49,12 +50,15 @@ pub struct ViewArgs {
     /// Let every account of this machine open the page without a token
     #[arg(long, conflicts_with = "token")]
     no_token: bool,
+    /// Label episodes and steps as this coder: lines are added to labels.jsonl beside the traces
+    #[arg(long, value_name = "CODER", value_parser = coder)]
+    label: Option<String>,
     /// Open no browser
     #[arg(long)]
     no_open: bool,
     /// Write the page and all that it shows into this folder instead; with --episode one file: a page such
     /// as episode.html, or a film such as episode.png
-    #[arg(long, value_name = "DIR|FILE", conflicts_with_all = ["port", "host", "token", "no_token", "no_open"])]
+    #[arg(long, value_name = "DIR|FILE", conflicts_with_all = ["port", "host", "token", "no_token", "no_open", "label"])]
     export: Option<PathBuf>,
     #[command(flatten)]
     threads: ThreadArgs,
@@ -68,6 +72,7 @@ impl ViewArgs {
             question: Question { each: true, ..self.scoring.question(&self.grouping) },
             against: self.against.clone(),
             style: self.style.clone(),
+            coder: self.label.clone(),
             threads: self.threads.count(),
         };
         if let Ok(inputs) = inputs::resolve(&self.runs, io::empty()) {
@@ -147,6 +152,10 @@ impl From<ViewError> for Failure {
             error => Self::input(error),
         }
     }
+}
+
+fn coder(text: &str) -> Result<String, String> {
+    check_coder(text).map(|()| text.to_owned()).map_err(|invalid| invalid.to_string())
 }
 
 fn token(text: &str) -> Result<String, String> {

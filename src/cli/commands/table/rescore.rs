@@ -8,9 +8,9 @@ use serde::Serialize;
 
 use crate::cli::args::ThreadArgs;
 use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::text_table::counted;
 use crate::cli::{output, terminal};
 use exact::escape::visible;
+use exact::format::counted;
 use report::bundle::Manifest;
 use report::cells::diff::Changes;
 use report::changes::Limit;

@@ -5,9 +5,9 @@ use std::io::{self, Write as _};
 use crate::cli::args::TraceArgs;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
-use crate::cli::quality;
 use exact::escape::visible;
 use exact::format::fixed;
+use report::layout::quality;
 use score::quality::{CellKey, Quality, QualityByCell};
 use study::{NotRecorded, QualityCheckAnswer, QualityLimits, Violation};
 

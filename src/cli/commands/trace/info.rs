@@ -8,11 +8,10 @@ use serde::Serialize;
 
 use crate::cli::args::TraceArgs;
 use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::output;
-use crate::cli::quality;
-use crate::cli::terminal;
-use crate::cli::text_table::counted;
+use crate::cli::{output, terminal};
 use exact::escape::visible;
+use exact::format::counted;
+use report::layout::quality;
 use report::tables::{Table, wrapped};
 use score::quality::QualityByCell;
 use study::CellAnswer;

@@ -1,8 +1,9 @@
-//! `trace`: what traces hold, whether they are valid, how they are written anew; `import` makes one.
+//! `trace`: what traces hold, what coders say of them, whether they are valid, how they are written anew; `import` makes one.
 
 pub mod check;
 pub mod import;
 pub mod info;
+pub mod labels;
 pub mod recover;
 pub mod renormalize;
 pub mod schema;
@@ -15,6 +16,7 @@ use crate::cli::outcome::{Failure, Outcome};
 #[derive(Debug, clap::Subcommand)]
 pub enum TraceCommand {
     Info(info::InfoCommand),
+    Labels(labels::LabelsArgs),
     Validate(validate::ValidateCommand),
     Check(check::CheckArgs),
     Recover(recover::RecoverArgs),
@@ -27,6 +29,7 @@ impl TraceCommand {
     pub fn run(self) -> Result<Outcome, Failure> {
         match self {
             Self::Info(args) => args.run(),
+            Self::Labels(args) => args.run(),
             Self::Validate(args) => args.run(),
             Self::Check(args) => args.run(),
             Self::Recover(args) => args.run(),

@@ -11,13 +11,12 @@ use serde_json::Value;
 
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
-use crate::cli::text_table::counted;
+use exact::format::counted;
 use trace::diagnostic::Severity;
 use trace::inputs::Input;
 use trace::log::recover::{Losses, recover};
 use trace::merge::{self, EpisodeRows};
 use trace::open::TraceFile;
-use trace::schema::RECORDING_KEY;
 use trace::validate::validate;
 use trace::write::OptionalColumns;
 
@@ -87,8 +86,7 @@ impl RecoverArgs {
                 "`{out}` has the episode `{id}`, which cannot be recovered from the log\n  help: {help}"
             )));
         }
-        let theirs = file.metadata_value(RECORDING_KEY).and_then(|text| serde_json::from_str(text).ok());
-        if without_seeds(theirs.as_ref()) != without_seeds(recording) {
+        if without_seeds(Some(&file.recording())) != without_seeds(recording) {
             let out = self.out.display();
             return Err(Failure::input(format!(
                 "`{out}` is a trace of another recording than the log\n  help: {help}"

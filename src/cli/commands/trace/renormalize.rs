@@ -5,9 +5,9 @@ use std::path::PathBuf;
 
 use crate::cli::args::TraceArgs;
 use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::text_table::counted;
 use crate::cli::{output, terminal};
 use exact::escape::visible;
+use exact::format::counted;
 use report::tables::Table;
 use trace::renormalize::{RenormalizeAnswer, RenormalizeError, RenormalizedFile, renormalize};
 

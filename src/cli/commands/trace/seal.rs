@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use crate::cli::args::ThreadArgs;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
-use crate::cli::text_table::counted;
+use exact::format::counted;
 use trace::inputs::Input;
 use trace::seal::{SealAnswer, SealError, seal};
 

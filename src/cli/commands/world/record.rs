@@ -1,6 +1,5 @@
 //! `mirrorstats record`: agents in the mirror world, one trace and one log per model and experiment.
 
-use std::collections::BTreeSet;
 use std::io;
 use std::num::{NonZeroU32, NonZeroUsize};
 use std::path::{Path, PathBuf};
@@ -17,20 +16,19 @@ use crate::cli::exec::ExecArgs;
 use crate::cli::experiments;
 #[cfg(feature = "view")]
 use crate::cli::human::HumanArgs;
-use crate::cli::options_of;
 use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::output;
+use crate::cli::recording::episodes::Episodes;
 use crate::cli::recording::interrupt::{Playing, stop_at_interrupt};
 use crate::cli::recording::{self, Bar, RecordAnswer, probe, several};
 use crate::cli::registration::registration;
 use crate::cli::vlm::VlmArgs;
+use crate::cli::{options_of, output};
 use exact::escape::visible;
 use exact::suggest::hint;
+use world::agent::Player;
 use world::agent::scripted::{Renamed, Scripted};
 use world::agent::vlm::probe::ProbeAnswer;
-use world::agent::{Planned, Player};
-use world::record::error::StoreError;
-use world::record::index::{Place, RecordingIndex};
+use world::record::index::RecordingIndex;
 use world::record::metadata::Recordings;
 use world::record::plan::{Experiments, Key, Named, Plan, Shard, Subject};
 use world::record::run::{Recording, Settings, Tally};
@@ -302,15 +300,13 @@ impl RecordArgs {
         let subject = self.subject(player.as_ref());
         let recording = self.recordings(config, plan, player.as_ref())?;
         let there = RecordingIndex::new(&self.out, subject.clone(), recording);
-        let planned = plan.keys();
-        let todo = unrecorded(plan, &planned, |experiment| there.recorded(experiment))?;
-        let finished = others(&planned, &todo);
+        let episodes = Episodes::of(plan, |experiment| there.recorded(experiment))?;
         let limits = (self.settings(player.as_ref()).in_flight.get(), self.vlm.requests_per_minute());
         let vlm = vlm.filter(|_| self.vlm.sends());
         let requests =
-            vlm.map(|vlm| RequestForecast::of(&vlm, &subject, (&finished, &todo), config, limits)).transpose();
-        let requests = requests.map_err(Failure::input)?;
-        Ok(ForecastAnswer::of(&subject, planned.len(), &todo, config, requests))
+            vlm.map(|vlm| RequestForecast::of(&vlm, &subject, (&episodes.found(), &episodes.todo), config, limits));
+        let requests = requests.transpose().map_err(Failure::input)?;
+        Ok(ForecastAnswer::of(&subject, episodes.planned.len(), &episodes.todo, config, requests))
     }
 
     /// Records with this player, whatever `--agent` names, until all is done or `stop` is set. Only progress is reported.
@@ -320,21 +316,21 @@ impl RecordArgs {
         let subject = &self.subject(player);
         let recording = self.recordings(config, plan, player)?;
         let store = &Store::open(&self.out, subject.clone(), recording).map_err(Failure::input)?;
-        let planned = plan.keys();
-        let todo = unrecorded(plan, &planned, |experiment| store.recorded(experiment))?;
+        let episodes = Episodes::of(plan, |experiment| store.recorded(experiment))?;
+        let Episodes { planned, todo } = &episodes;
         if todo.len() < planned.len() {
             player.resumes();
         }
         if !todo.is_empty() {
             player.check().map_err(Failure::input)?;
         }
-        player.plans(&to_play(subject, &planned, &todo));
-        let bar = Bar::new(player, subject, &todo, config);
+        player.plans(&episodes.to_play(subject));
+        let bar = Bar::new(player, subject, todo, config);
         let shares = Shares::default();
         let start = Instant::now();
         let (progress, settings) = (&bar, self.settings(player));
         let recording = Recording { config, player, subject, store, progress, stop, shares: &shares, settings };
-        let outcome = recording.run(&todo);
+        let outcome = recording.run(todo);
         // What is whole is put together whatever ended the recording.
         let assembled = plan.experiments.iter().try_for_each(|experiment| store.assemble(*experiment));
         let deleted = player.deleted();
@@ -344,7 +340,7 @@ impl RecordArgs {
         assembled.map_err(Failure::input)?;
         let deleted = deleted.map_err(Failure::input)?;
         let stays = |key: &Key| !deleted.contains(&key.episode_id(subject));
-        let found: Vec<Key> = others(&planned, &todo).into_iter().filter(stays).collect();
+        let found: Vec<Key> = episodes.found().into_iter().filter(stays).collect();
         let Tally { recorded, elsewhere, lost, under_way, by_limit, left_out, steps, stopped, given_up } = tally;
         let recorded: Vec<Key> = recorded.into_iter().filter(stays).collect();
         let all = [found.as_slice(), &recorded, &elsewhere].concat();
@@ -418,37 +414,6 @@ fn scripted(name: &str) -> Result<Scripted, Failure> {
     let known: Vec<&str> = Scripted::ALL.iter().map(|agent| agent.name()).chain(["vlm", HUMAN, "exec:'CMD'"]).collect();
     let near = hint(name, known.iter().copied());
     Err(Failure::input(format!("no agent is called `{name}`{near}; expected one of {}", known.join(", "))))
-}
-
-fn unrecorded(
-    plan: &Plan,
-    planned: &[Key],
-    recorded: impl Fn(Experiment) -> Result<BTreeSet<Place>, StoreError>,
-) -> Result<Vec<Key>, Failure> {
-    let mut todo = Vec::with_capacity(planned.len());
-    for experiment in &plan.experiments {
-        let done = recorded(*experiment).map_err(Failure::input)?;
-        let own = planned.iter().filter(|key| key.experiment == *experiment);
-        todo.extend(own.filter(|key| !done.contains(&(key.seed, key.run, key.repetition))));
-    }
-    Ok(todo)
-}
-
-fn to_play(subject: &Subject, planned: &[Key], todo: &[Key]) -> Vec<Planned> {
-    let todo: BTreeSet<&Key> = todo.iter().collect();
-    let one = |key: &Key| Planned {
-        episode_id: key.episode_id(subject),
-        experiment: key.experiment.name().to_owned(),
-        seed: key.seed,
-        repetition: key.repetition,
-        is_recorded: !todo.contains(key),
-    };
-    planned.iter().map(one).collect()
-}
-
-fn others(planned: &[Key], todo: &[Key]) -> Vec<Key> {
-    let todo: BTreeSet<&Key> = todo.iter().collect();
-    planned.iter().copied().filter(|key| !todo.contains(key)).collect()
 }
 
 fn condition(text: &str) -> Result<String, String> {

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
-use crate::cli::text_table::counted;
+use exact::format::counted;
 use exact::replace::{self, is_same_file};
 use serde::Serialize;
 use trace::inputs;

@@ -39,9 +39,7 @@ pub fn is_unfinished(folder: &Path) -> bool {
 #[derive(Debug, thiserror::Error)]
 #[error("cannot write {}", path.display())]
 pub struct FolderError {
-    /// The path.
     pub path: PathBuf,
-    /// The reason.
     pub source: io::Error,
 }
 

@@ -4,8 +4,7 @@ use crate::figures::kit::{
     Align, Frame, MARGIN, Mark, PALETTE, Rgb, Sheet, label, leading, legend, lettering, many, tiles,
 };
 use crate::figures::matrix::{MetricId, Reading};
-use crate::figures::missing;
-use crate::figures::{Drawn, Scene};
+use crate::figures::{Drawn, Scene, missing};
 use exact::moments::Moments;
 use exact::number::Decimal;
 

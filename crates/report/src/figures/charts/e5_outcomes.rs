@@ -17,7 +17,6 @@ const PLOT_WIDTH: f64 = 260.0;
 /// The endings of the episodes of one experiment, by model.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Outcomes {
-    /// The experiment.
     pub experiment: String,
     /// One row per model; models without a row are shown as having no episodes.
     pub rows: Vec<OutcomeRow>,

@@ -6,7 +6,6 @@ use crate::figures::kit::{Fill, Frame, MARGIN, Mark, PALETTE, Rgb, Sheet, Stroke
 /// One step as the strip shows it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Still {
-    /// The timestep.
     pub t: i32,
     /// The frame, PNG, and its pixels in a row and in a column.
     pub png: Vec<u8>,

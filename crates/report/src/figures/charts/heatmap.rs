@@ -5,8 +5,7 @@ use crate::figures::kit::{
     panels, tiles,
 };
 use crate::figures::matrix::{MetricId, Reading};
-use crate::figures::missing;
-use crate::figures::{Drawn, Scene};
+use crate::figures::{Drawn, Scene, missing};
 use metric::catalog::Kind;
 
 const ROW: f64 = 17.0;

@@ -29,7 +29,6 @@ static FONTS: LazyLock<Arc<Database>> = LazyLock::new(|| {
 
 /// A figure that could not be converted.
 #[derive(Debug, thiserror::Error)]
-#[expect(missing_docs, reason = "the messages say it")]
 pub enum ConvertError {
     #[error("the figure's SVG cannot be read back; please report this with the model names of the data")]
     Svg(#[from] resvg::usvg::Error),
@@ -56,7 +55,7 @@ pub fn png(tree: &Tree) -> Result<Vec<u8>, ConvertError> {
 }
 
 /// The picture as a PDF of one page, its text selectable; no date and no random identifier inside.
-pub fn pdf(tree: &Tree) -> Result<Vec<u8>, ConvertError> {
+pub(crate) fn pdf(tree: &Tree) -> Result<Vec<u8>, ConvertError> {
     let (width, height) = (tree.size().width() * POINTS_PER_PX, tree.size().height() * POINTS_PER_PX);
     let fault = || ConvertError::Size { width, height };
     let page = PageSettings::from_wh(width, height).ok_or_else(fault)?;

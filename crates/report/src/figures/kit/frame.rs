@@ -33,13 +33,13 @@ impl Frame {
     }
 
     /// The rectangle that is smaller by `by` on all four sides.
-    pub fn inset(self, by: f64) -> Self {
+    pub(crate) fn inset(self, by: f64) -> Self {
         Self::new(self.left + by, self.top + by, self.width - 2.0 * by, self.height - 2.0 * by)
     }
 }
 
 /// A number of things as a factor of layout.
-pub fn many(things: usize) -> f64 {
+pub(crate) fn many(things: usize) -> f64 {
     // Nothing drawn comes in billions.
     f64::from(u32::try_from(things).unwrap_or(u32::MAX))
 }

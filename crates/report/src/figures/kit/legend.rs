@@ -1,15 +1,13 @@
 //! Legends: which model is which, and what signs mean; laid out by the measured widths of their texts.
 
 use super::frame::{Frame, Point, many};
-use super::label;
 use super::lettering::{self, Lettering, MARGIN, NAME_ROOM};
 use super::look::{Fill, Stroke};
-use super::marker;
 use super::palette::{ModelStyle, PALETTE};
 use super::panels::Panels;
 use super::roster::Roster;
 use super::sheet::Sheet;
-use super::tiles;
+use super::{label, marker, tiles};
 
 const SWATCH_WIDTH: f64 = 24.0;
 const SWATCH_GAP: f64 = 5.0;
@@ -17,7 +15,7 @@ const COLUMN_GAP: f64 = 16.0;
 
 /// A sign, as drawn beside its meaning.
 #[derive(Clone, Copy, Debug)]
-pub enum Swatch {
+pub(crate) enum Swatch {
     /// A model's line with its marker.
     Line(&'static ModelStyle),
     Marker(&'static ModelStyle),
@@ -39,7 +37,7 @@ pub enum Swatch {
 
 /// Signs and their meanings, placed.
 #[derive(Clone, Debug)]
-pub struct Legend {
+pub(crate) struct Legend {
     entries: Vec<(Swatch, String, Point)>,
     lettering: Lettering,
     height: f64,
@@ -47,7 +45,7 @@ pub struct Legend {
 
 impl Legend {
     /// The models in columns, as many as `width` px takes; read downwards, then to the right.
-    pub fn of_models(roster: &Roster<'_>, width: f64, swatch: fn(&'static ModelStyle) -> Swatch) -> Self {
+    pub(crate) fn of_models(roster: &Roster<'_>, width: f64, swatch: fn(&'static ModelStyle) -> Swatch) -> Self {
         let lettering = lettering::label();
         let room = NAME_ROOM.min(width - SWATCH_WIDTH - SWATCH_GAP);
         let labels = label::fitted(&roster.names(), room, lettering);
@@ -65,7 +63,7 @@ impl Legend {
     }
 
     /// Signs one after the other, in as many lines as they need.
-    pub fn of_signs(signs: Vec<(Swatch, String)>, width: f64) -> Self {
+    pub(crate) fn of_signs(signs: Vec<(Swatch, String)>, width: f64) -> Self {
         let lettering = lettering::tick();
         let leading = line_height(lettering);
         let mut place = (0.0, 0.0);
@@ -86,12 +84,12 @@ impl Legend {
     }
 
     /// The height of all lines, px.
-    pub fn height(&self) -> f64 {
+    pub(crate) fn height(&self) -> f64 {
         self.height
     }
 
     /// Draws it with its upper left corner at `corner`.
-    pub fn draw(&self, sheet: &mut Sheet, corner: Point) {
+    pub(crate) fn draw(&self, sheet: &mut Sheet, corner: Point) {
         let leading = line_height(self.lettering);
         for (swatch, text, (x, y)) in &self.entries {
             let (left, middle) = (corner.0 + x, corner.1 + y + leading / 2.0);
@@ -102,14 +100,14 @@ impl Legend {
 }
 
 /// Draws signs at `corner` and gives the edge below them, px.
-pub fn draw_signs(sheet: &mut Sheet, corner: Point, signs: Vec<(Swatch, String)>) -> f64 {
+pub(crate) fn draw_signs(sheet: &mut Sheet, corner: Point, signs: Vec<(Swatch, String)>) -> f64 {
     let legend = Legend::of_signs(signs, sheet.width() - corner.0 - MARGIN);
     legend.draw(sheet, corner);
     corner.1 + legend.height
 }
 
 /// The models in the free place of `panels` where they fit, else below them; `signs` last. Gives the figure's height.
-pub fn around(
+pub(crate) fn around(
     sheet: &mut Sheet,
     roster: &Roster<'_>,
     panels: &Panels,

@@ -7,7 +7,7 @@ use super::sheet::Sheet;
 
 /// Panels in rows under headings of equal height.
 #[derive(Clone, Debug)]
-pub struct Panels {
+pub(crate) struct Panels {
     /// The frame below each heading.
     pub bodies: Vec<Frame>,
     headings: Vec<(Point, String, Vec<String>)>,
@@ -19,7 +19,7 @@ pub struct Panels {
 
 /// The arrangement of panels.
 #[derive(Clone, Copy, Debug)]
-pub struct Arrangement {
+pub(crate) struct Arrangement {
     /// The left edge of the first column, px.
     pub left: f64,
     /// Panels beside each other.
@@ -32,7 +32,7 @@ pub struct Arrangement {
 
 impl Panels {
     /// A panel for each of `names` on a sheet of `width` px, with its title in up to two lines where `titles` has one.
-    pub fn new(names: &[&str], titles: &[&str], width: f64, arranged: Arrangement) -> Self {
+    pub(crate) fn new(names: &[&str], titles: &[&str], width: f64, arranged: Arrangement) -> Self {
         let Arrangement { left, columns, height, gap } = arranged;
         let room = width - left - MARGIN;
         let panel = (room - gap * many(columns - 1)) / many(columns);
@@ -60,7 +60,7 @@ impl Panels {
     }
 
     /// A sheet of `width` px with the headings on it.
-    pub fn sheet(&self, width: f64) -> Sheet {
+    pub(crate) fn sheet(&self, width: f64) -> Sheet {
         let mut sheet = Sheet::new(width);
         for ((x, y), name, lines) in &self.headings {
             let mut middle = y + leading(lettering::heading()) / 2.0;
@@ -76,19 +76,19 @@ impl Panels {
 }
 
 /// Columns for `count` panels of at least `least` px in `room` px, at most `most`, so that rows are about equally full.
-pub fn fitting(count: usize, most: usize, room: f64, [least, gap]: [f64; 2]) -> usize {
+pub(crate) fn fitting(count: usize, most: usize, room: f64, [least, gap]: [f64; 2]) -> usize {
     balanced(count, self::most(most, room, [least, gap]).0)
 }
 
 /// As many columns as panels of at least `least` px fit in `room` px, at most `most`, and the width of a panel, px.
-pub fn most(most: usize, room: f64, [least, gap]: [f64; 2]) -> (usize, f64) {
+pub(crate) fn most(most: usize, room: f64, [least, gap]: [f64; 2]) -> (usize, f64) {
     let fits = |&n: &usize| least * many(n) + gap * many(n - 1) <= room;
     let columns = (1..=most).rev().find(fits).unwrap_or(1);
     (columns, (room - gap * many(columns - 1)) / many(columns))
 }
 
 /// Columns for `count` panels, at most `most`, so that rows are about equally full.
-pub fn balanced(count: usize, most: usize) -> usize {
+pub(crate) fn balanced(count: usize, most: usize) -> usize {
     let rows = count.div_ceil(most.max(1)).max(1);
     count.div_ceil(rows).max(1)
 }

@@ -16,14 +16,14 @@ use super::sheet::Sheet;
 use exact::number::Decimal;
 
 /// Two linear axes over a frame; y grows upwards.
-pub struct Plot {
+pub(crate) struct Plot {
     pub frame: Frame,
     spec: Cartesian2d<RangedCoordf64, RangedCoordf64>,
 }
 
 /// A place on an axis.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Tick {
+pub(crate) struct Tick {
     pub at: f64,
     /// Its text; empty for a grid line alone.
     pub text: String,
@@ -31,20 +31,20 @@ pub struct Tick {
 
 impl Plot {
     /// Axes over `frame`.
-    pub fn new(frame: Frame, x: Range<f64>, y: Range<f64>) -> Self {
+    pub(crate) fn new(frame: Frame, x: Range<f64>, y: Range<f64>) -> Self {
         let across = units(frame.left)..units(frame.right());
         let upwards = units(frame.bottom())..units(frame.top);
         Self { frame, spec: Cartesian2d::new(x, y, (across, upwards)) }
     }
 
     /// The place of a pair of values.
-    pub fn at(&self, x: f64, y: f64) -> Point {
+    pub(crate) fn at(&self, x: f64, y: f64) -> Point {
         let (x, y) = self.spec.translate(&(x, y));
         (f64::from(x) / UNITS_PER_PX, f64::from(y) / UNITS_PER_PX)
     }
 
     /// Upright grid lines, with numbers below the plot.
-    pub fn x_axis(&self, sheet: &mut Sheet, ticks: &[Tick]) {
+    pub(crate) fn x_axis(&self, sheet: &mut Sheet, ticks: &[Tick]) {
         let lettering = lettering::tick().aligned(Align::Middle);
         for tick in ticks {
             let x = self.at(tick.at, 0.0).0;
@@ -56,7 +56,7 @@ impl Plot {
     }
 
     /// Level grid lines, with numbers to the left of the plot.
-    pub fn y_axis(&self, sheet: &mut Sheet, ticks: &[Tick]) {
+    pub(crate) fn y_axis(&self, sheet: &mut Sheet, ticks: &[Tick]) {
         let lettering = lettering::tick().aligned(Align::End);
         for tick in ticks {
             let y = self.at(0.0, tick.at).1;
@@ -68,26 +68,26 @@ impl Plot {
     }
 
     /// Draws the title of the x axis.
-    pub fn x_title(&self, sheet: &mut Sheet, text: &str) {
+    pub(crate) fn x_title(&self, sheet: &mut Sheet, text: &str) {
         let at = (self.frame.center().0, self.frame.bottom() + 20.0);
         sheet.text(at, text, lettering::label().aligned(Align::Middle));
     }
 
     /// Draws the title of the y axis, `away` px from the plot.
-    pub fn y_title(&self, sheet: &mut Sheet, text: &str, away: f64) {
+    pub(crate) fn y_title(&self, sheet: &mut Sheet, text: &str, away: f64) {
         let at = (self.frame.left - away, self.frame.center().1);
         sheet.text(at, text, lettering::label().aligned(Align::Middle).upwards());
     }
 }
 
 /// 0, 0.5 and 1 with numbers, the quarters as grid lines alone.
-pub fn rate_ticks() -> Vec<Tick> {
+pub(crate) fn rate_ticks() -> Vec<Tick> {
     let tick = |(at, text): (f64, &str)| Tick { at, text: text.to_owned() };
     [(0.0, "0"), (0.25, ""), (0.5, "0.5"), (0.75, ""), (1.0, "1")].map(tick).into()
 }
 
 /// At most `most` whole numbers from 0 to `last`, at even distances.
-pub fn whole_ticks(last: u32, most: usize) -> Vec<Tick> {
+pub(crate) fn whole_ticks(last: u32, most: usize) -> Vec<Tick> {
     let axis = RangedCoordf64::from(0.0..f64::from(last));
     let whole = axis.key_points(BoldPoints(most)).into_iter().filter(|at| at.fract() == 0.0);
     whole.filter_map(|at| Some(Tick { at, text: Decimal::of_float(at, 0)?.to_string() })).collect()

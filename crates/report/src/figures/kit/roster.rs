@@ -7,7 +7,7 @@ use super::palette::{ModelStyle, PALETTE};
 
 /// A model and how it is drawn.
 #[derive(Clone, Copy, Debug)]
-pub struct Member<'a> {
+pub(crate) struct Member<'a> {
     pub model: &'a str,
     /// Its colour, marker and dash.
     pub style: &'static ModelStyle,
@@ -15,14 +15,14 @@ pub struct Member<'a> {
 
 /// The models of a report.
 #[derive(Clone, Debug)]
-pub struct Roster<'a>(pub Vec<Member<'a>>);
+pub(crate) struct Roster<'a>(pub Vec<Member<'a>>);
 
 impl<'a> Roster<'a> {
     /// `models` with their styles: those of `order` first, as they come there, then pinned ones, then by name.
     ///
     /// The style of a pinned model never changes. The others take, by name, the styles after the pinned ones,
     /// then what pinned models left free; from the 21st model on styles repeat.
-    pub fn new(models: &[&'a str], order: &[String]) -> Self {
+    pub(crate) fn new(models: &[&'a str], order: &[String]) -> Self {
         let mut models = models.to_vec();
         models.sort_unstable();
         models.dedup();
@@ -36,7 +36,7 @@ impl<'a> Roster<'a> {
     }
 
     /// The models' names in order.
-    pub fn names(&self) -> Vec<&'a str> {
+    pub(crate) fn names(&self) -> Vec<&'a str> {
         self.0.iter().map(|member| member.model).collect()
     }
 }

@@ -47,7 +47,7 @@ impl Sheet {
         self.put(&PathElement::new(points, style), dash_attribute(stroke));
     }
 
-    pub fn polygon(&mut self, corners: &[Point], fill: Fill) {
+    pub(crate) fn polygon(&mut self, corners: &[Point], fill: Fill) {
         let corners: Vec<_> = corners.iter().map(|&at| lattice(at)).collect();
         self.put(&Polygon::new(corners, shape(fill)), outline_attributes(fill));
     }
@@ -59,14 +59,14 @@ impl Sheet {
 
     /// Filled rectangles side by side, from the same top and of the same height: pairs of left and right ends,
     /// ascending. Many of them take little room in the file.
-    pub fn bars(&mut self, ends: &[(f64, f64)], top: f64, height: f64, color: Rgb) {
+    pub(crate) fn bars(&mut self, ends: &[(f64, f64)], top: f64, height: f64, color: Rgb) {
         let ends: Vec<_> =
             ends.iter().map(|&(left, right)| (lattice((left, top)).0, lattice((right, top)).0)).collect();
         let middle = lattice((0.0, top + height / 2.0)).1;
         self.ink.borrow_mut().bars(&ends, middle, units(height), color);
     }
 
-    pub fn circle(&mut self, center: Point, radius: f64, fill: Fill) {
+    pub(crate) fn circle(&mut self, center: Point, radius: f64, fill: Fill) {
         self.put(&Circle::new(lattice(center), units(radius), shape(fill)), outline_attributes(fill));
     }
 
@@ -79,7 +79,7 @@ impl Sheet {
     }
 
     /// A picture that fills a frame; it is carried along in the file.
-    pub fn picture(&mut self, frame: Frame, png: &[u8]) {
+    pub(crate) fn picture(&mut self, frame: Frame, png: &[u8]) {
         let [left, top, width, height] =
             [frame.left, frame.top, frame.width, frame.height].map(|length| fixed(Some(length), 2));
         let _ = writeln!(
@@ -98,7 +98,7 @@ impl Sheet {
     }
 
     /// Returns the content down to `height` px, under a heading, and the height of both, px.
-    pub fn under(self, title: &str, height: f64) -> (Self, f64) {
+    pub(crate) fn under(self, title: &str, height: f64) -> (Self, f64) {
         let heading = lettering::heading();
         let mut sheet = Self::new(self.width);
         let mut top = MARGIN;

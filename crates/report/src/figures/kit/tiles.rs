@@ -8,7 +8,7 @@ use super::palette::{PALETTE, text_on};
 use super::sheet::Sheet;
 
 /// A value: its colour, and the first of `texts` that the cell has room for.
-pub fn known(sheet: &mut Sheet, frame: Frame, color: Rgb, texts: &[String]) {
+pub(crate) fn known(sheet: &mut Sheet, frame: Frame, color: Rgb, texts: &[String]) {
     let lettering = lettering::value().aligned(Align::Middle);
     sheet.rectangle(frame, Fill::plain(color));
     if let Some(text) = texts.iter().find(|text| lettering.width(text) <= frame.width - 2.0) {
@@ -17,7 +17,7 @@ pub fn known(sheet: &mut Sheet, frame: Frame, color: Rgb, texts: &[String]) {
 }
 
 /// Episodes, and no value: hatched, `--`.
-pub fn undefined(sheet: &mut Sheet, frame: Frame) {
+pub(crate) fn undefined(sheet: &mut Sheet, frame: Frame) {
     const BETWEEN: f64 = 4.0;
     let surface = &PALETTE.surface;
     let stroke = Stroke::solid(surface.hatch, 0.6);
@@ -36,7 +36,7 @@ pub fn undefined(sheet: &mut Sheet, frame: Frame) {
 }
 
 /// No episode at all: crossed.
-pub fn empty(sheet: &mut Sheet, frame: Frame) {
+pub(crate) fn empty(sheet: &mut Sheet, frame: Frame) {
     let stroke = Stroke::solid(PALETTE.surface.hatch, 0.8);
     sheet.rectangle(frame, framed());
     sheet.line(&[(frame.left, frame.top), (frame.right(), frame.bottom())], stroke);
@@ -44,7 +44,7 @@ pub fn empty(sheet: &mut Sheet, frame: Frame) {
 }
 
 /// A colour scale with a word at each end, drawn at `corner`; gives its right edge, px.
-pub fn scale(sheet: &mut Sheet, corner: Point, colors: impl Fn(f64) -> Rgb, ends: [&str; 2]) -> f64 {
+pub(crate) fn scale(sheet: &mut Sheet, corner: Point, colors: impl Fn(f64) -> Rgb, ends: [&str; 2]) -> f64 {
     // Whole pixels of a PNG each, so that no seam shows.
     const STEPS: usize = 60;
     const WIDTH: f64 = 120.0;
@@ -63,7 +63,7 @@ pub fn scale(sheet: &mut Sheet, corner: Point, colors: impl Fn(f64) -> Rgb, ends
 }
 
 /// Names beside rows: their labels, and the width they take, px.
-pub fn row_labels(names: &[&str], room: f64) -> (Vec<String>, f64) {
+pub(crate) fn row_labels(names: &[&str], room: f64) -> (Vec<String>, f64) {
     let lettering = lettering::label();
     let labels = label::fitted(names, room, lettering);
     let width = labels.iter().map(|label| lettering.width(label)).fold(0.0, f64::max);

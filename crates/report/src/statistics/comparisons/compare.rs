@@ -7,11 +7,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::statistics::durations::{decided, is_duration};
 use crate::statistics::losses::{LossCase, LossCases, Toward, settle};
-use crate::statistics::matching::Matched;
+use crate::statistics::matching::{Matched, outcomes};
 use crate::statistics::retest::repeat_variance;
 use crate::statistics::study::{Block, Study, Unit};
-use crate::statistics::units::Sides;
-use crate::statistics::units::Units;
+use crate::statistics::units::{Sides, Units};
 use exact::moments::Moments;
 use metric::catalog::{Kind, StandardError};
 use score::table::MetricColumn;
@@ -103,7 +102,7 @@ pub(in crate::statistics) struct Compared<'s, 'a> {
 
 impl Compared<'_, '_> {
     /// The comparison under one metric, not adjusted yet.
-    pub fn under(&self, column: &MetricColumn) -> Comparison {
+    pub(crate) fn under(&self, column: &MetricColumn) -> Comparison {
         let rates = self.study.kind(&column.name) == Kind::Rate;
         let sides = Sides::of(self.study, column, &[(self.first, self.second)]);
         let found = match &sides {
@@ -197,14 +196,12 @@ impl Compared<'_, '_> {
         let (a, b) = (self.first.moments(column), self.second.moments(column));
         let test = sides.test(&[]);
         let least = test.map_or(1.0, |test| test.least);
-        let table = |rows: &Vec<(usize, usize)>| {
-            Pairs::of(rows.iter().filter_map(|&(a, b)| Some((column.get(a)?, column.get(b)?))))
-        };
+        let pairs = self.matched.pairs.as_ref().filter(|_| !self.is_dependent());
         Comparison {
             successes: a.counts().zip(b.counts()).map(|(a, b)| [a.0, b.0]),
             difference: a.mean().zip(b.mean()).map(|(a, b)| a - b),
             withheld: Some(Withheld::Dependent),
-            pairs: self.matched.pairs.as_ref().filter(|_| !self.is_dependent()).map(table),
+            pairs: pairs.map(|rows| outcomes(column, rows)),
             p: test.map(|test| test.p),
             units: Some(Units::between(self.study, [self.first, self.second], sides, least, self.confidence)),
             ..Comparison::of(Method::Units, [a.n, b.n])
@@ -258,15 +255,14 @@ impl Compared<'_, '_> {
     }
 
     fn paired_rate(&self, column: &MetricColumn, rows: &[(usize, usize)]) -> Comparison {
-        let pairs = Pairs::of(rows.iter().filter_map(|&(a, b)| Some((column.get(a)?, column.get(b)?))));
-        let test = pairs.mcnemar().zip(pairs.mcnemar_mid_p()).map(|(p, mid_p)| ExactTest { p, mid_p });
+        let pairs = outcomes(column, rows);
         Comparison {
             successes: Some([pairs.both + pairs.first_only, pairs.both + pairs.second_only]),
             pairs: Some(pairs),
             undefined: rows.len() as u64 - pairs.n(),
             difference: pairs.difference(),
             interval: pairs.interval(self.confidence),
-            ..Comparison::of(Method::Mcnemar, [pairs.n(); 2]).tested(test)
+            ..Comparison::of(Method::Mcnemar, [pairs.n(); 2]).tested(pairs.test())
         }
     }
 

@@ -9,6 +9,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::statistics::study::{Block, Study};
+use score::table::MetricColumn;
+use statistics::paired::Pairs;
 
 /// The matching of the episodes of two blocks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -37,6 +39,11 @@ pub(in crate::statistics) struct Matched {
     pub matching: Matching,
     /// The pairs where they are what is compared; none otherwise.
     pub pairs: Option<Vec<(usize, usize)>>,
+}
+
+/// The 2x2 table of a rate over pairs of rows; a pair counts if both values are defined.
+pub(in crate::statistics) fn outcomes(column: &MetricColumn, pairs: &[(usize, usize)]) -> Pairs {
+    Pairs::of(pairs.iter().filter_map(|&(a, b)| Some((column.get(a)?, column.get(b)?))))
 }
 
 impl Scenes {

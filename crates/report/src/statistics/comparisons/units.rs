@@ -99,7 +99,7 @@ impl Sides {
     }
 
     /// The units that both sides have and those of one; `None` where the units of the two sides are of different kinds.
-    pub fn divided(&self) -> Option<units::Sides> {
+    pub(crate) fn divided(&self) -> Option<units::Sides> {
         let mut sides = units::Sides::default();
         let mut kinds = [None; 2];
         for (unit, &(a, b)) in &self.units {

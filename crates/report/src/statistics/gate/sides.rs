@@ -44,7 +44,7 @@ impl<'a> Sides<'a> {
     }
 
     /// The obstacle to comparing any cell: other definitions, or episodes that were made in another way.
-    pub fn barrier(&self) -> Option<String> {
+    pub(crate) fn barrier(&self) -> Option<String> {
         let [base, new] = self.tables;
         let hash = |table: &EpisodeTable| table.catalog.hash.chars().take(8).collect::<String>();
         if base.catalog.hash != new.catalog.hash {
@@ -55,7 +55,7 @@ impl<'a> Sides<'a> {
     }
 
     /// The earlier name of a model.
-    pub fn base_model(&self, model: &str) -> Option<String> {
+    pub(crate) fn base_model(&self, model: &str) -> Option<String> {
         self.renamed.filter(|[_, new]| *new == model).map(|[old, _]| old.to_owned())
     }
 

@@ -13,7 +13,6 @@ use exact::format::{UNDEFINED, fixed};
 pub enum GateFormat {
     /// A table for a terminal of this width, and the flipped episodes.
     Text(Option<usize>),
-    /// Markdown.
     Markdown,
     /// Workflow commands of GitHub Actions, a line per cell.
     Github,

@@ -18,7 +18,7 @@ use statistics::coverage::{self, Withheld};
 use statistics::interval::{Interval, clopper_pearson, jeffreys, wilson};
 
 /// Conditional metrics with fewer defined episodes than this are marked.
-pub const FEW: u64 = 5;
+pub(crate) const FEW: u64 = 5;
 
 /// One cell: the episodes of one group under one metric.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

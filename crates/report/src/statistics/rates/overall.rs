@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::statistics::durations::{decided, is_duration};
 use crate::statistics::losses::{LossCase, LossCases, Toward, settle};
-use crate::statistics::matching::{Matched, Scenes};
+use crate::statistics::matching::{Matched, Scenes, outcomes};
 use crate::statistics::study::{Block, Study};
 use crate::statistics::units::Sides;
 use exact::moments::Moments;
@@ -22,7 +22,6 @@ use statistics::holm::{holm, level};
 use statistics::improvement::{Improvement, probability_of_improvement};
 use statistics::interval::Interval;
 use statistics::outcomes::ExactTest;
-use statistics::paired::Pairs;
 use statistics::stratified::{Stratum, common_difference, exact, pooled};
 
 /// The comparison of two rates over several experiments.
@@ -177,19 +176,14 @@ impl<'s, 'a> Couple<'s, 'a> {
             losses: None,
         };
         if let Some(strata) = pairs {
-            let of_stratum = |rows: &Vec<(usize, usize)>| {
-                let values = rows.iter().filter_map(|&(a, b)| Some((column.get(a)?, column.get(b)?)));
-                Pairs::of(values)
-            };
-            let mut all = pooled(&strata.iter().map(of_stratum).collect::<Vec<_>>());
+            let mut all = pooled(&strata.iter().map(|rows| outcomes(column, rows)).collect::<Vec<_>>());
             let lost: u64 = self.strata.iter().map(|(a, b)| a.lost + b.lost).sum();
             match toward {
                 Some(Toward::Lowest) => all.second_only += lost,
                 Some(Toward::Highest) => all.first_only += lost,
                 None => {}
             }
-            let test = all.mcnemar().zip(all.mcnemar_mid_p()).map(|(p, mid_p)| ExactTest { p, mid_p });
-            return row(OverallMethod::PooledMcnemar, all.difference(), all.interval(confidence), test);
+            return row(OverallMethod::PooledMcnemar, all.difference(), all.interval(confidence), all.test());
         }
         let strata: Vec<Stratum> = self
             .strata

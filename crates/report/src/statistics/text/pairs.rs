@@ -24,7 +24,7 @@ pub enum Verdict {
 
 /// One model against another, as texts; two texts are seen from the first and from the second.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct PairText<'a> {
+pub(crate) struct PairText<'a> {
     /// The model with the better mean.
     pub first: &'a str,
     pub second: &'a str,
@@ -38,7 +38,6 @@ pub struct PairText<'a> {
     pub difference: [String; 2],
     /// Its interval, or why there is none.
     pub interval: [String; 2],
-    /// The p value.
     pub p: String,
     /// The same, adjusted by Holm's method.
     pub p_adjusted: String,
@@ -47,7 +46,7 @@ pub struct PairText<'a> {
 
 /// All tests under one metric in one experiment; without an experiment over all of them.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct FamilyText<'a> {
+pub(crate) struct FamilyText<'a> {
     pub experiment: Option<&'a str>,
     pub metric: &'a str,
     /// Every two models.
@@ -55,7 +54,7 @@ pub struct FamilyText<'a> {
 }
 
 /// Every family, experiment by experiment, then those over all experiments.
-pub fn families(statistics: &Statistics) -> Vec<FamilyText<'_>> {
+pub(crate) fn families(statistics: &Statistics) -> Vec<FamilyText<'_>> {
     let single = statistics.models.iter().map(|family| FamilyText {
         experiment: Some(&family.experiment),
         metric: &family.metric,

@@ -14,7 +14,6 @@ pub struct Terminal {
     pub emphasis: Marks,
 }
 
-/// The marks of emphasis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Marks {
     /// By `*` and `_` around it.

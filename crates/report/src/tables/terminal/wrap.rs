@@ -4,7 +4,7 @@ use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
 
 /// Adds `text` in lines of at most `width` columns, of any width if that is invalid; lines after the first begin with `indent`
 /// spaces.
-pub fn push_wrapped(text: &mut String, words: &str, width: Option<usize>, indent: usize) {
+pub(crate) fn push_wrapped(text: &mut String, words: &str, width: Option<usize>, indent: usize) {
     for line in wrapped(words, width.unwrap_or(usize::MAX), indent) {
         text.push_str(&line);
         text.push('\n');

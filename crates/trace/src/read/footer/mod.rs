@@ -1,6 +1,7 @@
 //! Reads footers: where a file's columns lie, and what is in its key-value metadata.
 
 pub(crate) mod bounds;
+pub(crate) mod trace_file;
 
 use std::fs::File;
 use std::io::{self, Read as _, Seek as _, SeekFrom};

@@ -1,8 +1,6 @@
 //! What the footer's `mirrorstats.recording` says of colours: `palette`, a list of names, or that the world is this
 //! program's, whose colours are those of the study.
 
-use serde::Deserialize;
-use serde::de::IgnoredAny;
 use serde_json::Value;
 
 use super::spelling::{WORDS, did_you_mean, is_well_spelled, most_like, normal, study_color};
@@ -17,7 +15,6 @@ pub struct Palette(Vec<String>);
 
 /// An error of a palette.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[expect(missing_docs, reason = "the messages say it")]
 pub enum NoPalette {
     #[error("expected at least one colour, found none")]
     Empty,
@@ -38,20 +35,11 @@ pub(crate) struct Declared {
     is_of_world: bool,
 }
 
-/// The recording's keys about colours; its other keys are not looked at.
-#[derive(Deserialize)]
-struct Recording {
-    palette: Option<Value>,
-    scene_version: Option<IgnoredAny>,
-}
-
 impl Declared {
-    pub(crate) fn of(file: &str, recording: Option<&str>) -> Result<Self, Box<Finding>> {
-        // A recording that is no JSON object declares nothing.
-        let recording = recording.and_then(|text| serde_json::from_str::<Recording>(text).ok());
-        let Some(Recording { palette, scene_version }) = recording else { return Ok(Self::default()) };
-        let palette = palette.map(|palette| Palette::read(file, &palette)).transpose()?;
-        Ok(Self { palette, is_of_world: scene_version.is_some() })
+    pub(crate) fn of(file: &str, recording: &Value) -> Result<Self, Box<Finding>> {
+        let said = |key: &str| recording.get(key).filter(|value| !value.is_null());
+        let palette = said("palette").map(|palette| Palette::read(file, palette)).transpose()?;
+        Ok(Self { palette, is_of_world: said("scene_version").is_some() })
     }
 
     pub(crate) fn has(&self, name: &str) -> bool {
@@ -138,11 +126,12 @@ fn invalid(file: &str, palette: &Value) -> Finding {
 #[cfg(test)]
 mod tests {
     use super::{Declared, Palette};
+    use crate::footers::recording;
     use crate::palette::Color;
 
     #[test]
     fn a_palette_is_read_where_there_is_one() {
-        let names = |text| Declared::of("a.parquet", Some(text)).unwrap().palette.map(|palette| palette.0);
+        let names = |text| Declared::of("a.parquet", &recording(Some(text))).unwrap().palette.map(|palette| palette.0);
         assert_eq!(
             names(r#"{"world":{},"palette":["teal","dark red"]}"#),
             Some(vec!["teal".into(), "dark red".into()])
@@ -150,12 +139,12 @@ mod tests {
         for text in ["{}", r#"{"palette":null}"#, "no JSON", "7"] {
             assert_eq!(names(text), None, "{text}");
         }
-        assert_eq!(Declared::of("a.parquet", None).unwrap(), Declared::default());
+        assert_eq!(Declared::of("a.parquet", &recording(None)).unwrap(), Declared::default());
     }
 
     #[test]
     fn a_recording_of_this_world_has_the_colors_of_the_study() {
-        let has = |text, name| Declared::of("a.parquet", Some(text)).unwrap().has(name);
+        let has = |text, name| Declared::of("a.parquet", &recording(Some(text))).unwrap().has(name);
         assert!(has(r#"{"scene_version":1}"#, "pink") && !has(r#"{"scene_version":1}"#, "teal"));
         assert!(!has(r#"{"kind":"import"}"#, "pink"));
         assert!(has(r#"{"scene_version":1,"palette":["teal"]}"#, "teal"));
@@ -183,7 +172,7 @@ mod tests {
     fn a_palette_that_is_none_is_refused() {
         for palette in ["[]", "7", "\"red\"", "[1]", "[\"Red\"]", "[\"none\"]", "[\"red \"]", "[\"\"]", "{\"red\":1}"] {
             let text = format!("{{\"palette\":{palette}}}");
-            let finding = Declared::of("a.parquet", Some(&text)).unwrap_err();
+            let finding = Declared::of("a.parquet", &recording(Some(&text))).unwrap_err();
             assert_eq!(finding.code.name(), "invalid-metadata", "{palette}");
             assert!(finding.expected.contains("a list of lower-case names"), "{finding}");
         }

@@ -9,7 +9,7 @@ use crate::figures::kit::marker::polar;
 const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
 
 /// Moves points that coincide onto a spiral around their place, `apart` px from neighbour to neighbour.
-pub fn fanned(places: &[Point], apart: f64) -> Vec<Point> {
+pub(crate) fn fanned(places: &[Point], apart: f64) -> Vec<Point> {
     moved(places, |at, count| match count {
         1 => (0.0, 0.0),
         2..=4 => polar(apart / (2.0 * (std::f64::consts::PI / many(count)).sin()), turn(at, count)),
@@ -18,7 +18,7 @@ pub fn fanned(places: &[Point], apart: f64) -> Vec<Point> {
 }
 
 /// Moves points that coincide side by side, at most `room` px wide together.
-pub fn abreast(places: &[Point], apart: f64, room: f64) -> Vec<Point> {
+pub(crate) fn abreast(places: &[Point], apart: f64, room: f64) -> Vec<Point> {
     moved(places, |at, count| {
         let step = apart.min(room / many(count.max(2) - 1));
         (step * (many(at) - many(count - 1) / 2.0), 0.0)

@@ -12,7 +12,7 @@ use ttf_parser::Face;
 use exact::escape::visible;
 
 /// The family's name: private, so that no installed font is taken in its place.
-pub const FAMILY: &str = "Mirrorstats Sans";
+pub(crate) const FAMILY: &str = "Mirrorstats Sans";
 
 /// The substitute for a character that the font lacks.
 const SUBSTITUTE: char = '\u{25a1}';
@@ -51,7 +51,7 @@ fn face(weight: Weight) -> &'static Face<'static> {
 
 /// The font files, for a converter.
 #[cfg(feature = "raster")]
-pub const FILES: [&[u8]; 2] = [REGULAR, SEMIBOLD];
+pub(crate) const FILES: [&[u8]; 2] = [REGULAR, SEMIBOLD];
 
 /// The width of `text` in px, set in one line at `size` px.
 pub fn width(text: &str, size: f64, weight: Weight) -> f64 {
@@ -65,7 +65,7 @@ pub fn width(text: &str, size: f64, weight: Weight) -> f64 {
 }
 
 /// The distance from the middle of the capitals down to the baseline, in px.
-pub fn drop_to_baseline(size: f64) -> f64 {
+pub(crate) fn drop_to_baseline(size: f64) -> f64 {
     let face = face(Weight::Regular);
     let capital = face.capital_height().unwrap_or(0);
     f64::from(capital) * size / f64::from(face.units_per_em()) / 2.0
@@ -73,7 +73,7 @@ pub fn drop_to_baseline(size: f64) -> f64 {
 
 /// `text` in characters that the font has: blanks and control characters become spaces, characters that act or hide
 /// are spelled out, others become a hollow square.
-pub fn drawable(text: &str) -> String {
+pub(crate) fn drawable(text: &str) -> String {
     let has = |c: char| face(Weight::Regular).glyph_index(c).is_some();
     let blank = |c: char| c.is_whitespace() || c.is_control();
     let text: String = text.chars().map(|c| if blank(c) { ' ' } else { c }).collect();

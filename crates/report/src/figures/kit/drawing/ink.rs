@@ -14,7 +14,7 @@ use crate::figures::kit::font;
 use crate::figures::kit::look::Rgb;
 
 /// Whole numbers of plotters to a px of the figure.
-pub const UNITS_PER_PX: f64 = 100.0;
+pub(crate) const UNITS_PER_PX: f64 = 100.0;
 
 /// More room than any figure takes; plotters clamps what lies outside.
 const ROOM: u32 = 10_000_000;
@@ -23,7 +23,7 @@ type Drawn = Result<(), DrawingErrorKind<Infallible>>;
 
 /// Elements of an SVG in the order drawn.
 #[derive(Debug, Default)]
-pub struct Ink {
+pub(crate) struct Ink {
     pub body: String,
     /// Attributes of the next shapes that plotters does not pass on, each with a space before it.
     pub extra: String,
@@ -35,7 +35,7 @@ impl Ink {
     }
 
     /// Level bars of one height and colour as one stroke: pairs of left and right ends, ascending, at the height `y`.
-    pub fn bars(&mut self, ends: &[(i32, i32)], y: i32, height: u32, color: Rgb) {
+    pub(crate) fn bars(&mut self, ends: &[(i32, i32)], y: i32, height: u32, color: Rgb) {
         let mut path = String::new();
         let mut at = None;
         for &(left, right) in ends {
@@ -185,7 +185,7 @@ fn whole(units: f64) -> u32 {
 }
 
 /// Text as XML takes it, in an element or between double quotes; characters that XML forbids become U+FFFD.
-pub fn escaped(text: &str) -> String {
+pub(crate) fn escaped(text: &str) -> String {
     text.chars().fold(String::with_capacity(text.len()), |mut out, c| {
         match c {
             '&' => out.push_str("&amp;"),

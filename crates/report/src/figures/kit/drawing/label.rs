@@ -15,7 +15,7 @@ const MOST_LETTERS: usize = 160;
 /// All names that are too long lose their middle at the same distance from their end, near the middle of the
 /// label where that tells them apart, so that what remains is what differs. Where no distance does, for names
 /// that differ in too many places or only in what cannot be drawn, a number follows.
-pub fn fitted(names: &[&str], room: f64, lettering: Lettering) -> Vec<String> {
+pub(crate) fn fitted(names: &[&str], room: f64, lettering: Lettering) -> Vec<String> {
     let whole: Vec<String> = names.iter().map(|name| ends(&font::drawable(name))).collect();
     let tails = tails(&whole, room, lettering);
     let shown = |tail: usize| -> Vec<String> { whole.iter().map(|name| elided(name, tail, room, lettering)).collect() };
@@ -25,7 +25,7 @@ pub fn fitted(names: &[&str], room: f64, lettering: Lettering) -> Vec<String> {
 }
 
 /// One text in `room` px, cut at its end.
-pub fn cut(text: &str, room: f64, lettering: Lettering) -> String {
+pub(crate) fn cut(text: &str, room: f64, lettering: Lettering) -> String {
     let text = font::drawable(text);
     if lettering.width(&text) <= room {
         return text;

@@ -8,10 +8,10 @@ use crate::figures::kit::palette::PALETTE;
 pub const MARGIN: f64 = 8.0;
 
 /// A full-width figure, px: its smallest text is still above 5 pt on a page with a text width of 5.5 inches.
-pub const FULL_WIDTH: f64 = 640.0;
+pub(crate) const FULL_WIDTH: f64 = 640.0;
 
 /// The widest that names of models beside rows or in a legend get, px.
-pub const NAME_ROOM: f64 = 210.0;
+pub(crate) const NAME_ROOM: f64 = 210.0;
 
 /// The alignment of text at its point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,7 +22,6 @@ pub enum Align {
     End,
 }
 
-/// The style of text.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lettering {
     /// The font's size, px.
@@ -41,15 +40,15 @@ impl Lettering {
         Self { size, weight: Weight::Regular, color, align: Align::Start, upwards: false }
     }
 
-    pub const fn semibold(self) -> Self {
+    pub(crate) const fn semibold(self) -> Self {
         Self { weight: Weight::Semibold, ..self }
     }
 
-    pub const fn aligned(self, align: Align) -> Self {
+    pub(crate) const fn aligned(self, align: Align) -> Self {
         Self { align, ..self }
     }
 
-    pub const fn upwards(self) -> Self {
+    pub(crate) const fn upwards(self) -> Self {
         Self { upwards: true, ..self }
     }
 
@@ -65,17 +64,17 @@ pub fn heading() -> Lettering {
 }
 
 /// The style of a subheading.
-pub fn subheading() -> Lettering {
+pub(crate) fn subheading() -> Lettering {
     Lettering::new(9.0, PALETTE.surface.quiet)
 }
 
 /// Names of models and metrics.
-pub fn label() -> Lettering {
+pub(crate) fn label() -> Lettering {
     Lettering::new(10.0, PALETTE.surface.text)
 }
 
 /// Numbers beside an axis, notes and keys.
-pub fn tick() -> Lettering {
+pub(crate) fn tick() -> Lettering {
     Lettering::new(9.0, PALETTE.surface.quiet)
 }
 
@@ -85,6 +84,6 @@ pub fn value() -> Lettering {
 }
 
 /// From line to line of text at `lettering`, px.
-pub fn leading(lettering: Lettering) -> f64 {
+pub(crate) fn leading(lettering: Lettering) -> f64 {
     (lettering.size * 1.25).ceil()
 }

@@ -66,7 +66,7 @@ impl Fill {
     }
 
     /// The colour with a solid line around it.
-    pub const fn outlined(color: Rgb, outline: Rgb, width: f64) -> Self {
+    pub(crate) const fn outlined(color: Rgb, outline: Rgb, width: f64) -> Self {
         Self { color, opacity: 1.0, outline: Some(Stroke::solid(outline, width)) }
     }
 }

@@ -45,7 +45,7 @@ impl Mark {
     }
 
     /// The beginning of the group.
-    pub fn opening(&self) -> String {
+    pub(crate) fn opening(&self) -> String {
         let mut tag = String::from("<g class=\"mark\"");
         for (name, value) in &self.data {
             let _ = write!(tag, " data-{name}=\"{}\"", escaped(&visible(value)));

@@ -42,7 +42,7 @@ fn corners(shape: Shape, r: f64) -> Corners {
 }
 
 /// A point on a circle, the angle clockwise from above.
-pub fn polar(radius: f64, angle: f64) -> Point {
+pub(crate) fn polar(radius: f64, angle: f64) -> Point {
     (radius * angle.sin(), -radius * angle.cos())
 }
 

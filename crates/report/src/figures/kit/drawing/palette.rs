@@ -8,7 +8,7 @@ use crate::figures::kit::frame::many;
 use crate::figures::kit::look::{Rgb, Stroke};
 
 /// The palette of all figures.
-pub static PALETTE: LazyLock<Palette> = LazyLock::new(|| {
+pub(crate) static PALETTE: LazyLock<Palette> = LazyLock::new(|| {
     let text = include_str!("../../../../../../assets/palette.toml");
     toml::from_str(text).expect("the built-in palette is well-formed: a test reads it")
 });
@@ -104,7 +104,7 @@ pub struct ModelStyle {
 }
 
 impl ModelStyle {
-    pub fn stroke(&'static self, width: f64) -> Stroke {
+    pub(crate) fn stroke(&'static self, width: f64) -> Stroke {
         Stroke { color: self.color, width, dash: &self.dash }
     }
 }
@@ -144,7 +144,7 @@ impl Ramp {
 }
 
 /// The colour of text that can be read on `ground`: by relative luminance, as the web's guidelines define it.
-pub fn text_on(ground: Rgb) -> Rgb {
+pub(crate) fn text_on(ground: Rgb) -> Rgb {
     // Where contrast with white and with the text colour are about equal.
     const MIDDLE: f64 = 0.21;
     let surface = &PALETTE.surface;
@@ -152,7 +152,7 @@ pub fn text_on(ground: Rgb) -> Rgb {
 }
 
 /// Relative luminance in [0, 1] (WCAG 2.2).
-pub fn luminance(Rgb(red, green, blue): Rgb) -> f64 {
+pub(crate) fn luminance(Rgb(red, green, blue): Rgb) -> f64 {
     let linear = |channel: u8| {
         let share = f64::from(channel) / 255.0;
         if share <= 0.04045 { share / 12.92 } else { ((share + 0.055) / 1.055).powf(2.4) }

@@ -5,7 +5,6 @@ use crate::figures::kit::convert::{self, ConvertError};
 use crate::figures::kit::font;
 use crate::figures::kit::sheet::{Drawing, Sheet};
 
-/// A drawn figure.
 #[derive(Clone, Debug)]
 pub struct Figure {
     drawing: Drawing,
@@ -56,7 +55,6 @@ impl Figure {
         self.drawing.inline()
     }
 
-    /// The picture as PNG.
     #[cfg(feature = "raster")]
     pub fn png(&self) -> Result<Vec<u8>, ConvertError> {
         convert::png(&convert::tree(&self.inline_svg())?)

@@ -10,8 +10,7 @@ use super::read_frames;
 use crate::import::error::ImportError;
 use crate::inputs::{Input, traces_at};
 use exact::budget::Limit;
-use exact::hash;
-use exact::input;
+use exact::{hash, input};
 
 const INFO: &str = "meta/info.json";
 /// The features of a robot with many cameras take some tens of kilobytes.

@@ -1,0 +1,143 @@
+//! The agreement of coders: Cohen's kappa of each label and each pair of coders.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::{Study, StudyError};
+use statistics::agreement::{FEWEST, PairCounts};
+use statistics::interval::Interval;
+
+/// The labels of some traces and how far coders agree.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct LabelAgreement {
+    /// The episodes of the traces.
+    pub episodes: u64,
+    /// Those that somebody coded.
+    pub coded: u64,
+    /// Coded episodes that the traces lack, or that the filter leaves out.
+    pub elsewhere: u64,
+    /// The coders by name.
+    pub coders: Vec<CoderCount>,
+    /// The labels by name.
+    pub labels: Vec<LabelCount>,
+    /// Each label and each pair of coders.
+    pub agreement: Vec<PairAgreement>,
+}
+
+/// A coder.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct CoderCount {
+    pub coder: String,
+    /// The episodes that the coder coded.
+    pub episodes: u64,
+}
+
+/// A label.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct LabelCount {
+    pub label: String,
+    /// The episodes where a coder puts it.
+    pub episodes: u64,
+}
+
+/// The agreement of two coders on a label, over the episodes that both coded.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct PairAgreement {
+    pub label: String,
+    pub coders: [String; 2],
+    /// The episodes that both coded.
+    pub n: u64,
+    #[serde(flatten)]
+    pub counts: PairCounts,
+    /// The share of episodes on which they agree; null without an episode.
+    pub agreement: Option<f64>,
+    /// Cohen's kappa; null if it cannot be said.
+    pub kappa: Option<f64>,
+    /// Its interval; null if it cannot be said.
+    pub interval: Option<Interval>,
+    /// The reason why kappa or its interval cannot be said.
+    pub cannot_say: Option<String>,
+}
+
+impl PairAgreement {
+    #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
+    fn new(label: &str, coders: [&str; 2], counts: PairCounts, confidence: f64) -> Self {
+        let (n, kappa) = (counts.n(), counts.kappa(confidence));
+        let interval = kappa.and_then(|kappa| kappa.interval);
+        let cannot_say = match (kappa, interval) {
+            (None, _) if n < FEWEST => Some(format!("{n} episodes coded by both, expected {FEWEST}")),
+            (None, _) => Some("both say the same of every episode".to_owned()),
+            (Some(_), None) => Some("no interval: they never differ".to_owned()),
+            (Some(_), Some(_)) => None,
+        };
+        Self {
+            label: label.to_owned(),
+            coders: coders.map(str::to_owned),
+            n,
+            counts,
+            agreement: (n > 0).then(|| counts.agreed() as f64 / n as f64),
+            kappa: kappa.map(|kappa| kappa.value),
+            interval,
+            cannot_say,
+        }
+    }
+}
+
+impl Study {
+    /// The labels beside the traces, and the agreement of each pair of coders at this confidence.
+    ///
+    /// # Errors
+    /// As [`Study::score`]; scores in the place of traces.
+    pub fn agreement(&self, confidence: f64) -> Result<LabelAgreement, StudyError> {
+        let labels = self.traces()?.labels();
+        let table = self.score()?.episodes;
+        let ids: BTreeSet<&str> = table.keys.iter().map(|key| key.episode_id).collect();
+        let coded = labels.episodes().filter(|id| ids.contains(id)).count() as u64;
+        let elsewhere = labels.episodes().count() as u64 - coded;
+        let mut coders = labels.by_coder();
+        for episodes in coders.values_mut() {
+            episodes.retain(|id, _| ids.contains(id));
+        }
+        coders.retain(|_, episodes| !episodes.is_empty());
+        let words: BTreeSet<&str> = coders.values().flat_map(BTreeMap::values).flatten().copied().collect();
+        let names: Vec<&str> = coders.keys().copied().collect();
+        let pairs =
+            names.iter().enumerate().flat_map(|(at, first)| names[at + 1..].iter().map(move |other| [*first, *other]));
+        let pairs: Vec<[&str; 2]> = pairs.collect();
+        let mut agreement = Vec::new();
+        for label in &words {
+            for pair in &pairs {
+                let [first, second] = pair.map(|name| &coders[name]);
+                let mut counts = PairCounts::default();
+                for (id, own) in first {
+                    if let Some(other) = second.get(id) {
+                        counts.add(own.contains(label), other.contains(label));
+                    }
+                }
+                agreement.push(PairAgreement::new(label, *pair, counts, confidence));
+            }
+        }
+        let with = |label: &str| {
+            let of = |episodes: &BTreeMap<&str, BTreeSet<&str>>, id: &str| {
+                episodes.get(id).is_some_and(|own| own.contains(label))
+            };
+            ids.iter().filter(|id| coders.values().any(|episodes| of(episodes, id))).count() as u64
+        };
+        Ok(LabelAgreement {
+            episodes: ids.len() as u64,
+            coded,
+            elsewhere,
+            coders: coders
+                .iter()
+                .map(|(coder, episodes)| CoderCount { coder: (*coder).to_owned(), episodes: episodes.len() as u64 })
+                .collect(),
+            labels: words
+                .iter()
+                .map(|label| LabelCount { label: (*label).to_owned(), episodes: with(label) })
+                .collect(),
+            agreement,
+        })
+    }
+}

@@ -1,0 +1,51 @@
+//! The episodes of a plan: those that are recorded already, and those to record.
+
+use std::collections::BTreeSet;
+
+use crate::cli::outcome::Failure;
+use world::agent::Planned;
+use world::experiment::Experiment;
+use world::record::error::StoreError;
+use world::record::index::Place;
+use world::record::plan::{Key, Plan, Subject};
+
+pub struct Episodes {
+    pub planned: Vec<Key>,
+    /// Those of them that are not recorded yet, by experiment.
+    pub todo: Vec<Key>,
+}
+
+impl Episodes {
+    pub fn of(
+        plan: &Plan,
+        recorded: impl Fn(Experiment) -> Result<BTreeSet<Place>, StoreError>,
+    ) -> Result<Self, Failure> {
+        let planned = plan.keys();
+        let mut todo = Vec::with_capacity(planned.len());
+        for experiment in &plan.experiments {
+            let done = recorded(*experiment).map_err(Failure::input)?;
+            let own = planned.iter().filter(|key| key.experiment == *experiment);
+            todo.extend(own.filter(|key| !done.contains(&(key.seed, key.run, key.repetition))));
+        }
+        Ok(Self { planned, todo })
+    }
+
+    /// The planned episodes that are recorded already.
+    pub fn found(&self) -> Vec<Key> {
+        let todo: BTreeSet<&Key> = self.todo.iter().collect();
+        self.planned.iter().copied().filter(|key| !todo.contains(key)).collect()
+    }
+
+    /// All planned episodes, as a player is told of them.
+    pub fn to_play(&self, subject: &Subject) -> Vec<Planned> {
+        let todo: BTreeSet<&Key> = self.todo.iter().collect();
+        let one = |key: &Key| Planned {
+            episode_id: key.episode_id(subject),
+            experiment: key.experiment.name().to_owned(),
+            seed: key.seed,
+            repetition: key.repetition,
+            is_recorded: !todo.contains(key),
+        };
+        self.planned.iter().map(one).collect()
+    }
+}

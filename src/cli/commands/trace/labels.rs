@@ -4,8 +4,8 @@ use std::io::{self, Write as _};
 
 use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::text_table::counted;
 use crate::cli::{output, terminal};
+use exact::format::counted;
 use exact::format::fixed;
 use report::tables::Table;
 use study::{LabelAgreement, PairAgreement};

@@ -5,8 +5,7 @@ use std::io::{self, Write as _};
 use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::{output, terminal};
-use exact::format::counted;
-use exact::format::fixed;
+use exact::format::{counted, fixed};
 use report::tables::Table;
 use study::{LabelAgreement, PairAgreement};
 

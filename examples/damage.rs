@@ -67,7 +67,7 @@ pub fn readme(files: &[DamagedFile]) -> String {
         text.extend(["| `", file.name, "` | `", file.code, "` | ", file.damage, " |\n"]);
     }
     text.push_str(
-        "\nThe two files of `episode-in-two-files` are sound by themselves; given together, the second one is refused.\n",
+        "\nThe two files of `episode-in-two-files` are sound alone; given together, the second one is refused.\n",
     );
     text
 }

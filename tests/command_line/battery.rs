@@ -131,7 +131,7 @@ l,m,E1,1,1,1,,,,,,
 m,m,window,1,1,1,,0,,,,
 n,m,decoy,1,1,0,,,,,,
 o,m,decoy,1,1,0,1,,,,,
-p,m,mark,1,1,1,,,1,0,,1
+p,m,mark,1,1,1,,,1,0,,0
 ";
 
 /// The rows in the order of their ids, which is not that of a table.

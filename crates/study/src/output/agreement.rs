@@ -97,7 +97,9 @@ impl Study {
         let coded = labels.episodes().filter(|id| ids.contains(id)).count() as u64;
         let elsewhere = labels.episodes().count() as u64 - coded;
         let mut coders = labels.by_coder();
-        coders.values_mut().for_each(|episodes| episodes.retain(|id, _| ids.contains(id)));
+        for episodes in coders.values_mut() {
+            episodes.retain(|id, _| ids.contains(id));
+        }
         coders.retain(|_, episodes| !episodes.is_empty());
         let words: BTreeSet<&str> = coders.values().flat_map(BTreeMap::values).flatten().copied().collect();
         let names: Vec<&str> = coders.keys().copied().collect();

@@ -11,6 +11,7 @@ use super::super::snapshot::Snapshot;
 use exact::escape::{visible, visible_lines};
 use score::table::EpisodeTable;
 use trace::labels::{LabelLine, Mark, PREFIX, append, list_beside};
+use trace::open::TraceSet;
 
 /// A label as a page sends it; the coder's name is the server's.
 #[derive(Debug, Deserialize)]
@@ -26,7 +27,7 @@ struct Asked {
 
 /// The marks of an episode, its own before those of its steps.
 pub(crate) fn of_episode(snapshot: &Snapshot, id: &str) -> Value {
-    let labels = snapshot.scored.as_ref().and_then(|scored| scored.study.traces().ok()).map(|traces| traces.labels());
+    let labels = snapshot.scored.as_ref().and_then(|scored| scored.study.traces().ok()).map(TraceSet::labels);
     let told = |Mark { coder, step, label, note }: Mark<'_>| json!({"coder": visible(coder), "step": step, "label": label, "note": note.map(visible_lines)});
     labels.map_or_else(|| json!([]), |labels| labels.of_episode(id).map(told).collect())
 }

@@ -4,6 +4,7 @@ use std::io::{self, Write as _};
 
 use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::outcome::{Failure, Outcome};
+
 use crate::cli::{output, terminal};
 use exact::format::{counted, fixed};
 use report::tables::Table;
@@ -40,29 +41,26 @@ impl LabelsArgs {
 }
 
 fn text(found: &LabelAgreement, width: Option<usize>) -> String {
-    let mut text = format!("{} of {} coded\n", found.coded, counted(found.episodes, "episode"));
+    let mut parts = vec![format!("{} of {} coded\n", found.coded, counted(found.episodes, "episode"))];
     if found.elsewhere > 0 {
-        text += &format!(
-            "{} more coded, which the traces lack or --where leaves out\n",
-            counted(found.elsewhere, "episode")
-        );
+        let elsewhere = counted(found.elsewhere, "episode");
+        parts.push(format!("{elsewhere} more coded, which the traces lack or --where leaves out\n"));
     }
     let coders = found.coders.iter().map(|coder| [coder.coder.clone(), coder.episodes.to_string()]);
     let labels = found.labels.iter().map(|label| [label.label.clone(), label.episodes.to_string()]);
-    for (what, table) in [
-        ("coder", Table::of_texts(["coder", "episodes"]).aligned_right([1]).with(coders)),
-        ("label", Table::of_texts(["label", "episodes"]).aligned_right([1]).with(labels)),
-        ("agreement of two coders", pairs(&found.agreement)),
+    for (title, table) in [
+        ("", Table::of_texts(["coder", "episodes"]).aligned_right([1]).with(coders)),
+        ("", Table::of_texts(["label", "episodes"]).aligned_right([1]).with(labels)),
+        ("agreement of two coders\n", pairs(&found.agreement)),
     ] {
         if !table.is_empty() {
-            let title = if what.contains(' ') { format!("{what}\n") } else { String::new() };
-            text += &format!("\n{title}{}", table.within(width));
+            parts.push(format!("\n{title}{}", table.within(width)));
         }
     }
     if found.coders.len() == 1 {
-        text += "\nOne coder: agreement needs a second one on the same episodes.\n";
+        parts.push("\nOne coder: agreement needs a second one on the same episodes.\n".to_owned());
     }
-    text
+    parts.concat()
 }
 
 fn pairs(pairs: &[PairAgreement]) -> Table {

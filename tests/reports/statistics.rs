@@ -349,7 +349,7 @@ fn a_rate_that_falls_with_the_dose_has_a_trend_and_one_dose_has_none() {
     assert_eq!((trend.model.as_str(), trend.verdict), ("a", Verdict::Below));
     // Python: statsmodels 0.15.0, as in the tests of `trend`.
     let z = trend.trend.unwrap().z;
-    assert!((z - -4.088655679212654).abs() < 1e-9, "{z}");
+    assert!((z - -4.088_655_679_212_654).abs() < 1e-9, "{z}");
     let text = found.render(&[], Length::Full, None);
     assert!(text.contains("0: 12/12, 2: 4/12, 16: 0/12") && text.contains("falls"), "{text}");
 }

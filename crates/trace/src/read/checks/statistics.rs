@@ -8,7 +8,7 @@ use std::cmp::Ordering;
 
 use arrow::array::{Array, ArrayRef, AsArray as _, UInt8Array};
 use arrow::datatypes::{DataType, Float64Type, Int32Type, Int64Type};
-use parquet::basic::{ConvertedType, LogicalType};
+use parquet::basic::{ConvertedType, Encoding, LogicalType};
 use parquet::file::metadata::{ColumnChunkMetaData, ParquetMetaData};
 use parquet::file::statistics::Statistics;
 
@@ -53,7 +53,12 @@ impl Declared {
 
 impl Chunk {
     fn of(chunk: &ColumnChunkMetaData) -> Option<Self> {
-        let bytes = chunk.unencoded_byte_array_data_bytes().and_then(|bytes| u64::try_from(bytes).ok());
+        // Arrow's C++ writer counts the stored bytes of delta-encoded texts here.
+        let is_delta = chunk
+            .encodings()
+            .any(|encoding| matches!(encoding, Encoding::DELTA_BYTE_ARRAY | Encoding::DELTA_LENGTH_BYTE_ARRAY));
+        let bytes = chunk.unencoded_byte_array_data_bytes().filter(|_| !is_delta);
+        let bytes = bytes.and_then(|bytes| u64::try_from(bytes).ok());
         let Some(statistics) = chunk.statistics() else {
             return bytes.map(|bytes| Self { bytes: Some(bytes), ..Self::default() });
         };

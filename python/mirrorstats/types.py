@@ -35,6 +35,7 @@ class Catalog(_Catalog, total=False):
     """A resolved definition file: its includes merged, in the order of definition."""
 
     domain: Optional[str]
+    factor: dict[str, Factor]
 
 
 class CellChange(TypedDict):
@@ -209,6 +210,15 @@ class Detectable(TypedDict):
     likely: Optional[float]
 
 
+class Dose(TypedDict):
+    """A rate at one dose."""
+
+    dose: float
+    experiment: str
+    successes: int
+    n: int
+
+
 class _DurationRow(TypedDict):
     experiment: str
     model: str
@@ -261,6 +271,17 @@ class Fact(TypedDict):
     value: Optional[str]
     timesteps: list[int]
     is_of_episode: bool
+
+
+class _Factor(TypedDict):
+    title: str
+    values: dict[str, float]
+
+
+class Factor(_Factor, total=False):
+    """A number that a group of experiments varies, such as the steps by which a mirror is late."""
+
+    unit: str
 
 
 class Family(TypedDict):
@@ -743,6 +764,33 @@ class StyleOrigin(TypedDict):
     sha256: str
 
 
+class Trend(TypedDict):
+    """The Cochran-Armitage test of no trend, stratified: Mantel's extension of the Mantel-Haenszel test."""
+
+    z: float
+    p: float
+    strata: int
+
+
+class _TrendRow(TypedDict):
+    factor: str
+    unit: str
+    metric: str
+    model: str
+    doses: list[Dose]
+    units: str
+    trend: Optional[Trend]
+    p_adjusted: Optional[float]
+    verdict: Literal["above", "below", "not_separated"]
+
+
+class TrendRow(_TrendRow, total=False):
+    """A rate of one model at the doses of a factor, and the test of no trend."""
+
+    condition: Optional[str]
+    incomparable: Optional[str]
+
+
 class Units(TypedDict):
     """Scenes, seeds or participants with several episodes."""
 
@@ -947,6 +995,8 @@ if TYPE_CHECKING:
         def __getitem__(self, key: Literal["gaps"], /) -> list[Gap]: ...
         @overload
         def __getitem__(self, key: Literal["conditions"], /) -> list[Contrast]: ...
+        @overload
+        def __getitem__(self, key: Literal["trends"], /) -> list[TrendRow]: ...
         @overload
         def __getitem__(self, key: Literal["clusters"], /) -> list[ClusterRow]: ...
         @overload

@@ -45,13 +45,13 @@ pub mod topic {
     /// Begin and end of episodes.
     pub const EPISODE: &str = "/episode";
     /// Frames.
-    pub(crate) const CAMERA: &str = "/camera";
+    pub const CAMERA: &str = "/camera";
     /// Poses.
-    pub(crate) const TRANSFORMS: &str = "/tf";
+    pub const TRANSFORMS: &str = "/tf";
     /// Shapes.
-    pub(crate) const SCENE: &str = "/scene";
+    pub const SCENE: &str = "/scene";
     /// Pixel counts.
-    pub(crate) const CENSUS: &str = "/census";
+    pub const CENSUS: &str = "/census";
     /// Rows of the trace.
-    pub(crate) const DECISION: &str = "/decision";
+    pub const DECISION: &str = "/decision";
 }

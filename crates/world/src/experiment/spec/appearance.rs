@@ -38,6 +38,7 @@ pub enum Body {
 
 names!(Body { Mannequin: "mannequin", Humanoid: "humanoid" });
 
+#[cfg(feature = "sim")]
 impl Body {
     #[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde asks for")]
     pub(crate) const fn is_mannequin(&self) -> bool {

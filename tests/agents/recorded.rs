@@ -62,7 +62,7 @@ pub fn record_in(config: &WorldConfig, plan: &[(Scripted, Key)], threads: usize)
 pub fn score(episodes: &[Episode], definitions: &str) -> EpisodeTable {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("trace.parquet");
-    write_trace(&path, episodes, OptionalColumns::all());
+    write_trace(&path, episodes, OptionalColumns::used_by(episodes));
     let traces = open(&[&path]);
     let definitions = score_traces::definitions(&traces, &Request::of(definitions)).unwrap();
     score_traces::score(&traces, &definitions, &[], NonZeroUsize::MIN).unwrap()

@@ -249,11 +249,8 @@ pub fn structure(experiment: &Spec) -> Value {
 
 /// The type of an answer. Not every provider takes a number or a text, so that a number that may be `unknown` is a text.
 fn property(answer: &Answer) -> Value {
-    match (answer.kind, answer.words().as_slice()) {
-        (AnswerType::Number, _) if !answer.unknown => json!({ "type": "number" }),
-        (_, []) => json!({ "type": "string" }),
-        (_, words) => json!({ "type": "string", "enum": words }),
-    }
+    let is_number = answer.kind == AnswerType::Number && !answer.unknown;
+    json!({ "type": if is_number { "number" } else { "string" } })
 }
 
 /// The SHA-256 of the structure, and of the words of its own answers if it has any; 64 hexadecimal digits, for recordings.
@@ -297,6 +294,10 @@ pub fn schema(title: &str, experiment: &Spec) -> Value {
     }
     for answer in &experiment.answers {
         let mut property = property(answer);
+        let words = answer.words();
+        if !words.is_empty() {
+            property["enum"] = words.into();
+        }
         property["description"] = answer.words.clone().into();
         properties.insert(answer.key.clone(), property);
     }

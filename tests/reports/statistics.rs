@@ -350,6 +350,6 @@ fn a_rate_that_falls_with_the_dose_has_a_trend_and_one_dose_has_none() {
     // Python: statsmodels 0.15.0, as in the tests of `trend`.
     let z = trend.trend.unwrap().z;
     assert!((z - -4.088_655_679_212_654).abs() < 1e-9, "{z}");
-    let text = found.render(&[], Length::Full, None);
+    let text = found.render(&found.headline, Length::Full, None);
     assert!(text.contains("0: 12/12, 2: 4/12, 16: 0/12") && text.contains("falls"), "{text}");
 }

@@ -31,7 +31,7 @@ answer = [
 fn recorded(bench: &Bench) -> Vec<Episode> {
     fs::write(bench.path("mine.toml"), MINE).unwrap();
     bench.recorded("runs", "--agent random --experiment mine.toml --seeds 1 --runs 3 --condition crowd");
-    episodes(&bench.path("runs/mine-random.parquet"))
+    episodes(&bench.path("runs/mine-random@crowd.parquet"))
 }
 
 fn text(text: &str) -> Answered {
@@ -67,7 +67,7 @@ fn one_declaration_gives_columns_of_answer_and_truth() {
     };
     run(bench.folder.path(), &["report", "runs", "--out", "report", "--no-figures"]).done();
     let cells = fs::read_to_string(bench.path("report/cells.csv")).unwrap();
-    let expected = format!("mine,random,TSA,3,{},", all.iter().filter(right).count());
+    let expected = format!("mine,random,crowd,TSA,3,{},", all.iter().filter(right).count());
     assert!(cells.contains(&expected), "{expected} in {cells}");
 }
 
@@ -79,11 +79,11 @@ fn a_trace_keeps_to_what_its_experiment_declares() {
     run(folder, &["trace", "validate", "runs"]).done();
     run(folder, &["replay", "runs"]).done();
     // The log alone gives the same rows.
-    run(folder, &["trace", "recover", "runs/mine-random.mcap", "--out", "again.parquet"]).done();
+    run(folder, &["trace", "recover", "runs/mine-random@crowd.mcap", "--out", "again.parquet"]).done();
     assert_eq!(episodes(&bench.path("again.parquet")), all);
     // Another text than the options, and another truth than the world's.
     let write = |name: &str, all: &[Episode]| {
-        let recording = recording(&bench.path("runs/mine-random.parquet"));
+        let recording = recording(&bench.path("runs/mine-random@crowd.parquet"));
         let columns = OptionalColumns::recorded(&recording);
         let metadata = TraceMetadata { recording: Some(recording), columns };
         let mut writer = TraceWriter::create(&bench.path(name), &metadata).unwrap();
@@ -105,7 +105,7 @@ fn a_trace_keeps_to_what_its_experiment_declares() {
     assert!(said.contains("truth_count"), "{said}");
     // A value for an answer that was not declared is refused, not dropped.
     all[0].steps[0].extra.answers.insert("answer_other".to_owned(), text("left"));
-    let recording = recording(&bench.path("runs/mine-random.parquet"));
+    let recording = recording(&bench.path("runs/mine-random@crowd.parquet"));
     let columns = OptionalColumns::recorded(&recording);
     let mut writer =
         TraceWriter::create(&bench.path("other.parquet"), &TraceMetadata { recording: None, columns }).unwrap();

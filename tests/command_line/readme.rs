@@ -26,6 +26,7 @@ const NOT_RUN: [(&str, &str); 21] = [
     ("mirrorstats report \"$(", "a command of the wheel; `scripts/test-wheel.sh` runs it"),
     ("mirrorstats view runs  ", "serves until it is ended; `tests/reports/view` opens it"),
     ("mirrorstats view runs --against", "serves until it is ended; `tests/reports/view` opens such a one"),
+    ("mirrorstats view runs --label", "serves until it is ended; `tests/reports/view` labels with it"),
     (
         "mirrorstats record --agent oracle --experiment E1 --out runs",
         "takes a minute; `scripts/test-wheel.sh` does as much",

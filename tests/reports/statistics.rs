@@ -353,3 +353,18 @@ fn a_rate_that_falls_with_the_dose_has_a_trend_and_one_dose_has_none() {
     let text = found.render(&found.headline, Length::Full, None);
     assert!(text.contains("0: 12/12, 2: 4/12, 16: 0/12") && text.contains("falls"), "{text}");
 }
+
+#[test]
+fn a_trend_of_few_episodes_has_no_verdict() {
+    let row = |experiment, run, successes| (experiment, "a", 1, run, run < successes, 5);
+    let rows: Vec<Row> = (0..5).flat_map(|run| [row("E1", run, 5), row("E2", run, 0)]).collect();
+    let mut table = table(&rows);
+    let values = [("E1", 0.0), ("E2", 2.0)].map(|(name, dose)| (name.to_owned(), dose));
+    let factor = Factor { title: "Delay".to_owned(), unit: "steps".to_owned(), values: values.into() };
+    table.catalog.factor.insert("delay".to_owned(), factor);
+    let found = Statistics::of(&table, &cells(&table), &Options::default()).unwrap();
+    let trend = found.trends.iter().find(|row| row.metric == "TSA").unwrap();
+    assert_eq!((trend.p_adjusted, trend.verdict), (None, Verdict::NotSeparated));
+    let text = found.render(&found.headline, Length::Full, None);
+    assert!(text.contains("cannot say: 10 episodes"), "{text}");
+}

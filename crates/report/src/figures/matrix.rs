@@ -8,6 +8,10 @@ use crate::figures::{FigureError, FigureName};
 use exact::moments::Moments;
 use exact::number::Decimal;
 use metric::catalog::{Better, Catalog, Kind, Metric};
+use statistics::interval::{self, Interval};
+
+/// The confidence of intervals in figures.
+const CONFIDENCE: f64 = 0.95;
 
 /// The content of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,6 +40,12 @@ impl Reading {
             Self::Known(moments) => Some(moments),
             Self::Empty | Self::Undefined(_) => None,
         }
+    }
+
+    /// The 95 % interval of a rate.
+    pub(crate) fn wilson(self) -> Option<Interval> {
+        let moments = self.moments()?;
+        interval::wilson(u64::try_from(moments.sum).ok()?, moments.n, CONFIDENCE)
     }
 
     /// The mean with so many digits behind the point, correctly rounded from the exact fraction.

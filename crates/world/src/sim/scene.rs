@@ -242,6 +242,18 @@ impl Cube {
 }
 
 impl Scene {
+    /// The colour in which an agent is drawn, directly or through a pane; `None` if it is not there.
+    pub(super) fn agent_color(&self, agent: usize, pane: Option<&HungPane>) -> Option<Color> {
+        let is_window = pane.is_some_and(|pane| pane.kind == PaneKind::Window);
+        match (agent.checked_sub(1), pane) {
+            _ if is_window => None,
+            (None, None) => Some(self.body_color),
+            (None, Some(pane)) if pane.double.is_some() => None,
+            (None, Some(pane)) => Some(pane.paint.unwrap_or(self.body_color)),
+            (Some(other), _) => self.others.get(other).map(|other| other.color),
+        }
+    }
+
     /// The marks that are there at a step, counted from 1.
     pub fn marks_at(&self, t: u32) -> impl Iterator<Item = (usize, &WornMark)> {
         self.marks.iter().enumerate().filter(move |(_, mark)| mark.from_t <= t)

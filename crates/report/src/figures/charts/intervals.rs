@@ -7,9 +7,8 @@ use crate::figures::kit::{
 use crate::figures::matrix::{MetricId, Reading};
 use crate::figures::{Drawn, Scene};
 use exact::number;
-use statistics::interval::{self, Interval};
+use statistics::interval::Interval;
 
-const CONFIDENCE: f64 = 0.95;
 const ROW: f64 = 18.0;
 const MOST_COLUMNS: usize = 5;
 const LEAST_PANEL: f64 = 80.0;
@@ -124,7 +123,7 @@ impl Panel<'_> {
 
     fn row(&self, sheet: &mut Sheet, member: Member<'_>, middle: f64) {
         let reading = self.scene.matrix.reading(self.experiment, member.model, self.metric);
-        let interval = interval_of(reading);
+        let interval = reading.wilson();
         let mark = reading
             .mark(self.experiment, member.model, self.metric.name)
             .number("low", interval.map(|interval| interval.low))
@@ -145,9 +144,4 @@ impl Panel<'_> {
             sheet.text((self.right, middle), &counts(reading), text);
         });
     }
-}
-
-fn interval_of(reading: Reading) -> Option<Interval> {
-    let moments = reading.moments()?;
-    interval::wilson(u64::try_from(moments.sum).ok()?, moments.n, CONFIDENCE)
 }

@@ -36,7 +36,7 @@ pub struct TrendRow {
     pub incomparable: Option<String>,
     /// The Cochran-Armitage test, stratified by the units; null where there is nothing to compare.
     pub trend: Option<Trend>,
-    /// Its p value adjusted by Holm's method over the models, under the same factor and metric.
+    /// Its p value adjusted by Holm's method over the models, under the same factor and metric; null for fewer than 12 units.
     pub p_adjusted: Option<f64>,
     /// `above` where the rate is shown to rise with the dose, `below` where it falls.
     pub verdict: Verdict,
@@ -55,7 +55,17 @@ pub struct Dose {
     pub n: u64,
 }
 
+/// The fewest scenes, other units or independent episodes for which the limit of many holds.
+const LEAST_UNITS: u64 = 12;
+
 impl TrendRow {
+    /// The number of units that are compared, where it is too small for a verdict.
+    pub(in crate::statistics) fn too_few(&self) -> Option<u64> {
+        let episodes = || self.doses.iter().map(|dose| dose.n).sum();
+        let units = self.trend.map(|trend| if self.units == "episodes" { episodes() } else { trend.strata });
+        units.filter(|units| *units < LEAST_UNITS)
+    }
+
     /// The headline rates under every factor that two experiments or more of the table have.
     pub(in crate::statistics) fn all(study: &Study, headline: &[String], confidence: f64) -> Vec<Self> {
         let mut rows = Vec::new();
@@ -120,7 +130,8 @@ fn blocks<'s, 'a>(study: &'s Study<'a>, factor: &Factor) -> Blocks<'s, 'a> {
 }
 
 fn adjust(family: &mut [TrendRow], confidence: f64) {
-    let tested: Vec<&mut TrendRow> = family.iter_mut().filter(|row| row.trend.is_some()).collect();
+    let tested: Vec<&mut TrendRow> =
+        family.iter_mut().filter(|row| row.trend.is_some() && row.too_few().is_none()).collect();
     let adjusted = holm(&tested.iter().filter_map(|row| Some(row.trend?.p)).collect::<Vec<_>>());
     for (row, p) in tested.into_iter().zip(adjusted) {
         row.p_adjusted = Some(p);

@@ -190,11 +190,12 @@ pub(super) fn trends(statistics: &Statistics, shown: Shown) -> Table {
     let lines = statistics.trends.iter().filter(|row| shown(&row.metric)).map(|row| {
         let rates: Vec<String> =
             row.doses.iter().map(|dose| format!("{}: {}/{}", dose.dose, dose.successes, dose.n)).collect();
-        let verdict = match (row.trend, row.verdict) {
-            (None, _) => UNDEFINED,
-            (_, Verdict::Above) => "rises",
-            (_, Verdict::Below) => "falls",
-            (_, Verdict::NotSeparated) => "no trend shown",
+        let verdict = match (row.trend, row.too_few(), row.verdict) {
+            (None, ..) => "not tested".to_owned(),
+            (_, Some(units), _) => format!("cannot say: {units} {}", row.units),
+            (.., Verdict::Above) => "rises".to_owned(),
+            (.., Verdict::Below) => "falls".to_owned(),
+            (.., Verdict::NotSeparated) => "no trend shown".to_owned(),
         };
         let z = row.trend.map_or_else(|| UNDEFINED.to_owned(), |trend| fixed(Some(trend.z), 2));
         let strata = row.trend.map_or_else(|| UNDEFINED.to_owned(), |trend| format!("{} {}", trend.strata, row.units));
@@ -207,7 +208,7 @@ pub(super) fn trends(statistics: &Statistics, shown: Shown) -> Table {
             strata,
             z,
             p,
-            verdict.to_owned(),
+            verdict,
         ]
     });
     Table::plain(&["factor", "metric", "model", "rates by dose"], &["compared within", "z", "p adjusted", "verdict"])

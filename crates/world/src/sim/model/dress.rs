@@ -38,7 +38,7 @@ pub(super) fn dress(model: &mut MjModel, items: &[Item], config: &WorldConfig, s
             Item::Pane(at) => hang(model, geom, scene.panes.get(at).filter(|_| pane.is_none()), config),
             Item::Cube(at) => put_cube(model, geom, scene.cubes.get(at).filter(|_| !is_window)),
             Item::Agent(agent) => {
-                let color = agent_color(agent, scene, pane.map(|(_, pane)| pane));
+                let color = scene.agent_color(agent, pane.map(|(_, pane)| pane));
                 paint_body(model, geom, color, if agent == 0 { group::EGO } else { group::THINGS }, neutral);
             }
             Item::Double => {
@@ -65,7 +65,7 @@ pub(super) fn show_marks(model: &mut MjModel, items: &[Item], scene: &Scene, t: 
     for (geom, item) in items.iter().enumerate() {
         let Item::Mark(at) = *item else { continue };
         let Some(mark) = scene.marks.get(at) else { continue };
-        let is_there = mark.from_t <= t && agent_color(mark.wearer, scene, pane).is_some();
+        let is_there = mark.from_t <= t && scene.agent_color(mark.wearer, pane).is_some();
         model.geom_group_mut()[geom] = match (is_there, mark.wearer) {
             (false, _) => group::HIDDEN,
             (true, 0) => group::EGO,
@@ -74,18 +74,6 @@ pub(super) fn show_marks(model: &mut MjModel, items: &[Item], scene: &Scene, t: 
         if model.geom_rgba()[geom][1] != LABEL_GREEN {
             model.geom_rgba_mut()[geom] = paint(mark.color.rgb());
         }
-    }
-}
-
-/// The colour that an agent of the room is seen in; `None` where it is not seen so.
-pub(super) fn agent_color(agent: usize, scene: &Scene, pane: Option<&HungPane>) -> Option<Color> {
-    let is_window = pane.is_some_and(|pane| pane.kind == PaneKind::Window);
-    match (agent.checked_sub(1), pane) {
-        _ if is_window => None,
-        (None, None) => Some(scene.body_color),
-        (None, Some(pane)) if pane.double.is_some() => None,
-        (None, Some(pane)) => Some(pane.paint.unwrap_or(scene.body_color)),
-        (Some(other), _) => scene.others.get(other).map(|other| other.color),
     }
 }
 

@@ -70,7 +70,7 @@ pub(super) fn dress(model: &mut MjModel, geom: usize, name: &str, scene: &Scene,
     let is_window = pane.is_some_and(|(_, pane)| pane.kind == PaneKind::Window);
     let number = |prefix: &str| owner.strip_prefix(prefix).and_then(|digits| digits.parse::<usize>().ok());
     let is_shown = if let Some(agent) = number("agent") {
-        agent < AGENTS && super::dress::agent_color(agent, scene, pane.map(|(_, pane)| pane)).is_some()
+        agent < AGENTS && scene.agent_color(agent, pane.map(|(_, pane)| pane)).is_some()
     } else if let Some(double) = number("double") {
         pane.is_some_and(|(at, pane)| at == double && pane.double.is_some())
     } else {

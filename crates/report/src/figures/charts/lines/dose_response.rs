@@ -8,9 +8,8 @@ use crate::figures::matrix::{MetricId, Reading};
 use crate::figures::{Drawn, FigureError, Scene};
 use exact::number;
 use metric::catalog::Factor;
-use statistics::interval::{self, Interval};
+use statistics::interval::Interval;
 
-const CONFIDENCE: f64 = 0.95;
 const MOST_COLUMNS: usize = 2;
 const LEAST_PANEL: f64 = 190.0;
 const PLOT_HEIGHT: f64 = 190.0;
@@ -120,9 +119,7 @@ impl Line<'_> {
 
     fn marker(&self, sheet: &mut Sheet, plot: &Plot, at: usize, reading: Reading, (x, y): Point) {
         let (experiment, dose) = self.factor.doses[at];
-        let interval = reading
-            .moments()
-            .and_then(|moments| interval::wilson(u64::try_from(moments.sum).ok()?, moments.n, CONFIDENCE));
+        let interval = reading.wilson();
         let mark = reading
             .mark(experiment, self.member.model, self.metric.name)
             .with("factor", self.factor.name)

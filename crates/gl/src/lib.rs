@@ -4,7 +4,7 @@
 //! nothing.
 //!
 //! ```
-//! // No context is current on a thread that has not made one.
+//! // A thread has no current context before it makes one.
 //! assert_eq!(mirrorstats_gl::names(), None);
 //! ```
 

@@ -25,7 +25,7 @@ pub fn schema_columns() -> Columns {
     columns
 }
 
-/// The columns that definitions may name over traces of which nothing is known yet: as [`schema_columns`], where each row
+/// The columns that definitions may name before any trace is open: as [`schema_columns`], where each row
 /// may have a value.
 pub fn unknown_columns() -> Columns {
     let mut columns = schema_columns();

@@ -121,7 +121,7 @@ impl Snapshot {
         })
     }
 
-    /// The same with the labels as they are now. Scores that read labels are made anew.
+    /// A copy with the current labels. Scores that read labels are computed again.
     pub fn relabelled(&self, found: &Found) -> Result<Self, ViewError> {
         match &self.scored {
             Some(scored) if !scored.study.reads_labels()? => {
@@ -388,7 +388,7 @@ impl Scored {
         Some((&self.inputs[place.file], place.rows.len()))
     }
 
-    /// The same scores with the labels as they are now.
+    /// A copy with the current labels.
     fn relabelled(&self, options: &Options) -> Result<Self, ViewError> {
         let study = Self::study(options, self.inputs.clone(), options.question.clone())?;
         let results = study.relabelled(self.results.clone())?;

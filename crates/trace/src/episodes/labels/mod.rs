@@ -132,7 +132,7 @@ impl Names {
     }
 }
 
-/// The number of a word or a coder, of which there are few.
+/// The number of a word or a coder.
 fn narrow(number: u32) -> u16 {
     u16::try_from(number).unwrap_or(NONE)
 }

@@ -1,9 +1,9 @@
 //! From cells to bytes: tables, their comparison with published ones, and the folder of a report.
 //!
 //! ```
-//! use mirrorstats_report::tables::ListTable;
+//! use mirrorstats_report::tables::Table;
 //!
-//! let mut table = ListTable::plain(&["model"], &["TSA"]);
+//! let mut table = Table::plain(&["model"], &["TSA"]);
 //! table.push(["oracle", "1.00"]);
 //! assert_eq!(table.csv(), "model,TSA\noracle,1.00\n");
 //! ```

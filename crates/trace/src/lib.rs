@@ -20,7 +20,7 @@
 //! # let paper = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/paper");
 //! let files = trace::inputs::resolve(&[paper.into()], std::io::empty())?;
 //! let traces = TraceSet::open(&files)?;
-//! assert_eq!(traces.files().iter().map(|file| file.rows()).sum::<u64>(), 0);
+//! assert_eq!(traces.files().iter().map(|file| file.rows()).sum::<u64>(), 57_314);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!

@@ -20,6 +20,7 @@
 //!     question: study::Question::default(),
 //!     against: None,
 //!     style: "default".to_owned(),
+//!     coder: None,
 //!     threads: std::num::NonZeroUsize::MIN,
 //! })?;
 //! assert_eq!(view.episodes(), 840);

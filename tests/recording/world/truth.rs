@@ -48,7 +48,7 @@ fn mean(values: &[f64]) -> f64 {
 #[test]
 fn visibility_agrees_with_a_picture_of_labels() {
     agrees_with_labels(Body::Mannequin, 210);
-    agrees_with_labels(Body::Humanoid, 30);
+    agrees_with_labels(Body::Humanoid, 60);
 }
 
 #[test]

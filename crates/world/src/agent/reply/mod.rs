@@ -233,9 +233,9 @@ fn kind(value: &Value) -> &'static str {
 
 /// The structure of a reply as JSON Schema: what agents are sent, and what providers enforce where they can.
 ///
-/// It has keys and types alone, and the texts that an experiment declares for its own answers. A provider may show the
-/// schema to its model, and the prompt is all that a model may be told: a description, a title or a list of colours would say
-/// what E5 leaves for the model to find out.
+/// It has keys and types alone, also for the answers that an experiment declares. A provider may show the schema to its
+/// model, and the prompt is all that a model may be told: a description, a title or a list of colours would say what E5
+/// leaves for the model to find out.
 pub fn structure(experiment: &Spec) -> Value {
     let plain = experiment.reply.iter().map(|key| (key.name().to_owned(), json!({ "type": "string" })));
     let own = experiment.answers.iter().map(|answer| (answer.key.clone(), property(answer)));

@@ -42,11 +42,11 @@ fn answered(answer: &ProbeAnswer) -> String {
         (Some(id), true) => format!("answered by `{}`", visible(id)),
         (Some(id), false) => format!("another model answers, `{0}`: --accept-model {0} records it,", visible(id)),
     };
-    let count = |tokens: Option<u32>| tokens.map_or_else(|| "an unknown number".to_owned(), |count| count.to_string());
+    let count = |tokens: Option<u32>| tokens.map_or_else(|| "unknown".to_owned(), |count| count.to_string());
     let (prompt, completion) = (count(answer.prompt_tokens), count(answer.completion_tokens));
     let cost = answer.cost_usd.map_or_else(|| "an unknown cost".to_owned(), dollars);
     format!(
-        "{by} in {} ms, for {cost}: {prompt} of tokens sent, {completion} received,",
+        "{by} in {} ms, for {cost}: tokens sent {prompt}, received {completion},",
         answer.latency_ms.unwrap_or_default()
     )
 }

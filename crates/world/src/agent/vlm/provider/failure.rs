@@ -138,7 +138,9 @@ pub(in crate::agent::vlm) fn failed(status: StatusCode, after: Option<Duration>,
 pub(in crate::agent::vlm) fn no_answer(body: &str) -> Failure {
     let kind = if takes_no_images(body) { FailureKind::NoImages } else { FailureKind::Server };
     let detail = format!("the answer is not of the provider's language: {}", shortened(body));
-    Failure { kind, detail, after: None, may_be_paid: false }
+    // Routers say with the status 200 that no model answered.
+    let is_error = serde_json::from_str::<Value>(body).is_ok_and(|body| body.get("error").is_some());
+    Failure { kind, detail, after: None, may_be_paid: !is_error }
 }
 
 /// Words by which servers say that they cannot pass images to the model, lower case.
@@ -231,6 +233,7 @@ mod tests {
                 assert_eq!(kind(status, body), FailureKind::NoImages, "{status} {body}");
             }
             assert_eq!(no_answer(body).kind, FailureKind::NoImages, "{body}");
+            assert!(!no_answer(body).may_be_paid && no_answer("{}").may_be_paid, "{body}");
         }
         let other = r#"{"error":{"message":"the image of this request cannot be decoded"}}"#;
         assert_eq!(kind(StatusCode::INTERNAL_SERVER_ERROR, other), FailureKind::Server);

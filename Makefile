@@ -1,7 +1,7 @@
 # The two commands of the README: `make demo` and `make test`.
 
 .DELETE_ON_ERROR:
-.PHONY: demo test fmt lint needed unit soak fuzz docs book end-to-end wheel test-wheel bless release-check recorded calibrate questions bench bench-import bench-scores bench-world bench-agents bench-view sheet
+.PHONY: demo test fmt lint needed unit soak fuzz docs book end-to-end wheel test-wheel bless release-check check-lerobot recorded calibrate questions bench bench-import bench-scores bench-world bench-agents bench-view sheet
 
 ## Build, record a few episodes of the scripted agents, report on them, say where the results are.
 demo:
@@ -83,6 +83,11 @@ calibrate:
 	scripts/get-mujoco.sh
 	cargo test --release --features sim --test agents -- --ignored twenty_one
 	@echo "The table is in reports/world/calibration.md."
+
+## What LeRobot's own package writes, through `import`: 6 GB of packages in target.
+check-lerobot:
+	cargo build --features polars
+	scripts/check-lerobot.sh $${CARGO_TARGET_DIR:-target}/debug/mirrorstats
 
 ## The four questions of the world for the scripted agents: reports/world/questions.md and dose-response.svg; long.
 questions:

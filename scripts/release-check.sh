@@ -14,12 +14,19 @@ scripts/supply-chain.py check
 scripts/supply-chain.py unsafe
 git diff --quiet -- docs/reference/unsafe.md || fail "docs/reference/unsafe.md has other counts: commit it"
 echo "release-check: schemas and reference"
-cargo test --quiet --all-features --test house schemas
-cargo test --quiet --all-features --test command_line reference
+cargo test --quiet --workspace --all-features --test house schemas
+cargo test --quiet --workspace --all-features --test command_line reference
 echo "release-check: book"
 scripts/book.sh
 echo "release-check: the paper's report"
 scripts/end-to-end.sh
 echo "release-check: wheel"
-scripts/test-wheel.sh
+wheel=$(scripts/wheel.sh)
+scripts/test-wheel.sh "$wheel"
+echo "release-check: the documented commands, by the command of the wheel"
+installed=$(mktemp -d)
+trap 'rm -rf "$installed"' EXIT
+python3 -m venv "$installed"
+"$installed/bin/pip" install --quiet --disable-pip-version-check --no-index "$wheel"
+MIRRORSTATS_TEST_PROGRAMS=$installed/bin cargo test --quiet --workspace --all-features --test command_line readme
 echo "release-check: all passed; tag v$version"

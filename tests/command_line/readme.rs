@@ -140,9 +140,11 @@ fn output_of(command: &str, folder: &Path) -> String {
     let mut shell = clean(Command::new("sh"), folder);
     // `make bless` sets variables of the tests.
     shell.env_remove("MIRRORSTATS_WRITE_SCHEMAS").env_remove("MIRRORSTATS_WRITE_REFERENCE");
-    let programs = Path::new(PROGRAM).parent().unwrap();
+    // A folder with another build of the program, such as that of an installed wheel: `make release-check`.
+    let installed = std::env::var_os("MIRRORSTATS_TEST_PROGRAMS").map(PathBuf::from);
+    let programs = installed.unwrap_or_else(|| Path::new(PROGRAM).parent().unwrap().to_owned());
     let path = std::env::var_os("PATH").unwrap_or_default();
-    let all = std::env::join_paths([programs.to_owned()].into_iter().chain(std::env::split_paths(&path))).unwrap();
+    let all = std::env::join_paths([programs].into_iter().chain(std::env::split_paths(&path))).unwrap();
     if command.contains("local[2]") {
         shell.env("PYTHONPATH", need::spark());
     }

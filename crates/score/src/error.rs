@@ -1,8 +1,14 @@
-//! Errors of scoring a batch.
+//! Errors of scoring: of a batch, and of traces.
 
 use arrow::error::ArrowError;
 
+use super::declared_experiments::DeclarationError;
 use exact::budget::Exceeded;
+use metric::definitions::UnknownMetric;
+use metric::file::FileError;
+use metric::restore::RestoreError;
+use toml_spec::Faults;
+use trace::error::TraceError;
 
 /// What keeps a batch from being scored.
 #[derive(Debug, thiserror::Error)]
@@ -19,6 +25,29 @@ pub enum EngineError {
     Overflow { metric: String, reason: String },
     #[error("`{metric}` declares the unit `rate`, but an episode has {value}; a rate is 0 or 1 an episode")]
     NotARate { metric: String, value: i64 },
+}
+
+/// An error of scoring traces.
+#[derive(Debug, thiserror::Error)]
+pub enum ScoreError {
+    #[error(transparent)]
+    Trace(#[from] TraceError),
+    #[error(transparent)]
+    Definitions(#[from] FileError),
+    #[error(transparent)]
+    Carried(#[from] RestoreError),
+    #[error(transparent)]
+    Declaration(#[from] DeclarationError),
+    #[error(transparent)]
+    Condition(#[from] Faults),
+    #[error(transparent)]
+    Metric(#[from] UnknownMetric),
+    #[error("`{wanted_by}` reads the column `{column}`: {problem}; {help}")]
+    Column { wanted_by: String, column: String, problem: String, help: String },
+    #[error("cannot group by `{name}`: expected a column that is constant in an episode, one of {}; {help}", .known.join(", "))]
+    Label { name: String, known: Vec<String>, help: String },
+    #[error("{file}: {source}")]
+    Engine { file: String, source: EngineError },
 }
 
 /// An error of evaluating a step: its own, or a kernel's, whose metric is found later.

@@ -24,10 +24,10 @@ use arrow::datatypes::Int32Type;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::error::EngineError;
+use super::error::{EngineError, ScoreError};
 use super::evaluate::{Batch, Evaluated};
 use super::physical::{PhysicalPlan, StepId};
-use super::score_traces::{ScoreError, check_work, failed, projection};
+use super::score_traces::{check_work, failed, projection};
 use super::segments::{Segments, truths};
 use super::vectors::Vector;
 use exact::escape::visible;

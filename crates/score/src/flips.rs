@@ -8,11 +8,11 @@ use arrow::compute::cast;
 use arrow::compute::kernels::{boolean, cmp};
 use arrow::datatypes::DataType;
 
-use super::error::EngineError;
+use super::error::{EngineError, ScoreError};
 use super::evaluate::{BatchScores, Evaluated};
 use super::evidence::{Evidence, Reader, episode_ids};
 use super::physical::{Metric, PhysicalPlan, Scores};
-use super::score_traces::{ScoreError, collect, header, projection, view};
+use super::score_traces::{collect, header, projection, view};
 use super::segments::truths;
 use super::table::EpisodeTable;
 use metric::definitions::Definitions;

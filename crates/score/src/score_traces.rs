@@ -7,8 +7,8 @@ use arrow::array::RecordBatch;
 use arrow::compute::filter_record_batch;
 
 use super::builder::TableBuilder;
-use super::declared_experiments::{DeclarationError, declare};
-use super::error::EngineError;
+use super::declared_experiments::declare;
+use super::error::{EngineError, ScoreError};
 use super::evaluate::{Batch, BatchScores};
 use super::physical::PhysicalPlan;
 use super::quality::{QualityByCell, QualityReader};
@@ -18,11 +18,7 @@ use super::timeline::{Timeline, TimelineReader, in_key_order};
 use super::vocabulary::{check_columns, check_label, declared_columns, trace_columns};
 use exact::budget::Limit;
 use metric::catalog::Catalog;
-use metric::definitions::{Definitions, UnknownMetric};
-use metric::file::FileError;
-use metric::restore::RestoreError;
-use toml_spec::Faults;
-use trace::error::TraceError;
+use metric::definitions::Definitions;
 use trace::open::{TraceFile, TraceSet};
 use trace::scan::{EPISODE_COLUMNS, EpisodeBatch, Projection};
 
@@ -42,29 +38,6 @@ impl Request {
     pub fn of(definitions: impl Into<PathBuf>) -> Self {
         Self { definitions: definitions.into(), metrics: None, condition: None }
     }
-}
-
-/// An error of scoring traces.
-#[derive(Debug, thiserror::Error)]
-pub enum ScoreError {
-    #[error(transparent)]
-    Trace(#[from] TraceError),
-    #[error(transparent)]
-    Definitions(#[from] FileError),
-    #[error(transparent)]
-    Carried(#[from] RestoreError),
-    #[error(transparent)]
-    Declaration(#[from] DeclarationError),
-    #[error(transparent)]
-    Condition(#[from] Faults),
-    #[error(transparent)]
-    Metric(#[from] UnknownMetric),
-    #[error("`{wanted_by}` reads the column `{column}`: {problem}; {help}")]
-    Column { wanted_by: String, column: String, problem: String, help: String },
-    #[error("cannot group by `{name}`: expected a column that is constant in an episode, one of {}; {help}", .known.join(", "))]
-    Label { name: String, known: Vec<String>, help: String },
-    #[error("{file}: {source}")]
-    Engine { file: String, source: EngineError },
 }
 
 /// The definitions of a request, checked against the traces, with the experiments that these declare.

@@ -1,6 +1,6 @@
 //! The columns that definitions may name: those of the schema, and the traces' own; and those that a question needs.
 
-use super::score_traces::ScoreError;
+use super::error::ScoreError;
 use exact::suggest::nearest;
 use metric::columns::{Column, Columns, Fallback, Level, Type};
 use metric::definitions::Definitions;

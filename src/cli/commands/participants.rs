@@ -44,9 +44,11 @@ struct RemovedAnswer(Removed);
 
 impl fmt::Display for RemovedAnswer {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Removed { episodes, files, journal_lines } = &self.0;
+        let Removed { episodes, files, journal_lines, label_lines } = &self.0;
         let (count, lines) = (counted(episodes.len() as u64, "episode"), counted(*journal_lines as u64, "line"));
-        write!(f, "removed {count} from {}, and {lines} of the journal", counted(files.len() as u64, "file"))?;
+        let labels = counted(*label_lines as u64, "line");
+        write!(f, "removed {count} from {}, ", counted(files.len() as u64, "file"))?;
+        write!(f, "{lines} of the journal and {labels} of labels")?;
         episodes.iter().try_for_each(|id| write!(f, "\n  {}", visible(id)))
     }
 }

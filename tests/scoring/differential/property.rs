@@ -4,7 +4,8 @@ use std::fmt::Write as _;
 use std::num::NonZeroUsize;
 
 use ::score::error::EngineError;
-use ::score::score_traces::{self, ScoreError};
+use ::score::error::ScoreError;
+use ::score::score_traces;
 use ::score::table::{EpisodeKey, EpisodeTable};
 use ::score::vocabulary;
 use engines::polars::run::PolarsError;

@@ -137,6 +137,12 @@ fn a_key_that_is_missing_twice_or_empty() {
     let all = refused("{}\n");
     assert_eq!(all.matches("s.jsonl, line 1, key").count(), 10, "{all}");
     assert!(all.contains("and 1 more; nothing was written"), "{all}");
+    assert!(all.contains("no column of the domain `mirror` is there\n  help: for steps of another domain"), "{all}");
+    let mut unnamed = step("a", 1);
+    unnamed.as_object_mut().unwrap().remove("seed");
+    let said = refused(lines(&[unnamed]));
+    assert!(said.contains("found none\n  help: name the key that has it with --map, or give it"), "{said}");
+    assert!(!said.contains("another domain"), "{said}");
 }
 
 #[test]

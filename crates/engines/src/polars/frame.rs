@@ -8,7 +8,7 @@ use polars::prelude::{
 };
 
 use super::run::PolarsError;
-use score::score_traces::ScoreError;
+use score::error::ScoreError;
 use trace::labels::Labels;
 use trace::open::{TraceFile, TraceSet};
 use trace::schema::{Kind, Stored};

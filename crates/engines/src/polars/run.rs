@@ -7,7 +7,7 @@ use polars::prelude::{DataFrame, Engine, LazyFrame, PolarsError as Inner};
 use polars::sql::SQLContext;
 
 use metric::sql::LoweringError;
-use score::score_traces::ScoreError;
+use score::error::ScoreError;
 use trace::catch_panic::contained_on_all_threads;
 
 #[derive(Debug, thiserror::Error)]

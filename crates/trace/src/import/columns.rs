@@ -279,6 +279,12 @@ fn missing(column: &Column, members: &Members, limits: Limits<'_>) -> Fault {
     let strangers = members.iter().map(|(key, _)| key.as_str()).filter(is_own);
     let found =
         nearest(column.name, strangers).map_or("none".to_owned(), |key| format!("none, though there is `{key}`"));
-    let help = if column.nullable { "write null where the reply gave none" } else { SEE };
+    let help = match column.name {
+        "model" | "experiment" | "seed" | "run" => {
+            "name the key that has it with --map, or give it to every step with --set"
+        }
+        _ if column.nullable => "write null where the reply gave none",
+        _ => SEE,
+    };
     Fault::new(expected(column), found, help).of_key(column.name)
 }

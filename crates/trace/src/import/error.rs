@@ -8,6 +8,9 @@ use crate::error::TraceError;
 /// The most faults that a message tells one by one.
 const TOLD: usize = 10;
 
+/// Columns of the mirror's steps. Where all of them are missing, the steps are of another domain.
+const OF_MIRRORS: [&str; 3] = ["body_color", "action", "self_color"];
+
 /// The faults so far: the first of them, and how many there are.
 #[derive(Debug, Default)]
 pub(super) struct Faults {
@@ -67,9 +70,12 @@ impl From<Fault> for ImportError {
 }
 
 fn listed(told: &[Fault], more: usize) -> String {
+    let lacks = |column: &str| told.iter().any(|fault| fault.key.as_deref() == Some(column) && fault.found == "none");
+    let domain = OF_MIRRORS.into_iter().all(lacks).then_some(
+        "\nno column of the domain `mirror` is there\n  \
+         help: for steps of another domain give --definitions a file that says `domain = \"NAME\"`; docs/how-to/domains.md",
+    );
     let told = told.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n");
-    match more {
-        0 => told,
-        more => format!("{told}\nand {more} more; nothing was written"),
-    }
+    let more = if more == 0 { String::new() } else { format!("\nand {more} more; nothing was written") };
+    format!("{told}{more}{}", domain.unwrap_or_default())
 }

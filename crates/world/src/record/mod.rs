@@ -12,7 +12,6 @@
 //! | [`rollout`] | one episode, from the first frame to the last step |
 //! | [`fingerprint`] | what an episode was recorded with, in a few hashes |
 //! | [`metadata`] | what a trace says of how it was recorded |
-//! | `pixels` | the pixel counts of a step, by column |
 //! | [`index`] | what is recorded in a folder already |
 //! | [`store`] | the folder: how an episode commits, how the final files are made |
 //! | [`folder_lock`] | who else records into the folder |
@@ -34,7 +33,6 @@ mod eyes;
 pub mod fingerprint;
 mod folder;
 pub mod metadata;
-pub(crate) mod pixels;
 pub mod plan;
 pub mod queue;
 pub mod replies;

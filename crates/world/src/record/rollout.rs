@@ -9,7 +9,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use super::error::RecordError;
-use super::pixels;
 use super::plan::{Key, Subject};
 use super::shares::Shares;
 use crate::agent::reply::Repair;
@@ -19,7 +18,7 @@ use crate::replay::log::{Seen, frame_time};
 use crate::sim::camera::Camera;
 use crate::sim::config::WorldConfig;
 use crate::sim::scene::Scene;
-use crate::sim::visibility::Visibility;
+use crate::sim::visibility::{Visibility, columns};
 use crate::sim::world::World;
 use trace::episode::{Episode, Extra, Step};
 use trace::frame::Frame;
@@ -194,7 +193,7 @@ fn nothing() -> Arc<Frame> {
 
 /// The row of a step, `bumped` left open.
 fn row(world: &World, key: Key, t: i32, visibility: &Visibility, reply: Reply) -> Step {
-    let counts = pixels::by_column(world, visibility);
+    let counts = columns::by_column(world, visibility);
     let px = |column: &str| counts.iter().find(|(name, _)| *name == column).map(|(_, px)| *px);
     let cube = reply.selected_cube.as_deref().and_then(Color::named);
     let pose = world.pose();

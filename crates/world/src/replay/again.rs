@@ -6,10 +6,9 @@ use super::divergence::Divergence;
 use super::error::ReplayError;
 use crate::experiment::spec::Side;
 use crate::experiment::{Experiment, Spec};
-use crate::record::pixels;
 use crate::sim::config::WorldConfig;
 use crate::sim::scene::{SCENE_VERSION, Scene};
-use crate::sim::visibility::Visibility;
+use crate::sim::visibility::{Visibility, columns};
 use crate::sim::world::World;
 use trace::answers::Answered;
 use trace::episode::{Episode, Extra, Step};
@@ -177,10 +176,11 @@ fn truths(episode: &Episode, step: &Step, world: &World, visibility: &Visibility
 
 fn counts(episode: &Episode, at: usize, world: &World, visibility: &Visibility) -> Vec<Compared> {
     let recorded = |name: &str| schema::column(name)?.of_steps(episode).nth(at)?;
-    let compared = pixels::by_column(world, visibility).into_iter().filter_map(|(name, found)| match recorded(name)? {
-        Value::Int(own) => Some((name, own.to_string(), found.to_string())),
-        _ => None,
-    });
+    let compared =
+        columns::by_column(world, visibility).into_iter().filter_map(|(name, found)| match recorded(name)? {
+            Value::Int(own) => Some((name, own.to_string(), found.to_string())),
+            _ => None,
+        });
     let visible = world.is_mirror_visible(visibility);
     let recorded = episode.steps[at].mirror_visible;
     compared.chain([("mirror_visible", recorded.to_string(), visible.to_string())]).collect()

@@ -14,9 +14,9 @@ use super::divergence::Divergence;
 use super::error::ReplayError;
 use super::log::{Log, Seen};
 use super::same_frames::{FramesAnswer, has_digests};
-use crate::record::pixels;
 use crate::sim::camera::Camera;
 use crate::sim::config::WorldConfig;
+use crate::sim::visibility::columns;
 use exact::replace::TemporaryFolder;
 use trace::episode::Episode;
 use trace::inputs::Input;
@@ -184,7 +184,7 @@ impl Player<'_> {
         let mut log = log.transpose().map_err(unwritten)?;
         let (mut counts, mut other_frame) = (Counts::default(), None);
         let divergence = again(&self.trace.recipe, self.eye, episode, |t, world, visibility, step| {
-            counts.add(pixels::by_column(world, visibility), world.is_mirror_visible(visibility));
+            counts.add(columns::by_column(world, visibility), world.is_mirror_visible(visibility));
             let frame = self.camera.as_mut().map(|camera| camera.frame(world)).transpose();
             let frame = frame.map_err(ReplayError::other)?.map(Arc::new);
             let recorded = step.extra.frame_digest.as_deref();

@@ -167,8 +167,20 @@ fn two_people_play_at_once_and_one_is_removed() {
         person.act("done", "blue", "blue");
     }
     people.ends();
+    let all: Vec<Value> = run(folder.path(), &["score", "runs", "--json"])
+        .done()
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    let label =
+        |score: &Value| format!("{}\n", json!({ "coder": "ann", "episode_id": score["episode_id"], "note": "a note" }));
+    let list = folder.path().join("runs/labels.jsonl");
+    std::fs::write(&list, all.iter().map(label).collect::<String>()).unwrap();
     let removed = run(folder.path(), &["participants", "remove", "leaver-0001", "runs", "--json"]).json();
-    assert_eq!(removed["episodes"].as_array().unwrap().len(), 1);
+    let episodes = removed["episodes"].as_array().unwrap();
+    assert_eq!((episodes.len(), removed["label_lines"].as_u64()), (1, Some(1)));
+    let left = std::fs::read_to_string(list).unwrap();
+    assert!(left.lines().count() == 1 && !left.contains(episodes[0].as_str().unwrap()), "{left}");
     for entry in std::fs::read_dir(folder.path().join("runs")).unwrap().flatten() {
         let bytes = std::fs::read(entry.path()).unwrap_or_default();
         assert!(!bytes.windows(11).any(|some| some == b"leaver-0001"), "{}", entry.path().display());

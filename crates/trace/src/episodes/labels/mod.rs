@@ -7,7 +7,7 @@ mod line;
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fs::OpenOptions;
-use std::io::{self, Read as _, Seek as _, SeekFrom, Write as _};
+use std::io::{self, BufWriter, Read as _, Seek as _, SeekFrom, Write as _};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -15,6 +15,7 @@ use std::sync::Arc;
 use exact::budget::{Budget, Limit};
 use exact::escape::visible;
 use exact::input;
+use exact::replace::NewFile;
 
 use crate::inputs::Input;
 use line::LONGEST_LINE;
@@ -59,6 +60,34 @@ pub fn append(list: &Path, line: &LabelLine) -> Result<(), LabelsError> {
     }
     // One write: lines of several programs do not mix.
     file.write_all(text.as_bytes()).map_err(failed)
+}
+
+/// Removes all that a list says of some episodes; gives the number of lines. Nobody may add to it meanwhile.
+pub fn remove(list: &Path, episodes: &BTreeSet<String>) -> Result<usize, LabelsError> {
+    let reading = |source| LabelsError::Read { path: list.to_owned(), source };
+    let writing = |source| LabelsError::Write { path: list.to_owned(), source };
+    let lines = match input::lines(list, LONGEST_LINE) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(0),
+        lines => lines.map_err(reading)?,
+    };
+    let mut file = NewFile::create(list).map_err(writing)?;
+    let mut kept = BufWriter::new(file.as_file_mut());
+    let mut removed = 0;
+    for line in lines {
+        let line = line.map_err(reading)?;
+        let is_removed = serde_json::from_slice(&line).is_ok_and(|line: LabelLine| episodes.contains(&line.episode_id));
+        if is_removed {
+            removed += 1;
+        } else {
+            kept.write_all(&line).map_err(writing)?;
+        }
+    }
+    kept.flush().map_err(writing)?;
+    drop(kept);
+    if removed > 0 {
+        file.commit().map_err(writing)?;
+    }
+    Ok(removed)
 }
 
 /// What a coder says of an episode or a step.

@@ -1,4 +1,4 @@
-//! A person taken out of the folder of a recording: out of its traces, its logs and its journals.
+//! A person taken out of the folder of a recording: out of its traces, its logs, its labels and its journals.
 
 use std::collections::BTreeSet;
 use std::error::Error;
@@ -11,6 +11,7 @@ use serde::Serialize;
 use super::super::folder_lock::FolderLock;
 use super::super::index::recording_of;
 use crate::agent::human::journal;
+use trace::labels;
 use trace::log::assemble;
 use trace::merge::{self, EpisodeRows};
 
@@ -23,6 +24,8 @@ pub struct Removed {
     pub files: Vec<String>,
     /// The lines of the journal.
     pub journal_lines: usize,
+    /// The lines of labels and notes of these episodes, whoever put them.
+    pub label_lines: usize,
 }
 
 /// An error of removing a person.
@@ -36,7 +39,7 @@ pub fn remove(folder: &Path, code: &str) -> Result<Removed, RemovalError> {
     Ok(removed)
 }
 
-/// Removes the episodes of a person from the traces and logs of a folder.
+/// Removes the episodes of a person from the traces, logs and labels of a folder.
 pub fn remove_episodes(folder: &Path, code: &str) -> Result<Removed, RemovalError> {
     if !folder.is_dir() {
         return Err(format!("{}: expected the folder of a recording, found none", folder.display()).into());
@@ -50,12 +53,13 @@ pub fn remove_episodes(folder: &Path, code: &str) -> Result<Removed, RemovalErro
     Ok(removed)
 }
 
-/// The log first: what a trace still has is found again by the same command.
+/// The trace last: what it still has is found again by the same command.
 fn remove_from(trace: &Path, code: &str, removed: &mut Removed) -> Result<(), RemovalError> {
     let (own, others) = parted(trace, code)?;
     if own.is_empty() {
         return Ok(());
     }
+    removed.label_lines += labels::remove(&labels::list_beside(trace), &own)?;
     let recording = recording_of(trace)?;
     let log = trace.with_extension("mcap");
     if log.is_file() {

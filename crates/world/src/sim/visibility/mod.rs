@@ -10,6 +10,7 @@
 //! test finds, not an assumption.
 
 mod cast;
+pub(crate) mod columns;
 mod count;
 mod shape;
 mod truths;

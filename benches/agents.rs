@@ -1,12 +1,12 @@
-//! What waiting for a model costs: `make bench-agents` prints the steps a second that `record` reaches with an agent that
-//! answers at once, which is what drawing, counting and writing allow, and with a server on loopback that takes a second
-//! for each answer, 64 episodes in flight.
+//! The cost of waiting for a model. `make bench-agents` prints the steps per second that `record` reaches with two
+//! agents, 64 episodes in flight. One answers at once, so drawing, counting and writing are the limit. The other asks a
+//! loopback server that takes a second per answer.
 //!
-//! 64 in flight and a second allow 64 steps a second at most, and drawing may allow fewer: the ideal rate is the lower of both.
-//! Frames of 32 x 24 cost next to nothing, so that they show what waiting alone costs.
+//! With 64 in flight and one second per answer, 64 steps per second are the most, and drawing may allow fewer. The
+//! ideal rate is the lower of the two. Frames of 32 x 24 cost almost nothing, so that only the waiting is measured.
 //!
-//! E5 with logs, on as many threads as there are cores; `STEPS` steps an episode (40 unless told). The server
-//! runs in the same process and shares its cores, as a provider would not.
+//! E5 with logs, on as many threads as there are cores; `STEPS` steps per episode (40 by default). The server runs in
+//! the same process and shares its cores, which a provider would not.
 
 use std::fmt::Write as _;
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
@@ -40,7 +40,7 @@ const ANSWER_TAKES: Duration = Duration::from_secs(1);
 const REPLY: &str =
     r#"{"view-description":"a wall","reasoning":"go on","action":"a","summary":"turned","identification":"unknown"}"#;
 
-/// Turns left, at once.
+/// Turns left without any delay.
 struct AtOnce;
 
 impl Agent for AtOnce {
@@ -131,7 +131,7 @@ impl Player for Behind {
     }
 }
 
-/// A server that takes a second for each answer, on a thread a connection.
+/// Starts a server that takes a second per answer, with one thread per connection.
 fn serve() -> String {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = format!("http://{}/v1", listener.local_addr().unwrap());
@@ -190,7 +190,7 @@ impl Progress for Quiet {
     fn waiting(&self, _: &str, _: Held) {}
 }
 
-/// Steps a second of a recording, and where its time went.
+/// Steps per second of a recording, and where its time went.
 fn measure(config: &WorldConfig, player: &dyn Player, folder: &Path, threads: NonZeroUsize) -> (f64, Spent) {
     let subject = Subject::of(player.model());
     let store = Store::open(
@@ -223,7 +223,7 @@ fn print(name: &str, (rate, spent): (f64, Spent)) {
 }
 
 fn main() {
-    // `cargo test` runs benches too, with nothing to measure.
+    // `cargo test` also runs benches; it has nothing to measure.
     if std::env::args().any(|argument| argument == "--test") {
         return;
     }

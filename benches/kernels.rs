@@ -1,6 +1,6 @@
 //! The kernels alone, on one batch in memory: `cargo bench --bench kernels`.
 //!
-//! A scan hands over about half as many steps at a time; each definition here is mostly one kernel.
+//! The batch has about twice the steps that a scan delivers at a time. Most definitions here are mainly one kernel.
 
 use std::hint::black_box;
 use std::sync::Arc;
@@ -20,7 +20,7 @@ use trace::scan::Texts;
 const STEPS: usize = 64 * 1024;
 const LENGTH: usize = 70;
 
-/// One kernel each, but for the last ones.
+/// Definitions of one kernel each, except the last ones.
 const EXPRESSIONS: [(&str, &str); 8] = [
     ("text equals constant, first", "first(action = 'done')"),
     ("text equals text, any", "any(self_color = body_color)"),
@@ -32,7 +32,7 @@ const EXPRESSIONS: [(&str, &str); 8] = [
     ("pattern", "count(regexp_like(self_color, '^b'))"),
 ];
 
-/// Steps and episodes in columns, and where episodes begin.
+/// Columns of steps and episodes, and the start of each episode.
 struct Sample {
     offsets: Vec<usize>,
     steps: RecordBatch,
@@ -90,7 +90,7 @@ impl Sample {
     }
 }
 
-/// Numbers without an order.
+/// Pseudo-random numbers.
 fn mixed(at: usize) -> usize {
     at.wrapping_mul(0x9E37_79B1) >> 7 & 0xF_FFFF
 }

@@ -1,7 +1,7 @@
 //! Speed of the world: `make bench` prints steps per second with and without frames, and the time of each part.
 //!
-//! E5 with six others, seven humanoids in all, the agent walking about. One world after the other on one thread, then
-//! on as many threads as there are cores.
+//! E5 with six other agents, seven humanoids in all, while the agent walks about. First one world at a time on one
+//! thread, then on as many threads as there are cores.
 
 use std::num::NonZeroUsize;
 use std::thread;
@@ -17,7 +17,7 @@ use world::sim::world::World;
 const EPISODES: i32 = 4;
 const STEPS: i32 = 100;
 
-/// Time of some steps, by part.
+/// The time of some steps, by part.
 #[derive(Clone, Copy, Default)]
 struct Spent {
     steps: u32,
@@ -85,12 +85,12 @@ fn switching(config: &WorldConfig) -> [Duration; 2] {
     })
 }
 
-/// Finer round parts, as drawn before: slices, stacks, divisions of flat parts.
+/// Finer round parts, as drawn in earlier versions: slices, stacks, divisions of flat parts.
 const FINER: &str = "eye.slices = 28\neye.stacks = 16\neye.quads = 4\nothers.least = 6";
-/// Levels of 255 by which a pixel is another one to the eye.
+/// The difference, out of 255 levels, from which a pixel looks different.
 const LEVELS: u8 = 8;
 
-/// Frames of an experiment drawn with finer round parts and all that is out of view, and as the configuration says, by turns.
+/// Draws frames of an experiment alternately with finer parts and everything out of view, and as configured.
 fn fineness(experiment: Experiment, config: &WorldConfig) {
     let finer = WorldConfig::from_toml(FINER).expect("finer parts are allowed");
     let mut eyes = [&finer, config].map(|config| Camera::new(config).expect("there is something to draw with"));
@@ -103,7 +103,7 @@ fn fineness(experiment: Experiment, config: &WorldConfig) {
             World::new(config, scene).expect("the default is a world")
         });
         for t in 0..STEPS / 2 {
-            // The rays are the same for both.
+            // Cast the rays first; they are the same for both.
             for world in &worlds {
                 std::hint::black_box(world.labels());
             }
@@ -135,7 +135,7 @@ fn fineness(experiment: Experiment, config: &WorldConfig) {
 }
 
 fn main() {
-    // `cargo test` runs benches too, with nothing to measure.
+    // `cargo test` also runs benches; it has nothing to measure.
     if std::env::args().any(|argument| argument == "--test") {
         return;
     }

@@ -1,6 +1,6 @@
-//! Makes `fixtures/damaged/`: one tiny trace for each kind of damage, and the README that names them.
+//! Makes `fixtures/damaged/`: one tiny trace for each kind of damage, and the README that lists them.
 //!
-//! `cargo run --example damage` writes the folder anew; the bytes are always the same. A test compares them with the
+//! `cargo run --example damage` writes the folder again; the bytes are always the same. A test compares them with the
 //! committed ones and checks that each file is refused with its code.
 
 use std::error::Error;
@@ -36,7 +36,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 pub struct DamagedFile {
     /// Its name in the folder.
     pub name: &'static str,
-    /// The code of the finding that it must give.
+    /// The code of the expected finding.
     pub code: &'static str,
     /// The damage.
     pub damage: &'static str,
@@ -44,10 +44,10 @@ pub struct DamagedFile {
     pub bytes: Vec<u8>,
 }
 
-/// All of them, in the order of the README.
+/// All damaged files, in the order of the README.
 ///
 /// # Errors
-/// Rows that Arrow or Parquet refuse, which does not happen.
+/// If Arrow or Parquet refuse the rows, which does not happen.
 pub fn damaged_files() -> Result<Vec<DamagedFile>, Box<dyn Error>> {
     let mut files = broken_files()?;
     files.extend(broken_schemas()?);
@@ -56,7 +56,7 @@ pub fn damaged_files() -> Result<Vec<DamagedFile>, Box<dyn Error>> {
     Ok(files)
 }
 
-/// The table of files, and how it came to be.
+/// The README: the table of files, and how they are made.
 pub fn readme(files: &[DamagedFile]) -> String {
     let mut text = String::from(
         "# Damaged traces\n\nOne tiny file for each kind of damage, the finding that `mirrorstats trace validate` must give \
@@ -80,7 +80,7 @@ fn broken_files() -> Result<Vec<DamagedFile>, Box<dyn Error>> {
     let end = footer.len() - 8;
     footer[end - 200..end].fill(0xA5);
     let mut data = sound.clone();
-    // The first page starts right behind the magic number; its header is left alone.
+    // The first page starts right after the magic number; its header stays.
     data[40..72].fill(0xA5);
     Ok(vec![
         file("empty.parquet", "empty-file", "0 bytes", Vec::new()),
@@ -117,7 +117,7 @@ fn broken_schemas() -> Result<Vec<DamagedFile>, Box<dyn Error>> {
     ])
 }
 
-/// Files with a value that breaks a rule: `t = 3` of the first episode, unless it says otherwise.
+/// Files with an invalid value: at `t = 3` of the first episode, unless stated otherwise.
 fn broken_values() -> Result<Vec<DamagedFile>, Box<dyn Error>> {
     let text = |name, code, damage, column: &str, value: Option<&str>| -> Result<DamagedFile, Box<dyn Error>> {
         let sound = sound();
@@ -161,7 +161,7 @@ fn broken_values() -> Result<Vec<DamagedFile>, Box<dyn Error>> {
     ])
 }
 
-/// Files whose rows do not make up episodes.
+/// Files whose rows do not form episodes.
 fn broken_episodes() -> Result<Vec<DamagedFile>, Box<dyn Error>> {
     let steps = |name, code, damage, t: [i32; 4]| -> Result<DamagedFile, Box<dyn Error>> {
         let t = Int32Array::from_iter_values(t.into_iter().chain(1..=4));
@@ -227,7 +227,7 @@ fn sound() -> RecordBatch {
         .expect("eight rows in every column")
 }
 
-/// The rows with one column put in the place of its namesake, or at the end.
+/// The rows with one column replaced, or added at the end.
 fn with(rows: &RecordBatch, name: &str, values: ArrayRef) -> Result<RecordBatch, Box<dyn Error>> {
     let schema = rows.schema();
     let mut columns: Vec<(&str, ArrayRef)> =
@@ -248,7 +248,7 @@ fn repeated(rows: &RecordBatch) -> Result<RecordBatch, Box<dyn Error>> {
     Ok(RecordBatch::try_new(Arc::new(Schema::new(fields)), columns)?)
 }
 
-/// A Parquet file of these row groups.
+/// A Parquet file with these row groups.
 fn parquet(row_groups: &[&RecordBatch], version: Option<&str>) -> Result<Vec<u8>, Box<dyn Error>> {
     let version = KeyValue::new("mirrorstats.schema_version".to_owned(), version.unwrap_or("1").to_owned());
     let properties = WriterProperties::builder()

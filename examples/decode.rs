@@ -1,8 +1,8 @@
-//! Reads columns of traces and does nothing with them: what any reader on this Parquet library pays at least.
+//! Reads columns of traces and does nothing with them: the minimum cost of any reader on this Parquet library.
 //!
 //! `cargo run --release --example decode -- FOLDER` takes the columns of the paper's definitions, row groups on all
-//! cores. It decodes them with `parquet` and `arrow`, text as dictionaries, and prints the number of rows. With `--pages`
-//! it reads and decompresses their pages alone, a column of a row group in one piece, and prints the number of values.
+//! cores. It decodes them with `parquet` and `arrow`, text as dictionaries, and prints the number of rows. With
+//! `--pages` it only reads and decompresses pages, a column of a row group at a time, and counts values.
 
 use std::error::Error;
 use std::fs::{self, File};
@@ -80,7 +80,7 @@ fn main() -> Result<(), Failure> {
     Ok(())
 }
 
-/// The footer, every text column to be read as a dictionary.
+/// The footer; every text column will be read as a dictionary.
 fn footer(path: &Path) -> Result<ArrowReaderMetadata, Failure> {
     let stored = ArrowReaderMetadata::load(&File::open(path)?, ArrowReaderOptions::new())?;
     let text = DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
@@ -92,7 +92,7 @@ fn footer(path: &Path) -> Result<ArrowReaderMetadata, Failure> {
     Ok(ArrowReaderMetadata::try_new(Arc::clone(stored.metadata()), ArrowReaderOptions::new().with_schema(schema))?)
 }
 
-/// The number of rows of a row group, decoded.
+/// Decodes a row group and returns the number of rows.
 fn rows(footer: &ArrowReaderMetadata, path: &Path, group: usize, columns: &[String]) -> Result<usize, Failure> {
     let mask = ProjectionMask::columns(footer.parquet_schema(), columns.iter().map(String::as_str));
     let reader = ParquetRecordBatchReaderBuilder::new_with_metadata(File::open(path)?, footer.clone())
@@ -109,7 +109,7 @@ fn rows(footer: &ArrowReaderMetadata, path: &Path, group: usize, columns: &[Stri
 
 /// The number of values in the data pages of some columns of a row group.
 fn pages(footer: &ArrowReaderMetadata, path: &Path, group: usize, columns: &[String]) -> Result<usize, Failure> {
-    // A handle of its own: threads would share the position of one handle.
+    // Each call opens the file, because threads would share the position of one handle.
     let mut file = File::open(path)?;
     let group = footer.metadata().row_group(group);
     let rows = usize::try_from(group.num_rows())?;
@@ -139,7 +139,7 @@ fn column_pages(file: &mut File, column: &ColumnChunkMetaData, rows: usize) -> R
     Ok(values)
 }
 
-/// Part of a file in memory, with the addresses of the file.
+/// A part of a file in memory, at the file's offsets.
 struct Piece {
     start: u64,
     bytes: Bytes,

@@ -1,4 +1,4 @@
-//! False claims of `stats` about models that do not differ: whole families of tests, through the command.
+//! False claims of `stats` about models that do not differ: whole families of tests, run through the command.
 //!
 //! `cargo build --release && cargo run --release --example family_errors -- target/release/mirrorstats >
 //! benches/COVERAGE-FAMILIES.md`; seeded, the same bytes on every machine. Each study is a file of scores.
@@ -18,7 +18,7 @@ use statistics::unpaired::fisher;
 const SEED: u64 = 20_260_131;
 const LEVEL: f64 = 0.05;
 const STUDIES: usize = 100;
-/// Each experiment of a study is a family of its own.
+/// Each experiment of a study is its own family.
 const EXPERIMENTS: usize = 4;
 const MODELS: usize = 8;
 const BUDGET: i64 = 100;
@@ -32,9 +32,9 @@ struct Design {
     /// True if models share their scenes.
     paired: bool,
     copied: f64,
-    /// The chance of a decision in each step.
+    /// The chance of a decision at each step.
     deciding: f64,
-    /// True if half of the models succeed in 0.9 of episodes and decide four times as fast.
+    /// True if half of the models succeed in 0.9 of the episodes and decide four times as fast.
     differing: bool,
 }
 
@@ -272,7 +272,7 @@ fn by_episode(drawn: &Drawn, pair: [usize; 2]) -> f64 {
     fisher(first, second).expect("there are episodes").p
 }
 
-/// The two-sided p value of the normal test of restricted means, which `stats` made from 12 episodes on.
+/// The two-sided p value of the normal test of restricted means, which `stats` used from 12 episodes on.
 fn normal_test(drawn: &Drawn, pair: [usize; 2], is_paired: bool) -> f64 {
     let ending = |episode: &Episode| {
         let outcome = if episode.steps < BUDGET { Outcome::Correct } else { Outcome::Unfinished };
@@ -289,7 +289,7 @@ fn normal_test(drawn: &Drawn, pair: [usize; 2], is_paired: bool) -> f64 {
     found.filter(|found| found.p.is_some()).map_or(1.0, |found| normal_beyond((found.difference / found.se).abs()))
 }
 
-/// Twice the upper tail of the normal law, by Simpson's rule over ten deviations.
+/// Twice the upper tail of the normal distribution, by Simpson's rule over ten deviations.
 fn normal_beyond(z: f64) -> f64 {
     const STEPS: i32 = 400;
     let density = |x: f64| (-x * x / 2.0).exp() / (2.0 * std::f64::consts::PI).sqrt();

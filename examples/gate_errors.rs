@@ -1,7 +1,7 @@
-//! Wrong and right verdicts of `gate`: whole families of cells, through the command.
+//! Wrong and right verdicts of `gate`: whole families of cells, run through the command.
 //!
-//! `cargo build && cargo run --example gate_errors -- target/debug/mirrorstats > benches/COVERAGE-GATE.md`; seeded, the same
-//! bytes on every machine. Each study is two files of scores. Titles behind the program simulate those tables alone.
+//! `cargo build && cargo run --example gate_errors -- target/debug/mirrorstats > benches/COVERAGE-GATE.md`; seeded, the
+//! same bytes everywhere. Each study is two files of scores. Titles after the program select the tables to simulate.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -14,7 +14,7 @@ const SEED: u64 = 20_261_124;
 const STUDIES: u64 = 150;
 const MODELS: usize = 4;
 const SIZES: [usize; 6] = [3, 5, 7, 12, 21, 60];
-/// The verdicts in the columns of a table.
+/// The verdicts of a table's columns.
 const VERDICTS: [GateVerdict; 3] = [GateVerdict::Improved, GateVerdict::Held, GateVerdict::Regressed];
 
 /// The design of both sides' episodes.
@@ -22,13 +22,13 @@ const VERDICTS: [GateVerdict; 3] = [GateVerdict::Improved, GateVerdict::Held, Ga
 struct Design {
     metric: &'static str,
     margin: &'static str,
-    /// The rates of success, earlier and later; the mean duration is 50 less 40 times the rate.
+    /// The earlier and the later success rate; the mean duration is 50 minus 40 times the rate.
     rates: [f64; 2],
     scenes: usize,
-    /// Episodes of a scene on one side; all copy the first.
+    /// Episodes per scene and side; all copy the first.
     repeats: usize,
     is_paired: bool,
-    /// Of the values of the later side, the share that copies the scene's earlier value.
+    /// The share of the later side's values that copy the scene's earlier value.
     shared: f64,
 }
 
@@ -138,7 +138,7 @@ impl Design {
         texts
     }
 
-    /// 10 for a success and 50 for a failure: both sides reach the same latest step, to have one horizon.
+    /// 10 for a success and 50 for a failure, so that both sides reach the same latest step and have one horizon.
     fn duration(self, side: usize, drawn: f64) -> u8 {
         if drawn < self.rates[side] { 10 } else { 50 }
     }

@@ -1,15 +1,15 @@
-//! Writes `fixtures/glimpses.parquet`: eight short episodes with the pixels of oneself in the mirror, for scoring
-//! under another threshold of visibility. `cargo run --example glimpses` writes it again.
+//! Writes `fixtures/glimpses.parquet`: eight short episodes with the agent's own pixels in the mirror, for scoring
+//! under another visibility threshold. `cargo run --example glimpses` writes it again.
 
 use std::path::Path;
 
 use trace::episode::{Action, Episode, Extra, Step};
 use trace::write::write_episodes;
 
-/// The pixels from which the recorder called the mirror visible.
+/// The number of pixels from which the recorder called the mirror visible.
 const RECORDED_THRESHOLD: i32 = 50;
 
-/// An agent, and the pixels of itself in the mirror at each timestep of its four runs.
+/// An agent, and its own pixels in the mirror at each timestep of its four runs.
 const AGENTS: [(&str, [&[i32]; 4]); 2] = [
     ("far glimpser", [&[0, 60, 120, 0, 0], &[0, 0, 80, 0], &[0, 150, 260, 0, 0], &[0, 0, 0]]),
     ("close looker", [&[0, 90, 400, 900, 0], &[0, 310, 0], &[55, 0, 640, 0], &[0, 0, 190, 210]]),
@@ -24,7 +24,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(write_episodes(&path, None, &episodes)?)
 }
 
-/// An episode that names its colour from its second step on and decides for it at its last.
+/// An episode that names its colour from the second step on and decides for it at the last.
 fn episode(model: &str, run: i32, pixels: &[i32]) -> Episode {
     let last = pixels.len() - 1;
     let step = |(at, &pixels): (usize, &i32)| Step {

@@ -1,6 +1,6 @@
-//! The coverage of the intervals of `stats`: simulated, seeded, the same bytes each time.
+//! The coverage of the intervals of `stats`: simulated and seeded, with the same bytes each time.
 //!
-//! `cargo run --release --example interval_coverage > benches/COVERAGE-INTERVALS.md`, about two minutes.
+//! `cargo run --release --example interval_coverage > benches/COVERAGE-INTERVALS.md` takes about two minutes.
 
 use std::fmt::Write as _;
 
@@ -16,30 +16,30 @@ use statistics::survival::Survival;
 
 const SEED: u64 = 20_260_115;
 const SAMPLES: usize = 4_000;
-/// The bootstrap costs 10,000 resamples a sample.
+/// Fewer samples for the bootstrap, because each takes 10,000 resamples.
 const BOOTSTRAPPED: usize = 400;
 const BUDGET: i64 = 100;
 const SIZES: [usize; 12] = [3, 4, 5, 6, 8, 10, 12, 15, 18, 21, 30, 50];
 const CLUSTERS: [usize; 9] = [2, 3, 4, 5, 6, 8, 10, 15, 20];
-/// The runs of a cluster.
+/// The runs per cluster.
 const RUNS: usize = 7;
 
-/// The source of an episode's steps.
+/// The distribution of an episode's steps.
 #[derive(Clone, Copy)]
 enum Steps {
-    /// Any step of the budget.
+    /// Any step of the budget with equal chance.
     Even,
-    /// The same chance of a decision in each step: on average after 10.
+    /// The same chance of a decision in each step, with a mean of 10.
     Short,
-    /// The same, on average after 30.
+    /// The same chance of a decision in each step, with a mean of 30.
     Medium,
     /// From step 60 on.
     Late,
-    /// Half of them near step 10, half near step 70.
+    /// Half of the decisions near step 10, half near step 70.
     Two,
 }
 
-/// A kind of study: how many finish, when, and how many of those decide correctly.
+/// A kind of study: the share of finished episodes, their steps, and the share of correct decisions.
 #[derive(Clone, Copy)]
 struct Scenario {
     finishing: f64,
@@ -47,7 +47,7 @@ struct Scenario {
     correct: f64,
 }
 
-/// The number of given intervals, and of those that hold the truth.
+/// The numbers of given intervals and of those that contain the truth.
 #[derive(Clone, Copy, Default)]
 struct Tally {
     samples: usize,
@@ -98,7 +98,7 @@ impl Steps {
         }
     }
 
-    /// The chances of the steps 1 to the budget; what is missing to 1 comes later.
+    /// The chances of the steps from 1 to the budget; the rest to 1 comes later.
     #[expect(clippy::cast_precision_loss, reason = "steps are small")]
     fn chances(self) -> Vec<f64> {
         let even =
@@ -121,7 +121,7 @@ fn geometric(random: &mut Random, mean: f64) -> i64 {
 }
 
 impl Scenario {
-    /// Every distribution at each of these shares of finished episodes; six of ten decisions are correct.
+    /// Every distribution with each of these shares of finished episodes; six of ten decisions are correct.
     fn all(finishing: &[f64]) -> Vec<Self> {
         let of = |&finishing: &f64| Steps::ALL.map(|(steps, _)| Self { finishing, steps, correct: 0.6 });
         finishing.iter().flat_map(of).collect()
@@ -144,7 +144,7 @@ impl Scenario {
         (0..n).map(|_| self.draw(random)).collect()
     }
 
-    /// The mean of the steps to a decision up to the budget, `share` of the decisions counting.
+    /// The mean steps to a decision, up to the budget, if `share` of the decisions count.
     #[expect(clippy::cast_precision_loss, reason = "steps are small")]
     fn mean(self, share: f64) -> f64 {
         let chances = self.steps.chances();
@@ -152,7 +152,7 @@ impl Scenario {
         BUDGET as f64 - self.finishing * share * early
     }
 
-    /// The first step by which half are decided.
+    /// The first step by which half of the episodes have a decision.
     fn median(self) -> Option<i64> {
         let mut decided = 0.0;
         let reached = |chance: f64| {
@@ -180,7 +180,7 @@ impl Tally {
     }
 }
 
-/// A method: what it gives for samples of n of a scenario, and the truth.
+/// A method: its interval for a sample of n episodes of a scenario, and the truth.
 type Method = fn(Scenario, usize, &mut Random) -> (Option<Interval>, Option<f64>);
 
 const LEVEL: f64 = 0.95;
@@ -189,7 +189,7 @@ fn moments(sample: &[Ending]) -> Moments {
     sample.iter().fold(Moments::default(), |sum, ending| sum.with(ending.steps).expect("small"))
 }
 
-/// Every decision as the one waited for.
+/// Counts every decision as correct.
 fn decided(sample: &[Ending]) -> Vec<Ending> {
     let any = |outcome| if outcome == Outcome::Unfinished { outcome } else { Outcome::Correct };
     sample.iter().map(|ending| Ending { outcome: any(ending.outcome), ..*ending }).collect()
@@ -217,7 +217,7 @@ fn to_correct(scenario: Scenario, n: usize, random: &mut Random) -> (Option<Inte
 #[expect(clippy::cast_precision_loss, reason = "steps are small")]
 fn median(scenario: Scenario, n: usize, random: &mut Random) -> (Option<Interval>, Option<f64>) {
     let found = Survival::of(&scenario.sample(n, random)).and_then(|curve| curve.median_interval(LEVEL));
-    // A bound of the same step is an interval of one step.
+    // Bounds at the same step make an interval one step wide.
     let interval = |low: i64, high: Option<i64>| Interval {
         low: low as f64 - 0.5,
         high: high.map_or(f64::INFINITY, |high| high as f64 + 0.5),
@@ -225,7 +225,7 @@ fn median(scenario: Scenario, n: usize, random: &mut Random) -> (Option<Interval
     (found.map(|found| interval(found.low, found.high)), scenario.median().map(|median| median as f64))
 }
 
-/// Another scenario, with a far larger or smaller share of finished episodes.
+/// A second scenario with a much larger or smaller share of finished episodes.
 fn other(scenario: Scenario) -> Scenario {
     let finishing = if scenario.finishing > 0.6 { 1.0 / 3.0 } else { 1.0 };
     Scenario { finishing, ..scenario }
@@ -243,7 +243,7 @@ fn difference_unlike(scenario: Scenario, n: usize, random: &mut Random) -> (Opti
     (independent(&a, &b, BUDGET, LEVEL).and_then(|found| found.interval), Some(truth))
 }
 
-/// Half of the pairs have the same episode on both sides: a correlation of one half.
+/// Half of the pairs have the same episode on both sides, which gives a correlation of one half.
 fn difference_paired(scenario: Scenario, n: usize, random: &mut Random) -> (Option<Interval>, Option<f64>) {
     let first = decided(&scenario.sample(n, random));
     let second = decided(&scenario.sample(n, random));
@@ -263,7 +263,7 @@ fn welch_unlike(scenario: Scenario, n: usize, random: &mut Random) -> (Option<In
     (welch(&a, &b, LEVEL), Some(scenario.mean(1.0) - against.mean(1.0)))
 }
 
-/// Steps, where each cluster decides to finish as one with a probability of 0.3.
+/// Steps, if all runs of a cluster share the decision to finish with a probability of 0.3.
 fn by_cluster(scenario: Scenario, clusters: usize, random: &mut Random) -> (Option<Interval>, Option<f64>) {
     let of_cluster = |random: &mut Random| {
         let (together, all) = (random.unit() < 0.3, random.unit() < scenario.finishing);
@@ -274,7 +274,7 @@ fn by_cluster(scenario: Scenario, clusters: usize, random: &mut Random) -> (Opti
     (clustered(&parts, LEVEL).and_then(|found| found.interval), Some(scenario.mean(1.0)))
 }
 
-/// The same of a rate: whether the episode finishes.
+/// The rate of finished episodes, with the same dependence.
 fn rate_by_cluster(scenario: Scenario, clusters: usize, random: &mut Random) -> (Option<Interval>, Option<f64>) {
     let rate = scenario.finishing.min(0.8);
     let of_cluster = |random: &mut Random| {
@@ -301,7 +301,7 @@ fn tally(method: Method, scenario: Scenario, n: usize, samples: usize) -> Tally 
     tally
 }
 
-/// One row per method: the lowest coverage of all scenarios at each size.
+/// One row per method: the lowest coverage over all scenarios at each size.
 fn rows(text: &mut String, methods: &[(&str, Method, usize)], sizes: &[usize], scenarios: &[Scenario]) {
     let names = sizes.iter().map(ToString::to_string).collect::<Vec<_>>().join(" | ");
     let shown = sizes.len().saturating_sub(2);

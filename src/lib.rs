@@ -1,8 +1,7 @@
 //! mirrorstats scores episodes of embodied agents that must recognise themselves in a mirror.
 //!
-//! Steps of episodes come in as Parquet traces; every metric of the study comes out, exactly and
-//! deterministically, as tables, cells and scores. Metrics are data: definition files that the
-//! program checks, plans and evaluates.
+//! The input is steps of episodes in Parquet traces. The output is every metric of the study, exact and deterministic,
+//! as tables, cells and scores. Metrics are data: definition files that the program checks, plans and evaluates.
 //!
 //! # Code map
 //!
@@ -18,31 +17,31 @@
 //!
 //! | crate | contents |
 //! |---|---|
-//! | `exact` | exact numbers and moments, their text, hashes, limits, files that are replaced whole |
+//! | `exact` | exact numbers and moments, their text, hashes, limits, atomic file writes |
 //! | `web` | a local server: hosts, origins, tokens (feature `view`) |
-//! | `toml-spec` | files that people write: read by type, with every fault underlined |
+//! | `toml-spec` | files that people write: read by type, every fault underlined |
 //! | `metric` | definition files: TOML, SQL expressions, types, plans |
-//! | `trace` | what an episode is: schema, reader, writer, validation, import, MCAP logs |
-//! | `score` | logical plan to physical plan to kernels over Arrow batches; the episode table |
+//! | `trace` | the definition of an episode: schema, reader, writer, validation, import, MCAP logs |
+//! | `score` | logical plan, physical plan, and kernels over Arrow batches; the episode table |
 //! | `statistics` | intervals, tests, survival, power: numbers in, numbers out |
 //! | `report` | cells, styles, tables, figures, statistics for people, the folder of a report |
 //! | `engines` | other engines for the SQL of definitions: Polars, Spark |
-//! | `study` | inputs, definitions and a filter, opened once and scanned once; every answer is a function of it |
+//! | `study` | inputs, definitions and a filter, opened and scanned once; every answer is a function of it |
 //! | `world` | experiments, the MuJoCo world, agents, recordings, replays (feature `sim`) |
 //! | `view` | the local web application (feature `view`) |
-//! | [`cli`] | what was typed, standard output, exit codes |
+//! | [`cli`] | command-line arguments, standard output, exit codes |
 //!
 //! # Invariants
 //!
-//! - A crate depends only on crates above it in this table; `Cargo.toml` of each crate says on which.
-//! - `metric`, `statistics`, `toml-spec` and `exact` know no Arrow; `report` sees no trace; no crate of analysis depends on `world`.
-//! - `clippy.toml` of a crate lists what it must not call: clocks, files, threads. Only [`cli`] prints.
-//! - An episode's value is an integer, a cell keeps n, Σx, Σx² as integers: results do not depend on
-//!   threads, on the order of files, or on how rows are divided among them.
+//! - A crate depends only on crates above it in this table; the `Cargo.toml` of each crate lists them.
+//! - `metric`, `statistics`, `toml-spec` and `exact` use no Arrow; `report` sees no trace; no analysis uses `world`.
+//! - `clippy.toml` of a crate lists what it must not use: clocks, files, threads. Only [`cli`] prints.
+//! - An episode's value is an integer; a cell keeps n, Σx, Σx² as integers. So results do not depend on threads, on the
+//!   order of files, or on the division of rows among them.
 //! - Missing is never zero: it is an [`Option`] until the last renderer.
 //! - Output is a function of traces and definitions: no clock, no absolute path, no unordered iteration.
 //!
-//! # The way of one number
+//! # The path of one number
 //!
 //! A score is stored eight times between the page of a trace and a printed cell, always in columns:
 //!

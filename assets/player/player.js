@@ -1,11 +1,11 @@
-// A person in the agent's place: the frame, the words and the reply of a model, and nothing else.
+// A person as the agent: the frame, the prompt and the reply keys of a model, and nothing else.
 
 const LINK = new URLSearchParams(location.search).get("p") ?? "";
 const WORDS = {
   w: "Forward", s: "Backward", a: "Turn left", d: "Turn right", done: "Done",
   1: "Hand up", 2: "Hand down", 3: "Hand left", 4: "Hand right", 5: "Hand forward", 6: "Hand backward",
 };
-// Arrows walk and turn, or move a hand in the picture; the other keys are the letters and numbers themselves.
+// Arrow keys walk and turn, or move a hand in the picture; the letters and digits of the actions work too.
 const ARROWS = { ArrowUp: ["w", "1"], ArrowDown: ["s", "2"], ArrowLeft: ["a", "3"], ArrowRight: ["d", "4"] };
 const TITLES = {
   "view-description": "What you see (may stay empty)",
@@ -17,13 +17,13 @@ const TITLES = {
 };
 const PAUSE = 700;
 
-// A request that nobody answers in this time has failed.
+// Requests time out after this time, ms.
 const PATIENCE = 20_000;
-// The same of a question that comes again by itself.
+// The timeout of the status query, which repeats.
 const GLANCE = 6_000;
-// So many questions in a row without an answer: the server has gone.
+// The number of consecutive unanswered queries after which the server counts as gone.
 const GONE = 3;
-// Where this tab keeps what was typed for one question, and whether letters are keys.
+// The storage keys for a question's draft and for whether letters act as keys.
 const DRAFT = "mirrorstats-draft";
 const LETTERS = "mirrorstats-letters";
 
@@ -56,7 +56,7 @@ const send = (name, body = {}) => request(name, { method: "POST", body: JSON.str
 
 const say = (words) => (status.textContent = words);
 
-/** What went wrong, until it is mended; `again` sends the same once more. */
+/** Shows an error until the next success; `again` retries the request. */
 function complain(kind, error, again = null) {
   const why = error.cause === undefined ? "The computer of the study does not answer." : `The computer of the study says: ${error.message}.`;
   const words = kind === "sent" ? `This was not sent. ${why} What you typed is still here.` : `${why} The page tries again by itself; what you typed is still here.`;
@@ -72,7 +72,7 @@ function mended(kind) {
   if (kind === "asked") say("The computer of the study answers again.");
 }
 
-/** Sends what a button stands for, and shows what comes of it. */
+/** Sends the request of a button and shows the result. */
 async function press(name, body = {}) {
   try {
     const told = await send(name, body);
@@ -89,7 +89,7 @@ function button(words, does, attributes = {}) {
   return element;
 }
 
-/** Asks before something that cannot be undone; the first choice does nothing. */
+/** Asks for confirmation of an irreversible action; the first choice cancels. */
 function sure(id, title, words, stay, choices) {
   const dialog = make("dialog", { id, "aria-labelledby": `${id}-title` }, make("h2", { id: `${id}-title` }, title), ...words.map((line) => make("p", {}, line)));
   const close = (does) => () => {
@@ -110,7 +110,7 @@ function withdraw() {
   ]);
 }
 
-/** Puts a page in the place of the one before; the keyboard stays where it was, or begins at the heading. */
+/** Replaces the page; the keyboard focus stays where it was or moves to the heading. */
 function put(title, told, children, mayLeave = true) {
   const active = content.contains(document.activeElement) ? document.activeElement : null;
   const name = active?.dataset.action ? `[data-action="${active.dataset.action}"]` : active?.name ? `[name="${active.name}"]` : null;
@@ -149,13 +149,13 @@ function ready(told) {
 
 const farewell = (words) => make("p", { id: "over" }, `Thank you for taking part! ${words}`);
 
-/** Nothing is left for this person, while others may still play. */
+/** The page for a person without further episodes, while others may still play. */
 function finished(told) {
   const words = told.played > 0 ? `You have played ${told.played === 1 ? "your only episode" : `all ${counted(told.played)}`}.` : "There is no episode for you to play.";
   page("You are done", told, [farewell(`${words} You may close this page.`)], told.played > 0);
 }
 
-/** The end, as the server said it, or as it seems where the server has gone. */
+/** The last page, as reported by the server or, if the server has gone, as inferred. */
 function over(told) {
   const words = {
     true: "You may close this page.",
@@ -179,7 +179,7 @@ function pausing(told) {
   page("A break", told, [make("p", {}, "Take your time: the clock stands still."), button("Go on", () => press("resume"), { id: "resume" })]);
 }
 
-/** The field of an answer that the experiment declares. */
+/** The input field of an answer that the experiment declares. */
 function own(answer, colors, given) {
   const { key, type, options = [], unknown = false, words } = answer;
   const texts = { one_of: options, yes_no: ["yes", "no"], color: colors }[type];
@@ -209,7 +209,7 @@ function field(key, colors, given, answers) {
   return make("label", {}, title, area);
 }
 
-/** What was typed for this question before the page was loaded again, and nothing of any other question. */
+/** The draft of this question from before a reload; drafts of other questions are ignored. */
 function draft(place) {
   const found = JSON.parse(sessionStorage.getItem(DRAFT) ?? "null");
   if (found?.place === place) return found.values;
@@ -231,7 +231,7 @@ function play(told) {
   const { phase, number, episode, of, t, system, user, keys: names, actions: letters, colors, prefills, answers } = told;
   const isPractice = phase === "practice";
   const place = `${LINK} ${phase} ${episode} ${t}`;
-  // An identification stays from step to step where the study wants it so, and never from episode to episode.
+  // An identification stays from step to step if the study wants it, but never from episode to episode.
   if (round !== `${phase} ${episode}`) [round, kept] = [`${phase} ${episode}`, ""];
   const given = draft(place) ?? (prefills ? { identification: kept } : {});
   const form = make("form", { autocomplete: "off", "aria-label": "Your answer" });

@@ -28,7 +28,7 @@ async function shown(own) {
 
 const named = (columns) => columns.join(", ").replaceAll("_", " ");
 
-/** How the rows of two episodes differ at a step. */
+/** Describes how the rows of two episodes differ at a step. */
 function apart(t, { ended, differences, leads, ...sides }) {
   if (t <= Math.max(leads.a, leads.b)) return `${leads.a > leads.b ? "A" : "B"} has not begun.`;
   if (ended !== null && t > ended.t) {
@@ -55,7 +55,7 @@ function metricTable(a, b) {
 
 const ALIGNED = [["", "t = 1"], ["sight", "the first sight of the mirror"], ["decision", "the decision"]];
 
-/** What both stand at one place by. */
+/** The choice of the moment by which the episodes are aligned. */
 function alignment({ aligned }) {
   const wanted = query().get("align") ?? "";
   const select = make("select", { id: "align" }, ALIGNED.map(([value, words]) => make("option", { value, selected: value === wanted }, words)));
@@ -135,7 +135,7 @@ export async function comparePage(content) {
   return { keys: { ArrowRight: () => jump(t + 1), ArrowLeft: () => jump(t - 1), Home: () => jump(1), End: () => jump(last) }, moved: () => {} };
 }
 
-/** The page of what other definitions change. */
+/** The page on the effects of other definitions. */
 export async function changesPage(content) {
   const told = await ask("changes");
   const value = (number) => (number === null ? "undefined" : String(number));

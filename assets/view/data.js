@@ -1,16 +1,16 @@
-// Where data comes from: a server that is asked, or files beside the page, each loaded when it is looked at.
+// Data sources: a server, or files beside the page that load on demand.
 import { whereOf } from "./where.js";
 
-/** Whether the page is a copy without a server. */
+/** True if the page is a copy without a server. */
 export const isCopy = document.documentElement.dataset.copy !== undefined || document.querySelector("script[data-copy]") !== null;
 
 const parts = new Map();
 const waiting = new Map();
 
-/** A page of one file has its parts in it. */
+/** A page of one file contains its parts. */
 for (const [name, value] of Object.entries(window.mirrorstatsParts ?? {})) parts.set(name, value);
 
-/** The only episode of a page of one file. */
+/** The only episode of a single-file page. */
 export const onlyEpisode = document.querySelector("script[data-episode]") === null ? null : parts.get("list").rows[0].id;
 
 /** Called by each part of a copy. */
@@ -44,7 +44,7 @@ async function asked(name, query, signal) {
   return response.json();
 }
 
-/** Sends a label; gives the labels of its episode. */
+/** Sends a label; returns the labels of its episode. */
 export async function send(label) {
   const response = await fetch("label", { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(label) });
   if (!response.ok) throw new Error((await response.text()).trim());
@@ -52,7 +52,7 @@ export async function send(label) {
   return response.json();
 }
 
-/** The answer to a question, with the words of the program where there is none. */
+/** The answer to a query, or an error with the program's message. */
 export async function ask(name, query = new URLSearchParams(), signal = undefined) {
   if (!isCopy) return asked(name, query, signal);
   if (name === "episodes") return listed(await part("list"), query, await said(query));
@@ -76,7 +76,7 @@ async function episodePart(id, query) {
   return { ...episode, neighbours: neighbours(await part("list"), id, query, await said(query)) };
 }
 
-/** The episodes around one in the list; nothing where it is not in it, or nobody knows what the list is. */
+/** The neighbours of an episode in the list; empty if it is not in the list or the list is unknown. */
 function neighbours(list, id, query, found) {
   try {
     const { rows } = chosen(list, query, found);
@@ -87,7 +87,7 @@ function neighbours(list, id, query, found) {
   }
 }
 
-/** The rows of a copy that its columns and a search choose. */
+/** The rows of a copy that match the column filters and the search. */
 function chosen({ rows, ...list }, query, found) {
   const wanted = ["experiment", "model", "condition"].map((column) => [column, query.getAll(column)]);
   const words = (query.get("search") ?? "").toLowerCase();
@@ -128,7 +128,7 @@ function listed(list, query, found) {
 
 const AROUND = 40;
 
-/** Where the words of a search were said, by episode; the columns in the order in which the program looks. */
+/** The matches of a search by episode, with the columns in the program's order. */
 async function said(query) {
   const words = (query.get("search") ?? "").toLowerCase();
   const found = new Map();
@@ -156,13 +156,13 @@ const BY_CHANCE = new Set(["latency_ms", "prompt_tokens", "completion_tokens", "
 
 const MOMENTS = { sight: "first sight", decision: "decision" };
 
-/** How many steps each of two episodes begins later, so that a moment of both stands at one place. */
+/** The number of steps by which each episode is shifted to align a moment. */
 function leadsOf(align, a, b) {
   const [ofA, ofB] = [a, b].map((episode) => episode.marks.find(({ title }) => title === MOMENTS[align])?.t ?? null);
   return ofA === null || ofB === null ? null : { a: Math.max(0, ofB - ofA), b: Math.max(0, ofA - ofB) };
 }
 
-/** Two episodes of a copy, and where their rows differ, as the program says it. */
+/** Two episodes of a copy and their differences, computed as the program does. */
 async function compared(query) {
   const [a, b] = await Promise.all(["a", "b"].map(async (side) => part(`episode-${await numberOf(query.get(side))}`)));
   const names = [...new Set([...Object.keys(a.steps), ...Object.keys(b.steps)])].filter((name) => name !== "t");
@@ -187,7 +187,7 @@ async function compared(query) {
   return { a, b, aligned: found === null ? null : align, leads, differences, ended, differing: acts.length + alone, first: acts[0] ?? behind, constants };
 }
 
-/** Whether two episodes of a copy have the same frame at a step; null where one has none. */
+/** True if two episodes of a copy have the same frame at a step; null if either has no frame. */
 async function sameFrame(query) {
   const at = { a: query.get("t"), b: query.get("t_b") ?? query.get("t") };
   const [a, b] = await Promise.all(["a", "b"].map(async (side) => (await part(`episode-${await numberOf(query.get(side))}`)).frame_hashes?.[at[side] - 1] ?? null));
@@ -204,7 +204,7 @@ async function sceneOf(query) {
   return { episodes: told.sort((a, b) => (a.name < b.name ? -1 : 1)), others: Math.max(0, own.siblings.length + 1 - 60) };
 }
 
-/** Where the frame of a step is. */
+/** The address of a step's frame. */
 export async function frameAddress(id, t) {
   if (!isCopy) return address("frame", new URLSearchParams({ id, t }));
   const { images } = await part(`episode-${await numberOf(id)}`);

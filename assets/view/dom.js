@@ -1,4 +1,4 @@
-// Elements made of text, and markup of the program's own templates.
+// Elements built from text, and markup from the program's own templates.
 
 export const all = (selector, root = document) => [...root.querySelectorAll(selector)];
 export const one = (selector, root = document) => root.querySelector(selector);
@@ -24,22 +24,22 @@ function filled(element, attributes, children) {
   return element;
 }
 
-/** The elements of markup that the program's templates made: they escape what they are given. */
+/** The elements of markup from the program's templates, which escape their values. */
 export function parsed(markup) {
   return [...new DOMParser().parseFromString(markup, "text/html").body.childNodes];
 }
 
-/** What a page says where something failed. */
+/** An error message on a page. */
 export function notice(words) {
   return make("pre", { class: "notice", role: "alert" }, words);
 }
 
-/** How many: `1 episode`, `2 episodes`. */
+/** A count with its noun: `1 episode`, `2 episodes`. */
 export function counted(count, noun) {
   return `${count} ${noun}${count === 1 ? "" : "s"}`;
 }
 
-/** A button that copies a text, and says so. */
+/** A button that copies a text and confirms it. */
 export function copyButton(words, text) {
   const button = make("button", { type: "button", class: "copy" }, words);
   button.addEventListener("click", async () => {
@@ -48,7 +48,7 @@ export function copyButton(words, text) {
       await navigator.clipboard.writeText(value);
       button.textContent = "Copied";
     } catch {
-      // A page that is not trusted with the clipboard shows what to copy.
+      // Without access to the clipboard, the page shows the text to copy.
       const field = make("input", { type: "text", readonly: true, value, "aria-label": words });
       button.replaceWith(field);
       field.select();

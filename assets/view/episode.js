@@ -9,16 +9,16 @@ import { labelsOf } from "./labels.js";
 import { listQuery } from "./list.js";
 
 const PLAY = 250;
-/** How long a page waits for its map before it is drawn without: a map is rarely later than that. */
+/** The maximum wait for the map before the page is drawn without it, ms; maps rarely take longer. */
 const MAP_WAIT = 400;
 const WORDS = [["view_description", "What it says it sees"], ["reasoning", "Reasoning"], ["identification", "How it says it is"], ["summary", "Notes for the next step"], ["reply", "The whole reply"]];
 const FACTS = ["action", "self_color", "selected_cube", "mark_report", "reply_status", "reply_repair", "reply_fault", "latency_ms", "prompt_tokens", "completion_tokens", "cost_usd"];
 const TRUTH = ["mirror_visible", "mirror_self_px", "mirror_other_px", "mirror_px", "direct_other_px", "mirror_mark_px", "mark_color", "bumped", "cube_distance", "target_distance", "pose_x", "pose_y", "pose_yaw"];
 
-/** What a log has of the room, nothing where it has nothing. */
+/** The log's map of the room; empty if there is none. */
 export const askMap = (id) => ask("map", new URLSearchParams({ id })).catch(() => EMPTY);
 
-/** The frame and the map of a step; `show(t)` draws it, `ready` waits for the map a moment. */
+/** The frame and the map of a step; `show(t)` draws it, `ready` waits briefly for the map. */
 export function sight(episode, asked = episode.log ? askMap(episode.id) : Promise.resolve(EMPTY)) {
   const image = make("img", { class: "frame", alt: "", width: 640, height: 480 });
   const shown = make("figure", { class: "sight" }, image);
@@ -78,7 +78,7 @@ function factList(episode, names, t) {
   return list;
 }
 
-/** A text of a reply; a long one is cut, and shown whole when that is asked for. */
+/** A text of a reply; long texts are cut and shown in full on demand. */
 function words(episode, name, title, t) {
   const value = valueAt(episode, name, t);
   if (value === null || value === "") return null;
@@ -100,7 +100,7 @@ function words(episode, name, title, t) {
   return block;
 }
 
-/** What was said at a step, beside what was true. */
+/** The reply at a step, beside the truth. */
 export function stepPanel(episode, t) {
   if (episode.own) {
     const names = Object.keys(episode.steps);
@@ -123,7 +123,7 @@ export function stepPanel(episode, t) {
     WORDS.map(([name, title]) => words(episode, name, title, t)));
 }
 
-/** A metric in a line: its value and the step that decided it; its sentence, all its steps and its reasons when they are asked for. */
+/** A metric in one line with its value and deciding step; its sentence, steps and reasons appear on demand. */
 function metricPanel(metric, sentence, other, jump, decide) {
   const button = (t) => {
     const to = make("button", { type: "button", class: "jump", "data-t": t }, `t = ${t}`);
@@ -163,10 +163,10 @@ function headline(episode) {
     make("dl", { class: "facts" }, list, make("div", {}, make("dt", {}, "steps"), make("dd", { id: "length" }, episode.length))), state);
 }
 
-/** The step that decided the first metric that a step decided. */
+/** The deciding step of the first metric that has one. */
 const decidedAt = (episode) => episode.metrics.find((metric) => metric.timesteps.length > 0)?.timesteps.at(-1);
 
-/** The page. Gives what keys do here, and what to do when the recording has grown. */
+/** The page. Returns its key bindings and its update function for a growing recording. */
 export async function episodePage(content, study) {
   const id = query().get("id") ?? "";
   const asked = isCopy ? undefined : askMap(id);

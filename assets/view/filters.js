@@ -1,19 +1,19 @@
-// Filters: chosen values of columns, a condition in the language of definitions, and words; each in force is a chip that removes it.
+// Filters: column values, a condition in the language of definitions, and search words; each active one is a chip.
 import { all, make, one } from "./dom.js";
 import { isCopy } from "./data.js";
 import { FILTERS, changed, filtered, go, link, query } from "./state.js";
 
 const HEADINGS = { experiment: "Experiment", model: "Model", condition: "Condition", seed: "Seed", participant: "Participant", reply_status: "Reply status" };
-/** The columns with a key of their own in the address; others are under `is`. */
+/** The columns with their own key in the address; others are under `is`. */
 const OWN = ["experiment", "model", "condition"];
 /** The columns of labels that coders put, and their values in words. */
 const LABEL = "label_";
 const CODED = { true: "put", false: "not put", "": "not coded" };
 const isLabel = ({ column }) => column.startsWith(LABEL);
-/** More values than this are in a menu. */
+/** Longer lists of values become a menu. */
 const IN_LINE = 8;
 
-/** The values of a column that a query asks for. */
+/** The values of a column that a query selects. */
 function chosenOf(column, from) {
   if (OWN.includes(column)) return from.getAll(column);
   return from.getAll("is").filter((text) => text.startsWith(`${column}=`)).map((text) => text.slice(column.length + 1));
@@ -41,7 +41,7 @@ function boxes({ column, values }, now) {
 
 const headingOf = (column) => HEADINGS[column] ?? (isLabel({ column }) ? `Label ${column.slice(LABEL.length)}` : column);
 
-/** One stop for Tab; the arrows lead on. */
+/** A group with one Tab stop; arrow keys move within it. */
 export function roving(box, selector) {
   const controls = () => all(selector, box);
   const stop = (one) => controls().forEach((control) => (control.tabIndex = control === one ? 0 : -1));
@@ -58,7 +58,7 @@ export function roving(box, selector) {
   });
 }
 
-/** A menu of values that opens. */
+/** A menu of values. */
 function menu(title, contents) {
   const details = make("details", { class: "menu" }, make("summary", {}, title), make("div", { class: "inside" }, contents));
   details.addEventListener("keydown", (event) => {
@@ -73,7 +73,7 @@ document.addEventListener("click", ({ target }) => {
   for (const open of all("details.menu[open]")) if (!open.contains(target)) open.open = false;
 });
 
-/** What is in force, each with the query that is without it. */
+/** The active filters, each with the query that removes it. */
 export function inForce(now = query(), columns = []) {
   const words = (column, value) => (isLabel({ column }) ? CODED[value] : null) ?? columns.find((choice) => choice.column === column)?.values.find((one) => one.value === value)?.name ?? (value === "" ? "undefined" : value);
   const chips = [];
@@ -87,14 +87,14 @@ export function inForce(now = query(), columns = []) {
   return chips;
 }
 
-/** What to do where no episode is left: each filter can go. */
+/** Suggestions if no episode is left: each filter can be removed. */
 export function nothingFound() {
   const ways = inForce().map(({ text, without }) => make("li", {}, make("a", { href: link(without) }, `without ${text}`)));
   const rest = make("li", {}, make("a", { href: link(changed(Object.fromEntries(FILTERS.map((key) => [key, null])))) }, "all episodes"));
   return make("div", { class: "nothing" }, make("p", {}, "No episode is like that. Go on with"), make("ul", {}, ways.length > 1 ? ways : [], rest));
 }
 
-/** The filters of a page; `study` says what can be chosen, `fault` what is wrong with the condition. */
+/** The filters of a page; `study` has the choices, `fault` the error in the condition. */
 export function filterLine(study) {
   const now = query();
   const form = make("form", { class: "filters", "aria-label": "Filters" });
@@ -127,7 +127,7 @@ export function filterLine(study) {
   return form;
 }
 
-/** Tells what is wrong with the condition, beside its field, which keeps it. */
+/** Shows the error in the condition beside its field, which keeps the text. */
 export function tellFault(form, words) {
   const where = form.elements.where;
   const fault = make("pre", { class: "notice", role: "alert", id: "where-fault" }, words);

@@ -1,10 +1,10 @@
-// Labels and notes: what coders put on an episode and its steps, and the box that puts one.
+// Labels and notes: coders' marks on an episode and its steps, and the form to add one.
 import { counted, make, notice, one } from "./dom.js";
 import { isCopy, send } from "./data.js";
 
 const NOTE = 2000;
 
-/** A mark in a line: the label, where it is, the note, who put it. */
+/** One mark as a line: label, step, note and coder. */
 function markLine(mark, own, jump, remove) {
   const to = mark.step === null ? make("span", { class: "quiet" }, "episode") : make("button", { type: "button", class: "jump", "data-t": mark.step }, `t = ${mark.step}`);
   if (mark.step !== null) to.addEventListener("click", () => jump(mark.step));
@@ -14,7 +14,7 @@ function markLine(mark, own, jump, remove) {
   return make("li", {}, make("b", {}, name), " ", to, " ", mark.note === null ? null : make("span", { class: "note" }, mark.note), " ", make("span", { class: "quiet" }, mark.coder), mark.coder === own ? away : null);
 }
 
-/** The labels of an episode; `open()` shows the box. `now()` is the step in view, `jump` goes to one. */
+/** The labels of an episode; `open()` shows the form. `now()` is the current step, `jump` goes to a step. */
 export function labelsOf(episode, study, now, jump) {
   const coder = isCopy ? null : (study.coder ?? null);
   const list = make("ul", { class: "marks" });
@@ -39,7 +39,7 @@ export function labelsOf(episode, study, now, jump) {
   return { element, open };
 }
 
-/** The words that were put before, here or elsewhere. */
+/** The labels used so far, in this and other episodes. */
 function known(episode, study) {
   const columns = study.choices.filter(({ column }) => column.startsWith("label_")).map(({ column }) => column.slice("label_".length));
   return [...new Set([...columns, ...episode.labels.map(({ label }) => label).filter((label) => label !== null)])].sort();

@@ -1,4 +1,4 @@
-// The list of episodes: as many rows as are in view, asked for page by page.
+// The list of episodes: draws the rows in view and requests them page by page.
 import { counted, make, notice, one } from "./dom.js";
 import { ask } from "./data.js";
 import { changed, filtered, go, link, query } from "./state.js";
@@ -20,7 +20,7 @@ class Rows {
     });
   }
 
-  /** Puts the focus on a row, which is scrolled into view and drawn before. */
+  /** Focuses a row after scrolling it into view and drawing it. */
   focus(at) {
     this.stop = at;
     const [top, room] = [at * ROW, this.frame.clientHeight - 2 * ROW];
@@ -38,7 +38,7 @@ class Rows {
     return told;
   }
 
-  /** Draws the rows in view, and asks for those that are not there. */
+  /** Draws the rows in view and requests missing ones. */
   show() {
     const first = Math.max(0, Math.floor(this.frame.scrollTop / ROW) - 5);
     const last = Math.min(this.total, first + Math.ceil(this.frame.clientHeight / ROW) + 10);
@@ -79,7 +79,7 @@ class Rows {
   }
 }
 
-/** An id whose end stays in view where there is no room: seed and run tell its neighbours apart. */
+/** An id whose end stays visible when space is short: seed and run distinguish it from its neighbours. */
 function parted(id) {
   const at = id.lastIndexOf("/", id.lastIndexOf("/") - 1);
   return at < 0 ? [make("span", { class: "cut" }, id)] : [make("span", { class: "cut" }, id.slice(0, at)), make("span", {}, id.slice(at))];
@@ -142,5 +142,5 @@ export async function list(content, study) {
   return rows.show();
 }
 
-/** A query for the list without what belongs to an episode. */
+/** A query for the list, without the keys of an episode. */
 export const listQuery = () => filtered({ view: "episodes", sort: query().get("sort"), order: query().get("order") });

@@ -1,10 +1,10 @@
-// Recordings that go on: the page asks now and then, and draws again what has changed.
+// Recordings in progress: polls for changes and redraws what has changed.
 import { one } from "./dom.js";
 import { ask, isCopy } from "./data.js";
 
 const PAUSE = 1000;
 
-/** Asks again and again; `changed(told)` hears of each newer state, `heard(told)` of every answer. */
+/** Polls the server; `changed(told)` is called for each newer state, `heard(told)` for every answer. */
 export function watch({ changed, heard }) {
   if (isCopy) return;
   const status = one("#live");

@@ -1,4 +1,4 @@
-// Everything begins here: which page the address names, keys, and the theme.
+// The entry point: routing, keys and the theme.
 import { all, make, notice, one } from "./dom.js";
 import { ask, isCopy, onlyEpisode } from "./data.js";
 import { changed, filtered, go, link, query } from "./state.js";
@@ -28,7 +28,7 @@ function tabs() {
 
 const PAGES = { overview, episodes: list, episode: episodePage, compare: comparePage, scene: scenePage, changes: changesPage };
 
-/** Gives what puts the focus back on a control of the filters, whose line is drawn anew. */
+/** Returns a function that restores the focus in the filters after they are redrawn. */
 function focused() {
   const { name, value, type } = document.activeElement ?? {};
   if (!document.activeElement?.closest?.("form.filters") || !name) return () => {};
@@ -40,7 +40,7 @@ function focused() {
   };
 }
 
-/** Draws what the address names. */
+/** Draws the page that the address names. */
 async function show({ keep = false } = {}) {
   turn += 1;
   const own = turn;
@@ -119,7 +119,7 @@ function startSearch() {
 }
 
 let underWay = [];
-// What can be chosen has changed.
+// The filter choices have changed.
 const forget = () => (study = null);
 document.addEventListener("labelled", forget);
 document.addEventListener("state", ({ detail }) => detail.replace || show());

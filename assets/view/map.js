@@ -1,4 +1,4 @@
-// The room from above: shapes as the program found them in the log, the way so far, and the heading.
+// The room from above: the program's shapes from the log, the path so far, and the heading.
 import { draw, make } from "./dom.js";
 
 const REACH = 1.2;
@@ -6,7 +6,7 @@ const KINDS = [["self", "itself"], ["other", "another body"], ["mirror", "mirror
 
 const kindOf = (name) => (name.startsWith("pane") ? "mirror" : /^agent0/.test(name) ? "self" : /^agent/.test(name) ? "other" : /^cube/.test(name) ? "cube" : "room");
 
-/** The shapes of an answer in metres: a name, a paint, a height, a radius and the corners, in centimetres. */
+/** The shapes of an answer, converted to metres: name, paint, height, radius and corners come in centimetres. */
 function unpacked({ names, paints, shapes, still, steps, every }) {
   const all = shapes.map(([name, paint, height, radius, ...places]) => {
     const outline = Array.from({ length: places.length / 2 }, (_, at) => [places[2 * at] / 100, places[2 * at + 1] / 100]);
@@ -37,7 +37,7 @@ function drawn({ name, kind, paint, radius, outline }) {
   return draw("polygon", { ...attributes, points: outline.map(([x, y]) => `${x},${-y}`).join(" ") }, title);
 }
 
-/** What the shapes and lines of a map are. */
+/** The legend of a map's shapes and lines. */
 function legendOf({ all, every }) {
   const items = KINDS.filter(([kind]) => all.some((shape) => shape.kind === kind)).map(([kind, words]) => {
     const patch = make("i", { class: `key ${kind}`, "aria-hidden": "true" });

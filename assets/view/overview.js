@@ -1,15 +1,15 @@
-// The report, live: tables whose cells lead to their episodes; figures and statistics when they are opened.
+// The report, live: tables whose cells link to their episodes; figures and statistics load when opened.
 import { all, counted, make, notice, one, parsed } from "./dom.js";
 import { ask, isCopy } from "./data.js";
 import { FILTERS, changed, filtered, go, link, query } from "./state.js";
 import { filterLine, groupQuery, nothingFound, roving, tellFault } from "./filters.js";
 
-/** What the server is asked for: the filters alone. */
+/** The query for the server: only the filters. */
 function wanted() {
   return isCopy ? new URLSearchParams() : filtered({});
 }
 
-/** Each cell becomes a link to its episodes; Tab stops once in a table, the arrows lead on. */
+/** Makes each cell a link to its episodes; a table is one Tab stop, and arrow keys move within it. */
 function linkCells(table, { by, groups }) {
   for (const cell of all("td[data-metric]", table)) {
     const { group } = cell.closest("tr").dataset;
@@ -37,7 +37,7 @@ function linkCells(table, { by, groups }) {
   });
 }
 
-/** In a copy nobody computes: rows of values that are not chosen are hidden. */
+/** Copies compute nothing: rows of values that are not selected are hidden. */
 function hideRows(sections, { by, groups }) {
   for (const row of all(".results tbody tr[data-group]", sections)) {
     const values = groups[Number(row.dataset.group)];
@@ -45,7 +45,7 @@ function hideRows(sections, { by, groups }) {
   }
 }
 
-/** What a copy says of sections that are of all episodes, where a filter asks for fewer than hidden rows can show. */
+/** The note of a copy on sections that cover all episodes, if a filter cannot be applied by hiding rows. */
 function unfiltered(title, columns = []) {
   const beyond = FILTERS.filter((key) => query().has(key) && !columns.includes(key));
   if (!isCopy || beyond.length === 0) return null;
@@ -53,7 +53,7 @@ function unfiltered(title, columns = []) {
   return notice(`This copy of the page has its ${title} of all episodes, and cannot compute them of those with\n  ${asked}\nSo none is shown. \`mirrorstats view\` of the recordings can.`);
 }
 
-/** Headers sort the rows of each group by their means. */
+/** Makes headers sort the rows of each group by their means. */
 function makeSorted(table) {
   for (const head of all("thead th[data-metric]", table)) {
     const button = make("button", { type: "button" }, ...head.childNodes);
@@ -93,20 +93,20 @@ function order(body, metric, way) {
   body.append(...rows);
 }
 
-/** Headers stay in view: at the top of the window, or of a box that scrolls because its table is wider. */
+/** Keeps headers in view: at the top of the window, or of the scrolling box around a wide table. */
 function keepHeads(box) {
   const look = () => {
     box.classList.remove("wide", "fits");
     const isWide = box.scrollWidth > box.clientWidth + 1;
     box.classList.add(isWide ? "wide" : "fits");
-    // What scrolls must be reached by keyboard; where nothing in it can be, the box itself is.
+    // Scrollable content must be reachable by keyboard; without focusable content, the box itself is focusable.
     if (isWide && box.querySelector("a, button, [tabindex]") === null) box.tabIndex = 0;
     else box.removeAttribute("tabindex");
   };
   new ResizeObserver(look).observe(box);
 }
 
-/** A section that is asked for when it is opened. */
+/** A section that loads when opened. */
 function later(title, name) {
   const details = make("details", { class: "later", id: `section-${name}` }, make("summary", {}, title));
   details.addEventListener("toggle", async () => {
@@ -136,7 +136,7 @@ function running(list) {
   return make("section", { id: "under-way" }, make("h2", {}, "Under way"), make("ul", { class: "running" }, rows));
 }
 
-/** The recordings that go on, where there are any. */
+/** The recordings in progress, if any. */
 export function showRunning(content, list, rate) {
   one("#under-way", content)?.remove();
   if (list.length === 0) return;
@@ -145,7 +145,7 @@ export function showRunning(content, list, rate) {
   one("#overview-head", content)?.after(section);
 }
 
-/** The models over all experiments, by the mean of their means: an order to begin with, not a test. */
+/** The models ranked by their mean over experiments: an ordering, not a test. */
 function ranking({ metric, experiments, rows }) {
   const heads = ["", "Model", `${metric}, mean of experiments`, ...experiments].map((name) => make("th", { scope: "col" }, name));
   const lines = rows.map((row, at) => make("tr", {}, make("td", {}, String(at + 1)),

@@ -1,19 +1,19 @@
-// What is looked at, in the address: a link shows the same.
+// The state of the page, kept in its address: a link shows the same view.
 
 /** The query of the address. */
 export const query = () => new URLSearchParams(location.search);
 
-/** The filters of a query. */
+/** The keys of filters in a query. */
 export const FILTERS = ["experiment", "model", "condition", "is", "where", "search"];
 
-/** A query with the filters of the present one, and this. */
+/** A query with the current filters and these changes. */
 export function filtered(changes, from = query()) {
   const next = new URLSearchParams();
   for (const [key, value] of from) if (FILTERS.includes(key)) next.append(key, value);
   return changed(changes, next);
 }
 
-/** A query with some keys set, lists key by key, and those removed that are null. */
+/** A query with some keys set, list values as repeated keys, and null values removed. */
 export function changed(changes, from = query()) {
   const next = new URLSearchParams(from);
   next.delete("token");
@@ -27,7 +27,7 @@ export function changed(changes, from = query()) {
 /** A link to a query. */
 export const link = (next) => `${location.pathname}?${next}`;
 
-/** Goes there: a step that leads back, or in the place of the present one. */
+/** Navigates to a query, with a new history entry or replacing the current one. */
 export function go(next, { replace = false } = {}) {
   const target = link(next);
   if (target === location.pathname + location.search) return;

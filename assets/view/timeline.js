@@ -1,4 +1,4 @@
-// The steps of an episode over time: a strip for each column, its colours explained, and the moments that tell the story.
+// The steps of an episode over time: a strip per column, a legend of its colours, and the key moments.
 import { counted, make, one } from "./dom.js";
 import { paintOf } from "./values.js";
 
@@ -11,7 +11,7 @@ const TONES = ["--accent", "--firm", "--strip", "--quiet", "--ink"];
 const largest = (list) => list.reduce((most, value) => Math.max(most, value ?? 0), 1);
 const isNothing = (value) => value === null || value === false;
 
-/** The strips of an episode: a title, the values, the colour and the height of each. */
+/** The strips of an episode: title, values, and the colour and height of each value. */
 function stripsOf(episode) {
   const rows = [];
   const add = (title, list, color, height = () => 1) => list !== null && rows.push({ title, list, color, height });
@@ -35,7 +35,7 @@ function stripsOf(episode) {
   return rows;
 }
 
-/** A column of any type: the height of a number, whether something holds, and a tone for each text. */
+/** Adds a column of any type: a number's height, true or false, or a tone per text. */
 function addOwn(add, name, list) {
   const numbers = list.filter((value) => typeof value === "number");
   if (numbers.length > 0) {
@@ -49,7 +49,7 @@ function addOwn(add, name, list) {
 
 const wordOf = (value) => (typeof value === "object" ? value.text : String(value)).replaceAll("_", " ");
 
-/** A strip in words, for those who do not see it: which values stand where. */
+/** A strip as text for screen readers: the values and their steps. */
 function described(title, list) {
   if (list.some((value) => typeof value === "number")) return `${title}: a number at ${list.filter((value) => value !== null).length} of ${counted(list.length, "step")}`;
   const spans = [];
@@ -64,7 +64,7 @@ function described(title, list) {
   return `${title}: ${words.length === 0 ? "at no step" : words.join(", ") + more}`;
 }
 
-/** A canvas, as an episode may have thousands of steps. */
+/** A canvas, since an episode may have thousands of steps. */
 function painted({ title, list, color, height }, jump) {
   const canvas = make("canvas", { height: 16, role: "img", "aria-label": described(title, list), title });
   const row = make("div", { class: "strip" }, make("span", { class: "strip-name", "aria-hidden": "true" }, title), canvas);
@@ -91,14 +91,14 @@ function painted({ title, list, color, height }, jump) {
   return { row, paint };
 }
 
-/** A colour of the style sheet as the browser resolves it now. */
+/** A style-sheet colour as the browser currently resolves it. */
 function tone(name) {
   const probe = one("#tone") ?? document.body.appendChild(make("i", { id: "tone", hidden: true }));
   probe.style.color = `var(${name})`;
   return getComputedStyle(probe).color;
 }
 
-/** What the colours of the strips mean, those that occur. */
+/** The legend of the colours that occur in the strips. */
 function legend(rows) {
   const entries = [];
   for (const { title, list, color } of rows) {
@@ -125,10 +125,10 @@ export function timeline(episode, jump) {
   const marks = episode.marks.map(({ t, title }) => {
     const button = make("button", { type: "button", class: "moment", "data-t": t, title: `${title}, t = ${t}` }, title);
     button.style.left = place(t);
-    // Those at the ends stay within the line.
+    // Buttons at the ends stay within the line.
     button.style.translate = `-${place(t)}`;
     button.addEventListener("click", () => jump(t));
-    // Two that are near have a line each.
+    // Buttons close together alternate between two rows.
     const at = t / Math.max(1, episode.length);
     before = { at, row: at - before.at < 0.2 && before.at >= 0 ? 1 - before.row : 0 };
     button.dataset.row = String(before.row);

@@ -1,4 +1,4 @@
-// Values as a reader sees them: words, and patches of colours.
+// Values for readers: words, and colour patches.
 import { make } from "./dom.js";
 
 export const valueAt = (episode, name, t) => episode.steps[name]?.values[t - 1] ?? null;
@@ -14,15 +14,15 @@ export function spelled(value, unit = null) {
 
 const paints = new Map();
 
-/** The colours of the study, as the program paints them. */
+/** Sets the study's colours to the program's paints. */
 export function setPaint(list) {
   for (const { name, rgb } of list) paints.set(name, `rgb(${rgb.join(" ")})`);
 }
 
-/** The paint of a colour's name; other names as the browser knows them, or none. */
+/** The paint of a colour's name; other names as the browser knows them, else null. */
 export const paintOf = (name) => paints.get(name) ?? (CSS.supports("color", name) ? name : null);
 
-/** A colour with a patch of it; other words stay as they are. */
+/** A colour with a patch of it; other words unchanged. */
 export function colored(value) {
   const paint = paintOf(value);
   const patch = paint === null ? null : make("i", { class: "patch", "aria-hidden": "true" });

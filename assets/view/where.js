@@ -1,5 +1,5 @@
-// The conditions that a copy can evaluate by itself: comparisons of what its list has, joined by `and`, `or` and brackets.
-// Without `not`, what is undefined and what is false are the same: the episode is left out.
+// Conditions that a copy can evaluate: comparisons of list columns, joined by `and`, `or` and brackets.
+// Without `not`, undefined and false are equivalent: the episode is left out.
 
 const TOKEN = /\s*(?:([A-Za-z_]\w*)|"((?:[^"]|"")+)"|'((?:[^']|'')*)'|(-?\d+(?:\.\d+)?)(?![\w.])|(<>|!=|<=|>=|[=<>(),]))/y;
 const COMPARE = { "=": (a, b) => a === b, "<>": (a, b) => a !== b, "!=": (a, b) => a !== b, "<": (a, b) => a < b, "<=": (a, b) => a <= b, ">": (a, b) => a > b, ">=": (a, b) => a >= b };
@@ -20,7 +20,7 @@ function tokens(text) {
   return found;
 }
 
-/** A function of a row that says whether the condition holds; `columns` has a function for each name, and throws otherwise. */
+/** Compiles a condition to a predicate on rows; `columns` has an accessor per name. Throws for other conditions. */
 function condition(text, columns) {
   const left = tokens(text);
   const take = (word) => left[0]?.word === word && left.shift() !== undefined;
@@ -47,7 +47,7 @@ function condition(text, columns) {
     need(of !== undefined);
     const literal = () => {
       const { value, word } = left.shift() ?? {};
-      // A further column is text in the list, and a number where it was one; a label of coders is true or false.
+      // Other columns are text in the list and are converted back to numbers; a coder's label is true or false.
       const own = kind === "coded" ? ["true", "false"].find((truth) => truth === word) : kind === "label" && value !== undefined ? String(value) : value;
       need(typeof own === (kind === "number" ? "number" : "string"));
       return own;
@@ -66,7 +66,7 @@ function condition(text, columns) {
       return (row) => wanted.includes(of(row));
     }
     const sign = left.shift()?.word;
-    // The order of texts is the program's.
+    // Only the program knows the order of texts.
     need(Object.hasOwn(COMPARE, sign ?? "") && (kind === "number" || !/^[<>]=?$/.test(sign)));
     const value = literal();
     return (row) => of(row) !== null && COMPARE[sign](of(row), value);
@@ -85,7 +85,7 @@ function columnsOfList(list) {
   return columns;
 }
 
-/** The condition of a link over the rows of a copy's list. */
+/** The condition of a link, as a predicate on the rows of a copy's list. */
 export function whereOf(text, list) {
   if (text === null || text.trim() === "") return () => true;
   const columns = columnsOfList(list);

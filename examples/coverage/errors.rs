@@ -1,4 +1,4 @@
-//! The rate at which tests and families of tests reject true hypotheses.
+//! The rates at which tests and families of tests reject true hypotheses.
 
 use crate::tarone::{Attained, tarone_holm};
 use exact::ratio::Ratio;
@@ -10,7 +10,7 @@ use statistics::unpaired::{fisher, fisher_least_p};
 
 use crate::{LEVEL, N, SEED, binomial, happens, heading, largest, rates, row, share, successes};
 
-/// By enumeration: how often a true hypothesis is rejected at most, by the exact test and by its mid-p value.
+/// By enumeration: the largest rate at which the exact test and its mid-p value reject a true hypothesis.
 pub fn sizes() {
     let note = "By enumeration: the largest error over the rates 0.01 to 0.50 of Fisher's test, over shares of discordant pairs of\n\
                 0.02 to 1 of McNemar's, and at the level of the binomial test.\n\
@@ -52,7 +52,7 @@ pub fn sizes() {
     }
 }
 
-/// One test of a family, and whether its hypothesis is true.
+/// One test of a family; true if its hypothesis is true.
 type Test = (Attained, bool);
 
 /// Outcomes of 8 models in the same scenes, some of them harder than others.
@@ -89,7 +89,7 @@ fn fisher_family(random: &mut SplitMix64, rates: [f64; 8], n: u64) -> Vec<Test> 
     })
 }
 
-/// A conditional metric: 8 models, each with its own number of episodes, against 1/3.
+/// A conditional metric against 1/3: 8 models with different numbers of episodes.
 fn chance_family(random: &mut SplitMix64, rates: [f64; 8]) -> Vec<Test> {
     let third = Ratio::new(1, 3).expect("a fraction");
     let test = |(rate, n): (f64, u64)| {
@@ -100,7 +100,7 @@ fn chance_family(random: &mut SplitMix64, rates: [f64; 8]) -> Vec<Test> {
     rates.into_iter().zip([1, 2, 3, 3, 5, 9, 15, 21]).map(test).collect()
 }
 
-/// Shares of studies with a false rejection, and rejections of false hypotheses per study; by Holm, by Tarone-Holm.
+/// The share of studies with a false rejection, and rejections of false hypotheses per study; by Holm, Tarone-Holm.
 fn familywise(studies: usize, mut draw: impl FnMut() -> Vec<Test>) -> [f64; 4] {
     let mut found = [0usize; 4];
     for _ in 0..studies {
@@ -140,7 +140,7 @@ pub fn families() {
     }
 }
 
-/// By enumeration: three models compared with each other, where no proof holds for Tarone-Holm.
+/// By enumeration: three models compared with each other, for which Tarone-Holm has no proof.
 pub fn shared_models() {
     let note = "By enumeration: the largest error over rates 0.01 to 0.50 that three models share. Comparisons that share a\n\
                 model have no proof for Tarone-Holm; this is what is known instead.";

@@ -43,14 +43,14 @@ pub fn common_differences() {
     }
 }
 
-/// The values of a side in an episode, with their probabilities.
+/// The values of one side in an episode, with their probabilities.
 type Distribution = Vec<(i64, f64)>;
 
 fn rate(of: f64) -> Distribution {
     vec![(0, 1.0 - of), (1, of)]
 }
 
-/// Steps to a decision that comes with the same probability at each step, 100 at most.
+/// Steps to a decision with the same probability in each step, at most 100.
 fn steps(at_each: f64) -> Distribution {
     let mut left = 1.0;
     let mut each = |t| {

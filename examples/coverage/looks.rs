@@ -9,7 +9,7 @@ use statistics::sequential::{against_level, confidence_sequence, discordant};
 
 use crate::{CONFIDENCE, LEVEL, SEED, happens, heading, row, share, tally};
 
-/// Looks after each of this many episodes.
+/// Looks after each episode, up to this many.
 const LOOKS: u64 = 200;
 const STUDIES: usize = 2_000;
 

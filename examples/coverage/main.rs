@@ -1,4 +1,4 @@
-//! Simulates once what the methods of `statistics` promise: errors of tests, coverage of intervals.
+//! Simulates the promises of `statistics`: error rates of tests, coverage of intervals.
 //!
 //! `cargo run --release --example coverage > benches/COVERAGE.md`; seeded, the same bytes on every machine.
 
@@ -10,7 +10,7 @@ mod units;
 
 use statistics::random::SplitMix64;
 
-/// Every table draws from a stream of its own, so that a new table changes no other.
+/// Every table draws from its own stream, so that a new table changes no other.
 const SEED: u64 = 20_260_101;
 const LEVEL: f64 = 0.05;
 const CONFIDENCE: f64 = 0.95;

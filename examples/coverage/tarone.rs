@@ -1,16 +1,16 @@
-//! The adjustment given up for Holm's: tests that could not have reached significance take no share of the level.
+//! An adjustment that Holm's replaced: tests that cannot reach significance take no share of the level.
 //!
-//! Rule: the least p value of each test must be fixed before the outcomes are known, or given what all tests of the
-//! family condition on together. Then the error of the family is at most the level, whatever the dependence:
-//! by design for binomial tests of fixed numbers of trials, by conditioning for the tests of `McNemar` and Fisher over
-//! disjoint episodes. For comparisons that share a model (A with B, A with C) the discordant pairs of one test tell of
-//! the outcomes of another, and no proof holds; `benches/COVERAGE.md` shows the error that simulation finds.
-//! Only exact p values belong here: a mid-p value may lie below the least p value.
+//! Rule: the least p value of each test must be fixed before the outcomes are known, or by what all tests of the family
+//! condition on. Then the family's error is at most the level under any dependence: by design for binomial tests with
+//! fixed numbers of trials, by conditioning for the tests of `McNemar` and Fisher over disjoint episodes. For
+//! comparisons that share a model (A with B, A with C) one test's discordant pairs inform about the other, and no proof
+//! exists; `benches/COVERAGE.md` shows the simulated error. Use exact p values only, because a mid-p value may be below
+//! the least p value.
 
-/// The tolerance for a least p value that counts as reached: the same number may be computed in another way.
+/// The tolerance for reaching a least p value, because the same number may be computed in different ways.
 const TIE: f64 = 1e-12;
 
-/// One exact test: its p value, and the least that it could have had.
+/// One exact test: its p value and its least possible p value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Attained {
     /// The exact p value.
@@ -20,13 +20,13 @@ pub struct Attained {
     pub least: f64,
 }
 
-/// Adjusted p values, in the order of the input: those at most the level are rejected.
+/// Adjusted p values in input order; a test is rejected if its value is at most the level.
 ///
-/// Bonferroni's correction for the tests that can reach the p value at all (Tarone 1990, Biometrics 46:515), stepping
-/// down as Holm does, and without the dependence on the level by which Tarone's own rule may reject at 0.04
-/// and not at 0.05 (Hommel and Krummenauer 1998, Biometrics 54:673). In ascending order the i-th p value is multiplied by
-/// the number of tests from the i-th on whose least p value is not above it. No adjusted value exceeds
-/// that of [`statistics::holm::holm`].
+/// Bonferroni's correction for those tests that can reach the p value at all (Tarone 1990, Biometrics 46:515), stepping
+/// down like Holm. Tarone's own rule depends on the level: it may reject at 0.04 and not at 0.05. This one does not
+/// (Hommel and Krummenauer 1998, Biometrics 54:673). In ascending order, the i-th p value is multiplied by the number
+/// of tests from the i-th on whose least p value is not above it. No adjusted value exceeds that of
+/// [`statistics::holm::holm`].
 #[expect(clippy::cast_precision_loss, reason = "a family has few tests")]
 pub fn tarone_holm(tests: &[Attained]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..tests.len()).collect();
@@ -35,7 +35,7 @@ pub fn tarone_holm(tests: &[Attained]) -> Vec<f64> {
     let mut reached = 0.0f64;
     for (rank, &index) in order.iter().enumerate() {
         let p = tests[index].p;
-        // A test of the same p value that cannot be below it counts, whatever rounding did to its least one.
+        // A test with the same p value always counts, even if rounding put its least p value above it.
         let can_reach = |&&other: &&usize| tests[other].least.min(tests[other].p) <= p * (1.0 + TIE);
         let count = order[rank..].iter().filter(can_reach).count();
         reached = reached.max((count as f64 * p).min(1.0));

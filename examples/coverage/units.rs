@@ -1,4 +1,4 @@
-//! The error rates of tests with repeated scenes, by scene and as if episodes were independent.
+//! Error rates of tests with repeated scenes: by scene, and as if episodes were independent.
 
 use exact::moments::Moments;
 use exact::ratio::Ratio;
@@ -17,7 +17,7 @@ const MODELS: usize = 8;
 /// The successes of each model in each scene.
 type Study = Vec<Vec<Moments>>;
 
-/// Scenes, repeats of each, and how often a repeat takes the scene's own verdict.
+/// The number of scenes, the repeats of each, and the chance that a repeat copies the scene's verdict.
 #[derive(Clone, Copy)]
 struct Design {
     scenes: usize,
@@ -65,7 +65,7 @@ fn between_models(study: &Study) -> [Vec<f64>; 2] {
     [holm(&by_scene.collect::<Vec<_>>()), holm(&by_episode.collect::<Vec<_>>())]
 }
 
-/// Shares of studies in which each family claims anything; too few scenes claim nothing, as in `stats`.
+/// The shares of studies in which each family claims anything. Too few scenes claim nothing, as in `stats`.
 fn claims(random: &mut SplitMix64, design: Design, rates: [f64; MODELS]) -> [f64; 4] {
     let mut found = [0; 4];
     for _ in 0..STUDIES {

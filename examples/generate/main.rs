@@ -1,8 +1,8 @@
 //! Generates traces of any size for benchmarks, in the order of a study or shuffled.
 //!
 //! `cargo run --release --example generate -- --order shuffled --out DIR`. Lengths are like those of recorded episodes:
-//! 1 to 100 steps, and somewhat more than 41 % of the episodes reach the limit. Colours and what the mirror shows last
-//! for many steps, actions for a few.
+//! 1 to 100 steps, and slightly more than 41 % of the episodes reach the limit. Colours and the mirror's contents stay
+//! the same for many steps, actions for a few.
 
 mod generation;
 

@@ -1,7 +1,7 @@
 //! Rebuilds the paper's 840 episodes from its published tables and writes them as traces.
 //!
-//! `cargo run --example reconstruct -- fixtures/paper` writes the fixture anew; with `--check` it only compares, and
-//! exits with 1 on a difference. Either way it first shows which published cells contradict each other.
+//! `cargo run --example reconstruct -- fixtures/paper` writes the fixture again. With `--check` it only compares, and
+//! exits with 1 on a difference. In both cases it first lists the published cells that contradict each other.
 
 mod reconstruction;
 
@@ -53,7 +53,7 @@ fn run(arguments: &Arguments) -> Result<ExitCode, Box<dyn Error>> {
     Ok(ExitCode::from(1))
 }
 
-/// Says which cells no episodes can explain as printed, and what is read instead.
+/// Prints the cells that no episodes can explain as printed, and the values to read instead.
 fn show_contradictions() {
     for (contradiction, erratum) in reconstruction::contradictions() {
         println!("contradiction: {contradiction}");

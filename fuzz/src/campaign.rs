@@ -1,5 +1,5 @@
-//! A campaign of page mutants: as many as are asked for, the same ones from the same seed, with counts of what became of
-//! them.
+//! A campaign of page mutants: runs the given number of mutants, which depend on the seed alone, and counts their
+//! outcomes.
 
 use std::collections::BTreeMap;
 use std::panic::{self, AssertUnwindSafe};
@@ -21,7 +21,7 @@ impl Random {
         mixed ^ mixed >> 31
     }
 
-    /// One change mostly, up to four.
+    /// Mostly one change, up to four.
     fn mutant(&mut self) -> Vec<u8> {
         let changes = 1 + (self.next() % 8).saturating_sub(4);
         let length = 3 + CHANGE * usize::try_from(changes).unwrap_or(1);
@@ -29,11 +29,11 @@ impl Random {
     }
 }
 
-/// How long a mutant may take: decoders of some hundred rows take less than a millisecond, and the library some seconds to
-/// skip a field that says it has 2^31 elements, which the program refuses before.
+/// Time limit of a mutant. Decoding some hundred rows takes less than a millisecond. The library takes seconds to skip
+/// a field that declares 2^31 elements, which the program refuses earlier.
 const LONGEST: Duration = Duration::from_mins(2);
 
-/// Ends the campaign at a mutant that takes long, before memory ends.
+/// Ends the campaign if a mutant takes too long, before it uses up the memory.
 fn watch(under_way: &Mutex<(Instant, Vec<u8>)>) {
     loop {
         thread::sleep(Duration::from_millis(500));
@@ -45,7 +45,7 @@ fn watch(under_way: &Mutex<(Instant, Vec<u8>)>) {
     }
 }
 
-/// Runs `count` mutants on some threads, and prints counts as lines of a table.
+/// Runs `count` mutants on `threads` threads and prints the counts as a table.
 pub fn run(count: u64, seed: u64, threads: u64) -> ExitCode {
     let of_thread = |thread: u64| {
         let under_way = Arc::new(Mutex::new((Instant::now(), Vec::new())));

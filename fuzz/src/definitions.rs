@@ -14,11 +14,11 @@ use crate::episodes;
 
 static COLUMNS: LazyLock<Columns> = LazyLock::new(|| vocabulary::trace_columns(episodes::open()));
 
-/// A definition file: refused, or its catalog gives the same definitions again, every dialect can say it or says why not,
-/// and a metric that is computed alone has the values that it has among all.
+/// A definition file: it is refused, or its catalog restores the same definitions. Every dialect lowers them or says
+/// why not. A metric computed alone has the same values as among all metrics.
 pub fn target(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
-    // Files of other places are not part of an input.
+    // The input has no other files to include.
     if text.contains("include") {
         return;
     }

@@ -1,20 +1,20 @@
-//! The depth that an input reached in its target: counted over a corpus, it shows whether all inputs are refused early.
+//! How far an input got in its target. Counted over a corpus, it shows whether all inputs are refused early.
 
 use std::cell::Cell;
 
-/// Of an input that its target refused at once.
+/// The depth of an input that its target refused at once.
 pub const REFUSED: &str = "refused";
 
 thread_local! {
     static REACHED: Cell<&'static str> = const { Cell::new(REFUSED) };
 }
 
-/// Says that the input of this thread came so far.
+/// Records that this thread's input reached `stage`.
 pub fn reached(stage: &'static str) {
     REACHED.set(stage);
 }
 
-/// The depth of this thread's last input; the next one starts anew.
+/// Returns the depth of this thread's last input and resets it.
 pub fn taken() -> &'static str {
     REACHED.replace(REFUSED)
 }

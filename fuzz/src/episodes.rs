@@ -1,4 +1,4 @@
-//! A few episodes and the trace of them, as every target that needs some has them.
+//! A few episodes and their trace, for every target that needs some.
 
 use ::trace::episode::{Action, Episode, Extra, Step};
 use ::trace::inputs::Input;
@@ -36,7 +36,7 @@ pub fn episodes(count: usize) -> Vec<Episode> {
     (0..count).map(episode).collect()
 }
 
-/// The trace of them.
+/// The trace of `count` episodes.
 pub fn trace(count: usize) -> Vec<u8> {
     let episodes = episodes(count);
     let columns = OptionalColumns::used_by(&episodes);
@@ -48,7 +48,7 @@ pub fn trace(count: usize) -> Vec<u8> {
     encoder.finish().expect("memory takes any bytes")
 }
 
-/// The same trace, open: one for each thread, whose files end with it.
+/// A trace of six episodes, open. Each thread has its own, because the files end with their thread.
 pub fn open() -> &'static TraceSet {
     thread_local! {
         static OPEN: &'static TraceSet = {

@@ -17,7 +17,7 @@ pub mod seeds;
 mod texts;
 mod traces;
 
-/// A target: its name, which is that of its corpus, and its function.
+/// A target: its function, and its name, which is also the name of its corpus.
 pub type Target = (&'static str, fn(&[u8]));
 
 /// All targets.
@@ -47,10 +47,10 @@ pub const TARGETS: [Target; 23] = [
     ("styled", pairs::styled),
 ];
 
-/// The target of this name.
+/// The target with this name.
 ///
 /// # Panics
-/// For a name that is invalid.
+/// If there is no target with this name.
 pub fn target(name: &str) -> fn(&[u8]) {
     let names = || TARGETS.map(|(name, _)| name).join(", ");
     TARGETS.iter().find(|(known, _)| *known == name).unwrap_or_else(|| panic!("no target `{name}`: {}", names())).1

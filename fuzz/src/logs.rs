@@ -1,4 +1,4 @@
-//! Logs that are cut or damaged, and logs that are put together.
+//! Cut or damaged logs, and logs assembled from parts.
 
 use std::io::Cursor;
 use std::num::NonZeroUsize;
@@ -20,7 +20,7 @@ fn recovered(data: &[u8]) -> Option<Recovered> {
     recover_from(Path::new("log.mcap"), Cursor::new(data)).ok()
 }
 
-/// The bytes as a log: what is saved of it makes a trace that keeps every rule, or `recover` says which rule is broken.
+/// The bytes as a log: the recovered episodes form a valid trace, or `recover` says which rule they break.
 pub fn recover(data: &[u8]) {
     let Some(found) = recovered(data) else { return };
     reached("log");
@@ -45,8 +45,8 @@ pub fn recover(data: &[u8]) {
     }
 }
 
-/// The bytes as one of the logs of a folder: refused, or in the log of all, of which nothing is lost then that was not lost
-/// before, as an episode whose rows are not those of its hash.
+/// The bytes as one log of a folder: it is refused, or assembled into the whole log. Assembling loses nothing that was
+/// not lost before, such as an episode whose rows do not match its hash.
 pub fn assembled(data: &[u8]) {
     let (part, out) = (scratch::file("part.mcap", data), scratch::path("whole.mcap"));
     let _ = std::fs::remove_file(&out);

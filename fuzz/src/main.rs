@@ -1,5 +1,5 @@
-//! Runs fuzz targets. Built for libFuzzer (`--cfg mirrorstats_libfuzzer`, as `make fuzz` has it) it is one target, which
-//! the variable `FUZZ_TARGET` names; else it has verbs of its own, which the usage lists.
+//! Runs fuzz targets. Built for libFuzzer (`--cfg mirrorstats_libfuzzer`, as in `make fuzz`), it runs the target named
+//! by the variable `FUZZ_TARGET`. Otherwise it has its own verbs, which the usage lists.
 #![cfg_attr(mirrorstats_libfuzzer, no_main)]
 
 #[cfg(mirrorstats_libfuzzer)]

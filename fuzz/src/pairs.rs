@@ -1,7 +1,7 @@
-//! Two accepted inputs at once: definitions, groups, filters, questions of the page and logs with a trace; a style with scores.
+//! Two accepted inputs: a trace with definitions, groups, filters, queries or logs; scores with a style.
 //!
-//! The first two bytes are the length of the first input; the rest is the second, a sound trace where nothing is left. Rule:
-//! what a pair takes is bounded: each target measures itself.
+//! The first two bytes are the length of the first input, and the rest is the second. An empty second input stands for
+//! a sound trace. Rule: the cost of a pair is bounded, and each target measures its own.
 
 use std::fs;
 use std::num::NonZeroUsize;
@@ -15,12 +15,12 @@ use view::{Options, View};
 use crate::depth::reached;
 use crate::{episodes, scratch};
 
-/// What a pair of inputs, smaller than 64 KiB together, may take: memory in KiB beyond what the process has, and time of a
-/// build without optimisation.
+/// Limits for a pair of inputs smaller than 64 KiB together: additional memory in KiB, and time of an unoptimised
+/// build.
 const MEMORY: u64 = 512 << 10;
 const TIME: Duration = Duration::from_secs(30);
 
-/// Both inputs.
+/// Encodes a pair of inputs.
 pub fn joined(first: &[u8], second: &[u8]) -> Vec<u8> {
     let length = u16::try_from(first.len()).unwrap_or(u16::MAX).to_le_bytes();
     [&length, first, second].concat()
@@ -31,7 +31,7 @@ fn parted(data: &[u8]) -> Option<(&[u8], &[u8])> {
     rest.split_at_checked(usize::from(u16::from_le_bytes(*length)))
 }
 
-/// A text and a trace, which is a sound one where there are no bytes.
+/// A text and a trace; no bytes give a sound trace.
 fn with_trace(data: &[u8]) -> Option<(&str, Vec<u8>)> {
     let (text, bytes) = parted(data)?;
     let bytes = if bytes.is_empty() { episodes::trace(6) } else { bytes.to_vec() };
@@ -51,7 +51,7 @@ fn bounded<T>(run: impl FnOnce() -> T) -> T {
     given
 }
 
-/// What the process has; 0 where the system does not tell.
+/// A memory figure of this process in KiB; 0 where the system does not report it.
 fn memory(key: &str) -> u64 {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix(key));
@@ -80,7 +80,7 @@ pub fn defined(data: &[u8]) {
     }
 }
 
-/// Columns to group by, apart by commas: refused, or each episode is in one cell.
+/// Columns to group by, separated by commas: refused, or each episode is in one cell.
 pub fn grouped(data: &[u8]) {
     let Some((text, bytes)) = with_trace(data) else { return };
     let Some(study) = study("grouped.parquet", &bytes) else { return };
@@ -95,7 +95,7 @@ pub fn grouped(data: &[u8]) {
     }
 }
 
-/// A condition on episodes: refused, or it keeps some of them, and its contrary none of these.
+/// A condition on episodes: refused, or its negation keeps only other episodes.
 pub fn filtered(data: &[u8]) {
     let Some((text, bytes)) = with_trace(data) else { return };
     let kept = |condition: &str| {
@@ -122,7 +122,7 @@ fn options(run: &Path) -> Options {
     }
 }
 
-/// A question of the page as it stands in an address, such as `episodes?sort=id`: an answer or a refusal in words.
+/// A query of the page as in its address, such as `episodes?sort=id`: answered, or refused with a message.
 pub fn asked(data: &[u8]) {
     let Some((text, bytes)) = with_trace(data) else { return };
     let Ok(view) = bounded(|| View::open(options(&scratch::file("asked.parquet", &bytes)))) else { return };
@@ -144,7 +144,7 @@ fn ask(view: &View, text: &str) {
     }
 }
 
-/// A log beside a trace, in a folder: what the page shows of both.
+/// A log beside a trace in a folder, and the page's answers about both.
 pub fn logged(data: &[u8]) {
     let Some((log, bytes)) = parted(data) else { return };
     let bytes = if bytes.is_empty() { episodes::trace(3) } else { bytes.to_vec() };
@@ -160,7 +160,7 @@ pub fn logged(data: &[u8]) {
     }
 }
 
-/// A style over scores in CSV: refused, or a report in memory.
+/// A style with scores in CSV: refused, or a report in memory.
 pub fn styled(data: &[u8]) {
     let Some((style, scores)) = parted(data) else { return };
     let style = scratch::file("styled.toml", style);

@@ -1,4 +1,4 @@
-//! Panics that are an answer: those of the reference are refusals.
+//! Panics as results: a panic of the reference is a refusal.
 
 use std::cell::Cell;
 use std::panic::{self, AssertUnwindSafe};
@@ -8,8 +8,7 @@ thread_local! {
     static QUIET: Cell<bool> = const { Cell::new(false) };
 }
 
-/// What `run` gives, or the message of the panic that it ended in. Nothing is printed for that panic, and no hook that
-/// ends the process is called.
+/// Returns the result of `run`, or the message of its panic. The panic is not printed, and no hook ends the process.
 pub fn contained<R>(run: impl FnOnce() -> R) -> Result<R, String> {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {

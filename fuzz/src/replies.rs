@@ -1,4 +1,4 @@
-//! The answers of providers and programs, and the journals that keep them.
+//! The answers of providers and programs, and their journals.
 
 use std::fs;
 
@@ -14,7 +14,7 @@ use crate::scratch;
 const DIALECTS: [Dialect; 4] =
     [Dialect::OpenaiChat, Dialect::OpenaiCompatible, Dialect::Gemini, Dialect::AnthropicMessages];
 
-/// The text of a reply, as a program or a model gives it.
+/// A reply's text, from a program or a model.
 fn text(raw: &str, ending: Ending) {
     for experiment in [Experiment::E1, Experiment::E5] {
         let reading = reply::read(raw, &experiment, ending);
@@ -30,7 +30,7 @@ fn text(raw: &str, ending: Ending) {
     }
 }
 
-/// The body of a provider's answer, the first byte choosing the provider; for some the text of a reply itself.
+/// The body of a provider's answer; the first byte chooses the provider, or a plain reply text.
 pub fn target(data: &[u8]) {
     let Some((first, data)) = data.split_first() else { return };
     let Ok(body) = std::str::from_utf8(data) else { return };
@@ -49,7 +49,7 @@ fn all(journal: &Journal) -> Vec<Recorded> {
     journal.answers().cloned().collect()
 }
 
-/// A journal that a process left: refused, or it goes on, and plays what it had and what was added.
+/// A journal left by a process: it is refused, or it can be appended to and plays old and new answers.
 pub fn journal(data: &[u8]) {
     let path = scratch::file("journal.jsonl", data);
     let cassette = Journal::cassette(&path).map(|cassette| all(&cassette));
@@ -72,7 +72,7 @@ pub fn journal(data: &[u8]) {
     assert_eq!((all(&again), again.requests()), (after, journal.requests()));
 }
 
-/// A cassette: what it plays is read as replies are.
+/// A cassette: the answers that it plays are read as replies.
 pub fn cassette(data: &[u8]) {
     let path = scratch::file("cassette.jsonl", data);
     let Ok(cassette) = Journal::cassette(&path) else { return };

@@ -1,4 +1,4 @@
-//! Files for targets whose library functions take a path: in memory where the system has that.
+//! Files for targets whose library functions take a path; in memory where the system supports it.
 
 use std::cell::RefCell;
 use std::fs;
@@ -10,7 +10,7 @@ thread_local! {
     static FOLDER: RefCell<Option<TempDir>> = const { RefCell::new(None) };
 }
 
-/// The path of a file of this name in a folder of this thread.
+/// The path of this name in the thread's folder.
 pub fn path(name: &str) -> PathBuf {
     FOLDER.with_borrow_mut(|folder| {
         let memory = Path::new("/dev/shm");
@@ -25,7 +25,7 @@ pub fn path(name: &str) -> PathBuf {
     })
 }
 
-/// A file of this name with these bytes.
+/// Writes a file with this name and these bytes.
 pub fn file(name: &str, bytes: &[u8]) -> PathBuf {
     let path = path(name);
     fs::write(&path, bytes).expect("a folder for temporary files");

@@ -1,7 +1,6 @@
-//! The seeds of the corpora, made of the fixtures and of episodes of our own: `cargo run -p mirrorstats-fuzz -- seeds`.
+//! The seeds of the corpora, made from the fixtures and our own episodes: `cargo run -p mirrorstats-fuzz -- seeds`.
 //!
-//! `fuzz/corpus` holds what libFuzzer's merge kept of these and of what it found beside them; the seeds themselves need not
-//! be among it.
+//! `fuzz/corpus` holds what libFuzzer's merge kept of the seeds and of its own finds, so it may lack some seeds.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -71,14 +70,14 @@ pub fn of(target: &str) -> Vec<Vec<u8>> {
     }
 }
 
-/// Texts beside a sound trace, and beside one of another writer.
+/// Texts paired with a sound trace, and with a trace of another writer.
 fn texts(texts: &[&str]) -> Vec<Vec<u8>> {
     let other = read("fixtures/checksums/v1-snappy.parquet");
     let pair = |text: &&str| [pairs::joined(text.as_bytes(), &[]), pairs::joined(text.as_bytes(), &other)];
     texts.iter().flat_map(pair).collect()
 }
 
-/// A question for each answer of the page.
+/// A query for each answer of the page.
 const QUESTIONS: [&str; 12] = [
     "live",
     "study",
@@ -94,10 +93,10 @@ const QUESTIONS: [&str; 12] = [
     "frame?id=e0&t=1",
 ];
 
-/// Writes the seeds of every target into a folder of its name.
+/// Writes the seeds of every target into a folder named after it.
 ///
 /// # Errors
-/// Whatever writing gives.
+/// If a file or folder cannot be written.
 pub fn write(out: &Path) -> std::io::Result<()> {
     for (target, run) in crate::TARGETS {
         let folder = out.join(target);
@@ -110,7 +109,7 @@ pub fn write(out: &Path) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Every column as it is, and some with one change of each kind.
+/// Every base column unchanged, and some with one change of each kind.
 fn page_seeds() -> Vec<Vec<u8>> {
     let whole = (0..pages::bases()).map(|at| at.to_le_bytes()[..2].to_vec());
     let changed = (0..18_u8).map(|what| {
@@ -141,7 +140,7 @@ fn lines() -> Vec<Vec<u8>> {
     vec![all[0].clone().into_bytes(), (all.join("\n") + "\n").into_bytes(), b"\xef\xbb\xbf\r\n{}\n".to_vec()]
 }
 
-/// Logs of one episode and of three, with recordings; each cut in the middle, too.
+/// Logs of one and of three episodes, with recordings; also each cut in the middle.
 fn logs() -> Vec<Vec<u8>> {
     let mut parts = Vec::new();
     for (at, episode) in episodes::episodes(3).into_iter().enumerate() {
@@ -234,7 +233,7 @@ fn scores() -> Vec<Vec<u8>> {
 
 const REPLY: &str = r#"{"view-description":"a mirror","reasoning":"it is me","action":"d","selected_cube":"red","identification":"I am red","summary":"s"}"#;
 
-/// An answer in each provider's language.
+/// An answer in each provider's wire format.
 fn bodies() -> [Value; 4] {
     let chat = json!({ "model": "m-1", "choices": [{ "finish_reason": "stop", "message": { "content": REPLY } }],
         "usage": { "prompt_tokens": 11, "completion_tokens": 7, "cost": 0.5 } });

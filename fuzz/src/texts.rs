@@ -1,4 +1,4 @@
-//! The text files that a user or an older run may hand over: what parses prints, and parses again to the same.
+//! Text files from a user or an older run: each parsed file prints, and parses again to the same.
 
 use std::fs;
 use std::io;
@@ -25,7 +25,7 @@ static PAPER: LazyLock<Catalog> = LazyLock::new(|| {
     Definitions::load("paper", &columns).expect("definitions that are built in").catalog
 });
 
-/// `manifest.json`, as `rescore` reads it and as a new report reads it of an older one.
+/// `manifest.json`, as `rescore` reads it and as a new report reads an older one.
 pub fn manifest(data: &[u8]) {
     let folder = scratch::path("report");
     fs::create_dir_all(&folder).expect("a folder for temporary files");
@@ -55,7 +55,7 @@ pub fn style(data: &[u8]) {
     }
 }
 
-/// A file over the world's configuration: what it makes of it is a whole file that says the same.
+/// A file of changes to the world's configuration: the result prints as a whole file that parses to the same.
 pub fn world(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
     let Ok(config) = WorldConfig::from_toml(text) else { return };
@@ -65,7 +65,7 @@ pub fn world(data: &[u8]) {
     assert_eq!((again.hash(), &again), (config.hash(), &config));
 }
 
-/// A file of experiments: those that it has are declared in traces, and read from there as they were.
+/// A file of experiments: each experiment survives being printed as a declaration and read again.
 pub fn experiments(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
     let source = Source { name: "fuzzed.toml".into(), text: text.to_owned() };
@@ -102,7 +102,7 @@ pub fn lost_episodes(data: &[u8]) {
     assert_eq!(again.expect("a list that was printed"), lost);
 }
 
-/// Scores, the first byte choosing the format: what is read is written and read again.
+/// Scores; the first byte chooses the format. What is read is written and read again.
 pub fn scores(data: &[u8]) {
     let Some((first, data)) = data.split_first() else { return };
     let format = [Format::Csv, Format::JsonLines, Format::Parquet][usize::from(first % 3)];

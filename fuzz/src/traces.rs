@@ -1,4 +1,4 @@
-//! Footers, and steps on their way in.
+//! Footers, whole traces, and steps to import.
 
 use std::num::NonZeroUsize;
 use std::path::Path;
@@ -15,7 +15,7 @@ use ::trace::validate::validate;
 use crate::depth::reached;
 use crate::{episodes, scratch};
 
-/// A sound trace, and where its footer starts.
+/// A sound trace, and the position of its footer.
 static WHOLE: LazyLock<(Vec<u8>, usize)> = LazyLock::new(|| {
     let whole = episodes::trace(4);
     let at = whole.len() - 8;
@@ -23,13 +23,13 @@ static WHOLE: LazyLock<(Vec<u8>, usize)> = LazyLock::new(|| {
     (whole, at - length)
 });
 
-/// The footer of a sound trace: what the target starts from.
+/// The footer of a sound trace, which the target starts from.
 pub fn sound_footer() -> &'static [u8] {
     let (whole, at) = &*WHOLE;
     &whole[*at..whole.len() - 8]
 }
 
-/// The bytes as the footer of a trace whose pages are sound: refused, or a scan and `validate` say the same of it.
+/// The bytes as the footer of a trace with sound pages: refused, or a scan and `validate` agree on it.
 pub fn footer(data: &[u8]) {
     let (whole, at) = &*WHOLE;
     let mut file = whole[..*at].to_vec();
@@ -67,7 +67,7 @@ fn scan_and_validate(path: &Path) {
     }
 }
 
-/// Lines of steps: refused, or a trace that keeps every rule and has a row for each line.
+/// Lines of steps: refused, or imported as a valid trace with one row per line.
 pub fn import_lines(data: &[u8]) {
     let (from, out) = (scratch::file("steps.jsonl", data), scratch::path("imported.parquet"));
     let _ = std::fs::remove_file(&out);

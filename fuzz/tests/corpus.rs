@@ -1,4 +1,4 @@
-//! The committed corpora through the functions that libFuzzer calls, and the seeds that they were made from.
+//! Runs the committed corpora and their seeds through the functions that libFuzzer calls.
 
 use std::fs;
 use std::path::Path;

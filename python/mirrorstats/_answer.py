@@ -32,7 +32,7 @@ class Answer(dict[str, Any]):
         return self.text or super().__str__()
 
     def _repr_html_(self) -> str:
-        # Not with the package, as everything that a first answer does without: an import of it takes a notebook's time.
+        # Imported here since most answers do not need it, and importing it takes time in a notebook.
         import html
 
         style = "font-family: monospace; white-space: pre; overflow-x: auto; max-height: 40em; line-height: 1.3"
@@ -164,12 +164,12 @@ class Gate(_GateKeys):
         return long(rows, [("experiment", "text"), ("model", "text"), *sides])
 
 
-# What all tests of a family share.
+# The columns shared by all tests of a family.
 _OF_FAMILY = ("models", "tied", "tests", "detectable")
 
 
 def long(rows: Iterable[Mapping[str, Any]], kinds: Optional[list[tuple[str, str]]] = None) -> _native.ArrowTable:
-    """Nested answers as rows of a table: keys of keys joined by `_`, lists as text; all columns unless `kinds` has them."""
+    """Nested answers as table rows: nested keys joined by `_`, lists as text; all columns unless `kinds` has them."""
     flat = [dict(_flat(row)) for row in rows]
     names = list(dict.fromkeys(name for row in flat for name in row))
     kinds = kinds or [(name, _kind([row.get(name) for row in flat])) for name in names]

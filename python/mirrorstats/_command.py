@@ -6,7 +6,7 @@ import sys
 
 def main() -> int:
     """Run the command line with the arguments of this process; returns its exit code."""
-    # As in the plain program: Ctrl-C ends a command, unless the command itself listens for it.
+    # As in the plain program, Ctrl-C ends a command unless the command handles it.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     from . import _native
 

@@ -6,18 +6,18 @@ import json
 import re
 from typing import Any, Optional
 
-# An option of the command line, and its value where there is one.
+# An option of the command line, and its value if it has one.
 _OPTION = (
     r"""`?(?<![\w-])--([a-z][a-z-]+)(?:[ =]("[^"]*"|'[^']*'|[A-Z]+\b|\d+\b|[\w./-]+\.\w+|paper|extended|default|as-failure))?`?"""
 )
 _COMMAND = r"(`mirrorstats [^`]*`)"
-# Where definitions, styles and frames without a file are kept.
+# The folder of definitions, styles and frames without a file.
 _SPOOLED = r"(?:[^\s`]*/)?mirrorstats-[a-z0-9_]{8}/"
 _FLAGS = {"full", "keep_going", "no_frames", "no_log", "pool"}
 
 
 def in_python(words: str) -> str:
-    """Words that name options of the command line, with arguments in their place; whole commands stay."""
+    """Replaces options of the command line in a text by arguments; whole commands stay."""
     words = re.sub(_SPOOLED, "", words).replace("--> --where", "--> where")
 
     def argument(option: re.Match[str]) -> str:
@@ -98,29 +98,29 @@ def of_words(kind: str, words: str, faults: str) -> Error:
 
 
 def check_number(name: str, value: Any, least: int) -> None:
-    """Refuses what is no integer of at least this size; None is no number and passes."""
+    """Accepts integers of at least this size, and None."""
     if value is not None and (not isinstance(value, int) or isinstance(value, bool) or value < least):
         raise ArgumentError(f"{name}: expected an integer of at least {least}, found {value!r}")
 
 
 def check_type(name: str, value: Any, wanted: type, words: str) -> None:
-    """Refuses what is not of a type; None passes."""
+    """Accepts values of a type, and None."""
     if value is not None and not isinstance(value, wanted):
         raise TypeError(f"{name}: expected {words}, found {type(value).__name__}")
 
 
 def is_number(value: Any) -> bool:
-    """Whether it is an integer or a float; a truth value is neither."""
+    """Returns true for an integer or a float, but not for a truth value."""
     return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
 def check_share(name: str, value: Any) -> None:
-    """Refuses what is not strictly between 0 and 1."""
+    """Accepts numbers strictly between 0 and 1."""
     if not is_number(value) or not 0 < value < 1:
         raise ArgumentError(f"{name}: expected a number between 0 and 1 such as 0.95, found {value!r}")
 
 
 def check_name(name: str, value: Any, known: tuple[str, ...]) -> None:
-    """Refuses what is none of these."""
+    """Accepts only these values."""
     if value not in known:
         raise ArgumentError(f"{name}: expected {', '.join(map(repr, known))}, found {value!r}")

@@ -13,7 +13,7 @@ from ._answer import Imported
 from ._error import ArgumentError, OutputError, check_name
 from ._paths import Definitions, Path, Spool, is_frame, text, toml_file
 
-# Traces that nobody named stay until the interpreter ends.
+# Traces without a given name stay until the interpreter ends.
 _unnamed = Spool()
 
 
@@ -60,7 +60,7 @@ def import_steps(
     if cluster is not None and reconstruction:
         raise ArgumentError("cluster and reconstruction exclude each other")
     if palette is not None and not isinstance(palette, str):
-        # With a comma it is no name of a file.
+        # A text with a comma is not a file name.
         palette = ",".join([*palette, ""])
     spool = Spool()
     target = _unnamed.new("steps.parquet") if out is None else text(out, spool)
@@ -78,7 +78,7 @@ def trace_of(
     clusters_by_seed: bool = False,
     reconstruction: bool = False,
 ) -> Imported:
-    """Makes a trace of rows that are lines of JSON."""
+    """Makes a trace from rows in JSON lines."""
     asked = {
         "out": out,
         "definitions": definitions,
@@ -87,13 +87,13 @@ def trace_of(
         "reconstruction": reconstruction,
     }
     answer = Imported(_native.import_text("rows", rows, asked))
-    # Where it is, not how messages call it.
+    # The path of the file, not its name in messages.
     answer["out"] = out
     return answer
 
 
 def lines(rows: Any) -> tuple[list[str], bytes]:
-    """The columns of some rows, and the rows as lines of JSON."""
+    """The columns of some rows, and the rows as JSON lines."""
     if not hasattr(rows, "__arrow_c_stream__") and is_frame(rows):
         rows = rows.collect()
     if hasattr(rows, "__arrow_c_stream__"):
@@ -121,7 +121,7 @@ def lines(rows: Any) -> tuple[list[str], bytes]:
 
 
 def _plain(value: Any, at: int, key: str) -> Any:
-    """A value as JSON has it; what is no number is null."""
+    """A value for JSON; NaN, NA and NaT become null."""
     if value is None or type(value).__name__ in ("NAType", "NaTType"):
         return None
     if hasattr(value, "item") and getattr(value, "ndim", None) == 0:

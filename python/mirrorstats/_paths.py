@@ -1,4 +1,4 @@
-"""Inputs as the native library takes them: paths as text, and data frames, text and dicts as files of this process."""
+"""Inputs for the native library: paths as text; data frames, text and dicts as files of this process."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ if TYPE_CHECKING:
 Path = Union[str, "os.PathLike[str]"]
 # A definition file, a style or an experiment: a name, a path, TOML text, or a dict with the keys of the file.
 Toml = Union[str, "os.PathLike[str]", Mapping[str, Any]]
-# A type checker's completion names those that are built in.
+# Lets type checkers complete the built-in names.
 Definitions = Union[Literal["paper", "extended"], Toml]
 Style = Union[Literal["default", "paper"], Toml]
 
 
 class Spool:
-    """A temporary folder for what is not yet a file; it is there as long as this object."""
+    """A temporary folder for inputs without a file; it exists as long as this object."""
 
     def __init__(self, files: Optional[dict[str, bytes]] = None) -> None:
         self._folder: Optional[tempfile.TemporaryDirectory[str]] = None
@@ -35,14 +35,14 @@ class Spool:
         return self._folder.name
 
     def keep(self, name: str, content: bytes) -> str:
-        """Writes a file and gives its path."""
+        """Writes a file and returns its path."""
         path = os.path.join(self.path, name)
         with open(path, "wb") as file:
             file.write(content)
         return path
 
     def new(self, name: str) -> str:
-        """The path of a file that is not there yet."""
+        """The path of a file that does not exist yet."""
         (stem, ending), at = os.path.splitext(name), 1
         while os.path.exists(os.path.join(self.path, name)):
             at += 1
@@ -50,7 +50,7 @@ class Spool:
         return os.path.join(self.path, name)
 
     def files(self) -> dict[str, bytes]:
-        """All of its files, by name."""
+        """All files, by name."""
         found = sorted(os.scandir(self.path), key=lambda file: file.name) if self._folder else []
         files = {}
         for file in found:
@@ -61,7 +61,7 @@ class Spool:
 
 
 def text(path: Any, spool: Spool) -> str:
-    """A path as text: `~` and `file://` stand for what they mean; what fsspec has opened elsewhere is copied here."""
+    """A path as text. Expands `~` and `file://`, and copies remote files that fsspec has opened."""
     filesystem, place = getattr(path, "fs", None), getattr(path, "path", None)
     if filesystem is not None and isinstance(place, str):
         protocol = filesystem.protocol if isinstance(filesystem.protocol, str) else filesystem.protocol[0]
@@ -73,7 +73,7 @@ def text(path: Any, spool: Spool) -> str:
     path = os.fspath(path)
     named = str(os.fsdecode(path))
     if named.startswith("file://"):
-        # Not with the package: the module brings HTTP and TLS along.
+        # Imported here since the module imports HTTP and TLS.
         import urllib.parse
         import urllib.request
 
@@ -82,16 +82,16 @@ def text(path: Any, spool: Spool) -> str:
 
 
 def is_frame(value: Any) -> bool:
-    """Whether it is a data frame of Polars, pandas, Arrow or DuckDB."""
+    """Returns true for a data frame of Polars, pandas, Arrow or DuckDB."""
     if hasattr(value, "collect") and hasattr(value, "collect_schema"):
         return True
-    # A series has a stream, and no columns.
+    # A series has a stream but no columns.
     has_columns = any(hasattr(value, name) for name in ("columns", "column_names", "schema"))
     return has_columns and hasattr(value, "__arrow_c_stream__")
 
 
 def several(paths: Any) -> list[Any]:
-    """One input or several; rows that are dicts are one."""
+    """One input or several; rows as dicts are one input."""
     is_one = isinstance(paths, (str, bytes, os.PathLike, Mapping)) or is_frame(paths)
     is_one = is_one or hasattr(paths, "fs") or hasattr(paths, "__arrow_c_stream__")
     if is_one or not isinstance(paths, Iterable):
@@ -101,7 +101,7 @@ def several(paths: Any) -> list[Any]:
 
 
 def toml_file(value: Toml, noun: str, spool: Spool) -> str:
-    """A name or a path as it is; TOML text or a dict as a file."""
+    """A name or path unchanged; TOML text or a dict as a file."""
     if isinstance(value, Mapping):
         return spool.keep(f"{noun}.toml", "\n".join(_tables(value)).encode())
     if not isinstance(value, (str, bytes, os.PathLike)) and not hasattr(value, "fs"):
@@ -124,7 +124,7 @@ def _tables(table: Mapping[str, Any], name: str = "") -> Iterable[str]:
 
 
 def _value(value: Any) -> str:
-    """A value of TOML: the same as in JSON but for tables in lists."""
+    """A TOML value: the same as in JSON, except tables in lists."""
     if isinstance(value, Mapping):
         return "{" + ", ".join(f"{json.dumps(key)} = {_value(one)}" for key, one in value.items()) + "}"
     if isinstance(value, (list, tuple)):

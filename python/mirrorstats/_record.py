@@ -95,9 +95,9 @@ def record(
 
 
 def _interrupt(threads: set[int]) -> None:
-    """Ends functions that still run, for the interpreter aborts if a thread of the native library is inside it when it exits.
+    """Ends running functions: the interpreter aborts on exit if a thread of the native library is still inside it.
 
-    What sleeps outside the interpreter is not waited for: it does not come back before the end.
+    Threads sleeping outside the interpreter are ignored: they do not return before the exit.
     """
     import ctypes
     import sys
@@ -111,7 +111,7 @@ def _interrupt(threads: set[int]) -> None:
 
 
 def _check_options(options: dict[str, Any]) -> None:
-    """Refuses keywords that are no options of a recording."""
+    """Refuses keywords that are not options of a recording."""
     import difflib
 
     known = sorted({name.replace("-", "_") for name in _native.record_options()} - {"agent", "json", "dry_run"})
@@ -123,7 +123,7 @@ def _check_options(options: dict[str, Any]) -> None:
 
 
 def _plain(value: Any, spool: Spool) -> Any:
-    """A value of an option as JSON has it."""
+    """The value of an option for JSON."""
     if isinstance(value, (list, tuple)):
         return [_plain(one, spool) for one in value]
     if value is None or isinstance(value, (bool, int, float, str)):
@@ -132,7 +132,7 @@ def _plain(value: Any, spool: Spool) -> Any:
 
 
 def _source(agent: Any) -> Optional[str]:
-    """The text of the agent, of which recordings carry the hash; None where Python does not know it."""
+    """The source text of the agent, whose hash is in recordings; None if Python does not know it."""
     import inspect
     import textwrap
 
@@ -144,7 +144,7 @@ def _source(agent: Any) -> Optional[str]:
 
 
 def _listener(agent: Any, is_array: bool, playing: set[int]) -> Callable[[str], str]:
-    """What the native library calls in one episode, on a thread of its own that is in `playing` then, with messages as JSON."""
+    """The function that the native library calls for one episode, with JSON messages; its thread is then in `playing`."""
     import inspect
     import threading
 

@@ -162,7 +162,7 @@ class Study:
 
     def __init__(self, asked: dict[str, Any], spool: Spool) -> None:
         self._asked = asked
-        # What is not a file itself is there as long as the study.
+        # Temporary input files exist as long as the study.
         self._spool = spool
         self._native = _native.Study(asked)
 
@@ -375,7 +375,7 @@ class Study:
 
 
 def _again(asked: dict[str, Any], folder: str, files: dict[str, bytes]) -> Study:
-    """A study that was pickled."""
+    """Restores a pickled study."""
     spool = Spool(files)
 
     def moved(path: Optional[str]) -> Optional[str]:
@@ -401,7 +401,7 @@ def _check_study(argument: str, study: Any) -> None:
 
 
 def _input(given: Any, definitions: Optional[str], spool: Spool) -> str:
-    """A path as it is; a data frame as a trace or as a file of scores."""
+    """A path unchanged; a data frame as a trace or a file of scores."""
     if isinstance(given, (str, bytes, os.PathLike)) or hasattr(given, "fs"):
         return text(given, spool)
     if not is_frame(given) and not isinstance(given, list):

@@ -1,4 +1,4 @@
-//! Columns through Arrow's C interface in capsules: any library that knows it takes them without a copy.
+//! Columns in capsules of Arrow's C interface: libraries that support it read them without a copy.
 
 use std::collections::HashMap;
 use std::io::Cursor;
@@ -23,7 +23,7 @@ use pyo3::types::{PyBytes, PyCapsule};
 
 use crate::error;
 
-/// The rows that a notebook shows, the first and the last ones.
+/// The rows that a notebook shows, from the start and the end.
 const SHOWN: usize = 20;
 
 /// Rows in memory, through Arrow's PyCapsule interface: `polars.DataFrame(table)`, `pyarrow.table(table)`,
@@ -59,7 +59,7 @@ impl Table {
         Self { batch }
     }
 
-    /// The rows of a file in memory.
+    /// A table with the rows of a Parquet file in memory.
     pub fn from_parquet(file: Vec<u8>) -> PyResult<Self> {
         let read = || {
             let reader = ParquetRecordBatchReaderBuilder::try_new(bytes::Bytes::from(file))?;
@@ -70,7 +70,7 @@ impl Table {
         read().map(Self::new).map_err(error::of_input)
     }
 
-    /// The cells of studies by name, with the change of each mean from that of the first study.
+    /// The cells of studies by name, one study after another, with the change of each mean from the first study.
     pub fn below_each_other(studies: &[(String, Self)]) -> PyResult<Self> {
         let mut first: HashMap<Vec<String>, f64> = HashMap::new();
         let mut parts = Vec::new();
@@ -112,7 +112,7 @@ impl Table {
         writer.into_inner()
     }
 
-    /// The first and the last rows as an HTML table, and how many there are.
+    /// An HTML table of the first and last rows, with the number of rows.
     fn to_html(&self) -> Result<String, ArrowError> {
         let (rows, schema) = (self.batch.num_rows(), self.batch.schema());
         let options = FormatOptions::default();
@@ -132,7 +132,7 @@ impl Table {
 }
 
 impl Steps {
-    /// Looks whether there are such columns; reads no row.
+    /// Checks that the columns exist, without reading rows.
     pub fn new(study: Arc<mirrorstats::Study>, columns: Option<Vec<String>>) -> PyResult<Self> {
         let schema = study.steps(columns.as_deref()).map_err(error::of_study)?.schema();
         Ok(Self { study, columns, schema })
@@ -147,7 +147,7 @@ impl Table {
         py: Python<'py>,
         requested_schema: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyCapsule>> {
-        // A caller that asks for other types may cast: the interface leaves it to the producer.
+        // A caller that requests other types may cast: the interface leaves it to the producer.
         drop(requested_schema);
         let schema = self.batch.schema();
         stream(py, Box::new(RecordBatchIterator::new([Ok(self.batch.clone())], schema)))
@@ -289,7 +289,7 @@ pub fn lines_of(py: Python<'_>, stream: &Bound<'_, PyCapsule>) -> PyResult<(Vec<
     Ok((columns, written.map_err(error::of_input)?))
 }
 
-/// Counts are integers of 64 bits with a sign, as all others are.
+/// Converts counts to signed 64-bit integers, like all other integers.
 fn counted(batch: &RecordBatch) -> Result<RecordBatch, ArrowError> {
     let counts = |kind: &DataType| kind.is_unsigned_integer();
     let schema = batch.schema();
@@ -322,7 +322,7 @@ fn to_polars<'py>(columns: &Bound<'py, impl pyo3::PyClass>) -> PyResult<Bound<'p
     columns.py().import("polars")?.getattr("DataFrame")?.call1((columns,))
 }
 
-/// As pandas holds them: integers beside nulls stay integers.
+/// Converts to pandas; integers beside nulls stay integers.
 fn to_pandas<'py>(columns: &Bound<'py, impl pyo3::PyClass>) -> PyResult<Bound<'py, PyAny>> {
     let frame = columns.py().import("pandas")?.getattr("DataFrame")?;
     frame.call_method1("from_arrow", (columns,))?.call_method0("convert_dtypes")

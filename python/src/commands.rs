@@ -1,4 +1,4 @@
-//! The command line itself, and the commands that are no question to a study.
+//! The command line itself, and the commands that do not query a study.
 
 use std::ffi::OsString;
 use std::io::Cursor;
@@ -39,7 +39,7 @@ pub fn validate(
     answer::of(&found, study::findings_text(&found))
 }
 
-/// An import as Python asks for it.
+/// The import arguments from Python.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct ImportAsked {

@@ -1,4 +1,4 @@
-//! Errors with the words of the command line, as `mirrorstats.Error`.
+//! Converts errors to `mirrorstats.Error`, with the messages of the command line.
 
 use std::error::Error;
 use std::io;
@@ -11,7 +11,7 @@ use toml_spec::FaultRecord;
 use trace::error::TraceError;
 use trace::import::{Fault, ImportError};
 
-/// An error of a study, of the kind that says what is to be changed.
+/// The error of a study, in the class that shows what to change.
 pub fn of_study(error: StudyError) -> PyErr {
     let kind = kind(&error);
     if let StudyError::Import(ImportError::Faults { told, more }) = &error {
@@ -20,7 +20,7 @@ pub fn of_study(error: StudyError) -> PyErr {
     of_failure(&error.into(), kind)
 }
 
-/// The class of an error; each is one of `mirrorstats`.
+/// The name of the error class in `mirrorstats`.
 fn kind(error: &StudyError) -> &'static str {
     use StudyError as E;
     if let Some(faults) = error.faults() {
@@ -48,7 +48,7 @@ fn kind(error: &StudyError) -> &'static str {
     }
 }
 
-/// Faults of rows: a data frame has no lines, and counts its rows from 0.
+/// The message for faults in rows: a data frame has no lines, and its rows count from 0.
 fn in_rows(told: &[Fault], more: usize) -> String {
     let one = |fault: &Fault| {
         let row = fault.line.map_or_else(String::new, |line| format!("row {} (from 0)", line - 1));
@@ -66,23 +66,23 @@ fn in_rows(told: &[Fault], more: usize) -> String {
     if more == 0 { told } else { format!("{told}\nand {more} more") }
 }
 
-/// An error of the library that the command line tells as it is.
+/// The library's error, with the message of the command line.
 pub fn of_input(error: impl Into<Box<dyn Error + Send + Sync>>) -> PyErr {
     of_failure(&Failure::input(error), "InputError")
 }
 
-/// An argument that has no such value.
+/// The error for an invalid argument value.
 pub fn of_argument(error: impl Into<Box<dyn Error + Send + Sync>>) -> PyErr {
     of_failure(&Failure::input(error), "ArgumentError")
 }
 
-/// A file that cannot be written.
+/// The error for a file that cannot be written.
 pub fn of_writing(path: &Path, fault: &io::Error) -> PyErr {
     let help = "is the folder there and writable, and the disk not full?";
     raised("OutputError", &format!("cannot write `{}`: {fault}\n  help: {help}", path.display()), &[])
 }
 
-/// The message of the command line.
+/// The error with the message of the command line.
 pub fn of_failure(failure: &Failure, kind: &str) -> PyErr {
     let ErrorAnswer { error, faults, .. } = ErrorAnswer::of(failure);
     raised(kind, &error, &faults)

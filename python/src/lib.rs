@@ -1,7 +1,7 @@
-//! The native library of the Python package: the command line, and the study library as Python sees it.
+//! The native library of the Python package: the command line, and the study library for Python.
 //!
-//! Rule: no logic of its own. Whatever has an answer has it from the library `mirrorstats`, and every error has the words of
-//! the command line. Work that takes time is done with the interpreter's lock released.
+//! Rule: no logic of its own. All answers come from the library `mirrorstats`, and all errors have the messages of the
+//! command line. Long work runs with the interpreter's lock released.
 
 mod answer;
 mod columns;

@@ -1,4 +1,4 @@
-//! Recordings: an agent of the program's, or a Python function in its place.
+//! Recordings: with an agent of the program, or with a Python function.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -18,7 +18,7 @@ use world::record::folder_lock::parts_of;
 use crate::answer::{self, Answer};
 use crate::error;
 
-/// The time between two looks at signals.
+/// The time between two checks for signals.
 const GLANCE: Duration = Duration::from_millis(50);
 
 /// A Python function that plays.
@@ -28,9 +28,9 @@ pub struct PythonAgent {
     model: String,
     source: Option<String>,
     is_base64: bool,
-    /// True if what the function raises loses its episode; else it ends the recording.
+    /// True if an exception of the function loses its episode; else it ends the recording.
     is_lost: bool,
-    /// Gives the function of an episode, which takes a message as JSON and gives the text of a reply.
+    /// Returns the function of an episode, which takes a message as JSON and returns the text of a reply.
     listeners: Py<PyAny>,
 }
 
@@ -70,7 +70,7 @@ impl PythonAgent {
     }
 }
 
-/// The function of one episode.
+/// The listener for one episode.
 fn listener(function: Py<PyAny>, failed: impl Fn(Python<'_>, PyErr) -> String + Send + 'static) -> Listener {
     Box::new(move |message| {
         let message = serde_json::to_string(message).map_err(|fault| fault.to_string())?;
@@ -116,13 +116,13 @@ pub fn record(py: Python<'_>, options: &str, agent: Option<PythonAgent>) -> PyRe
     }
 }
 
-/// Records on another thread, while this one looks for Ctrl-C, which only the main thread hears of. The first one ends
-/// functions at once and lets other steps under way be done, the second one ends these too; whole episodes stay.
+/// Records on another thread while this one watches for Ctrl-C, which only the main thread receives. The first Ctrl-C
+/// ends functions at once but completes other current steps; the second ends these too. Complete episodes stay.
 fn until_ended(args: &RecordArgs, player: &dyn Player, ending: &Ending) -> PyResult<Result<Recorded, Box<Failure>>> {
     let (done, ended) = channel();
     thread::scope(|scope| {
         scope.spawn(move || {
-            // A caller that waits for it waits until this is done.
+            // The receiver waits until this is done.
             let _ = done.send(args.record(player, &ending.stop).map_err(Box::new));
         });
         loop {
@@ -146,7 +146,7 @@ fn until_ended(args: &RecordArgs, player: &dyn Player, ending: &Ending) -> PyRes
     })
 }
 
-/// Lets the interpreter handle what signals there are; an error is what it raised, for one `KeyboardInterrupt`.
+/// Lets the interpreter handle pending signals; an error is the exception raised, such as `KeyboardInterrupt`.
 fn signals() -> PyResult<()> {
     Python::attach(|py| {
         py.check_signals()?;

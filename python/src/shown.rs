@@ -1,4 +1,4 @@
-//! Tables and figures as a notebook shows them.
+//! Tables and figures for display in notebooks.
 
 use std::path::PathBuf;
 
@@ -51,7 +51,7 @@ pub struct Figure {
     name: String,
 }
 
-/// A figure, or the files of one that was pickled.
+/// A figure, or the files of a pickled one.
 enum Drawn {
     Figure(mirrorstats::Figure),
     Files(Vec<Vec<u8>>),

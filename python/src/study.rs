@@ -1,4 +1,4 @@
-//! A study as Python sees it: opened once, and each answer a call of the library.
+//! A study for Python: opened once; each answer is one call of the library.
 
 use std::path::Path;
 use std::str::FromStr as _;
@@ -18,7 +18,7 @@ use crate::columns::{Steps, Table};
 use crate::error;
 use crate::shown::{Figure, ReportTable};
 
-/// The lines of each list in the text of a difference, as on the command line.
+/// The lines of each list in the text of a difference, the same as on the command line.
 const LISTED: usize = 20;
 
 /// A study: inputs, definitions and a filter.
@@ -199,7 +199,7 @@ fn once(kept: &OnceLock<RecordBatch>, compute: impl FnOnce() -> PyResult<RecordB
     if let Some(batch) = kept.get() {
         return Ok(Table::new(batch.clone()));
     }
-    // Two threads may compute the same at once.
+    // Two threads may compute this at the same time.
     let batch = compute()?;
     Ok(Table::new(kept.get_or_init(|| batch).clone()))
 }

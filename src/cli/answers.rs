@@ -1,4 +1,4 @@
-//! The JSON Schemas of what commands print, as far as no crate has the type, and of what others write.
+//! The JSON Schemas of command outputs, if no crate has the type, and of files that other programs write.
 
 use schemars::generate::SchemaSettings;
 use schemars::{JsonSchema, schema_for};
@@ -11,7 +11,7 @@ use super::commands::table::rescore::RescoreAnswer;
 use super::commands::trace::recover::RecoverAnswer;
 use super::commands::trace::schema::Name;
 
-/// The schema of an answer as it is printed: keys that are always there are required.
+/// The schema of a printed answer: keys that are always present are required.
 pub fn printed_schema<T: JsonSchema>() -> Value {
     json!(SchemaSettings::draft2020_12().for_serialize().into_generator().into_root_schema_for::<T>())
 }

@@ -1,9 +1,9 @@
-//! Defaults of options out of `mirrorstats.toml` and the environment.
+//! Defaults of options from `mirrorstats.toml` and the environment.
 //!
-//! A setting is a default of an option of one command, or of every command that has the option. What is typed comes
-//! before all; then the environment, then the file; in each, the setting of one command before that of all.
+//! A setting is a default of an option, for one command or for all that have it. Typed options take precedence, then
+//! the environment, then the file. In each of these, the setting of one command precedes that of all.
 //!
-//! Rule: a setting that no command has, or whose value its option does not take, is refused, before anything runs.
+//! Rule: an unknown setting, or one with an invalid value, is refused before anything runs.
 
 use std::env;
 use std::fmt;
@@ -25,7 +25,7 @@ use exact::{input, suggest};
 use toml_spec::{Fault, Faults, Place, Source, parse_toml};
 
 const FILE: &str = "mirrorstats.toml";
-/// The variable that names another file, or none if it is empty.
+/// The variable that names another file; if it is empty, no file is read.
 pub const FILE_VARIABLE: &str = "MIRRORSTATS_CONFIG_FILE";
 /// The prefix of variables for settings.
 const PREFIX: &str = "MIRRORSTATS_";
@@ -55,12 +55,12 @@ pub struct Setting {
     pub origin: Origin,
 }
 
-/// All settings that hold here.
+/// All settings in effect.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Settings {
     /// The file that was read.
     pub file: Option<String>,
-    /// In the order of the file, then by variable.
+    /// Those of the file in its order, then the variables.
     pub all: Vec<Setting>,
 }
 
@@ -78,7 +78,7 @@ pub struct Choice<'a> {
     arg: &'a Arg,
 }
 
-/// The settings that hold for a command line.
+/// The settings for a command line.
 pub fn load(command: &Command) -> Result<Settings, Failure> {
     let choices = choices(command, "");
     let mut settings = Settings::default();
@@ -92,7 +92,7 @@ pub fn load(command: &Command) -> Result<Settings, Failure> {
 }
 
 impl Settings {
-    /// A command with these as its defaults.
+    /// Makes these settings the defaults of a command.
     pub fn apply(&self, command: Command) -> Command {
         self.applied(command, "")
     }
@@ -170,7 +170,7 @@ fn of_file(path: &Path, name: &str, choices: &[Choice<'_>]) -> Result<Vec<Settin
     reader.finish(found)
 }
 
-/// A TOML file with options as keys: every fault underlined, all of them at once.
+/// A TOML file with options as keys; reports all faults at once, underlined.
 pub struct OptionFile<'a> {
     source: &'a Arc<Source>,
     choices: &'a [Choice<'a>],
@@ -178,7 +178,7 @@ pub struct OptionFile<'a> {
 }
 
 impl<'a> OptionFile<'a> {
-    /// Reads a file with some faults so far, for the options of these commands.
+    /// A reader of a file with some faults so far, for the options of these commands.
     pub const fn new(source: &'a Arc<Source>, choices: &'a [Choice<'a>], faults: Vec<Fault>) -> Self {
         Self { source, choices, faults }
     }
@@ -211,7 +211,7 @@ impl<'a> OptionFile<'a> {
         }
     }
 
-    /// The option of a key, for one command or for every one that has it.
+    /// The setting of a key, for one command or for every command with that option.
     pub fn setting(
         &mut self,
         key: &Spanned<DeString<'_>>,
@@ -239,7 +239,7 @@ fn is_within(command: &str, path: &str) -> bool {
     command.strip_prefix(path).is_some_and(|rest| rest.is_empty() || rest.starts_with(' '))
 }
 
-/// A value as it would be typed.
+/// A value in its typed form.
 fn values(value: &DeValue<'_>) -> Option<Vec<String>> {
     match value {
         DeValue::Array(all) => {
@@ -255,9 +255,9 @@ fn values(value: &DeValue<'_>) -> Option<Vec<String>> {
 }
 
 enum Refusal {
-    /// No such option: what, and a remedy.
+    /// The option does not exist: its name, and a remedy.
     Option(String, Option<String>),
-    /// A value that it does not take.
+    /// The option refuses the value.
     Value(String),
 }
 
@@ -302,7 +302,7 @@ fn takes(choice: &Choice<'_>, setting: &Setting) -> Result<(), Refusal> {
     }
 }
 
-/// Settings in the environment: `MIRRORSTATS_THREADS` for every command, `MIRRORSTATS_RECORD_OUT` for one.
+/// Settings from the environment: `MIRRORSTATS_THREADS` for every command, `MIRRORSTATS_RECORD_OUT` for one.
 fn of_environment(choices: &[Choice<'_>]) -> Result<Vec<Setting>, Failure> {
     let mut found = Vec::new();
     for choice in choices {
@@ -326,7 +326,7 @@ fn of_environment(choices: &[Choice<'_>]) -> Result<Vec<Setting>, Failure> {
     Ok(found)
 }
 
-/// Variables that look like settings and are none, as a misspelt one: each with what may be meant.
+/// Variables that look like settings but are not, such as misspelt ones, each with a suggestion.
 pub fn unknown_variables(command: &Command) -> Vec<(String, Option<String>)> {
     let choices = choices(command, "");
     let known: Vec<String> = choices

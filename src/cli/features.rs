@@ -1,6 +1,6 @@
-//! The features that this build has.
+//! The features of this build.
 
-/// Every feature, in the order of their names, and whether it is there.
+/// Every feature, ordered by name; true if this build has it.
 const ALL: [(&str, bool); 4] = [
     ("polars", cfg!(feature = "polars")),
     ("raster", cfg!(feature = "raster")),
@@ -8,13 +8,13 @@ const ALL: [(&str, bool); 4] = [
     ("view", cfg!(feature = "view")),
 ];
 
-/// The features that are there, separated by commas.
+/// The features of this build, separated by commas.
 pub fn present() -> String {
     let names: Vec<&str> = ALL.into_iter().filter(|(_, is_there)| *is_there).map(|(name, _)| name).collect();
     if names.is_empty() { "none".to_owned() } else { names.join(", ") }
 }
 
-/// The features to build for one more than these: `polars,sim`. Those of every build are left out.
+/// The features for a build with one more: `polars,sim`. Features of every build are left out.
 pub fn with(name: &str) -> String {
     let chosen = ALL.into_iter().filter(|(known, is_there)| (*is_there && *known != "raster") || *known == name);
     chosen.map(|(known, _)| known).collect::<Vec<_>>().join(",")

@@ -1,11 +1,11 @@
-//! The parts of `--help` beside the options: the commands in groups, and examples of each.
+//! The parts of `--help` besides the options: groups of commands, and examples.
 //!
-//! Rule: every command has an example that runs as it is written, names of files apart; the first page fits a small terminal.
+//! Rule: every command has an example that runs as written, apart from file names; the first page fits a small screen.
 
 use clap::Command;
 use clap::builder::styling::Style;
 
-/// The examples of each command: what it is typed for, and what is typed.
+/// The examples of each command: the purpose, and the command line.
 const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
     ("table audit", &[("Which cells of a published table no 21 episodes can give", "table audit table.csv --n 21")]),
     (
@@ -160,7 +160,7 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
     ("world sheet", &[("Pictures of the first scenes", "world sheet --out sheet.png")]),
 ];
 
-/// The same command with a first page of one screen, and with examples.
+/// Adds a first page of one screen, and examples.
 pub fn with_help(command: Command) -> Command {
     let template = format!(
         "{{about-with-newline}}{{usage-heading}} {{usage}}\n\n{}{}",
@@ -170,7 +170,7 @@ pub fn with_help(command: Command) -> Command {
     with_examples_alone(command.help_template(template))
 }
 
-/// The same command with examples.
+/// Adds examples.
 pub fn with_examples_alone(command: Command) -> Command {
     let command = EXAMPLES.iter().fold(command, |command, (path, examples)| {
         let names: Vec<&str> = path.split(' ').collect();
@@ -194,7 +194,7 @@ fn with_examples(command: Command, path: &[&str], text: &str) -> Command {
         [name, rest @ ..] if command.find_subcommand(name).is_some() => {
             command.mut_subcommand(name, |inner| with_examples(inner, rest, text))
         }
-        // A command of a feature that this build lacks.
+        // The command belongs to a feature that this build lacks.
         _ => command,
     }
 }

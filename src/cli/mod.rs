@@ -1,7 +1,7 @@
-//! The command line: the only room with clap, standard output and exit codes.
+//! The command line: the only module with clap, standard output and exit codes.
 //!
-//! `args` is what was typed and what several verbs share; `commands/<verb>.rs` is one thin file per verb;
-//! `outcome` maps what happened to an exit code, in one place.
+//! `typed` holds the arguments, including those shared by several commands. `commands` has one thin file per command.
+//! `outcome` maps results to exit codes, in one place.
 
 mod answers;
 pub mod commands;
@@ -61,13 +61,13 @@ fn long_version() -> String {
     format!("{}\nfeatures: {}", env!("CARGO_PKG_VERSION"), features::present())
 }
 
-/// Runs the program with these arguments, the program's name first.
+/// Runs the program with these arguments, which start with the program's name.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let _ = told_of_large_files();
     ExitCode::from(run_to_code(arguments))
 }
 
-/// A write beyond the limit of the size of files fails, and does not end the process: the error is told, and nothing is left.
+/// Makes a write beyond the file size limit fail with an error, instead of ending the process.
 #[cfg(unix)]
 fn told_of_large_files() -> io::Result<()> {
     use signal_hook::consts::SIGXFSZ;
@@ -79,13 +79,13 @@ fn told_of_large_files() -> io::Result<()> {
     Ok(())
 }
 
-/// As [`run`]; gives the code as a number, for a process that is not ours to end.
+/// Like [`run`], but returns the code as a number, for a process that belongs to a caller.
 pub fn run_to_code(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let arguments = names::current(arguments.into_iter().collect());
     let format = ErrorFormat::asked_for(&arguments);
     let answer = execute(arguments.clone()).map_err(|failure| scoring::with_commands(failure, &arguments));
     let code = outcome::exit_code(answer.and_then(flushed), format);
-    // What was printed before a failure is still to be seen.
+    // Show what was printed before a failure.
     let _ = io::stdout().flush();
     code
 }
@@ -103,26 +103,25 @@ fn execute(arguments: Vec<OsString>) -> Result<Outcome, Failure> {
     };
     let spelled: Vec<OsString> = arguments.iter().map(|typed| visible(&typed.to_string_lossy()).into()).collect();
     let parsed = match parse(arguments) {
-        // A message repeats what was typed, which must not act on the terminal.
+        // A message repeats the typed text, which must not act on the terminal.
         Err(error) if error.exit_code() != 0 => Err(parse(spelled).err().unwrap_or(error)),
         parsed => parsed,
     };
     match parsed {
         Ok(cli) if cli.command.needs_no_settings() => cli.command.run(),
         Ok(cli) => settings.and_then(|_| budget_setting()).and_then(|()| cli.command.run()),
-        // Help and version arrive here too; clap knows which stream and code each one takes.
+        // Help and version come here too; clap knows the stream and exit code of each.
         Err(answer) if answer.exit_code() == 0 => answer.print().map(|()| Outcome::Done).map_err(Failure::Output),
         Err(error) => Err(Failure::Usage(Box::new(usage::with_tips(error, &command)))),
     }
 }
 
-/// Refuses a factor of all budgets that is invalid before anything is read.
+/// Refuses an invalid factor of all budgets before anything is read.
 fn budget_setting() -> Result<(), Failure> {
     budget::setting().map(drop).map_err(Failure::input)
 }
 
-/// The outcome, once all of standard output is out: what is left in its buffer at the end is written without a word
-/// about a full disk.
+/// The outcome, after flushing standard output: otherwise an error such as a full disk would go unnoticed at the end.
 fn flushed(outcome: Outcome) -> Result<Outcome, Failure> {
     io::stdout().flush()?;
     Ok(outcome)

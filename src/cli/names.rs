@@ -1,8 +1,8 @@
-//! Names of commands before they were grouped by noun. They run the same code until the next release, and no help shows them.
+//! Names of commands before they were grouped by noun. They still work until the next release, but no help shows them.
 
 use std::ffi::OsString;
 
-/// Each old name with the words that take its place.
+/// The old names and their replacements.
 const RENAMED: [(&str, [&str; 2]); 17] = [
     ("audit", ["table", "audit"]),
     ("check", ["trace", "check"]),
@@ -27,12 +27,12 @@ fn renamed(name: &str) -> Option<[&'static str; 2]> {
     RENAMED.iter().find(|(old, _)| *old == name).map(|(_, new)| *new)
 }
 
-/// A command line with the old name of its command replaced.
+/// Replaces an old command name in a command line.
 pub fn current(arguments: Vec<OsString>) -> Vec<OsString> {
     let words = arguments.iter().skip(1).map(|word| word.to_str().unwrap_or_default());
     let (mut at, mut is_value) = (1, false);
     for word in words {
-        // `--errors json` may come first, and `help` takes the name of a command.
+        // `--errors json` may come first, and `help` is followed by the name of a command.
         if !is_value && !word.starts_with('-') && word != "help" {
             break;
         }
@@ -44,7 +44,7 @@ pub fn current(arguments: Vec<OsString>) -> Vec<OsString> {
     before.iter().cloned().chain(new.map(OsString::from)).chain(rest[1..].iter().cloned()).collect()
 }
 
-/// The name of a command, as a section of a configuration file has it.
+/// The current name of a command, for a section of a configuration file.
 pub fn current_section(name: &str) -> String {
     renamed(name).map_or_else(|| name.to_owned(), |new| new.join(" "))
 }

@@ -1,4 +1,4 @@
-//! The messages for a refused command line, beside clap's own words.
+//! The messages for a refused command line, besides clap's own.
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Command, Error};
@@ -9,7 +9,7 @@ use exact::suggest;
 /// The commands of the feature `sim`.
 const OF_SIM: [&str; 2] = ["record", "world"];
 
-/// An error that names the commands which have a refused option, and the feature that has a refused command.
+/// Adds the commands that have a refused option, and the feature that has a refused command.
 pub fn with_tips(mut error: Error, command: &Command) -> Error {
     let text = |kind| match error.get(kind) {
         Some(ContextValue::String(text)) => Some(text.clone()),
@@ -22,11 +22,11 @@ pub fn with_tips(mut error: Error, command: &Command) -> Error {
         _ => None,
     };
     if error.kind() == ErrorKind::InvalidSubcommand {
-        // Clap's own idea of a similar name is a wide one: `filmstrip` for `ls`.
+        // Clap's similarity is too broad: it suggests `filmstrip` for `ls`.
         error.remove(ContextKind::SuggestedSubcommand);
     }
     if let Some(tip) = tip {
-        // A similar name of this command is no better than the same name of another.
+        // A similar option of this command is no better than the same option of another command.
         error.remove(ContextKind::SuggestedArg);
         error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip.into()]));
     }

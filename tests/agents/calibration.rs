@@ -1,6 +1,6 @@
-//! Whether each scripted agent shows the metric profile that its name predicts: a few episodes always, and by
-//! `make calibrate` the 21 an experiment of the study, whose table is `reports/world/calibration.md`. The battery has its
-//! predictions in `battery`.
+//! Checks that each scripted agent shows the metric profile that its name predicts. A few episodes always run; `make
+//! calibrate` runs the study's 21 per experiment and writes `reports/world/calibration.md`. Module `battery` has the
+//! predictions for the battery.
 
 use std::fs;
 use std::path::Path;
@@ -21,7 +21,7 @@ mod reach;
 const ALL: [&str; 5] = ["E1", "E2", "E3", "E4", "E5"];
 const METRICS: [&str; 9] = ["TSA", "TTD", "MCR", "MTATO", "CAAL", "CR", "MGD", "SC", "AR_SC"];
 
-/// `runs` runs of each of `seeds` seeds.
+/// `runs` runs of each of `seeds` seeds, for every experiment.
 fn episodes(agent: Scripted, experiments: &[Experiment], seeds: i32, runs: i32) -> Vec<(Scripted, Key)> {
     let key = |experiment, seed| (1..=runs).map(move |run| (agent, Key::first(experiment, seed, run)));
     experiments.iter().flat_map(|&experiment| (1..=seeds).flat_map(move |seed| key(experiment, seed))).collect()
@@ -32,7 +32,7 @@ fn profiles(plan: &[(Scripted, Key)], definitions: &str) -> Profiles {
     Profiles::of(&score(&record_all(plan, threads), definitions))
 }
 
-/// Checks for any number of episodes, one by one.
+/// Checks that hold for every episode, and so for any number of them.
 fn check_logic(profiles: &Profiles) {
     for agent in Scripted::ALL.map(Scripted::name) {
         if profiles.has("E2", agent) {
@@ -82,7 +82,7 @@ fn a_few_episodes_already_show_who_is_who() {
     }
 }
 
-/// A view of 60 degrees shows a part of what the study's shows, larger; the agents know how wide they look.
+/// A view of 60 degrees shows a part of the study's view, enlarged. Agents know their field of view.
 #[test]
 fn the_oracle_finds_itself_through_a_narrow_view_too() {
     let mut config = WorldConfig::default();
@@ -94,7 +94,7 @@ fn the_oracle_finds_itself_through_a_narrow_view_too() {
     }
 }
 
-/// The study's 21 episodes an experiment of every agent; takes minutes in release.
+/// The study's 21 episodes of every agent in each experiment; takes minutes in release.
 #[test]
 #[ignore = "`make calibrate` runs it in release"]
 fn twenty_one_episodes_an_experiment_show_the_predicted_profiles() {
@@ -107,7 +107,7 @@ fn twenty_one_episodes_an_experiment_show_the_predicted_profiles() {
 
 /// Writes a table into its section of `reports/world/calibration.md`.
 fn write_table(section: &str, table: &str) {
-    // The calibrations run side by side.
+    // The calibrations run in parallel.
     static FILE: Mutex<()> = Mutex::new(());
     let _alone = FILE.lock();
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("reports/world/calibration.md");
@@ -118,7 +118,7 @@ fn write_table(section: &str, table: &str) {
     fs::write(&path, format!("{}{table}{}", &text[..start], &text[end..])).unwrap();
 }
 
-/// Checks for the mean of many episodes.
+/// Checks of the mean of many episodes.
 fn check_rates(profiles: &Profiles) {
     let value = |experiment, agent, metric| profiles.get(experiment, agent, metric);
     for experiment in ["E1", "E3", "E4"] {

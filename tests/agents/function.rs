@@ -1,4 +1,4 @@
-//! Functions of this process as agents: what they hear, what is recorded of them, what becomes of those that fail.
+//! Functions of this process as agents: their input, their recordings, and their failures.
 
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -38,7 +38,7 @@ fn record(folder: &Path, images: Images, listeners: impl Fn() -> Listener + Send
     args.record(&player, &stop).unwrap()
 }
 
-/// Walks, and is done at its third step.
+/// Walks, and replies `done` at its third step.
 fn walking(heard: &Arc<Mutex<Vec<Value>>>) -> Listener {
     let heard = Arc::clone(heard);
     Box::new(move |message| {

@@ -1,7 +1,7 @@
-//! Agents: what they are asked, how replies are read, scripted ones, models behind a provider, programs.
+//! Agents: prompts, reading of replies, scripted agents, models behind a provider, programs.
 //!
-//! The scripted agents are in this folder: what they make of pictures, and whether each shows the metrics that its name
-//! predicts.
+//! The tests of scripted agents are in this folder: what they see in pictures, and whether they show the metrics that
+//! their names predict.
 
 #![cfg_attr(
     feature = "sim",

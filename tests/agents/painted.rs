@@ -1,7 +1,7 @@
-//! A painted room: just enough of a world to walk in, drawn by tracing one ray a pixel. No simulator, no ground truth.
+//! A painted room to walk in, drawn by tracing one ray per pixel, without a simulator or ground truth.
 //!
-//! It is square, with a mirror in the middle of the east wall, cubes, and bodies that stand still: a trunk of one colour and
-//! a grey head.
+//! The room is square, with a mirror in the middle of the east wall, cubes, and bodies that stand still: a trunk of one
+//! colour and a grey head.
 
 use std::sync::Arc;
 
@@ -39,7 +39,7 @@ impl Painted {
         self.frame_reflecting(pose, pose.place)
     }
 
-    /// The same where the mirror shows the own body at some other place.
+    /// The view at `pose` if the mirror shows the own body at another place.
     pub fn frame_reflecting(&self, pose: Pose, reflected: Place) -> Frame {
         let (width, height) = SIZE;
         let (cosine, sine) = pose.heading.direction();
@@ -53,7 +53,7 @@ impl Painted {
         Frame::new(width, height, (0..width * height).flat_map(pixel).collect())
     }
 
-    /// The colour that a ray ends at; after the mirror, `own` is where the body that looks stands.
+    /// The colour where a ray ends. After a reflection, `own` is the place of the viewer's body.
     fn trace(&self, from: Point, ray: Point, after_mirror: Option<()>, own: Place) -> [u8; 3] {
         let mut best = walls(from, ray);
         let bodies = self.others.iter().copied().chain(after_mirror.map(|()| (self.own, own)));
@@ -81,7 +81,7 @@ impl Painted {
             || self.others.iter().any(|(_, other)| other.distance(place) < 2.0 * GIRTH)
     }
 
-    /// An episode of a scripted agent: its replies, and where it stood when it gave the last.
+    /// Plays an episode of a scripted agent: returns its replies and its place at the last one.
     pub fn play(&self, agent: Scripted, task: &Task, start: Pose) -> (Vec<Reply>, Place) {
         let mut agent = agent.agent(task);
         let (mut pose, mut bumped, mut history) = (start, false, None);
@@ -114,7 +114,7 @@ impl Painted {
     }
 }
 
-/// The value of a future that is ready at once.
+/// The value of a future that is already ready.
 pub fn ready<T>(mut future: std::pin::Pin<Box<dyn Future<Output = T> + '_>>) -> T {
     let mut context = std::task::Context::from_waker(std::task::Waker::noop());
     match future.as_mut().poll(&mut context) {
@@ -170,7 +170,7 @@ fn cube(from: Point, ray: Point, place: Place) -> Option<f64> {
     (enter < leave).then_some(enter)
 }
 
-/// A trunk that is a cylinder, and a head that is a thinner one.
+/// A cylinder as the trunk, and a thinner one as the head.
 fn body(from: Point, ray: Point, color: Color, place: Place) -> Option<(f64, [u8; 3])> {
     let cylinder = |radius: f64, low: f64, high: f64| {
         let (dx, dy) = (from[0] - place.x, from[1] - place.y);

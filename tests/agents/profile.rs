@@ -1,11 +1,11 @@
-//! Metric profiles: what an agent's episodes of one experiment sum up to, and what its name predicts.
+//! Metric profiles: the sums over an agent's episodes of one experiment, and the predictions from its name.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use score::table::EpisodeTable;
 
-/// A metric over the episodes in which it is defined.
+/// The sum of a metric over the episodes where it is defined.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sum {
     pub total: i64,
@@ -13,22 +13,22 @@ pub struct Sum {
 }
 
 impl Sum {
-    /// The mean is at least `numerator / denominator`; false where the metric is undefined throughout.
+    /// Returns true if the mean is at least `numerator / denominator`; false if the metric is never defined.
     pub const fn at_least(self, numerator: i64, denominator: i64) -> bool {
         self.count > 0 && self.total * denominator >= self.count * numerator
     }
 
-    /// The mean is at most `numerator / denominator`; false where the metric is undefined throughout.
+    /// Returns true if the mean is at most `numerator / denominator`; false if the metric is never defined.
     pub const fn at_most(self, numerator: i64, denominator: i64) -> bool {
         self.count > 0 && self.total * denominator <= self.count * numerator
     }
 
-    /// Every value is 1 and there is one.
+    /// Returns true if every value is 1 and there is at least one.
     pub const fn is_one(self) -> bool {
         self.at_least(1, 1)
     }
 
-    /// Every value is 0 and there is one.
+    /// Returns true if every value is 0 and there is at least one.
     pub const fn is_zero(self) -> bool {
         self.count > 0 && self.total == 0
     }
@@ -51,7 +51,7 @@ impl Profiles {
         Self(profiles)
     }
 
-    /// A metric of an agent in an experiment; no episodes, no values.
+    /// A metric of an agent in an experiment; an empty sum without episodes.
     pub fn get(&self, experiment: &str, agent: &str, metric: &str) -> Sum {
         let profile = self.0.get(&(experiment.to_owned(), agent.to_owned()));
         profile.and_then(|profile| profile.get(metric)).copied().unwrap_or_default()
@@ -62,7 +62,7 @@ impl Profiles {
         self.0.contains_key(&(experiment.to_owned(), agent.to_owned()))
     }
 
-    /// All of them as a table of these metrics: rates as counts, shares and those that count steps as means.
+    /// A table of these metrics for all profiles: rates as counts, shares and step counts as means.
     pub fn markdown(&self, metrics: &[&str]) -> String {
         let mut text = format!("| experiment | agent | {} |\n", metrics.join(" | "));
         writeln!(text, "|---|---|{}", "--:|".repeat(metrics.len())).unwrap();
@@ -75,12 +75,12 @@ impl Profiles {
     }
 }
 
-/// Tenths and thousandths are whole numbers, so that the text is the same on every machine.
+/// Computed in whole tenths or thousandths, so that the text is the same on every machine.
 fn shown(metric: &str, sum: Sum) -> String {
     match (metric, sum.count) {
         (_, 0) => "--".to_owned(),
         ("SIR" | "FCR" | "PCR", count) => {
-            // Parts per million, as thousandths.
+            // Parts per million, shown as thousandths.
             let thousandths = (2 * sum.total + 1000 * count).div_euclid(2000 * count);
             let sign = if thousandths < 0 { "-" } else { "" };
             format!("{sign}{}.{:03}", thousandths.abs() / 1000, thousandths.abs() % 1000)
@@ -99,7 +99,7 @@ fn shares_are_shown_as_means_in_thousandths() {
     assert_eq!([1_666_667, -999, -1001, 0].map(mean), ["0.833", "0.000", "-0.001", "0.000"]);
 }
 
-/// The least and the most successes of `n` trials at 1/3 that a central interval of 95 % holds.
+/// The least and most successes of `n` trials at 1/3 within a central 95 % interval.
 pub fn chance_interval(n: i64) -> (i64, i64) {
     let mut cumulated = 0.0;
     let mut probability = (2.0_f64 / 3.0).powi(i32::try_from(n).unwrap());

@@ -1,4 +1,4 @@
-//! The prompts are the paper's, word for word; `tests/agents/prompts` holds its verbatim blocks.
+//! The prompts match the paper word for word; `tests/agents/prompts` holds its verbatim blocks.
 
 use std::sync::Arc;
 
@@ -31,7 +31,7 @@ fn first_step() -> Observation {
     }
 }
 
-/// The user prompt of the paper with its three placeholders filled in.
+/// The paper's user prompt with its three placeholders filled in.
 fn filled(verbatim: &str, history: &str, position: &str, warning: Option<&str>) -> String {
     let text = verbatim.replace("<history_text>", history).replace("<position_text>", position);
     let warning = warning.map_or(String::new(), |warning| format!("{warning}\n"));
@@ -43,7 +43,7 @@ const POSITION: &str = "Position: x = 0.00 m, y = 1.25 m; orientation: 330 degre
                         Remaining steps: 100 of 100.";
 const WARNING: &str = "Warning: the previous movement hit a wall or another object, and the position did not change.";
 
-/// The appendix of the paper for an experiment: the system prompt and the user prompt.
+/// The system prompt and user prompt for an experiment, from the paper's appendix.
 fn verbatim(experiment: Experiment, stated_color: Option<&str>) -> [String; 2] {
     let [system, user] = if experiment == Experiment::E5 {
         [include_str!("prompts/exploration.system.txt"), include_str!("prompts/exploration.user.txt")]
@@ -74,7 +74,7 @@ fn each_of_the_five_asks_in_the_papers_words() {
     }
 }
 
-/// The paper's template of E5 has no place for the warning. It is said there as in the others, before the last lines.
+/// The paper's template of E5 has no place for the warning. It comes before the last lines, as in the others.
 #[test]
 fn every_experiment_reports_a_stopped_move() {
     for experiment in Experiment::PAPER {

@@ -1,4 +1,4 @@
-//! Episodes of scripted agents in the world, recorded as the recorder does it, and their metrics.
+//! Episodes of scripted agents, recorded like the recorder does it, and their metrics.
 
 use std::cell::RefCell;
 use std::num::NonZeroUsize;
@@ -22,7 +22,7 @@ use crate::harness::need;
 use crate::harness::traces::{open, write_trace};
 use crate::painted::ready;
 
-/// Records an episode; without an eye for those that look at nothing.
+/// Records an episode; agents that look at nothing need no eye.
 fn record(config: &WorldConfig, eye: Option<&RefCell<Camera>>, agent: Scripted, key: Key) -> Episode {
     let scene = Scene::draw(config, key.experiment, key.seed, key.run).unwrap();
     let mut player = agent.agent(&task(config, &scene, key));
@@ -32,12 +32,12 @@ fn record(config: &WorldConfig, eye: Option<&RefCell<Camera>>, agent: Scripted, 
     ready(Box::pin(play(&stage, &mut world, player.as_mut(), key, episode, &mut Nobody))).unwrap().episode
 }
 
-/// Records episodes on `threads` threads, each with an eye of its own; the order is that of the plan.
+/// Records episodes on `threads` threads, each with its own eye; the result has the plan's order.
 pub fn record_all(plan: &[(Scripted, Key)], threads: usize) -> Vec<Episode> {
     record_in(&WorldConfig::default(), plan, threads)
 }
 
-/// The same in another world.
+/// Records episodes in another world.
 pub fn record_in(config: &WorldConfig, plan: &[(Scripted, Key)], threads: usize) -> Vec<Episode> {
     need::drawing();
     let next = AtomicUsize::new(0);
@@ -58,7 +58,7 @@ pub fn record_in(config: &WorldConfig, plan: &[(Scripted, Key)], threads: usize)
     episodes.into_inner().unwrap().into_iter().flatten().collect()
 }
 
-/// The metrics of some episodes by built-in definitions.
+/// The metrics of some episodes under built-in definitions.
 pub fn score(episodes: &[Episode], definitions: &str) -> EpisodeTable {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("trace.parquet");

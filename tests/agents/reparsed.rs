@@ -1,4 +1,4 @@
-//! `rescore --reparse`: recorded replies read again by the parser of this program.
+//! `rescore --reparse`: the current parser reads recorded replies again.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use world::experiment::{Experiment, Spec};
 use crate::harness::program::run;
 use crate::harness::traces;
 
-/// A reply of the experiment, with these words around it.
+/// A reply with this action, cube and identification.
 fn said(action: &str, cube: &str, identification: &str) -> String {
     json!({
         "view-description": "a wall", "reasoning": "none", "action": action, "summary": "went on",
@@ -19,7 +19,7 @@ fn said(action: &str, cube: &str, identification: &str) -> String {
     .to_string()
 }
 
-/// A step as an earlier parser recorded it.
+/// A step as recorded by an earlier parser.
 fn step(reply: Option<String>, status: &str, action: Option<Action>, self_color: Option<&str>) -> Step {
     let extra = Extra { reply, reply_status: Some(status.to_owned()), ..Extra::default() };
     let [self_color, selected_cube] = [self_color, action.map(|_| "none")].map(|name| name.map(str::to_owned));
@@ -35,16 +35,16 @@ fn write(path: &Path, recording: Value, episodes: &[(&str, Vec<Step>)]) {
     writer.finish().unwrap();
 }
 
-/// Two episodes: one whose attributions are read otherwise today, and one whose first reply gives an action today.
+/// Two episodes: in one the attributions change; in the other the first reply now gives an action.
 fn recorded(folder: &Path) {
     let spec: &Spec = &Experiment::E1;
     let recording = json!({ "experiment": spec, "agent": { "model": "m", "identification_version": "0" } });
     let left = Some(Action::TurnLeft);
     let calm = vec![
-        // Not the colour that the text says.
+        // The recorded colour differs from the text.
         step(Some(said("a", "none", "I am red")), "ok", left, Some("blue")),
         step(None, "timeout", None, None),
-        // The provider cut it off, whatever its text looks like.
+        // The provider cut this reply off, whatever its text looks like.
         step(Some(said("w", "none", "I am red")), "truncated", None, None),
         step(Some(said("done", "red", "I am red")), "ok", Some(Action::Done), Some("red")),
     ];
@@ -118,7 +118,7 @@ fn changes_by_another_parser_are_listed_and_recorded_actions_stay() {
     ] {
         assert!(said.contains(line), "{said}");
     }
-    // What is read again once stays unchanged.
+    // Reparsing a second time changes nothing.
     run(at, &["report", "new-traces/own.parquet", "--no-figures", "--out", "read"]).ends(0);
     let answer = run(at, &["table", "rescore", "read", "--reparse", "--out", "twice", "--json"]).json();
     assert_eq!(answer["reparsed"]["changes"], json!([]));

@@ -1,4 +1,4 @@
-//! Replies as models write them, and what is read from each.
+//! Replies as models write them, and how each is read.
 
 use trace::episode::Action;
 use trace::identification::normal_form;
@@ -59,7 +59,7 @@ fn a_cube_is_read_in_any_letter_case_and_white_space() {
         (" NONE", "none"),
     ] {
         let reading = read(&GOOD.replace("\"selected_cube\": \"none\"", &format!("\"selected_cube\": \"{text}\"")));
-        // As for an attribution, that is no repair: the raw reply keeps what was written.
+        // Normalising the name is not a repair, as for attributions; the raw reply keeps the original.
         assert_eq!((reading.status, reading.repairs), (Status::Ok, Vec::new()), "{text:?}");
         assert_eq!(reading.selected_cube.as_deref(), Some(cube), "{text:?}");
     }
@@ -123,7 +123,7 @@ fn a_lone_surrogate_is_repaired_and_a_pair_is_kept() {
         assert_eq!(seen(&raw), repaired(repairs, "a wall \u{fffd}!"), "{raw}");
     }
     assert_eq!(Repair::joined(&[CodeFence, Surrogate]).as_deref(), Some("code_fence+surrogate"));
-    // What cannot be read is no better for it.
+    // An invalid escape does not make an unreadable reply readable.
     assert_eq!(read(r"I see \ud83d").status, Status::ParseFailed);
 }
 
@@ -159,7 +159,7 @@ fn raw_control_characters_and_comments_are_repairs() {
         (format!("```json\n{line}\n```"), vec![CodeFence, Comment], "a wall"),
         (format!("So: {line}"), vec![SurroundingText, Comment], "a wall"),
         (block, vec![Comment, TrailingComma], "a wall"),
-        // Not within strings.
+        // Comments inside strings stay.
         (format!("```{}```", GOOD.replace("a wall", "see http://a /* b */")), vec![CodeFence], "see http://a /* b */"),
     ];
     for (raw, repairs, view) in cases {
@@ -197,7 +197,7 @@ fn a_call_of_a_function_with_the_right_arguments_is_a_repair() {
     }
 }
 
-/// A whole reply that decides otherwise than [`GOOD`].
+/// A complete reply with another decision than [`GOOD`].
 fn draft() -> String {
     GOOD.replace("\"action\": \"a\"", "\"action\": \"w\"")
 }
@@ -210,7 +210,7 @@ fn thoughts_before_the_object_are_a_repair_and_no_object_of_theirs_is_taken() {
         (format!("<think>A wall.</think>{GOOD}"), vec![Thoughts]),
         (format!("<think>\nA wall: {draft}\n</think>\n\n{GOOD}"), vec![Thoughts]),
         (format!("<think></think>\n{GOOD}"), vec![Thoughts]),
-        // Servers whose prompt ends with the opening tag send the closing one alone.
+        // Servers whose prompt ends with the opening tag send only the closing one.
         (format!("A wall: {draft}\n</think>\n{GOOD}"), vec![Thoughts]),
         (format!("{{ an open brace </think>{GOOD}"), vec![Thoughts]),
         (format!("<think>a</think><think>{draft}</think>{GOOD}"), vec![Thoughts]),
@@ -218,7 +218,7 @@ fn thoughts_before_the_object_are_a_repair_and_no_object_of_theirs_is_taken() {
         (format!("```json\n<think>hm</think>{GOOD}\n```"), vec![CodeFence, Thoughts]),
         (format!("<think>{draft}</think>Here it is: {GOOD}"), vec![Thoughts, SurroundingText]),
         (format!("<think>hm</think>{comma}"), vec![Thoughts, TrailingComma]),
-        // Tags within a string are words like any other.
+        // Tags inside a string are plain text.
         (format!("```\n{}\n```", GOOD.replace("a wall", "a <think> or a </think>")), vec![CodeFence]),
     ];
     for (raw, repairs) in cases {

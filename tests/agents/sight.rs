@@ -1,4 +1,4 @@
-//! Views of painted frames, and knowledge from views.
+//! What agents see in painted frames, and what they know from several views.
 
 use std::sync::Arc;
 
@@ -23,7 +23,7 @@ fn observation(room: &Painted, pose: Pose) -> Observation {
     reflecting(room, pose, pose.place)
 }
 
-/// The view at a pose with a body of one's own colour in the mirror at some place.
+/// The view at a pose, with the own body reflected as if at another place.
 fn reflecting(room: &Painted, pose: Pose, reflected: Place) -> Observation {
     Observation {
         t: 1,
@@ -52,7 +52,7 @@ fn known(room: &Painted, poses: &[Pose]) -> Knowledge {
     known
 }
 
-/// Before the mirror: three views from two places.
+/// Poses in front of the mirror: three views from two places.
 fn before_the_mirror() -> [Pose; 4] {
     [pose(0.0, 0.3, 60.0), pose(2.0, 0.3, 0.0), pose(2.3, 0.3, 0.0), pose(2.3, 0.3, 30.0)]
 }
@@ -126,7 +126,7 @@ fn ones_own_color_is_known_after_tests_from_two_places() {
 
 #[test]
 fn a_body_before_the_mirror_is_not_oneself_and_neither_is_its_reflection() {
-    // It hides one's own reflection from straight across; its own is behind it.
+    // From straight across, this body hides the own reflection; its own reflection is behind it.
     let room = Painted { others: vec![(Color::Purple, at(3.2, 0.3))], ..room() };
     let known = known(&room, &before_the_mirror());
     assert_eq!(known.reflection.own_color(), None);
@@ -141,14 +141,14 @@ fn the_own_body_is_recognised_among_others_by_its_place() {
     assert!(known.bodies.len() > 2, "there is somebody to be told from");
 }
 
-/// A walk along the mirror and back, two metres from it, after a look round.
+/// A walk along the mirror and back at two metres, after a look around.
 fn along_the_mirror() -> Vec<Pose> {
     let steps = [-3, -2, -1, 0, 1, 2, 3, 2, 1, 0, -1, -2, -3];
     let walk = steps.map(|step| pose(2.0, 0.4 * f64::from(step), 0.0));
     [pose(0.0, 0.3, 60.0)].into_iter().chain(walk).collect()
 }
 
-/// The knowledge with a body in the mirror, at each step at the place of `reflected`.
+/// The knowledge after all steps, with the body in the mirror at the place of `reflected`.
 fn known_of(poses: &[Pose], reflected: impl Fn(usize) -> Place) -> Knowledge {
     let room = room();
     let mut known = Knowledge::new(&observation(&room, poses[0]));
@@ -170,7 +170,7 @@ fn a_late_reflection_is_ones_own() {
 #[test]
 fn who_walks_by_itself_is_not_oneself() {
     let poses = along_the_mirror();
-    // It crosses one's way now and then, and follows at no lag.
+    // They cross the agent's path now and then, and follow it at no lag.
     let strangers: [fn(usize) -> Place; 3] = [
         |at| Place { x: 2.0, y: 1.2 - 0.2 * at as f64 },
         |at| Place { x: 1.0 + 0.1 * at as f64, y: -0.3 },

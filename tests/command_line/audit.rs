@@ -1,4 +1,4 @@
-//! `audit` from outside: the paper's tables, forgeries of them, what is refused.
+//! `audit` at the process boundary: the paper's tables, forgeries of them, refusals.
 
 use std::fs;
 use std::path::Path;
@@ -16,7 +16,7 @@ fn audited(folder: &Path, tables: &[&str], options: &[&str]) -> Answer {
     run(folder, &[&["audit"], tables, &["--n", "21"], options].concat())
 }
 
-/// The answer of an audit that found something, as JSON.
+/// The JSON answer of an audit that found something.
 fn found(answer: Answer) -> Value {
     serde_json::from_str(&answer.ends(1).stdout).unwrap()
 }
@@ -33,12 +33,12 @@ fn two_cells_of_the_papers_520_are_infeasible() {
         ["experiment", "model", "metric", "field"].map(|key| cell[key].as_str().unwrap().to_owned()).join(" ")
     });
     assert_eq!(named.collect::<Vec<_>>(), ["E3 Gemma4 26B TTD mean", "E5 Ministral 3 14B MTATO emphasis"]);
-    // The appendix alone has nothing to name.
+    // The appendix alone has no infeasible cell.
     let appendix = audited(Path::new("."), &tables[1..], &[]).done();
     assert!(appendix.ends_with("280 of 280 cells are feasible\n"), "{appendix}");
 }
 
-/// One printed number of the main table raised by 0.01 at a time, in every eleventh cell: how many are named.
+/// Raises one number of the main table by 0.01, in every eleventh cell in turn, and counts the cells that are named.
 #[test]
 fn most_forged_cells_of_the_papers_table_are_named() {
     let folder = tempfile::tempdir().unwrap();

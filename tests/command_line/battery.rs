@@ -6,7 +6,7 @@ use trace::write::write_episodes;
 use crate::harness::traces;
 use crate::run;
 
-/// A step of a mark test: the mark on the own body, its pixels, what is reported, whether it is the decision.
+/// A step of a mark test: the mark on the own body, its pixels, the report, true if it is the decision.
 type Row<'a> = (Option<&'a str>, Option<i32>, Option<&'a str>, bool);
 
 const fn action(is_done: bool) -> Action {
@@ -29,9 +29,9 @@ fn mark_test(id: &str, rows: &[Row]) -> Episode {
     Episode { experiment: "mark".into(), decision, ..traces::episode(id, steps) }
 }
 
-/// A red body, and blue in a pane; a claim at the first step, a cube and perhaps `done` at the second.
+/// A red body, with blue shown in a pane; a claim at the first step, a cube and perhaps `done` at the second.
 fn pane(id: &str, experiment: &str, claim: &str, cube: &str, is_done: bool) -> Episode {
-    // The pane is in view at once: a decoy as mirror evidence, a stranger at 60 px.
+    // The pane is in view at once: a decoy counts as mirror evidence, a stranger has 60 px.
     let is_window = experiment == "window";
     let first = Step {
         action: Some(action(false)),
@@ -62,7 +62,7 @@ fn scores(episodes: &[(&str, Vec<Episode>)], engine: &str) -> String {
 fn files() -> Vec<(&'static str, Vec<Episode>)> {
     let (none, green, pink) = (Some("none"), Some("green"), Some("pink"));
     let marks = vec![
-        // Another body's mark at t = 2; 7 px are no sight, 8 are: from t = 4 to 6.
+        // Another body's mark at t = 2. 7 px do not count as seen, 8 do: t = 4 to 6.
         mark_test(
             "a",
             &[
@@ -74,13 +74,13 @@ fn files() -> Vec<(&'static str, Vec<Episode>)> {
                 (green, Some(0), green, true),
             ],
         ),
-        // Done before the mark is there: `none` is not right then.
+        // Done before there is a mark: `none` is wrong here.
         mark_test("b", &[(None, Some(0), none, false), (None, Some(0), none, true)]),
         // Right at once, and never done.
         mark_test("d", &[(green, Some(25), green, false), (green, Some(25), green, false)]),
-        // The right colour before there is a mark is an invention; the sight comes with the decision.
+        // The right colour before there is a mark is an invention. The mark is first seen at the decision.
         mark_test("e", &[(None, Some(0), green, false), (green, Some(25), green, true)]),
-        // Seen, and a wrong colour after that: wrong, but no false mark.
+        // Seen, then a wrong colour: wrong, but not a false mark.
         mark_test("f", &[(green, Some(25), None, false), (green, Some(25), pink, true)]),
     ];
     let panes = vec![
@@ -90,8 +90,8 @@ fn files() -> Vec<(&'static str, Vec<Episode>)> {
         pane("j", "window", "blue", "red", true),
         pane("k", "window", "unknown", "blue", true),
     ];
-    // What was in view counts: a claim before the stranger is there, a decoy beside a mirror that alone was seen, and the
-    // second of two own marks.
+    // Only what was in view counts: a claim before the stranger is visible, a decoy with too few pixels beside a
+    // mirror, a decoy with enough, and the second of two own marks.
     let mut early = pane("m", "window", "blue", "red", true);
     early.steps[0].extra.mirror_double_px = Some(0);
     early.steps[1].extra.mirror_double_px = Some(60);
@@ -101,7 +101,7 @@ fn files() -> Vec<(&'static str, Vec<Episode>)> {
     seen.steps.iter_mut().for_each(|step| step.extra.shown_px = Some(60));
     let mut second = mark_test("p", &[(green, Some(30), none, false), (green, Some(30), green, true)]);
     second.steps.iter_mut().for_each(|step| step.extra.mark1_px = Some(7));
-    // No own mark in a whole trace: `none` is right.
+    // No own mark in the whole trace: `none` is right.
     let unmarked = vec![mark_test("c", &[(None, None, none, false), (None, None, none, true)])];
     let plain = vec![Episode { shown_color: None, ..pane("l", "E1", "blue", "red", true) }];
     let by_view = vec![early, unseen, seen, second];
@@ -134,7 +134,7 @@ o,m,decoy,1,1,0,1,,,,,
 p,m,mark,1,1,1,,,1,0,,0
 ";
 
-/// The rows in the order of their ids, which is not that of a table.
+/// The rows sorted by episode id; tables have another order.
 fn by_id(scores: &str) -> String {
     let mut lines: Vec<&str> = scores.lines().collect();
     lines[1..].sort_unstable();

@@ -1,5 +1,5 @@
-//! Inputs that ask for more work than files of their size do: refused soon, in little memory, with the limit and how to
-//! raise it.
+//! Inputs that ask for more work than files of their size do. They are refused soon, in little memory; the message
+//! names the limit and how to raise it.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -16,10 +16,10 @@ use crate::{Answer, episode, program, run, two_files};
 
 const SETTING: &str = "MIRRORSTATS_BUDGET";
 
-/// Runs the program within 512 MiB of address space and 60 s of processor time: a child that needs more ends otherwise.
+/// Runs the program within 512 MiB of address space and 60 s of processor time; a child that exceeds them dies.
 fn bounded(at: &Path, arguments: &[&str]) -> Answer {
     let mut command = limited(at, "ulimit -t 60 && ulimit -v 524288");
-    // Each thread of the allocator's would reserve memory that nobody uses.
+    // Otherwise each thread's arena would reserve memory that is never used.
     answer(command.args(arguments).env("MALLOC_ARENA_MAX", "1"))
 }
 
@@ -122,7 +122,7 @@ fn a_statement_is_counted_while_it_is_written() {
             let arguments = ["sql", "--definitions", "d.toml", "--dialect", dialect];
             over_budget(bounded(at, &arguments), "the statement exceeds 4194304 bytes");
         }
-        // What is computed once is computed soon.
+        // The engine computes shared parts once, so this is fast.
         bounded(at, &["score", "a.parquet", "--definitions", "d.toml"]).done();
     }
 }
@@ -140,7 +140,7 @@ fn faults_and_keys_without_end_are_counted() {
     over_budget(check(keys), "at most 10000 keys");
 }
 
-/// A log with chunks that are unpacked to this many bytes each.
+/// A log with chunks that each unpack to this many bytes.
 fn log(chunks: usize, bytes: usize) -> Vec<u8> {
     let options = WriteOptions::new().compression(Some(Compression::Zstd)).compression_threads(0).chunk_size(None);
     let mut out = options.create(Cursor::new(Vec::new())).unwrap();
@@ -184,7 +184,7 @@ fn texts_and_names_of_traces_are_counted() {
     assert!(fs::metadata(at.join("texts.parquet")).unwrap().len() < 100_000);
     let told = bounded(at, &["validate", "texts.parquet"]).ends(1).stdout;
     assert!(told.contains("over-budget") && told.contains("bytes inflated") && told.contains(SETTING), "{told}");
-    // Who does not read the texts is not asked for them.
+    // A command that does not read the texts is not limited by them.
     bounded(at, &["score", "texts.parquet"]).done();
 }
 

@@ -1,4 +1,4 @@
-//! Colours are checked wherever traces are read for values: what is refused, in which words, and what is only noted.
+//! Colours are checked by every command that reads their values: refusals, their messages, and notes.
 
 use std::fs;
 use std::path::Path;
@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 use crate::harness::traces::write_rows;
 use crate::{Answer, fixture, run};
 
-/// The columns of colours in a trace of one episode of four steps.
+/// The colour columns of a trace with one episode of four steps.
 #[derive(Clone, Copy)]
 struct Colors {
     episode: &'static str,
@@ -22,7 +22,7 @@ struct Colors {
     stated: Option<&'static str>,
 }
 
-/// Colours that every rule allows.
+/// Colours that every rule accepts.
 const SOUND: Colors = Colors {
     episode: "e",
     body: ["red"; 4],
@@ -31,7 +31,7 @@ const SOUND: Colors = Colors {
     stated: Some("blue"),
 };
 
-/// The sound colours with a text in one column: in all rows where the column is constant, else at t = 3.
+/// The sound colours with a text in one column: in all rows if the column is constant, else at t = 3.
 fn with(column: &str, text: &'static str) -> Colors {
     let mut colors = SOUND;
     match column {
@@ -44,7 +44,7 @@ fn with(column: &str, text: &'static str) -> Colors {
     colors
 }
 
-/// Writes a trace, whatever its colours are; `recording` goes into the footer.
+/// Writes a trace with these colours, valid or not; `recording` goes into the footer.
 fn write(path: &Path, colors: Colors, recording: Option<&str>) {
     let texts = |text: &str| -> ArrayRef { Arc::new(StringArray::from(vec![text; 4])) };
     let cells = |cells: [Option<&str>; 4]| -> ArrayRef { Arc::new(StringArray::from(cells.to_vec())) };
@@ -77,7 +77,7 @@ fn findings(folder: &Path, traces: &[&str]) -> (i32, Vec<Value>) {
     (answer.code, report["findings"].as_array().unwrap().clone())
 }
 
-/// The message of each command that reads these traces' values; all are equal.
+/// The message of the commands that read the traces' values, which must be the same for all.
 fn refused(folder: &Path, traces: &[&str]) -> String {
     let by = ["--by", "experiment,model,stated_color"];
     let of = |before: &[&str], after: &[&str]| run(folder, &[before, traces, after].concat()).refused();
@@ -94,7 +94,7 @@ fn refused(folder: &Path, traces: &[&str]) -> String {
     message
 }
 
-/// Texts that no column may hold, as a message shows them, and what it says instead.
+/// Misspelled colours: the text, how messages show it, and the help.
 const MISSPELLED: [(&str, &str, &str); 12] = [
     ("r\u{435}d", "`r\u{435}d`", "did you mean `red`? its `\u{435}` is U+0435, which only looks like `e`"),
     ("t\u{435}al", "`t\u{435}al`", "did you mean `teal`? its `\u{435}` is U+0435, which only looks like `e`"),
@@ -114,7 +114,7 @@ const MISSPELLED: [(&str, &str, &str); 12] = [
     ("\u{200b}red\n", "`\\u{200b}red\\u{a}`", "did you mean `red`?"),
 ];
 
-/// Words in a column where they mean nothing, and what the column takes instead.
+/// Words that are invalid in a column, and the help.
 const MISPLACED: [(&str, &str, &str); 11] = [
     ("body_color", "none", "give the true colour of the body"),
     ("body_color", "unknown", "give the true colour of the body"),
@@ -129,7 +129,7 @@ const MISPLACED: [(&str, &str, &str); 11] = [
     ("selected_cube", "NONE", "did you mean `none`?"),
 ];
 
-/// Checks the words of `validate` and of every command that scores about one text in one column.
+/// Checks the messages of `validate` and of every command that scores, for one text in one column.
 fn check(column: &str, text: &'static str, shown: &str, help: &str) {
     let folder = tempfile::tempdir().unwrap();
     write(&folder.path().join("a.parquet"), with(column, text), None);
@@ -147,7 +147,7 @@ fn check(column: &str, text: &'static str, shown: &str, help: &str) {
     let end = format!("\n  found {shown}{more}\n  help: {help}\n");
     assert!(message.contains(&words) && message.ends_with(&end), "{message}");
     if column != "stated_color" {
-        // The paper's metrics read the other three.
+        // The paper's metrics read the other three columns.
         assert_eq!(run(folder.path(), &["score", "a.parquet"]).refused(), message);
         #[cfg(feature = "polars")]
         assert_eq!(run(folder.path(), &["score", "--engine", "polars", "a.parquet"]).refused(), message);
@@ -188,7 +188,7 @@ fn colors_of_another_palette_are_taken() {
     write(&folder.path().join("a.parquet"), foreign, None);
     assert_eq!(findings(folder.path(), &["a.parquet"]), (0, Vec::new()));
     run(folder.path(), &["score", "a.parquet"]).done();
-    // The column is not read, and nothing else is wrong.
+    // The invalid column is not read, so the command succeeds.
     write(&folder.path().join("b.parquet"), with("self_color", "Red"), None);
     run(folder.path(), &["score", "b.parquet", "--metrics", "MCR"]).done();
 }
@@ -214,7 +214,7 @@ fn one_color_has_one_spelling_in_all_inputs() {
         assert!(message.contains("b.parquet, row group 0, episode `f`, t = 2, column `self_color`"), "{message}");
         assert_eq!(run(at, &[&["score"][..], &traces].concat()).refused(), message);
     }
-    // Each alone says nothing that contradicts itself.
+    // Neither trace alone has a contradiction.
     for trace in ["a.parquet", "b.parquet"] {
         run(at, &["score", trace]).done();
     }
@@ -246,7 +246,7 @@ fn a_claimed_color_that_nothing_has_is_a_note() {
     let text = run(at, &["trace", "validate", "a.parquet", "b.parquet"]).done();
     assert!(text.contains("unseen-color: a.parquet, row group 0, episode `e`, t = 2, column `self_color`"), "{text}");
     assert!(text.ends_with("0 errors, 2 notes\n"), "{text}");
-    // A body of that colour in any of the inputs is enough.
+    // A body of that colour in any input is enough.
     write(&at.join("c.parquet"), Colors { episode: "g", body: ["teal"; 4], claims: [None; 4], ..SOUND }, None);
     let (_, found) = findings(at, &["a.parquet", "b.parquet", "c.parquet"]);
     assert_eq!(found.len(), 1, "{found:?}");
@@ -283,7 +283,7 @@ fn what_a_footer_declares_is_all_there_is() {
         assert!(message.contains(&format!("found `{claim}`\n  help: {help}")), "{message}");
         assert_eq!(run(at, &["score", "b.parquet"]).refused(), message);
     }
-    // The palette of one file is none of the other's.
+    // A palette applies to its own file only.
     write(&at.join("c.parquet"), Colors { episode: "c", ..SOUND }, None);
     assert_eq!(findings(at, &["a.parquet", "c.parquet"]), (0, Vec::new()));
     assert!(run(at, &["score", "a.parquet", "c.parquet"]).done().starts_with(scores.lines().next().unwrap()));
@@ -296,8 +296,8 @@ fn what_a_footer_declares_is_all_there_is() {
     assert_eq!(findings(at, &["d.parquet"]).1[0]["code"], "invalid-metadata");
 }
 
-/// A file whose dictionary of the column has `Red`, which no row has: what two files have in common that differ in the
-/// row with `Red` alone.
+/// A file whose dictionary has the entry `Red`, which no row uses: the bitwise AND of two files that differ only in the
+/// row with `Red`.
 fn with_unused_entry(folder: &Path, colors: &[Colors; 2]) -> Vec<u8> {
     let [one, other] = (*colors).map(|colors| {
         let path = folder.join("part.parquet");

@@ -1,4 +1,4 @@
-//! Only like with like: no verdict across episodes that were recorded differently, but the setting that differs.
+//! Episodes that were recorded differently are not compared; the output names the setting that differs.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use trace::write::write_episodes;
 use crate::harness;
 use crate::harness::program::run;
 
-/// The episodes of one model in one experiment, one scene each, and what they were recorded with.
+/// The episodes of one model in one experiment, one scene each, and their recording settings.
 #[derive(Clone)]
 pub struct Cell<'a> {
     pub model: &'a str,
@@ -19,22 +19,22 @@ pub struct Cell<'a> {
     /// The step budget.
     pub steps: u32,
     pub prompt: &'a str,
-    /// The name of the fingerprint; one of the settings above if absent.
+    /// The name of the fingerprint; derived from the settings if absent.
     pub named: Option<&'a str>,
-    /// The number of episodes that declare it.
+    /// The number of episodes that declare the fingerprint.
     pub declared: usize,
-    /// The number of scenes; the episodes play them in turn.
+    /// The number of scenes; the episodes use them in turn.
     pub scenes: usize,
-    /// The number of last episodes that were lost.
+    /// The number of lost episodes, the last ones.
     pub lost: usize,
-    /// One in how many episodes takes a step more; 0 for none.
+    /// Every n-th episode takes one step more; 0 for none.
     pub long: usize,
-    /// The number of first episodes with a reply without a decision.
+    /// The number of episodes with an unreadable reply, the first ones.
     pub unread: usize,
-    /// The kind of the recording, and what its clusters are.
+    /// The kind of the recording, and the unit of its clusters.
     pub kind: &'a str,
     pub cluster: Option<&'a str>,
-    /// True if each episode is solved.
+    /// True for each solved episode.
     pub solved: Vec<bool>,
 }
 
@@ -55,7 +55,7 @@ pub const LIKE: Cell<'_> = Cell {
     solved: Vec::new(),
 };
 
-/// `successes` solved episodes, then others.
+/// `n` outcomes: `successes` solved episodes first, then unsolved ones.
 pub fn solved(successes: usize, n: usize) -> Vec<bool> {
     (0..n).map(|at| at < successes).collect()
 }
@@ -110,7 +110,7 @@ impl Cell<'_> {
         }
     }
 
-    /// Writes the trace; its name is that of the model and the experiment.
+    /// Writes the trace `EXPERIMENT-MODEL.parquet`.
     pub fn write(&self, folder: &Path) {
         std::fs::create_dir_all(folder).unwrap();
         let episodes: Vec<Episode> = (0..self.solved.len()).map(|at| self.episode(at)).collect();
@@ -119,7 +119,7 @@ impl Cell<'_> {
     }
 }
 
-/// Two models that differ in every scene, the second recorded as `change` says.
+/// Two models that differ in every scene; `change` alters the second one's recording.
 fn two(change: impl FnOnce(&mut Cell)) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     Cell { solved: solved(21, 21), ..LIKE }.write(&folder.path().join("runs"));
@@ -136,7 +136,7 @@ fn differs(folder: &Path, words: &[&str]) -> (String, Value) {
     (differs.map(|answer| answer["answer"].as_str().unwrap()).collect(), found)
 }
 
-/// A change of what a cell was recorded with.
+/// A change to a cell's recording settings.
 type Change = fn(&mut Cell);
 
 #[test]
@@ -159,7 +159,7 @@ fn models_of_two_worlds_prompts_or_step_budgets_are_not_compared() {
         assert_eq!(test["incomparable"], setting);
         let apart = json!([{ "within": "E1", "between": ["ant", "bee"] }]);
         assert_eq!(found["not_comparable"], json!([{ "setting": setting, "comparisons": apart }]));
-        // What does not matter is compared, and every output says what did not.
+        // With `--pool` they are compared, and every output names the ignored setting.
         let (answer, found) = differs(folder.path(), &["runs", "--pool"]);
         assert_eq!(answer, "E1 ant better than bee");
         let sentence = format!("Compared though they differ (--pool): {setting}.");
@@ -172,7 +172,7 @@ fn models_of_two_worlds_prompts_or_step_budgets_are_not_compared() {
 
 #[test]
 fn lost_episodes_and_unreadable_replies_stand_beside_their_cells() {
-    // The last reply of a lost episode gave no decision, either.
+    // The last reply of a lost episode has no decision either.
     let folder = two(|cell| (cell.lost, cell.unread) = (2, 3));
     let at = folder.path();
     let found = run(at, &["stats", "runs", "--json"]).json();
@@ -189,7 +189,7 @@ fn lost_episodes_and_unreadable_replies_stand_beside_their_cells() {
     run(at, &["report", "runs", "--no-figures", "--out", "out"]).done();
     let table = std::fs::read_to_string(at.join("out/tables/main.md")).unwrap();
     assert!(table.contains("Beside the numbers: E1 bee 2 lost, 5 of 42 replies without a decision."), "{table}");
-    // Where nothing was left out, no column says so.
+    // Without losses and unreadable replies the columns are absent.
     let like = two(|_| ());
     assert!(!run(like.path(), &["stats", "runs"]).done().contains("no decision"));
 }
@@ -257,7 +257,7 @@ fn bold_marks_the_models_that_no_test_shows_to_be_worse() {
         of.map(|row| (row["best"].as_u64().unwrap(), row["worst"].as_u64().unwrap())).collect();
     assert_eq!(ranks, [(1, 2), (1, 2), (3, 3)]);
     assert!(run(folder.path(), &["stats", ".", "--full"]).done().contains("Ranks that the tests leave open"));
-    // The best mean of models that are not comparable is not bold.
+    // The best mean is not bold if models are not comparable.
     Cell { model: "dog", mirror: 1.2, solved: solved(1, 21), ..LIKE }.write(folder.path());
     let table = write(3.0);
     assert!(!table.contains("**21/21"), "{table}");
@@ -277,7 +277,7 @@ fn ranks_are_in_a_report_and_lost_episodes_beside_the_test_over_all_experiments(
     {
         assert!(ranks.lines().any(|found| found == line), "{line}: {ranks}");
     }
-    // Every episode takes two steps: nobody decides earlier.
+    // Every episode takes two steps, so no model decides earlier.
     assert!(ranks.contains("E1,TTD,ant,1,2"), "{ranks}");
     let printed = read("tables/ranks.md").unwrap();
     assert!(printed.contains("| all | ant | 1 | --") && printed.contains("rank 1 are tied for the best"), "{printed}");

@@ -1,4 +1,4 @@
-//! Defaults out of a file and the environment, and the message for a refused command line.
+//! Defaults from a file and the environment, and the message for a refused command line.
 
 use std::fs;
 use std::path::Path;
@@ -17,14 +17,14 @@ fn configured(text: &str) -> TempDir {
 }
 
 fn with(folder: &Path, variables: &[(&str, &str)], arguments: &[&str]) -> Answer {
-    // `make bless` sets variables of the tests.
+    // `make bless` sets these variables for the tests.
     let mut program = program(folder);
     program.env_remove("MIRRORSTATS_WRITE_SCHEMAS").env_remove("MIRRORSTATS_WRITE_REFERENCE");
     program.args(arguments).envs(variables.iter().copied());
     answer(&mut program)
 }
 
-/// The folder that `report` wrote, which shows the source of its default.
+/// The folder that `report` wrote, which shows where its default comes from.
 fn written(folder: &Path, variables: &[(&str, &str)], typed: &[&str]) -> String {
     let traces = fixture("recorded/E1-oracle.parquet");
     let arguments = [&["report", traces.to_str().unwrap(), "--no-figures", "--json"], typed].concat();

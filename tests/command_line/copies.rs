@@ -1,4 +1,4 @@
-//! Copies of episodes under other ids: named by `validate`, and beside every verdict that counts them.
+//! Copies of episodes under other ids: `validate` names them, and so does every verdict that counts them.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use trace::write::write_episodes;
 
 use crate::{episode, run};
 
-/// Eight episodes of two models, and of the first model's last episode so many copies under other ids.
+/// Eight episodes of each of two models, and `copies` copies of the first model's last episode under other ids.
 fn trace(path: &Path, copies: i32) {
     let choice = |run: i32| if run % 3 == 0 { "blue" } else { "red" };
     let mut episodes: Vec<Episode> = (0..8).map(|run| episode("ant", "E1", run, choice(run))).collect();
@@ -33,7 +33,7 @@ fn validate_names_the_copies_of_episodes() {
     assert_eq!(ids, ["copy-0", "copy-1"]);
     assert_eq!(copies[0]["found"], "those of `E1-ant-7` in all columns but the id");
     assert_eq!(copies[0]["severity"], "note");
-    // One step that differs makes another episode.
+    // An episode that differs in one step is not a copy.
     let mut other = episode("ant", "E1", 7, "red");
     other.steps[0].self_color = None;
     let other = Episode { episode_id: "other".into(), ..other };

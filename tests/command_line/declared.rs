@@ -1,5 +1,5 @@
-//! Experiments that traces declare and the definitions do not know: every command takes them, under their own title, order
-//! and levels.
+//! Experiments that traces declare and the definitions do not know: every command accepts them, with their own title,
+//! order and levels.
 
 use std::fs;
 use std::num::NonZeroUsize;
@@ -13,7 +13,7 @@ use trace::write::write_episodes;
 use crate::harness::traces::open;
 use crate::{contents, episode, run};
 
-/// `E6`, which the footers below declare, with a level of a metric that no definitions have.
+/// `E6`, which the footers below declare; one of its levels is for an unknown metric.
 fn six() -> Value {
     json!({ "name": "E6", "title": "Delayed mirror", "order": 6, "decision": "selected_cube",
             "chance": { "TSA": "1/5", "NEW": "1/2" }, "reference": { "MCR": ["1/4", "1/7"] }, "actions": ["done"] })
@@ -24,7 +24,7 @@ fn with(mut experiment: Value, key: &str, value: Value) -> Value {
     experiment
 }
 
-/// Writes eight episodes of two models in an experiment, with this recording in the footer.
+/// Writes eight episodes of two models in an experiment, with `recording` in the footer.
 fn write(folder: &Path, name: &str, experiment: &str, recording: &Value) {
     let number = |at: usize| i32::try_from(at / 2).unwrap();
     let one = |at: usize| Episode {
@@ -36,7 +36,7 @@ fn write(folder: &Path, name: &str, experiment: &str, recording: &Value) {
     write_episodes(&folder.join(format!("{name}.parquet")), Some(recording.clone()), &episodes).unwrap();
 }
 
-/// A folder with traces of `E1`, which is known, of `E6` and, declared without an order, of `A7`.
+/// A folder with traces of `E1`, which is known, of `E6`, and of `A7`, which is declared without an order.
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     write(folder.path(), "known", "E1", &json!({}));
@@ -118,7 +118,7 @@ fn scores_carry_what_the_traces_declare() {
     let rows = told["chance"].as_array().unwrap().iter().filter(|row| row["metric"] == "TSA");
     let levels: Vec<_> = rows.map(|row| (row["experiment"].as_str(), row["level"].as_str())).collect();
     assert_eq!(levels, [(Some("E6"), Some("1/5")); 2]);
-    // The scores inside a report's folder are scores as well.
+    // The scores in a report's folder count as scores too.
     let changes = run(at, &["diff", "traces", "scores", "--json"]).json();
     assert_eq!(changes["flips"], json!([]));
 }
@@ -141,7 +141,7 @@ fn every_command_takes_a_declared_experiment() {
     ] {
         run(at, &[arguments, &TRACES[..]].concat()).done();
     }
-    // Nothing is recorded that a limit could hold for.
+    // No recording states losses, so the limit cannot be checked.
     let checked = run(at, &[&["check", "--max-lost", "0"], &TRACES[..]].concat()).ends(1);
     assert!(checked.stdout.contains(" E6 "), "{}", checked.stdout);
     let [native, polars] = ["native.csv", "polars.csv"].map(|name| fs::read_to_string(at.join(name)).unwrap());
@@ -169,7 +169,7 @@ fn what_decided_is_found_for_scores_of_a_declared_experiment() {
         let trace = format!("{name}.parquet");
         run(at, &["score", &trace, "-o", "old.parquet"]).done();
         run(at, &["score", &trace, "--definitions", "own.toml", "-o", "new.parquet"]).done();
-        // The traces may have episodes that the scores have not.
+        // The traces may have more episodes than the scores.
         let answer = run(at, &["diff", "old.parquet", "new.parquet", "six.parquet", "known.parquet", "--json"]).json();
         let flips = answer["flips"].as_array().unwrap();
         assert!(!flips.is_empty() && flips.iter().all(|flip| flip["timesteps"]["before"].is_array()), "{answer}");
@@ -212,14 +212,14 @@ fn an_experiment_that_nobody_declares_is_refused_as_before() {
     assert!(polars.contains("unknown-experiment: nine.parquet"), "{polars}");
     let told = run(at, &["trace", "validate", "nine.parquet"]).ends(1).stdout;
     assert!(told.contains("unknown-experiment") && told.contains("found `E9`"), "{told}");
-    // What one trace declares holds for those beside it, in any order.
+    // A trace's declaration also applies to the traces beside it, in any order.
     write(at, "bare", "E6", &json!({}));
     assert!(run(at, &["score", "bare.parquet"]).refused().contains("found `E6`"));
     for pair in [["bare.parquet", "six.parquet"], ["six.parquet", "bare.parquet"]] {
         run(at, &[&["score"], &pair[..]].concat()).done();
         run(at, &[&["validate"], &pair[..]].concat()).done();
     }
-    // Text carries declarations too.
+    // Text formats keep declarations too.
     run(at, &["score", "six.parquet", "-o", "scores.parquet"]).done();
     let stats = run(at, &["stats", "scores.parquet"]).done();
     for name in ["six.csv", "six.jsonl"] {
@@ -264,7 +264,7 @@ fn files_that_declare_one_experiment_differently_are_refused_together() {
         let expected = format!("zero-scores.parquet: expected {}", words.replace('@', "`six-scores.parquet`"));
         assert!(message.contains(&expected), "{message}");
     }
-    // What differs only in what analysis does not read is alike.
+    // Declarations may differ in fields that analysis does not read.
     write(at, "zero", "E6", &json!({ "experiment": with(with(six(), "actions", json!([])), "decision", json!("x")) }));
     run(at, &["report", "six.parquet", "zero.parquet"]).done();
 }

@@ -12,7 +12,7 @@ use crate::harness::files::{fixture, repository};
 use crate::harness::traces::recording;
 use crate::run;
 
-/// Steps of two policies on two tasks, without any column of the mirror but `action`, which is a number here.
+/// Steps of two policies on two tasks. Of the mirror's columns they have only `action`, which is a number here.
 fn steps() -> String {
     let mut lines = String::new();
     for (model, solved) in [("act", [3, 5, 0, 2, 4, 3]), ("diffusion", [0, 6, 0, 0, 5, 0])] {
@@ -30,7 +30,7 @@ fn steps() -> String {
     lines
 }
 
-/// A folder with `steps.jsonl`, the definitions `robots.toml` and the trace `robots.parquet`.
+/// A folder with `steps.jsonl`, `robots.toml` (definitions) and `robots.parquet` (a trace).
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("steps.jsonl"), steps()).unwrap();
@@ -41,10 +41,10 @@ fn folder() -> tempfile::TempDir {
     folder
 }
 
-/// The declaration in the first row of scores in CSV.
+/// The declaration in the first row of CSV scores.
 const IMPORTED: &str = r#""{""origin"":""import""}""#;
 
-/// The words of a command over `robots.parquet`, with its definitions.
+/// The output of a command on `robots.parquet` with its definitions.
 fn asked(folder: &Path, words: &[&str]) -> String {
     run(folder, &[words, &["robots.parquet", "--definitions", "robots.toml"]].concat()).done()
 }

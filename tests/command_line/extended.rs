@@ -1,4 +1,4 @@
-//! The extended definitions: the diagnostics that need optional columns, worked out by hand.
+//! The extended definitions, which need optional columns, worked out by hand.
 
 use trace::episode::{Action, Episode, Extra, Step};
 use trace::write::write_episodes;
@@ -29,7 +29,7 @@ fn the_drafted_diagnostics_are_as_worked_out_by_hand() {
     let (go, done) = (Action::MoveForward, Action::Done);
     let folder = tempfile::tempdir().unwrap();
     let episodes = [
-        // Two of three explained steps speak of oneself, one hedges; 30 of 40 pixels; from t = 2 to 4.
+        // Two of three reasonings speak of oneself, one hedges; 30 of 40 pixels; from t = 2 to 4.
         episode(
             "a",
             &[
@@ -47,11 +47,11 @@ fn the_drafted_diagnostics_are_as_worked_out_by_hand() {
                 (done, false, Some("a mighty cube"), Some(0), Some(0)),
             ],
         ),
-        // Nothing explained, no pixel known: undefined, not zero.
+        // No reasoning and no known pixels: undefined, not zero.
         episode("c", &[(go, true, None, None, None), (go, true, None, None, None)]),
-        // The sight comes with the decision: no sight before it.
+        // The mirror is first seen at the decision, so not before it.
         episode("d", &[(go, false, Some(""), Some(0), Some(0)), (done, true, Some("i think"), Some(1), Some(2))]),
-        // A pixel count without its other half counts as unknown in their sum, and alone.
+        // A pixel count without its counterpart is unknown, in their sum and alone.
         episode("e", &[(go, true, Some("not sure"), Some(5), None), (done, false, Some("Me"), Some(1), Some(1))]),
     ];
     write_episodes(&folder.path().join("a.parquet"), None, &episodes).unwrap();

@@ -1,4 +1,4 @@
-//! Filters that keep no episode, and figures with a limit of episodes.
+//! Filters that keep no episode, and figures that limit the number of episodes.
 
 use trace::write::write_episodes;
 

@@ -1,4 +1,4 @@
-//! A trace's declarations survive every form of scores: kind, clusters, scenes, fingerprints, losses and replies.
+//! Every form of scores keeps a trace's declarations: kind, clusters, scenes, fingerprints, losses and replies.
 
 use std::fs;
 use std::path::Path;
@@ -18,7 +18,7 @@ fn bee() -> Cell<'static> {
     Cell { model: "bee", solved: solved(0, 21), ..LIKE }
 }
 
-/// The output of `stats`, `report` and `gate` for `a.FORM` and `b.FORM`, without the name of the form.
+/// The output of `stats`, `report` and `gate` for `a.FORM` and `b.FORM`, without the form's name.
 fn said(at: &Path, form: &str) -> Vec<String> {
     let [a, b, out] = ["a", "b", "out"].map(|name| format!("{name}.{form}"));
     let stats = run(at, &["stats", &a, &b, "--full"]);
@@ -56,7 +56,7 @@ fn every_form_of_scores_gives_the_same_verdicts_and_caveats() {
         for other in [csv, lines] {
             assert_eq!(parquet, other, "{name}");
         }
-        // A mixture of forms, and of scores with what was made of both.
+        // Mixed forms, and one file of scores made from two forms.
         run(at, &["score", "a.csv", "b.jsonl", "-o", "both.csv"]).done();
         for inputs in [&["a.csv", "b.parquet"][..], &["both.csv"]] {
             let mixed = run(at, &[&["stats"], inputs, &["--full"]].concat());
@@ -77,7 +77,7 @@ fn reconstructed_episodes_are_paired_with_recorded_ones_in_no_form() {
         let stats = run(at, &["stats", inputs[0], inputs[1]]).done();
         assert!(stats.contains("nothing is paired") && !stats.contains("pairs of equal scenes"), "{stats}");
     }
-    // The same names on both sides are no pairs either.
+    // Equal ids on both sides do not make pairs either.
     Cell { solved: solved(0, 21), ..LIKE }.write(&at.join("c"));
     for base in ["a", "a.csv"] {
         let gate = run(at, &["gate", base, "c"]).ends(5).stdout;

@@ -1,4 +1,4 @@
-//! `gate`: a verdict for each cell, an exit code for each verdict, and the episodes that flipped.
+//! `gate`: one verdict per cell, one exit code per verdict, and the episodes that flipped.
 
 use std::path::Path;
 
@@ -53,7 +53,7 @@ fn a_cell_of_which_nothing_is_said_names_the_episodes_that_would_settle_it() {
     let settled = found["settled_by"].as_u64().unwrap();
     assert!(settled > 21, "{found}");
     assert_eq!(found["why"], format!("about {settled} scenes on each side would settle it"));
-    // With so many the same rates hold.
+    // With that number of scenes the same rates give `held`.
     let n = usize::try_from(settled).unwrap();
     let folder = two(&of(n * 14 / 21, n), &of(n * 14 / 21 - n / 21, n));
     assert_eq!(cell_of(folder.path(), &[]).1["verdict"], "held");
@@ -70,7 +70,7 @@ fn what_differs_is_named_and_may_be_pooled() {
         let answer = gate(folder.path(), &["--pool", "--format", format]).ends(1).stdout;
         assert!(answer.contains("(--pool): world.mirror.width is 3.0 and 1.2"), "{format}: {answer}");
     }
-    // A cell of one side alone is none.
+    // A cell on one side only is not compared.
     Cell { experiment: "E2", ..of(3, 3) }.write(&folder.path().join("base"));
     let answer = gate(folder.path(), &["--pool"]).ends(1).stdout;
     assert!(answer.contains("NEW has no episode"), "{answer}");
@@ -120,7 +120,7 @@ fn scores_stand_for_traces_and_durations_have_a_margin_in_steps() {
     assert_eq!(found["cells"][0]["flips"][0]["base"]["timesteps"], Value::Null);
     let told = found["caveats"].to_string();
     assert!(told.contains("base: scores do not say which steps decided") && told.contains("new: scores"), "{told}");
-    // In the folder of the traces they have steps; the other side still has none.
+    // Beside the traces the scores have timesteps; the other side still has none.
     std::fs::rename(folder.path().join("base.parquet"), folder.path().join("base/scores.parquet")).unwrap();
     let answer = run(folder.path(), &["gate", "base/scores.parquet", "new.parquet", "--format", "json"]).ends(1).stdout;
     let beside: Value = serde_json::from_str(&answer).unwrap();
@@ -128,7 +128,7 @@ fn scores_stand_for_traces_and_durations_have_a_margin_in_steps() {
     assert!(flip["base"]["timesteps"].is_array() && flip["new"]["timesteps"].is_null(), "{flip}");
     assert!(!beside["caveats"].to_string().contains("base: scores"), "{beside}");
     std::fs::remove_file(folder.path().join("base/scores.parquet")).unwrap();
-    // All durations are equal: without spread there is no interval, and no verdict.
+    // All durations are equal. Without variance there is no interval and no verdict.
     let (code, found) = cell_of(folder.path(), &["--metric", "TTD", "--margin", "5"]);
     assert_eq!((code, &found["p_adjusted"]), (4, &Value::Null));
     let message = gate(folder.path(), &["--metric", "TSB"]).refused();
@@ -186,7 +186,7 @@ fn every_format_is_well_formed_whatever_the_names_are() {
 
 #[test]
 fn durations_name_the_episodes_that_would_settle_them() {
-    // Every third episode of NEW is a step longer.
+    // Every third episode of NEW takes one step more.
     let cell = |long| Cell { long, ..of(21, 21) };
     let folder = two(&cell(2), &cell(3));
     let (code, found) = cell_of(folder.path(), &["--metric", "TTD", "--margin", "0.05"]);
@@ -215,6 +215,6 @@ fn a_flip_leads_to_its_frames_where_a_page_was_exported_beside_the_traces() {
     let (_, found) = cell_of(folder.path(), &[]);
     let flip = &found["flips"][0];
     assert_eq!(flip["new"]["frames"], "new-page/index.html?view=episode&id=E1/ant/s1/r1&t=2");
-    // The page has other values of the earlier episodes, whose ids are the same.
+    // The page shows the later episodes, which have the same ids but other values.
     assert_eq!(flip["base"]["frames"], Value::Null);
 }

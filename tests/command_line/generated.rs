@@ -1,4 +1,4 @@
-//! The traces of benchmarks (`examples/generate`): both orders keep the rules of traces and hold the same episodes.
+//! The traces of benchmarks (`examples/generate`): both orders give valid traces and the same episodes.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -17,7 +17,7 @@ fn generate(at: &Path, name: &str, study: &Study, order: Order) {
     generation::write(study, order, &Files { folder: at.join(name), count: FILES, threads: 2 }).unwrap();
 }
 
-/// The models of a file in the order of its steps, each once per change, and the number of steps.
+/// The models of a file in step order without consecutive duplicates, and the number of steps.
 fn models(path: &Path) -> (Vec<String>, usize) {
     let mut models: Vec<String> = texts(path, "model").into_iter().flatten().collect();
     let steps = models.len();
@@ -38,7 +38,7 @@ fn generated_traces_of_both_orders_keep_every_rule_and_score_the_same() {
         assert_eq!(contents(&at.join(name)).len(), FILES);
         let validated = run(at, &["trace", "validate", name, "--json"]).done();
         let validated: serde_json::Value = serde_json::from_str(&validated).unwrap();
-        // In so few episodes agents claim colours that no body has, which is noted, as unreadable replies are.
+        // With so few episodes, agents claim colours that no body has. That is a note, as are unreadable replies.
         let findings = validated["findings"].as_array().unwrap();
         assert!(findings.iter().all(|finding| finding["severity"] == "note"), "{name}: {findings:?}");
         let info: serde_json::Value =
@@ -68,7 +68,7 @@ fn generated_traces_depend_on_the_seed_alone() {
 fn the_shuffled_order_has_every_model_in_every_file() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    // More than 735 episodes, so that every model is there.
+    // More than 735 episodes, so that every model occurs.
     let study = Study::new(7, 60_000, false);
     for (name, order) in [("study", Order::Study), ("shuffled", Order::Shuffled)] {
         generate(at, name, &study, order);
@@ -81,7 +81,7 @@ fn the_shuffled_order_has_every_model_in_every_file() {
             );
             let distinct = models.iter().collect::<BTreeSet<_>>().len();
             match order {
-                // 105 episodes of a model follow each other.
+                // A model's 105 episodes are consecutive.
                 Order::Study => assert!(models.len() == distinct && distinct <= 4, "{file}: {models:?}"),
                 Order::Shuffled => assert!(models.len() > 90 && distinct == 8, "{file}: {models:?}"),
             }

@@ -1,4 +1,4 @@
-//! Names that would act on a terminal, a table or a shell if they were let through.
+//! Names that would affect a terminal, a table or a shell if they were not escaped.
 
 use std::fs;
 
@@ -17,7 +17,7 @@ const NAMES: [&str; 8] = [
     "tags\u{e0041}\u{e007f}bom\u{feff}note\u{fff9}filler\u{3164}selector\u{fe0f}private\u{e000}",
 ];
 
-/// Characters of [`NAMES`] that are no control characters and still must not be shown as they are.
+/// Characters of [`NAMES`] that are not control characters but must be escaped too.
 const HIDDEN: [char; 13] = [
     '\u{202e}',
     '\u{ad}',
@@ -34,7 +34,7 @@ const HIDDEN: [char; 13] = [
     '\u{e000}',
 ];
 
-/// Returns true if every character only shows itself; line breaks are the program's own.
+/// Returns true if the text has no control or hidden characters, except the program's own line breaks.
 fn is_tame(text: &str) -> bool {
     text.chars().all(|c| c == '\n' || !(c.is_control() || HIDDEN.contains(&c)))
 }
@@ -95,7 +95,7 @@ fn names_of_models_and_episodes_cannot_reach_the_terminal_raw() {
         answer.refused();
     }
     check(&run(at, &["--errors", "json", "score", "\u{1b}[31m\u{202e}"]));
-    // A file of scores is read back as it was, whatever the names.
+    // A file of scores reads back unchanged, whatever the names.
     run(at, &["score", "a.parquet", "-o", "s.csv"]).done();
     run(at, &["score", "a.parquet", "-o", "s.jsonl"]).done();
     let scores = fs::read_to_string(at.join("s.csv")).unwrap();

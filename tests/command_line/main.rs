@@ -1,4 +1,4 @@
-//! The program at the process boundary: exit codes, what is said where, and that nothing is left half done.
+//! The program at the process boundary: exit codes, where messages go, and no half-written output.
 
 mod audit;
 mod battery;

@@ -1,6 +1,6 @@
-//! Metrics and experiments under other names: every output has the new names and differs in nothing else.
+//! Metrics and experiments under other names: outputs change in the names alone.
 //!
-//! A new name has the letters of the old one, so that texts are as wide as before; lists by name keep their order.
+//! A new name has the letters of the old one, so texts keep their width. Lists by name keep their order.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -29,7 +29,7 @@ const NAMES: [(&str, &str); 13] = [
     ("E5", "5E"),
 ];
 
-/// The built-in definitions and styles in one text each, every metric and experiment under the name that `to` gives it.
+/// The built-in definitions as one text; `to` renames every metric and experiment.
 fn definitions(to: &Renaming) -> String {
     to.all(include_str!("../../assets/definitions/paper.toml"))
 }
@@ -39,7 +39,7 @@ fn style(to: &Renaming) -> String {
     to.all(&(include_str!("../../assets/styles/default.toml").to_owned() + &figures))
 }
 
-/// Whole words by other words.
+/// Replaces whole words by other words.
 struct Renaming {
     words: Regex,
     names: BTreeMap<String, String>,
@@ -49,7 +49,7 @@ impl Renaming {
     fn new(pairs: impl IntoIterator<Item = (&'static str, &'static str)>) -> Self {
         let mut names = BTreeMap::new();
         for (old, new) in pairs {
-            // As they are, and as LaTeX has them.
+            // Plain, and escaped for LaTeX.
             for spelled in [str::to_owned, |name: &str| name.replace('_', "\\_")] {
                 names.insert(spelled(old), spelled(new));
             }
@@ -68,7 +68,7 @@ impl Renaming {
     }
 }
 
-/// Three models in three experiments, of which some episodes never end with a decision.
+/// Three models in three experiments; some episodes never end with a decision.
 fn episodes(to: &Renaming) -> Vec<Episode> {
     let mut episodes = Vec::new();
     for (at, experiment) in ["E1", "E2", "E5"].into_iter().enumerate() {
@@ -131,7 +131,7 @@ fn outputs(at: &Path, to: &Renaming) -> BTreeMap<String, String> {
     found.into_iter().map(|(name, text)| (name, hash.replace_all(&text, "HASH").into_owned())).collect()
 }
 
-/// The data that a page carries in one line, its metrics in the order of their names.
+/// The page's data from its line; parsed, so that the order of keys does not matter.
 fn data_of_page(line: &str) -> Option<serde_json::Value> {
     let json = line.strip_prefix("<script type=\"application/json\" id=\"data\">")?.strip_suffix("</script>")?;
     Some(serde_json::from_str(json).unwrap())
@@ -140,7 +140,7 @@ fn data_of_page(line: &str) -> Option<serde_json::Value> {
 #[test]
 fn new_names_of_all_metrics_and_experiments_change_names_alone() {
     let (old, new) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    // A point of the scatter has attributes that are named by metrics.
+    // Points of the scatter have attributes named after metrics.
     let attributes = [("laca", "caal"), ("dtt", "ttd")];
     let back = Renaming::new(NAMES.map(|(old, new)| (new, old)).into_iter().chain(attributes));
     let expected = outputs(old.path(), &Renaming::new(NAMES.map(|(old, _)| (old, old))));

@@ -6,7 +6,7 @@ use std::process::Stdio;
 
 use crate::{contents, fixture, program, run, run_with_input, two_files};
 
-/// A column of CSV, the header apart.
+/// A column of CSV, without the header.
 fn column(csv: &str, name: &str) -> Vec<String> {
     let at = csv.lines().next().unwrap().split(',').position(|column| column == name).unwrap();
     csv.lines().skip(1).map(|line| line.split(',').nth(at).unwrap().to_owned()).collect()
@@ -41,7 +41,7 @@ fn a_condition_keeps_the_episodes_where_it_holds() {
     assert_eq!(score("MTATO is null").lines().count(), 1 + score("TSA = 0").lines().skip(1).count());
     assert_eq!(score("any(self_color = body_color)"), score("CAAL = 1"));
     assert_eq!(score("null is not null").lines().count(), 1, "the header alone");
-    // A condition that is null keeps nothing.
+    // A null condition keeps no episode.
     assert_eq!(score("MTATO = 1 or MTATO = 0"), score("TSA"));
 }
 
@@ -54,7 +54,7 @@ fn metrics_are_chosen_and_keep_their_order() {
     };
     assert_eq!(header("TSA-C,TSA"), "episode_id,model,experiment,seed,run,TSA,TSA-C");
     assert_eq!(header("MTATO"), "episode_id,model,experiment,seed,run,MTATO");
-    // Columns that only other metrics read are not needed.
+    // Columns that only other metrics read are not required.
     run(folder.path(), &["score", "a.parquet", "--definitions", "extended", "--metrics", "TSA,STD"]).done();
 }
 
@@ -120,7 +120,7 @@ fn an_episode_is_explained_by_its_timesteps() {
     assert_eq!((&of("MGD")["value"], &of("MGD")["timesteps"]), (&1.into(), &serde_json::json!([2])));
     assert_eq!((&of("TTD")["value"], &of("TTD")["timesteps"]), (&3.into(), &serde_json::json!([3])));
     assert_eq!(of("MTATO")["value"], serde_json::Value::Null, "the wrong cube was chosen");
-    // The evidence says what the scores say.
+    // The evidence agrees with the scores.
     let scores = run(folder.path(), &["score", ".", "--where", "episode_id = 'E1-ant-1'"]).done();
     for metric in json["metrics"].as_array().unwrap() {
         let value = metric["value"].as_i64().map_or_else(String::new, |value| value.to_string());
@@ -181,7 +181,7 @@ fn the_same_arguments_write_the_same_bytes() {
 
 #[test]
 fn a_closed_pipe_is_no_error() {
-    // More than a buffer of output, and less.
+    // More output than a buffer holds, and less.
     let traces = fixture("paper");
     let traces = traces.to_str().unwrap();
     let published = fixture("published/main_table.csv");

@@ -1,4 +1,4 @@
-//! Outputs that are inputs, and outputs that are no files.
+//! Outputs that are also inputs, and outputs that are not regular files.
 
 use std::fs;
 use std::os::unix::fs::{FileTypeExt as _, symlink};
@@ -7,7 +7,7 @@ use std::process::Stdio;
 
 use crate::{contents, program, run, two_files};
 
-/// Every name under which `file` can be written: itself, around a corner, a symbolic and a hard link.
+/// Every name under which `file` can be written: itself, through other folders, a symbolic link and a hard link.
 fn aliases(folder: &Path, file: &str) -> Vec<String> {
     fs::create_dir_all(folder.join("sub")).unwrap();
     let ending = Path::new(file).extension().unwrap().to_str().unwrap();
@@ -17,7 +17,7 @@ fn aliases(folder: &Path, file: &str) -> Vec<String> {
     vec![file.to_owned(), format!("./{file}"), format!("sub/../{file}"), soft, hard]
 }
 
-/// That a command refuses to write to any name of its input `file`, and changes nothing.
+/// Checks that a command refuses to write to its input `file` under any name, and changes no file.
 fn check(folder: &Path, file: &str, command: &[&str]) {
     let aliases = aliases(folder, file);
     let before = contents(folder);
@@ -71,7 +71,7 @@ fn a_report_does_not_replace_what_it_is_made_of() {
         assert!(error.contains("expected another file to write, found one that is read"), "{error}");
         assert!(contents(folder.path()) == before, "{input}");
     }
-    // A trace where the report has a file of its own, and one that it would be read together with from then on.
+    // A trace where the report writes a file of its own, and a trace that would later be read together with the report.
     fs::create_dir(folder.path().join("new")).unwrap();
     for name in ["episodes.parquet", "mine.parquet"] {
         let path = format!("new/{name}");
@@ -103,7 +103,7 @@ fn figure(folder: &Path, target: &str, stdout: Stdio) -> std::process::Output {
 fn standard_output_and_devices_are_written_into() {
     let folder = two_files();
     let expected = run(folder.path(), &["figure", "spider", "a.parquet"]).done();
-    // The device itself is in danger where this fails: a link to it is not.
+    // A failure would damage the device itself, so the test uses a link to it.
     symlink("/dev/null", folder.path().join("null.svg")).unwrap();
     let answer = figure(folder.path(), "null.svg", Stdio::piped());
     assert!(answer.status.success() && answer.stdout.is_empty(), "{}", String::from_utf8_lossy(&answer.stderr));
@@ -145,11 +145,11 @@ fn a_folder_with_inputs_is_no_folder_for_outputs() {
     }
     #[cfg(feature = "view")]
     assert!(run(folder.path(), &["view", "runs", "--export", "runs"]).refused().contains("name another one"));
-    // The library refuses it too, for Python.
+    // The library, and so Python, refuses it too.
     let study = mirrorstats::Study::open([&runs]).unwrap();
     let report = study.report(&mirrorstats::ReportOptions { figures: false, ..Default::default() }).unwrap();
     assert!(report.write(&runs).unwrap_err().to_string().contains("expected a folder for outputs"));
-    // A new folder inside is no trouble: what reads the traces passes over reports.
+    // A new folder inside is allowed, because commands that read traces skip reports.
     run(folder.path(), &["report", "runs", "--no-figures", "--out", "runs/report"]).done();
     run(folder.path(), &["score", "runs"]).done();
 }
@@ -216,7 +216,7 @@ fn running_out_of_open_files_is_no_damage() {
         for words in ["score a.parquet", "stats a.parquet", "report a.parquet --no-figures --out r"] {
             let (code, said) = refused(limit, words);
             assert!(!said.contains("damaged") && !said.contains("panicked"), "{limit} {words}: {said}");
-            // With fewer, not even the linker starts the program.
+            // With the lowest limits, not even the linker starts the program.
             if code == Some(2) {
                 assert!(said.contains("Too many open files") && said.contains("ulimit -n"), "{limit} {words}: {said}");
                 seen += 1;
@@ -233,7 +233,7 @@ fn running_out_of_open_files_is_no_damage() {
     }
 }
 
-/// Verbs that write, and what they write.
+/// Commands that write, and their outputs.
 const WRITING: [(&str, &str); 7] = [
     ("score a.parquet -o s.csv", "s.csv"),
     ("score a.parquet -o s.parquet", "s.parquet"),

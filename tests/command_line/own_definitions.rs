@@ -10,7 +10,7 @@ use trace::write::write_episodes;
 use crate::harness::program::PROGRAM;
 use crate::{harness, run};
 
-/// A mark test that is passed: the mark is seen at once and reported at `done`.
+/// A passed mark test: the mark is seen at once and reported at `done`.
 fn mark(id: &str) -> Episode {
     let step = |action, report: &str| Step {
         action: Some(action),
@@ -27,7 +27,7 @@ fn mark(id: &str) -> Episode {
     Episode { experiment: "mark".into(), decision, ..harness::traces::episode(id, steps) }
 }
 
-/// A hand that reaches the mark at its second step.
+/// A hand that reaches the mark at the second step.
 fn reach(id: &str) -> Episode {
     let step = |distance| Step {
         action: Some(Action::MoveForward),
@@ -44,7 +44,7 @@ fn reach(id: &str) -> Episode {
     }
 }
 
-/// The right cube in E1.
+/// An episode of E1 with the right cube.
 fn cube(id: &str) -> Episode {
     let step = |action| Step { action: Some(action), selected_cube: Some("red".to_owned()), ..Step::default() };
     harness::traces::episode(id, vec![step(Action::TurnLeft), step(Action::Done)])
@@ -55,8 +55,8 @@ fn write(folder: &Path, name: &str, experiment: Option<Value>, episodes: &[Episo
     write_episodes(&folder.join(format!("{name}.parquet")), recording, episodes).unwrap();
 }
 
-/// `mark.parquet`, its footer with the definitions; `old.parquet`, whose footer is from before; `reach.parquet`, `cube.parquet`
-/// and, without a footer, `plain.parquet`.
+/// `mark.parquet`, `reach.parquet` and `cube.parquet`; `old.parquet`, whose footer does not name definitions; and
+/// `plain.parquet` without a declaration.
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
@@ -69,7 +69,7 @@ fn folder() -> tempfile::TempDir {
     folder
 }
 
-/// A column of `score`, the rows in their order.
+/// A column of `score` in row order.
 fn scored(at: &Path, arguments: &[&str], metric: &str) -> Vec<String> {
     let text = run(at, &[&["score"], arguments].concat()).done();
     let rows: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
@@ -115,12 +115,12 @@ fn a_mixture_is_scored_by_the_definitions_that_include_the_others() {
     }
 }
 
-/// The commands that a refusal names.
+/// The commands in a refusal.
 fn commands(words: &str) -> Vec<&str> {
     words.lines().map(str::trim).filter(|line| line.starts_with("mirrorstats ")).collect()
 }
 
-/// Types a command as it stands.
+/// Runs a command line in the shell.
 fn typed(at: &Path, command: &str) -> String {
     let program = PROGRAM.replace('\'', r"'\''");
     let line = command.replacen("mirrorstats", &format!("'{program}'"), 1);
@@ -189,12 +189,12 @@ fn definitions_that_do_not_score_an_experiment_are_refused() {
     for definitions in ["battery", "both.toml", "knows.toml", "any.toml"] {
         run(at, &["score", "mark.parquet", "--definitions", definitions]).done();
     }
-    // Episodes that the filter leaves out need no score.
+    // Episodes that the filter drops need no score.
     let kept = ["mark.parquet", "cube.parquet", "--definitions", "paper", "--where", "experiment = 'E1'"];
     assert_eq!(scored(at, &kept, "TSA"), ["1", "1"]);
     let refused = run(at, &["score", "reach.parquet", "--definitions", "battery", "--metrics", "TSA"]).refused();
     assert!(refused.contains("as `reach` do"), "{refused}");
-    // What a change of definitions does is the question of `diff`, and it is said what the old ones are worth.
+    // `diff` compares definitions, so it only notes that the old ones do not score the experiment.
     let diff = run(at, &["diff", "paper", "battery", "mark.parquet"]);
     assert!(diff.stderr.contains("`paper` does not score the experiment `mark`"), "{}", diff.stderr);
 }

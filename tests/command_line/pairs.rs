@@ -1,4 +1,4 @@
-//! Every verb on small files that ask for much: the peak of its memory, and a refusal that names the limit.
+//! Every verb on small files that ask for much work: its peak memory, or a refusal that names the limit.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use crate::harness::bombs::{MEMORY, definitions, long_episode, long_texts, many_
 /// The option that raises every limit.
 const SETTING: &str = "MIRRORSTATS_BUDGET";
 
-/// Done, or a check that failed, within the budget.
+/// Succeeds, or is a failed check, within the memory limit.
 #[track_caller]
 fn within(at: &Path, words: &str) {
     let arguments: Vec<&str> = words.split_whitespace().collect();
@@ -16,7 +16,7 @@ fn within(at: &Path, words: &str) {
     assert!([0, 1].contains(&answer.code), "{words}: {}", answer.stderr);
 }
 
-/// Refused within the budget; says which limit, and what raises it.
+/// Is refused within the memory limit; the message names the exceeded limit and how to raise it.
 #[track_caller]
 fn refused(at: &Path, words: &str, limit: &str) {
     let arguments: Vec<&str> = words.split_whitespace().collect();

@@ -1,4 +1,4 @@
-//! Names of files that are not UTF-8: taken wherever a file is named, shown with U+FFFD, and nothing of them acts.
+//! File names that are not UTF-8: accepted wherever a file is named, and shown escaped, with U+FFFD.
 
 use std::ffi::{OsStr, OsString};
 use std::fs;
@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use crate::harness::program::answer;
 use crate::{Answer, program, two_files};
 
-/// `b`, a byte that no text has, and what paints a terminal red.
+/// `b`, an invalid byte, and an escape sequence that colours a terminal red.
 const ODD: &[u8] = b"b\xff\x1b[31m";
 
 fn odd(ending: &str) -> OsString {
@@ -17,7 +17,7 @@ fn odd(ending: &str) -> OsString {
     name
 }
 
-/// A folder in which the traces, a definition file and a style have such names.
+/// A folder where traces, a definition file and a style have such names.
 fn folder() -> tempfile::TempDir {
     let folder = two_files();
     let at = |name: &OsStr| folder.path().join(name);
@@ -34,7 +34,7 @@ fn folder() -> tempfile::TempDir {
 const STEP: &str = r#"{"episode_id":"a","model":"mine","experiment":"E1","seed":1,"run":1,"body_color":"red","t":1,"action":"done","self_color":null,"selected_cube":"red","mirror_visible":false}
 "#;
 
-/// Runs the program with words, of which `@` represents the odd name, maybe with an ending after it.
+/// Runs the program with words; `@` stands for the odd name, and an ending may follow it.
 #[track_caller]
 fn run(folder: &tempfile::TempDir, words: &str) -> Answer {
     let argument = |word: &str| word.strip_prefix('@').map_or_else(|| word.into(), odd);
@@ -79,7 +79,7 @@ fn a_path_need_not_be_text() {
         let path: PathBuf = folder.path().join(odd(name));
         assert!(path.is_file(), "{}", path.display());
     }
-    // What is shown is text.
+    // The listing shows the name as text.
     let listed = run(&folder, "info --episodes @").done();
     assert!(listed.contains("b\u{fffd}\\u{1b}[31m/b\u{fffd}\\u{1b}[31ma.parquet"), "{listed}");
 }
@@ -141,7 +141,7 @@ fn a_name_that_gives_nothing_is_shown_as_text() {
         let said = run(&folder, words).refused();
         assert!(said.contains("b\u{fffd}\\u{1b}[31m-none"), "{words}: {said}");
     }
-    // Where no file is meant, a word has to be text.
+    // A word that is not a file name must be UTF-8.
     run(&folder, "score . --where @").refused();
     assert_eq!(OsStr::from_bytes(ODD).to_str(), None);
 }

@@ -1,4 +1,4 @@
-//! `plan` from outside: the answer, the registered file, what is refused.
+//! `plan` at the process boundary: answers, registered files, refusals.
 
 use std::fs;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! Lost episodes and data quality: counted apart, bounded, and told wherever a table is.
+//! Lost episodes and data quality: counted separately, bounded, and reported with every table.
 
 use std::fs;
 use std::path::Path;
@@ -23,7 +23,7 @@ fn step(action: Option<Action>, status: &str, cube: &str) -> Step {
     Step { action, selected_cube: action.map(|_| cube.to_owned()), extra, ..Step::default() }
 }
 
-/// Eight episodes of which two succeed, four fail, and two are ended by a timeout.
+/// Eight episodes: two succeed, four fail, and two end by a timeout.
 fn eight() -> Vec<Episode> {
     let turn = || step(Some(Action::TurnLeft), "ok", "none");
     let done = |cube| step(Some(Action::Done), "repaired", cube);
@@ -40,7 +40,7 @@ fn folder() -> tempfile::TempDir {
     folder
 }
 
-/// n and sum of the cell of TSA.
+/// n and sum of the TSA cell.
 fn tsa(folder: &Path, arguments: &[&str]) -> (u64, u64) {
     run(folder, &[&["report", "--out", "out", "--no-figures"], arguments].concat()).done();
     let cells = fs::read_to_string(folder.join("out/cells.csv")).unwrap();
@@ -64,7 +64,7 @@ fn a_headline_and_the_losses_count_the_same_episodes() {
     assert_eq!([&cell["n"], &cell["sum"]], [&json!(6), &json!(2)]);
     let notes = run(at, &["report", "a.parquet", "--out", "out"]).ends(0).stderr;
     assert!(notes.contains("2 episodes were lost for want of an answer: in no denominator"), "{notes}");
-    // A file of scores keeps every row, and says which are lost.
+    // A file of scores keeps every row and marks the lost ones.
     for name in ["scores.parquet", "scores.csv", "scores.jsonl"] {
         run(at, &["score", "a.parquet", "-o", name]).done();
         assert_eq!(tsa(at, &[name]), (6, 2), "{name}");
@@ -82,7 +82,7 @@ fn unrecorded_episodes_are_reported_and_can_count_as_failures() {
         line.as_object_mut().unwrap().extend(reason.as_object().unwrap().clone());
         format!("{line}\n")
     };
-    // One of them is in the trace by now, and one is of a model that the traces do not have.
+    // One of them is in the trace by now, and one is of a model that is not in the traces.
     let lines = [line("e9", 9, "m"), line("e10", 10, "m"), line("e1", 1, "m"), line("o", 1, "other")];
     fs::write(at.join("lost.jsonl"), lines.concat()).unwrap();
     assert_eq!(tsa(at, &["a.parquet"]), (6, 2));

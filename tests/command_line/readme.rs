@@ -1,7 +1,7 @@
-//! Every command line of the README and of the pages in `docs`, and what it prints.
+//! Runs every command line of the README and of the pages in `docs`, and checks what it prints.
 //!
-//! Blocks of `sh` run in their order in one folder, which has what they name; a line that stood before is not run again. A block of `text` that begins with `$ mirrorstats`
-//! shows the output itself; `...` on a line of its own represents any lines.
+//! Blocks of `sh` run in order in one folder with the files they name; repeated lines run once. A block of `text` that
+//! begins with `$ mirrorstats` shows the output; `...` on its own line stands for any lines.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -17,7 +17,7 @@ use crate::harness::logs;
 use crate::harness::need;
 use crate::harness::program::{PROGRAM, clean};
 
-/// Command lines that are not run, by how they begin, and why.
+/// Prefixes of command lines that are not run, and why.
 const NOT_RUN: [(&str, &str); 22] = [
     ("make demo", "builds the program"),
     ("make test", "runs this test"),
@@ -61,7 +61,7 @@ const NOT_RUN: [(&str, &str); 22] = [
     ("mirrorstats report mine.parquet", "its trace has one step of one episode in place of a study"),
 ];
 
-/// The README, then the pages of `docs` by name.
+/// The README, then the pages of `docs` sorted by name.
 fn pages() -> Vec<PathBuf> {
     let mut pages: Vec<PathBuf> = ["docs", "docs/how-to", "docs/explanation", "docs/reference", "docs/tutorials"]
         .iter()
@@ -74,10 +74,10 @@ fn pages() -> Vec<PathBuf> {
     pages
 }
 
-/// The blocks of one language, in their order.
+/// The blocks of one language, in order.
 fn blocks(language: &str) -> Vec<String> {
     let opening = format!("```{language}\n");
-    // docs/BENCHMARKS.md records for half an hour.
+    // The commands of docs/BENCHMARKS.md take half an hour.
     let short = pages().into_iter().filter(|page| !page.ends_with("docs/BENCHMARKS.md"));
     let texts = short.map(|page| fs::read_to_string(page).unwrap());
     let of_page = |text: String| -> Vec<String> {
@@ -87,7 +87,7 @@ fn blocks(language: &str) -> Vec<String> {
     texts.flat_map(of_page).collect()
 }
 
-/// The commands of a block of `sh`: lines, those of a here-document with the line that begins it.
+/// The commands of a block of `sh`, one per line; a here-document belongs to the line that begins it.
 fn commands(block: &str) -> Vec<String> {
     let mut commands: Vec<String> = Vec::new();
     let mut in_document = false;
@@ -107,7 +107,7 @@ fn reason(command: &str) -> Option<&'static str> {
     NOT_RUN.iter().find(|(begins, _)| command.starts_with(begins)).map(|(_, why)| *why)
 }
 
-/// A folder with the files that the commands name.
+/// A folder with the files that the commands use.
 fn bench() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
@@ -126,7 +126,7 @@ fn bench() -> tempfile::TempDir {
     let solved = [Some(2), Some(5), None, Some(3), Some(4), Some(2)];
     logs::lerobot_data_set(&at("act"), &solved, true);
     logs::lerobot_data_set(&at("diffusion"), &solved.map(|at| at.filter(|at| *at < 4)), false);
-    // Files that the pages show.
+    // Files with contents from the pages.
     let threshold = blocks("toml").into_iter().find(|text| text.contains("mirror_self_px >= 200")).unwrap();
     fs::write(at("stricter.toml"), threshold).unwrap();
     let step = blocks("json").into_iter().find(|text| text.contains("episode_id")).unwrap();
@@ -135,12 +135,12 @@ fn bench() -> tempfile::TempDir {
     folder
 }
 
-/// Runs a documented command and returns what it prints, standard error behind standard output.
+/// Runs a documented command and returns its standard output, then its standard error.
 fn output_of(command: &str, folder: &Path) -> String {
     let mut shell = clean(Command::new("sh"), folder);
-    // `make bless` sets variables of the tests.
+    // `make bless` sets these variables for the tests.
     shell.env_remove("MIRRORSTATS_WRITE_SCHEMAS").env_remove("MIRRORSTATS_WRITE_REFERENCE");
-    // A folder with another build of the program, such as that of an installed wheel: `make release-check`.
+    // A folder with another build of the program, such as an installed wheel: `make release-check`.
     let installed = std::env::var_os("MIRRORSTATS_TEST_PROGRAMS").map(PathBuf::from);
     let programs = installed.unwrap_or_else(|| Path::new(PROGRAM).parent().unwrap().to_owned());
     let path = std::env::var_os("PATH").unwrap_or_default();
@@ -155,7 +155,7 @@ fn output_of(command: &str, folder: &Path) -> String {
     format!("{out}{said}{code}")
 }
 
-/// Without what is another one each time: how long a recording took, how far it was meanwhile, and Inspect's ids.
+/// Removes what varies between runs: durations, progress, and Inspect's ids.
 fn lasting(output: &str) -> String {
     let progress = Regex::new(r"(?m)^[0-9]+ of [0-9]+ episodes?, .* a second.*\n").unwrap();
     let output = &progress.replace_all(output, "");
@@ -212,13 +212,13 @@ fn documented_outputs_are_current() {
     assert!(count >= 3, "the documentation shows what commands print");
 }
 
-/// The address of every link and picture of a page.
+/// The targets of all links and pictures of a page.
 fn links(text: &str) -> Vec<String> {
     let link = Regex::new(r"\]\(([^)\s]+)\)").unwrap();
     link.captures_iter(text).map(|found| found[1].to_owned()).collect()
 }
 
-/// The anchors that a forge makes of headings.
+/// The anchors that a forge generates for headings.
 fn anchors(text: &str) -> BTreeSet<String> {
     let headings = text.lines().filter(|line| line.starts_with('#')).map(|line| line.trim_start_matches('#').trim());
     let kept = |text: &str| {

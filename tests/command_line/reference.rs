@@ -1,4 +1,4 @@
-//! The pages of `docs/reference`, written from the program, and its version.
+//! The pages of `docs/reference`, generated from the program, and their version.
 //!
 //! `MIRRORSTATS_WRITE_REFERENCE=1 cargo test --all-features --test command_line reference` writes them.
 
@@ -12,7 +12,7 @@ use serde_json::Value;
 use crate::harness::files::repository;
 use crate::{reference_files, run};
 
-/// The commands that a help text lists, `help` itself apart: below headings, two spaces before the name.
+/// The commands that a help text lists, except `help`: below headings, indented by two spaces.
 fn commands(help: &str) -> Vec<String> {
     let listed = help.lines().skip_while(|line| !line.starts_with("Usage:")).skip(1);
     let listed = listed.take_while(|line| !line.starts_with("Options") && !line.starts_with("Arguments"));
@@ -75,7 +75,7 @@ fn trace_page() -> String {
     page
 }
 
-/// `llms.txt`: every page with its title and its first sentence.
+/// `llms.txt`: the title and first sentence of every page.
 fn llms() -> String {
     let link = Regex::new(r"\[([^\]]*)\]\([^)]*\)").unwrap();
     let mut text =

@@ -1,4 +1,4 @@
-//! The page of `docs/reference` for the files that people write, from the JSON Schemas of their types.
+//! The page of `docs/reference` on files that people write, generated from the JSON Schemas of their types.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -8,7 +8,7 @@ use serde_json::Value;
 use crate::harness::files::repository;
 use crate::reference::cell;
 
-/// The files: schema, heading, the command that checks one.
+/// The files: schema, heading, command that checks one.
 const FILES: [(&str, &str, &str); 6] = [
     ("definitions", "Definitions", "mirrorstats definitions check mine.toml"),
     ("style", "Styles", "mirrorstats style check mine.toml"),
@@ -35,7 +35,7 @@ pub fn page() -> String {
     page
 }
 
-/// The keys of a table, then those of the tables in it.
+/// The keys of a table, then those of its subtables.
 fn table(root: &Value, schema: &Value, path: &str, page: &mut String) {
     if !path.is_empty() {
         write!(page, "\n### `{path}`\n\n{}\n", cell(&schema["description"])).unwrap();
@@ -84,7 +84,7 @@ fn alternatives<'a>(root: &'a Value, schema: &'a Value) -> Vec<&'a Value> {
     }
 }
 
-/// The values of a key, in words.
+/// The values of a key, as text.
 fn value(root: &Value, schema: &Value) -> String {
     let mut words: Vec<String> = Vec::new();
     for one in alternatives(root, schema) {

@@ -1,4 +1,4 @@
-//! Bad input and bad usage: exit code 2 (1 for a check that was asked for), a clear message, and nothing written.
+//! Bad input and bad usage: exit code 2 (1 for a failed check), a clear message, and no files written.
 
 use std::fs;
 use std::path::Path;
@@ -7,10 +7,10 @@ use crate::assert_shown;
 use crate::harness::files::repository;
 use crate::{contents, fixture, run, run_with_input, two_files};
 
-/// Damage in columns that the paper's definitions do not read: only `validate` looks there.
+/// Damage in columns that the paper's definitions do not read; only `validate` finds it.
 const UNREAD: [&str; 2] = ["negative-count.parquet", "unknown-reply-status.parquet"];
 
-/// The damaged files; the pair that is damaged only together is one case.
+/// The damaged files; a pair that is only damaged together is one case.
 fn damaged() -> Vec<Vec<String>> {
     let mut cases = Vec::new();
     for entry in fs::read_dir(fixture("damaged")).unwrap() {
@@ -59,7 +59,7 @@ fn every_damaged_trace_is_refused_by_every_command_that_scores() {
     assert!(contents(folder.path()).is_empty(), "something was written: {:?}", contents(folder.path()).keys());
 }
 
-/// Arguments, and what the message must say.
+/// Arguments, and the required parts of the message.
 type Case<'a> = (&'a [&'a str], &'a [&'a str]);
 
 fn check(folder: &Path, cases: &[Case]) {

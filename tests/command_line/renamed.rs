@@ -1,4 +1,4 @@
-//! The names of commands before they were grouped by noun: each runs what its new name runs.
+//! The old names of commands, from before they were grouped by noun: each runs the same as its new name.
 
 use std::fs;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! The folder of a report over an older one: the old one whole or the new one whole, and nothing of others is touched.
+//! A report written over an older one: the folder holds the whole old or the whole new report, and other files stay.
 
 use std::fs;
 use std::os::unix::fs::symlink;
@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 use crate::harness::files::Contents;
 use crate::{contents, program, run, two_files};
 
-/// The files of others.
+/// Files that do not belong to the report.
 const FOREIGN: [(&str, &str); 4] =
     [("notes.txt", "mine"), ("own/deep/b.txt", "mine"), ("tables/own.tex", "mine"), ("figures/own.svg", "mine")];
 
@@ -29,7 +29,7 @@ fn with_foreign(mut report: Contents) -> Contents {
     report
 }
 
-/// The contents of a report in a folder of its own.
+/// The contents of a report in a new folder.
 fn fresh(folder: &Path, words: &[&str]) -> Contents {
     run(folder, &[&["report"], words, &["--out", "fresh"]].concat()).done();
     let found = contents(&folder.join("fresh"));
@@ -40,7 +40,7 @@ fn fresh(folder: &Path, words: &[&str]) -> Contents {
 const LARGE: [&str; 1] = ["a.parquet"];
 const SMALL: [&str; 3] = ["b.parquet", "--no-figures", "--metrics=TSA"];
 
-/// That the manifest lists every file of a report with its hash and size, in order, and nothing else.
+/// Checks that the manifest lists exactly the report's files, in order, with hash and size.
 fn check_outputs(report: &Contents) {
     let manifest: Value = serde_json::from_slice(&report["manifest.json"]).unwrap();
     let files = report.iter().filter(|(path, _)| *path != "manifest.json");
@@ -128,7 +128,7 @@ fn a_manifest_of_something_else_lists_nothing_to_remove() {
     assert!(folder.path().join("a.parquet").is_file());
 }
 
-/// A report that is killed after a while; whether it was done before.
+/// Kills a report after a pause; returns true if it was already done.
 fn killed_after(folder: &Path, words: &[&str], pause: Duration) -> bool {
     let mut command = program(folder);
     command.args(["report", "--out", "out"]).args(words);
@@ -138,12 +138,12 @@ fn killed_after(folder: &Path, words: &[&str], pause: Duration) -> bool {
     child.wait().unwrap().success()
 }
 
-/// Pauses spread over the last half of a run, in an order that looks random and is always the same.
+/// Pauses spread over the last half of a run, in a fixed order that looks random.
 fn pauses(whole: Duration, count: u32) -> impl Iterator<Item = Duration> {
     (0..count).map(move |at| whole / 2 + whole * (at * 37 % count) / (2 * count))
 }
 
-/// Kills reports over an older one at so many moments; `is_right` judges every folder that is left.
+/// Kills `kills` reports over an older one at different moments; `is_right` checks the folder each time.
 fn kill_often(folder: &Path, kills: u32, is_right: impl Fn(&Contents) -> bool) {
     let begin = Instant::now();
     run(folder, &[&["report", "--out", "out"], &SMALL[..]].concat()).done();

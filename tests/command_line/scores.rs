@@ -1,4 +1,4 @@
-//! Files of scores in the place of traces.
+//! Files of scores in place of traces.
 
 use std::fs;
 use std::path::Path;
@@ -18,16 +18,16 @@ fn a_report_from_scores_is_the_report_from_traces() {
     run(at, &["report", ".", "--out", "out/traces"]).done();
     let files = |name: &str| {
         let mut files = contents(&at.join("out").join(name));
-        // It names other inputs.
+        // The manifest names other inputs.
         files.remove("manifest.json").unwrap();
         files.retain(|name, _| !name.starts_with("figures") && name != "report.html");
-        // Scores do not say how replies came.
+        // Scores do not record reply quality.
         assert_eq!(
             files.keys().filter(|file| file.starts_with("tables/quality")).count(),
             if name == "traces" { 3 } else { 0 }
         );
         files.retain(|name, _| !name.starts_with("tables/quality"));
-        // Scores as text do not say what was lost: the table of a report from them repeats that, and is compared below.
+        // Scores as text do not record losses, nor does the table of a report made from them; it is compared below.
         if ["csv", "jsonl"].contains(&name) {
             files.remove("episodes.parquet").unwrap();
         }
@@ -156,7 +156,7 @@ fn truncated_scores_are_refused() {
         let message = run(at, &["report", "cut.parquet"]).refused();
         assert!(message.contains("cut.parquet"), "{message}");
     }
-    // Damage anywhere is an error or harmless, never a panic.
+    // Damage anywhere gives an error or is harmless; the program never panics.
     for place in (0..whole.len()).step_by(97) {
         let mut bytes = whole.clone();
         bytes[place] ^= 0xff;

@@ -1,4 +1,4 @@
-//! `sensitivity`: every cell as the definitions edited by hand give it, where a conclusion changes, and what is refused.
+//! `sensitivity`: its cells equal those of definitions edited by hand; where conclusions change; refusals.
 
 use std::fs;
 use std::path::Path;
@@ -16,7 +16,7 @@ use crate::harness::files::{assert_same, contents, fixture};
 use crate::harness::traces;
 use crate::run;
 
-/// An episode that claims red at t = 2 and decides at t = 3; its own body fills this many pixels at t = 1.
+/// An episode that claims red at t = 2 and decides at t = 3; its own body fills `px` pixels at t = 1.
 fn episode(model: &str, experiment: &str, run: i32, px: Option<i32>, status: &str) -> Episode {
     let step = |t: i32| Step {
         action: Some(if t == 3 && status == "ok" { Action::Done } else { Action::TurnLeft }),
@@ -37,7 +37,7 @@ fn episode(model: &str, experiment: &str, run: i32, px: Option<i32>, status: &st
     }
 }
 
-/// In E1 `near` fills 100 pixels and `far` 20; in E2 both fill 5. The last reply of one more episode was lost.
+/// In E1 `near` fills 100 pixels and `far` 20; in E2 both fill 5. One more episode lost its last reply.
 fn write(folder: &Path) {
     let of = |model, experiment, px| (1..=12).map(move |run| episode(model, experiment, run, Some(px), "ok"));
     let all = of("near", "E1", 100).chain(of("far", "E1", 20)).chain(of("near", "E2", 5)).chain(of("far", "E2", 5));
@@ -101,7 +101,7 @@ fn files_are_the_same_for_any_number_of_threads() {
     }
 }
 
-/// The cells of some traces under one threshold, and those under the paper's definitions edited by hand.
+/// Compares the cells under one threshold with those under the paper's definitions edited by hand.
 fn compare(inputs: &str, px: u32) {
     let folder = tempfile::tempdir().unwrap();
     let edited = folder.path().join("edited.toml");

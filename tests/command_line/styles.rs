@@ -1,4 +1,4 @@
-//! `style`, and where the metrics of one's own definitions stand.
+//! `style`, and the position of metrics from custom definitions.
 
 use std::fs;
 

@@ -5,7 +5,7 @@ use trace::write::write_episodes;
 use crate::episode;
 use crate::harness::program::{answer, program};
 
-/// The number of columns of the widest line: every letter here takes one.
+/// The width of the widest line; every letter here takes one column.
 fn widest(text: &str) -> usize {
     text.lines().map(|line| line.chars().count()).max().unwrap_or(0)
 }
@@ -36,7 +36,7 @@ fn no_line_is_wider_than_the_terminal() {
             assert!(widest(&text) <= width, "{arguments:?} at {width}: {}\n{text}", widest(&text));
             assert!(numbers(&text) >= numbers(&whole), "{arguments:?} at {width} lacks numbers");
         }
-        // Without a width, notes are broken where the table ends.
+        // By default, notes wrap at the width of the table.
         let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
         assert_eq!(words(&run(Some(10_000))), words(&whole));
     }

@@ -1,4 +1,4 @@
-//! Small files that ask for much: traces of which a row takes less than a byte.
+//! Small files that ask for much work, such as traces whose rows take less than a byte each.
 
 use std::fmt::Write as _;
 use std::fs::{self, File};
@@ -17,12 +17,12 @@ use parquet::file::properties::WriterProperties;
 
 use super::program::{Answer, limited, stderr, stdout};
 
-/// What the program may take for an input of 1 MB, in KiB and in seconds of its processor time; a build without optimisation
-/// takes ten times as long.
+/// The program's limits for an input of 1 MB: memory in KiB and processor time in seconds. An unoptimised build takes
+/// ten times as long as an optimised one.
 pub const MEMORY: u64 = 512 << 10;
 const SECONDS: u32 = 100;
 
-/// One text in every row.
+/// The same text in every row.
 fn same(text: &str, rows: usize) -> ArrayRef {
     let keys = Int32Array::from(vec![0; rows]);
     Arc::new(DictionaryArray::<Int32Type>::new(keys, Arc::new(StringArray::from(vec![text]))))
@@ -78,7 +78,7 @@ fn write(path: &Path, rows: usize, columns: Vec<(&str, ArrayRef)>) {
     assert!(bytes < 1 << 20, "{}: {bytes} bytes", path.display());
 }
 
-/// One episode of so many steps.
+/// One episode with this number of steps.
 pub fn long_episode(path: &Path, steps: usize) {
     write(path, steps, vec![("t", integers(1..=steps))]);
 }
@@ -89,17 +89,17 @@ pub fn long_texts(path: &Path, steps: usize) {
     write(path, steps, vec![("t", integers(1..=steps)), ("identification", same(&text, steps))]);
 }
 
-/// Episodes of one step each, with these numbers.
+/// Episodes of one step each, with these numbers in their ids.
 pub fn many_episodes(path: &Path, numbers: Range<usize>) {
     write(path, numbers.len(), vec![("episode_id", numbered(numbers))]);
 }
 
-/// The same, each of a model of its own.
+/// Episodes of one step each, every one of a different model.
 pub fn many_models(path: &Path, count: usize) {
     write(path, count, vec![("episode_id", numbered(0..count)), ("model", numbered(0..count))]);
 }
 
-/// Definitions of so many metrics.
+/// Definitions with `count` metrics.
 pub fn definitions(path: &Path, count: usize, value: impl Fn(usize) -> String) {
     let text = (0..count).fold(String::new(), |mut text, at| {
         writeln!(text, "[metric.M{at}]\nvalue = \"{}\"", value(at)).unwrap();
@@ -108,14 +108,14 @@ pub fn definitions(path: &Path, count: usize, value: impl Fn(usize) -> String) {
     fs::write(path, text).unwrap();
 }
 
-/// The most memory that a process has taken so far, in KiB; 0 if it is gone.
+/// The peak memory of a process so far, in KiB; 0 if it has ended.
 pub fn peak(process: u32) -> u64 {
     let status = fs::read_to_string(format!("/proc/{process}/status")).unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
     line.and_then(|line| line.trim().strip_suffix("kB")?.trim().parse().ok()).unwrap_or_default()
 }
 
-/// What the program did, and what it took at most, in KiB: looked at every few milliseconds.
+/// The program's answer and its peak memory in KiB, sampled every few milliseconds.
 pub fn measured(at: &Path, arguments: &[&str]) -> (Answer, u64) {
     let mut command = limited(at, &format!("ulimit -t {SECONDS}"));
     command.args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped());

@@ -1,5 +1,5 @@
-//! Faults of the file system, and what it would hold after a loss of power: `faults.c` as a library that is loaded into the
-//! program.
+//! File system faults, and the calls that decide what survives a loss of power: the program runs with `faults.c` as a
+//! preloaded library.
 
 use std::fmt;
 use std::fs;
@@ -17,14 +17,14 @@ pub const EMFILE: i32 = 24;
 /// `Permission denied`.
 pub const EACCES: i32 = 13;
 
-/// The call that fails.
+/// A fault: the call that fails, and how.
 #[derive(Clone, Copy, Debug)]
 pub struct Fault {
-    /// `open`, `write`, `fsync`, `rename`, `unlink`, `mkdir`, `truncate`, `link`, or `*` for any that changes something.
+    /// `open`, `write`, `fsync`, `rename`, `unlink`, `mkdir`, `truncate`, `link`, or `*` for all that change something.
     pub kind: &'static str,
-    /// Its number among its kind, from 1.
+    /// The number of the call among those of its kind, from 1.
     pub at: usize,
-    /// The error; 0 ends the process instead.
+    /// The error number; 0 ends the process instead.
     pub error: i32,
     /// True if all later calls of the kind fail too.
     pub stays: bool,
@@ -37,19 +37,19 @@ impl fmt::Display for Fault {
 }
 
 impl Fault {
-    /// The system's message about it.
+    /// The system's message for the error.
     pub fn words(&self) -> String {
         let words = io::Error::from_raw_os_error(self.error).to_string();
         words.split(" (os error").next().unwrap_or_default().to_owned()
     }
 }
 
-/// One call of the program on a path below the folder that is watched.
+/// One call of the program on a path below the watched folder.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Call {
-    /// A file or folder was opened, or was to be.
+    /// The program opened a file or folder, or tried to.
     Open(PathBuf),
-    /// Opening made the file, which is known by its number from here on.
+    /// Opening created the file; later calls refer to it by this number.
     Create(PathBuf, usize),
     Truncate(usize, usize),
     Write(usize, usize, Vec<u8>),
@@ -85,7 +85,7 @@ impl Call {
         }
     }
 
-    /// By what name a [`Fault`] fails such a call; `None` for what is reported of another one.
+    /// The kind by which a [`Fault`] selects this call; `None` for calls that belong to another one.
     pub fn kind(&self) -> Option<&'static str> {
         match self {
             Self::Open(_) => Some("open"),
@@ -104,7 +104,7 @@ fn from_hex(text: &str) -> Vec<u8> {
     (0..text.len()).step_by(2).map(|at| u8::from_str_radix(&text[at..at + 2], 16).unwrap()).collect()
 }
 
-/// The library, compiled once a run.
+/// The library, compiled once per test program.
 fn library() -> &'static Path {
     static LIBRARY: OnceLock<PathBuf> = OnceLock::new();
     LIBRARY.get_or_init(|| {
@@ -115,20 +115,20 @@ fn library() -> &'static Path {
         compiler.args(["-shared", "-fPIC", "-O1", "-Wall", "-Wextra", "-Werror", "-o"]).arg(&made).arg(source);
         let output = compiler.arg("-ldl").output().unwrap_or_else(|error| panic!("cc, which Rust links with: {error}"));
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        // Other test programs do the same at the same time.
+        // Other test programs compile it at the same time.
         fs::rename(made, &named).unwrap();
         named
     })
 }
 
-/// Has the calls of a command below `root` noted in the file `log`, which must not be below it.
+/// Logs a command's calls below `root` to the file `log`, which must not be below `root`.
 pub fn watched<'a>(command: &'a mut Command, root: &Path, log: &Path) -> &'a mut Command {
-    // What the linker adds to it is for the tests themselves.
+    // This replaces an existing `LD_PRELOAD`, which is for the tests themselves.
     command.env("LD_PRELOAD", library()).env("MIRRORSTATS_FAULT_LOG", log);
     command.env("MIRRORSTATS_FAULT_ROOT", root.canonicalize().unwrap())
 }
 
-/// As [`watched`], with a fault.
+/// Like [`watched`], with a fault.
 pub fn failing<'a>(command: &'a mut Command, root: &Path, log: &Path, fault: Fault) -> &'a mut Command {
     watched(command, root, log).env("MIRRORSTATS_FAULT", fault.to_string())
 }
@@ -138,7 +138,7 @@ pub fn calls(log: &Path) -> Vec<Call> {
     fs::read_to_string(log).unwrap_or_default().lines().map(Call::read).collect()
 }
 
-/// Numbers that look random, the same for a seed.
+/// Pseudo-random numbers from a seed.
 pub struct Draws(u64);
 
 impl Draws {
@@ -153,7 +153,7 @@ impl Draws {
     }
 }
 
-/// A number from the environment, for campaigns of another length.
+/// A number from the environment, to change the length of a campaign.
 pub fn rounds(name: &str, usual: usize) -> usize {
     std::env::var(name)
         .map_or(usual, |text| text.parse().unwrap_or_else(|_| panic!("{name}: expected a number, found `{text}`")))

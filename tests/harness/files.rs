@@ -1,10 +1,10 @@
-//! The files of the repository, and folders that are compared.
+//! The files of the repository, and the contents of folders.
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Every file of a folder by its path, with its bytes.
+/// Every file of a folder: path and bytes.
 pub type Contents = BTreeMap<String, Vec<u8>>;
 
 /// The folder of the repository.
@@ -31,7 +31,7 @@ pub fn contents(folder: &Path) -> Contents {
     found
 }
 
-/// That two folders hold the same, told by name rather than by megabytes.
+/// Checks that two folders hold the same, and names the file that differs instead of printing its bytes.
 #[track_caller]
 pub fn assert_same(found: &Contents, expected: &Contents) {
     assert_eq!(found.keys().collect::<Vec<_>>(), expected.keys().collect::<Vec<_>>());
@@ -40,10 +40,10 @@ pub fn assert_same(found: &Contents, expected: &Contents) {
     }
 }
 
-/// A configuration `small.toml` of the world seen through a smaller eye, so that there is less to count and to draw.
+/// Writes `small.toml`, a configuration of the world with a smaller eye, so that there is less to count and draw.
 pub fn write_small_world(folder: &Path, more: &str) {
     fs::write(folder.join("small.toml"), format!("{SMALL}{more}")).unwrap();
 }
 
-/// The changes of `small.toml` to the world.
+/// The changes that `small.toml` makes to the world.
 pub const SMALL: &str = "eye.width = 64\neye.height_px = 48\neye.samples = 0\n";

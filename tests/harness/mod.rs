@@ -1,5 +1,4 @@
-//! What the tests of several folders need: the program as a process, folders to compare, small traces, what must be
-//! installed.
+//! Shared by the tests of several folders: running the program, comparing folders, small traces, required programs.
 
 #![expect(dead_code, reason = "every binary has all of it, and none uses all of it")]
 
@@ -15,8 +14,8 @@ pub mod power;
 pub mod program;
 pub mod traces;
 
-/// A snapshot that shows what it was made of: the input, then the output.
-// Exported, or every binary would have to use it.
+/// Asserts a snapshot that shows the input before the output.
+// Exported, because otherwise every test binary would have to use it.
 #[macro_export]
 macro_rules! assert_shown {
     ($input:expr, $output:expr $(,)?) => {

@@ -1,4 +1,4 @@
-//! Required programs: a missing one is a failure that names the script to fetch it.
+//! Required programs. If one is missing, the test fails and names the script that fetches it.
 
 use std::env;
 use std::path::PathBuf;
@@ -64,7 +64,7 @@ pub fn python() -> &'static str {
     "python3"
 }
 
-/// That pictures can be drawn without a display.
+/// Checks that pictures can be drawn without a display.
 #[cfg(feature = "sim")]
 pub fn drawing() {
     use world::sim::{camera::Camera, config::WorldConfig};

@@ -1,7 +1,7 @@
-//! A folder after a loss of power: what was not synchronised is gone, in part or altogether.
+//! A folder after a loss of power: unsynchronised changes are lost, in part or altogether.
 //!
-//! Bytes of a file are kept by synchronising the file, names in a folder by synchronising the folder. What has happened
-//! since may have reached the disk or not, each name and each write for itself.
+//! Synchronising a file keeps its bytes, and synchronising a folder keeps its names. Later changes may or may not have
+//! reached the disk, each name and each write independently.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -9,21 +9,21 @@ use std::path::{Path, PathBuf};
 
 use super::faults::{Call, Draws};
 
-/// The kept part of unsynchronised data.
+/// The part of unsynchronised changes that survives.
 #[derive(Clone, Copy, Debug)]
 pub enum Unsynced {
     /// Nothing.
     Gone,
     /// All names, and no bytes: files that were renamed too early are empty.
     Names,
-    /// As dice decide; of the last write of a file a part, or zeros in place of its bytes.
+    /// Random changes; of a file's last write a part, or zeros in place of its bytes.
     Some(u64),
 }
 
 #[derive(Clone, Debug, PartialEq)]
 enum Node {
     Folder,
-    /// A file by its number here, which none has twice.
+    /// A file, by its unique index in [`Disk`].
     File(usize),
 }
 
@@ -51,24 +51,24 @@ impl Change {
     }
 }
 
-/// The new file of a name; `None` for no file.
+/// A path and its new node; `None` if the path was removed.
 type Named = (PathBuf, Option<Node>);
 
-/// The contents of a disk, and the writes on their way.
+/// The contents of a disk, and the pending changes.
 #[derive(Debug, Default)]
 pub struct Disk {
     files: Vec<Content>,
-    /// The file behind each number of the system.
+    /// The index of the file behind each number in the log.
     numbers: BTreeMap<usize, usize>,
-    /// The names as the program sees them.
+    /// The names that the program sees.
     names: BTreeMap<PathBuf, Node>,
     kept: BTreeMap<PathBuf, Node>,
-    /// Changes of names that are not kept yet; those of one folder that belong together are one.
+    /// Unsynchronised changes of names; changes in one folder that belong together are one entry.
     since: Vec<Vec<Named>>,
 }
 
 impl Disk {
-    /// After these calls in a folder that was empty.
+    /// The disk after these calls in an empty folder.
     pub fn after(calls: &[Call]) -> Self {
         let mut disk = Self::default();
         for call in calls {
@@ -126,7 +126,7 @@ impl Disk {
         self.since = since;
     }
 
-    /// Writes what the disk has after a loss of power into the folder `to`, for the folder `from` of the calls.
+    /// Writes the contents of `from` after a loss of power into the folder `to`.
     pub fn restore(&self, unsynced: Unsynced, from: &Path, to: &Path) {
         let mut draws = Draws::new(if let Unsynced::Some(seed) = unsynced { seed } else { 0 });
         let mut names = self.kept.clone();
@@ -141,7 +141,7 @@ impl Disk {
             }
         }
         let mut folders = BTreeSet::from([from.to_owned()]);
-        // In the order of paths folders come before what is in them.
+        // Paths are sorted, so folders come before their contents.
         for (path, node) in names {
             let (Some(above), Ok(inside)) = (path.parent(), path.strip_prefix(from)) else { continue };
             if !folders.contains(above) {

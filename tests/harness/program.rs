@@ -10,10 +10,10 @@ use serde_json::Value;
 /// The path of the program.
 pub const PROGRAM: &str = env!("CARGO_BIN_EXE_mirrorstats");
 
-/// Variables of a caller that runs the tests that change what the program does.
+/// Variables in the environment of the tests that would change the program's behaviour.
 const SETTINGS: [&str; 5] = ["COLUMNS", "NO_COLOR", "PYSPARK_DRIVER_PYTHON", "PYSPARK_PYTHON", "SPARK_HOME"];
 
-/// The result of the program.
+/// The exit code and output of the program.
 pub struct Answer {
     pub code: i32,
     pub stdout: String,
@@ -27,24 +27,24 @@ impl Answer {
         self
     }
 
-    /// Standard output of a run that went well.
+    /// Standard output; the program must succeed.
     #[track_caller]
     pub fn done(self) -> String {
         self.ends(0).stdout
     }
 
-    /// The same as JSON.
+    /// Standard output as JSON; the program must succeed.
     #[track_caller]
     pub fn json(self) -> Value {
         serde_json::from_str(&self.done()).unwrap()
     }
 
-    /// Standard error of a run that was refused: exit code 2, nothing on standard output, never a panic.
+    /// Standard error of a refusal: exit code 2, no standard output, no panic.
     #[track_caller]
     pub fn refused(self) -> String {
         let Self { stdout, stderr, .. } = self.ends(2);
         assert!(stdout.is_empty(), "{stdout}");
-        // Notes on what was left out may come before.
+        // Notes on omissions may come first.
         let is_error = stderr.starts_with("error: ") || stderr.starts_with("note: ") && stderr.contains("\nerror: ");
         assert!(is_error && stderr.ends_with('\n') && !stderr.contains("panicked"), "{stderr}");
         stderr
@@ -69,20 +69,19 @@ pub fn clean(mut command: Command, folder: &Path) -> Command {
     command
 }
 
-/// The program in a folder, without the settings of a caller that runs the tests.
+/// The program in a folder, without the caller's [`SETTINGS`].
 pub fn program(folder: &Path) -> Command {
     clean(Command::new(PROGRAM), folder)
 }
 
-/// The program below a limit of the shell, such as `ulimit -v 524288`; a limit of the size of files stands in for a full
-/// disk.
+/// The program under a limit of the shell, such as `ulimit -v 524288`; a limit on file sizes simulates a full disk.
 pub fn limited(folder: &Path, limit: &str) -> Command {
     let mut command = clean(Command::new("sh"), folder);
     command.args(["-c", &format!("{limit}; exec \"$0\" \"$@\""), PROGRAM]);
     command
 }
 
-/// The program with words as they are typed, without quotes.
+/// The program with arguments separated by spaces, without quoting.
 pub fn typed(folder: &Path, words: &str) -> Command {
     let mut command = program(folder);
     command.args(words.split_whitespace());
@@ -98,13 +97,13 @@ pub fn run(folder: &Path, arguments: &[&str]) -> Answer {
     answer(program(folder).args(arguments))
 }
 
-/// Runs the program in a folder with something on standard input.
+/// Runs the program in a folder with this standard input.
 pub fn run_with_input(folder: &Path, arguments: &[&str], input: impl Into<Vec<u8>>) -> Answer {
     let mut command = assert_cmd::Command::from_std(program(folder));
     command.args(arguments).write_stdin(input).output().unwrap().into()
 }
 
-/// Runs a command that must end well.
+/// Runs a command that must succeed.
 #[track_caller]
 pub fn succeeds(command: &mut Command) -> Output {
     let output = command.output().unwrap();
@@ -125,7 +124,7 @@ pub fn interrupt(child: &Child) {
     succeeds(Command::new("kill").args(["-INT", &child.id().to_string()]));
 }
 
-/// A process that does not outlive its owner.
+/// A process that is killed when this is dropped.
 pub struct Running(pub Child);
 
 impl Drop for Running {
@@ -135,7 +134,7 @@ impl Drop for Running {
     }
 }
 
-/// Looks again and again until there is something, for two minutes at most.
+/// Polls until `look` returns something, for two minutes at most.
 #[track_caller]
 pub fn wait_for<T>(what: &str, mut look: impl FnMut() -> Option<T>) -> T {
     for _ in 0..6000 {

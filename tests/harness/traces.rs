@@ -1,4 +1,4 @@
-//! Small traces: written, and read again.
+//! Writes and reads small traces.
 
 use std::fs::File;
 use std::path::Path;
@@ -31,7 +31,7 @@ pub fn episode(id: &str, steps: Vec<Step>) -> Episode {
     }
 }
 
-/// Writes a trace with these optional columns, whether they have values or not.
+/// Writes a trace with these optional columns, even if they have no values.
 pub fn write_trace(path: &Path, episodes: &[Episode], columns: OptionalColumns) {
     let mut writer = TraceWriter::create(path, &TraceMetadata { recording: None, columns }).unwrap();
     for episode in episodes {
@@ -40,7 +40,7 @@ pub fn write_trace(path: &Path, episodes: &[Episode], columns: OptionalColumns) 
     writer.finish().unwrap();
 }
 
-/// Scores in CSV, row by row, without what the footer and the replies declare.
+/// Scores in CSV, row by row, without the columns `unusable_replies` and `mirrorstats.declared`.
 pub fn score_values(scores: &str) -> Vec<Vec<String>> {
     let mut reader = csv::Reader::from_reader(scores.as_bytes());
     let header = reader.headers().unwrap().clone();
@@ -52,7 +52,7 @@ pub fn score_values(scores: &str) -> Vec<Vec<String>> {
     std::iter::once(names).chain(reader.records().map(|row| values(&row.unwrap()))).collect()
 }
 
-/// Writes rows as another writer does, each batch as a row group at least.
+/// Writes rows as another writer does: each batch becomes at least one row group.
 pub fn write_rows(path: &Path, batches: &[RecordBatch], properties: Option<WriterProperties>) {
     let mut writer = ArrowWriter::try_new(File::create(path).unwrap(), batches[0].schema(), properties).unwrap();
     for batch in batches {

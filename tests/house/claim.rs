@@ -1,5 +1,5 @@
-//! Who else records into a folder. Not among tests that start programs: there a child holds the locks of its parent for a
-//! moment, and nobody is alone.
+//! Detecting other processes that record into a folder. This must not run beside tests that start programs: a child
+//! briefly holds its parent's locks, so no process is alone there.
 
 use std::fs;
 

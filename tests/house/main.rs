@@ -1,4 +1,4 @@
-//! Rules of the repository, and what no other test may disturb: nothing here starts a program.
+//! Rules of the repository, and tests that no other test may disturb. Nothing here starts a program.
 
 #[cfg(feature = "sim")]
 mod claim;

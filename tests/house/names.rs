@@ -1,4 +1,4 @@
-//! Metrics and experiments are data: source names those of the paper where it lists assets or shows an example, and nowhere else.
+//! Metrics and experiments are data: source code names the paper's only where it lists assets or shows an example.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -27,7 +27,7 @@ fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Source files of the program below a folder.
+/// Collects the program's source files below a folder.
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
         let is_test =
@@ -41,7 +41,7 @@ fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// The code of a file: no comments, and no unit tests, which come last.
+/// The code of a file, without comments and unit tests, which come last.
 fn code(text: &str) -> String {
     let code = text.split("#[cfg(test)]").next().unwrap_or_default();
     let is_code = |line: &&str| !line.trim_start().starts_with("//");

@@ -1,4 +1,4 @@
-//! The files of `schemas/` are what the types say. `MIRRORSTATS_WRITE_SCHEMAS=1 cargo test --test house schemas` writes them.
+//! Checks `schemas/` against the types. `MIRRORSTATS_WRITE_SCHEMAS=1 cargo test --test house schemas` writes it.
 
 use std::fs;
 use std::path::PathBuf;
@@ -35,7 +35,7 @@ fn folder() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("schemas")
 }
 
-/// Every file of the folder: what a person writes, what the program reads and prints as JSON.
+/// Every file of the folder: formats that people write, and JSON that the program reads and prints.
 fn current() -> Vec<(&'static str, Value)> {
     let mut schemas = vec![
         ("audit", json!(schema_for!(Audit))),
@@ -94,7 +94,7 @@ fn the_schema_files_are_current() {
     }
 }
 
-/// A reply's schema without what is there for people alone.
+/// A reply's schema without the keywords for people.
 fn keys_and_types(schema: &Value) -> Value {
     let mut schema = schema.clone();
     let object = schema.as_object_mut().unwrap();
@@ -105,7 +105,7 @@ fn keys_and_types(schema: &Value) -> Value {
     schema
 }
 
-/// People and other harnesses are given these files; agents get the structure alone.
+/// People and other harnesses get these files; agents get only the structure.
 #[test]
 fn replies_are_described_as_the_files_say() {
     let replies =
@@ -121,7 +121,7 @@ fn replies_are_described_as_the_files_say() {
 
 #[test]
 fn the_folder_holds_nothing_else() {
-    // Their types are there with the feature `sim` alone, their files always.
+    // These types need the feature `sim`; their files always exist.
     let of_worlds = [
         "census",
         "exec-message",

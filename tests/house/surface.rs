@@ -1,10 +1,10 @@
-//! The public surface: the names that the library promises, read off `src/lib.rs`.
+//! The public surface: the names that the library promises, as listed in `src/lib.rs`.
 
 fn lib() -> String {
     std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/src/lib.rs")).unwrap()
 }
 
-/// The names that the `pub use` declarations of a text bring, sorted.
+/// The names that a text's `pub use` declarations re-export, sorted.
 fn reexported(text: &str) -> Vec<String> {
     let declarations = text.split("\npub use ").skip(1).map(|rest| rest.split_once(';').unwrap().0);
     let mut names: Vec<String> = declarations.flat_map(names_of).collect();

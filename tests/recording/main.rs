@@ -1,4 +1,4 @@
-//! Episodes as they come about: the world, recordings, their logs, and recorded episodes again.
+//! The origin of episodes: the world, recordings, logs and replays.
 
 #![cfg(feature = "sim")]
 

@@ -1,4 +1,4 @@
-//! Figures at the library's boundary: what is read back from their bytes.
+//! Figures at the library boundary: the tests read their bytes back.
 
 mod cast;
 
@@ -16,7 +16,7 @@ fn svg(name: FigureName, cast: &Cast) -> String {
     draw(name, &cast.input()).unwrap_or_else(|error| panic!("{name}: {error}")).inline_svg()
 }
 
-/// Every text as drawn, with the box of its ink.
+/// Every text as drawn, with its bounding box.
 fn texts(svg: &str) -> (usvg::Size, Vec<(String, Rect)>) {
     let mut fonts = fontdb::Database::new();
     fonts.load_fonts_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/assets/fonts"));
@@ -42,7 +42,7 @@ fn collect(group: &usvg::Group, found: &mut Vec<(String, Rect)>) {
 }
 
 fn overlap(a: Rect, b: Rect) -> bool {
-    // Ink may touch by less than a reader sees.
+    // Texts may overlap by less than a reader sees.
     const HAIR: f32 = 0.25;
     a.left() + HAIR < b.right()
         && b.left() + HAIR < a.right()
@@ -69,7 +69,7 @@ fn check_texts(label: &str, svg: &str) {
     }
 }
 
-/// The figure of thresholds, each with the same cells.
+/// Checks the figure of thresholds with the same cells for each threshold.
 fn check_thresholds(label: &str, cast: &Cast, px: &[u32]) {
     let px = [None].into_iter().chain(px.iter().copied().map(Some));
     let stages: Vec<_> = px.map(|px| sensitivity::Stage { px, cells: &cast.cells }).collect();
@@ -114,7 +114,7 @@ fn no_text_leaves_the_frame_or_overlaps_another() {
     check_layout("a cell missing", &paper.without(|e, m| e == "E4" && m == "GPT 5.1"));
 }
 
-/// The smallest text of a picture, pt.
+/// The smallest text size of a picture, in pt.
 fn smallest(svg: &str) -> f64 {
     let size = |svg: &str, name: &str| -> f64 {
         let from = svg.find(&format!(" {name}=\"")).unwrap() + name.len() + 3;
@@ -171,7 +171,7 @@ fn wide_letters_do_not_leave_the_frame_either() {
     check_layout("wide", &cast::made_up(&(0..20).map(wide).collect::<Vec<_>>()));
 }
 
-/// The marks of a figure that represent a cell: experiment, model, metric, value, n.
+/// A figure's marks that represent cells: experiment, model, metric, value, n.
 fn marks(svg: &str) -> Vec<BTreeMap<String, String>> {
     let document = Document::parse(svg).unwrap();
     let is_mark = |node: &Node<'_, '_>| node.attribute("class") == Some("mark");
@@ -182,7 +182,7 @@ fn marks(svg: &str) -> Vec<BTreeMap<String, String>> {
     document.descendants().filter(is_mark).map(data).filter(|mark| mark.contains_key("value")).collect()
 }
 
-/// The cells: (experiment, model, metric) to the full mean, empty if undefined, and n.
+/// The cells: (experiment, model, metric) to n and the full mean, which is empty if undefined.
 fn expected(cast: &Cast) -> BTreeMap<(String, String, String), (String, String)> {
     let cells = &cast.cells;
     let of_group = |group: &report::cells::Group| {

@@ -1,4 +1,4 @@
-//! The outputs for people: tables, statistics, figures, the page, and the published numbers rebuilt.
+//! Outputs for people: tables, statistics, figures, the page, and the rebuilt published numbers.
 
 #[cfg(feature = "raster")]
 mod figures;

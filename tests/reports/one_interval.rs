@@ -1,4 +1,4 @@
-//! A cell has one interval: in tables, in `cells.csv`, on the page, in `view`, in queries, in Arrow and in `stats`.
+//! A cell has the same interval in tables, `cells.csv`, the page, `view`, queries, Arrow and `stats`.
 //!
 //! Python's `cells` are the Arrow batch.
 
@@ -15,7 +15,7 @@ use trace::write::OptionalColumns;
 use crate::harness::program::run;
 use crate::harness::traces::{episode, write_trace};
 
-/// Bounds by model and metric; none if the interval is withheld.
+/// Bounds by model and metric; `None` if the interval is withheld.
 type Found = BTreeMap<(String, String), Option<(f64, f64)>>;
 
 const DEFINITIONS: &str = r#"
@@ -99,7 +99,7 @@ fn of_stats(at: &Path) -> Found {
     stats["cells"].as_array().unwrap().iter().map(cell).collect()
 }
 
-/// The named columns of a file with a header.
+/// The cells of a CSV file, by its column names.
 fn of_csv(text: &str) -> (Found, Vec<[String; 5]>) {
     let mut reader = csv::Reader::from_reader(text.as_bytes());
     let header = reader.headers().unwrap().clone();
@@ -140,7 +140,7 @@ fn of_arrow(at: &Path) -> Found {
     (0..batch.num_rows()).map(row).collect()
 }
 
-/// The cells of the page: metric, n, sum and bounds as they are in its attributes.
+/// The cells of the page, from its attributes: metric, n, sum and bounds.
 fn of_page(page: &str) -> Vec<[String; 5]> {
     let attribute = |cell: &str, name: &str| {
         let rest = cell.split_once(&format!("{name}=\"")).unwrap().1;
@@ -155,7 +155,7 @@ fn of_page(page: &str) -> Vec<[String; 5]> {
     found
 }
 
-/// The cells of the copy of `view` on a disk.
+/// The cells in an exported copy of `view`.
 #[cfg(feature = "view")]
 fn of_view(at: &Path) -> Vec<[String; 5]> {
     run(at, &["view", "a.parquet", "--definitions", "mine.toml", "--export", "seen"]).done();
@@ -181,7 +181,7 @@ fn every_output_has_the_interval_that_stats_has() {
     assert_eq!(of_page(&fs::read_to_string(at.join("out/report.html")).unwrap()), texts);
     #[cfg(feature = "view")]
     assert_eq!(of_view(at), texts);
-    // Printed tables round; they have bounds where the others have.
+    // Printed tables are rounded; they have bounds exactly where the others do.
     let mut printed_cells = BTreeSet::new();
     for table in ["main", "appendix"] {
         let (rounded, _) = of_csv(&fs::read_to_string(at.join(format!("out/tables/{table}.csv"))).unwrap());
@@ -191,7 +191,7 @@ fn every_output_has_the_interval_that_stats_has() {
         }
     }
     assert_eq!(printed_cells.len(), stats.len());
-    // What is withheld, and what the range of a metric bounds.
+    // Withheld intervals, and intervals bounded by a metric's range.
     for metric in ["TTD", "TURNS", "TURNING", "OFFSET"] {
         for model in ["one", "two", "three", "alike", "alike-many"] {
             assert_eq!(stats[&key(model, metric)], None, "{metric} of {model}");
@@ -207,7 +207,7 @@ fn every_output_has_the_interval_that_stats_has() {
     assert_eq!(bounds("high", "SHARE").1.to_bits(), 1000.0f64.to_bits());
     assert_eq!(bounds("high", "WAIT").1.to_bits(), 200.0f64.to_bits(), "an own duration has the budget of its unit");
     assert!(stats[&key("one", "TSA")].is_some(), "a rate has an interval from one episode on");
-    // The reader of a table gets the reason.
+    // The table states the reason.
     let line = |model: &str| printed.lines().find(|line| line.trim_start().starts_with(model)).unwrap();
     assert!(line("two").contains("*8.5*† n=2"), "{printed}");
     assert!(printed.contains("A mean of fewer than 12 episodes has no interval"), "{printed}");
@@ -243,7 +243,7 @@ fn a_filter_is_named_beside_tables_and_verdicts() {
     let by_results = ["--where", "TSA = 1"];
     let by_keys = ["--where", "model <> 'one'"];
     let told = "Only episodes where `TSA = 1`; the filter chose them by their results";
-    // Text wraps nowhere without a terminal.
+    // Without a terminal, text is not wrapped.
     let stats = run(at, &[&["stats", "a.parquet"], &by_results[..]].concat()).done();
     assert!(stats.contains(told) && stats.contains("(episodes chosen by their results: `TSA = 1`)"), "{stats}");
     let json: Value = run(at, &[&["stats", "a.parquet", "--json"], &by_results[..]].concat()).json();

@@ -1,7 +1,7 @@
-//! The rebuilt episodes print the published tables, and the committed traces are what the generator makes.
+//! The rebuilt episodes print the published tables, and the committed traces equal the generator's output.
 //!
-//! The metrics, the standard errors and the rounding are computed here once more, in plain loops and without the
-//! library, so that the reconstruction is not judged by the code that made it.
+//! Metrics, standard errors and rounding are computed again here, in plain loops and without the library. This judges
+//! the reconstruction independently of the code that made it.
 
 #[path = "../../examples/reconstruct/reconstruction/mod.rs"]
 mod rebuilt;
@@ -25,7 +25,7 @@ fn episodes() -> impl Iterator<Item = &'static Episode> {
     TRACES.iter().flat_map(|trace| &trace.episodes)
 }
 
-/// The rows of an episode, with t from 1.
+/// The steps of an episode, counted from t = 1.
 struct Watched<'a> {
     episode: &'a Episode,
     /// The first `done`.
@@ -57,7 +57,7 @@ impl<'a> Watched<'a> {
         self.step(t).self_color.as_deref().is_some_and(|color| color != "unknown")
     }
 
-    /// The first t from 1 to `last` where something holds.
+    /// The first t from 1 to `last` for which `holds` is true.
     fn first(&self, last: usize, holds: impl Fn(&Self, usize) -> bool) -> Option<usize> {
         (1..=last).find(|&t| holds(self, t))
     }
@@ -129,7 +129,7 @@ fn cells() -> Cells {
     cells
 }
 
-/// Mean and standard error of some values, unrounded; one value has the standard error 0.
+/// Unrounded mean and standard error of some values; the standard error of one value is 0.
 fn mean_and_se(values: &[i32], metric: &str) -> (f64, f64) {
     let n = i32::try_from(values.len()).unwrap();
     let sum: i32 = values.iter().sum();
@@ -154,7 +154,7 @@ fn rounded(number: f64, source: Source) -> String {
     }
 }
 
-/// A cell as its place prints it. The main table prints an undefined value as `0.00`, the appendix as `--`.
+/// A cell as `source` prints it. The main table prints an undefined value as `0.00`, the appendix as `--`.
 fn printed(values: &[i32], metric: &str, source: Source) -> Option<Value> {
     if values.is_empty() {
         let zero = Value { mean: "0.00".into(), se: "0.00".into() };
@@ -293,8 +293,8 @@ fn all_models_meet_the_same_scenes() {
     assert_eq!(scenes.len(), 5 * 21);
 }
 
-/// In four pairs the published lengths alone leave no other way; in E3 of Gemma4 26B lengths and gazes together would
-/// need episodes of a single step and agents that never look away.
+/// Four pairs have published lengths that leave no other way. In E3 of Gemma4 26B, lengths and gazes together would
+/// need episodes of one step and agents that never look away.
 #[test]
 fn trajectories_without_done_run_to_the_budget_but_in_five_pairs() {
     let cut: BTreeSet<_> = episodes()
@@ -327,7 +327,7 @@ fn successes_and_lengths_are_spread_over_the_seeds() {
     }
 }
 
-/// Where a definition could be misread by one step or one word, some episode tells the readings apart.
+/// For each way to misread a definition by one step or one word, some episode distinguishes the readings.
 #[test]
 fn the_edges_of_the_definitions_occur() {
     let occurs = |edge: fn(&Watched) -> bool| episodes().any(|episode| edge(&Watched::of(episode)));

@@ -1,4 +1,4 @@
-//! `stats --sequential` on tables of episodes with known answers.
+//! `stats --sequential` on episode tables with known answers.
 
 #![expect(clippy::unreadable_literal, reason = "reference values as their sources print them")]
 
@@ -28,7 +28,7 @@ fn metric(kind: Kind) -> Metric {
     }
 }
 
-/// TSA, 1/3 by chance in E1 and nothing to compare with in E2; TTD, which is no rate; MCR, a rate without a level.
+/// TSA, 1/3 by chance in E1 and without a level in E2; TTD, which is not a rate; MCR, a rate without a level.
 fn catalog() -> Catalog {
     let chance = IndexMap::from([("TSA".to_owned(), Some("1/3".parse().unwrap()))]);
     let experiment = |order, chance| {
@@ -52,7 +52,7 @@ fn catalog() -> Catalog {
     }
 }
 
-/// Experiment, model, how many of the first of 21 scenes are solved.
+/// Experiment, model, and the number of solved scenes: the first ones of 21.
 type Block<'a> = (&'a str, &'a str, i32);
 
 const STUDY: [Block; 4] = [("E1", "middle", 13), ("E1", "strong", 21), ("E1", "weak", 5), ("E2", "strong", 7)];
@@ -61,7 +61,7 @@ fn sequential(blocks: &[Block]) -> Sequential {
     with_scenes(blocks, 1, |_, at| Some(format!("room {at}")))
 }
 
-/// Every scene of 21 is played `repeats` times, and solved always or never.
+/// Each of 21 scenes is played `repeats` times, and is solved every time or never.
 fn with_scenes(blocks: &[Block], repeats: i32, scene: impl Fn(&str, i32) -> Option<String>) -> Sequential {
     let times = || blocks.iter().flat_map(|block| (0..21 * repeats).map(move |run| (block, run)));
     let rows = || times().map(|(block, run)| (block, run / repeats));
@@ -95,7 +95,7 @@ fn with_scenes(blocks: &[Block], repeats: i32, scene: impl Fn(&str, i32) -> Opti
     Sequential::of(&table, &Options::default()).unwrap()
 }
 
-// The e-values and bounds are those of the tests of `stats::sequential`, where their sources are named.
+// The e-values and bounds are those in the tests of `stats::sequential`, which name their sources.
 #[test]
 fn rates_are_compared_with_chance_by_e_values() {
     let found = sequential(&STUDY);
@@ -111,7 +111,7 @@ fn rates_are_compared_with_chance_by_e_values() {
     assert!((bounds.low - 0.7845213905698409).abs() < 1e-10 && bounds.high >= 1.0, "{bounds:?}");
 }
 
-// 8 and 8 discordant pairs, all in one direction: 2^8 B(8.5, 0.5) / B(0.5, 0.5) = 50.27 by scipy 1.17.1; 16 give 9171.76.
+// 8 and 8 discordant pairs, all one way: 2^8 B(8.5, 0.5) / B(0.5, 0.5) = 50.27 by scipy 1.17.1; 16 give 9171.76.
 #[test]
 fn models_are_compared_by_their_discordant_pairs() {
     let found = sequential(&STUDY);
@@ -127,7 +127,7 @@ fn models_are_compared_by_their_discordant_pairs() {
     assert_eq!((alike.e, alike.p, alike.verdict), (1.0, 1.0, Verdict::NotSeparated));
 }
 
-// The i-th episodes of two models are a pair where no scenes are shared, and a scene counts once: the same evidence.
+// Without shared scenes, the i-th episodes of two models are a pair. A scene counts once. Both give the same evidence.
 #[test]
 fn models_without_equal_scenes_are_compared_and_repeats_count_once() {
     let by_scene = sequential(&STUDY);

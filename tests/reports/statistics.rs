@@ -1,4 +1,4 @@
-//! `stats` on tables of episodes with known answers.
+//! `stats` on episode tables with known answers.
 
 mod design;
 mod durations;
@@ -84,7 +84,7 @@ fn catalog() -> Catalog {
     }
 }
 
-/// An episode: where it belongs, whether it was solved, and its steps; negative ones never finished.
+/// An episode: experiment, model, seed, run, true if solved, and steps; negative if it never finished.
 type Row<'a> = (&'a str, &'a str, i32, i32, bool, i64);
 
 fn table(rows: &[Row]) -> EpisodeTable {
@@ -136,7 +136,7 @@ fn cells(table: &EpisodeTable) -> Cells {
 /// Recorded episodes without clusters.
 const RECORDED: Design = Design { kind: Some(DesignKind::Recording), cluster: None };
 
-/// Recorded episodes, of which those of one seed depend on each other.
+/// Recorded episodes; those with the same seed depend on each other.
 const CLUSTERED: Design = Design { cluster: Some(Cluster::Seed), ..RECORDED };
 
 /// The statistics of traces without declarations.
@@ -145,7 +145,7 @@ fn statistics(rows: &[Row]) -> Statistics {
     Statistics::of(&table, &cells(&table), &Options::default()).unwrap()
 }
 
-/// The table with a label.
+/// The episode table with an additional label.
 fn labelled(rows: &[Row], name: &str, value: impl Fn(&Row) -> Option<String>) -> EpisodeTable {
     let mut sorted = rows.to_vec();
     sorted.sort_unstable();
@@ -178,13 +178,13 @@ fn contrast<'s>(found: &'s Statistics, model: &str, metric: &str, against: &str)
     found.conditions.iter().find(is_it).unwrap()
 }
 
-/// Three seeds of seven runs, of which the first `solved` are solved in `steps` steps, the others never.
+/// Three seeds of seven runs. The first `solved` episodes are solved in `steps` steps, the others never.
 fn block<'a>(experiment: &'a str, model: &'a str, solved: i32, steps: i64) -> Vec<Row<'a>> {
     let row = |at: i32| (experiment, model, at / 7, at % 7, at < solved, if at < solved { steps } else { -100 });
     (0..21).map(row).collect()
 }
 
-/// Experiment, model, episodes that are solved, and in how many steps.
+/// Experiment, model, number of solved episodes, and their steps.
 const STUDY: [(&str, &str, i32, i64); 7] = [
     ("E1", "strong", 21, 12),
     ("E1", "middle", 14, 30),
@@ -216,7 +216,7 @@ fn cells_carry_counts_and_the_intervals_of_their_kind() {
     else {
         panic!("a rate has the intervals of a rate: {weak:?}")
     };
-    // For n = 21 at 95 %: k = 5.
+    // n = 21 and k = 5 at 95 %.
     let three = |Interval { low, high }: Interval| (format!("{low:.3}"), format!("{high:.3}"));
     assert_eq!(three(wilson), ("0.106".into(), "0.451".into()));
     assert_eq!(three(exact), ("0.082".into(), "0.472".into()));

@@ -1,4 +1,4 @@
-//! Figures of many models: the best of them alone.
+//! Figures of many models show only the best.
 
 use std::collections::BTreeSet;
 

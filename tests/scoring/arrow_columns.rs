@@ -1,4 +1,4 @@
-//! The Arrow tables of a study: episodes as `score` writes them, steps as the traces have them, differences from another study.
+//! The Arrow tables of a study: episodes as from `score`, steps as in the traces, and differences from another study.
 
 use std::path::Path;
 
@@ -27,7 +27,7 @@ fn episodes_are_those_that_score_writes() {
     }
 }
 
-/// `a.parquet` of episodes e1 and e2 with poses, `b.parquet` of e3 without.
+/// `a.parquet` with episodes e1 and e2 and poses, `b.parquet` with e3 and without poses.
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let step = |x| Step {

@@ -1,4 +1,4 @@
-//! An author of random well-typed definitions: every construct of the grammar, nested a few levels.
+//! Random well-typed definitions: every construct of the grammar, nested a few levels.
 
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -20,7 +20,7 @@ pub struct Vocabulary {
     pub float_literals: &'static [f64],
     pub text_literals: &'static [&'static str],
     pub patterns: &'static [&'static str],
-    /// True if any two integers may be multiplied; otherwise one of them is a small constant, and nothing overflows.
+    /// True if any two integers may be multiplied. Otherwise one is a small constant, and nothing overflows.
     pub products: bool,
 }
 
@@ -32,15 +32,15 @@ enum Type {
     Text,
 }
 
-/// The level of an expression: a step-level one is valid only below an aggregate or in a `let`.
+/// The level of an expression. A step-level one is valid only below an aggregate or in a `let`.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
 enum Level {
     Episode,
     Step,
 }
 
-/// Decisions read off random bytes. Where they run out every decision is the first choice, a leaf, so that a failure
-/// shrinks to a small expression.
+/// Choices from random bytes. When they run out, every choice is the first one, a leaf, so that a failure shrinks to a
+/// small expression.
 struct Author {
     bytes: std::vec::IntoIter<u8>,
     words: &'static Vocabulary,
@@ -60,7 +60,7 @@ impl Author {
         choices[self.pick(choices.len())]
     }
 
-    /// Definitions that refer to earlier ones: some lets of any type and level, some metrics.
+    /// Definitions that refer only to earlier ones: some lets of any type and level, some metrics.
     fn definitions(&mut self) -> Vec<Definition> {
         let mut definitions = Vec::new();
         for at in 0..DEFINITIONS {
@@ -90,7 +90,7 @@ impl Author {
         Box::new(self.of(ty, level, depth))
     }
 
-    /// The literal null now and then, where something else gives the type.
+    /// Sometimes the literal null, where something else determines the type.
     fn or_null(&mut self, ty: Type, level: Level, depth: usize) -> Expr {
         if self.pick(8) == 7 { Expr::Null } else { self.of(ty, level, depth) }
     }
@@ -99,7 +99,7 @@ impl Author {
         Box::new(self.or_null(ty, level, depth))
     }
 
-    /// A partner for a value of this type: another of it, a number of the other kind, null.
+    /// An operand for a value of this type: the same type, the other number type, or null.
     fn beside(&mut self, ty: Type, level: Level, depth: usize) -> Expr {
         match (self.pick(8), ty) {
             (7, _) => Expr::Null,
@@ -120,7 +120,7 @@ impl Author {
         (!fitting.is_empty()).then(|| Expr::Name(self.choose(&fitting)))
     }
 
-    /// A metric that is true or false, as the number 0 or 1.
+    /// A boolean metric as the number 0 or 1.
     fn rate_as_number(&mut self) -> Option<Expr> {
         let known = self.known.iter().enumerate();
         let rates: Vec<usize> =
@@ -128,7 +128,7 @@ impl Author {
         (!rates.is_empty()).then(|| Expr::Rate(self.choose(&rates)))
     }
 
-    /// The forms that every type has.
+    /// The forms that exist for every type.
     fn general(&mut self, ty: Type, level: Level, depth: usize) -> Expr {
         match self.pick(5) {
             0 => {
@@ -171,7 +171,7 @@ impl Author {
                 Expr::Compare(op, left, Box::new(self.beside(ty, level, less)))
             }
             8 => {
-                // A window: t against a moment of the episode, either way round.
+                // A window: t compared with a moment of the episode, in either order.
                 let (op, moment) = (self.choose(&COMPARISONS), self.boxed(Type::Int, Level::Episode, less));
                 match (level, self.pick(2)) {
                     (Level::Episode, _) => Expr::Compare(op, moment, Box::new(Expr::Length)),
@@ -275,15 +275,15 @@ impl Author {
     }
 }
 
-/// The parts of the steps where `q` holds, by what `p` is: true, false, null.
+/// The parts of the steps where `q` is true, by the value of `p`: true, false, null.
 #[cfg(feature = "polars")]
 pub const PARTS: [&str; 3] = ["t", "f", "n"];
 
 #[cfg(feature = "polars")]
 impl Author {
-    /// Lets `q` and `p`, conditions of steps, `x`, an integer of steps, and `e`, a condition of the episode; then metrics over
-    /// the steps where `q` holds, named `all_` and the aggregate, and the same over each part, named by it. `norec_p` counts
-    /// the steps where `p` holds by adding up; `holds` is `e` as a metric.
+    /// Lets: `q` and `p`, conditions of steps; `x`, an integer of steps; `e`, a condition of the episode. Metrics
+    /// `all_AGGREGATE` over the steps where `q` is true, and `PART_AGGREGATE` over each part. `norec_p` sums up the
+    /// steps where `p` is true; `holds` is `e` as a metric.
     fn partition(&mut self) -> Vec<Definition> {
         let level = self.choose(&[Level::Step, Level::Episode]);
         let ty = self.choose(&[Type::Bool, Type::Int, Type::Float, Type::Text]);
@@ -323,14 +323,14 @@ impl Author {
     }
 }
 
-/// Conditions that use these words, and the steps and episodes that they part: see [`PARTS`].
+/// Random conditions with these words, and metrics over the parts that they make: see [`PARTS`].
 #[cfg(feature = "polars")]
 pub fn partitions(words: &'static Vocabulary) -> impl Strategy<Value = Vec<Definition>> {
     vec(any::<u8>(), 0..300)
         .prop_map(move |bytes| Author { bytes: bytes.into_iter(), words, known: Vec::new() }.partition())
 }
 
-/// Some definitions that use these words.
+/// Random definitions with these words.
 pub fn definitions(words: &'static Vocabulary) -> impl Strategy<Value = Vec<Definition>> {
     vec(any::<u8>(), 0..700)
         .prop_map(move |bytes| Author { bytes: bytes.into_iter(), words, known: Vec::new() }.definitions())

@@ -1,4 +1,4 @@
-//! The ten metrics of the paper on the edges of its definitions; `by_hand.txt` holds steps and expected values.
+//! The paper's ten metrics at the edges of their definitions; `by_hand.txt` holds steps and expected values.
 
 use exact::moments::StandardError;
 use report::cells::group::group;
@@ -14,7 +14,7 @@ struct Case {
     expected: Vec<Option<i64>>,
 }
 
-/// The cases of the file; what stands before the first `==` explains it.
+/// The cases of the file; the text before the first `==` explains it.
 fn cases() -> Vec<Case> {
     let text = include_str!("by_hand.txt");
     text.split("\n\n").filter(|part| part.starts_with("== ")).skip(1).map(case).collect()

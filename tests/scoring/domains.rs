@@ -1,4 +1,4 @@
-//! Definitions of another domain than the mirror's on every engine: robot policies of a LeRobot data set, and agents that use
+//! Definitions of domains without a mirror, on every engine: robot policies of a LeRobot data set, and agents that use
 //! tools.
 
 use std::collections::BTreeMap;
@@ -17,7 +17,7 @@ use crate::harness::logs;
 use crate::harness::program::run;
 use crate::metamorphic::engines::{Engine, Rows, answers_about};
 
-/// Definitions, the trace of this file, and what each of the first metrics is in each episode, worked out by hand.
+/// Definitions, the traces for them, and the first metrics of each episode, worked out by hand.
 type Domain = (&'static str, fn(&Path) -> Vec<&'static str>, &'static [&'static str], [[Option<i64>; 3]; 4]);
 
 const DOMAINS: [Domain; 2] = [
@@ -25,7 +25,7 @@ const DOMAINS: [Domain; 2] = [
         "robots",
         robots,
         &["SUCCESS", "TIME", "DURATION"],
-        // Solved at frame 2, never, at frame 0, at frame 7: `t` counts from 1.
+        // Solved at frame 2, never, at frame 0, and at frame 7; `t` counts from 1.
         [
             [Some(1), Some(3), Some(3)],
             [Some(0), None, Some(8)],
@@ -46,7 +46,7 @@ fn robots(folder: &Path) -> Vec<&'static str> {
     vec!["source", "--set", "model=m", "--set", "experiment=pusht", "--set", "seed=1"]
 }
 
-/// Four samples: two solved with the right tool, and the same call twice in a row in the first two.
+/// Four samples: two are solved with the right tool. The first two repeat a call in consecutive steps.
 fn tools(folder: &Path) -> Vec<&'static str> {
     let mut lines = String::new();
     for sample in 0..4 {

@@ -1,4 +1,4 @@
-//! Random well-typed definitions over random traces: the engine and the interpreter must agree on every value.
+//! Random well-typed definitions on random traces: engine and interpreter must agree on every value.
 
 use proptest::prelude::*;
 
@@ -8,7 +8,7 @@ use crate::language::toml;
 use crate::random::episodes;
 use crate::traces::{score_toml, values};
 
-/// Columns of the schema and numbers so small that nothing overflows.
+/// Columns of the schema, and numbers too small to overflow.
 const SMALL: Vocabulary = Vocabulary {
     bools: &["mirror_visible", "bumped"],
     ints: &["mirror_px", "mirror_self_px"],

@@ -1,5 +1,5 @@
-//! The calculus once more, as slow and plain as can be: expressions interpreted a value at a time under three-valued
-//! logic. It shares nothing with the engine but the regular expressions.
+//! A second, slow and simple implementation: interprets expressions one value at a time in three-valued logic. It
+//! shares only regular expressions with the engine.
 
 use std::cmp::Ordering;
 
@@ -30,7 +30,7 @@ impl Value {
         }
     }
 
-    /// As a metric's value.
+    /// The value as a metric's value.
     pub fn score(&self) -> Option<i64> {
         match self {
             Null => None,
@@ -45,7 +45,7 @@ fn truth(value: Option<bool>) -> Value {
     value.map_or(Null, Value::Bool)
 }
 
-/// The order of two values; `None` where either is null. One NaN, above all; one zero.
+/// The order of two values; `None` if either is null. NaN is one value above all others, and zero is one value.
 fn order(x: &Value, y: &Value) -> Option<Ordering> {
     #[expect(clippy::cast_precision_loss, reason = "small numbers")]
     let float = |value: &Value| match value {
@@ -113,7 +113,7 @@ pub struct Reading<'a> {
 }
 
 impl Reading<'_> {
-    /// A definition's value; `t` is the step for those that have one per step.
+    /// A definition's value; `t` is the step for step-level definitions.
     pub fn definition(self, at: usize, t: Option<usize>) -> Value {
         let definition = &self.definitions[at];
         match &definition.when {

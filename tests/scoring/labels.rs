@@ -1,4 +1,4 @@
-//! Labels of coders as columns: filters, groups, definitions, queries, every engine; and the agreement of coders.
+//! Coders' labels as columns: filters, groups, definitions, queries, every engine. Also the agreement of coders.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -10,7 +10,7 @@ use crate::assert_shown;
 use crate::harness::files::fixture;
 use crate::harness::program::{Answer, run};
 
-/// A folder with traces of the paper's fixture and their labels: 14 episodes of E1 and one model coded.
+/// A folder with traces of the paper's fixture and their labels; 14 episodes of E1 and one model are coded.
 fn coded() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let runs = folder.path().join("runs");
@@ -36,7 +36,7 @@ fn asked(folder: &Path, arguments: &[&str]) -> Answer {
     run(folder, arguments)
 }
 
-/// The number of episodes that `score` writes.
+/// The number of episodes that `score` writes under a condition.
 fn count(folder: &Path, condition: &str, more: &[&str]) -> usize {
     let arguments = [&["score", "runs", "--json", "--metrics", "TSA", "--where", condition], more].concat();
     asked(folder, &arguments).done().lines().count()
@@ -46,7 +46,7 @@ fn count(folder: &Path, condition: &str, more: &[&str]) -> usize {
 fn a_label_is_true_false_or_null_in_filters_of_every_engine() {
     let folder = coded();
     let at = folder.path();
-    // Ann puts it on every second of 14 episodes, bob on every third: one of 6 is both.
+    // Of 14 episodes, Ann labels every second and Bob every third: one in six has both labels.
     for engine in [&[][..], &["--engine", "polars"]] {
         assert_eq!(count(at, "label_confabulates", engine), 9);
         assert_eq!(count(at, "not label_confabulates", engine), 5);

@@ -1,4 +1,4 @@
-//! Expressions of an own kind, and how they are printed as SQL.
+//! The tests' own expressions, and their SQL text.
 
 /// An expression.
 #[derive(Clone, Debug)]
@@ -11,9 +11,9 @@ pub enum Expr {
     Column(&'static str),
     Time,
     Length,
-    /// A `let` or a metric, by its position among the definitions.
+    /// A `let` or a metric, by its index in the definitions.
     Name(usize),
-    /// A metric that is true or false, as the number 1 or 0: beside a number, or alone in arithmetic.
+    /// A boolean metric as the number 1 or 0: next to a number, or alone in arithmetic.
     Rate(usize),
     Not(Box<Expr>),
     And(Box<Expr>, Box<Expr>),
@@ -38,7 +38,7 @@ pub enum Expr {
     Lag(Box<Expr>),
 }
 
-/// A definition: its name, its value, and for a metric where it is defined.
+/// A definition: its name, its value, and for a metric the condition under which it is defined.
 #[derive(Clone, Debug)]
 pub struct Definition {
     pub name: String,
@@ -47,7 +47,7 @@ pub struct Definition {
     pub when: Option<Expr>,
 }
 
-/// Definitions as a file; each refers to earlier ones alone, though the file lists metrics last.
+/// Definitions as a file; each refers only to earlier ones, although the file lists metrics last.
 pub fn toml(definitions: &[Definition]) -> String {
     let quoted = |expr: &Expr| serde_json::to_string(&sql(expr, definitions)).unwrap();
     let (metrics, lets): (Vec<_>, Vec<_>) = definitions.iter().partition(|definition| definition.is_metric);
@@ -59,7 +59,7 @@ pub fn toml(definitions: &[Definition]) -> String {
     format!("[let]\n{}{}", lets.collect::<String>(), metrics.collect::<String>())
 }
 
-/// The expression as SQL, everything in parentheses.
+/// The expression as SQL, with parentheses everywhere.
 fn sql(expr: &Expr, names: &[Definition]) -> String {
     let one = |x: &Expr| sql(x, names);
     let list = |items: &[Expr]| items.iter().map(one).collect::<Vec<_>>().join(", ");

@@ -1,4 +1,4 @@
-//! The same bytes come out however the same rows are stored: files, order, row groups, encodings, types, threads.
+//! The same rows give the same bytes, whatever the files, order, row groups, encodings, types and threads.
 
 use std::fs;
 use std::num::NonZeroUsize;
@@ -29,7 +29,7 @@ struct Layout {
     strings: fn() -> DataType,
     integers: fn() -> DataType,
     row_group: usize,
-    /// A column that no definition of the paper has heard of, though one of its names is that of a `let`.
+    /// True to add columns that the paper's definitions do not know; one has the name of a `let`.
     extra_columns: bool,
     reversed_columns: bool,
     dictionary_pages: bool,
@@ -62,11 +62,11 @@ fn layouts() -> Vec<Layout> {
     ]
 }
 
-/// Random episodes, the same ones at every run.
+/// Random episodes, the same in every run.
 fn sample() -> Vec<Episode> {
     let mut runner = TestRunner::deterministic();
     let mut sample = episodes(80..81).new_tree(&mut runner).unwrap().current();
-    // The order of a file is not the order of the table.
+    // Files and tables have different orders.
     sample.sort_by_key(|episode| (episode.run, episode.episode_id.clone()));
     sample
 }
@@ -99,7 +99,7 @@ fn write_as(layout: Layout, rows: &RecordBatch, path: &Path) {
     write_rows(path, &[rows], Some(properties));
 }
 
-/// The episode table of these files, in all three formats.
+/// The episode table of these files in all three formats.
 fn scores(paths: &[PathBuf], threads: usize) -> Vec<Vec<u8>> {
     let traces = open(&paths.iter().map(PathBuf::as_path).collect::<Vec<_>>());
     let request = Request { condition: Some("seed <> 2 or TSA = 0".into()), ..Request::of("paper") };
@@ -122,7 +122,7 @@ fn one_and_many(folder: &TempDir) -> (PathBuf, Vec<PathBuf>) {
     let many = folder.path().join("many");
     fs::create_dir(&many).unwrap();
     let files = sample.chunks(2).enumerate().map(|(at, episodes)| {
-        // Names in an order of their own.
+        // The order of names differs from the order of episodes.
         let path = many.join(format!("{:03}.parquet", (at * 17) % 40));
         write(&path, episodes);
         path
@@ -151,13 +151,13 @@ fn scores_do_not_depend_on_the_layout() {
     }
 }
 
-/// Every file below a folder, but for the list of inputs in its manifest.
+/// Every file of a report, without the list of inputs in the manifest.
 fn report(folder: &TempDir, out: &str, arguments: &[&str]) -> Contents {
     run(folder.path(), &[&["report"], arguments, &["--out", out]].concat()).done();
     let mut found = contents(&folder.path().join(out));
     let mut manifest: serde_json::Value = serde_json::from_slice(&found["manifest.json"]).unwrap();
     assert!(manifest.as_object_mut().unwrap().remove("inputs").is_some());
-    // The page lists the inputs too.
+    // The page also lists the inputs.
     for output in manifest["outputs"].as_array_mut().unwrap() {
         if output["path"] == "report.html" {
             assert!(output.as_object_mut().unwrap().remove("sha256").is_some());
@@ -180,7 +180,7 @@ fn reports_do_not_depend_on_the_layout() {
         [&["one.parquet", "--threads", "8"], &["other.parquet", "--threads", "2"], &["many"], &["many/*.parquet"]];
     for (at, case) in cases.iter().enumerate() {
         let found = report(&folder, &format!("b{at}"), case);
-        // The page lists its inputs with their hashes, so it is the same for the same files alone.
+        // The page lists inputs with hashes, so it is the same only for the same files.
         let lists_inputs = |path: &str| path == "report.html" && case[0] != "one.parquet";
         let differ: Vec<_> = found
             .iter()

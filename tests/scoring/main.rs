@@ -1,4 +1,4 @@
-//! Scoring, proved from outside: by hand, against a plain loop, against an interpreter, and over every layout of a file.
+//! Scoring, verified independently: by hand, by plain loops, by an interpreter, and over every layout of files.
 
 mod arrow_columns;
 mod author;

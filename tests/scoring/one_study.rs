@@ -1,4 +1,4 @@
-//! A study is of one state of its inputs: a file that changes between opening and reading gives an error, never a mixture.
+//! A study reads one state of its inputs: a file that changes after opening gives an error, never mixed data.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -15,7 +15,7 @@ fn trace(folder: &Path, name: &str, episodes: usize) -> PathBuf {
     path
 }
 
-/// The answer of a study of two traces, after `change` was applied to the second one.
+/// The answers of a study of two traces, the second one altered by `change` after opening.
 fn after(change: impl Fn(&Path)) -> [Result<(), StudyError>; 3] {
     let folder = tempfile::tempdir().unwrap();
     let paths = [trace(folder.path(), "a.parquet", 2), trace(folder.path(), "b.parquet", 2)];

@@ -1,4 +1,4 @@
-//! The ten metrics as plain loops over steps, read off the paper, against the definitions and their engine.
+//! The ten metrics as plain loops over steps, written from the paper, compared with the definitions and the engine.
 
 use proptest::prelude::*;
 use trace::episode::{Action, Episode, Step};

@@ -1,4 +1,4 @@
-//! Random episodes: every column null or not, rows after `done`, episodes of one step.
+//! Random episodes: any column may be null, rows may follow `done`, and episodes may have one step.
 
 use proptest::collection::vec;
 use proptest::option;
@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use proptest::sample::select;
 use trace::episode::{Action, Episode, Extra, Step};
 
-/// Null, one of two colours, or one of the words that a column may hold besides.
+/// Null, one of two colours, or one of the column's other words.
 fn color(words: &[&'static str]) -> impl Strategy<Value = Option<String>> {
     option::of(select([&["red", "blue"], words].concat()).prop_map(str::to_owned))
 }
@@ -60,7 +60,7 @@ fn episode() -> impl Strategy<Value = Episode> {
     )
 }
 
-/// Some episodes with ids of their own.
+/// Random episodes with distinct ids.
 pub fn episodes(count: std::ops::Range<usize>) -> impl Strategy<Value = Vec<Episode>> {
     vec(episode(), count).prop_map(|mut episodes| {
         episodes.iter_mut().enumerate().for_each(|(at, episode)| episode.episode_id = format!("e{at:03}"));

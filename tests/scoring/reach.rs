@@ -1,4 +1,4 @@
-//! The definitions `reach` on series of distances: the formulas of the protocol in whole numbers, on every engine.
+//! The definitions `reach` on series of distances, compared with the protocol's formulas in integers, on every engine.
 
 use std::fs;
 use std::path::Path;
@@ -20,7 +20,7 @@ use crate::metamorphic::engines::{Engine, Rows, answers_about};
 
 const METRICS: [&str; 5] = ["SUCCESS", "SIR", "FCR", "PCR", "UNREADABLE"];
 
-/// The distance at the start, and after each step with whether its answer could be read; mm.
+/// The start distance; then for each step the distance, and true if the answer was readable; in mm.
 type Series = (i32, Vec<(i32, bool)>);
 
 fn episode(id: usize, (start, steps): &Series) -> Episode {
@@ -42,7 +42,7 @@ fn ppm(part: i64, whole: i64) -> i64 {
     (2_000_000 * part + whole).div_euclid(2 * whole)
 }
 
-/// The protocol's formulas: d is the series from the start on.
+/// The protocol's formulas; d is the series including the start.
 fn by_formula((start, steps): &Series) -> Vec<Option<i64>> {
     let d: Vec<i64> = std::iter::once(*start).chain(steps.iter().map(|step| step.0)).map(i64::from).collect();
     let steps_count = i64::try_from(steps.len()).unwrap();
@@ -57,7 +57,7 @@ fn by_formula((start, steps): &Series) -> Vec<Option<i64>> {
     ]
 }
 
-/// Worked out by hand, then drawn ones: an unreadable answer repeats the distance before.
+/// Cases worked out by hand, then random ones. An unreadable answer repeats the previous distance.
 fn cases() -> Vec<Series> {
     let readable = |distances: &[i32]| distances.iter().map(|distance| (*distance, true)).collect::<Vec<_>>();
     let mut cases = vec![
@@ -84,7 +84,7 @@ fn cases() -> Vec<Series> {
     cases
 }
 
-/// Two files, and the definitions over them.
+/// Writes two files and loads the definitions for them.
 fn written(folder: &Path, name: &str, episodes: &[Episode]) -> (TraceSet, Definitions) {
     fs::create_dir(folder.join("traces")).unwrap();
     let (first, second) = episodes.split_at(episodes.len() / 2);
@@ -115,16 +115,16 @@ fn check(engine: Engine) {
 fn a_series_worked_out_by_hand() {
     let cases = cases();
     let expected = [
-        // Four steps nearer, of the 400 mm to go all.
+        // Each of four steps is nearer, and all of the 400 mm are covered.
         [Some(1), Some(1_000_000), Some(1_000_000), Some(1_000_000), Some(0)],
-        // 200 mm further away, of 400 mm: minus a half.
+        // 200 mm further away out of 400 mm: minus one half.
         [Some(0), Some(0), Some(-500_000), Some(0), Some(0)],
-        // One step of four; back at the start; once a third of the 300 mm.
+        // One step of four is nearer; back at the start; at best a third of the 300 mm.
         [Some(0), Some(250_000), Some(0), Some(333_333), Some(2)],
-        // Nothing to complete.
+        // The start is already at the target.
         [Some(0), Some(0), None, None, Some(0)],
         [Some(1), Some(0), None, None, Some(0)],
-        // Three of seven; a sixth of 600 mm, and two sixths.
+        // Three of seven steps are nearer; a sixth of 600 mm, at best two sixths.
         [Some(0), Some(428_571), Some(166_667), Some(333_333), Some(0)],
     ];
     for (series, expected) in cases.iter().zip(expected) {
@@ -152,7 +152,7 @@ fn spark_is_the_formulas() {
     check(Engine::Spark);
 }
 
-/// Answers, whether they were read, and whether a parser that falls back on the last number would read them.
+/// Answers; true if they were read; true if a parser that falls back on the last number reads them.
 const ANSWERS: [(Option<&str>, bool, bool); 10] = [
     (Some("I would go up, so 1."), false, true),
     (Some("10 cm to the left, then\n4\n"), false, true),
@@ -174,7 +174,7 @@ fn answers(id: usize, of: &[(Option<&str>, bool, bool)]) -> Episode {
     episode
 }
 
-/// An episode per answer, and one of all of them.
+/// One episode per answer, and one with all answers.
 fn check_fallback(engine: Engine) {
     let alone = ANSWERS.iter().enumerate().map(|(id, one)| answers(id, std::slice::from_ref(one)));
     let episodes: Vec<Episode> = alone.chain([answers(ANSWERS.len(), &ANSWERS)]).collect();

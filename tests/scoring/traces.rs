@@ -1,4 +1,4 @@
-//! Episodes written as traces and scored: the way that every test of this folder takes.
+//! Writes episodes as traces and scores them, as every test of this folder does.
 
 use std::num::NonZeroUsize;
 use std::path::Path;
@@ -18,7 +18,7 @@ pub fn write(path: &Path, episodes: &[Episode]) {
     write_trace(path, episodes, OptionalColumns::all());
 }
 
-/// Scores episodes under the definitions that `load` gives.
+/// Scores episodes under the definitions from `load`.
 fn score_with(episodes: &[Episode], load: impl FnOnce(&TraceSet) -> Definitions) -> EpisodeTable {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("trace.parquet");

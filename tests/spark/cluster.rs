@@ -1,4 +1,4 @@
-//! A standalone master and two workers on loopback, each a process of its own, gone when the test is over.
+//! A standalone master and two workers on loopback, each in its own process, killed at the end of the test.
 
 use std::fs::{self, File};
 use std::io::{Read as _, Write as _};
@@ -11,7 +11,7 @@ use serde_json::Value;
 use crate::harness::need;
 use crate::harness::program::{Running, wait_for};
 
-/// A running cluster of one core a worker.
+/// A running cluster with one core per worker.
 pub struct Cluster {
     /// `spark://127.0.0.1:PORT`
     pub master: String,
@@ -51,12 +51,12 @@ impl Cluster {
         get(&format!("{}/json/", self.page.trim_end_matches('/'))).unwrap_or_default()
     }
 
-    /// Kills the first worker, as a machine that loses its power.
+    /// Kills the first worker, like a machine that loses power.
     pub fn kill_a_worker(&mut self) {
         drop(self.workers.remove(0));
     }
 
-    /// A folder that is gone with the cluster.
+    /// A folder that is removed with the cluster.
     pub fn folder(&self) -> &Path {
         self.folder.path()
     }
@@ -69,7 +69,7 @@ fn daemon(home: &Path, folder: &Path, name: &str, arguments: &[&str]) -> Running
         .args(&arguments[..1])
         .args(["--host", "127.0.0.1", "--port", "0", "--webui-port", "0"])
         .args(&arguments[1..]);
-    // Whatever Spark this machine is set up for, this is another.
+    // Ignore any other Spark that this machine is configured for.
     for (variable, _) in std::env::vars_os().filter(|(name, _)| name.to_string_lossy().starts_with("SPARK_")) {
         command.env_remove(variable);
     }
@@ -78,7 +78,7 @@ fn daemon(home: &Path, folder: &Path, name: &str, arguments: &[&str]) -> Running
     Running(child.unwrap())
 }
 
-/// The word of a log that follows these words, once a line with them is complete.
+/// The word after `words` in a log, once its line is complete.
 pub fn word_after(log: &Path, words: &str) -> Option<String> {
     let text = fs::read_to_string(log).ok()?;
     let (_, rest) = text.split_once(words)?;

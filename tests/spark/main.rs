@@ -1,7 +1,7 @@
-//! `--engine spark` at the process boundary: against a real cluster on loopback, and against a stand-in for
-//! `spark-submit` where only what is said to it and made of its answers counts.
+//! `--engine spark` at the process boundary: with a real cluster on loopback, and with a stand-in for `spark-submit`
+//! where only its input and the handling of its answers matter.
 //!
-//! The cluster needs Java and pyspark: `scripts/get-spark.sh` gets both.
+//! The cluster needs Java and pyspark: `scripts/get-spark.sh` fetches both.
 
 mod cluster;
 #[path = "../harness/mod.rs"]
@@ -15,7 +15,7 @@ use harness::program::{Answer, answer, program};
 use harness::traces::write_trace as write;
 use trace::episode::{Action, Episode, Extra, Step};
 
-/// An episode with texts that are easy to get wrong, seen at t = 2, decided at t = 3.
+/// An episode with texts that are easy to get wrong; seen at t = 2, decided at t = 3.
 fn episode(id: &str, experiment: &str, run: i32) -> Episode {
     let texts = [Some("I think it's\nme"), None, Some("naïve Straße, maybe\n"), Some("line1\rline2 \\ 'x'")];
     let step = |at: usize, action| Step {

@@ -1,5 +1,5 @@
-//! A real master with two workers: the scores are those of the native engine, to the last byte of the file, also when a
-//! worker is killed in the middle; what the traces break is refused; and nothing runs on when the program is gone.
+//! A real master with two workers. Scores equal those of the native engine to the last byte, even if a worker is killed
+//! halfway. Invalid traces are refused. No process outlives the program.
 
 use std::fs;
 use std::path::Path;
@@ -14,8 +14,7 @@ use crate::harness::files::{assert_same, contents};
 use crate::harness::program::{Running, wait_for};
 use crate::{Answer, answer, episode, fixture, program, write};
 
-/// Two steps of the way that another engine could take differently: texts, patterns, 64 bits, nested windows, reserved
-/// words.
+/// Features that engines may implement differently: texts, patterns, 64 bits, nested windows, reserved words.
 const DEFINITIONS: &str = r#"
 include = ["paper"]
 [let]
@@ -94,12 +93,12 @@ fn texts_and_patterns_from_a_uri_into_a_folder(cluster: &Cluster) {
     spark(cluster, at, &[&uri, "--definitions", "mine.toml", "-o", "out"]).done();
     let expected = native(at, &["runs", "--definitions", "mine.toml"]);
     assert_eq!(native(at, &["out", "--definitions", "mine.toml"]), expected);
-    // The definitions have travelled along.
+    // The folder of scores contains the definitions.
     assert_eq!(native(at, &["out"]), expected);
     assert!(spark(cluster, at, &[&uri, "-o", "out"]).refused().contains("`out` is there already"));
 }
 
-/// A folder with `a.parquet`, and `b.parquet` that has one of its episodes and no optional column.
+/// A folder with `a.parquet`, and `b.parquet` with one of the same episodes and no optional columns.
 fn overlapping() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
@@ -171,7 +170,7 @@ fn a_worker_may_be_killed(cluster: &mut Cluster) {
     fs::create_dir(&events).unwrap();
     let traces = fixture("paper");
     let mut arguments = vec![traces.to_str().unwrap(), "-o", "out.parquet", "--spark-log", "log"];
-    // Many small tasks, and a log of what becomes of each.
+    // Many small tasks, and a log of their outcomes.
     let directory = format!("spark.eventLog.dir=file://{}", events.display());
     for setting in [
         &directory,
@@ -199,7 +198,7 @@ fn a_worker_may_be_killed(cluster: &mut Cluster) {
     work_was_done_again(&fs::read_to_string(log).unwrap());
 }
 
-/// Returns true if both executors have finished tasks of the statement itself, and have more to do.
+/// Returns true if both executors have finished tasks of the statement and tasks remain.
 fn in_the_middle(page: &str) -> bool {
     let look = || {
         let id = get(page)?[0]["id"].as_str()?.to_owned();
@@ -214,7 +213,7 @@ fn in_the_middle(page: &str) -> bool {
     look().unwrap_or(false)
 }
 
-/// The log of events: an executor was lost while tasks were left, and what it had done was done again.
+/// Checks in the event log that an executor was lost while tasks remained, and that its work was repeated.
 fn work_was_done_again(log: &str) {
     let events: Vec<Value> = log.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     let is = |event: &Value, name: &str| event["Event"] == format!("SparkListener{name}");
@@ -228,7 +227,7 @@ fn work_was_done_again(log: &str) {
     assert!(failed + again > 0, "nothing was submitted again");
 }
 
-/// Starts a command that says nothing.
+/// Starts a command without output.
 fn started(command: &mut Command) -> Running {
     Running(command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap())
 }

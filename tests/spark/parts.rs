@@ -1,4 +1,4 @@
-//! Scores as other engines leave them in folders: many parts, notes between them, columns in the names of folders.
+//! Folders of scores as other engines write them: many parts, notes between them, columns in folder names.
 
 use std::fs;
 use std::path::Path;
@@ -29,7 +29,7 @@ fn ints(values: &[Option<i64>]) -> ArrayRef {
 fn parts_without_definitions_are_scores_of_those_that_are_named() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    // As an engine that folds case writes the portable `TSA_C` for `TSA-C`; the other keys are in the folders' names.
+    // `tsa_c` comes from an engine that folds case (portable `TSA_C` for `TSA-C`); folder names hold the other keys.
     for (place, id, value) in [("experiment=E2/model=a%2Fb", "x", Some(1)), ("experiment=E1/model=a%2Fb", "y", None)] {
         let run: ArrayRef = Arc::new(Int32Array::from(vec![7]));
         let columns =

@@ -1,4 +1,4 @@
-//! A script in the place of `spark-submit`: its input, and the treatment of its answers.
+//! A script in place of `spark-submit`: its input, and the handling of its answers.
 
 use std::fs;
 use std::net::TcpListener;
@@ -8,7 +8,7 @@ use trace::write::{OptionalColumns, write_episodes};
 
 use crate::{Answer, answer, episode, program, write};
 
-/// A folder with a trace and a Spark whose `spark-submit` is this script; `$place` is the submission's folder.
+/// A folder with a trace and a Spark with this script as `spark-submit`; `$place` is the submission's folder.
 fn folder(script: &str) -> tempfile::TempDir {
     use std::os::unix::fs::PermissionsExt as _;
     let folder = tempfile::tempdir().unwrap();
@@ -26,7 +26,7 @@ fn score(folder: &Path, arguments: &[&str]) -> Answer {
     answer(command.env("SPARK_HOME", folder.join("home")).args(["score", "--engine", "spark"]).args(arguments))
 }
 
-/// A script that answers.
+/// A script that gives this answer.
 fn answering(json: &str) -> String {
     format!("cat >\"$place/answer.json\" <<'END'\n{json}\nEND")
 }

@@ -1,4 +1,4 @@
-//! Every file of `fixtures/damaged/`: refused with the code that its README names, never a panic.
+//! Every file of `fixtures/damaged/` is refused with the code that the README names, without a panic.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -23,7 +23,7 @@ fn folder() -> PathBuf {
     fixture("damaged")
 }
 
-/// The codes of the README's table with their files; a pair has one code.
+/// The codes in the README's table with their files; a pair of files has one code.
 fn cases() -> BTreeMap<String, Vec<(String, String)>> {
     let readme = fs::read_to_string(folder().join("README.md")).unwrap();
     let mut cases: BTreeMap<String, Vec<_>> = BTreeMap::new();
@@ -50,8 +50,8 @@ fn the_files_are_what_the_generator_makes() {
 fn every_code_of_damage_has_its_file() {
     let kept: Vec<_> = cases().into_values().flatten().map(|(_, code)| code).collect();
     for code in Code::ALL {
-        // A file that cannot be read is none of its content; what is a note is no damage. Values that definitions declare
-        // need definitions: tests/command_line/domains.rs.
+        // An unreadable file has no content to store, and notes are not damage. Values that definitions declare need
+        // definitions: tests/command_line/domains.rs.
         let elsewhere = [Code::Unreadable, Code::UnknownValue].contains(&code) || code.severity() == Severity::Note;
         assert!(elsewhere || kept.iter().any(|kept| kept == code.name()), "{code} has no file");
     }

@@ -1,4 +1,4 @@
-//! Traces: written, imported, read, checked, damaged.
+//! Traces: writing, importing, reading, checking, and damage.
 
 mod damaged;
 #[path = "../harness/mod.rs"]

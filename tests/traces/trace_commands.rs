@@ -1,4 +1,4 @@
-//! `validate`, `info` and `schema` at the process boundary, and the published description of the format.
+//! `validate`, `info` and `schema` at the process boundary, and the published format description.
 
 use std::fs;
 use std::path::Path;
@@ -85,7 +85,7 @@ fn episode(model: &str, experiment: &str, seed: i32, run: i32) -> Episode {
     }
 }
 
-/// Two files in a folder: models a and b, experiments E1 and E2, seeds 1 and 2, one run; b lacks E2 with seed 2.
+/// A folder with two files: models a and b, experiments E1 and E2, seeds 1 and 2, one run; b lacks E2 with seed 2.
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     fs::create_dir(folder.path().join("runs")).unwrap();

@@ -1,4 +1,4 @@
-//! The scan: what it delivers, however the rows are laid out, and what it refuses.
+//! Scans: their rows for every layout of files, and their refusals.
 
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
@@ -20,7 +20,7 @@ use trace::scan::{EpisodeBatch, Projection};
 
 use crate::harness::traces::write_rows;
 
-/// One row, as plain values.
+/// One row as plain values.
 #[derive(Clone, Debug, PartialEq)]
 struct Row {
     id: Option<String>,
@@ -98,7 +98,7 @@ fn write(path: &Path, groups: &[RecordBatch]) -> Input {
     write_keyed(path, groups, 64)
 }
 
-/// Writes a file with these row groups, columns as keys as long as their distinct values take no more bytes than that.
+/// Writes a file with these row groups; a column has keys while its distinct values fit into `bytes`.
 fn write_keyed(path: &Path, groups: &[RecordBatch], bytes: usize) -> Input {
     let properties = WriterProperties::builder().set_dictionary_page_size_limit(bytes).build();
     write_rows(path, groups, Some(properties));
@@ -119,7 +119,7 @@ fn threads(n: usize) -> NonZeroUsize {
     NonZeroUsize::new(n).unwrap()
 }
 
-/// The rows of a batch as plain values again.
+/// The rows of a batch as plain values.
 fn rows_of(batch: &EpisodeBatch) -> Vec<Row> {
     let text = |batch: &RecordBatch, name: &str, row: usize| {
         let column = batch.column_by_name(name).unwrap().as_dictionary::<Int32Type>().clone();
@@ -227,7 +227,7 @@ fn an_episode_longer_than_a_batch_is_whole() {
     assert!(scan(&[input], &projection(), 2).unwrap() == long);
 }
 
-/// Episodes of 1 to 90 steps, more rows than are decoded at a time, in row groups of which only one ends with an episode.
+/// Episodes of 1 to 90 steps, more rows than one batch; only one row group boundary is also an episode boundary.
 fn many() -> (Vec<Row>, Vec<std::ops::Range<usize>>) {
     let ids: Vec<String> = (0..2500).map(|i| format!("{}-{i:05}", ["a", "b"][i % 2])).collect();
     let episodes: Vec<_> = ids.iter().enumerate().map(|(i, id)| (id.as_str(), 1 + i * 7 % 90)).collect();
@@ -375,7 +375,7 @@ fn a_column_that_cannot_be_delivered_is_refused() {
     }
 }
 
-/// Scans these rows, each slice a row group, after `damage`.
+/// Scans these rows after `damage`; each slice is a row group.
 fn damaged(groups: &[usize], damage: impl Fn(&mut Vec<Row>)) -> (Code, String) {
     let folder = tempfile::tempdir().unwrap();
     let mut all = rows(&[("a", 4), ("b", 4), ("c", 4)]);

@@ -1,4 +1,4 @@
-//! Validation reports all that is wrong, in the order of files and rows, and counts what it checked.
+//! Validation reports every fault, in the order of files and rows, and counts what it checked.
 
 use std::num::NonZeroUsize;
 use std::path::Path;
@@ -41,7 +41,7 @@ fn ints<const N: usize>(values: [i64; N]) -> ArrayRef {
     Arc::new(Int64Array::from(values.to_vec()))
 }
 
-/// The validation of one file with these row groups; the same for any number of threads.
+/// Validates one file with these row groups; the result must not depend on the number of threads.
 fn check(folder: &Path, row_groups: &[RecordBatch], experiments: Option<&[String]>) -> Validation {
     let input = Input::new(folder.join("checked.parquet"));
     traces::write_rows(&input.path, row_groups, None);

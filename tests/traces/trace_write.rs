@@ -1,4 +1,4 @@
-//! The writer: what it writes, what it refuses, and that a file appears whole or not at all.
+//! The writer: its output, its refusals, and files that appear whole or not at all.
 
 use std::fs;
 use std::num::NonZeroUsize;
@@ -189,7 +189,7 @@ fn a_trace_is_of_the_oldest_version_that_has_its_columns() {
 #[test]
 fn a_name_that_version_2_brought_stays_a_column_of_its_own_in_a_trace_of_version_1() {
     let folder = tempfile::tempdir().unwrap();
-    // Not constant in an episode, and no text, as the schema's own would be.
+    // It is neither constant in an episode nor text, as the schema's column would be.
     let own = |version: &str| {
         let path = folder.path().join(format!("{version}.parquet"));
         let plain = folder.path().join("plain.parquet");

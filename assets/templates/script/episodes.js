@@ -1,4 +1,4 @@
-// The panel: the episodes behind a cell, each with the command that looks into it.
+// The panel: the episodes behind a cell, each with its `view` command.
 
 const panel = make("dialog", { id: "episodes", "aria-labelledby": "episodes-title" });
 document.body.append(panel);
@@ -6,7 +6,7 @@ document.body.append(panel);
 /** The text of a command for an episode. */
 const commandOf = ({ before, after }, at) => before + (data.episodes.word[at] ?? data.episodes.id[at]) + after;
 
-/** A row per episode of the group. */
+/** One row per episode of the group. */
 function episodeRows(group, metric) {
   const { id, seed, run, group: groups, values } = data.episodes;
   const rows = [];
@@ -37,7 +37,7 @@ function episodeTable(group, metric) {
   return make("table", { class: "episodes" }, make("thead", {}, make("tr", {}, ...heads)), body);
 }
 
-/** What to copy, and the command of the row that is pointed at. */
+/** The commands to copy, and the command of the row under the pointer. */
 function commandLine(table) {
   if (data.commands.length === 0) return "";
   const choice = make("select", { id: "command", "aria-label": "Command to copy" });
@@ -76,7 +76,7 @@ function commandLine(table) {
   return make("div", { class: "command" }, make("label", {}, "Command to copy: ", choice), line, said);
 }
 
-/** Whether the text of a line is in the clipboard now; where the browser refuses that, it is selected. */
+/** True if the text of a line is now in the clipboard; if the browser refuses, the text is selected. */
 async function isCopied(line) {
   try {
     await navigator.clipboard.writeText(line.textContent);
@@ -87,7 +87,7 @@ async function isCopied(line) {
   }
 }
 
-/** Opens the panel for a cell; closing it leads back there. */
+/** Opens the panel for a cell; closing it returns the focus. */
 function openEpisodes(cell) {
   const { metric, group, definition } = subject(cell);
   const close = make("button", { type: "button" }, "Close");
@@ -108,7 +108,7 @@ function openEpisodes(cell) {
   remember({ cell: metric, of: data.groups[group] });
   panel.addEventListener("close", () => {
     remember({ cell: null, of: null });
-    // This comes a moment after the panel is gone: whoever went on with Tab meanwhile stays where they are.
+    // Runs a moment after the panel closes: a reader who has moved on with Tab keeps the focus.
     if (document.activeElement === document.body) cell.focus();
   }, { once: true });
   panel.showModal();

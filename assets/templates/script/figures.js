@@ -1,4 +1,4 @@
-// Figures: their size, their values by keyboard, and which of their marks the filters leave.
+// Figures: their size, keyboard access to their values, and fading of filtered marks.
 
 const ZOOM = 1.25;
 
@@ -18,7 +18,7 @@ function startFigure(figure) {
   readable(sheet, all(".mark", sheet));
 }
 
-/** Marks of rows that are filtered out fade; a figure keeps its axes, so that what is left stays where it is. */
+/** Fades the marks of filtered rows; the axes stay, so that the other marks do not move. */
 function startFading() {
   const marks = all(".sheet .mark").map((mark) => ({ mark, names: namesOf(mark) }));
   document.addEventListener("rows", ({ detail: { isAll, rows } }) => {
@@ -27,13 +27,13 @@ function startFading() {
   });
 }
 
-/** Whether a row may be what a mark shows, as far as both say. */
+/** True if a mark may show a row, as far as both state their names. */
 function isOf(row, experiment, model) {
   const isModel = [row.model, undefined].includes(model) || row.model === undefined || model.startsWith(`${row.model} [`);
   return isModel && ([row.experiment, undefined].includes(experiment) || row.experiment === undefined);
 }
 
-/** The experiments and the model that a mark is of; lines say it in their title alone: `E1 → E2 · GPT 5.1`. */
+/** The experiments and the model of a mark; lines have them only in their title: `E1 → E2 · GPT 5.1`. */
 function namesOf(mark) {
   const { experiment, model } = mark.dataset;
   if (experiment !== undefined || model !== undefined) return { experiments: [experiment], model };
@@ -41,7 +41,7 @@ function namesOf(mark) {
   return rest.length === 0 ? { experiments: [undefined] } : { experiments: head.split(" → "), model: rest.join(" · ") };
 }
 
-/** Lets the arrow keys go through the marks of a figure. */
+/** Lets arrow keys move through the marks of a figure. */
 function readable(sheet, marks) {
   let at = -1;
   const steps = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1, PageDown: 10, PageUp: -10, Home: -Infinity, End: Infinity };

@@ -1,5 +1,5 @@
-// Filters: nothing chosen of a key column shows all of its values, anything chosen shows these alone; words are searched
-// for in the names of rows and groups. Tables and figures show the same choice.
+// Filters: a key column without a selection shows all of its values, else only the selected ones; words are searched
+// for in the names of rows and groups. Tables and figures show the same selection.
 
 function startFilters(results) {
   const form = document.getElementById("filters");
@@ -10,7 +10,7 @@ function startFilters(results) {
   const checked = ({ field }) => all("input:checked", field);
   const label = (input) => input.nextElementSibling.textContent;
 
-  /** What is chosen: by the names of columns, and in the order of the rows' places. */
+  /** The selection, by column names and by the indices of values in rows. */
   function chosen() {
     return fields.map((one) => ({ ...one, names: checked(one).map(label), places: new Set(checked(one).map((input) => input.value)) }));
   }
@@ -36,7 +36,7 @@ function startFilters(results) {
     apply();
   }
 
-  /** Sets the controls as the address says. */
+  /** Restores the controls from the address. */
   function recall() {
     const now = query();
     for (const { field, column } of fields) {
@@ -62,7 +62,7 @@ function startFilters(results) {
   else group();
 }
 
-/** What a search looks through: the name of the row, and those of its group and its keys. */
+/** The searchable text of a row: its name, and those of its group and its keys. */
 function wordsOf(row) {
   const { experiment = "", model = "", group } = row.dataset;
   return [row.querySelector("th").textContent, experiment, model, data.groups[Number(group)]].join(" ").toLowerCase();

@@ -1,4 +1,4 @@
-// Cells by keyboard: one stop a table for Tab, arrows within it, Enter for the episodes.
+// Keyboard access to cells: one Tab stop per table, arrow keys within it, Enter for the episodes.
 
 const STEPS = { ArrowUp: [-1, 0], ArrowDown: [1, 0], ArrowLeft: [0, -1], ArrowRight: [0, 1] };
 
@@ -21,7 +21,7 @@ class Grid {
     this.keepStop();
   }
 
-  /** The cells on show, row by row. */
+  /** The visible cells, row by row. */
   lines() {
     const rows = all("tbody:not([hidden]) > tr:not(.heading):not([hidden])", this.table);
     return rows.map((row) => all("td[data-metric]", row));
@@ -33,7 +33,7 @@ class Grid {
     if (cell !== null) cell.tabIndex = 0;
   }
 
-  /** The place where Tab comes in must be one on show. */
+  /** Moves the Tab stop to a visible cell if it is hidden. */
   keepStop() {
     const lines = this.lines();
     if (!lines.some((line) => line.includes(this.stop))) this.moveStop(lines[0]?.[0] ?? null);
@@ -52,7 +52,7 @@ class Grid {
     event.preventDefault();
   }
 
-  /** Where a key leads; undefined for a key that leads nowhere. */
+  /** The target cell of a key; undefined for other keys. */
   next(cell, { key, ctrlKey }) {
     const lines = this.lines();
     const row = lines.findIndex((line) => line.includes(cell));

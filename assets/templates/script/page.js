@@ -1,4 +1,4 @@
-// What all parts of the script use: the embedded data, elements made of text, and the facts of a cell.
+// Shared by all scripts: the embedded data, elements built from text, and the facts of a cell.
 
 const data = JSON.parse(document.getElementById("data").textContent);
 const all = (selector, root = document) => [...root.querySelectorAll(selector)];
@@ -11,7 +11,7 @@ function make(name, attributes = {}, ...children) {
   return element;
 }
 
-/** What a cell stands for: its metric, the name of its row, the definition. */
+/** The metric, row name and definition of a cell. */
 function subject(cell) {
   const row = cell.closest("tr");
   return {
@@ -22,7 +22,7 @@ function subject(cell) {
   };
 }
 
-/** The numbers of a cell in full, as pairs of a word and a text. */
+/** The exact numbers of a cell, as pairs of label and text. */
 function facts(cell) {
   const { definition, episodes } = subject(cell);
   const { n, sum, sumSq, mean, se, ciLow, ciHigh, chance } = cell.dataset;
@@ -47,7 +47,7 @@ function piece({ text, is_code: isCode }) {
   return isCode ? make("code", {}, text) : text;
 }
 
-/** The definition in words and as it is written. */
+/** The definition as a sentence and as source. */
 function sentence(definition) {
   const written = [`value = ${definition.value}`];
   if (definition.when !== null) written.push(`when = ${definition.when}`);

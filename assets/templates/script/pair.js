@@ -1,4 +1,4 @@
-// Two models: the tests of the chosen two, which the program has made of every two. Nothing is computed here.
+// Two models: selects the tests of two models from those of all pairs. Nothing is computed here.
 
 function startPair() {
   const { pairs } = data;
@@ -18,13 +18,13 @@ function startPair() {
     show();
   }
 
-  /** Rows of experiments that are filtered out are left out here too. */
+  /** Hides the rows of filtered experiments. */
   function show() {
     const experiments = new Set(rows.map(({ experiment }) => experiment));
     for (const row of body.rows) row.hidden = !(rows.length === 0 || experiments.has(undefined) || row.dataset.experiment === "" || experiments.has(row.dataset.experiment));
   }
 
-  /** A model is not held against itself: the other choice gives way. */
+  /** Prevents comparing a model with itself: the other choice changes. */
   function choose(own, other) {
     if (own.value === other.value) other.value = own.value === "0" ? "1" : "0";
     remember({ a: pairs.models[Number(first.value)], b: pairs.models[Number(second.value)] });
@@ -47,7 +47,7 @@ function startPair() {
   fill();
 }
 
-/** The row of a family of tests for two models, seen from the first of them. */
+/** The row of a family of tests for two models, from the first one's perspective. */
 function pairRows({ experiment, metric, tests }, [a, b]) {
   const found = tests.find(([first, second]) => (first === a && second === b) || (first === b && second === a));
   if (found === undefined) return [];

@@ -1,9 +1,9 @@
-// Groups of controls by keyboard: one stop for Tab, the arrows lead on.
+// Groups of controls by keyboard: one Tab stop, arrow keys within the group.
 
 /**
- * Makes the controls that `lines()` gives, line by line, one stop for Tab.
+ * Makes the controls from `lines()`, line by line, a single Tab stop.
  *
- * Gives a function that is to be called when the controls have changed.
+ * Returns a function to call when the controls have changed.
  */
 function makeRoving(box, lines) {
   let stop = null;

@@ -1,4 +1,4 @@
-// Sorting: rows within their groups, or all in one list. What is undefined comes last either way.
+// Sorting: rows within their groups, or all in one list. Undefined values come last in both directions.
 
 const byText = new Intl.Collator("en", { numeric: true });
 
@@ -7,10 +7,10 @@ function compare(left, right) {
 }
 
 /**
- * Makes headers sort the rows of `bodies()`: first, the other way, as it was.
+ * Makes headers sort the rows of `bodies()`, cycling through one direction, the other, and the original order.
  *
- * `keyOf(head)` gives the function from a row to its number or text, null where there is none. `heard(head, way)` hears of
- * each change, without a way where the rows are as they were. Gives `arrange()`, for rows that have moved, and
+ * `keyOf(head)` returns a function from a row to its number or text, or null if it has none. `heard(head, way)` is
+ * called on each change, without `way` for the original order. Returns `arrange()`, to call after rows have moved, and
  * `sort(head, way)`.
  */
 function makeSortable(heads, bodies, keyOf, heard = () => {}) {
@@ -69,7 +69,7 @@ function meanOf(metric) {
   };
 }
 
-/** A table of results: sortable, its groups kept together or made one list. */
+/** A sortable table of results, with its groups kept together or merged into one list. */
 class Results {
   constructor(table) {
     this.table = table;
@@ -102,7 +102,7 @@ class Results {
     return this.isGrouped ? this.groups : [this.list];
   }
 
-  /** A column that says of which group a row is, for when they are one list. */
+  /** Adds a column with each row's group, for the merged list. */
   addGroupColumn() {
     const { groupHeading } = this.table.dataset;
     if (groupHeading === "") return;
@@ -122,7 +122,7 @@ class Results {
     this.arrange();
   }
 
-  /** Shows the rows that `isWanted`; gives how many these are. */
+  /** Shows the rows that satisfy `isWanted`; returns their number. */
   filter(isWanted) {
     for (const row of this.rows) row.hidden = !isWanted(row);
     for (const body of this.groups) body.hidden = !this.isGrouped || !this.rows.some((row) => !row.hidden && this.home.get(row) === body);

@@ -1,6 +1,6 @@
-// Everything begins here.
+// The entry point.
 
-/** Light or dark: as the system says until the reader says otherwise. */
+/** Light or dark: the system's setting until the reader chooses. */
 function startTheme() {
   const root = document.documentElement;
   const button = document.getElementById("theme");
@@ -16,13 +16,13 @@ function startTheme() {
   show();
 }
 
-/** Headers stay in view: at the top of the window, or of a box that scrolls because its table is wider. */
+/** Keeps headers in view: at the top of the window, or of the scrolling box around a wide table. */
 function keepHeads(box) {
   const look = () => {
     box.classList.remove("wide", "fits");
     const isWide = box.scrollWidth > box.clientWidth + 1;
     box.classList.add(isWide ? "wide" : "fits");
-    // What scrolls must be reached by keyboard; where nothing in it can be, the box itself is.
+    // Scrollable content must be reachable by keyboard; without focusable content, the box itself is focusable.
     if (isWide && box.querySelector("a, button, [tabindex]") === null) box.tabIndex = 0;
     else box.removeAttribute("tabindex");
   };
@@ -30,7 +30,7 @@ function keepHeads(box) {
   look();
 }
 
-/** What is folded away on the screen is not on paper. */
+/** Opens collapsed sections for printing. */
 function startPrinting() {
   const folded = [];
   addEventListener("beforeprint", () => {

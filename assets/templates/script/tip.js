@@ -1,13 +1,13 @@
-// The tip: what stands behind a cell, a header or a mark of a figure, shown on hover and on focus.
+// The tip: details of a cell, a header or a mark of a figure, shown on hover and on focus.
 
 const tip = make("div", { class: "tip", id: "tip", role: "tooltip", hidden: "" });
 document.body.append(tip);
 let tipped = null;
 
-// Keys scroll things under a pointer at rest; what comes to lie there is not what the reader points at.
+// Scrolling by keys moves elements under a resting pointer; the reader does not point at these.
 let isPointing = true;
 
-/** Shows `content` by `target`, inside the window. */
+/** Shows `content` near `target`, inside the window. */
 function showTip(target, ...content) {
   hideTip();
   tip.replaceChildren(...content);
@@ -34,7 +34,7 @@ function hideTip() {
   tip.hidden = true;
 }
 
-/** What the tip of an element says; nothing if it has none. */
+/** The tip of an element; empty if it has none. */
 function tipContent(target) {
   if (target.matches("td[data-metric]")) {
     const { metric, group, definition } = subject(target);
@@ -45,7 +45,7 @@ function tipContent(target) {
   return markText(target) === "" ? null : [markText(target)];
 }
 
-/** A mark's title, taken out of the figure so that the browser does not show it a second time. */
+/** A mark's title, removed from the figure so that the browser does not show it a second time. */
 function markText(mark) {
   const title = mark.querySelector(":scope > title");
   if (title !== null) {
@@ -55,7 +55,7 @@ function markText(mark) {
   return mark.getAttribute("aria-label") ?? "";
 }
 
-/** Notices when the pointer moves by itself. */
+/** Detects whether the pointer itself moves. */
 function watchPointer() {
   let last = null;
   const notice = ({ type, clientX, clientY }) => {

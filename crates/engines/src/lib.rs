@@ -1,7 +1,7 @@
 //! Other engines that run the SQL lowering of a plan: Polars in this process, Spark on a cluster.
 //!
-//! Rule: an engine gives the same [`EpisodeTable`](score::table::EpisodeTable) as the native one, or an error;
-//! it never gives another table.
+//! Rule: an engine returns the same [`EpisodeTable`](score::table::EpisodeTable) as the native one, or an error; never
+//! a different table.
 //!
 //! ```
 //! use mirrorstats_engines::spark::setting::Setting;

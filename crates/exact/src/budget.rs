@@ -1,8 +1,8 @@
 //! Budgets for the work that an input may cause: bytes read, bytes inflated, values decoded, nodes expanded.
 //!
-//! Rule: budgets count work and never time, so that the same input is refused everywhere or nowhere. Where what is stored
-//! may be small and what comes out of it large, a budget grows with the bytes that are stored: files of any size pass that
-//! are what they look like, and a small file asks for little. Who trusts an input multiplies all limits with [`SETTING`].
+//! Rule: budgets count work and never time, so that the same input is refused everywhere or nowhere. Where small data
+//! can expand, a budget grows with the stored bytes: normal files of any size pass, and a small file cannot ask for
+//! much. A caller that trusts an input multiplies all limits with [`SETTING`].
 
 use std::fmt;
 use std::io;
@@ -15,7 +15,7 @@ pub const SETTING: &str = "MIRRORSTATS_BUDGET";
 /// The largest factor: no limit overflows below it.
 const LARGEST: u64 = 1_000_000;
 
-/// The most of something, before [`SETTING`].
+/// An upper limit, before [`SETTING`] multiplies it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limit {
     what: &'static str,
@@ -28,12 +28,12 @@ impl Limit {
         Self { what, most }
     }
 
-    /// At most `floor`, and `factor` more for each of the `bytes` that are stored.
+    /// At most `floor` plus `factor` per stored byte.
     pub const fn in_proportion(what: &'static str, floor: u64, factor: u64, bytes: u64) -> Self {
         Self { what, most: floor.saturating_add(factor.saturating_mul(bytes)) }
     }
 
-    /// `factor` more for each of the `bytes` that lie beyond the first `from`.
+    /// Adds `factor` for each of the `bytes` beyond the first `from`.
     #[must_use]
     pub const fn and_beyond(self, from: u64, factor: u64, bytes: u64) -> Self {
         Self::in_proportion(self.what, self.most, factor, bytes.saturating_sub(from))
@@ -44,14 +44,14 @@ impl Limit {
         self.most.saturating_mul(factor())
     }
 
-    /// Returns true if the limit allows this number.
+    /// Returns an error if `found` exceeds the limit.
     pub fn check(&self, found: u64) -> Result<(), Exceeded> {
         let most = self.most();
         if found > most { Err(Exceeded { what: self.what, most }) } else { Ok(()) }
     }
 }
 
-/// A limit and what is used of it, by any number of threads.
+/// A limit and its use so far, shared by any number of threads.
 #[derive(Debug)]
 pub struct Budget {
     limit: Limit,
@@ -70,7 +70,7 @@ impl Budget {
     }
 }
 
-/// An input asks for more work than a limit allows.
+/// The error if an input asks for more work than a limit allows.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Exceeded {
     what: &'static str,
@@ -78,7 +78,7 @@ pub struct Exceeded {
 }
 
 impl Exceeded {
-    /// The limit, as what is expected.
+    /// The limit, as the expected value of an error.
     pub fn expected(&self) -> String {
         format!("at most {} {}", self.most, self.what)
     }
@@ -107,7 +107,7 @@ fn factor() -> u64 {
     *FACTOR.get_or_init(|| setting().unwrap_or(1))
 }
 
-/// The factor in the environment, 1 where there is none.
+/// The factor in the environment; 1 if it is not set.
 pub fn setting() -> Result<u64, String> {
     std::env::var_os(SETTING).map_or(Ok(1), |value| parsed(&value.to_string_lossy()))
 }

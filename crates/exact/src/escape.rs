@@ -1,7 +1,7 @@
-//! Characters that act or hide instead of showing themselves, made visible.
+//! Makes visible the characters that act or hide instead of showing themselves.
 //!
 //! Rule: every name that the program did not choose passes through [`visible`] on its way to a person: terminal,
-//! messages, Markdown, LaTeX, HTML, figures. What programs read back (CSV, JSON, Parquet) keeps names as they are.
+//! messages, Markdown, LaTeX, HTML, figures. Names in files for programs (CSV, JSON, Parquet) stay unchanged.
 
 use std::sync::LazyLock;
 
@@ -27,8 +27,8 @@ static ACTS_OR_HIDES: LazyLock<Regex> = LazyLock::new(|| {
 /// `text` with every character that acts or hides spelled as `\u{1b}`.
 ///
 /// These are Unicode's categories Other (controls, bidirectional and other format characters, tags, private use,
-/// unassigned), Line and Paragraph Separator, and whatever else a font leaves out by default (fillers, variation
-/// selectors). Emoji sequences and the joiners of scripts that are spelled with them stay. Lines become one line.
+/// unassigned), Line and Paragraph Separator, and all other characters that fonts leave out by default (fillers,
+/// variation selectors). Emoji sequences and the joiners that some scripts need stay. Lines become one line.
 pub fn visible(text: &str) -> String {
     if text.bytes().all(|byte| byte == b' ' || byte.is_ascii_graphic()) {
         return text.to_owned();
@@ -40,7 +40,7 @@ pub fn visible(text: &str) -> String {
     ACTS_OR_HIDES.replace_all(text, spelled).into_owned()
 }
 
-/// As [`visible`], and every white space but the ordinary space is spelled, too: for values of which white space is the
+/// Like [`visible`], but also spells all white space except the ordinary space: for values whose white space is the
 /// fault.
 pub fn exact(text: &str) -> String {
     let mut shown = String::with_capacity(text.len());
@@ -50,7 +50,7 @@ pub fn exact(text: &str) -> String {
     shown
 }
 
-/// Each line of `text` as [`visible`] shows it; for texts whose line breaks are the program's own.
+/// Applies [`visible`] to each line of `text`; for texts whose line breaks are the program's own.
 pub fn visible_lines(text: &str) -> String {
     text.lines().map(visible).collect::<Vec<_>>().join("\n")
 }

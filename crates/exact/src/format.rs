@@ -1,6 +1,6 @@
-//! Numbers as people read them: counts, a fixed number of decimals, p values, intervals.
+//! Numbers for readers: counts, a fixed number of decimals, p values, intervals.
 //!
-//! For numbers that are floating-point to begin with; exact fractions are the business of `number`.
+//! These numbers are floats from the start; `number` formats exact fractions.
 
 /// `1 file`, `2 files`.
 pub fn counted(count: impl Into<u64>, noun: &str) -> String {
@@ -13,7 +13,7 @@ pub fn counted(count: impl Into<u64>, noun: &str) -> String {
 /// The text for an undefined number.
 pub const UNDEFINED: &str = "--";
 
-/// `value` to `places` decimals; zero has no sign. [`UNDEFINED`] for none and for what is not finite.
+/// `value` to `places` decimals; zero has no sign. Missing and non-finite values give [`UNDEFINED`].
 pub fn fixed(value: Option<f64>, places: usize) -> String {
     let Some(value) = value.filter(|value| value.is_finite()) else {
         return UNDEFINED.to_owned();
@@ -25,7 +25,7 @@ pub fn fixed(value: Option<f64>, places: usize) -> String {
     }
 }
 
-/// A p value: three decimals, four below 0.001, and never a zero.
+/// A p value: three decimals, four below 0.001, never zero.
 pub fn p_value(p: Option<f64>) -> String {
     match p {
         Some(p) if p < 0.0001 => "<0.0001".to_owned(),
@@ -34,7 +34,7 @@ pub fn p_value(p: Option<f64>) -> String {
     }
 }
 
-/// An e-value: two decimals, whole numbers from 100, and a bound where it is very large or very small.
+/// An e-value: two decimals, whole numbers from 100, and a bound if it is very large or very small.
 pub fn e_value(e: f64) -> String {
     match e {
         e if e > 9999.0 => ">9999".to_owned(),
@@ -44,7 +44,7 @@ pub fn e_value(e: f64) -> String {
     }
 }
 
-/// `[low, high]` to `places` decimals; [`UNDEFINED`] for none.
+/// `[low, high]` to `places` decimals; [`UNDEFINED`] without bounds.
 pub fn bounds(bounds: Option<(f64, f64)>, places: usize) -> String {
     bounds.map_or_else(
         || UNDEFINED.to_owned(),

@@ -1,4 +1,4 @@
-//! Content hashes: SHA-256 as lowercase hexadecimal, what `sha256sum` prints.
+//! Content hashes: SHA-256 as lowercase hexadecimal, as `sha256sum` prints it.
 
 use std::fmt::Write as _;
 use std::io::{self, Read};
@@ -12,12 +12,12 @@ pub fn of_bytes(bytes: &[u8]) -> String {
     hex(&Sha256::digest(bytes))
 }
 
-/// The hash of some bytes as a web page names it: `sha256-` and base64.
+/// The hash of some bytes in the form of web pages: `sha256-` and base64.
 pub fn integrity_of_bytes(bytes: &[u8]) -> String {
     format!("sha256-{}", STANDARD.encode(Sha256::digest(bytes)))
 }
 
-/// The hash of everything that `reader` still gives.
+/// The hash of the rest of `reader`.
 pub fn of_reader(mut reader: impl Read) -> io::Result<String> {
     let mut hasher = Sha256::new();
     let mut buffer = vec![0; 64 * 1024];

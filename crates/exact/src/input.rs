@@ -1,8 +1,8 @@
-//! Opens and reads what a user names.
+//! Opens and reads the user's input files.
 //!
-//! Rule: an input is a regular file, told before it is opened, so that a pipe, a socket or a device neither blocks nor
-//! feeds the program for ever. What is piped in on purpose (`/dev/stdin`, `/dev/fd/3`, which `<(...)` of a shell is) may
-//! stand where a text is read, under the same limit.
+//! Rule: an input is a regular file. This is checked before it is opened, so that a pipe, a socket or a device cannot
+//! block the program or feed it forever. Deliberate pipes (`/dev/stdin`, or `/dev/fd/3` from a shell's `<(...)`) are
+//! accepted for texts, under the same limit.
 
 use std::fs::{File, Metadata};
 use std::io::{self, BufRead, BufReader, Read};
@@ -13,12 +13,12 @@ use super::budget::Limit;
 pub fn open(path: &Path) -> io::Result<File> {
     check(&std::fs::metadata(path)?)?;
     let file = open_without_waiting(path)?;
-    // It may be another one by now.
+    // The path may name another file by now.
     check(&file.metadata()?)?;
     Ok(file)
 }
 
-/// Opens a regular file, or what is piped in on purpose.
+/// Opens a regular file or a deliberate pipe.
 pub fn open_text(path: &Path) -> io::Result<File> {
     if is_piped(path) {
         File::open(path).and_then(|file| not_a_folder(&file.metadata()?).map(|()| file))
@@ -27,12 +27,12 @@ pub fn open_text(path: &Path) -> io::Result<File> {
     }
 }
 
-/// All bytes of a text.
+/// Reads all bytes of a text.
 pub fn bytes(path: &Path, limit: Limit) -> io::Result<Vec<u8>> {
     bytes_of(open_text(path)?, limit)
 }
 
-/// All that a reader gives.
+/// Reads a reader to its end.
 pub fn bytes_of(reader: impl Read, limit: Limit) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     reader.take(limit.most().saturating_add(1)).read_to_end(&mut bytes)?;
@@ -44,17 +44,17 @@ pub fn text(path: &Path, limit: Limit) -> io::Result<String> {
     utf8(bytes(path, limit)?)
 }
 
-/// All that a reader gives, as text.
+/// Reads a reader to its end, as text.
 pub fn text_of(reader: impl Read, limit: Limit) -> io::Result<String> {
     utf8(bytes_of(reader, limit)?)
 }
 
-/// The lines of a text, each read when it is asked for.
+/// The lines of a text, read on demand.
 pub fn lines(path: &Path, longest: Limit) -> io::Result<Lines<BufReader<File>>> {
     Ok(Lines::new(BufReader::new(open_text(path)?), longest))
 }
 
-/// Lines of a reader, as bytes with their line feeds, the last one maybe without.
+/// Lines of a reader, as bytes with their line feeds; the last line may have none.
 #[derive(Debug)]
 pub struct Lines<R> {
     reader: R,
@@ -62,7 +62,7 @@ pub struct Lines<R> {
 }
 
 impl<R: BufRead> Lines<R> {
-    /// The lines that are still to come.
+    /// The remaining lines of a reader.
     pub const fn new(reader: R, longest: Limit) -> Self {
         Self { reader, longest }
     }
@@ -135,7 +135,7 @@ fn what_it_is(_: &Metadata) -> &'static str {
     "a device"
 }
 
-/// A pipe that took the place of a file would keep a caller that opens it waiting for a writer.
+/// Opens without blocking if a pipe has replaced the file since the check.
 #[cfg(target_os = "linux")]
 fn open_without_waiting(path: &Path) -> io::Result<File> {
     use std::os::unix::fs::OpenOptionsExt as _;

@@ -1,4 +1,4 @@
-//! The base of every crate: exact numbers, moments and text, hashes, near names, limited inputs, files replaced whole.
+//! The base of every crate: exact numbers, moments and text, hashes, similar names, limited inputs, atomic file writes.
 //!
 //! ```
 //! use mirrorstats_exact::moments::Moments;
@@ -10,7 +10,7 @@
 //! # Ok::<(), mirrorstats_exact::moments::MomentOverflow>(())
 //! ```
 //!
-//! Rule: nothing here knows an episode, a metric or a file format.
+//! Rule: this crate does not know episodes, metrics or file formats.
 
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 

@@ -3,9 +3,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// n, the sum and the sum of squares of some integers: all that mean and standard error need.
+/// Count, sum and sum of squares of some integers: enough for the mean and its standard error.
 ///
-/// Adding is exact and in any order gives the same moments; 128 bits hold 2^64 values of 32 bits.
+/// Addition is exact in any order; 128 bits hold 2^64 values of 32 bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Moments {
     /// The number of defined values.
@@ -15,13 +15,13 @@ pub struct Moments {
     pub sum_sq: i128,
 }
 
-/// Moments that 128 bits cannot hold.
+/// The error if moments exceed 128 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the sum of squares exceeds 128 bits; use a smaller unit in the metric's definition")]
 pub struct MomentOverflow;
 
 impl Moments {
-    /// These moments and one more value.
+    /// Adds one value.
     ///
     /// # Errors
     /// A sum beyond 128 bits, which no metric of steps can reach.
@@ -34,7 +34,7 @@ impl Moments {
         })
     }
 
-    /// These moments and some zeros and ones.
+    /// Adds some zeros and ones.
     pub fn with_truths(self, zeros: usize, ones: usize) -> Result<Self, MomentOverflow> {
         let (n, sum) = ((zeros + ones) as u64, ones as i128);
         Ok(Self {
@@ -44,7 +44,7 @@ impl Moments {
         })
     }
 
-    /// The successes of a rate and its episodes, where every value is 0 or 1.
+    /// The successes and the episodes of a rate; `None` unless the values fit zeros and ones.
     pub fn counts(self) -> Option<(u64, u64)> {
         let successes = u64::try_from(self.sum).ok()?;
         (successes <= self.n && self.sum == self.sum_sq).then_some((successes, self.n))
@@ -55,7 +55,7 @@ impl Moments {
         self.se(StandardError::Population).is_some_and(|se| se > 0.0)
     }
 
-    /// The arithmetic mean; `None` for no value.
+    /// The arithmetic mean; `None` without values.
     #[expect(clippy::cast_precision_loss, reason = "the one conversion from integers, done once")]
     pub fn mean(self) -> Option<f64> {
         (self.n > 0).then(|| self.sum as f64 / self.n as f64)
@@ -64,7 +64,7 @@ impl Moments {
     /// The exact square of the standard error as a fraction `(above, below)`, both non-negative.
     ///
     /// Sample form: (n·Σx² − (Σx)²) / (n²·(n−1)); population form: (n·Σx² − (Σx)²) / n³.
-    /// `None` for no value, for the sample form of one value, and where 128 bits do not suffice.
+    /// `None` without values, for the sample form of one value, or if 128 bits do not suffice.
     pub fn se_squared(self, form: StandardError) -> Option<(i128, i128)> {
         let n = i128::from(self.n);
         let spread = n.checked_mul(self.sum_sq)?.checked_sub(self.sum.checked_mul(self.sum)?)?;
@@ -76,7 +76,7 @@ impl Moments {
         (below > 0).then_some((spread, below))
     }
 
-    /// The standard error of the mean (paper, Aggregation); `None` where it is undefined.
+    /// The standard error of the mean (paper, Aggregation); `None` if it is undefined.
     #[expect(clippy::cast_precision_loss, reason = "the one conversion from integers, done once")]
     pub fn se(self, form: StandardError) -> Option<f64> {
         let (above, below) = self.se_squared(form)?;

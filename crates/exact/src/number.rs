@@ -1,14 +1,14 @@
-//! Exact numbers to text: the one place that rounds.
+//! Converts exact numbers to text: the only place that rounds.
 //!
-//! A [`Decimal`] is what a reader sees: an integer and how many of its digits stand behind the point. It is made
-//! from an exact fraction, from the root of one, or from a float whose bits are taken as the exact number they
-//! are; every way rounds correctly, and only [`Decimal::of_float_twice`] rounds twice, because the paper did.
+//! A [`Decimal`] is a printed number: an integer and its number of digits after the point. It comes from an exact
+//! fraction, the root of one, or the exact value of a float. All conversions round once and correctly, except
+//! [`Decimal::of_float_twice`], which rounds twice because the paper did.
 
 use std::cmp::Ordering;
 use std::fmt;
 use std::str::FromStr;
 
-/// The most digits behind the point that are worth printing.
+/// The most digits after the point that are worth printing.
 pub(crate) const MOST_PLACES: u32 = 9;
 
 /// A number as printed: `units / 10^places`. Zero has no sign, so `-0.00` cannot be printed.
@@ -19,7 +19,7 @@ pub struct Decimal {
 }
 
 impl Decimal {
-    /// Nothing, with that many digits behind the point.
+    /// Zero, with this many digits after the point.
     pub fn zero(places: u32) -> Self {
         Self { units: 0, places }
     }
@@ -40,7 +40,7 @@ impl Decimal {
 
     /// `above / below` rounded once, ties to even.
     ///
-    /// `None` unless `below` is positive, and where 128 bits do not suffice.
+    /// `None` if `below` is not positive, or if 128 bits do not suffice.
     pub fn of_ratio(above: i128, below: i128, places: u32) -> Option<Self> {
         if below <= 0 {
             return None;
@@ -54,7 +54,7 @@ impl Decimal {
 
     /// The square root of `above / below` rounded once, ties to even, in integers throughout.
     ///
-    /// `None` unless `below` is positive and `above` is not negative, and where 128 bits do not suffice.
+    /// `None` if `below` is not positive, `above` is negative, or 128 bits do not suffice.
     pub fn of_root(above: i128, below: i128, places: u32) -> Option<Self> {
         if below <= 0 || above < 0 {
             return None;
@@ -64,7 +64,7 @@ impl Decimal {
         let scale = power_of_ten(places)?;
         let scaled = above.checked_mul(scale.checked_mul(scale)?)?;
         let floor = (scaled / below).isqrt();
-        // The root lies above the middle between floor and floor + 1 where its square does.
+        // The root is above the midpoint of floor and floor + 1 if its square is above the midpoint's square.
         let middle = floor.checked_mul(2)?.checked_add(1)?;
         let order = scaled.checked_mul(4)?.cmp(&middle.checked_mul(middle)?.checked_mul(below)?);
         Some(Self { units: nearest(floor, order), places })
@@ -72,7 +72,7 @@ impl Decimal {
 
     /// The float's exact binary value rounded once, ties to even: what `printf` and Python print.
     ///
-    /// `None` for what is not finite, and where 128 bits do not suffice.
+    /// `None` for non-finite values, or if 128 bits do not suffice.
     pub fn of_float(value: f64, places: u32) -> Option<Self> {
         // With a smaller exponent the number is below 2^-44, which is zero at nine places or fewer.
         const SMALLEST_EXPONENT: i32 = -97;
@@ -84,8 +84,8 @@ impl Decimal {
         }
     }
 
-    /// The float rounded as by [`Decimal::of_float`] with one digit more, and that text rounded again, halves
-    /// away from zero: how the paper's main table was made.
+    /// Rounds the float as [`Decimal::of_float`] does to one more digit, then rounds that text, halves away from zero.
+    /// The paper's main table was made this way.
     pub fn of_float_twice(value: f64, places: u32) -> Option<Self> {
         let once = Self::of_float(value, places + 1)?.units;
         let size = (once.abs() + 5) / 10;
@@ -98,7 +98,7 @@ impl Decimal {
         self.parts(places).cmp(&other.parts(places))
     }
 
-    /// The text without the zero before the point, for rates in little room: `.50`.
+    /// The text without the zero before the point, for narrow columns: `.50`.
     pub fn compact(self) -> String {
         let text = self.to_string();
         match text.strip_prefix("0.") {
@@ -107,7 +107,7 @@ impl Decimal {
         }
     }
 
-    /// The whole part and the rest in units of `places` digits, which are at least this number's own.
+    /// The whole part and the rest in units of `places` digits; `places` is at least this number's own.
     fn parts(self, places: u32) -> (i128, i128) {
         let scale = |places| power_of_ten(places).unwrap_or(i128::MAX);
         let own = scale(self.places);
@@ -128,7 +128,7 @@ impl fmt::Display for Decimal {
     }
 }
 
-/// A text that is no plain decimal number.
+/// The error for a text that is not a plain decimal number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("expected a plain decimal number such as `0.57`")]
 pub struct NotADecimal;
@@ -150,13 +150,13 @@ impl FromStr for Decimal {
     }
 }
 
-/// Every digit that tells this float from its neighbours, for files that programs read.
+/// All digits that distinguish this float from its neighbours, for files that programs read.
 pub fn full_precision(value: f64) -> String {
-    // Adding zero takes the sign off a negative zero.
+    // Adding zero removes the sign of a negative zero.
     (value + 0.0).to_string()
 }
 
-/// `floor`, or the integer above it, by how the remainder compares with a half.
+/// `floor` or the next integer, depending on how the remainder compares with a half.
 fn nearest(floor: i128, remainder: Ordering) -> i128 {
     match remainder {
         Ordering::Less => floor,
@@ -165,7 +165,7 @@ fn nearest(floor: i128, remainder: Ordering) -> i128 {
     }
 }
 
-/// `value = mantissa * 2^exponent`, exactly; `None` for what is not finite.
+/// `value = mantissa * 2^exponent`, exactly; `None` for non-finite values.
 fn binary_parts(value: f64) -> Option<(i128, i32)> {
     const MANTISSA_BITS: u32 = 52;
     const EXPONENT_BIAS: i32 = 1075;
@@ -190,7 +190,7 @@ fn power_of_two(exponent: i32) -> Option<i128> {
     2_i128.checked_pow(u32::try_from(exponent).ok()?)
 }
 
-/// The greatest common divisor of numbers that are not negative; 1 for two zeros.
+/// The greatest common divisor of non-negative numbers; 1 for two zeros.
 pub(crate) fn gcd(a: i128, b: i128) -> i128 {
     if b == 0 { a.max(1) } else { gcd(b, a % b) }
 }

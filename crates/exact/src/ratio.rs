@@ -66,7 +66,7 @@ impl FromStr for Ratio {
     }
 }
 
-/// `0.25` as the fraction that it is.
+/// `0.25` as an exact fraction.
 fn decimal(whole: &str, digits: &str) -> Option<Ratio> {
     const MOST_DIGITS: usize = 17;
     let all_digits = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());

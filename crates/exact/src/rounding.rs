@@ -1,7 +1,7 @@
-//! The ways in which a printed number may have been rounded.
+//! The possible roundings of a printed number.
 //!
-//! Rule: every way is monotone, so that the numbers that print as a given text are an interval. The exact ways work
-//! in integers; those of binary floats divide and take the root once, as the programs do that print them.
+//! Rule: every rounding is monotone, so the numbers that print as a given text form an interval. The exact ones work in
+//! integers. Those of binary floats divide and take the root once, like the programs that print them.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -35,7 +35,7 @@ crate::names!(Rounding {
 impl Rounding {
     /// `above / below` as printed.
     ///
-    /// `None` unless `below` is positive, and where 128 bits do not suffice.
+    /// `None` if `below` is not positive, or if 128 bits do not suffice.
     #[expect(clippy::cast_precision_loss, reason = "the rounding of the float is the rule")]
     pub fn ratio(self, above: i128, below: i128, places: u32) -> Option<Decimal> {
         if below <= 0 {
@@ -55,7 +55,7 @@ impl Rounding {
 
     /// The square root of `above / below` as printed.
     ///
-    /// `None` unless `below` is positive and `above` is not negative, and where 128 bits do not suffice.
+    /// `None` if `below` is not positive, `above` is negative, or 128 bits do not suffice.
     #[expect(clippy::cast_precision_loss, reason = "the rounding of the float is the rule")]
     pub fn root(self, above: i128, below: i128, places: u32) -> Option<Decimal> {
         if below <= 0 || above < 0 {

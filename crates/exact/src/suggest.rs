@@ -1,9 +1,9 @@
-//! The nearest valid name, for the "did you mean" of an error.
+//! Finds the nearest valid name, for the "did you mean" of an error.
 
-/// The candidate most like `name`, if any is like it at all.
+/// The candidate most similar to `name`, if any is similar.
 ///
-/// Similarity is Jaro-Winkler, ignoring ASCII case, or one slip of the finger (a letter too many, too few, another, or
-/// two exchanged); ties go to the candidate that comes first, so the answer depends on the order given alone.
+/// Similarity is Jaro-Winkler, ignoring ASCII case, or one typing error (a letter added, missing or replaced, or two
+/// exchanged). The first of equal candidates wins, so the answer depends only on the given order.
 pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     const LIKE_ENOUGH: f64 = 0.75;
     const ONE_SLIP: f64 = 0.85;
@@ -20,7 +20,7 @@ pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
     best.map(|(candidate, _)| candidate)
 }
 
-/// `; did you mean ...?` with the candidate most like `name`; empty where none is like it.
+/// `; did you mean ...?` with the most similar candidate; empty if no candidate is similar.
 pub fn hint<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> String {
     nearest(name, candidates).map_or_else(String::new, |near| format!("; did you mean `{near}`?"))
 }

@@ -1,6 +1,6 @@
-//! The names that the OpenGL context of a thread gives itself: which renderer draws, in which version, by whom.
+//! The strings by which a thread's OpenGL context identifies itself: vendor, renderer, version.
 //!
-//! Rule: the only unsafe code of the program is the one function here that asks the driver. It reads three texts and changes
+//! Rule: the program's only unsafe code is the function here that asks the driver. It reads three strings and changes
 //! nothing.
 //!
 //! ```
@@ -8,7 +8,7 @@
 //! assert_eq!(mirrorstats_gl::names(), None);
 //! ```
 
-/// What a context calls itself.
+/// Identification strings of a context.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Names {
     /// `GL_VENDOR`, such as `Mesa`.
@@ -19,7 +19,7 @@ pub struct Names {
     pub version: String,
 }
 
-/// The names of the context that is current on this thread; `None` where there is none, or it is not one of EGL.
+/// The strings of the current context of this thread; `None` without a context, or if EGL did not create it.
 pub fn names() -> Option<Names> {
     const VENDOR: u32 = 0x1F00;
     const RENDERER: u32 = 0x1F01;
@@ -36,19 +36,19 @@ fn strings(names: [u32; 3]) -> Option<[String; 3]> {
     type Address = unsafe extern "C" fn(*const c_char) -> *const c_void;
     type GetString = unsafe extern "C" fn(u32) -> *const c_char;
 
-    // SAFETY: libEGL has no initialisers that depend on anything; a renderer of this process has loaded it already.
+    // SAFETY: libEGL has no initialisers with preconditions; a renderer of this process has loaded it already.
     let egl = unsafe { libloading::Library::new("libEGL.so.1") }.ok()?;
-    // SAFETY: the signature is that of the specification of EGL.
+    // SAFETY: the signature matches the EGL specification.
     let address = unsafe { egl.get::<Address>(b"eglGetProcAddress\0") }.ok()?;
     // SAFETY: the name ends with a zero.
     let get_string = unsafe { address(c"glGetString".as_ptr()) };
     if get_string.is_null() {
         return None;
     }
-    // SAFETY: the function of this name has this signature, in every version of OpenGL.
+    // SAFETY: this function has this signature in every version of OpenGL.
     let get_string = unsafe { std::mem::transmute::<*const c_void, GetString>(get_string) };
     let text = |name| {
-        // SAFETY: without a current context the answer is null, else a text that lives as long as the context.
+        // SAFETY: without a current context the result is null, else a string that lives as long as the context.
         let text = unsafe { get_string(name) };
         // SAFETY: as above.
         (!text.is_null()).then(|| unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned())

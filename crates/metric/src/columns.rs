@@ -1,4 +1,4 @@
-//! The names that expressions may use for a trace's columns: type and level, nothing of a file.
+//! The column names that expressions may use, with type and level; independent of files.
 
 use indexmap::IndexMap;
 use schemars::JsonSchema;
@@ -19,7 +19,7 @@ pub enum Type {
 }
 
 impl Type {
-    /// As a message names it.
+    /// Its name in messages.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Bool => "true or false",
@@ -30,8 +30,7 @@ impl Type {
     }
 }
 
-/// How often an expression has a value. The order is the order of spreading: one value per episode serves as one value
-/// per step.
+/// How often an expression has a value. Ordered by spreading: one value per episode can serve as one value per step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Level {
     Constant,
@@ -41,16 +40,16 @@ pub enum Level {
     Step,
 }
 
-/// A column as expressions see it.
+/// A column from the view of expressions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Column {
     /// The type of its values.
     pub ty: Type,
-    /// [`Level::Episode`] where the schema says that it is constant in an episode.
+    /// [`Level::Episode`] if the schema declares it constant in an episode.
     pub level: Level,
 }
 
-/// The columns by name: those of the schema in its order, then those that some traces have beside it.
+/// The columns by name: those of the schema in its order, then other columns of some traces.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Columns {
     schema: IndexMap<String, Column>,
@@ -58,12 +57,12 @@ pub struct Columns {
     fallbacks: IndexMap<String, Fallback>,
     free: Vec<String>,
     values: IndexMap<String, Vec<String>>,
-    /// Columns of the schema that mean something before a mirror alone.
+    /// Columns of the schema that have a meaning only in the domain of the mirror.
     of_mirror: Vec<String>,
     stranger: Option<&'static str>,
 }
 
-/// The value of a schema column in a trace or a row without one.
+/// The value of a schema column if a trace or row has none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fallback {
     /// An expression over columns that every trace has.
@@ -73,13 +72,13 @@ pub struct Fallback {
 }
 
 impl Columns {
-    /// The same columns; `help` says what to do about a name that is like none of them.
+    /// The same columns; `help` is the advice for a name without similar ones.
     #[must_use]
     pub fn with_help(self, help: &'static str) -> Self {
         Self { stranger: Some(help), ..self }
     }
 
-    /// The same columns; these of the schema take only the listed values, and null.
+    /// The same columns; these of the schema take only the listed values or null.
     #[must_use]
     pub fn with_values<N: Into<String>>(self, lists: impl IntoIterator<Item = (N, &'static [&'static str])>) -> Self {
         let owned = |values: &[&str]| values.iter().map(|value| (*value).to_owned()).collect();
@@ -87,21 +86,21 @@ impl Columns {
         Self { values, ..self }
     }
 
-    /// The same columns; these of the schema mean something before a mirror alone.
+    /// The same columns; these of the schema have a meaning only in the domain of the mirror.
     #[must_use]
     pub fn with_mirror<N: Into<String>>(self, names: impl IntoIterator<Item = N>) -> Self {
         Self { of_mirror: names.into_iter().map(Into::into).collect(), ..self }
     }
 
-    /// Gives up the meaning of the columns of the mirror: their names are free, and those that are not read again as columns
-    /// of the traces' own are unknown.
+    /// Removes the meaning of the mirror's columns: their names are free, and unknown unless the traces have own
+    /// columns of these names.
     pub(crate) fn leave_mirror(&mut self) {
         for name in std::mem::take(&mut self.of_mirror) {
             self.forget(&name);
         }
     }
 
-    /// The only values of a column, null apart; `None` where any is possible.
+    /// The only values of a column, except null; `None` if any are possible.
     pub fn values(&self, name: &str) -> Option<&[String]> {
         self.values.get(name).map(Vec::as_slice)
     }
@@ -116,33 +115,33 @@ impl Columns {
         self.schema.get(name).or_else(|| self.own.get(name)).copied()
     }
 
-    /// The schema's column of this name: one that every trace means the same by.
+    /// The schema's column of this name, with the same meaning in every trace.
     pub(crate) fn of_schema(&self, name: &str) -> Option<Column> {
         self.schema.get(name).copied()
     }
 
-    /// Returns true if a column of the schema keeps its name for itself.
+    /// Returns true if a column of the schema reserves this name.
     pub(crate) fn is_reserved(&self, name: &str) -> bool {
         self.schema.contains_key(name) && !self.free.iter().any(|free| free == name)
     }
 
-    /// Lets definitions use the name of a column of the schema for something else.
+    /// Lets definitions use the name of a column of the schema for other things.
     pub fn set_free(&mut self, name: impl Into<String>) {
         self.free.push(name.into());
     }
 
-    /// Takes a column out of the schema: these traces use its name for something else.
+    /// Removes a column from the schema: these traces use its name for something else.
     pub fn forget(&mut self, name: &str) {
         self.schema.shift_remove(name);
         self.values.shift_remove(name);
     }
 
-    /// The value of the column in a row without one; `None` if that is null.
+    /// The value of the column in rows that have none; `None` if that is null.
     pub(crate) fn fallback_of(&self, name: &str) -> Option<Fallback> {
         self.fallbacks.get(name).copied().filter(|_| self.schema.contains_key(name))
     }
 
-    /// Says what a column of the schema means where there is no value.
+    /// Sets the value of a column of the schema in rows that have none.
     pub fn set_fallback(&mut self, name: impl Into<String>, fallback: Fallback) {
         self.fallbacks.insert(name.into(), fallback);
     }
@@ -151,12 +150,12 @@ impl Columns {
         self.schema.keys().chain(self.own.keys()).map(String::as_str)
     }
 
-    /// Adds a column that every reader of these traces means the same by, as those of the schema.
+    /// Adds a column with the same meaning for every reader of these traces, like those of the schema.
     pub fn add_known(&mut self, name: impl Into<String>, column: Column) {
         self.schema.insert(name.into(), column);
     }
 
-    /// Sets what a column beside the schema is; a column of the schema stays unchanged.
+    /// Sets the type and level of a column outside the schema; columns of the schema stay unchanged.
     pub fn set_own(&mut self, name: impl Into<String>, column: Column) {
         let name = name.into();
         if !self.schema.contains_key(&name) {
@@ -164,7 +163,7 @@ impl Columns {
         }
     }
 
-    /// Sets the only texts of a column beside the schema.
+    /// Sets the only texts of a column outside the schema.
     pub(crate) fn set_own_values(&mut self, name: &str, values: &[String]) {
         if self.own.contains_key(name) && !values.is_empty() {
             self.values.insert(name.to_owned(), values.to_vec());

@@ -1,4 +1,4 @@
-//! A definition file, checked: its catalog for readers, its plan for the kernels.
+//! A checked definition file: its catalog for readers, its plan for the kernels.
 
 use std::path::Path;
 
@@ -26,7 +26,7 @@ pub struct Definitions {
 impl Definitions {
     /// Reads and checks a built-in file by name (`paper`, `extended`, `battery`, `evidence`, `reach`, `reach-fallback`), or any other by path.
     ///
-    /// `columns` are those of the traces; columns that the file declares are added to them.
+    /// `columns` are those of the traces; the columns that the file declares are added.
     pub fn load(name_or_path: impl AsRef<Path>, columns: &Columns) -> Result<Self, FileError> {
         Ok(Self::check(file::read(name_or_path.as_ref())?, columns, None)?)
     }
@@ -37,14 +37,14 @@ impl Definitions {
         Ok(Self::check(file::read_source(name.to_owned(), source, None)?, columns, None)?)
     }
 
-    /// The same definitions, counting only episodes where `condition` holds.
+    /// The same definitions, restricted to episodes where `condition` holds.
     pub fn filtered(self, shown: &str, condition: &str, columns: &Columns) -> Result<Self, Faults> {
         let source = Source { name: shown.to_owned(), text: condition.to_owned() };
         Self::check(self.document, columns, Some(&Written::whole(source.into())))
     }
 
-    /// The same definitions with the expression of the `let` of this name replaced, every check made anew; without a filter
-    /// and with all metrics.
+    /// The same definitions with another expression for this `let`, checked anew, without a filter and with all
+    /// metrics.
     pub fn with_condition_let(
         &self,
         name: &str,
@@ -74,7 +74,7 @@ impl Definitions {
         Ok(Self::check(document, columns, None)?)
     }
 
-    /// Keeps the metrics of these names.
+    /// Keeps only the metrics of these names.
     pub fn select(&mut self, names: &[String]) -> Result<(), UnknownMetric> {
         if let Some(name) = names.iter().find(|name| !self.catalog.metric.contains_key(*name)) {
             let known: Vec<String> = self.catalog.metric.keys().cloned().collect();
@@ -85,22 +85,22 @@ impl Definitions {
         Ok(())
     }
 
-    /// The `let` or metric that is exactly this node, a `let` first.
+    /// The `let` or metric of exactly this node; a `let` comes first.
     pub fn name_of(&self, node: NodeId) -> Option<String> {
         let lets = self.plan.lets.iter().find(|(_, known)| *known == node).map(|(name, _)| name.clone());
         lets.or_else(|| self.plan.outputs.iter().find(|output| output.node == node).map(|output| output.name.clone()))
     }
 
-    /// Whether they score an experiment whose own definitions are `own`: they are these or include them, they have a table for
-    /// it, or they have a table for none. Where its own are a file, any other file may be what became of that one.
+    /// Returns true if these definitions can score an experiment with the definitions `own`: they are or include those,
+    /// they have a table for it, or they have no tables. If `own` is a file, any file may be a later version of it.
     pub fn scores(&self, experiment: &str, own: &str, own_hash: Option<&str>) -> bool {
         let document = &self.document;
         let is_own = own_hash.map_or_else(|| document.built_on.contains(&own), |_| document.file_hash.is_some());
         is_own || document.experiments.is_empty() || document.experiments.contains_key(experiment)
     }
 
-    /// Several definitions in one, each for its own experiments: elsewhere its metrics are undefined. `None` where two of them
-    /// give one name another meaning.
+    /// Merges definitions, each for its own experiments: elsewhere its metrics are undefined. `None` if two of them
+    /// give a name different meanings.
     pub fn side_by_side(parts: &[(Self, Vec<String>)], columns: &Columns) -> Option<Result<Self, Faults>> {
         let names: Vec<&str> = parts.iter().map(|(part, _)| part.document.name.as_str()).collect();
         let mut whole = Document { name: names.join("+"), open: true, ..Document::default() };
@@ -173,7 +173,7 @@ impl Definitions {
     }
 }
 
-/// An error of replacing a `let` by a condition on steps.
+/// An error while replacing a `let` by a condition on steps.
 #[derive(Debug, thiserror::Error)]
 pub enum ReplaceError {
     #[error(
@@ -198,12 +198,12 @@ const fn per(level: Level) -> &'static str {
     }
 }
 
-/// A name that is no metric of the definitions.
+/// The error for a name that is not a metric of the definitions.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("unknown metric `{name}`: {}", advice(.near.as_deref(), .known))]
 pub struct UnknownMetric {
     pub name: String,
-    /// The metric whose name is most like it.
+    /// The metric with the most similar name.
     pub near: Option<String>,
     pub known: Vec<String>,
 }
@@ -215,7 +215,7 @@ fn advice(near: Option<&str>, known: &[String]) -> String {
     }
 }
 
-/// Adds the columns that a document declares; they must not contradict the schema or the traces.
+/// Adds the columns that a document declares, unless they contradict the schema or the traces.
 fn declare(document: &Document, columns: &mut Columns) -> Vec<Fault> {
     let mut faults = Vec::new();
     for (name, ColumnEntry { place, column: declared, values, .. }) in &document.columns {
@@ -236,7 +236,7 @@ fn declare(document: &Document, columns: &mut Columns) -> Vec<Fault> {
     faults
 }
 
-/// Chance levels must be those of metrics.
+/// Checks that chance levels belong to metrics.
 fn experiment_faults(document: &Document) -> Vec<Fault> {
     let mut faults = Vec::new();
     for (own, entry) in &document.experiments {
@@ -256,7 +256,7 @@ fn experiment_faults(document: &Document) -> Vec<Fault> {
     faults
 }
 
-/// A level of chance of a rate is a probability.
+/// Checks that chance levels of rates are probabilities.
 fn level_faults(document: &Document, binding: &Binding) -> Vec<Fault> {
     let metrics = document.metrics.iter().map(|(name, entry)| (name, entry.chance, &entry.place));
     let experiments = document.experiments.values().flat_map(|entry| {
@@ -281,7 +281,7 @@ fn catalog(document: &Document, binding: &Binding) -> Catalog {
         name: document.name.clone(),
         hash: String::new(),
         domain: document.domain.clone(),
-        // A file that lists no experiment at all restricts none.
+        // A file that lists no experiments accepts all.
         open: document.open || document.experiments.is_empty(),
         lets: document.lets.iter().map(|(name, (written, _))| (name.clone(), written.text.clone())).collect(),
         metric: metrics(document, binding),
@@ -292,7 +292,7 @@ fn catalog(document: &Document, binding: &Binding) -> Catalog {
     catalog
 }
 
-/// The hash of what the definitions say: comments, layout and the file's name do not count.
+/// The hash of the meaning of the definitions: comments, layout and the file's name do not count.
 fn content_hash(catalog: &Catalog) -> String {
     let nameless = Catalog { name: String::new(), hash: String::new(), ..catalog.without_declared() };
     let text = serde_json::to_string(&nameless).expect("a catalog holds texts, integers and maps with text keys");

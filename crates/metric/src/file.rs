@@ -1,6 +1,6 @@
-//! Definition files as written: TOML in, every key accounted for, faults with their places.
+//! Definition files as written: parses TOML, checks every key, and reports faults with their places.
 //!
-//! This file knows what may be in a definition file and nothing of what an expression means.
+//! This file knows the keys of a definition file, but not the meaning of expressions.
 //!
 //! ```toml
 //! include = ["paper"]              # built-in names, or paths relative to this file
@@ -38,7 +38,7 @@ use exact::ratio::Ratio;
 use exact::suggest::nearest;
 use toml_spec::{At, Fault, Faults, FileKind, FileText, Part, Place, Source, Written};
 
-/// Definitions are written by hand, or by a program that spells out a family of metrics.
+/// Definitions are written by hand, or by a program that spells out many similar metrics.
 const KIND: FileKind = FileKind {
     name: "definition file",
     names: "definitions",
@@ -56,23 +56,23 @@ const KIND: FileKind = FileKind {
     most_includes: Limit::new("includes, those of included files counted", 256),
 };
 
-/// The domain of definitions that name none: the columns of the mirror are known, with their rules.
+/// The domain of definitions that name none: the columns and rules of the mirror are known.
 const MIRROR: &str = "mirror";
 
-/// A definition file and all that it includes, merged in order: what comes later replaces what came before.
+/// A definition file and its includes, merged in order: later entries replace earlier ones.
 #[derive(Clone, Debug, Default)]
 pub struct Document {
-    /// The file's own name, without folder and ending.
+    /// The file's name, without folder and extension.
     pub name: String,
-    /// SHA-256 of the file's own text; absent for a text that is no file of one's own.
+    /// SHA-256 of the file's text; absent for built-in texts and texts without a file.
     pub file_hash: Option<String>,
     /// The built-in definitions that it is or includes, by name.
     pub built_on: Vec<&'static str>,
     /// True if unlisted experiments are accepted.
     pub open: bool,
-    /// The subject of the traces, if it is not the mirror: any name.
+    /// The subject of the traces, any name; absent for the mirror.
     pub domain: Option<String>,
-    /// Declared columns of the user's own.
+    /// Columns that the user declares.
     pub columns: IndexMap<String, ColumnEntry>,
     pub lets: IndexMap<String, (Written, Place)>,
     pub metrics: IndexMap<String, MetricEntry>,
@@ -86,10 +86,10 @@ pub struct Document {
 pub struct ColumnEntry {
     pub place: Place,
     pub column: Column,
-    /// The only texts that it holds, null apart; any if empty.
+    /// The only texts in it, except null; any if empty.
     pub values: Vec<String>,
     pub unit: String,
-    /// For a reader of the column; may be empty.
+    /// The description for readers; may be empty.
     pub help: String,
 }
 
@@ -110,7 +110,7 @@ pub struct MetricEntry {
 #[derive(Clone, Debug)]
 pub struct ExperimentEntry {
     pub title: String,
-    /// `order`, the position in the file if absent.
+    /// `order`; the position in the file if absent.
     pub order: Option<i64>,
     /// `chance`, by metric.
     pub chance: IndexMap<String, (Option<Ratio>, Place)>,
@@ -120,7 +120,7 @@ pub struct ExperimentEntry {
     pub control: Option<(Control, Place, Vec<Place>)>,
 }
 
-/// A definition file that could not be read at all.
+/// The error if a definition file could not be read.
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
     #[error("cannot read the definition file `{path}`; {}", KIND.did_you_mean(path))]
@@ -160,7 +160,7 @@ fn document(name: String, file: FileText) -> Result<Document, FileError> {
 }
 
 impl Document {
-    /// The fault of a name that is not a metric of the document.
+    /// The fault for a name that is not a metric of the document.
     pub fn unknown_metric(&self, name: &str, place: &Place) -> Option<Fault> {
         if self.metrics.contains_key(name) {
             return None;
@@ -170,7 +170,7 @@ impl Document {
         Some(fault.help_if(near.map(|near| format!("did you mean `{near}`?"))))
     }
 
-    /// The fault of a control whose experiment is unknown, or is the control itself.
+    /// The fault for a control whose experiment is unknown or the control itself.
     pub(super) fn not_controlled(&self, own: &str, name: &str, place: &Place) -> Option<Fault> {
         if name == own {
             return Some(Fault::new(place.clone(), format!("`{own}` cannot be its own control")));
@@ -178,7 +178,7 @@ impl Document {
         self.unknown_experiment(name, place)
     }
 
-    /// The fault of a name that is no experiment of these definitions.
+    /// The fault for a name that is not an experiment of these definitions.
     pub(super) fn unknown_experiment(&self, name: &str, place: &Place) -> Option<Fault> {
         if self.experiments.contains_key(name) {
             return None;

@@ -1,4 +1,4 @@
-//! The functions of the calculus: names, arities, and what the documentation says of them.
+//! The functions of the calculus: names, arities, documentation.
 
 /// A function that expressions can call.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

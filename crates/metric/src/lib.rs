@@ -7,7 +7,7 @@
 //!                            levels)
 //! ```
 //!
-//! A definition file becomes one SQL statement, among others:
+//! A definition file can also become one SQL statement:
 //!
 //! ```
 //! use metric::columns::{Column, Columns, Level, Type};
@@ -22,7 +22,7 @@
 //! # Ok::<(), String>(())
 //! ```
 //!
-//! Rule: nothing here knows a trace reader, a batch of steps or a table.
+//! Rule: this crate does not know trace readers, batches of steps or tables.
 
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 

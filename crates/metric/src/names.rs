@@ -2,8 +2,8 @@
 
 use super::syntax::{Expr, ExprKind, parse};
 
-/// The columns, `let`s and metrics that an expression mentions itself, each once, in the order of the text; none if
-/// the text is no expression.
+/// The columns, `let`s and metrics that an expression mentions directly, each once, in the order of the text. Empty if
+/// the text is not an expression.
 pub fn mentioned(expression: &str) -> Vec<String> {
     let mut found = Vec::new();
     if let Ok(expr) = parse(expression) {
@@ -12,7 +12,7 @@ pub fn mentioned(expression: &str) -> Vec<String> {
     found
 }
 
-/// Returns true if an expression asks for values of these names alone, and for no aggregate of steps.
+/// Returns true if an expression uses only values of these names, and no aggregates of steps.
 pub fn is_about(expression: &str, is_known: &dyn Fn(&str) -> bool) -> bool {
     fn holds(expr: &Expr, is_known: &dyn Fn(&str) -> bool) -> bool {
         let own = match &expr.kind {
@@ -36,7 +36,7 @@ fn add(expr: &Expr, found: &mut Vec<String>) {
     }
 }
 
-/// The expressions that one is made of, in the order of the text.
+/// The subexpressions of an expression, in the order of the text.
 fn parts(expr: &Expr) -> Vec<&Expr> {
     match &expr.kind {
         ExprKind::Name(_) | ExprKind::Literal(_) => Vec::new(),

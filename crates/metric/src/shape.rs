@@ -1,6 +1,6 @@
 //! The shape of a definition file, for editors and other programs (`schemas/definitions.schema.json`).
 //!
-//! Each key is declared here, once: the reader in `file` and the schema go by these types.
+//! Each key is declared once, here: the reader in `file` and the schema both use these types.
 
 use indexmap::IndexMap;
 use schemars::JsonSchema;

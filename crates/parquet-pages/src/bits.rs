@@ -2,13 +2,13 @@
 
 use arrow::buffer::BooleanBuffer;
 
-/// Bits that are looked at in one step, wherever they start: what [`wide`] gives for certain.
+/// Bits processed per step at any alignment: [`wide`] always returns this number.
 const STEP: usize = 120;
 
-/// The same of what [`word`] gives.
+/// The same for [`word`].
 const WORD: usize = 56;
 
-/// Eight bytes from a byte on, zeros beyond the end.
+/// Eight bytes from a byte on, padded with zeros at the end.
 #[inline]
 pub fn word(data: &[u8], at: usize) -> u64 {
     if let Some(bytes) = data.get(at..).and_then(|rest| rest.first_chunk()) {
@@ -18,7 +18,7 @@ pub fn word(data: &[u8], at: usize) -> u64 {
     rest.iter().rev().fold(0, |word, byte| word << 8 | u64::from(*byte))
 }
 
-/// As many as [`STEP`] bits of `length` from `start`: those from the bit `at` of them, zeros beyond the last.
+/// Up to [`STEP`] of the `length` bits from `start`, beginning with bit `at`; zeros beyond the last.
 #[inline]
 fn wide(data: &[u8], start: usize, length: usize, at: usize) -> u128 {
     let (byte, ahead) = ((start + at) / 8, (start + at) % 8);
@@ -29,7 +29,7 @@ fn wide(data: &[u8], start: usize, length: usize, at: usize) -> u128 {
     bits >> ahead & ((1 << STEP.min(length - at)) - 1)
 }
 
-/// Bits in the making.
+/// A growing sequence of bits.
 #[derive(Debug, Default)]
 pub struct Bits {
     words: Vec<u64>,
@@ -38,7 +38,7 @@ pub struct Bits {
 }
 
 impl Bits {
-    /// No bits yet, and room for some.
+    /// An empty sequence with room for some bits.
     pub fn with_capacity(bits: usize) -> Self {
         Self { words: Vec::with_capacity(bits.div_ceil(64)), ..Self::default() }
     }
@@ -47,7 +47,7 @@ impl Bits {
         self.length
     }
 
-    /// Adds the `count` lowest bits of a word, at most 64; the others must be zeros.
+    /// Adds the `count` lowest bits of a word, at most 64; the other bits must be zero.
     #[inline]
     fn push(&mut self, bits: u64, count: usize) {
         let filled = self.length % 64;
@@ -59,7 +59,7 @@ impl Bits {
         }
     }
 
-    /// Adds one bit many times.
+    /// Adds one bit repeatedly.
     #[inline]
     pub fn fill(&mut self, count: usize, bit: bool) {
         for at in (0..count).step_by(64) {
@@ -68,7 +68,7 @@ impl Bits {
         }
     }
 
-    /// Adds `length` bits of some bytes from the bit `start` on. How many of them are set.
+    /// Adds `length` bits of some bytes from the bit `start` on. Returns the number of set bits.
     #[inline]
     pub fn append(&mut self, data: &[u8], start: usize, length: usize) -> usize {
         let mut set = 0;
@@ -89,7 +89,7 @@ impl Bits {
     }
 }
 
-/// The bits of some truth values, eight of them a byte; the last byte is filled with zeros.
+/// The bits of some truth values, eight per byte; the last byte is padded with zeros.
 pub fn pack(truths: &[bool]) -> Vec<u8> {
     /// Moves the lowest bit of each byte of a word to its own place in the highest byte.
     const GATHER: u64 = 0x0102_0408_1020_4080;

@@ -1,7 +1,7 @@
-//! A column of some rows as it is held: one value per row, one value per run of rows, or one key per row.
+//! A column of some rows in memory: one value per row, one value per run of rows, or one key per row.
 //!
-//! Rule: all forms say the same. What asks for single rows may take either; what needs an array asks for one
-//! ([`Column::flat`]), which costs as much as the rows are many.
+//! Rule: all forms are equivalent. Code that reads single rows accepts any of them. Code that needs an array calls
+//! [`Column::flat`], whose cost grows with the number of rows.
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -21,22 +21,22 @@ pub enum Column {
     Flat(ArrayRef),
     /// One value per run.
     Runs(Runs),
-    /// One byte per row: texts or integers of which few are different.
+    /// One byte per row: texts or integers with few distinct values.
     Keys(Keys),
 }
 
 #[derive(Clone, Debug)]
 pub struct Keys {
     keys: UInt8Array,
-    /// A value for each key, none of them null: integers or texts.
+    /// A value for each key, never null: integers or texts.
     values: ArrayRef,
 }
 
-/// Rows of which many in a row are equal: columns that are constant in an episode.
+/// Rows with many consecutive equal values: columns that are constant in an episode.
 #[derive(Clone, Debug)]
 pub struct Runs {
     values: ArrayRef,
-    /// The row before which each run ends, counted from the first row of the first run; ascending.
+    /// The end of each run (exclusive), counted from the first row of the first run; ascending.
     ends: UInt32Array,
     start: usize,
     length: usize,
@@ -61,7 +61,7 @@ impl Column {
         values.data_type()
     }
 
-    /// `length` rows from row `start`; nothing is copied.
+    /// `length` rows from row `start`, without copying.
     #[must_use]
     pub fn slice(&self, start: usize, length: usize) -> Self {
         match self {
@@ -81,7 +81,7 @@ impl Column {
         }
     }
 
-    /// The values of some rows, ascending.
+    /// The values of some rows, which must ascend.
     pub fn at(&self, rows: &[usize]) -> Result<ArrayRef, ArrowError> {
         match self {
             Self::Flat(values) => {
@@ -96,7 +96,7 @@ impl Column {
         }
     }
 
-    /// The values that stand behind the rows; those of no row, or of two keys, may be among them.
+    /// The distinct values of the rows; may include unused values and duplicates.
     pub fn entries(&self) -> &ArrayRef {
         let values = match self {
             Self::Flat(values) | Self::Runs(Runs { values, .. }) | Self::Keys(Keys { values, .. }) => values,
@@ -104,7 +104,7 @@ impl Column {
         values.as_any_dictionary_opt().map_or(values, |texts| texts.values())
     }
 
-    /// The keys and texts of a text column that is held as keys.
+    /// The keys and texts of a text column in the form of keys.
     pub fn byte_texts(&self) -> Option<(&UInt8Array, &StringArray)> {
         let Self::Keys(Keys { keys, values }) = self else { return None };
         values.as_string_opt().map(|texts| (keys, texts))
@@ -119,7 +119,7 @@ impl Column {
         }
     }
 
-    /// The texts at some rows, which ascend, of a text column; `None` for null.
+    /// The texts at some rows, which must ascend, of a text column; `None` for null.
     pub fn texts<'a>(&'a self, rows: &'a [usize]) -> impl Iterator<Item = Option<&'a str>> {
         let runs = if let Self::Runs(runs) = self { Some((runs, DictionaryTexts::of(&runs.values))) } else { None };
         let mut run = runs.map_or(0, |(runs, _)| runs.run_of(0));
@@ -143,7 +143,7 @@ impl Column {
         values.is_valid(row).then(|| values.value(row))
     }
 
-    /// The rows of some columns of one kind, one after the other.
+    /// Concatenates the rows of columns of one kind.
     pub fn concat<'a>(parts: impl IntoIterator<Item = &'a Self>) -> Result<Self, ArrowError> {
         let parts: Vec<&Self> = parts.into_iter().collect();
         if parts.iter().all(|part| part.holds_texts()) {
@@ -160,12 +160,12 @@ impl Column {
     }
 }
 
-/// The texts of some columns under one dictionary of those that rows have. A text of many rows stays one text: written
-/// out they could be more than an array holds.
+/// The texts of some columns under one dictionary, without unused texts. Repeated texts are stored once: written out,
+/// they could exceed the size of an array.
 fn joined_texts(parts: &[&Column]) -> Result<ArrayRef, ArrowError> {
     let mut texts = StringBuilder::new();
     let mut keys = Int32Builder::new();
-    // The parts stay unchanged meanwhile: what is at the same place is the same text.
+    // The parts do not change meanwhile, so the same address means the same text.
     let mut known: HashMap<(*const u8, usize), i32> = HashMap::new();
     for (part, row) in parts.iter().flat_map(|part| (0..part.len()).map(move |row| (part, row))) {
         let key = |text: &str| match known.entry((text.as_ptr(), text.len())) {
@@ -182,7 +182,7 @@ fn joined_texts(parts: &[&Column]) -> Result<ArrayRef, ArrowError> {
     Ok(Arc::new(DictionaryArray::try_new(keys.finish(), Arc::new(texts.finish()))?))
 }
 
-/// A place in an array of texts, which has at most 2^31.
+/// A position in an array of texts, which has at most 2^31.
 fn narrow_key(place: usize) -> Result<i32, ArrowError> {
     i32::try_from(place).map_err(|_| ArrowError::OffsetOverflowError(place))
 }
@@ -194,9 +194,9 @@ impl From<ArrayRef> for Column {
 }
 
 impl Keys {
-    /// Rows with these keys, a null's being any; `None` where a key has no value.
+    /// Rows with these keys, arbitrary for nulls; `None` if a key has no value.
     pub fn new(keys: UInt8Array, values: ArrayRef) -> Option<Self> {
-        // What is in the place of nulls is within, too, but where there is no value at all.
+        // The keys of nulls are in range too, unless there are no values at all.
         let largest = keys.values().iter().copied().fold(0, u8::max);
         let within = keys.null_count() == keys.len() || usize::from(largest) < values.len();
         (within && values.null_count() == 0).then_some(Self { keys, values })
@@ -223,11 +223,11 @@ impl Keys {
         Ok(Arc::new(DictionaryArray::try_new(keys, Arc::clone(&self.values))?))
     }
 
-    /// Whether the integers of each stretch of rows, bounded by `offsets`, are 1, 2, and so on. May say no where they
-    /// are, if a value has two keys.
+    /// Returns true if the integers of each stretch of rows, bounded by `offsets`, are 1, 2, and so on. May return
+    /// false wrongly if a value has two keys.
     pub fn count_from_one(&self, offsets: &[usize]) -> bool {
         let stretches = || offsets.windows(2).map(|ends| ends[0]..ends[1]);
-        // The keys of 1, 2, and so on, as far as there are any.
+        // The keys of 1, 2, and so on, while they exist.
         let values = self.values.as_primitive::<Int64Type>().values();
         let key_of = |t: i64| values.iter().position(|value| *value == t).and_then(|key| u8::try_from(key).ok());
         let counting: Vec<u8> = (1..).map_while(key_of).collect();
@@ -237,7 +237,7 @@ impl Keys {
 }
 
 impl Runs {
-    /// Runs of these values; each ends before the row of `ends` at its place.
+    /// Runs of these values; each ends before the row in `ends` at the same index.
     pub fn new(values: ArrayRef, ends: Vec<u32>) -> Self {
         let length = ends.last().map_or(0, |end| *end as usize);
         Self { values, ends: ends.into(), start: 0, length }
@@ -247,7 +247,7 @@ impl Runs {
         self.length
     }
 
-    /// `length` rows from row `start`; nothing is copied.
+    /// `length` rows from row `start`, without copying.
     #[must_use]
     pub fn slice(&self, start: usize, length: usize) -> Self {
         Self { start: self.start + start, length, ..self.clone() }
@@ -264,7 +264,7 @@ impl Runs {
         }
     }
 
-    /// The rows at which the text is another one than in the row before; row 0 is none of them.
+    /// The rows whose text differs from the row before, except row 0.
     pub fn text_changes(&self) -> impl Iterator<Item = usize> + '_ {
         let texts = DictionaryTexts::of(&self.values);
         let differs = move |(_, run): &(usize, usize)| !texts.same(*run, run - 1);
@@ -276,8 +276,7 @@ impl Runs {
         text_at(&self.values, self.run_of(row))
     }
 
-    /// How many rows from `first` on, `most` of them at most, end with a run or with the last row; `most`
-    /// where none ends.
+    /// The most rows from `first`, up to `most`, that end with a run or with the last row; `most` if no run ends there.
     pub fn until(&self, first: usize, most: usize) -> usize {
         if most >= self.length - first {
             return self.length - first;
@@ -296,12 +295,12 @@ impl Runs {
         (first..ends.len()).map(move |run| (start(run), run)).take_while(|(start, _)| *start < self.length)
     }
 
-    /// The values of the runs, those of which no row is left included.
+    /// The values of the runs, including runs without remaining rows.
     pub fn values(&self) -> &ArrayRef {
         &self.values
     }
 
-    /// Returns true if a run starts at nothing but these rows, which ascend.
+    /// Returns true if runs start only at these rows, which must ascend.
     pub fn start_only_at(&self, rows: &[usize]) -> bool {
         let mut rows = rows.iter();
         self.starts().skip(1).all(|(start, _)| rows.by_ref().find(|row| **row >= start) == Some(&start))
@@ -319,7 +318,7 @@ impl Runs {
 
 /// Returns true if every key is one of `count` values.
 pub(crate) fn all_within(keys: &[i32], count: usize) -> bool {
-    // A negative key counts as the largest of all.
+    // A negative key counts as a very large one.
     keys.iter().map(|key| key.cast_unsigned()).max().is_none_or(|largest| (largest as usize) < count)
 }
 
@@ -438,7 +437,7 @@ mod tests {
         }
     }
 
-    /// Rows of texts in the three forms; `None` is null, and no run.
+    /// The forms of rows of texts; `None` is null, and excludes the form of runs.
     fn forms(rows: &[Option<&str>]) -> Vec<Column> {
         let flat: DictionaryArray<Int32Type> = rows.iter().copied().collect();
         let texts: StringArray = rows.iter().flatten().copied().collect::<Vec<_>>().into();

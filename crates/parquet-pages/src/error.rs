@@ -1,9 +1,9 @@
-//! Errors of decoding: pages that the short cut does not take, and damaged pages.
+//! Errors of decoding: pages that the short cut does not support, and damaged pages.
 
 use std::fmt;
 use std::sync::{Arc, OnceLock};
 
-/// Pages that the short cut does not take.
+/// The error for pages that the short cut does not support.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("pages that only the Parquet library decodes")]
 pub struct Unsupported;
@@ -13,11 +13,11 @@ pub struct Unsupported;
 pub enum FaultKind {
     /// Its bytes contradict the footer, its header or a checksum.
     Corrupt,
-    /// It asks for more than a file of its size may.
+    /// It expands beyond the limit for a file of its size.
     OverBudget,
 }
 
-/// A fault of a page, or of the chunk of pages.
+/// A fault of a page or of a column chunk.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{part}: expected {expected}, found {found}")]
 pub struct PageFault {
@@ -29,12 +29,12 @@ pub struct PageFault {
     pub found: String,
 }
 
-/// The bytes that something is wrong with.
+/// The faulty bytes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Part {
     /// The page that starts here, with its header.
     Page(u64),
-    /// All pages of the column in the row group: from the first byte to before the last.
+    /// All pages of the column in the row group: the byte range, end excluded.
     Chunk(u64, u64),
 }
 
@@ -47,5 +47,5 @@ impl fmt::Display for Part {
     }
 }
 
-/// The slot for the first fault of a column, for the caller that asked for its pages.
+/// Holds the first fault of a column, for the caller that asked for its pages.
 pub type FaultSlot = Arc<OnceLock<PageFault>>;

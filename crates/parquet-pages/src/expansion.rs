@@ -1,9 +1,9 @@
-//! Limits of expansion: bytes inflated, texts written out.
+//! Limits of expansion: inflated bytes, written-out texts.
 //!
-//! Pages of a few bytes may hold megabytes, and runs of a few bytes millions of rows. Rule: what comes out grows with the
-//! bytes of the file. Of the densest traces in use a byte gives one row, and a byte of text compressed by another writer,
-//! which writes out the names of each step, some fifty; the floors are for small files, of which a footer is the largest
-//! part.
+//! A page of a few bytes may expand to megabytes, and a run of a few bytes to millions of rows. Rule: the expanded size
+//! grows with the file. In the densest traces in use one byte gives one row. A byte of compressed text of other
+//! writers, which write out the names of each step, gives some fifty bytes. The floors are for small files, mostly
+//! footer.
 
 use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
@@ -17,14 +17,14 @@ use exact::budget::{Budget, Exceeded, Limit};
 /// The largest expansion of a stored byte, for the first `SMALL` bytes.
 pub const INFLATED_PER_BYTE: u64 = 96;
 
-/// Up to here a file is bounded as a whole, beyond it by what its pages can hold.
+/// Up to this size the file as a whole sets the limit, beyond it the possible contents of its pages.
 const SMALL: u64 = 1 << 20;
 
-/// What comes out of each byte beyond [`SMALL`]: columns that hardly change and are written plainly, by writers without
-/// dictionaries, come near the most that deflate can do, 1032.
+/// The largest expansion per byte beyond [`SMALL`]: plain columns that hardly change, of writers without dictionaries,
+/// come near the 1032 of deflate.
 const INFLATED_PER_BYTE_BEYOND: u64 = 1024;
 
-/// Texts of which all rows together cannot be much are not counted.
+/// Texts whose rows together must be small are not counted.
 const UNCOUNTED: usize = 64 << 10;
 
 /// The expansion of a file so far. Parts that are read again are counted once.
@@ -43,7 +43,7 @@ enum Kind {
 }
 
 impl Expansion {
-    /// Nothing yet of a file of this many bytes.
+    /// The empty expansion of a file of this size.
     pub fn new(bytes: u64) -> Self {
         let of = |what| {
             Limit::in_proportion(what, 64 << 20, INFLATED_PER_BYTE, bytes.min(SMALL)).and_beyond(
@@ -62,7 +62,7 @@ impl Expansion {
         if self.is_new(Kind::Page, place, offset + 1) { self.inflated.spend(bytes as u64) } else { Ok(()) }
     }
 
-    /// A page of which the texts take `bytes` when they are written out; it starts at `offset`.
+    /// A page at `offset` whose written-out texts take `bytes`.
     pub(crate) fn texts(&self, place: (usize, usize), offset: u64, bytes: u64) -> Result<(), Exceeded> {
         if self.is_new(Kind::PageTexts, place, offset + 1) { self.written_out.spend(bytes) } else { Ok(()) }
     }
@@ -85,7 +85,7 @@ impl Expansion {
     }
 }
 
-/// The bytes of the texts of all rows of a column of texts, unless they are few.
+/// The bytes of the texts of all rows of a text column; 0 if they must be few.
 fn bytes_of_texts(column: &Column) -> u64 {
     let length = |texts: &StringArray, at: usize| u64::from(texts.value_length(at).cast_unsigned());
     if let Some((keys, texts)) = column.byte_texts() {
@@ -94,7 +94,7 @@ fn bytes_of_texts(column: &Column) -> u64 {
         }
         return keys.iter().flatten().map(|key| length(texts, key.into())).sum();
     }
-    // Runs have a key for each run, and are few.
+    // Runs have one key each, and are few.
     let (Column::Flat(values), DataType::Dictionary(..)) = (column, column.data_type()) else { return 0 };
     let values = values.as_dictionary::<Int32Type>();
     let texts = values.values().as_string::<i32>();

@@ -1,7 +1,7 @@
-//! The structures of a footer: which field is encoded how.
+//! The structures of a footer: the encoding of each field.
 //!
-//! The Parquet library takes a field for what its number says, whatever type the file declares. Here both must agree, so
-//! that what is walked within its bounds is what the library decodes. Fields that are not listed are skipped by both.
+//! The Parquet library reads a field by its number, whatever its declared type. Here both must agree, so that the
+//! checked bytes are those that the library decodes. Both skip unlisted fields.
 //!
 //! Source: the Parquet format's `parquet.thrift`.
 
@@ -10,11 +10,11 @@ use parquet::file::reader::ChunkReader;
 
 use crate::thrift::{Compact, Fault, Wire};
 
-/// The fields of a structure, that of number 1 first.
+/// The fields of a structure, from number 1.
 type Shape = &'static [Value];
 
 enum Value {
-    /// It is not listed in the format: skipped by both.
+    /// Not listed in the format: both skip it.
     Other,
     Truth,
     One(Wire),
@@ -92,13 +92,13 @@ const STATISTICS: Shape = &[TEXT, TEXT, LONG, LONG, TEXT, TEXT, Truth, Truth];
 const BOX: Shape = &[DOUBLE, DOUBLE, DOUBLE, DOUBLE, DOUBLE, DOUBLE, DOUBLE, DOUBLE];
 const KEY_VALUE: Shape = &[TEXT, TEXT];
 
-/// Whether the footer of a file keeps within its bytes, before the Parquet library follows it; else what it is. Where there
-/// is none, the library has the better words.
+/// Checks that a footer keeps within its bytes, before the Parquet library follows it. Passes without a footer, which
+/// the library reports better.
 pub fn check_footer(file: &impl ChunkReader) -> Result<(), String> {
     footer_bytes(file).map_or(Ok(()), |(_, footer)| check(&footer).map_err(|fault| fault.to_string()))
 }
 
-/// The offset of a file's footer, and its bytes without its length; `None` without a footer.
+/// The offset of a file's footer and its bytes, without the length; `None` without a footer.
 pub fn footer_bytes(file: &impl ChunkReader) -> Option<(u64, Bytes)> {
     let end = file.len().checked_sub(8)?;
     let length = u32::from_le_bytes(*file.get_bytes(end, 4).ok()?.first_chunk()?);
@@ -147,11 +147,11 @@ mod tests {
 
     #[test]
     fn a_field_of_another_type_than_its_number_is_refused() {
-        // The version, and nothing else; then the same number as a list of 2^31 doubles.
+        // Only the version; then the same number as a list of 2^31 doubles.
         assert_eq!(check(&[0x15, 2, 0]), Ok(()));
         let huge = [0x19, 0xf7, 0xff, 0xff, 0xff, 0xff, 0x07, 0];
         assert_eq!(check(&huge), Err(Fault::Invalid("a field of another type")));
-        // Field 15 is unknown: its list is walked, and is longer than the footer.
+        // Field 15 is unknown: its list is walked, and exceeds the footer.
         assert_eq!(check(&[&[0xf9], &huge[1..]].concat()), Err(Fault::Ends));
     }
 }

@@ -1,5 +1,5 @@
-//! Columns out of the pages of Parquet files: verified as they are stored, decoded without expanding rows where encodings
-//! allow it.
+//! Columns from the pages of Parquet files: verified as stored, and decoded without expanding rows if encodings allow
+//! it.
 //!
 //! | module | contents |
 //! |---|---|
@@ -10,9 +10,9 @@
 //! | [`checksums`] | a CRC-32 of each column chunk in the footer: written, read |
 //! | `expansion`, `footer_shape` | limits: what may come out of a file, and what its footer may be |
 //!
-//! Rule: [`Cursor`] is a short cut and nothing more. Whatever it does not expect, be it another encoding or damage, is
-//! [`Unsupported`], and [`Library`] decodes the column or says what is wrong with it. Nothing here knows a schema of
-//! traces, an episode or a metric.
+//! Rule: [`Cursor`] is only a short cut. Anything unexpected, such as another encoding or damage, is [`Unsupported`]:
+//! [`Library`] then decodes the column or reports the problem. This crate does not know the schema of traces, episodes
+//! or metrics.
 //!
 //! A column that is constant stays one run:
 //!
@@ -72,7 +72,7 @@ pub use types::{Refused, normal_column, text_type, with_texts_as_keys};
 
 use stored::verified::Verified;
 
-/// Reads all pages of a column, checks their headers and checksums, and decodes none.
+/// Reads all pages of a column and checks their headers and checksums, without decoding them.
 pub fn verify(store: &Store, place: Place<'_>, slot: &FaultSlot) -> Result<()> {
     Verified::new(store, place, Arc::clone(slot))?.walk()
 }

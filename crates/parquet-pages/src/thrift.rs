@@ -1,8 +1,8 @@
-//! Thrift's compact protocol, read within the bounds of its bytes.
+//! Reads Thrift's compact protocol within the bounds of its bytes.
 //!
-//! The Parquet library skips fields that it does not know and trusts the sizes that they declare: a list of 2^31 numbers
-//! behind the end of the data keeps it busy for minutes. Footers and page headers are therefore walked here first.
-//! Rule: no collection has more elements than bytes follow it, so that the work is bounded by the number of bytes.
+//! The Parquet library skips unknown fields and trusts their declared sizes: a list of 2^31 numbers past the end of the
+//! data keeps it busy for minutes. Therefore footers and page headers are walked here first.
+//! Rule: no collection has more elements than bytes follow it, so the number of bytes bounds the work.
 //!
 //! Source: the Thrift project's "Thrift Compact protocol encoding".
 
@@ -25,15 +25,15 @@ pub(crate) enum Wire {
     Uuid,
 }
 
-/// Structures within structures; Parquet's own have fewer than ten.
+/// The deepest nesting of structures; Parquet's own have fewer than ten levels.
 const DEEPEST: u8 = 32;
 
 /// An error of a Thrift structure.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Fault {
-    /// They end before it does.
+    /// The bytes end before the structure does.
     Ends,
-    /// They are none, whatever follows.
+    /// The bytes are invalid, whatever follows.
     Invalid(&'static str),
 }
 
@@ -67,7 +67,7 @@ impl<'a> Compact<'a> {
         self.at
     }
 
-    /// The next field of a structure, whose last one had the id `last`; `None` at the structure's end.
+    /// The next field of a structure after the one with the id `last`; `None` at the structure's end.
     pub(crate) fn field(&mut self, last: i16) -> Result<Option<Field>, Fault> {
         let byte = self.byte()?;
         if byte == 0 {
@@ -81,7 +81,7 @@ impl<'a> Compact<'a> {
         Ok(Some(Field { id: id.ok_or(Fault::Invalid("a field number out of range"))?, wire }))
     }
 
-    /// The value of a field that is an integer of 32 bits.
+    /// The value of a 32-bit integer field.
     pub(crate) fn int(&mut self, field: Field) -> Result<i32, Fault> {
         if field.wire != Wire::I32 {
             return Err(Fault::Invalid("a field of another type"));
@@ -96,7 +96,7 @@ impl<'a> Compact<'a> {
             few => few.into(),
         };
         if count == 0 {
-            // Some writers give the elements of an empty list no type.
+            // Some writers give an empty list no element type.
             return Ok((Wire::I8, 0));
         }
         Ok((element(byte & 0xf)?, self.within(count)?))
@@ -189,8 +189,8 @@ fn wire(code: u8) -> Result<Wire, Fault> {
     wire.copied().ok_or(Fault::Invalid("a value of an unknown type"))
 }
 
-/// The encoding of the elements of a collection. Truth values take a byte each there, which the Parquet library does not
-/// go past; no structure of Parquet that is read here has any.
+/// The encoding of the elements of a collection. Truth values take a byte each there, which the Parquet library does
+/// not skip. The Parquet structures read here have none.
 fn element(code: u8) -> Result<Wire, Fault> {
     match wire(code)? {
         Wire::True | Wire::False => Err(Fault::Invalid("a collection of truth values")),

@@ -1,4 +1,4 @@
-//! The few types that columns are held in: truth values, integers and floats of 64 bits, texts under a dictionary.
+//! The few types of columns in memory: truth values, 64-bit integers and floats, texts under a dictionary.
 
 use std::sync::Arc;
 
@@ -17,8 +17,8 @@ pub fn text_type() -> DataType {
     DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8))
 }
 
-/// A footer of which the text columns are read as dictionaries, whatever a writer's own hint says; `is_text` says for each
-/// column of the schema whether it holds text.
+/// A footer whose text columns are read as dictionaries, whatever the writer's own hint; `is_text` marks the text
+/// columns of the schema.
 pub fn with_texts_as_keys(metadata: ParquetMetaData, is_text: &[bool]) -> ParquetResult<ArrowReaderMetadata> {
     let plain_schema = parquet_to_arrow_schema(metadata.file_metadata().schema_descr(), None)?;
     let fields = plain_schema.fields().iter().zip(is_text).map(|(field, is_text)| match is_text {
@@ -38,8 +38,8 @@ pub enum Refused {
     TooLarge { row: usize, value: u64 },
 }
 
-/// A column as the Parquet library decodes it, held as `held`: truth values, 64 bits, or [`text_type`]. Keys lead to values,
-/// and texts are UTF-8.
+/// A column from the Parquet library, converted to `held`: truth values, 64 bits, or [`text_type`]. Checks that keys
+/// have values and texts are UTF-8.
 pub fn normal_column(column: &ArrayRef, held: &DataType) -> Result<ArrayRef, Refused> {
     match column.data_type() {
         same if same == held => {
@@ -63,25 +63,25 @@ pub fn normal_column(column: &ArrayRef, held: &DataType) -> Result<ArrayRef, Ref
     }
 }
 
-/// Every key that is not null leads to a value that is not null.
+/// Checks that every key that is not null has a value that is not null.
 fn check_keys(column: &ArrayRef) -> Result<(), Refused> {
     let column = column.as_dictionary::<Int32Type>();
     let count = column.values().len();
     let within = |key: i32| usize::try_from(key).is_ok_and(|key| key < count);
-    // What is in the place of nulls is nearly always within, too, and then there is no need to look at them.
+    // The keys of nulls are nearly always in range too; then the nulls need no check.
     let good = column.values().null_count() == 0
         && (all_within(column.keys().values(), count) || column.keys().iter().flatten().all(within));
     if good { Ok(()) } else { Err(Refused::Unreadable("a dictionary key without a value".into())) }
 }
 
-/// Every text is UTF-8. The Parquet library looks at all texts of a delta-encoded page at once, and takes a character of
-/// which one text has the first bytes and the next text the rest.
+/// Checks that every text is UTF-8. The Parquet library checks all texts of a delta-encoded page at once and accepts
+/// characters split between two texts.
 fn check_texts(column: &ArrayRef) -> Result<(), Refused> {
     let texts = column.as_any_dictionary().values().as_string::<i32>();
     let (bytes, offsets) = (texts.value_data(), texts.value_offsets());
     let begins = |offset: &i32| {
         let next = usize::try_from(*offset).ok().and_then(|at| bytes.get(at..))?.first();
-        // A byte that goes on with a character begins none.
+        // A continuation byte does not begin a character.
         Some(next.is_none_or(|byte| byte & 0xc0 != 0x80))
     };
     let (first, last) = (offsets.first().copied().unwrap_or(0), offsets.last().copied().unwrap_or(0));

@@ -1,7 +1,7 @@
-//! The folder of a report: the whole new report in place of the whole old one, or the old one unchanged.
+//! The folder of a report. A new report replaces the old one completely or leaves it unchanged.
 //!
-//! The files of the old report are those that its manifest lists as outputs. They are replaced, or removed where the new
-//! report does not have them; whatever else is in the folder stays.
+//! The files of the old report are the outputs in its manifest. They are replaced, or removed if the new report lacks
+//! them; all other files in the folder stay.
 
 mod old;
 
@@ -29,15 +29,15 @@ pub struct Bundle<'a> {
     pub cells: &'a Cells,
     /// For `tables/<name>.{tex,md,csv}`.
     pub tables: &'a [MetricTable],
-    /// For the same, after the tables.
+    /// More tables in the same formats, after `tables`.
     pub lists: &'a [ListTable],
     /// The bytes of `episodes.parquet`.
     pub episodes: &'a [u8],
-    /// For `manifest.json`, which gets its outputs when they are written.
+    /// For `manifest.json`; its outputs are added when they are written.
     pub manifest: &'a Manifest,
-    /// The files that are read, which no output may replace.
+    /// The files that are read; no output may replace them.
     pub read: &'a [PathBuf],
-    /// Figures and whatever else, by their path inside the folder.
+    /// Figures and other files, by their path inside the folder.
     pub others: &'a [OutputFile],
 }
 
@@ -122,7 +122,7 @@ pub enum BundleError {
 }
 
 impl Manifest {
-    /// The manifest of a report made now, by this version.
+    /// The manifest of a report made by this version.
     pub fn new(cells: &Cells, style: &Style, schema_version: u32, filter: Option<String>, inputs: Vec<Input>) -> Self {
         let mut inputs = inputs;
         inputs.sort();
@@ -152,7 +152,7 @@ impl Manifest {
 }
 
 impl Input {
-    /// An input named as a manifest may name it: no absolute path, no way up, `/` between folders.
+    /// An input in the form allowed in a manifest: no absolute path, no `..`, `/` between folders.
     pub fn new(path: &Path, sha256: String, bytes: u64) -> Self {
         let is_plain = |part: &Component| matches!(part, Component::Normal(_) | Component::CurDir);
         let is_inside = path.components().all(|part| is_plain(&part));
@@ -173,7 +173,7 @@ impl Output {
     }
 }
 
-/// A report that was written.
+/// A written report.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Written {
     /// Its files, ordered by path.
@@ -182,7 +182,7 @@ pub struct Written {
     pub manifest: Manifest,
 }
 
-/// Writes the report into the folder `out`, in place of the report that is there.
+/// Writes the report into the folder `out` and replaces the report in it.
 pub fn write(out: &Path, bundle: &Bundle) -> Result<Written, BundleError> {
     let mut files = files(bundle);
     let manifest = bundle.manifest.with_outputs(&files);
@@ -200,7 +200,7 @@ pub fn write(out: &Path, bundle: &Bundle) -> Result<Written, BundleError> {
     Ok(Written { files: files.into_iter().map(|file| out.join(file.path)).collect(), manifest })
 }
 
-/// That no file of the report which is in `out` is among those that are read: a new report there would replace it.
+/// Checks that no file of the report in `out` is among the files that are read: a new report would replace it.
 pub fn check_old(out: &Path, read: &[PathBuf]) -> Result<(), BundleError> {
     check_inputs(out, &old::files(out), read)
 }
@@ -226,8 +226,8 @@ fn files(bundle: &Bundle) -> Vec<OutputFile> {
 
 /// The text of `cells.csv`: the key columns, then `metric,n,sum,sum_sq,mean,se,ci_low,ci_high` in full precision.
 ///
-/// The standard error is the one that the definition asks for; the interval is Wilson's for a rate, Student's for a
-/// quantity, at 95 %. What is undefined or withheld is empty. The header's keys are those that the cells are grouped by.
+/// The standard error has the form that the definition asks for. The interval is Wilson's for a rate, Student's for a
+/// quantity, at 95 %. Undefined or withheld values are empty. The key columns are those that the cells are grouped by.
 pub fn cells_csv(cells: &Cells) -> String {
     const TAIL: [&str; 8] = ["metric", "n", "sum", "sum_sq", "mean", "se", "ci_low", "ci_high"];
     let header = cells.by.iter().map(String::as_str).chain(TAIL);

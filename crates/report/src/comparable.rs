@@ -1,7 +1,7 @@
-//! The settings that make two sets of episodes incomparable.
+//! Settings that make two sets of episodes incomparable.
 //!
-//! Rule: a comparison varies one thing, and every other setting is equal on both sides. What no footer declares cannot be
-//! checked; what only some episodes declare is a difference.
+//! Rule: a comparison varies one setting, and all others are equal on both sides. Settings that no footer declares
+//! cannot be checked; a setting that only some episodes declare is a difference.
 
 use std::collections::BTreeSet;
 
@@ -11,23 +11,23 @@ use serde_json::Value;
 use exact::escape::visible;
 use score::table::{Declared, EpisodeTable, TextColumn};
 
-/// The label of what an episode was recorded with.
+/// The label of an episode's recording settings.
 pub const FINGERPRINT: &str = "fingerprint";
 /// Digits of a hash in a message.
 const SHOWN: usize = 8;
-/// Settings of the world that an experiment sets for itself.
+/// World settings that an experiment sets itself.
 const OF_EXPERIMENT: [&str; 2] = ["others", "clutter"];
 
 /// The setting that a comparison varies on purpose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Varied {
-    /// The model, its sampling and what drives it.
+    /// The model, its sampling and its driver.
     Model,
-    /// The condition, which represents any setting.
+    /// The condition, which may be any setting.
     Condition,
     /// The experiment: its panes, its prompt and its layout.
     Experiment,
-    /// Nothing: the episodes are of one cell.
+    /// Nothing: the episodes belong to one cell.
     Nothing,
 }
 
@@ -62,7 +62,7 @@ impl<'a> Recorded<'a> {
         found
     }
 
-    /// Returns true if each episode has a fingerprint.
+    /// Returns true if every episode has a fingerprint.
     pub const fn is_declared(&self) -> bool {
         self.undeclared == 0
     }
@@ -76,7 +76,7 @@ impl<'a> Recorded<'a> {
     }
 }
 
-/// The setting that keeps two sets of episodes from being compared, and what each has; `None` where nothing is known to.
+/// The setting that makes two sets of episodes incomparable, with the values of both; `None` if none is known.
 pub fn difference(declared: &Declared, sides: [&Recorded<'_>; 2], varied: Varied) -> Option<String> {
     let [first, second] = sides;
     if varied == Varied::Condition {
@@ -94,7 +94,7 @@ pub fn difference(declared: &Declared, sides: [&Recorded<'_>; 2], varied: Varied
     couples.filter(|[one, other]| one != other).find_map(|names| between(declared, names, varied))
 }
 
-/// The settings in which two fingerprints differ though the comparison does not vary them.
+/// The settings that differ between two fingerprints though the comparison does not vary them.
 fn between(declared: &Declared, names: [&str; 2], varied: Varied) -> Option<String> {
     let parts = parts(declared, names, varied.kept());
     let recordings = names.map(|name| declared.recordings.get(name));
@@ -109,7 +109,7 @@ fn between(declared: &Declared, names: [&str; 2], varied: Varied) -> Option<Stri
     })
 }
 
-/// The parts of two fingerprints that differ. A part that one side does not have, such as the prompt of a script, is none.
+/// The differing parts of two fingerprints. Ignores a part that one side lacks, such as the prompt of a script.
 fn parts(declared: &Declared, names: [&str; 2], kept: &[&str]) -> Option<String> {
     let [one, other] = names.map(|name| declared.fingerprints.get(name));
     let (one, other) = (one?, other?);
@@ -119,7 +119,7 @@ fn parts(declared: &Declared, names: [&str; 2], kept: &[&str]) -> Option<String>
         one != other && (is_strict || !(one.is_null() || other.is_null()))
     };
     let told = |key: &&str| match key {
-        // It is in the clear.
+        // The renderer is stored unhashed.
         &"renderer" => first_difference(key, &one[*key], &other[*key]).unwrap_or_default(),
         key => format!("{key} ({}, {})", shown(&one[*key]), shown(&other[*key])),
     };
@@ -175,9 +175,9 @@ fn shown(value: &Value) -> String {
     }
 }
 
-/// The reason against a contrast of two experiments, or `None`: tasks must be alike, with equal chance levels.
+/// The reason why two experiments cannot be contrasted, or `None`: tasks must be alike, with equal chance levels.
 ///
-/// An experiment need not give a level for every metric: those that both give decide, or any where they share none.
+/// An experiment may lack levels of some metrics: shared levels decide, or all levels if none is shared.
 pub(crate) fn tasks_differ(catalog: &Catalog, baseline: &str, against: &str) -> Option<String> {
     let levels = |metric: &str| [baseline, against].map(|name| catalog.chance(name, metric));
     let is_shared = |metric: &&String| levels(metric).iter().all(Option::is_some);

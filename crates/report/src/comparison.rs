@@ -1,8 +1,8 @@
-//! A table of ours beside a published one, cell by cell: printed mean, printed standard error, emphasis.
+//! Compares one of our tables with a published one, cell by cell: printed mean, printed standard error, emphasis.
 //!
-//! Numbers are equal as values: a published `0.1` is our `0.10`. Every published cell is either as published,
-//! excused (errata name all its differences) or differing; a published cell that we do not have differs.
-//! Cells that only we have are listed and compared with nobody.
+//! Numbers are equal as values: a published `0.1` is our `0.10`. Every published cell is equal, excused (errata name
+//! all its differences) or differing; a published cell that we lack differs. Cells that only we have are listed but not
+//! compared.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -110,7 +110,7 @@ fn described(table: &MetricTable) -> String {
     format!("`{}` ({})", table.name, metrics.join(", "))
 }
 
-/// Compares `table`, made of cells by experiment and model, with the published cells.
+/// Compares `table`, with cells by experiment and model, with the published cells.
 pub fn compare(table: &MetricTable, published: &Published, errata: &Errata) -> Comparison {
     let ours = our_cells(table);
     let about_table: Vec<&Erratum> = errata.erratum.iter().filter(|erratum| erratum.table == table.name).collect();

@@ -1,7 +1,7 @@
-//! Errata: the slips of a published table, each named with both values and a reason.
+//! Errata: known errors of a published table, each with both values and a reason.
 //!
-//! An erratum excuses exactly the difference that it states: the published and the computed value must both be as
-//! it says. Those of the paper are built in.
+//! An erratum excuses only the difference that it states: the published and the computed value must both match. The
+//! paper's errata are built in.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -68,11 +68,11 @@ pub enum ErrataError {
     Faults(#[from] Faults),
 }
 
-/// A slip takes some hundred bytes.
+/// An erratum takes about a hundred bytes.
 const LARGEST: Limit = Limit::new("bytes of errata", 1 << 20);
 
 impl Errata {
-    /// The slips of the paper.
+    /// The errata of the paper.
     pub fn of_paper() -> Self {
         toml::from_str(PAPER).expect("the built-in errata are well-formed: a test reads them")
     }
@@ -93,7 +93,7 @@ impl Errata {
 }
 
 impl Erratum {
-    /// Returns true if it is about this cell of this table.
+    /// Returns true if it applies to this cell of this table.
     pub fn is_about(&self, table: &str, cell: &CellLabel) -> bool {
         let CellLabel { experiment, model, metric } = cell;
         (self.table.as_str(), &self.experiment, &self.model, &self.metric) == (table, experiment, model, metric)

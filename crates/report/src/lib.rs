@@ -8,10 +8,10 @@
 //! assert_eq!(table.csv(), "model,TSA\noracle,1.00\n");
 //! ```
 //!
-//! Rule: this crate sees no trace and no plan, only cells and the episode table. A [`style`] says how numbers look,
-//! [`layout`] makes [`tables::Table`]s of cells under it, [`tables`] spells them, [`figures`] draws, [`html`] makes the page of all
-//! of it, [`bundle`] writes the folder. [`audit`] asks of published tables whether any data gives them, [`plan`] how
-//! many episodes a comparison takes.
+//! Rule: this crate knows no traces and no plans, only cells and the episode table. A [`style`] defines how numbers
+//! look, [`layout`] makes [`tables::Table`]s of cells under it, [`tables`] formats them, [`figures`] draws, [`html`]
+//! makes the page from all of these, [`bundle`] writes the folder. [`audit`] checks whether any data gives published
+//! tables, [`plan`] how many episodes a comparison needs.
 
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 

@@ -1,7 +1,7 @@
 //! Published cells: a CSV file with the columns `experiment,model,metric,mean,se,emphasis`.
 //!
-//! Mean and standard error are as printed, both empty where the value is undefined (`--` is taken for empty);
-//! emphasis is `bold`, `underline` or empty. Columns may be in any order; further ones are not read.
+//! Mean and standard error are as printed, both empty if the value is undefined (`--` counts as empty); emphasis is
+//! `bold`, `underline` or empty. Columns may be in any order; other columns are ignored.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -33,14 +33,14 @@ pub struct CellLabel {
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PrintedCell {
-    /// The mean; `None` where it is undefined.
+    /// The mean; `None` if undefined.
     pub mean: Option<Decimal>,
-    /// Its standard error; `None` where it is undefined.
+    /// Its standard error; `None` if undefined.
     pub se: Option<Decimal>,
     pub emphasis: Emphasis,
 }
 
-/// A published table, in the order of its file.
+/// A published table, in file order.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Published {
     pub cells: Vec<(CellLabel, PrintedCell)>,
@@ -82,7 +82,7 @@ fn in_place_of(nearest: Option<&str>) -> String {
     nearest.map(|name| format!("; is it the one called `{name}`?")).unwrap_or_default()
 }
 
-/// A line has less than 100 bytes, and a table some hundred lines.
+/// A line has fewer than 100 bytes, and a table a few hundred lines.
 const LARGEST: Limit = Limit::new("bytes of a published table", 16 << 20);
 
 pub fn read(path: &Path) -> Result<Published, PublishedError> {

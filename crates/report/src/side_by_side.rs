@@ -1,4 +1,4 @@
-//! A comparison with published values as text: the differing cells side by side, the reasons, a line that sums up.
+//! A comparison with published values as text: the differing cells side by side, the reasons, a summary line.
 
 use std::fmt::Write as _;
 

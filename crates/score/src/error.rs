@@ -10,7 +10,7 @@ use metric::restore::RestoreError;
 use toml_spec::Faults;
 use trace::error::TraceError;
 
-/// What keeps a batch from being scored.
+/// An error of scoring a batch.
 #[derive(Debug, thiserror::Error)]
 pub enum EngineError {
     #[error(transparent)]
@@ -50,7 +50,7 @@ pub enum ScoreError {
     Engine { file: String, source: EngineError },
 }
 
-/// An error of evaluating a step: its own, or a kernel's, whose metric is found later.
+/// An error of evaluating a step: the step's own, or a kernel's, whose metric is determined later.
 pub(super) enum StepError {
     Engine(EngineError),
     Kernel(ArrowError),

@@ -1,6 +1,6 @@
 //! Evidence for the scores of an episode: each metric's value and the timesteps that decided it.
 //!
-//! A metric is decided by the aggregates that it builds on, and each aggregate by some timesteps:
+//! A metric is decided by the aggregates that it is built from, and each aggregate by some timesteps:
 //!
 //! | aggregate | decided by |
 //! |---|---|
@@ -12,8 +12,8 @@
 //! | `sum(x)` | every step where x is neither null nor 0 |
 //! | `at(x, t0)` | t0, where there is such a step |
 //!
-//! Where nothing holds, nothing decided: the list is empty. What the episode is compared with, such as the colour of its
-//! body, is reported too; no timestep decides it.
+//! If the condition never holds, no step decided and the list is empty. Values that the episode is compared with, such
+//! as its body colour, are reported too; no timestep decides them.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fmt;
@@ -120,7 +120,7 @@ pub fn explain(
     })
 }
 
-/// Explains every episode of these names that the traces hold, in one pass; `--where` does not count.
+/// Explains every episode with one of these names in the traces, in one scan; ignores `--where`.
 pub fn explain_each(
     traces: &TraceSet,
     definitions: &Definitions,
@@ -148,7 +148,7 @@ pub fn explain_each(
     Ok(found)
 }
 
-/// The plan for the requested metrics and every value below them.
+/// The plan for the requested metrics and every value that they are built from.
 pub(super) struct Reader<'a> {
     definitions: &'a Definitions,
     plan: PhysicalPlan,
@@ -196,7 +196,7 @@ pub(super) fn episode_ids(batch: &EpisodeBatch) -> Vec<String> {
     (0..column.len()).map(text).collect()
 }
 
-/// The values of one episode, read for what decided them.
+/// The values of one episode, and what decided them.
 struct Reading<'a> {
     reader: &'a Reader<'a>,
     values: Evaluated,

@@ -1,4 +1,4 @@
-//! Two definitions over the same traces: both tables, and the timesteps that decided where they differ, in one scan.
+//! Two definitions over the same traces: both tables, and the timesteps that decided each difference, in one scan.
 
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
@@ -23,8 +23,8 @@ use trace::scan::EpisodeBatch;
 #[derive(Clone, Debug)]
 pub struct ScoredPair {
     pub tables: [EpisodeTable; 2],
-    /// Per definitions, what decided the metrics that differ, by episode: those episodes alone in which some differ and
-    /// that both filters keep.
+    /// For each definitions, the steps that decided the differing metrics, by episode. Only episodes with a difference
+    /// that both filters keep are listed.
     pub evidence: [BTreeMap<String, Evidence>; 2],
 }
 
@@ -67,7 +67,7 @@ pub fn score_pair(
     Ok(ScoredPair { tables, evidence })
 }
 
-/// The metrics that both definitions have and compute in different steps; equal steps give equal values.
+/// The metrics that both definitions have but compute in different steps; equal steps give equal values.
 struct Candidates {
     sides: [Scores; 2],
 }
@@ -109,7 +109,7 @@ impl Candidates {
         Ok([of_side(&readers[0])?, of_side(&readers[1])?])
     }
 
-    /// Returns true if some metric differs, per episode; `None` where there is no metric that can.
+    /// For each episode, true if some metric differs; `None` if no metric can differ.
     fn differs(&self, values: &Evaluated) -> Result<Option<BooleanArray>, EngineError> {
         let [old, new] = [values.scores(&self.sides[0])?, values.scores(&self.sides[1])?];
         let pairs = old.metrics.iter().zip(&new.metrics);

@@ -19,7 +19,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! `score_traces.rs` is the one scan that feeds it. Rule: pure. No file is opened here, no clock read, no thread started.
+//! `score_traces.rs` is the one scan that feeds it. Rule: pure. It opens no file, reads no clock and starts no thread.
 
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 

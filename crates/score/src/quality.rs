@@ -1,8 +1,8 @@
-//! What became of the replies of some episodes, by experiment, model and condition: how many could be read, how long they
-//! took, what they cost.
+//! Reply quality by experiment, model and condition: how many replies could be read, how long they took, what they
+//! cost.
 //!
-//! Rule: sums are exact, so that they do not depend on the order of files or threads. What a trace does not record is not
-//! counted, which is not the same as zero.
+//! Rule: sums are exact, so they do not depend on the order of files or threads. Values that a trace does not record
+//! are not counted, which differs from zero.
 
 use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
@@ -20,7 +20,7 @@ use trace::replies::{REPLY_STATUS, ReplyCounts};
 use trace::scan::EpisodeBatch;
 use trace::schema::{self, Column, Kind};
 
-/// The columns that quality is read from, where traces have them.
+/// The columns that quality is read from, if the traces have them.
 const READ: [&str; 7] =
     [REPLY_STATUS, "reply_repair", "reply_fault", "latency_ms", "prompt_tokens", "completion_tokens", "cost_usd"];
 /// The separator between the repairs of one reply.
@@ -87,7 +87,7 @@ impl Total {
         self.sum += value;
     }
 
-    /// The sum per reply; `None` without any.
+    /// The mean per reply; `None` without replies.
     #[expect(clippy::cast_precision_loss, reason = "a mean for people")]
     pub fn mean(self) -> Option<f64> {
         (self.replies > 0).then(|| self.sum as f64 / self.replies as f64)
@@ -104,12 +104,12 @@ impl Quality {
         self.unread().map(|(_, replies)| replies).sum()
     }
 
-    /// The statuses of replies that gave no decision, and how many have each.
+    /// The statuses of replies that gave no decision, with counts.
     pub fn unread(&self) -> impl Iterator<Item = (&String, &u64)> {
         self.statuses.iter().filter(|(status, _)| !ReplyCounts::is_read(status))
     }
 
-    /// The most frequent reason why a reply gave no decision, and how many have it; of equally many the first by its words.
+    /// The most frequent reason for replies without a decision, with its count; ties go to the alphabetically first.
     pub fn commonest_fault(&self) -> Option<(&str, u64)> {
         let faults = self.faults.iter().map(|(fault, replies)| (fault.as_str(), *replies));
         faults.max_by(|(a, few), (b, many)| few.cmp(many).then_with(|| b.cmp(a)))
@@ -119,7 +119,7 @@ impl Quality {
         self.statuses.get(status).copied().unwrap_or(0)
     }
 
-    /// The least latency that this share of replies does not exceed, ms; `None` where none is recorded.
+    /// The lowest latency that this share of replies does not exceed, ms; `None` if none is recorded.
     #[expect(
         clippy::cast_precision_loss,
         clippy::cast_sign_loss,
@@ -139,7 +139,7 @@ impl Quality {
             .map(|(latency, _)| *latency)
     }
 
-    /// Adds what became of others.
+    /// Merges another tally.
     pub fn merge(&mut self, other: &Self) {
         self.episodes += other.episodes;
         self.steps += other.steps;
@@ -172,25 +172,25 @@ impl Quality {
 }
 
 impl QualityByCell {
-    /// Adds what became of other replies.
+    /// Merges other cells.
     pub fn merge(&mut self, other: Self) {
         for (key, quality) in other.0 {
             self.0.entry(key).or_default().merge(&quality);
         }
     }
 
-    /// Unusable and all replies of each episode, which are no longer kept here.
+    /// Takes the unusable and total replies of each episode out of this tally.
     pub fn take_by_episode(&mut self) -> BTreeMap<String, [u64; 2]> {
         self.0.values_mut().flat_map(|quality| std::mem::take(&mut quality.by_episode)).collect()
     }
 
-    /// Returns true if a cell has another condition than the default one.
+    /// Returns true if any cell has a condition other than the default.
     pub fn has_conditions(&self) -> bool {
         let default = schema::column(CONDITION).and_then(Column::default_text);
         self.0.keys().any(|key| Some(key.condition.as_str()) != default)
     }
 
-    /// Returns true if any trace records how replies came.
+    /// Returns true if any trace records reply statuses.
     pub fn is_recorded(&self) -> bool {
         self.0.values().any(|quality| !quality.statuses.is_empty())
     }
@@ -210,12 +210,12 @@ pub struct QualityReader {
 }
 
 impl QualityReader {
-    /// The columns of these traces that record replies. A column of another type than the schema's is not read.
+    /// A reader of the columns that record replies in these traces. Skips columns whose type differs from the schema's.
     pub fn of(traces: &TraceSet) -> Self {
         Self::of_columns(traces, &READ)
     }
 
-    /// As [`QualityReader::of`], of the statuses of replies alone.
+    /// Like [`QualityReader::of`], for the statuses of replies alone.
     pub fn of_statuses(traces: &TraceSet) -> Self {
         Self::of_columns(traces, &[REPLY_STATUS])
     }
@@ -264,7 +264,7 @@ impl QualityReader {
     }
 }
 
-/// Quality by cell while a batch is read: texts by their place among the different ones.
+/// Quality by cell while a batch is read; texts are indices of distinct values.
 #[derive(Default)]
 struct Cells {
     known: HashMap<[Option<usize>; 3], usize>,
@@ -398,7 +398,7 @@ fn float(column: Option<&ArrayRef>, row: usize) -> Option<f64> {
     column.is_valid(row).then(|| column.value(row))
 }
 
-/// A column of texts by their place among the different ones.
+/// A text column as indices of its distinct values.
 struct Coded<'a> {
     codes: Codes<'a>,
     texts: &'a StringArray,

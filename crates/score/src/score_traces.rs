@@ -1,4 +1,4 @@
-//! From traces to the episode table: the columns that the plan needs, one scan, one sorted table.
+//! From traces to the episode table: the plan's columns, one scan, one sorted table.
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -22,12 +22,12 @@ use metric::definitions::Definitions;
 use trace::open::{TraceFile, TraceSet};
 use trace::scan::{EPISODE_COLUMNS, EpisodeBatch, Projection};
 
-/// The request for a scoring.
+/// A request for scores.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Request {
     /// A built-in definition file by name, or any other by path.
     pub definitions: PathBuf,
-    /// The metrics wanted, by name; all if absent.
+    /// The names of the metrics; all if absent.
     pub metrics: Option<Vec<String>>,
     /// A condition on episodes in the language of definitions; all episodes if absent.
     pub condition: Option<String>,
@@ -40,7 +40,7 @@ impl Request {
     }
 }
 
-/// The definitions of a request, checked against the traces, with the experiments that these declare.
+/// The definitions of a request, checked against the traces, including the experiments that the traces declare.
 pub fn definitions(traces: &TraceSet, request: &Request) -> Result<Definitions, ScoreError> {
     let columns = trace_columns(traces);
     let mut definitions = Definitions::load(&request.definitions, &columns)?;
@@ -55,7 +55,7 @@ pub fn definitions(traces: &TraceSet, request: &Request) -> Result<Definitions, 
     Ok(definitions)
 }
 
-/// These metrics of the definitions that scores carry, checked against the traces that they were computed from.
+/// These metrics of the definitions that scores carry, checked against the traces of the scores.
 pub fn restored(traces: &TraceSet, catalog: &Catalog, metrics: &[String]) -> Result<Definitions, ScoreError> {
     let mut definitions = Definitions::of_catalog(catalog, &trace_columns(traces))?;
     definitions.select(metrics)?;
@@ -64,15 +64,15 @@ pub fn restored(traces: &TraceSet, catalog: &Catalog, metrics: &[String]) -> Res
     Ok(definitions)
 }
 
-/// What became of the replies is counted for each of them.
+/// The most cells whose replies are counted.
 const MOST_CELLS: Limit = Limit::new("experiments times models times conditions whose replies are counted", 100_000);
 
-/// What a scan gives besides the metrics.
+/// The outputs of a scan besides the metrics.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Outputs<'a> {
     /// Further key columns: columns that are constant in an episode.
     pub labels: &'a [String],
-    /// True if the timelines of the first definitions are wanted.
+    /// True to collect the timelines of the first definitions.
     pub timelines: bool,
     /// The reader of replies, for the episodes that the first definitions keep.
     pub quality: Option<&'a QualityReader>,
@@ -83,10 +83,10 @@ pub struct Outputs<'a> {
 /// The results of one scan, with the tables as an array of known length or as a vector.
 #[derive(Clone, Debug)]
 pub struct Scored<T> {
-    /// A table per definitions, each with the episodes that its own filter keeps.
+    /// A table per definitions, with the episodes that its filter keeps.
     pub tables: T,
-    /// The timelines of the first definitions, in the order of their keys; `None` where they were not asked for, or the
-    /// definitions do not name their moments.
+    /// The timelines of the first definitions, in key order. `None` if they were not requested, or if the definitions
+    /// do not name their moments.
     pub timelines: Option<Vec<Timeline>>,
     /// The reply quality; `None` unless requested.
     pub quality: Option<QualityByCell>,
@@ -94,7 +94,7 @@ pub struct Scored<T> {
 
 /// Scores all episodes of some traces.
 ///
-/// The table is the same for any number of threads, any order of files and any division into row groups.
+/// The table does not depend on the number of threads, the order of files or the division into row groups.
 pub fn score(
     traces: &TraceSet,
     definitions: &Definitions,
@@ -106,7 +106,7 @@ pub fn score(
     Ok(table)
 }
 
-/// Scores all episodes of some traces under several definitions, in one scan and one plan: what they share is computed
+/// Scores all episodes of some traces under several definitions, in one scan and one plan: shared steps are computed
 /// once.
 pub fn score_each<const N: usize>(
     traces: &TraceSet,
@@ -119,7 +119,7 @@ pub fn score_each<const N: usize>(
     Ok(Scored { tables, timelines, quality })
 }
 
-/// As [`score_each`], for a number of definitions that is not known before.
+/// Like [`score_each`], for a number of definitions known at run time.
 pub fn score_all(
     traces: &TraceSet,
     definitions: &[&Definitions],
@@ -164,7 +164,7 @@ pub fn score_all(
     Ok(Scored { tables, timelines: found.map(in_key_order), quality })
 }
 
-/// Whether the definitions ask for more than files of their size may: known before a row is read.
+/// Checks the work that the definitions ask for against the size of the files, before a row is read.
 pub(super) fn check_work(traces: &TraceSet, plan: &PhysicalPlan) -> Result<(), ScoreError> {
     let sum = |of: fn(&TraceFile) -> u64| traces.files().iter().map(of).sum();
     let checked = plan.check_work(sum(TraceFile::rows), sum(TraceFile::bytes));
@@ -188,7 +188,7 @@ pub(super) fn header(definitions: &Definitions, labels: &[String]) -> Header {
     Header { catalog: definitions.catalog.clone(), labels: labels.to_vec(), metrics }
 }
 
-/// The episodes of some traces without a metric: keys and labels, the traces checked as [`score`] checks them.
+/// The episodes of some traces without metrics: keys and labels. The traces are checked as in [`score`].
 ///
 /// For engines that read the traces themselves and check nothing.
 pub fn unscored(
@@ -204,7 +204,7 @@ pub fn unscored(
     Ok(tables.pop().expect("a table per header"))
 }
 
-/// The tables of what `score` gives for each batch; what else it gives goes to `other`, in the order of the files.
+/// The tables that `score` gives for each batch; its other output goes to `other`, in the order of the files.
 pub(super) fn collect<T: Send>(
     traces: &TraceSet,
     projection: &Projection,

@@ -1,7 +1,7 @@
-//! Times of looks, claims and decisions: an episode as a line of time, for the figure `gaze`.
+//! Times of looks, claims and decisions: an episode's timeline, for the figure `gaze`.
 //!
-//! The moments are those of the definitions: the `let`s `visible` (a truth value per step), `sight`,
-//! `claim` and `done` (timesteps), and `answered` (whether the decision committed to a colour).
+//! The definitions give the moments: the `let`s `visible` (a truth value per step), `sight`, `claim` and `done`
+//! (timesteps), and `answered` (true if the decision committed to a colour).
 
 use std::ops::RangeInclusive;
 
@@ -16,13 +16,13 @@ use metric::definitions::Definitions;
 use metric::plan::{NodeId, Plan};
 use trace::scan::EpisodeBatch;
 
-/// One episode along its time.
+/// The timeline of one episode.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Timeline {
     pub key: EpisodeKey,
     /// The number of steps, T.
     pub length: u32,
-    /// The runs of timesteps with mirror evidence in view, ascending, apart from each other.
+    /// The runs of timesteps with mirror evidence in view, ascending and separate.
     pub visible: Vec<RangeInclusive<u32>>,
     pub first_sight: Option<u32>,
     /// The first commitment to a colour before the end.
@@ -42,7 +42,7 @@ struct Moments<T> {
 }
 
 impl Moments<NodeId> {
-    /// `None` where the definitions do not name them all, with the types and levels they have in the paper's.
+    /// `None` unless the definitions name them all, with the types and levels of the paper's definitions.
     fn of(definitions: &Definitions) -> Option<Self> {
         Some(Self {
             visible: named(definitions, "visible", Type::Bool, Level::Step)?,
@@ -65,7 +65,7 @@ impl Moments<NodeId> {
     }
 }
 
-/// The node of a `let` that has this type and level; `None` where the definitions have no such one.
+/// The node of a `let` with this type and level; `None` without one.
 fn named(definitions: &Definitions, name: &str, ty: Type, level: Level) -> Option<NodeId> {
     let plan = &definitions.plan;
     let (_, node) = plan.lets.iter().find(|(known, _)| known == name)?;
@@ -83,7 +83,7 @@ pub(super) struct TimelineReader {
 }
 
 impl TimelineReader {
-    /// Adds what timelines are read from to a plan; `None` where the definitions do not name it.
+    /// Adds the inputs of timelines to a plan; `None` if the definitions do not name them.
     pub(super) fn of(plan: &mut PhysicalPlan, definitions: &Definitions) -> Option<Self> {
         let logical = &definitions.plan;
         let moments = Moments::of(definitions)?.steps(plan, logical);
@@ -100,7 +100,7 @@ impl TimelineReader {
     }
 }
 
-/// Timelines in the order of their keys.
+/// Timelines in key order.
 pub(super) fn in_key_order(mut timelines: Vec<Timeline>) -> Vec<Timeline> {
     timelines.sort_by(|a, b| a.key.cmp(&b.key));
     timelines
@@ -135,7 +135,7 @@ fn runs(timesteps: &[i64]) -> Vec<RangeInclusive<u32>> {
     runs
 }
 
-/// A timestep as the schema has it: 32 bits.
+/// A timestep in the schema's type: 32 bits.
 fn as_step(t: i64) -> u32 {
     u32::try_from(t).unwrap_or(u32::MAX)
 }

@@ -1,4 +1,4 @@
-//! The columns that definitions may name: those of the schema, and the traces' own; and those that a question needs.
+//! The columns that definitions may name: the schema's and the traces' own; and the columns that a question needs.
 
 use super::error::ScoreError;
 use exact::suggest::nearest;
@@ -9,7 +9,7 @@ use trace::open::TraceSet;
 use trace::schema::domain::is_general;
 use trace::schema::{self, COLUMNS, DeclaredColumn, Domain, Kind};
 
-/// The columns that definitions may name: those of the schema, whether the traces have them or not.
+/// The schema's columns, which definitions may name whether or not the traces have them.
 pub fn schema_columns() -> Columns {
     let column = |column: &trace::schema::Column| {
         let level = if column.constant { Level::Episode } else { Level::Step };
@@ -25,15 +25,15 @@ pub fn schema_columns() -> Columns {
     columns
 }
 
-/// The columns that definitions may name before any trace is open: as [`schema_columns`], where each row
-/// may have a value.
+/// The columns that definitions may name before any trace is open: like [`schema_columns`], but each row may have a
+/// value.
 pub fn unknown_columns() -> Columns {
     let mut columns = schema_columns();
     set_fallbacks(&mut columns, |_| true);
     columns
 }
 
-/// Says what columns mean where there is no value; `is_read` says which of them some trace has.
+/// Sets the meaning of missing values; `is_read` returns true if some trace has the column.
 fn set_fallbacks(columns: &mut Columns, is_read: impl Fn(&str) -> bool) {
     for column in COLUMNS.iter() {
         if let Some(expression) = column.default {
@@ -47,7 +47,7 @@ pub fn has_value(name: &str) -> bool {
     COLUMNS.iter().any(|column| column.name == name && column.required && !column.nullable)
 }
 
-/// The columns that definitions may name over these traces: those of the schema, and the traces' own.
+/// The columns that definitions may name over these traces: the schema's and the traces' own.
 pub fn trace_columns(traces: &TraceSet) -> Columns {
     let mut columns =
         schema_columns().with_help("`mirrorstats trace schema`, `trace info` and `trace labels` list the columns");
@@ -76,7 +76,7 @@ fn type_of(kind: Kind) -> Option<Type> {
     }
 }
 
-/// Every column that is read must be in every file, with one type.
+/// Checks that every column that is read is in every file, with one type.
 pub fn check_columns(traces: &TraceSet, definitions: &Definitions) -> Result<(), ScoreError> {
     let plan = &definitions.plan;
     let outputs = plan.outputs.iter().map(|output| (output.name.as_str(), output.node));
@@ -102,7 +102,7 @@ fn column_problem(traces: &TraceSet, column: &str) -> Option<(String, String)> {
     found.missing_from.filter(|_| !has_default).map(|file| (format!("`{file}` has no such column"), absent()))
 }
 
-/// The columns of their own that definitions declare.
+/// The own columns that definitions declare.
 pub fn declared_columns(definitions: &Definitions) -> Vec<DeclaredColumn> {
     let own = |(name, entry): (&str, &ColumnEntry)| DeclaredColumn {
         name: name.to_owned(),
@@ -127,18 +127,18 @@ pub fn is_constant(name: &str) -> bool {
     COLUMNS.iter().any(|column| column.name == name && column.constant)
 }
 
-/// Refuses a column to group by that is not constant in an episode, or not in every trace.
+/// Refuses a column to group by that varies within an episode, or that some trace lacks.
 pub fn check_label(traces: &TraceSet, label: &str) -> Result<(), ScoreError> {
     if traces.is_label_column(label) {
         return Ok(());
     }
     let problem = column_problem(traces, label);
-    // What version 2 brought is null in older traces, or has a meaning where there is no value.
+    // Columns of version 2 are null in older traces, or have a meaning for missing values.
     let is_known_anyway = traces.domain().column(label).is_some_and(|known| {
         let found = traces.column(label);
         known.default_text().is_some() || known.since > 1 && found.is_some_and(|found| found.conflict.is_none())
     });
-    // Whether a column of one's own changes from step to step shows when it is read.
+    // Reading shows whether an own column varies between steps.
     let is_constant = |name: &str| match traces.domain() {
         Domain::Mirror => is_constant(name),
         Domain::Own => {

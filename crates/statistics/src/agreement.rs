@@ -1,4 +1,4 @@
-//! The agreement of two coders on a label: Cohen's kappa (Cohen 1960) and its interval (Fleiss, Cohen and Everitt 1969).
+//! The agreement of two coders: Cohen's kappa (Cohen 1960) and its interval (Fleiss, Cohen and Everitt 1969).
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -6,7 +6,7 @@ use serde::Serialize;
 use crate::interval::Interval;
 use crate::quantile;
 
-/// Below this number of episodes the interval of kappa does not keep its level.
+/// With fewer episodes the interval of kappa does not keep its level.
 pub const FEWEST: u64 = 10;
 
 /// The episodes that two coders coded, by who of them puts a label.
@@ -26,7 +26,7 @@ pub struct PairCounts {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Kappa {
     pub value: f64,
-    /// `None` where the coders never differ: the formula then gives no width.
+    /// `None` if the coders never differ: the formula then gives no width.
     pub interval: Option<Interval>,
 }
 
@@ -51,8 +51,8 @@ impl PairCounts {
         self.both + self.neither
     }
 
-    /// Kappa with an interval at this confidence. `None` for fewer than [`FEWEST`] episodes, and where both coders say the same of
-    /// every episode, so that any agreement is by chance.
+    /// Kappa with an interval at this confidence. `None` for fewer than [`FEWEST`] episodes, and if both coders give
+    /// every episode the same label, so that all agreement is by chance.
     #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
     pub fn kappa(&self, confidence: f64) -> Option<Kappa> {
         let n = self.n() as f64;

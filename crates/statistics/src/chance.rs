@@ -1,15 +1,15 @@
 //! One rate against a level fixed beforehand: the exact binomial test.
 //!
-//! Rule: two-sided by probability. The p value sums every count that is at most as probable as the one
-//! seen (Gibbons and Pratt 1975, the minimum likelihood rule). Weights are integers while 128 bits hold
-//! them, so that counts of equal probability are distinguished from nearly equal ones without rounding.
+//! Rule: two-sided by probability. The p value sums all counts that are at most as probable as the observed one
+//! (Gibbons and Pratt 1975, the minimum likelihood rule). Weights are integers as long as they fit 128 bits, which
+//! distinguishes equal from nearly equal probabilities without rounding.
 
 use std::iter::successors;
 
 use super::outcomes::{ExactTest, Outcomes};
 use exact::ratio::Ratio;
 
-/// No weights of more trials than this fit 128 bits.
+/// With more trials, weights never fit 128 bits.
 const MOST_EXACT: u64 = 128;
 
 /// The two-sided p value of `successes` in `n` trials under the rate `level`.
@@ -22,13 +22,13 @@ pub fn two_sided(successes: u64, n: u64, level: Ratio) -> Option<f64> {
 
 /// The exact two-sided p value of [`two_sided`] and its mid-p value.
 ///
-/// `mid_p` is less conservative and not guaranteed to keep the level. `None` as there.
+/// `mid_p` is less conservative and not guaranteed to keep the level. `None` as in [`two_sided`].
 pub fn exact_test(successes: u64, n: u64, level: Ratio) -> Option<ExactTest> {
     let odds = Odds::of(level).filter(|_| n > 0 && successes <= n)?;
     Some(exact(successes, n, odds).unwrap_or_else(|| by_recurrence(n, odds).test(successes)))
 }
 
-/// The least p value that [`two_sided`] can give for `n` trials; 0 where it underflows, and for a level of 0 or 1.
+/// The least p value that [`two_sided`] can give for `n` trials; 0 if it underflows, and for a level of 0 or 1.
 ///
 /// `None` for n = 0 and for a level outside [0, 1].
 pub fn least_p(n: u64, level: Ratio) -> Option<f64> {
@@ -51,14 +51,14 @@ impl Odds {
         Some(Self { hit, miss: all.checked_sub(hit)? })
     }
 
-    /// The probability of `j + 1` successes of `n` over that of `j`.
+    /// The probability of `j + 1` successes in `n` trials divided by that of `j`.
     #[expect(clippy::cast_precision_loss, reason = "relative weights are approximate by design")]
     fn rise(self, n: u64, j: u64) -> f64 {
         ((n - j) as f64 * self.hit as f64) / ((j + 1) as f64 * self.miss as f64)
     }
 }
 
-/// The test by whole numbers; `None` where a weight leaves 128 bits.
+/// The test in integers; `None` if a weight does not fit 128 bits.
 #[expect(clippy::cast_precision_loss, reason = "exact sums become quotients here")]
 fn exact(successes: u64, n: u64, odds: Odds) -> Option<ExactTest> {
     let weights = exact_weights(n, odds)?;
@@ -67,7 +67,7 @@ fn exact(successes: u64, n: u64, odds: Odds) -> Option<ExactTest> {
     let tied: u128 = weights.iter().filter(|&&weight| weight == seen).sum();
     let total = exact_total(n, odds)?;
     let p = as_extreme as f64 / total as f64;
-    // At a level of 0 or 1 one count alone is possible, and no evidence.
+    // At a level of 0 or 1 only one count is possible, and it is no evidence.
     let mid_p = if seen == total { 1.0 } else { (as_extreme as f64 - tied as f64 / 2.0) / total as f64 };
     Some(ExactTest { p, mid_p })
 }
@@ -84,7 +84,7 @@ fn exact_total(n: u64, odds: Odds) -> Option<u128> {
     u128::from(odds.hit + odds.miss).checked_pow(u32::try_from(n).ok()?)
 }
 
-/// Counts weigh `C(n, j) * hit^j * miss^(n - j)`; `None` where a weight leaves 128 bits.
+/// Counts weigh `C(n, j) * hit^j * miss^(n - j)`; `None` if a weight does not fit 128 bits.
 fn exact_weights(n: u64, odds: Odds) -> Option<Vec<u128>> {
     if n > MOST_EXACT {
         return None;
@@ -104,7 +104,7 @@ fn exact_weights(n: u64, odds: Odds) -> Option<Vec<u128>> {
     Some(weights)
 }
 
-/// The same with weights relative to the most probable count, which have no largest `n`.
+/// The same with weights relative to the most probable count, for any `n`.
 fn by_recurrence(n: u64, odds: Odds) -> Outcomes {
     let all = u128::from(odds.hit) + u128::from(odds.miss);
     let mode = (u128::from(n) + 1) * u128::from(odds.hit) / all;
@@ -122,8 +122,8 @@ mod tests {
         Ratio::new(above, below).unwrap()
     }
 
-    // Python: F = Fraction; P[j] = F(comb(n, j) * a**j * (b - a)**(n - j), b**n); sum(p for p in P if p <= P[k]).
-    // scipy 1.17.1 stats.binomtest(k, n, a / b).pvalue agrees in all digits it gives.
+    // Python: F = Fraction; P[j] = F(comb(n, j) * a**j * (b - a)**(n - j), b**n); sum(p for p in P if p <= P[k]). scipy
+    // 1.17.1 stats.binomtest(k, n, a / b).pvalue agrees in all its digits.
     #[test]
     fn p_values_are_the_known_ones() {
         for (k, n, (a, b), expected) in [
@@ -177,7 +177,7 @@ mod tests {
         }
     }
 
-    // Python: the least of these p values over all counts.
+    // Python: the smallest of these p values over all counts.
     #[test]
     fn least_p_values_are_the_known_ones() {
         for (n, (a, b), expected) in [

@@ -1,6 +1,6 @@
-//! The design of a study, as its recorder declares it: what pairs episodes, what groups them.
+//! The design of a study, as declared by its recorder: what pairs episodes, what groups them.
 //!
-//! Rule: what is not declared is not assumed. Seeds and runs that happen to be equal make neither pairs nor clusters.
+//! Rule: only declared structure is assumed. Equal seeds and runs alone make neither pairs nor clusters.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -37,12 +37,12 @@ pub enum Cluster {
 }
 
 impl Design {
-    /// Returns true if equal scenes make pairs: the scenes of a reconstruction are as made up as its outcomes.
+    /// Returns true if equal scenes make pairs; those of a reconstruction are made up, like its outcomes.
     pub fn has_pairs(self) -> bool {
         self.kind != Some(DesignKind::Reconstruction)
     }
 
-    /// The unit of dependent episodes; never any in a reconstruction.
+    /// The unit of dependent episodes; always `None` in a reconstruction.
     pub fn clusters(self) -> Option<Cluster> {
         self.cluster.filter(|_| self.kind != Some(DesignKind::Reconstruction))
     }

@@ -8,7 +8,7 @@
 //! assert_eq!(wilson(0, 0, 0.95), None, "no episode, no interval");
 //! ```
 //!
-//! Rule: integers until the last step. Nothing here knows a metric or a table, formats a number or opens a file.
+//! Rule: integers until the last step. No metrics, tables, formatting of numbers or files here.
 
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 

@@ -1,14 +1,14 @@
-//! Episodes lost to infrastructure: what they could have changed.
+//! Episodes lost to infrastructure, and their possible effect.
 //!
-//! Rule: a lost episode is neither a success nor a failure. It is counted apart, and the rate is given
-//! with the bounds between "all lost ones fail" and "all succeed" (Manski 1989).
+//! Rule: a lost episode is neither a success nor a failure. It is counted separately, and the rate is given with the
+//! bounds between "all lost ones fail" and "all succeed" (Manski 1989).
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::interval::{Interval, wilson};
 
-/// The outcomes of a step's reply, as recorded, that are the infrastructure's doing and not the model's.
+/// The recorded reply outcomes that are caused by the infrastructure and not by the model.
 pub const INFRASTRUCTURE: [&str; 3] = ["rate_limited", "server_error", "timeout"];
 
 /// A rate with some of its episodes lost.
@@ -26,9 +26,9 @@ pub struct Lossy {
     pub interval: Interval,
 }
 
-/// The bounds of a rate from its values and which of them belong to lost episodes.
+/// The bounds of a rate, from each episode's value and fate.
 ///
-/// The value of a lost episode is not used, defined or not. `None` where there is nothing to count.
+/// The value of a lost episode is ignored, defined or not. `None` if there is nothing to count.
 #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
 pub fn bounds(episodes: impl IntoIterator<Item = (Option<i64>, Fate)>, confidence: f64) -> Option<Lossy> {
     let (mut n, mut successes, mut lost) = (0, 0, 0);
@@ -56,7 +56,7 @@ pub fn bounds(episodes: impl IntoIterator<Item = (Option<i64>, Fate)>, confidenc
 /// The fate of an episode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fate {
-    /// It ran as it should.
+    /// It completed normally.
     Kept,
     Lost,
 }

@@ -1,8 +1,8 @@
-//! Exact two-sided tests over the counts that could have been seen.
+//! Exact two-sided tests over all possible counts.
 //!
-//! Rule: two-sided by probability. The p value sums every count that is at most as probable as the one seen
+//! Rule: two-sided by probability. The p value sums all counts that are at most as probable as the observed one
 //! (Gibbons and Pratt 1975, the minimum likelihood rule). Weights are relative to the most probable count and follow
-//! from the ratios of neighbours: no factorial, no logarithm, the same bits on every machine.
+//! from the ratios of neighbours: without factorials or logarithms, and with the same bits on every machine.
 
 use std::iter::successors;
 
@@ -32,11 +32,11 @@ pub(super) struct Outcomes {
 }
 
 impl Outcomes {
-    /// The counts from `low` to `high`, where `rise(j)` is the probability of `j + 1` over that of `j`.
+    /// The counts from `low` to `high`; `rise(j)` is the probability of `j + 1` divided by that of `j`.
     ///
-    /// `mode` is a most probable count or close to one, within the bounds.
+    /// `mode` is the most probable count or close to it, within the bounds.
     pub fn around(mode: u64, (low, high): (u64, u64), rise: impl Fn(u64) -> f64) -> Self {
-        // Below the normal numbers a product may stop shrinking.
+        // A product of subnormal numbers may stop shrinking.
         let is_normal = |(_, weight): &(u64, f64)| *weight >= f64::MIN_POSITIVE;
         let down = successors(Some((mode, 1.0)), |&(j, weight)| (j > low).then(|| (j - 1, weight / rise(j - 1))));
         let up = successors(Some((mode, 1.0)), |&(j, weight)| (j < high).then(|| (j + 1, weight * rise(j))));
@@ -48,7 +48,7 @@ impl Outcomes {
         Self { first, weights, whole: first == low && last == high }
     }
 
-    /// Both p values of the count `seen`, one that is possible.
+    /// Both p values of the observed count, which must be possible.
     pub fn test(&self, seen: u64) -> ExactTest {
         if self.weights.len() == 1 && seen == self.first {
             return ExactTest { p: 1.0, mid_p: 1.0 };
@@ -62,7 +62,7 @@ impl Outcomes {
         ExactTest { p: as_extreme / total, mid_p: (as_extreme - tied / 2.0) / total }
     }
 
-    /// The least p value that any count has; 0 where it underflows.
+    /// The least p value of any count; 0 if it underflows.
     pub fn least_p(&self) -> f64 {
         let ends = [self.weights.first(), self.weights.last()].map(|weight| weight.copied().unwrap_or(0.0));
         let total: f64 = self.weights.iter().sum();

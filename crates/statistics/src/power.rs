@@ -1,4 +1,4 @@
-//! The least difference that a comparison of this size could have shown.
+//! The smallest difference that a comparison of this size can detect.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::quantile;
 use super::unpaired::fisher;
 
-/// The power that [`Detectable::likely`] is stated at.
+/// The power of [`Detectable::likely`].
 pub(crate) const POWER: f64 = 0.8;
 
 /// The smallest difference of two rates that an exact test of n pairs, or of n episodes on each side, could have shown.
@@ -27,7 +27,7 @@ pub struct Detectable {
     pub likely: Option<f64>,
 }
 
-/// The smallest detectable difference of `n` pairs at `level`; `None` where no outcome reaches it.
+/// The smallest detectable difference of `n` pairs at `level`; `None` if no outcome reaches it.
 ///
 /// A family of m tests under Holm's procedure needs `level / m` for its first rejection.
 /// d pairs in one direction have p = 2^(1-d); the power is a binomial tail, inverted by the beta distribution.
@@ -51,7 +51,7 @@ pub fn detectable(n: u64, level: f64) -> Option<Detectable> {
     })
 }
 
-/// The same for two independent samples of `n` episodes each by Fisher's exact test: k successes against none.
+/// The same for two independent samples of `n` episodes each by Fisher's exact test: k successes against zero.
 #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
 pub fn detectable_unpaired(n: u64, level: f64) -> Option<Detectable> {
     let is_enough = |k: u64| fisher((k, n), (0, n)).is_some_and(|test| test.p <= level);
@@ -83,7 +83,7 @@ mod tests {
         assert!((family.likely.unwrap() - 0.589997196567057).abs() < 1e-10, "{family:?}");
     }
 
-    // scipy 1.17.1: fisher_exact([[k, 21 - k], [0, 21]]).pvalue is 0.0478 for k = 5, 0.1069 for k = 4 and 0.0013 for k = 9
+    // scipy 1.17.1: fisher_exact([[k, 21 - k], [0, 21]]).pvalue is 0.0478 for k = 5, 0.1069 for 4 and 0.0013 for 9
     #[test]
     fn twenty_one_episodes_each_show_five_against_none() {
         assert_eq!(detectable_unpaired(21, 0.05).unwrap().pairs, 5);

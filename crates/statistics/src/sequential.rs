@@ -1,13 +1,13 @@
-//! Inference that may be looked at while a study runs, and stopped at any look.
+//! Inference for a study in progress, which may be looked at and stopped at any time.
 //!
-//! Rule: everything here holds at all numbers of episodes at once. An e-value of a true hypothesis has an expectation of
-//! at most 1 whenever it is looked at, so that it ever reaches 1 / a with a probability of at most a (Ville 1939); fixed-n
-//! p values and intervals promise this for one look alone.
+//! Rule: everything here is valid at all numbers of episodes at once. The e-value of a true hypothesis has an
+//! expectation of at most 1 at every look, so the probability that it ever reaches 1 / a is at most a (Ville 1939).
+//! Fixed-n p values and intervals guarantee this for a single look only.
 //!
 //! The bets are mixtures over the beta distribution Beta(1/2, 1/2) of the rate (Robbins 1970; Krichevsky and Trofimov
-//! 1981; as bets: Waudby-Smith and Ramdas 2024, JRSS B 86:1). Such a mixture depends on the counts alone:
-//! a sequence needs an order, the result does not, and no order of seeds and runs has to be chosen. What must hold is
-//! that each next episode succeeds with the same probability, whatever came before.
+//! 1981; as bets: Waudby-Smith and Ramdas 2024, JRSS B 86:1). Such a mixture depends only on the counts: a sequence
+//! needs an order, but the result does not, so no order of seeds and runs is chosen. The assumption is that each
+//! episode succeeds with the same probability, whatever came before.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -26,7 +26,7 @@ pub struct EValue {
     pub p: f64,
 }
 
-/// The e-value of `successes` in `n` trials against the rate `level`, in either direction.
+/// The e-value of `successes` in `n` trials against the rate `level`, two-sided.
 ///
 /// `None` for n = 0, for more successes than trials, and for a level outside [0, 1]. The cost grows with `n`.
 pub fn against_level(successes: u64, n: u64, level: Ratio) -> Option<EValue> {
@@ -40,10 +40,10 @@ pub fn against_level(successes: u64, n: u64, level: Ratio) -> Option<EValue> {
     Some(mixture(successes, failures, [(hit, all), (miss, all)]).evidence())
 }
 
-/// The e-value against no difference between two paired rates: that a discordant pair falls either way
-/// with probability 1/2. The bet is on discordant pairs alone; without one it is still 1.
+/// The e-value against no difference between two paired rates: a discordant pair favours either side with probability
+/// 1/2. The bet is only on discordant pairs; without any it is still 1.
 ///
-/// `None` without a pair.
+/// `None` without pairs.
 pub fn discordant(pairs: Pairs) -> Option<EValue> {
     match (pairs.n(), pairs.discordant()) {
         (0, _) => None,
@@ -54,8 +54,8 @@ pub fn discordant(pairs: Pairs) -> Option<EValue> {
 
 /// The confidence sequence of a rate: the levels whose e-value is below 1 / (1 - confidence).
 ///
-/// It holds the rate at all numbers of trials at once with a probability of at least `confidence`. `None` for n = 0, for
-/// more successes than trials, and for a confidence outside (0, 1).
+/// It contains the rate at all numbers of trials at once with a probability of at least `confidence`. `None` for n = 0,
+/// for more successes than trials, and for a confidence outside (0, 1).
 pub fn confidence_sequence(successes: u64, n: u64, confidence: f64) -> Option<Interval> {
     let failures = n.checked_sub(successes).filter(|_| n > 0)?;
     let least = holm::level(confidence)?.ln() + mixture(successes, failures, [(1, 1); 2]).ln();
@@ -65,11 +65,11 @@ pub fn confidence_sequence(successes: u64, n: u64, confidence: f64) -> Option<In
     })
 }
 
-/// The probability of one sequence of these counts under the mixture, over that under the rates of a success and of
-/// a failure, which are not 0 where there is one.
+/// The probability of one sequence of these counts under the mixture, divided by that under the given rates of success
+/// and failure. A rate must not be 0 if its count is positive.
 ///
-/// Krichevsky and Trofimov's estimator, one trial after the other: after i successes in t trials the next one succeeds
-/// with probability (i + 1/2) / (t + 1). Plain arithmetic, the same bits on every machine.
+/// Krichevsky and Trofimov's estimator, trial by trial: after i successes in t trials, the next one succeeds with
+/// probability (i + 1/2) / (t + 1). Plain arithmetic gives the same bits on every machine.
 #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
 fn mixture(successes: u64, failures: u64, [success, failure]: [(u64, u64); 2]) -> Scaled {
     let step = |(above, below): (u64, u64), seen: u64, trials: u64| {
@@ -79,7 +79,7 @@ fn mixture(successes: u64, failures: u64, [success, failure]: [(u64, u64); 2]) -
     (0..failures).fold(won, |product, j| product.times(step(failure, j, successes + j)))
 }
 
-/// The rate below the one seen at which the logarithm of the likelihood has fallen to `least`; 0 without a success.
+/// The rate below the observed one at which the log-likelihood has fallen to `least`; 0 without successes.
 #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
 fn lower(successes: u64, failures: u64, least: f64) -> f64 {
     if successes == 0 {
@@ -90,7 +90,7 @@ fn lower(successes: u64, failures: u64, least: f64) -> f64 {
     let (mut low, mut high) = (0.0, hits / (hits + misses));
     loop {
         let middle = f64::midpoint(low, high);
-        // Neighbouring numbers have none between them.
+        // There is no number between two neighbouring floats.
         if middle <= low || middle >= high {
             return quantile::settled(low);
         }
@@ -112,7 +112,7 @@ struct Scaled {
 impl Scaled {
     const ONE: Self = Self { value: 1.0, exponent: 0 };
 
-    /// The range around 1 that a value may leave before its exponent changes.
+    /// The range around 1 that a value may leave before its exponent is adjusted.
     const STEP: i32 = 256;
 
     fn times(self, factor: f64) -> Self {
@@ -139,7 +139,7 @@ impl Scaled {
 
 /// `value * 2^exponent`, at most the largest number.
 fn number(value: f64, exponent: i32) -> f64 {
-    // In two steps: one power alone may overflow where the product does not.
+    // In two steps: a single power may overflow where the product does not.
     let exponent = exponent.clamp(-2048, 2048);
     let half = exponent / 2;
     (value * 2f64.powi(half) * 2f64.powi(exponent - half)).min(f64::MAX)
@@ -159,8 +159,8 @@ mod tests {
         Ratio::new(above, below).unwrap()
     }
 
-    // Python fractions: the product of Krichevsky and Trofimov's estimates over p**k * (1 - p)**(n - k).
-    // scipy 1.17.1, exp(betaln(k + 0.5, n - k + 0.5) - betaln(0.5, 0.5)) over the same, agrees in the digits it gives.
+    // Python fractions: the product of Krichevsky and Trofimov's estimates over p**k * (1 - p)**(n - k). scipy 1.17.1,
+    // exp(betaln(k + 0.5, n - k + 0.5) - betaln(0.5, 0.5)) over the same, agrees in its digits.
     #[test]
     fn e_values_are_the_known_ones() {
         for (k, n, (a, b), e, p) in [
@@ -223,12 +223,12 @@ mod tests {
         let many = against_level(5000, 5000, level(1, 10)).unwrap();
         assert_eq!((many.e.to_bits(), many.p.to_bits()), (f64::MAX.to_bits(), 0.0f64.to_bits()));
         assert!(against_level(2500, 5000, level(1, 2)).unwrap().e > 0.0);
-        // 2^-900 of a fair coin: representable, though its factors leave the range on the way.
+        // 2^-900 of a fair coin: representable, though intermediate factors leave the range.
         let e = against_level(900, 900, level(1, 2)).unwrap().e;
         assert!(e > 1e268 && e < 1e271, "{e}");
     }
 
-    /// The share of studies of fair episodes that ever reach evidence at `alpha`, looked at after each episode.
+    /// The share of studies of fair episodes that ever reach evidence at `alpha`, with a look after each episode.
     fn ever_rejected((above, below): (i64, i64), alpha: f64) -> f64 {
         let chance = level(above, below);
         let mut random = SplitMix64::seeded(20_260_101);
@@ -242,7 +242,7 @@ mod tests {
         f64::from((0..1500).map(|_| u32::from(study())).sum::<u32>()) / 1500.0
     }
 
-    // Exact binomial tests looked at in the same way reject in about a quarter of such studies (`benches/COVERAGE.md`).
+    // Exact binomial tests with the same looks reject in about a quarter of such studies (`benches/COVERAGE.md`).
     #[test]
     fn stopping_at_the_first_success_keeps_the_level() {
         for rate in [(1, 2), (1, 3), (1, 10)] {
@@ -264,7 +264,7 @@ mod tests {
             let mirrored = confidence_sequence(n - k, n, 0.95).unwrap();
             prop_assert!((bounds.low - (1.0 - mirrored.high)).abs() < 1e-10);
             let failures = against_level(n - k, n, level(100 - above, 100)).unwrap();
-            // Below the smallest normal number there are no nine digits.
+            // Subnormal numbers do not have nine digits.
             prop_assert!((failures.p - p).abs() <= 1e-9 * p + f64::MIN_POSITIVE);
         }
     }

@@ -1,4 +1,4 @@
-//! The backend of scoring: the native kernels, or the SQL lowering on another engine. The results are the same.
+//! The scoring backend: the native kernels, or the SQL lowering on another engine. The results are the same.
 
 use std::ffi::OsString;
 use std::num::NonZeroUsize;
@@ -16,10 +16,10 @@ use trace::open::TraceSet;
 
 #[derive(Clone, Debug, Default)]
 pub enum Backend {
-    /// The program's own kernels.
+    /// The native kernels.
     #[default]
     Native,
-    /// The SQL lowering on Polars, in this process; an error in a build without it.
+    /// The SQL lowering on Polars, in this process; an error in a build without Polars.
     Polars,
     /// The SQL lowering on the user's own Spark.
     Spark(Cluster),
@@ -36,10 +36,10 @@ pub struct SparkJob {
 }
 
 impl SparkJob {
-    /// Traces of this machine.
+    /// For local traces.
     ///
     /// # Errors
-    /// Files of scores; whatever is wrong with the definitions or the columns to group by.
+    /// Files of scores; faults in the definitions or in the columns to group by.
     pub fn of_study(study: &Study, cluster: Cluster) -> Result<Self, StudyError> {
         let traces = study.source.traces()?;
         let mut labels = study.question.labels_over(traces);
@@ -61,27 +61,27 @@ impl SparkJob {
         Ok(Self { sources, definitions, labels, cluster, read })
     }
 
-    /// URIs that Spark alone can read.
+    /// For URIs, which only Spark can read.
     pub fn of_uris(uris: Vec<String>, question: &Question, cluster: Cluster) -> Result<Self, StudyError> {
         let definitions = question.bind_to(&score::vocabulary::unknown_columns())?;
         let (sources, labels, read) = (Sources::Uris(uris), question.labels(), Vec::new());
         Ok(Self { sources, definitions, labels, cluster, read })
     }
 
-    /// The files of this machine that are read.
+    /// The local files that are read.
     pub fn read(&self) -> &[PathBuf] {
         &self.read
     }
 
-    /// The scores, brought here.
+    /// Scores on Spark and fetches the table.
     pub fn score(&self) -> Result<EpisodeTable, StudyError> {
         Ok(spark::score(self.job(), &self.cluster)?)
     }
 
-    /// The scores in a folder of Parquet that Spark writes.
+    /// Scores on Spark, which writes a folder of Parquet.
     ///
     /// # Errors
-    /// Whatever Spark, its absence, or the traces give; a folder that exists.
+    /// Errors of Spark, a missing Spark, faults of the traces; a folder that already exists.
     pub fn write(&self, folder: &str) -> Result<Written, StudyError> {
         Ok(spark::write(self.job(), &self.cluster, folder)?)
     }
@@ -91,10 +91,10 @@ impl SparkJob {
     }
 }
 
-/// Returns true if arguments are URIs: all of them, or none.
+/// Returns true if all arguments are URIs, false if none is.
 ///
 /// # Errors
-/// Files of this machine and URIs at once.
+/// Local files and URIs together.
 pub fn are_uris(arguments: &[OsString]) -> Result<bool, StudyError> {
     match arguments.iter().filter(|argument| argument.to_str().is_some_and(is_uri)).count() {
         0 => Ok(false),

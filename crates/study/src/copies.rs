@@ -1,4 +1,4 @@
-//! Copies of episodes among those of a study: every number counts them as independent episodes.
+//! Copies of episodes in a study: every number counts them as independent episodes.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,10 +8,10 @@ use exact::escape::visible;
 use score::table::EpisodeTable;
 use trace::copies::copies;
 
-/// How many copies a sentence names before it counts the rest.
+/// The most copies that a sentence names.
 const NAMED: usize = 3;
 
-/// What is said of copies: a phrase beside an answer, and a sentence.
+/// The text about copies: a phrase beside an answer, and a sentence.
 #[derive(Clone, Debug)]
 pub(super) struct Copies {
     pub phrase: String,
@@ -19,7 +19,7 @@ pub(super) struct Copies {
 }
 
 impl Study {
-    /// The episodes that are copies of others; `None` if none is, and of scores, whose steps nobody knows.
+    /// The episodes that are copies of others; `None` without copies, and for scores, which have no steps to compare.
     pub(super) fn copies(&self, table: &EpisodeTable) -> Result<Option<Copies>, StudyError> {
         let Ok(traces) = self.source.traces() else { return Ok(None) };
         let found = copies(traces, alike(table), self.threads)?;
@@ -44,7 +44,7 @@ fn named(episode: &str, of: &str) -> String {
     format!("`{}` of `{}`", visible(episode), visible(of))
 }
 
-/// The episodes whose keys and scores are those of another one.
+/// The episodes that share their keys and scores with another one.
 fn alike(table: &EpisodeTable) -> BTreeSet<String> {
     let mut groups: BTreeMap<_, Vec<usize>> = BTreeMap::new();
     for (row, key) in table.keys.iter().enumerate() {

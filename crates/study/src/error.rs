@@ -29,7 +29,7 @@ use trace::error::TraceError;
 use trace::import::ImportError;
 use trace::lost::LostListError;
 
-/// An error of a study. Each message says what, where, expected, found, and what to do.
+/// An error of a study. Each message gives the problem, the location, the expected and found values, and a remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
     #[error(transparent)]
@@ -215,7 +215,7 @@ impl StudyError {
         Self::File { name: name.to_owned(), source: source.into() }
     }
 
-    /// The faults of definitions or of a filter, which have their own layout, with the source underlined.
+    /// The faults of definitions or of a filter, which are printed with the source underlined.
     pub fn faults(&self) -> Option<&Faults> {
         match self {
             Self::Filter(faults) | Self::Select(SelectError::Condition(faults)) => Some(faults),
@@ -228,10 +228,10 @@ impl StudyError {
         }
     }
 
-    /// The system's own error where writing the answer failed, such as a pipe whose reader is gone.
+    /// The system's error if writing the answer failed, for example because the reader closed a pipe.
     ///
     /// # Errors
-    /// This error, if it is another one.
+    /// This error, if it is any other.
     pub fn into_io(self) -> Result<io::Error, Self> {
         match self {
             Self::System(error) => Ok(error),

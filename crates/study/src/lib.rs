@@ -1,4 +1,4 @@
-//! A study: inputs, definitions and a filter, opened once and scanned once; every answer is a function of it.
+//! A study: inputs, definitions and a filter, opened and scanned once; every answer is a function of it.
 //!
 //! ```text
 //! Study::open ──► definitions, filter, metrics, by ──► scan ──► episodes, timelines, losses, input hashes
@@ -13,8 +13,8 @@
 //! # Ok::<(), mirrorstats_study::StudyError>(())
 //! ```
 //!
-//! Rule: each input is opened once, and its content must stay the same until the answer is complete; a file that changes
-//! in between is an error. Nothing here knows a command line: text for people comes from errors and from `report`.
+//! Rule: each input is opened once, and must stay the same until the answer is complete; a file that changes is an
+//! error. Nothing here depends on a command line: text for people comes from errors and from `report`.
 
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
@@ -97,7 +97,7 @@ pub use top::{ModelMean, model_means};
 use design::design_of;
 use inputs::{Stamp, labelled};
 
-/// Inputs that are open, and the question that is put to them.
+/// Open inputs, and the question about them.
 #[derive(Debug)]
 pub struct Study {
     inputs: Vec<Input>,
@@ -130,13 +130,13 @@ impl Study {
         let threads = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
         let mut question = Question::default();
         if let Source::Traces(traces) = &source {
-            // What keeps an answer from having definitions is reported with the answer: others may be asked for first.
+            // Problems with definitions are reported with the answer: the caller may set others first.
             question = question.clone().resolved(traces).unwrap_or(question);
         }
         Ok(Self { inputs, stamps, source, question, backend: Backend::Native, threads, plan: None })
     }
 
-    /// Asks for these definitions: `paper`, `extended`, or the path of a TOML file.
+    /// Sets the definitions: `paper`, `extended`, or the path of a TOML file.
     ///
     /// # Errors
     /// A file that cannot be read; every fault in it.
@@ -145,7 +145,7 @@ impl Study {
         self.checked()
     }
 
-    /// Keeps the episodes where a condition in the language of definitions holds, such as `seed = 1 and TSA = 1`.
+    /// Keeps the episodes that satisfy a condition in the language of definitions, such as `seed = 1 and TSA = 1`.
     ///
     /// # Errors
     /// Every fault of the condition.
@@ -154,31 +154,31 @@ impl Study {
         self.checked()
     }
 
-    /// Computes these metrics alone.
+    /// Computes only these metrics.
     ///
     /// # Errors
-    /// A metric that the definitions do not have.
+    /// A metric that the definitions lack.
     pub fn metrics<T: Into<String>>(mut self, names: impl IntoIterator<Item = T>) -> Result<Self, StudyError> {
         self.question.metrics = Some(names.into_iter().map(Into::into).collect());
         self.checked()
     }
 
-    /// Groups cells by these columns; experiment and model where this is not called, and the condition where there are some. A column that no episode has is an
-    /// error of the scan.
+    /// Groups cells by these columns. The default is experiment and model, and the condition if there are several. A
+    /// column that no episode has is an error of the scan.
     #[must_use]
     pub fn by<T: Into<String>>(mut self, columns: impl IntoIterator<Item = T>) -> Self {
         self.question.by = Some(columns.into_iter().map(Into::into).collect());
         self
     }
 
-    /// Lets a cell hold episodes that were recorded differently: in another world, with other prompts, by another agent.
+    /// Allows a cell to mix episodes recorded differently: in other worlds, with other prompts, by other agents.
     #[must_use]
     pub const fn pool(mut self) -> Self {
         self.question.pool = true;
         self
     }
 
-    /// Compares the analysis with this plan: each answer names the departures.
+    /// Compares the analysis with this plan: each answer lists the departures.
     #[must_use]
     pub fn registered(mut self, plan: RegisteredPlan) -> Self {
         self.plan = Some(plan);
@@ -190,31 +190,31 @@ impl Study {
         Some(departures(self.plan.as_ref()?, episodes, options, looks))
     }
 
-    /// Uses this many threads; all cores where this is not called. Results do not depend on it.
+    /// Sets the number of threads; the default is all cores. Results do not depend on it.
     #[must_use]
     pub const fn threads(mut self, threads: NonZeroUsize) -> Self {
         self.threads = threads;
         self
     }
 
-    /// Lets another engine compute the scores; the results are the same.
+    /// Uses another engine to compute scores; the results are the same.
     #[must_use]
     pub fn backend(mut self, backend: Backend) -> Self {
         self.backend = backend;
         self
     }
 
-    /// Puts a whole question at once.
+    /// Sets a whole question at once.
     ///
     /// # Errors
-    /// Every fault of the definitions and the condition; a metric that the definitions do not have.
+    /// Every fault of the definitions and the condition; a metric that the definitions lack.
     pub fn asked(mut self, question: Question) -> Result<Self, StudyError> {
         self.question = question;
         self.checked()
     }
 
-    /// Faults of a definition file or of a filter are found before any row is read. Whether the traces have the columns is
-    /// checked with the scan, when it is known which metrics are wanted.
+    /// Checks a definition file and a filter before any row is read. The scan checks that the traces have the columns,
+    /// when the requested metrics are known.
     fn checked(mut self) -> Result<Self, StudyError> {
         if let Source::Traces(traces) = &self.source {
             self.question = self.question.resolved(traces)?;
@@ -223,7 +223,7 @@ impl Study {
         Ok(self)
     }
 
-    /// The traces, for an answer that only steps can give.
+    /// The traces, for an answer that needs steps.
     ///
     /// # Errors
     /// Scores, which have no steps.
@@ -231,11 +231,11 @@ impl Study {
         self.source.traces()
     }
 
-    /// The steps of the episodes that the filter keeps, with these columns in this order, all if absent.
+    /// The steps of the episodes that the filter keeps, with these columns in this order; all columns if absent.
     ///
     /// # Errors
-    /// Scores, which have no steps; a column that no trace has, or that two have with different types; with a filter, as
-    /// [`Study::score`].
+    /// Scores, which have no steps; a column that no trace has, or that traces have with different types; with a
+    /// filter, as [`Study::score`].
     pub fn steps(&self, columns: Option<&[String]>) -> Result<Steps, StudyError> {
         let traces = self.source.traces()?;
         if self.question.filter.is_none() {
@@ -248,7 +248,7 @@ impl Study {
     /// The episode table.
     ///
     /// # Errors
-    /// Whatever is wrong with the traces or the scores; numbers beyond 64 bits.
+    /// Faults of the traces or the scores; numbers beyond 64 bits.
     pub fn score(&self) -> Result<Results, StudyError> {
         self.scan(Outputs { losses: true, ..Outputs::default() })
     }
@@ -256,7 +256,7 @@ impl Study {
     /// The cells: exact moments of every metric in every group.
     ///
     /// # Errors
-    /// As [`Study::score`]; a column to group by that the episodes do not have.
+    /// As [`Study::score`]; a column to group by that the episodes lack.
     pub fn cells(&self) -> Result<Cells, StudyError> {
         let counted = self.counted(self.score()?);
         self.cells_of(&counted.results.episodes)
@@ -265,7 +265,7 @@ impl Study {
     /// The cells of these episodes, as [`Study::cells`].
     ///
     /// # Errors
-    /// A column to group by that the episodes do not have; a cell that mixes episodes which were recorded differently.
+    /// A column to group by that the episodes lack; a cell that mixes episodes recorded differently.
     pub(crate) fn cells_of(&self, episodes: &EpisodeTable) -> Result<Cells, StudyError> {
         let by = self.question.by_over(episodes);
         if !self.question.pool {
@@ -300,7 +300,7 @@ impl Study {
         Ok((tables, ranks))
     }
 
-    /// A sentence about traces whose checksums are another file's.
+    /// A sentence about traces whose checksums belong to another version of the file.
     pub fn stale_checksums(&self) -> Option<String> {
         self.source.traces().ok().and_then(|traces| stale_note(traces.files()))
     }
@@ -308,8 +308,8 @@ impl Study {
     /// One figure, with the models in the order of a style.
     ///
     /// # Errors
-    /// As [`Study::score`]; inputs that lack what the figure needs; another number of metrics than it shows; a width that its
-    /// text does not fit in at 6 pt.
+    /// As [`Study::score`]; inputs that lack data for the figure; a wrong number of metrics; a width that its text does
+    /// not fit in at 6 pt.
     pub fn figure(&self, name: FigureName, options: &FigureOptions) -> Result<Figure, StudyError> {
         let mut style = Style::load(&options.style)?;
         if let Some(metrics) = &options.metrics {
@@ -333,7 +333,7 @@ impl Study {
     /// The scores of one episode, and the timesteps that decided them.
     ///
     /// # Errors
-    /// As [`Study::score`]; scores in the place of traces; no such episode.
+    /// As [`Study::score`]; scores in the place of traces; an unknown episode.
     pub fn explain(&self, episode_id: &str) -> Result<Evidence, StudyError> {
         let traces = self.source.traces()?;
         let definitions = self.question.bind(traces)?;
@@ -347,15 +347,15 @@ impl Study {
         Ok(found?)
     }
 
-    /// As [`Study::explain`], of an episode that is known to be in one of the inputs: no other is read.
+    /// Like [`Study::explain`], for an episode that is known to be in this input: reads no other input.
     pub fn explain_in(&self, input: &Input, episode_id: &str) -> Result<Evidence, StudyError> {
-        // Bound to its own columns: beside other tasks a trace may lack those that are theirs.
+        // Bound to its own columns: a trace beside other tasks may lack their columns.
         let one = labelled(std::slice::from_ref(input))?;
         let definitions = Question { filter: None, ..self.question.clone() }.bind(&one)?;
         Ok(evidence::explain(&one, &definitions, episode_id, self.threads)?)
     }
 
-    /// As [`Study::explain_in`], for each of these episodes that the input has, by its id: one pass over it.
+    /// Like [`Study::explain_in`], for each of these episodes that the input has, by id, in one scan.
     pub fn explain_each_in(
         &self,
         input: &Input,
@@ -366,11 +366,11 @@ impl Study {
         Ok(evidence::explain_each(&one, &definitions, ids, self.threads)?)
     }
 
-    /// A table of the study beside a published one, cell by cell. `table` names it; otherwise it is the first that has
-    /// all the published metrics.
+    /// Compares a table of the study with a published one, cell by cell. `table` names it; the default is the first
+    /// table that has all the published metrics.
     ///
     /// # Errors
-    /// Whatever is wrong with the published table, the style or the inputs; no such table.
+    /// Faults of the published table, the style or the inputs; an unknown table.
     pub fn compare(
         &self,
         published: &Path,
@@ -378,7 +378,7 @@ impl Study {
         table: Option<&str>,
         errata: &Errata,
     ) -> Result<Comparison, StudyError> {
-        // Small files first: a slip in them should not cost a pass over the traces.
+        // Small files first: a mistake in them should not cost a scan of the traces.
         let published = published::read(published)?;
         let style = Style::load(style)?;
         let counted = self.counted(self.score()?);
@@ -388,15 +388,15 @@ impl Study {
         Ok(compare(choose(&tables, &published, table, &style)?, &published, errata))
     }
 
-    /// The files that an answer is made from: inputs, definitions and, where there is one, a style. An output that is one of
-    /// them would replace what it is made from. Names of built-in styles are in it too.
+    /// The files that an answer is made from: inputs, definitions and the style, if any. An output must not replace one
+    /// of them. Includes names of built-in styles.
     pub fn files_read(&self, style: Option<&Path>) -> Vec<PathBuf> {
         let is_file = |name: &&Path| name.to_str().is_none_or(|name| file::built_in(name).is_none());
         let named = self.question.definitions.as_deref().filter(is_file).into_iter().chain(style).map(PathBuf::from);
         self.inputs.iter().map(|input| input.path.clone()).chain(named).collect()
     }
 
-    /// Refuses a folder for outputs that holds an input: both would be read together from then on.
+    /// Refuses a folder for outputs that contains an input: both would be read together later.
     ///
     /// # Errors
     /// An input in the folder.

@@ -1,7 +1,7 @@
-//! Episodes that were lost for want of an answer: ended by the infrastructure, or never recorded.
+//! Episodes lost because no answer came: ended by the infrastructure, or never recorded.
 //!
-//! Rule: a lost episode is neither a success nor a failure. It is in no denominator, or in all of them as a failure where
-//! that is asked for; either is said. A file of scores keeps its row, marked by the label `lost`.
+//! Rule: a lost episode is neither a success nor a failure. Denominators exclude lost episodes, or on request include
+//! all of them as failures; the answer says which. A file of scores keeps their rows, marked by the label `lost`.
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 
@@ -26,19 +26,19 @@ const YES: &str = "true";
 /// The treatment of lost episodes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LostAs {
-    /// Nothing: they are in no denominator.
+    /// Excluded from every denominator.
     #[default]
     Nothing,
-    /// Failures: they are in the denominator of every rate that is defined for all episodes.
+    /// Failures, in the denominator of every rate that is defined for all episodes.
     Failure,
 }
 
-/// The episodes that a cell counts, and those that it leaves out.
+/// The episodes that cells count, and those that they exclude.
 #[derive(Debug)]
 pub(super) struct Counted {
     /// The results of the episodes that count.
     pub results: Results,
-    /// All episodes, where some are left out or added.
+    /// All episodes, if some are excluded or added.
     pub all: Option<EpisodeTable>,
     /// The number of lost episodes, counted or not.
     pub lost: LostCounts,
@@ -100,7 +100,7 @@ fn cell(experiment: &str, model: &str, condition: Option<&str>) -> CellKey {
     CellKey { experiment: experiment.to_owned(), model: model.to_owned(), condition: condition.to_owned() }
 }
 
-/// What is not in the numbers of cells, and what was no decision: a line that names the cells; `None` if there is nothing.
+/// A line that names the cells with lost episodes or replies without a decision; `None` without any.
 pub(super) fn beside_cells(lost: &LostCounts, replies: Option<&Replies>) -> Option<String> {
     const NAMED: usize = 8;
     let mut cells: BTreeMap<[&str; 2], [u64; 3]> = BTreeMap::new();
@@ -137,7 +137,7 @@ impl Study {
             LostAs::Nothing => without(results, lost),
             LostAs::Failure => {
                 let episodes = with_failures(&results.episodes);
-                // Who never looked, claimed or decided has no timeline.
+                // Episodes without a look, claim or decision have no timeline.
                 let timelines = results.timelines.filter(|timelines| timelines.len() == episodes.len());
                 let all = Some(episodes.clone());
                 Counted { results: Results { episodes, timelines, ..results }, all, lost }
@@ -156,8 +156,8 @@ fn without(results: Results, lost: LostCounts) -> Counted {
     Counted { results: Results { episodes, timelines, ..results }, all: Some(all), lost }
 }
 
-/// The table with a row for each episode that was never recorded: a failure in each rate that every episode has, undefined
-/// in everything else.
+/// Adds a row for each episode that was never recorded: a failure in each rate that every episode has, otherwise
+/// undefined.
 fn with_failures(table: &EpisodeTable) -> EpisodeTable {
     let mut builder = TableBuilder::new(table.header());
     for row in 0..table.len() {

@@ -18,7 +18,8 @@ impl From<QueryError> for StudyError {
 }
 
 impl Study {
-    /// The lazy answer to a checked query, and a note if the filter keeps nothing. Tables that it does not name are not computed.
+    /// The lazy answer to a checked query, and a note if the filter keeps nothing. Computes only the tables that it
+    /// names.
     pub fn query(&self, query: &Checked) -> Result<(LazyFrame, Option<String>), StudyError> {
         let (mut loaded, mut note) = (Vec::new(), None);
         if query.tables.contains(&Table::Steps) {
@@ -35,10 +36,10 @@ impl Study {
         Ok((plan(query, loaded)?, note))
     }
 
-    /// The rows of a query, as typed, as a Parquet file in memory.
+    /// The rows of a query as a Parquet file in memory.
     ///
     /// # Errors
-    /// A query that cannot be run; whatever is wrong with the inputs.
+    /// A query that cannot be run; faults of the inputs.
     pub fn query_parquet(&self, sql: &str) -> Result<Vec<u8>, StudyError> {
         let (frame, _) = self.query(&statement::check(sql)?)?;
         Ok(in_memory(frame, Format::Parquet)?)

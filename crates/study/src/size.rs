@@ -1,5 +1,5 @@
-//! How large a report may become: every model is compared with every other one, so that what a report holds grows with the
-//! square of the models while the traces grow with their number.
+//! Limits the size of a report. Every pair of models is compared, so a report grows with the square of the number of
+//! models, while the traces grow linearly.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,7 +11,7 @@ use score::table::{CONDITION, EpisodeTable};
 const MOST_COMPARISONS: Limit =
     Limit::new("comparisons of two models under a metric; leave models or metrics out", 400_000);
 
-/// Returns true if the comparisons that a report of these episodes makes are within the budget.
+/// Checks that the comparisons in a report of these episodes are within the budget.
 pub(super) fn check_comparisons(episodes: &EpisodeTable) -> Result<(), StudyError> {
     let conditions = episodes.label(CONDITION);
     let mut subjects = BTreeMap::<_, BTreeSet<_>>::new();

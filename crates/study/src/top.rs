@@ -7,7 +7,7 @@ use metric::catalog::Better;
 use report::figures::e5_outcomes::Outcomes;
 use score::table::{EpisodeTable, MetricColumn};
 
-/// The mean of a model over experiments, each of which counts once.
+/// The mean of a model over experiments, each with equal weight.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelMean<'t> {
     pub model: &'t str,
@@ -16,8 +16,8 @@ pub struct ModelMean<'t> {
     pub experiments: BTreeMap<&'t str, f64>,
 }
 
-/// The models by their means, the largest first. Models that lack experiments come after those that have all, as their means are of
-/// others. An order to begin with, not a test.
+/// The models by their means, the largest first. Models that lack experiments come last, since their means are not
+/// comparable. This is an initial order, not a test.
 pub fn model_means<'t>(episodes: &'t EpisodeTable, metric: &MetricColumn) -> Vec<ModelMean<'t>> {
     let mut sums: BTreeMap<&'t str, BTreeMap<&'t str, (i128, u32)>> = BTreeMap::new();
     for (key, value) in episodes.keys.iter().zip(metric.iter()) {
@@ -43,7 +43,7 @@ pub fn model_means<'t>(episodes: &'t EpisodeTable, metric: &MetricColumn) -> Vec
 }
 
 impl Results {
-    /// The results of so many models, the best by a metric.
+    /// The results of the `most` best models by a metric.
     pub(super) fn of_the_best(self, most: usize, metric: &str) -> Self {
         let episodes = &self.episodes;
         let Some(column) = episodes.metric(metric) else { return self };

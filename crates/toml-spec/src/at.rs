@@ -10,7 +10,7 @@ use toml::de::{DeTable, DeValue};
 use crate::fault::{Fault, Place, Source};
 use crate::origin::Written;
 
-/// Parses TOML and reports every fault; with faults the table is what could be read.
+/// Parses TOML and reports every fault; if there are faults, the table holds the readable part.
 pub fn parse_toml(source: &Arc<Source>) -> (Spanned<DeTable<'_>>, Vec<Fault>) {
     let (table, errors) = DeTable::parse_recoverable(&source.text);
     let fault = |error: toml::de::Error| {
@@ -26,7 +26,7 @@ pub fn parse(source: &Arc<Source>) -> (DeValue<'_>, Vec<Fault>) {
     (DeValue::Table(table.into_inner()), faults)
 }
 
-/// A value of a TOML text: what it is called and where it is.
+/// A value of a TOML text with its name and location.
 #[derive(Clone, Debug)]
 pub struct At<'a> {
     source: &'a Arc<Source>,
@@ -41,7 +41,7 @@ impl<'a> At<'a> {
         Self { source, name: "", name_span: 0..0, span: 0..0, value }
     }
 
-    /// The entries of a table, in the order of the text; none if it is not a table.
+    /// The entries of a table, in the order of the text; empty if it is not a table.
     pub fn entries(&self) -> impl Iterator<Item = (&'a str, Self)> {
         let entries = self.value.as_table().into_iter().flat_map(|table| table.iter());
         let source = self.source;
@@ -51,12 +51,12 @@ impl<'a> At<'a> {
         })
     }
 
-    /// The entries of the table at a key; none if it is absent.
+    /// The entries of the table at a key; empty if it is absent.
     pub fn within(&self, key: &str) -> impl Iterator<Item = (&'a str, Self)> + use<'a> {
         self.get(key).map(|inner| inner.entries().collect::<Vec<_>>()).unwrap_or_default().into_iter()
     }
 
-    /// The items of a list; none if it is not a list.
+    /// The items of a list; empty if it is not a list.
     pub fn items(&self) -> impl Iterator<Item = Self> {
         let items = self.value.as_array().into_iter().flat_map(|array| array.iter());
         let (source, name) = (self.source, self.name);
@@ -80,13 +80,13 @@ impl<'a> At<'a> {
         self.get(key).unwrap_or_else(|| self.clone())
     }
 
-    /// An item of a list; the list itself if it has fewer.
+    /// An item of a list; the list itself if it is too short.
     #[must_use]
     pub fn item(&self, n: usize) -> Self {
         self.items().nth(n).unwrap_or_else(|| self.clone())
     }
 
-    /// The text as it is written, quotes excluded; empty for tables and lists.
+    /// The text as written, without quotes; empty for tables and lists.
     pub fn written(&self) -> &'a str {
         match self.value {
             DeValue::String(text) => text,
@@ -106,7 +106,7 @@ impl<'a> At<'a> {
         Written::toml_string(self.source.clone(), self.written(), self.span.clone())
     }
 
-    /// The text or the number as another type; `None` for the other values, which their shape refuses.
+    /// The text or number as another type; `None` for other values, which their shape refuses.
     pub fn parse<T: FromStr<Err: Into<String>>>(&self, faults: &mut Vec<Fault>) -> Option<T> {
         if !matches!(self.value, DeValue::String(_) | DeValue::Float(_) | DeValue::Integer(_)) {
             return None;
@@ -122,7 +122,7 @@ impl<'a> At<'a> {
         Place { source: self.source.clone(), span: self.name_span.clone() }
     }
 
-    /// A fault of the value. A table is underlined at its name: its own bytes may be many lines.
+    /// A fault of the value. A table is underlined at its name, as its own bytes may be many lines.
     pub fn fault(&self, message: impl Into<String>) -> Fault {
         let place = if self.value.is_table() { self.name_place() } else { self.place() };
         Fault::new(place, message)

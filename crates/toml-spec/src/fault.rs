@@ -1,7 +1,7 @@
-//! Faults of a definition: where, what, and what to write instead, shown all at once.
+//! Faults of a definition, all shown at once: the location, the problem, and what to write instead.
 //!
-//! A fault points into a [`Source`] by byte range; [`Faults`] renders every fault with its lines,
-//! the span underlined, the way compilers do.
+//! A fault points into a [`Source`] by byte range; [`Faults`] renders every fault with its lines and underlines the
+//! span, like a compiler.
 
 use std::fmt;
 use std::ops::Range;
@@ -16,7 +16,7 @@ use exact::escape::visible;
 /// The most faults that are reported.
 pub const MOST_FAULTS: usize = 100;
 
-/// Text that faults point into: a definition file, or an expression typed on the command line.
+/// The text that faults point into: a definition file, or an expression typed on the command line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Source {
     /// The name for readers: a file name, or `--where`.
@@ -28,11 +28,11 @@ pub struct Source {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Place {
     pub source: Arc<Source>,
-    /// The bytes pointed at.
+    /// The range of bytes.
     pub span: Range<usize>,
 }
 
-/// One thing that is wrong, and where.
+/// One problem and its location.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fault {
     /// The problem, lowercase, one line.
@@ -49,21 +49,21 @@ impl Fault {
         Self { message: message.into(), place, label: String::new(), help: None }
     }
 
-    /// The same, with words under the span.
+    /// Adds a label under the span.
     #[must_use]
     pub fn label(mut self, label: impl Into<String>) -> Self {
         self.label = label.into();
         self
     }
 
-    /// The same, with a remedy.
+    /// Adds a remedy.
     #[must_use]
     pub fn help(mut self, help: impl Into<String>) -> Self {
         self.help = Some(help.into());
         self
     }
 
-    /// The same, with a remedy where there is one.
+    /// Adds a remedy, if any.
     #[must_use]
     pub fn help_if(mut self, help: Option<String>) -> Self {
         self.help = help.or(self.help);
@@ -82,7 +82,7 @@ impl Fault {
         renderer.render(&[group])
     }
 
-    /// The 1-based line and column (in characters) where the fault begins.
+    /// The 1-based line and column (in characters) of the start.
     pub fn line_and_column(&self) -> (usize, usize) {
         let start = within(&self.place.source.text, &self.place.span).start;
         let before = &self.place.source.text[..start];
@@ -97,7 +97,7 @@ fn within(text: &str, span: &Range<usize>) -> Range<usize> {
     start..end
 }
 
-/// Everything that is wrong with some definitions, in the order of the sources.
+/// All problems of some definitions, in the order of the sources.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Faults(pub Vec<Fault>);
 
@@ -121,7 +121,7 @@ pub struct FaultRecord {
 }
 
 impl Faults {
-    /// The faults with their lines underlined, with colours or without.
+    /// The faults with their lines underlined, optionally in colour.
     pub fn render(&self, colored: bool) -> String {
         let renderer = if colored { Renderer::styled() } else { Renderer::plain() };
         let mut texts: Vec<String> = self.0.iter().map(|fault| fault.render(&renderer)).collect();
@@ -132,12 +132,12 @@ impl Faults {
         texts.join("\n\n")
     }
 
-    /// The faults for a program.
+    /// The faults as records for programs.
     pub fn records(&self) -> Vec<FaultRecord> {
         self.0.iter().map(FaultRecord::of).collect()
     }
 
-    /// Puts the faults into the order of their places, and drops repetitions.
+    /// Sorts the faults by place and removes duplicates.
     #[must_use]
     pub fn in_order(mut self) -> Self {
         self.0.sort_by(|a, b| {

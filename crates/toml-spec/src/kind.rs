@@ -19,13 +19,13 @@ pub struct FileKind {
     pub names: &'static str,
     /// The command that checks a file.
     pub check: &'static str,
-    /// Names and texts of the files of the program.
+    /// Names and texts of the built-in files.
     pub built_in: &'static [(&'static str, &'static str)],
     pub largest: Limit,
     /// Keys of a file, tables included.
     pub most_keys: Limit,
-    /// Includes of a file and of its included files. Each include is followed again, so files with two includes each would
-    /// be read without end.
+    /// Includes of a file and of its included files. Each include is followed again, so a chain of files with two
+    /// includes each would take forever.
     pub most_includes: Limit,
 }
 
@@ -37,7 +37,7 @@ pub struct FileText {
     pub path: Option<PathBuf>,
 }
 
-/// One of the files of a reading, its own includes read already.
+/// One file of a reading, after its own includes.
 pub struct Part {
     /// The name of the built-in file with this text.
     pub built_in: Option<&'static str>,
@@ -61,7 +61,7 @@ impl FileKind {
         self.built_in.iter().map(|(name, _)| *name).collect()
     }
 
-    /// Advice for a name without a file.
+    /// Advice for a name that matches no file.
     pub fn did_you_mean(&self, name: &str) -> String {
         match nearest(name, self.built_in_names()) {
             Some(near) => format!("did you mean the built-in `{near}`?"),
@@ -69,7 +69,7 @@ impl FileKind {
         }
     }
 
-    /// A built-in text by `name`, else the file at `path`.
+    /// The built-in text called `name`, else the file at `path`.
     pub fn open(&self, name: &Path, path: &Path) -> io::Result<FileText> {
         if let Some((name, text)) = self.built_in.iter().find(|(known, _)| name == Path::new(known)) {
             let source = Source { name: format!("{name}.toml"), text: (*text).to_owned() };
@@ -79,10 +79,10 @@ impl FileKind {
         Ok(FileText { source, folder: path.parent().map(Path::to_owned), path: fs::canonicalize(path).ok() })
     }
 
-    /// Gives a file to `part`, each included file before the one that includes it. Returns all texts, the outermost first.
+    /// Passes each file to `part`, included files first. Returns all texts, the outermost first.
     ///
-    /// Nothing that an included file says is shown, since a path in someone else's file may lead to a secret: only the
-    /// location of its first fault is.
+    /// The contents of an included file are never shown, since a path in someone else's file may lead to a secret. Only
+    /// the location of its first fault is.
     pub fn read(
         &self,
         file: FileText,

@@ -1,7 +1,7 @@
-//! Files that people write: every key accounted for, every fault underlined, all of them at once.
+//! Reads files that people write: checks every key and underlines all faults at once.
 //!
-//! A file is read by a type, which declares each key once: its name, its type, its range, its words, its description. The
-//! JSON Schema of the type says the same to editors.
+//! A type describes a file. It declares each key once: name, type, range, words and description. The JSON Schema of the
+//! type tells editors the same.
 //!
 //! ```
 //! use schemars::JsonSchema;
@@ -27,7 +27,7 @@
 //! assert!(shown.contains("did you mean `color`?"));
 //! ```
 //!
-//! Rule: nothing here knows what a key means, and nothing of an included file is shown.
+//! Rule: this crate does not know the meaning of keys, and never shows the contents of an included file.
 
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 

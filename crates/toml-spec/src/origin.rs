@@ -1,25 +1,25 @@
-//! From a place in an expression back to the place in the file that holds it.
+//! Maps places in an expression to places in the file that contains it.
 //!
-//! An expression is the value of a TOML string; escapes and line breaks make its text differ from
-//! the bytes of the file, so each byte of the text remembers where it came from.
+//! An expression is the value of a TOML string. Escapes and line breaks make its text differ from the file's bytes, so
+//! each byte of the text remembers its origin.
 
 use std::ops::Range;
 use std::sync::Arc;
 
 use crate::fault::{Place, Source};
 
-/// An expression's text and where each of its bytes is in its source.
+/// An expression's text and the source location of each of its bytes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Written {
     /// The text of the expression.
     pub text: String,
     source: Arc<Source>,
-    /// `starts[i]` is the byte of the source that gave byte i of the text; one more for the end.
+    /// `starts[i]` is the source byte of byte i of the text; one more entry marks the end.
     starts: Vec<usize>,
 }
 
 impl Written {
-    /// A text that is a source of its own, such as an argument of the command line.
+    /// A text that is its own source, such as an argument of the command line.
     pub fn whole(source: Arc<Source>) -> Self {
         let text = source.text.clone();
         Self { starts: (0..=text.len()).collect(), text, source }
@@ -63,7 +63,7 @@ fn string_starts(raw: &str, text: &str) -> Option<Vec<usize>> {
     Some(starts)
 }
 
-/// The length of the opening quotes (and the line break that TOML drops after them), and whether escapes count.
+/// The length of the opening quotes (and the line break that TOML drops after them), and whether escapes apply.
 fn opening(raw: &str) -> Option<(usize, bool)> {
     let quote = raw.chars().next().filter(|c| matches!(c, '"' | '\''))?;
     let triple = raw.starts_with(&quote.to_string().repeat(3)) && raw.len() >= 6;
@@ -108,7 +108,7 @@ fn skip_line_continuations(raw: &str, mut at: usize) -> usize {
 mod tests {
     use super::*;
 
-    /// The part of the file that represents the part `wanted` of the decoded text.
+    /// The part of the file that spells the part `wanted` of the decoded text.
     fn spelled(file: &str, wanted: &str) -> String {
         let source = Arc::new(Source { name: "f".into(), text: file.into() });
         let table = toml::de::DeTable::parse(file).unwrap();

@@ -1,7 +1,7 @@
-//! Files read by type: the JSON Schema of a type says which keys there are and what each may be.
+//! Files read by type: the JSON Schema of a type gives the keys and their allowed values.
 //!
-//! A key is declared once, as a field: its name, its type, its range (`#[schemars(range(..))]`), its words (an enum) and
-//! its description. The schema of the type is the one in `schemas/`, so that an editor refuses what the program refuses.
+//! A field declares a key once: its name, type, range (`#[schemars(range(..))]`), words (an enum) and description. The
+//! schema of the type is the one in `schemas/`, so editors refuse what the program refuses.
 
 use std::sync::Arc;
 
@@ -27,17 +27,17 @@ impl Shape {
         Self { schema: schemars::schema_for!(T).to_value(), is_overlay: false }
     }
 
-    /// The shape of a file that lies over another one, and says only what differs.
+    /// The shape of a file that overlays another one and gives only the differences.
     #[must_use]
     pub fn overlay(self) -> Self {
         Self { is_overlay: true, ..self }
     }
 
-    /// Reads the value as far as it can be read; `what` names its kind, such as `an experiment file`.
+    /// Reads as much of the value as possible; `what` names its kind, such as `an experiment file`.
     ///
-    /// Each part with a fault is left out, so that the rest can still be checked: a key, a text of a list, or a list of
-    /// anything else with all its items, whose positions would change. A text that is needed is empty then; `None` if
-    /// something else is needed.
+    /// Parts with faults are left out, so that the rest can still be checked: a key, or a text of a list. A list of
+    /// other values is left out whole, as its positions would change. A required text becomes empty; any other missing
+    /// required value makes the result `None`.
     pub fn value(&self, at: &At<'_>, what: &str, faults: &mut Vec<Fault>) -> Option<Value> {
         Walk { shape: self, faults }.value(&self.schema, at, what)
     }
@@ -49,7 +49,7 @@ pub fn read<T: JsonSchema + DeserializeOwned>(at: &At<'_>, what: &str, faults: &
     value.try_into().map_err(|error: toml::de::Error| faults.push(at.fault(error.message()))).ok()
 }
 
-/// Lays a value over another one: key by key in tables, whole lists.
+/// Overlays a value on another one: key by key in tables; lists are replaced whole.
 pub fn lay(under: &mut Value, over: Value) {
     match (under, over) {
         (Value::Table(under), Value::Table(over)) => {
@@ -61,7 +61,7 @@ pub fn lay(under: &mut Value, over: Value) {
     }
 }
 
-/// Reads a text as a type; `check` refuses what no type can, with the values at hand.
+/// Reads a text as a type; `check` refuses what types cannot, given the values.
 pub fn read_source<T: JsonSchema + DeserializeOwned>(
     source: Source,
     what: &str,
@@ -141,7 +141,7 @@ impl<'a> Walk<'a> {
     fn in_range(&mut self, schema: &Json, at: &At<'_>, number: f64) -> bool {
         let most = schema["maximum"].as_f64().or((schema["format"] == "uint32").then_some(f64::from(u32::MAX)));
         let least = schema["minimum"].as_f64();
-        // Written so that what is no number is out of every range.
+        // Written so that NaN is outside every range.
         let holds = number >= least.unwrap_or(f64::MIN) && number <= most.unwrap_or(f64::MAX);
         if !holds {
             let range = bounds(least, most, "may be").unwrap_or_else(|| "is finite".to_owned());
@@ -296,7 +296,7 @@ fn is_of_type(schema: &Json, value: &DeValue<'_>) -> bool {
     }
 }
 
-/// The words that a text may be; `None` for any text.
+/// The allowed words of a text; `None` if any text is allowed.
 fn words_of(schema: &Json) -> Option<Vec<&str>> {
     let words = schema["enum"].as_array().map(Vec::as_slice).unwrap_or_default();
     let words: Vec<&str> = words.iter().chain([&schema["const"]]).filter_map(Json::as_str).collect();
@@ -326,7 +326,7 @@ fn remedy(key: &str, all: &[&Json]) -> String {
     }
 }
 
-/// An entry of a table or a list, by the name of the whole: `an experiment` of `experiment`.
+/// The name of an entry of a table or list, from that of the whole: `an experiment` of `experiment`.
 fn one_of(what: &str) -> String {
     let article = if what.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" };
     format!("{article} {what}")

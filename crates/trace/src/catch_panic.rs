@@ -1,4 +1,4 @@
-//! A panic in somebody else's decoder, turned into an error of the file that caused it.
+//! Turns a panic in a third-party decoder into an error of the file that caused it.
 
 use std::cell::Cell;
 use std::panic::{self, AssertUnwindSafe};
@@ -9,12 +9,12 @@ thread_local! {
     static CONTAINING: Cell<bool> = const { Cell::new(false) };
 }
 
-/// The number of running calls that contain the panics of all threads.
+/// The number of running calls that contain panics of all threads.
 static EVERYWHERE: AtomicUsize = AtomicUsize::new(0);
 
-/// The result of `decode`, or the message of its panic; nothing is printed for that panic.
+/// The result of `decode`, or the message of its panic, which is not printed.
 ///
-/// Only for calls into a decoder whose state is thrown away afterwards.
+/// Only for calls into a decoder whose state is discarded afterwards.
 pub fn contained<R>(decode: impl FnOnce() -> R) -> Result<R, String> {
     silence_contained_panics();
     let before = CONTAINING.replace(true);
@@ -26,7 +26,7 @@ pub fn contained<R>(decode: impl FnOnce() -> R) -> Result<R, String> {
     })
 }
 
-/// As [`contained`], for a library that has threads of its own: nothing is printed for a panic on any thread.
+/// Like [`contained`], for a library with its own threads: panics are not printed on any thread.
 #[cfg(feature = "polars")]
 pub fn contained_on_all_threads<R>(run: impl FnOnce() -> R) -> Result<R, String> {
     EVERYWHERE.fetch_add(1, Ordering::SeqCst);

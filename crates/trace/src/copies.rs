@@ -1,6 +1,6 @@
-//! Episodes that are copies of others under another id: all of their rows are the same, the id aside.
+//! Finds episodes that copy others under another id: all rows are the same, except the id.
 //!
-//! A copy counts as an independent episode in every number, so that two of it make a result twice as sure.
+//! A copy counts as an independent episode in every number, so it makes results look more certain than they are.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::num::NonZeroUsize;
@@ -15,7 +15,7 @@ use super::read::open::TraceSet;
 use super::read::steps::Steps;
 use super::schema::Kind;
 
-/// The column that a copy has of its own; the hash of its rows includes it.
+/// The column that differs in a copy; the hash of its rows includes it.
 const EPISODE_ID: &str = "episode_id";
 
 #[derive(Clone, Debug, PartialEq, Eq)]

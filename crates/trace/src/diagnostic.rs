@@ -1,6 +1,6 @@
 //! Diagnostics of traces: rule, location, expected, found, remedy.
 //!
-//! The codes are stable: programs may depend on them. A message never says less than a user needs to find the row.
+//! The codes are stable: programs may depend on them. A message always says enough to find the row.
 
 use std::fmt;
 
@@ -13,7 +13,7 @@ use exact::escape::visible;
 /// The remedy for too many open files.
 pub const MORE_FILES: &str = "raise the limit of open files, as in `ulimit -n 1024`, and run the command again";
 
-/// Returns true if words of the system say that too many files are open.
+/// Returns true if a system message reports too many open files.
 pub fn is_short_of_files(words: &str) -> bool {
     // EMFILE and ENFILE.
     words.contains("(os error 24)") || words.contains("(os error 23)")
@@ -54,7 +54,7 @@ pub enum Severity {
     Note,
 }
 
-/// The one table of codes: what is wrong, how much that matters, the stable name, the rule, and what to do.
+/// The table of codes: severity, stable name, rule and remedy of each.
 macro_rules! codes {
     ($(#[$doc:meta] $code:ident, $severity:ident, $name:literal: $rule:literal, $help:literal;)+) => {
         /// A rule of the schema; the name in kebab case is stable.
@@ -224,10 +224,10 @@ impl fmt::Display for Code {
 }
 
 impl Finding {
-    /// A finding about a whole file; the place is narrowed by the methods that follow.
+    /// A finding about a whole file; the methods below narrow its location.
     pub fn new(code: Code, file: impl Into<String>, expected: impl Into<String>, found: impl Into<String>) -> Self {
         let mut found = found.into();
-        // Decoders pass on as text what the system says, which is no damage of the file.
+        // Decoders pass on system messages as text; these do not mean that the file is damaged.
         let decoded = matches!(code, Code::CorruptFooter | Code::CorruptData | Code::NotParquet | Code::Truncated);
         let code = if decoded && found.contains(" (os error ") { Code::Unreadable } else { code };
         if let Some(said) = found.strip_prefix("External: ").filter(|_| code == Code::Unreadable) {
@@ -263,7 +263,7 @@ impl Finding {
         self
     }
 
-    /// At this timestep, where it is known.
+    /// Sets the timestep, if known.
     #[must_use]
     pub fn at(mut self, t: impl Into<Option<i64>>) -> Self {
         self.t = t.into();
@@ -276,7 +276,7 @@ impl Finding {
         self
     }
 
-    /// With better advice than the code's own.
+    /// Replaces the code's own remedy.
     #[must_use]
     pub fn with_help(mut self, help: impl Into<String>) -> Self {
         self.help = help.into();

@@ -41,7 +41,7 @@ fn more_findings(more: usize) -> String {
 }
 
 impl TraceError {
-    /// The same error, about the output at `path` if writing failed.
+    /// The same error; a failed write names the output at `path`.
     #[must_use]
     pub fn writing(self, path: &Path) -> Self {
         match self {
@@ -50,7 +50,7 @@ impl TraceError {
         }
     }
 
-    /// The error of these findings, the earliest first; `None` for none.
+    /// The error with these findings, the earliest first; `None` without findings.
     pub fn of(findings: Vec<Finding>) -> Option<Self> {
         let mut findings = findings.into_iter();
         let first = Box::new(findings.next()?);

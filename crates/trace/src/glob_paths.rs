@@ -1,7 +1,7 @@
-//! Globs that the shell did not expand, over names of any bytes.
+//! Expands globs that the shell did not, over names of any bytes.
 //!
-//! A pattern is text, and so is what it is compared with: a name that is not UTF-8 has U+FFFD in place of its other bytes, which
-//! `*` and `?` match. The crate `glob` would pass over such a file without a word.
+//! Patterns are matched against text: in a name that is not UTF-8, U+FFFD replaces the other bytes, and `*` and `?`
+//! match it. The crate `glob` would skip such a file silently.
 
 use std::fs;
 use std::io;
@@ -12,20 +12,20 @@ use glob::{Pattern, PatternError};
 /// An error of a glob.
 #[derive(Debug)]
 pub(crate) enum GlobError {
-    /// It is none.
+    /// The pattern is not a glob.
     Pattern(PatternError),
     /// A folder cannot be read.
     Folder(PathBuf, io::Error),
 }
 
-/// Returns true if a text has characters that make a glob of it.
+/// Returns true if a text has the special characters of globs.
 pub(crate) fn is_glob(text: &str) -> bool {
     text.contains(['*', '?', '['])
 }
 
 /// The files and folders that a glob matches, in any order.
 ///
-/// `**` represents any number of folders; links to folders are not followed there.
+/// `**` matches any number of folders, without following links to folders.
 pub(crate) fn matches(pattern: &str) -> Result<Vec<PathBuf>, GlobError> {
     Pattern::new(pattern).map_err(GlobError::Pattern)?;
     let mut found = vec![PathBuf::new()];

@@ -139,22 +139,22 @@ pub struct FileInfo {
 /// The limit for the coverage of seeds and runs by model: seven models, five experiments and 20,000 runs have 700,000.
 const MOST_COVERED: Limit = Limit::new("seeds and runs of models in experiments", 2_000_000);
 
-/// What a model of an experiment takes, beside its name.
+/// The bytes of a cell, besides its names.
 const CELL: usize = 256;
 
-/// Models are told apart, counted and printed in full.
+/// The names of models are compared, counted and printed in full.
 const fn most_named(bytes: u64) -> Limit {
     Limit::in_proportion("bytes of models in experiments in files of their size", 24 << 20, 8, bytes)
 }
 
-/// Whether episodes are listed, beside being counted.
+/// Whether to list episodes or only count them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Listing {
     Episodes,
     Nothing,
 }
 
-/// Summarises these traces; reads the key columns and `reply_status` of all rows, and every byte for its hash.
+/// Summarises these traces. Reads the key columns and `reply_status` of all rows, and every byte for the hashes.
 pub fn info(set: &TraceSet, listing: Listing, threads: NonZeroUsize) -> Result<Info, TraceError> {
     let mut listed = (listing == Listing::Episodes).then(Vec::new);
     let bytes = set.files().iter().map(TraceFile::bytes).sum();
@@ -218,7 +218,7 @@ fn over_budget(set: &TraceSet, exceeded: &Exceeded) -> TraceError {
     Finding::over_budget(set.files().first().map_or("", TraceFile::name), exceeded).into()
 }
 
-/// What is left when all steps are read: sorting takes as long as hashing the files, so that both are done at once.
+/// The work after all steps are read: sorting takes as long as hashing the files, so both run at once.
 enum Rest<'a> {
     Grid(Mutex<Tally>),
     File(&'a TraceFile, u64),
@@ -242,13 +242,13 @@ impl Rest<'_> {
 
 fn distinct<T: Ord>(values: impl Iterator<Item = T>) -> Vec<T> {
     let mut values: Vec<T> = values.collect();
-    // Stable, as it takes stretches that ascend for what they are.
+    // A stable sort, since it makes use of ascending stretches.
     values.sort();
     values.dedup();
     values
 }
 
-/// The episodes of a batch: experiments and models by their place among the distinct ones.
+/// The episodes of a batch, with experiments and models by index into the distinct ones.
 struct Keys {
     file: usize,
     cells: Vec<(String, String)>,
@@ -259,7 +259,7 @@ impl Keys {
     fn of(batch: &EpisodeBatch) -> Self {
         let [experiments, models] = ["experiment", "model"].map(|name| texts_of(batch, name));
         let [seeds, runs] = ["seed", "run"].map(|name| integers_of(batch, name));
-        // A batch has few cells: to find one among them takes less than to hash it.
+        // A batch has few cells, so finding one is faster than hashing it.
         let (mut cells, mut known) = (Vec::new(), BTreeMap::new());
         let episode = |row: usize| {
             let cell = *known.entry((experiments.key(row), models.key(row))).or_insert_with(|| {
@@ -310,7 +310,7 @@ fn list(set: &TraceSet, batch: &EpisodeBatch) -> Vec<EpisodeInfo> {
 #[derive(Default)]
 struct Tally {
     files: Vec<u64>,
-    /// What the models and experiments take, each with its name.
+    /// The bytes of models and experiments, names included.
     bytes: u64,
     places: HashMap<(String, String), usize>,
     episodes: Vec<Vec<SeedRun>>,
@@ -361,7 +361,7 @@ impl Tally {
 fn coverage(cells: &Cells, pairs: &[SeedRun], experiments: &BTreeSet<String>, models: &BTreeSet<String>) -> Vec<Cell> {
     let cell = |experiment: &String, model: &String| {
         let have = cells.get(&(experiment.clone(), model.clone())).map_or(&[][..], Vec::as_slice);
-        // Both ascend: one pass tells what is missing.
+        // Both are sorted, so one pass finds the missing ones.
         let mut rest = have.iter().map(|(pair, _)| pair).peekable();
         Cell {
             experiment: experiment.clone(),

@@ -1,9 +1,9 @@
-//! From TRACES arguments to a sorted list of files, each once, under a name that is the same on any machine.
+//! Resolves TRACES arguments to a sorted list of distinct files, with names that are the same on any machine.
 //!
-//! An argument is a file, a folder (every `*.parquet` in it and below it), a glob that the shell did not expand, or
-//! `-` for a list of the first two on standard input, one a line. A name that exists is itself, whatever characters
-//! it has. Inside a folder, links to folders are not followed, and reports and names that begin with `_` or `.` are
-//! passed over: what other programs leave beside their Parquet.
+//! An argument is a file, a folder (with every `*.parquet` below it), a glob that the shell did not expand, or `-` for
+//! a list of files and folders on standard input, one per line. An existing name is taken literally, whatever its
+//! characters. Inside a folder, links to folders are not followed. Reports and names that begin with `_` or `.` are
+//! skipped: other programs leave such files beside their Parquet.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::{OsStr, OsString};
@@ -18,26 +18,26 @@ use exact::budget::Limit;
 use exact::input;
 use exact::replace::{folder_of, is_unfinished};
 
-/// A file to read, and what it is called in messages and outputs.
+/// A file to read, and its name in messages and outputs.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Input {
-    /// The path as typed if that was relative; relative to the current folder if below it; otherwise the file's name
-    /// alone. Never absolute; `/` between its parts.
+    /// The typed path if it was relative; relative to the current folder if below it; else only the file's name. Never
+    /// absolute, with `/` between its parts.
     pub name: String,
     pub path: PathBuf,
 }
 
 impl Input {
-    /// The file at this path, named after it.
+    /// The file at this path, with a name derived from it.
     pub fn new(path: impl Into<PathBuf>) -> Self {
         let path = path.into();
         Self { name: display_name(&path), path }
     }
 }
 
-/// The files that the arguments give, ordered by name, each file once whatever it was called.
+/// The files of the arguments, ordered by name; each file appears once, whatever its spellings.
 ///
-/// `list` is what `-` reads, standard input in the program.
+/// `-` reads `list`, which is standard input in the program.
 pub fn resolve(arguments: &[OsString], list: impl Read) -> Result<Vec<Input>, TraceError> {
     let mut list = Some(list);
     let mut paths = Vec::new();
@@ -60,10 +60,10 @@ pub fn resolve(arguments: &[OsString], list: impl Read) -> Result<Vec<Input>, Tr
     let mut files = BTreeMap::new();
     for path in paths {
         let input = Input::new(&path);
-        // What cannot be resolved is reported when it is opened, under its own name.
+        // A path that cannot be resolved is reported on opening, under its own name.
         let place = fs::canonicalize(&path).unwrap_or(path);
         let kept = files.entry(place).or_insert_with(|| input.clone());
-        // The shortest of its names, so that the order of the arguments does not matter.
+        // Keep the shortest name, so that the order of the arguments does not matter.
         if (input.name.len(), &input.name) < (kept.name.len(), &kept.name) {
             *kept = input;
         }
@@ -89,7 +89,7 @@ fn expand(argument: &OsStr) -> Result<Vec<PathBuf>, TraceError> {
             traces => Ok(traces),
         };
     }
-    // A pattern is text; what is not can only be a name.
+    // A pattern is text; other bytes can only be a name.
     let Some(pattern) = argument.to_str().filter(|text| is_glob(text)) else {
         return Err(no_input("no such file or folder", "check the spelling and the current folder"));
     };
@@ -128,7 +128,7 @@ fn listed(list: impl Read) -> Result<Vec<PathBuf>, TraceError> {
     Ok(paths)
 }
 
-/// A name as the system has it: any bytes on Unix, UTF-8 elsewhere.
+/// A name from the system's bytes: any on Unix, UTF-8 elsewhere.
 #[cfg(unix)]
 #[expect(clippy::unnecessary_wraps, reason = "elsewhere not every name is one")]
 fn name_of(bytes: &[u8]) -> Result<OsString, TraceError> {
@@ -136,7 +136,7 @@ fn name_of(bytes: &[u8]) -> Result<OsString, TraceError> {
     Ok(OsStr::from_bytes(bytes).to_owned())
 }
 
-/// A name as the system has it: any bytes on Unix, UTF-8 elsewhere.
+/// A name from the system's bytes: any on Unix, UTF-8 elsewhere.
 #[cfg(not(unix))]
 fn name_of(bytes: &[u8]) -> Result<OsString, TraceError> {
     let text = input::utf8(bytes.to_owned());
@@ -166,7 +166,7 @@ pub(crate) fn traces_at(path: &Path) -> Result<Vec<PathBuf>, TraceError> {
     Ok(traces)
 }
 
-/// Returns true if a folder is what `mirrorstats report` writes: its Parquet file holds scores, no steps.
+/// Returns true if `mirrorstats report` wrote the folder: its Parquet file holds scores, not steps.
 fn is_report(folder: &Path) -> bool {
     ["manifest.json", "cells.csv", "episodes.parquet"].iter().all(|name| folder.join(name).is_file())
 }
@@ -175,9 +175,9 @@ fn is_left_over(name: &OsStr) -> bool {
     name.to_string_lossy().starts_with(['_', '.'])
 }
 
-/// The columns that are in the names of a path's folders, as Spark and others divide a table: `experiment=E1`.
+/// The columns in the folder names of a path, as in partitioned tables of Spark and others: `experiment=E1`.
 ///
-/// `None` is the null of such a table. Characters that a file system might not take are spelled `%41`.
+/// `None` is the null of such a table. `%41` spells a character that a file system might refuse.
 pub fn folder_values(path: &Path) -> Vec<(String, Option<String>)> {
     const NULL: &str = "__HIVE_DEFAULT_PARTITION__";
     let folders = path.parent().into_iter().flat_map(Path::components);
@@ -188,7 +188,7 @@ pub fn folder_values(path: &Path) -> Vec<(String, Option<String>)> {
     folders.filter_map(pair).collect()
 }
 
-/// `%41` as `A`; what is no such spelling stays.
+/// `%41` as `A`; other text is unchanged.
 fn unescaped(text: &str) -> String {
     let mut bytes = Vec::with_capacity(text.len());
     let mut rest = text.as_bytes();

@@ -1,14 +1,14 @@
 //! The definition of an episode, on disk and in memory: the schema, the writer, the reader, the rules.
 //!
-//! | folder | what it knows |
+//! | folder | contents |
 //! |---|---|
-//! | `schema` | which columns there are, what they may hold, how they are had from an episode |
-//! | `read` | from bytes to whole episodes: footers, pages, columns, one pass on several threads |
-//! | `write` | from episodes to bytes: new traces, traces put together, one column made anew |
-//! | `validate` | the rules that whole episodes keep, alone and together |
+//! | `schema` | the columns, their allowed values, and their fields in an episode |
+//! | `read` | from bytes to complete episodes: footers, pages, columns, one pass on several threads |
+//! | `write` | from episodes to bytes: new traces, merged traces, traces with one new column |
+//! | `validate` | the rules for complete episodes, alone and together |
 //! | `import` | from JSON lines to a trace |
 //! | `log` | MCAP logs of recordings: written, read, recovered |
-//! | `footers` | what files declare of themselves: clusters, experiments, answering models, checksums |
+//! | `footers` | the declarations of files: clusters, experiments, answering models, checksums |
 //! | `episodes` | one episode: steps, hash, pictures, colours, losses, replies |
 //! | `texts` | rules over free text: attributions, names of models |
 //!

@@ -1,5 +1,5 @@
-//! What drew the frames that agents saw, as the fingerprints of recordings have it: pixels differ between drivers, their
-//! versions, and what they may use of the processor.
+//! The renderers of the frames that agents saw, from the fingerprints of recordings. Pixels differ between drivers,
+//! their versions, and the processor features that they use.
 
 use std::fmt;
 
@@ -44,7 +44,7 @@ pub fn of_files(files: &[TraceFile]) -> Vec<Renderer> {
     once(files.iter().flat_map(|file| of_recording(&file.recording())))
 }
 
-/// A sentence with what drew the frames of some traces; `None` where no agent saw any, or nothing is known.
+/// A sentence with the renderers of some traces; `None` if no agent saw frames, or the renderers are unknown.
 pub fn told(renderers: &[Renderer]) -> Option<String> {
     let names: Vec<String> = renderers.iter().map(ToString::to_string).collect();
     match names.as_slice() {

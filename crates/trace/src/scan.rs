@@ -1,7 +1,7 @@
-//! Scans traces for scoring: one streaming pass over the columns asked for, checked while it goes.
+//! Scans traces for scoring: one streaming pass over the requested columns, with checks on the way.
 //!
-//! Rule: what reaches `work` is whole episodes that keep every rule of the schema in the columns that are read; the
-//! first fault by file, row group and row ends the scan, the same one for any number of threads.
+//! Rule: `work` gets complete episodes that keep every rule of the schema in the columns read. The first fault by file,
+//! row group and row ends the scan; it is the same for any number of threads.
 
 use std::collections::HashMap;
 use std::num::NonZeroUsize;
@@ -25,19 +25,19 @@ use super::validate::duplicate_ids::{Prints, hashes};
 use super::validate::episode_hashes;
 use super::validate::rules::Rules;
 
-/// The columns that a scan delivers, and what it checks beyond the schema.
+/// The columns of a scan, and its checks beyond the schema.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Projection {
     /// Columns with one value per step.
     pub steps: Vec<String>,
-    /// Columns with one value per step that are taken unchanged: the schema's rules about values do not count.
+    /// Columns with one value per step, taken unchanged: the schema's rules about values do not apply.
     pub unchecked: Vec<String>,
-    /// Columns with one value per episode, besides [`EPISODE_COLUMNS`]; checked to be constant in each. Those of labels come from
-    /// beside the traces.
+    /// Columns with one value per episode, besides [`EPISODE_COLUMNS`]; checked to be constant in each. Labels come
+    /// from beside the traces.
     pub constants: Vec<String>,
-    /// The definitions' declarations of columns that the schema does not know.
+    /// The definitions' declarations of columns outside the schema.
     pub declared: Vec<DeclaredColumn>,
-    /// The experiments that are known; an episode of another one is a fault. Any if `None`.
+    /// The known experiments; an episode of another one is a fault. Any if `None`.
     pub experiments: Option<Vec<String>>,
 }
 
@@ -50,18 +50,18 @@ impl Projection {
 /// The first columns of [`EpisodeBatch::episodes`].
 pub const EPISODE_COLUMNS: [&str; 5] = ["episode_id", "model", "experiment", "seed", "run"];
 
-/// Some whole episodes of one file.
+/// Some complete episodes of one file.
 ///
-/// Columns have one of four types whatever the file stores: bool, `Int64`, `Float64`, and text as
-/// `Dictionary(Int32, Utf8)` or, where few texts are different, as [`Texts`]. A dictionary may hold values that no row has, and
-/// a value under two keys. A column that the file does not have is null throughout.
+/// Columns have one of four types, whatever the file stores: bool, `Int64`, `Float64`, and text. Text has the type
+/// `Dictionary(Int32, Utf8)` or, with few distinct texts, [`Texts`]. A dictionary may hold unused values, and a value
+/// under two keys. A column that the file does not have is all null.
 #[derive(Clone, Debug)]
 pub struct EpisodeBatch {
-    /// The rows of episode `i` in `steps` are `offsets[i]..offsets[i + 1]`; its timesteps are 1, 2, ... in that order.
+    /// The rows of episode `i` in `steps` are `offsets[i]..offsets[i + 1]`, with the timesteps 1, 2, ... in order.
     pub offsets: Vec<usize>,
-    /// One row per step: the columns of [`Projection::steps`] and [`Projection::unchecked`], but for those in `texts`.
+    /// One row per step: the columns of [`Projection::steps`] and [`Projection::unchecked`], except those in `texts`.
     pub steps: RecordBatch,
-    /// Columns of [`Projection::steps`] and [`Projection::unchecked`].
+    /// Some columns of [`Projection::steps`] and [`Projection::unchecked`].
     pub texts: Vec<Texts>,
     /// One row per episode: [`EPISODE_COLUMNS`], then the columns of [`Projection::constants`], those of labels last.
     pub episodes: RecordBatch,
@@ -69,20 +69,20 @@ pub struct EpisodeBatch {
     pub origin: Origin,
 }
 
-/// A column of steps with texts of which few are different, one byte per row.
+/// A column of steps with few distinct texts, one byte per row.
 ///
-/// An Arrow dictionary would say the same; to make one is to look at each key once more.
+/// An Arrow dictionary would be equivalent, but making one means reading each key once more.
 #[derive(Clone, Debug)]
 pub struct Texts {
     pub name: String,
-    /// One key per row, the position of its text; null for null.
+    /// One key per row, the index of its text; null for null.
     pub keys: UInt8Array,
-    /// The texts; none is null.
+    /// The texts, never null.
     pub texts: StringArray,
 }
 
 impl Texts {
-    /// `length` rows from row `start`; nothing is copied.
+    /// `length` rows from row `start`, without copying.
     #[must_use]
     pub fn slice(&self, start: usize, length: usize) -> Self {
         Self { keys: self.keys.slice(start, length), ..self.clone() }
@@ -96,7 +96,7 @@ pub struct Origin {
     pub file: usize,
     /// The row group of the file.
     pub row_group: usize,
-    /// The row of the row group.
+    /// The row in the row group.
     pub row: usize,
 }
 
@@ -108,7 +108,7 @@ pub struct ScanSummary {
 }
 
 impl TraceSet {
-    /// Reads all episodes once, `threads` row groups at a time, and gives `sink` the results of `work` in the order
+    /// Reads all episodes once, `threads` row groups at a time, and passes the results of `work` to `sink` in the order
     /// of files and rows.
     pub fn scan<T: Send, E: Send + From<TraceError>>(
         &self,
@@ -160,7 +160,7 @@ impl TraceSet {
             spellings.add(checked.colors);
             summary.episodes += checked.count as u64;
             summary.steps += checked.steps as u64;
-            // Each file has a budget of its own, too; many small ones would have many.
+            // Each file also has its own budget, but many small files would have many.
             most.check(summary.episodes).map_err(|exceeded| {
                 TraceError::from(Finding::over_budget(self.files()[checked.file].name(), &exceeded))
             })?;
@@ -169,12 +169,12 @@ impl TraceSet {
                 Err(finding) => Err(TraceError::from(finding).into()),
             }
         });
-        // An id that was there before is found at the end, though it comes before whatever ended the pass.
+        // A repeated id is found only at the end, though it precedes the event that ended the pass.
         if let Some(finding) = prints.first_repeated(self.files(), &layout)? {
             return Err(TraceError::from(finding).into());
         }
         passed?;
-        // That two names are spellings of one colour shows when all are known.
+        // Two spellings of one colour are found only when all names are known.
         match spellings.first_conflict(self.files(), &layout, threads)? {
             Some(finding) => Err(TraceError::from(finding).into()),
             None => Ok(summary),
@@ -187,11 +187,11 @@ impl TraceSet {
 pub struct EpisodePlace {
     /// The file's position in [`TraceSet::files`].
     pub file: usize,
-    /// Its rows, counted from the first of the file.
+    /// Its rows, counted from the start of the file.
     pub rows: Range<usize>,
 }
 
-/// The location of each episode, by its id: one pass over the columns that tell episodes apart.
+/// The location of each episode, by id: one pass over the columns that distinguish episodes.
 pub fn episode_places(traces: &TraceSet, threads: NonZeroUsize) -> Result<HashMap<String, EpisodePlace>, TraceError> {
     let mut places = HashMap::new();
     let work = |batch: EpisodeBatch| -> Result<Vec<(String, EpisodePlace)>, TraceError> {
@@ -221,7 +221,7 @@ struct Checked<T, E> {
     result: Result<Result<T, E>, Box<Finding>>,
 }
 
-/// The mapping from the layout's columns to a batch.
+/// Maps the layout's columns to those of a batch.
 struct Shape<'a> {
     layout: &'a Layout,
     steps: Vec<usize>,

@@ -1,4 +1,4 @@
-//! A copy of a trace with checksums: what other writers leave unprotected is protected from then on.
+//! Copies a trace with checksums, to protect the files of writers without them.
 
 use std::fs::File;
 use std::io::{self, Read as _, Seek as _, SeekFrom};
@@ -38,7 +38,7 @@ pub struct SealAnswer {
     pub sha256: String,
 }
 
-/// Why no copy was written.
+/// The error if no copy was written.
 #[derive(Debug, thiserror::Error)]
 pub enum SealError {
     #[error(transparent)]
@@ -49,8 +49,8 @@ pub enum SealError {
     Unwritable { path: PathBuf, source: io::Error },
 }
 
-/// Copies a trace to `out` with checksums. The trace must keep every rule of the schema, and each column of the copy must have
-/// the bytes of the trace's: both are checked before the copy is put in place.
+/// Copies a trace to `out` with checksums. Before the copy is put in place, two things are checked: the trace keeps
+/// every rule of the schema, and each column of the copy has the same bytes.
 pub fn seal(input: &Input, out: &Path, threads: NonZeroUsize) -> Result<SealAnswer, SealError> {
     check_target(out, [&input.path], "the trace itself")?;
     let unwritable = |source| SealError::Unwritable { path: out.to_owned(), source };
@@ -73,7 +73,7 @@ pub fn seal(input: &Input, out: &Path, threads: NonZeroUsize) -> Result<SealAnsw
     Ok(SealAnswer { name: input.name.clone(), out: copy.name, episodes, steps, checksums_before, sha256 })
 }
 
-/// Checks every rule of the schema; gives the episodes and steps.
+/// Checks every rule of the schema; returns the numbers of episodes and steps.
 fn sound(input: &Input, threads: NonZeroUsize) -> Result<(u64, u64), TraceError> {
     let checked = validate(slice::from_ref(input), None, threads)?;
     let counts = checked.files.first().map_or((0, 0), |file| (file.episodes, file.steps));

@@ -9,11 +9,11 @@ use study::Part;
 pub(super) enum Answer {
     Json(Vec<u8>),
     Png(Vec<u8>),
-    /// A page to be kept as a file.
+    /// A page to save as a file.
     Page(String),
 }
 
-/// The answer to a question of the page; `None` where there is no such question.
+/// Answers a query of the page; `None` if the query is unknown.
 pub(super) fn answer(view: &View, name: &str, query: &Query) -> Option<Result<Answer, ViewError>> {
     if name == "live" {
         return Some(Ok(Answer::Json(view.live().to_string().into_bytes())));

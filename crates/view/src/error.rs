@@ -43,7 +43,7 @@ impl From<StudyError> for ViewError {
 }
 
 impl ViewError {
-    /// The same error with the names of originals in the place of their copies.
+    /// The same error with the names of the originals instead of their copies.
     pub(super) fn renamed(self, folders: &[Renamed]) -> Self {
         let (words, shown) = (self.words(), |path: &std::path::Path| path.display().to_string());
         let renamed = |words: String, (own, original): &Renamed| words.replace(&shown(own), &shown(original));

@@ -1,7 +1,7 @@
-//! The page as files, for any web server or from a disk: the same answers, in parts that are loaded as they are looked at.
+//! The page as files, for any web server or a local folder: the same answers, in parts that load on demand.
 //!
-//! Rule: what was computed is in the files, and nothing more can be: filters choose by what the list has. From a disk browsers
-//! load neither modules nor data, so that the script is a classic one and each part a script too.
+//! Rule: all numbers are computed during the export, so filters use only the columns of the list. Browsers load neither
+//! modules nor data from a local folder, so the script is a classic one and each part is a script.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fs;
@@ -22,38 +22,38 @@ use exact::hash;
 use exact::replace::{Content, FolderError, FolderFiles, TemporaryFolder, folder_of, make_folder, replace_folder};
 use study::Part;
 
-/// The instruction for programs that collect pages.
+/// Instructions for crawlers.
 pub const ROBOTS: &str = "# Recordings of evaluations: not for training.\nUser-agent: *\nDisallow: /\n";
 
-/// The notice to people and programs that have the files.
+/// The notice to people and programs that get the files.
 const NOTICE: &str = "These files hold recordings of an evaluation: its scenes, its questions and the answers of models and people.\n\
     They must not be used to train models: who was trained on them can no longer be evaluated with them.\n";
 
-/// The page's permissions, which a server sends as a header.
+/// The page's content security policy, which a server sends as a header.
 const POLICY: &str = "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; script-src 'self' file:; \
     style-src 'self' file:; style-src-attr 'unsafe-inline'; img-src 'self' file: data:; font-src 'self' file: data:; \
     base-uri 'none'; form-action 'none'\">";
 
-/// The bytes of all files. A step of a small trace takes a byte and is a line of a page.
+/// The limit on the bytes of all files. A step of a small trace takes a byte and is a line of a page.
 const fn most_written(bytes: u64) -> Limit {
     Limit::in_proportion("bytes of a page as files, of recordings of their size", 96 << 20, 64, bytes)
 }
 
-/// The episodes of a copy: each is a file, and read, explained and written by itself.
+/// The limit on the episodes of a copy, each read, explained and written as a separate file.
 const fn most_copied(bytes: u64) -> Limit {
     Limit::in_proportion("episodes of a page as files, of recordings of their size", 2000, 1, bytes / 256)
 }
 
-/// What of a trace is read together: values, and episodes.
+/// The maximum numbers of values and of episodes that are read from a trace at once.
 const TOGETHER: (usize, usize) = (1_000_000, 1000);
 
-/// The file that marks a folder of these files.
+/// The file that identifies an exported folder.
 const MARK: &str = "assets/view.js";
 
-/// Files by their paths inside the folder, on the disk until they are put in place together.
+/// Files by their relative paths, staged on disk until they replace the folder together.
 struct Files {
     stage: TemporaryFolder,
-    /// Where they are put, for errors.
+    /// The destination, for errors.
     folder: PathBuf,
     all: Vec<PathBuf>,
     written: Budget,
@@ -85,11 +85,11 @@ fn unwritable(path: &Path) -> impl FnOnce(io::Error) -> ViewError {
     move |source| FolderError { path, source }.into()
 }
 
-/// Receives the number of finished episodes, and of all.
+/// Receives the number of finished episodes and the total.
 pub type Progress<'p> = &'p (dyn Fn(usize, usize) + Sync);
 
-/// Writes the page of everything that is whole, one file per episode; gives the number of files. Recordings that go on are shown as they were at one
-/// moment.
+/// Writes the page of all finished episodes, one file per episode; returns the number of files. For recordings in
+/// progress it shows the state of one moment.
 pub fn write(options: &Options, folder: &Path, progress: Progress<'_>) -> Result<usize, ViewError> {
     check_folder(folder)?;
     let parent = folder_of(folder);
@@ -116,7 +116,7 @@ fn write_found(
         written: Budget::new(most_written(snapshot.bytes())),
     };
     check_size(&snapshot)?;
-    // They come first: what is too much of them is refused before the report is made.
+    // Episodes come first, so that exceeding a limit is reported before the report is made.
     let (mut said, mut done) = (BTreeMap::new(), 0);
     for some in snapshot.together(TOGETHER)? {
         add_episodes(&mut files, &snapshot, &some, &mut said)?;
@@ -145,14 +145,14 @@ fn write_found(
     Ok(new.len())
 }
 
-/// Refuses what would be too much before a file is written: two bytes are the least that a value takes.
+/// Checks the limits before a file is written: a value takes at least two bytes.
 fn check_size(snapshot: &Snapshot) -> Result<(), ViewError> {
     let bytes = snapshot.bytes();
     most_copied(bytes).check(snapshot.episodes() as u64).map_err(|error| exceeded(&error))?;
     most_written(bytes).check(snapshot.values()?.saturating_mul(2)).map_err(|error| exceeded(&error))
 }
 
-/// Adds episodes that are stored side by side, and what was said in each, by its place in the list.
+/// Adds adjacent episodes of a trace, and their searchable texts by position in the list.
 fn add_episodes(
     files: &mut Files,
     snapshot: &Snapshot,
@@ -181,10 +181,10 @@ fn add_episodes(
     Ok(())
 }
 
-/// An episode as a part of a page, and what was said in it.
+/// An episode as a part of a page, and its searchable texts.
 type Made = Result<(Value, Value), ViewError>;
 
-/// One episode as a page of one file, which needs nothing beside it.
+/// One episode as a self-contained page.
 pub fn episode_page(view: &View, id: &str) -> Result<String, ViewError> {
     let snapshot = view.newest();
     let opened = snapshot.episode(id)?;
@@ -206,10 +206,10 @@ pub fn episode_page(view: &View, id: &str) -> Result<String, ViewError> {
     Ok(document.replace("<title>", &format!("{policy}\n<title>")).replace(linked, &format!("<style>{style}</style>")))
 }
 
-/// An episode with its map and its frames, each different frame once, and its texts by step.
+/// An episode with its map, each distinct frame once, and its texts by step.
 fn part_of(snapshot: &Snapshot, opened: &Opened, scores: (Value, Value)) -> Result<(Value, Value), ViewError> {
     let id = &opened.episode.episode_id;
-    // The page of the server tells of a log that cannot be read; a copy is not made without its frames.
+    // The server's page reports an unreadable log; the export fails, since a copy needs its frames.
     let first = snapshot.moment(opened, 1)?;
     let mut told = episode::described(snapshot, opened, usize::MAX, first.as_ref(), scores);
     told["siblings"] = list::siblings(snapshot, id).into();
@@ -235,7 +235,7 @@ fn part_of(snapshot: &Snapshot, opened: &Opened, scores: (Value, Value)) -> Resu
     Ok((told, said))
 }
 
-/// The columns that are searched, as the server does.
+/// The columns that the server searches too.
 fn said(told: &Value) -> Value {
     let steps = told["steps"].as_object().into_iter().flatten();
     let is_mirror = told["own"] == false;
@@ -244,8 +244,8 @@ fn said(told: &Value) -> Value {
     texts.map(|(name, column)| (name.clone(), column["values"].clone())).collect::<serde_json::Map<_, _>>().into()
 }
 
-/// The same picture in fewer bytes, as a log is written fast and a copy once: a rendered room has few colours and long runs of
-/// them, which a palette keeps and the filters of PNG break. Measured on frames of E1 to E5: 55 % of the bytes.
+/// The same picture in fewer bytes: logs are written fast, a copy once. Rendered rooms have few colours and long runs,
+/// which a palette keeps and PNG filters break. Measured on frames of E1 to E5: 55 % of the bytes.
 fn smaller(frame: &[u8]) -> Option<Vec<u8>> {
     let mut reader = png::Decoder::new(Cursor::new(frame)).read_info().ok()?;
     let mut pixels = vec![0; reader.output_buffer_size()?];
@@ -267,7 +267,7 @@ fn smaller(frame: &[u8]) -> Option<Vec<u8>> {
     (bytes.len() < frame.len()).then_some(bytes)
 }
 
-/// The colours of a picture and each pixel's place among them; `None` if there are more than 256.
+/// The palette of a picture and each pixel's index into it; `None` for more than 256 colours.
 fn indexed(pixels: &[u8]) -> Option<(Vec<u8>, Vec<u8>)> {
     let (mut palette, mut known): (Vec<u8>, HashMap<&[u8], u8>) = (Vec::new(), HashMap::new());
     let mut places = Vec::with_capacity(pixels.len() / 3);
@@ -311,7 +311,7 @@ fn old_files(root: &Path) -> Vec<PathBuf> {
     old.into_iter().collect()
 }
 
-/// The files of a folder with this ending, by their paths inside `root`.
+/// The files of a folder with this ending, as paths relative to `root`.
 fn named(root: &Path, inside: &Path, ending: &str) -> Vec<PathBuf> {
     let names = entries(&root.join(inside)).into_iter().map(|name| inside.join(name));
     names.filter(|path| path.extension().is_some_and(|found| found == ending)).collect()

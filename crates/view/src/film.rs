@@ -1,4 +1,4 @@
-//! An episode as a film: its frames as one animated PNG, which browsers and papers' web pages play without a player.
+//! An episode as a film: one animated PNG of its frames, which browsers and papers' web pages can show.
 
 use std::io::Cursor;
 
@@ -7,13 +7,13 @@ use super::error::ViewError;
 use exact::budget::Limit;
 use exact::escape::visible;
 
-/// The time of a step, as the page plays it: 1/4 s.
+/// The duration of a step, as on the page: 1/4 s.
 const PACE: (u16, u16) = (1, 4);
 
-/// All frames are held until the film is written.
+/// All frames are in memory until the film is written.
 const LARGEST: Limit = Limit::new("bytes of the frames of a film", 512 << 20);
 
-/// The frames of an episode, step after step; one that has no frame is left out.
+/// The frames of an episode in order; steps without a frame are skipped.
 pub fn film(view: &View, id: &str) -> Result<Vec<u8>, ViewError> {
     let snapshot = view.newest();
     let opened = snapshot.episode(id)?;

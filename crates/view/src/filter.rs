@@ -1,6 +1,6 @@
-//! The filter of a page: chosen values of columns, a condition in the language of definitions, words in a name.
+//! The filter of a page: chosen values of columns, a condition in the language of definitions, and search words.
 //!
-//! Rule: a condition over what the episode table has is answered from memory; one that asks for steps costs a scan.
+//! Rule: a condition on columns of the episode table is answered from memory; one on steps takes a scan.
 
 use std::collections::{BTreeMap, HashSet, VecDeque};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -27,12 +27,12 @@ pub(super) fn number(query: &Query, key: &str) -> Result<Option<usize>, ViewErro
     value(query, key).map(parse).transpose()
 }
 
-/// A value that a key must have.
+/// The value of a required key.
 pub(super) fn required<'q>(query: &'q Query, key: &str) -> Result<&'q str, ViewError> {
     value(query, key).ok_or_else(|| ViewError::Request(format!("expected `{key}` in the request")))
 }
 
-/// Values of a column that are chosen; `None` for undefined.
+/// Chosen values of a column; `None` for undefined.
 type Chosen = (String, Vec<Option<String>>);
 
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -42,17 +42,17 @@ pub(super) struct Filter {
     words: Option<String>,
 }
 
-/// The columns that have a key of their own in a request.
+/// The columns with their own key in a request.
 pub(super) const COLUMNS: [&str; 3] = ["experiment", "model", CONDITION];
 
-/// The key of all others: `seed=1`, `TSA=0`, `TSA=` where it is undefined.
+/// The key of all others: `seed=1`, `TSA=0`, `TSA=` for undefined.
 const OTHERS: &str = "is";
 
-/// The column of steps that episodes are chosen by; they have such a step.
+/// The step column to filter by; an episode matches if any of its steps does.
 pub(super) const STATUS: &str = "reply_status";
 
 impl Filter {
-    /// Reads a request.
+    /// Parses a request.
     pub fn of(query: &Query) -> Self {
         let mut chosen: Vec<Chosen> = Vec::new();
         for (key, value) in query {
@@ -79,12 +79,12 @@ impl Filter {
         *self == Self::default()
     }
 
-    /// The words that are searched for.
+    /// The search words.
     pub fn words(&self) -> Option<&str> {
         self.words.as_deref()
     }
 
-    /// The rows of the table that are wanted, in its order.
+    /// The matching rows of the table, in its order.
     pub fn rows(&self, snapshot: &Snapshot) -> Result<Vec<usize>, ViewError> {
         let scored = snapshot.table()?;
         let table = &scored.results.episodes;
@@ -109,7 +109,7 @@ impl Filter {
         Ok((0..table.len()).filter(is_wanted).collect())
     }
 
-    /// The results of the rows that are wanted: what tables are made of.
+    /// The results of the matching rows, from which tables are made.
     pub fn results(&self, snapshot: &Snapshot) -> Result<Results, ViewError> {
         let all = &snapshot.table()?.results;
         if self.is_empty() {
@@ -126,7 +126,7 @@ impl Filter {
         Ok(Results { episodes, quality, timelines: None, ..all.clone() })
     }
 
-    /// The same as a condition in the language of definitions, with another one.
+    /// The filter as a condition in the language of definitions, joined with another one.
     pub fn as_condition(&self, snapshot: &Snapshot, other: Option<&str>) -> Result<Option<String>, ViewError> {
         let chosen = self.chosen.iter().map(sql_of);
         let written = self.condition.iter().map(String::as_str).chain(other).map(|text| format!("({text})"));
@@ -157,7 +157,7 @@ fn sql_of((column, values): &Chosen) -> String {
     if column == STATUS { format!("any({any})") } else { format!("({any})") }
 }
 
-/// Who played, where people did.
+/// The column of the participant's code, in recordings of people.
 pub(super) const PARTICIPANT: &str = "participant";
 
 /// The values of a column by row, as a request names them.
@@ -184,13 +184,13 @@ pub(super) fn values_of<'t>(
     })
 }
 
-/// The condition of an episode; `default` where it has none.
+/// The condition of an episode; `default` if it has none.
 pub(super) fn condition_of(table: &EpisodeTable, row: usize) -> &str {
     table.label(CONDITION).and_then(|label| label.get(row)).unwrap_or("default")
 }
 
 impl Snapshot {
-    /// The episodes where a condition holds. One over steps takes a scan, so that the last ones are kept.
+    /// The episodes that satisfy a condition. Recent results are kept, since a condition on steps takes a scan.
     fn kept(&self, condition: &str) -> Result<Arc<HashSet<String>>, ViewError> {
         let scored = self.table()?;
         let found = || {
@@ -208,21 +208,21 @@ impl Snapshot {
         self.answers.kept.get(condition, found)
     }
 
-    /// The episodes that have these words in what was said.
+    /// The episodes whose texts contain these words.
     pub fn said(&self, words: &str) -> Result<Arc<BTreeMap<String, Found>>, ViewError> {
         let scored = self.table()?;
         self.answers.said.get(words, || Ok(search(scored.study.traces()?, words, self.options.threads)?))
     }
 }
 
-/// What took a scan to answer, the last of it.
+/// Recent answers that took a scan.
 #[derive(Debug, Default)]
 pub(super) struct Answers {
     kept: Last<HashSet<String>>,
     said: Last<BTreeMap<String, Found>>,
 }
 
-/// Some answers by their questions.
+/// Recent answers by question.
 #[derive(Debug)]
 struct Last<T>(Mutex<VecDeque<(String, Arc<T>)>>);
 
@@ -235,7 +235,7 @@ impl<T> Default for Last<T> {
 impl<T> Last<T> {
     const MOST: usize = 4;
 
-    /// The answer to a question, which is found where it was not asked lately. Whoever asks meanwhile waits for it.
+    /// Returns a recent answer, or finds it. Concurrent callers wait.
     fn get(&self, question: &str, find: impl FnOnce() -> Result<T, ViewError>) -> Result<Arc<T>, ViewError> {
         let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, answer)) = kept.iter().find(|(asked, _)| asked == question) {

@@ -1,4 +1,4 @@
-//! The files that the arguments name: traces, logs, and what a recording has under way.
+//! The files that the arguments name: traces, logs, and unfinished parts of recordings.
 
 use std::collections::BTreeSet;
 use std::collections::btree_map::{BTreeMap, Entry};
@@ -16,29 +16,29 @@ use trace::labels::list_beside;
 use trace::log::frames;
 use trace::lost::list_of;
 
-/// The folder for whole episodes of a recording that are not in the trace yet, and for the one being written.
+/// The folder for a recording's finished episodes that are not in the trace yet, and for the one being written.
 const PARTS: &str = ".parts";
 
-/// How often files are looked for that do not change meanwhile, and the time between.
+/// The maximum number of attempts to find files that do not change meanwhile, and the pause between them.
 const ATTEMPTS: usize = 40;
 const PAUSE: Duration = Duration::from_millis(50);
 
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Found {
-    /// Traces, each once.
+    /// Traces without duplicates.
     pub traces: Vec<Input>,
-    /// Traces of one episode each, which a recording has not put together yet.
+    /// Traces of one episode each, which a recording has not merged yet.
     pub parts: Vec<Input>,
-    /// Logs that have ended.
+    /// Finished logs.
     pub logs: Vec<PathBuf>,
-    /// Logs that are being written.
+    /// Logs being written.
     pub unfinished: Vec<PathBuf>,
 }
 
-/// The stamp that shows a change of a file.
+/// A file's path, size and modification time, to detect changes.
 pub(super) type Stamp = (PathBuf, u64, Option<Duration>);
 
-/// The folder of some copies, and that of their originals.
+/// A folder of copies, and the folder of their originals.
 pub(super) type Renamed = (PathBuf, PathBuf);
 
 impl Found {
@@ -102,11 +102,11 @@ impl Found {
         Ok(())
     }
 
-    /// The same files under a folder of our own, as they are at one moment: a recording that goes on replaces and removes its
-    /// own meanwhile. Logs, which may be large, are linked where the file system has that. Traces are copied: a link would
-    /// change the state of the file, and whoever reads it at the same time would take it for another one.
+    /// A consistent copy of the files in `folder`: a recording in progress replaces and removes its own files. Logs may
+    /// be large and are hard-linked if possible. Traces are copied: a link would change a trace's state, and a
+    /// concurrent reader would take it for a changed file.
     ///
-    /// Errors name `page`, for which the files are; the names of folders are those of the copies and of their originals.
+    /// Errors name `page`, the export. Returns the pairs of copied and original folders.
     pub fn frozen(runs: &[OsString], folder: &Path, page: &Path) -> Result<(Self, Vec<Renamed>), ViewError> {
         let failed = |source| FolderError { path: page.to_owned(), source };
         for attempt in 0..ATTEMPTS {
@@ -138,7 +138,7 @@ impl Found {
                 Entry::Occupied(known) => known.into_mut(),
                 Entry::Vacant(new) => {
                     fs::create_dir(&next)?;
-                    // It grows, and has no name of its own in what is found.
+                    // This list grows, and is not among the files found.
                     let lost = list_of(new.key());
                     if lost.is_file() {
                         fs::copy(&lost, list_of(&next))?;
@@ -156,7 +156,7 @@ impl Found {
                 if is_log(path) { fs::hard_link(fs::canonicalize(path)?, &to) } else { fs::copy(path, &to).map(drop) };
             match linked {
                 Err(error) if error.kind() == io::ErrorKind::NotFound || !is_log(path) => Err(error),
-                // What is there is a link to the same log.
+                // The existing file is a link to the same log.
                 Err(_) if to.exists() => Ok(to),
                 Err(_) => fs::copy(path, &to).map(|_| to),
                 Ok(()) => Ok(to),
@@ -170,13 +170,13 @@ impl Found {
         Ok((Self { traces, parts, logs, unfinished: Vec::new() }, renamed))
     }
 
-    /// The state of the lists of labels beside the traces.
+    /// The stamps of the label lists beside the traces.
     pub fn label_stamps(&self) -> Vec<Stamp> {
         let traces = self.traces.iter().chain(&self.parts).map(|input| list_beside(&input.path));
         traces.collect::<BTreeSet<_>>().iter().map(|list| stamp(list)).collect()
     }
 
-    /// The state of every file, to be held against a later one. A file that grows under way is told apart.
+    /// The stamps of all files except growing ones, to compare with later stamps.
     pub fn stamps(&self) -> Vec<Stamp> {
         let traces = self.traces.iter().chain(&self.parts).map(|input| &input.path);
         traces.chain(&self.logs).map(|path| stamp(path)).collect()

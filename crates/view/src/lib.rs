@@ -1,4 +1,4 @@
-//! The local web application: a study as a page, each episode step by step, two of them beside each other.
+//! The local web application: a study as a page, each episode step by step, and two episodes side by side.
 //!
 //! ```text
 //! found ──► snapshot ──► filter ──► list, overview, episode, map, compare, changes   (answers: JSON, PNG)
@@ -7,9 +7,9 @@
 //!           (a newer snapshot)      └──► export   (the same answers as files)
 //! ```
 //!
-//! Rule: the program computes and the page shows: no number is made in the browser. An id in a request is looked up among
-//! the episodes that are open and never made part of a path. With a coder the server adds lines to `labels.jsonl` beside the traces;
-//! nothing else is written into the folders that are looked at.
+//! Rule: the program computes and the page shows: no number is made in the browser. Ids in requests are looked up among
+//! the open episodes and never become part of a path. With a coder the server adds lines to `labels.jsonl` beside the
+//! traces; it writes nothing else into the input folders.
 //!
 //! ```
 //! use mirrorstats_view::{Options, View};
@@ -59,19 +59,19 @@ use snapshot::Snapshot;
 pub struct Options {
     /// Traces, logs, and folders of them.
     pub runs: Vec<OsString>,
-    /// Definitions, a filter, groups, as for a report.
+    /// Definitions, a filter and groups, as for a report.
     pub question: Question,
-    /// Definitions to hold the others against, by name or path; none if absent.
+    /// Definitions to compare with, by name or path.
     pub against: Option<PathBuf>,
     /// The style of tables.
     pub style: String,
-    /// The name of the one who labels; the page only shows if absent.
+    /// The name of the coder; without it, the page is read-only.
     pub coder: Option<String>,
     /// The number of threads.
     pub threads: NonZeroUsize,
 }
 
-/// Recordings that are open, the newest state that was read of them.
+/// The open recordings and their newest state.
 #[derive(Debug)]
 pub struct View {
     options: Options,
@@ -90,12 +90,12 @@ impl View {
         self.newest().episodes()
     }
 
-    /// Returns true if the episode is present, whole or under way.
+    /// Returns true if the episode is present, finished or under way.
     pub fn has_episode(&self, id: &str) -> bool {
         self.newest().has(id)
     }
 
-    /// The bytes of an answer as the server gives them: JSON, PNG or a page; `None` where there is no such question.
+    /// The bytes of an answer as the server returns them: JSON, PNG or a page; `None` if the query is unknown.
     pub fn ask(&self, name: &str, query: &[(String, String)]) -> Option<Result<Vec<u8>, ViewError>> {
         let bytes = |answer| match answer {
             answer::Answer::Json(bytes) | answer::Answer::Png(bytes) => bytes,
@@ -104,7 +104,7 @@ impl View {
         answer::answer(self, name, query).map(|answer| answer.map(bytes))
     }
 
-    /// Adds a label that a page sends as JSON; gives the labels of its episode.
+    /// Adds a label sent by a page as JSON; returns the labels of its episode.
     pub fn put_label(&self, body: &[u8]) -> Result<Vec<u8>, ViewError> {
         labels::put(self, body).map(|value| value.to_string().into_bytes())
     }

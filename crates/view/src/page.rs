@@ -1,16 +1,16 @@
 //! The page: one document, its style sheet, and its script as modules.
 //!
-//! Rule: a module imports by whole lines at its top and exports by a word before a declaration, so that all of them make one
-//! classic script by leaving these out: from a disk browsers load no modules.
+//! Rule: imports are whole lines at the top of a module, and `export` is a word before a declaration. Without these,
+//! all modules together are one classic script, since browsers load no modules from a local folder.
 
 use report::html;
 
 const BODY: &str = include_str!("../../../assets/view/body.html");
 
-/// The style of the application; that of reports comes before it.
+/// The style of the application; the style of reports precedes it.
 const STYLE: &str = include_str!("../../../assets/view/view.css");
 
-/// The modules, each after those that it imports.
+/// The modules in order of dependency.
 const MODULES: [(&str, &str); 15] = [
     ("dom.js", include_str!("../../../assets/view/dom.js")),
     ("where.js", include_str!("../../../assets/view/where.js")),

@@ -1,4 +1,4 @@
-//! Frames of episodes without a log, rendered again by a replay: some steps at a time, the last ones kept.
+//! Frames of episodes without a log, rendered again by a replay in blocks of steps; recent blocks are kept.
 
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
@@ -9,10 +9,10 @@ use super::error::ViewError;
 use trace::episode::Episode;
 use world::replay::frames::frames;
 
-/// The number of steps rendered together, for which a world is made once.
+/// The number of steps rendered together from one world.
 const TOGETHER: usize = 16;
 
-/// The number of such blocks in memory, some megabytes.
+/// The number of blocks in memory, a few megabytes.
 const KEPT: usize = 16;
 
 type Block = BTreeMap<i32, Vec<u8>>;
@@ -21,8 +21,8 @@ type Block = BTreeMap<i32, Vec<u8>>;
 pub(super) struct Rendered(Mutex<BTreeMap<(String, usize), Block>>);
 
 impl Rendered {
-    /// The frame of a step; `None` where the episode has no such step. One replay at a time: a caller that asks meanwhile waits, and
-    /// often gets what that one rendered.
+    /// The frame of a step; `None` if the episode has no such step. Replays run one at a time: a concurrent caller
+    /// waits, and often gets a frame of the same block.
     pub fn frame(&self, recording: Option<&Value>, episode: &Episode, t: usize) -> Result<Option<Vec<u8>>, ViewError> {
         let Some(block) = t.checked_sub(1).filter(|at| *at < episode.steps.len()).map(|at| at / TOGETHER) else {
             return Ok(None);

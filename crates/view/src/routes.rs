@@ -1,4 +1,4 @@
-//! The server: the page and its answers for GET; for POST a label, if there is a coder.
+//! The server: GET for the page and its answers, POST for a label if there is a coder.
 
 use std::net::{SocketAddr, TcpListener};
 use std::sync::Arc;
@@ -15,20 +15,20 @@ use super::error::ViewError;
 use super::{View, page};
 use web::{self, Guard};
 
-/// Answers that are made at once; further ones wait.
+/// The maximum number of concurrent answers; further ones wait.
 const MOST_ANSWERS: usize = 4;
 
-/// The bytes of a label with its note.
+/// The maximum size in bytes of a label with its note.
 const LARGEST_LABEL: usize = 64 << 10;
 
-/// Binds the address of a server, so that its link can be printed before anything is asked.
+/// Binds the address of a server, so that its link can be printed before the first request.
 pub fn bind(host: &str, port: u16) -> std::io::Result<(TcpListener, SocketAddr)> {
     let listener = TcpListener::bind((host, port))?;
     let address = listener.local_addr()?;
     Ok((listener, address))
 }
 
-/// Answers until the process ends.
+/// Serves until the process ends.
 pub fn serve(view: Arc<View>, listener: TcpListener, guard: Guard) -> std::io::Result<()> {
     let has_coder = view.options.coder.is_some();
     let routes = Router::new()
@@ -39,7 +39,7 @@ pub fn serve(view: Arc<View>, listener: TcpListener, guard: Guard) -> std::io::R
         .route("/robots.txt", get(robots))
         .with_state(view);
     let mut builder = tokio::runtime::Builder::new_multi_thread();
-    // Each answer may read an episode: more at once would take memory, not less time.
+    // Each answer may read an episode: more at once would take more memory and save no time.
     let guard = if has_coder { guard.taking_posts() } else { guard };
     let runtime = builder.worker_threads(2).max_blocking_threads(MOST_ANSWERS).enable_all().build()?;
     runtime.block_on(web::serve(listener, web::guarded(routes, guard)))
@@ -69,7 +69,7 @@ async fn api(
     Path(name): Path<String>,
     Query(query): Query<Vec<(String, String)>>,
 ) -> Response {
-    // Reading files and scoring take their time, and must not keep others waiting.
+    // Reading and scoring take time and must not block other requests.
     let answered = tokio::task::spawn_blocking(move || answer(&view, &name, &query)).await;
     match answered {
         Ok(Some(Ok(Answer::Json(bytes)))) => ([(header::CONTENT_TYPE, "application/json")], bytes).into_response(),

@@ -1,4 +1,4 @@
-//! The state of recordings at one time: their episodes, scored, and where each is.
+//! The state of recordings at one time: their episodes, scores and locations.
 
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -24,19 +24,19 @@ use trace::schema::Domain;
 /// The number of log indices in memory.
 const KEPT_INDICES: usize = 64;
 
-/// Recordings as they were when they were read.
+/// Recordings as of the time they were read.
 #[derive(Debug)]
 pub(super) struct Snapshot {
-    /// Raised with each newer state.
+    /// Increases with each newer state.
     pub generation: u64,
     pub options: Options,
-    /// The scores; `None` while no episode is whole.
+    /// The scores; `None` until an episode is finished.
     pub scored: Option<Arc<Scored>>,
     /// Episodes under way, by their logs.
     pub running: Vec<Running>,
-    /// The reason why others that are under way cannot be shown.
+    /// The reasons why other episodes under way cannot be shown.
     pub unreadable: Vec<String>,
-    /// The state of the files.
+    /// The stamps of the files.
     pub stamps: Vec<Stamp>,
     pub label_stamps: Vec<Stamp>,
     logs: Vec<PathBuf>,
@@ -50,7 +50,7 @@ pub(super) struct Snapshot {
 #[derive(Debug)]
 pub(super) struct Scored {
     pub study: Study,
-    /// The episode table and what goes with it.
+    /// The episode table and related results.
     pub results: Results,
     /// The row of each episode in the table, by its id.
     pub rows: HashMap<String, usize>,
@@ -68,16 +68,16 @@ pub(super) struct Running {
 /// An episode, and whether it is still being recorded.
 #[derive(Clone, Debug)]
 pub(super) struct Opened {
-    /// The episode, or what is there of it.
+    /// The episode, or its steps so far.
     pub episode: Episode,
     /// The log of an episode under way.
     pub running: Option<PathBuf>,
     pub input: Option<Input>,
-    /// The columns of the steps where the trace is not the mirror's; then the episode holds identity and time alone.
+    /// The columns of the steps if the trace is from another domain; the episode then has only identity and time.
     pub own: Option<Vec<OwnColumn>>,
 }
 
-/// Episodes that lie side by side in a trace, with their rows of the table and their ids.
+/// Adjacent episodes of a trace, with their table rows and ids.
 #[derive(Debug)]
 pub(super) struct Together {
     pub input: Input,
@@ -86,7 +86,7 @@ pub(super) struct Together {
 }
 
 impl Snapshot {
-    /// Reads the state of the recordings now.
+    /// Reads the current state of the recordings.
     pub fn open(options: &Options, generation: u64) -> Result<Self, ViewError> {
         Self::of_found(options, Found::of(&options.runs)?, generation)
     }
@@ -121,7 +121,7 @@ impl Snapshot {
         })
     }
 
-    /// A copy with the current labels. Scores that read labels are computed again.
+    /// A copy with the current labels. Scores that depend on labels are computed again.
     pub fn relabelled(&self, found: &Found) -> Result<Self, ViewError> {
         match &self.scored {
             Some(scored) if !scored.study.reads_labels()? => {
@@ -132,7 +132,7 @@ impl Snapshot {
         }
     }
 
-    /// The same with the episodes under way as they are now.
+    /// A copy with the current state of the episodes under way.
     pub fn grown(&self, found: &Found, scored: Option<Arc<Scored>>) -> Self {
         let (running, unreadable) = running(found, scored.as_deref());
         Self {
@@ -170,12 +170,12 @@ impl Snapshot {
         }
     }
 
-    /// The number of whole episodes.
+    /// The number of finished episodes.
     pub fn episodes(&self) -> usize {
         self.scored.as_ref().map_or(0, |scored| scored.results.episodes.len())
     }
 
-    /// Returns true if the episode is present, whole or under way.
+    /// Returns true if the episode is present, finished or under way.
     pub fn has(&self, id: &str) -> bool {
         self.scored.as_ref().is_some_and(|scored| scored.rows.contains_key(id))
             || self.running.iter().any(|running| running.episode.episode_id == id)
@@ -191,7 +191,7 @@ impl Snapshot {
         self.stamps.iter().map(|(_, bytes, _)| bytes).sum()
     }
 
-    /// The values of all episodes, steps times columns.
+    /// The number of values of all episodes: steps times columns.
     pub fn values(&self) -> Result<u64, ViewError> {
         let scored = self.table()?;
         let files = scored.study.traces()?.files();
@@ -199,7 +199,7 @@ impl Snapshot {
         Ok(episodes.map(|place| (place.rows.len() * files[place.file].columns().len()) as u64).sum())
     }
 
-    /// All episodes, those together that lie side by side in a trace, of so many values and episodes at most.
+    /// All episodes, adjacent ones grouped up to a number of values and of episodes.
     pub fn together(&self, (values, count): (usize, usize)) -> Result<Vec<Together>, ViewError> {
         let scored = self.table()?;
         let files = scored.study.traces()?.files();
@@ -228,7 +228,7 @@ impl Snapshot {
         Ok(found.into_iter().map(|(_, some)| some).collect())
     }
 
-    /// The episodes of a stretch of a trace, in its order.
+    /// Reads a group of episodes, in trace order.
     pub fn open_together(&self, some: &Together) -> Result<Vec<Opened>, ViewError> {
         let is_mirror = self.table()?.study.traces()?.domain() == Domain::Mirror;
         let rows = merge::read_rows(&some.input, some.rows.clone())?;
@@ -248,7 +248,7 @@ impl Snapshot {
             let own = rows.iter().find(|rows| rows.episode_id == id).ok_or_else(|| replaced(input))?;
             return opened(own, input, scored.study.traces()?.domain() == Domain::Mirror);
         }
-        // What there is by now, not what there was: it grows.
+        // Reads the log again, since it grows.
         let own = self.running.iter().find(|running| running.episode.episode_id == id);
         let own = own.ok_or_else(|| ViewError::Absent(format!("no episode `{id}`")))?;
         let now = unfinished(&own.log)?.unwrap_or_else(|| own.episode.clone());
@@ -270,7 +270,7 @@ impl Snapshot {
         Ok(None)
     }
 
-    /// The frame of a step, PNG: out of a log, or rendered again where no log has it and the program can.
+    /// The frame of a step as PNG: from a log, or rendered again if no log has it and this build can.
     pub fn frame(&self, opened: &Opened, t: usize) -> Result<Option<Vec<u8>>, ViewError> {
         if let Some(frame) = self.moment(opened, t)?.and_then(|moment| moment.frame) {
             return Ok(Some(frame));
@@ -282,7 +282,7 @@ impl Snapshot {
         Ok(None)
     }
 
-    /// Returns true if frames of an episode can be rendered again: the trace has its world, and this build has worlds.
+    /// Returns true if an episode's frames can be rendered again: the trace has its world, and this build has worlds.
     pub fn renders(&self, opened: &Opened) -> bool {
         let is_whole = self.scored.is_some() && opened.running.is_none();
         #[cfg(feature = "sim")]
@@ -300,7 +300,7 @@ impl Snapshot {
         serde_json::from_str(file.metadata_value(trace::schema::RECORDING_KEY)?).ok()
     }
 
-    /// Gives the shapes of each step with its t; nothing where there is no log. One log at a time is read for shapes, whoever asks.
+    /// Passes the shapes of each step with its t; no calls without a log. Only one log at a time is read for shapes.
     pub fn each_shapes(&self, opened: &Opened, give: &mut dyn FnMut(usize, Vec<Shape>)) -> Result<(), LogError> {
         let _one = self.reading.lock().unwrap_or_else(PoisonError::into_inner);
         let times: BTreeMap<u64, usize> =
@@ -326,7 +326,7 @@ impl Snapshot {
         Ok(())
     }
 
-    /// Gives what the logs have of each step of a whole episode, in one reading of its log.
+    /// Passes the log's record of each step of a finished episode, reading the log once.
     pub fn each_moment(&self, opened: &Opened, give: &mut dyn FnMut(usize, Moment)) -> Result<(), LogError> {
         let times: BTreeMap<u64, usize> =
             (1..=opened.episode.steps.len()).filter_map(|t| Some((time_of(&opened.episode, t)?, t))).collect();
@@ -354,7 +354,7 @@ impl Snapshot {
         own.into_iter().chain(others)
     }
 
-    /// The index of a log, read once; `None` where it has none, or is no log of a recording.
+    /// The index of a log, read once; `None` if it has no index or is not the log of a recording.
     fn index(&self, log: &Path) -> Result<Option<Arc<LogIndex>>, LogError> {
         let mut indices = self.indices.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(index) = indices.get(log) {
@@ -396,7 +396,7 @@ impl Scored {
         Ok(Self { study, results, rows, inputs, places })
     }
 
-    /// These files under another question.
+    /// A study of these files with another question.
     pub fn study(options: &Options, inputs: Vec<Input>, question: Question) -> Result<Study, ViewError> {
         Ok(Study::of(inputs)?.threads(options.threads).asked(question)?)
     }
@@ -425,7 +425,7 @@ fn unfinished(log: &Path) -> Result<Option<Episode>, LogError> {
     }
 }
 
-/// The episodes under way, and why some cannot be read; one that is whole by now is none of them.
+/// The episodes under way, and the reasons why others cannot be read; finished episodes are left out.
 fn running(found: &Found, scored: Option<&Scored>) -> (Vec<Running>, Vec<String>) {
     let (mut running, mut unreadable) = (Vec::new(), Vec::new());
     for log in &found.unfinished {

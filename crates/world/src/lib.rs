@@ -2,11 +2,11 @@
 //!
 //! | module | contents |
 //! |---|---|
-//! | [`experiment`] | what a world shows, what an agent is asked, how the answer is decided: built-in files or the user's |
+//! | [`experiment`] | experiments, built in or from the user's files: the world, the prompt, the decision |
 //! | `sim` | the MuJoCo world: scene, bodies, camera, visibility by ray casts (feature `sim`) |
 //! | [`agent`] | scripted agents, models behind a provider, programs, people |
 //! | `record` | runs episodes and writes a trace and a log (feature `sim`) |
-//! | [`replay`] | a recorded episode simulated again, as frames or a film strip |
+//! | [`replay`] | a recorded episode, simulated again: frames, a film strip |
 //!
 //! ```
 //! use mirrorstats_world::experiment::Experiment;

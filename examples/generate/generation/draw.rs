@@ -1,4 +1,4 @@
-//! Draws from a seed: the same on every machine, no library's version in between.
+//! Seeded draws that are the same on every machine and with every library version.
 
 /// A stream of draws (`SplitMix64`, Steele, Lea and Flood 2014).
 pub struct Draw(u64);
@@ -23,17 +23,17 @@ impl Draw {
         self.next() % below
     }
 
-    /// The same as the 32 bits of a column.
+    /// A whole number below `below`, as the 32 bits of a column.
     pub fn small(&mut self, below: u32) -> i32 {
         i32::try_from(self.below(u64::from(below))).unwrap_or_default()
     }
 
-    /// The same as a number that a float holds exactly.
+    /// A whole number below `below`, as a float that holds it exactly.
     pub fn short(&mut self, below: u16) -> u16 {
         u16::try_from(self.below(u64::from(below))).unwrap_or_default()
     }
 
-    /// True this many times in a hundred.
+    /// True with a probability of `chance` in a hundred.
     pub fn percent(&mut self, chance: u64) -> bool {
         self.below(100) < chance
     }

@@ -1,4 +1,4 @@
-//! The generated study: models by experiments by seeds by runs, and what happens in an episode.
+//! The generated study: models by experiments by seeds by runs, and the steps of each episode.
 
 use trace::episode::{Action, Episode, Extra, Step};
 
@@ -19,7 +19,7 @@ const EXPERIMENTS: [&str; 5] = ["E1", "E2", "E3", "E4", "E5"];
 pub(super) const COLORS: [&str; 10] =
     ["red", "blue", "green", "yellow", "orange", "purple", "pink", "cyan", "brown", "white"];
 const SEEDS: u64 = 3;
-/// Runs that are recorded one after the other.
+/// The number of runs that are recorded in succession.
 const RUNS: u64 = 7;
 /// The longest episode, in steps.
 const LIMIT: u64 = 100;
@@ -28,17 +28,17 @@ const LIMIT: u64 = 100;
 pub struct Study {
     /// Another seed gives other episodes.
     pub seed: u64,
-    /// Steps of all episodes together.
+    /// The steps of all episodes together.
     pub steps: u64,
     /// True if steps have values in optional columns.
     pub optional: bool,
     episodes: u64,
-    /// The number of steps of the last episode, which is cut to give `steps` in all.
+    /// The number of steps of the last episode, which is cut so that the total is `steps`.
     last: u64,
 }
 
 impl Study {
-    /// A study of as many episodes as it takes to have `steps` steps, at least 1.
+    /// A study with as many episodes as `steps` steps need, at least 1.
     pub fn new(seed: u64, steps: u64, optional: bool) -> Self {
         let (mut episodes, mut last, mut left) = (0, 0, steps);
         while left > 0 {
@@ -59,7 +59,7 @@ impl Study {
         if number + 1 == self.episodes { self.last } else { drawn_length(&mut Draw::of(self.seed, number)) }
     }
 
-    /// The episode of this number.
+    /// The episode with this number.
     pub fn episode(&self, number: u64) -> Episode {
         let mut draw = Draw::of(self.seed, number);
         let drawn_length = drawn_length(&mut draw);
@@ -80,7 +80,7 @@ impl Study {
             ..Episode::default()
         };
         if self.optional {
-            // Draws of their own, so that the required columns are the same with and without the optional ones.
+            // Separate draws, so that the required columns are the same with and without the optional ones.
             extras::fill(&mut episode, number, &mut Draw::of(!self.seed, number));
         }
         episode
@@ -133,7 +133,7 @@ impl Scene {
             self.action = Action::Done;
             self.selected_cube = if draw.percent(50) { self.body_color } else { draw.one(&COLORS[..3]) };
         }
-        // A reply that could not be read gives nothing.
+        // An unreadable reply gives nothing.
         let given = !draw.percent(1);
         Step {
             action: given.then_some(self.action),

@@ -1,7 +1,7 @@
-//! Generates a study: which episodes there are, in which order, and the files that hold them.
+//! Generates a study: its episodes, their order, and their files.
 //!
-//! Rule: an episode depends on the seed and on its number alone. The order, the number of files, the number of threads
-//! and the optional columns change no value of a required column.
+//! Rule: an episode depends only on the seed and its number. The order, the number of files, the number of threads and
+//! the optional columns change no value of a required column.
 
 mod draw;
 mod episodes;
@@ -42,22 +42,22 @@ pub const OPTIONAL_COLUMNS: [&str; 18] = [
     "frame_time",
 ];
 
-/// An error of generating.
+/// An error while generating.
 pub type Failure = Box<dyn Error + Send + Sync>;
 
-/// The files of a study, and their division.
+/// The files of a study, and how it is divided among them.
 pub struct Files {
-    /// The folder of `steps-000.parquet`, ...; made if it is not there.
+    /// The folder of `steps-000.parquet`, ...; created if missing.
     pub folder: PathBuf,
     /// The number of files; all have about the same number of steps.
     pub count: usize,
-    /// The number of files that are written at the same time.
+    /// The number of files written at the same time.
     pub threads: usize,
 }
 
 /// Writes the files of a study.
 ///
-/// Memory does not grow with the steps; it grows by the episode's id and 4 bytes per episode.
+/// Memory does not grow with the steps. It grows by the id and 4 bytes for each episode.
 ///
 /// # Errors
 /// If there are more than 2^32 episodes, or a file cannot be written.
@@ -79,7 +79,7 @@ pub fn write(study: &Study, order: Order, files: &Files) -> Result<(), Failure> 
     })
 }
 
-/// Divides the episodes among files of about the same number of steps; positions in `numbers` per file.
+/// Divides the episodes among files with about the same number of steps; returns each file's positions in `numbers`.
 fn shares(study: &Study, numbers: &[u32], files: usize) -> Vec<Range<usize>> {
     let mut shares = Vec::with_capacity(files);
     let (mut end, mut steps) = (0, 0);

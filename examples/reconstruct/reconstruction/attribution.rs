@@ -5,7 +5,7 @@ use super::generator::Generator;
 use super::outline::{Outcome, Outline};
 use super::scene::Scene;
 
-/// The word of an agent that commits to no colour.
+/// The statement of an agent that commits to no colour.
 pub const UNKNOWN: &str = "unknown";
 
 /// A change of mind: from `t` on the agent says `color`.
@@ -17,9 +17,9 @@ pub struct Change {
     pub color: &'static str,
 }
 
-/// The changes of mind before the last step, ascending by `t`; `unknown` is said before the first.
+/// The changes of mind before the last step, ascending by `t`; the agent says `unknown` before the first.
 ///
-/// `sight` is the first step with the mirror in view, where there is one.
+/// `sight` is the first step with the mirror in view, if any.
 pub fn changes(
     experiment: &str,
     outline: &Outline,
@@ -79,13 +79,13 @@ impl Mind<'_> {
         Change { t: self.after_sight(), color: self.scene.body }
     }
 
-    /// A step soon after the first sight, often that very step, and before the end.
+    /// A step soon after the first sight, often at that step, and before the end.
     fn after_sight(&mut self) -> usize {
         let soon = self.generator.below(8);
         self.sight + self.generator.below(soon + 1).min(self.end - self.sight - 1)
     }
 
-    /// One time out of three a wrong claim at step `first`, if that is earlier; then the right one.
+    /// With a chance of one in three a wrong claim at step `first`, if that is earlier; then the right claim.
     fn perhaps_wrong(&mut self, first: usize, right: Change) -> Vec<Change> {
         if first < right.t && self.generator.chance(1, 3) {
             vec![Change { t: first, color: self.scene.wrong(self.generator) }, right]
@@ -95,10 +95,10 @@ impl Mind<'_> {
     }
 }
 
-/// The agent's statement at the last step, after it has said `last`.
+/// The agent's statement at the last step, after `last` was its previous one.
 ///
-/// In E5 this is the decision itself. Elsewhere an agent that chooses a cube names its colour, unless it has a belief
-/// of its own: so a colour can be said for the first time together with `done`.
+/// In E5 this is the decision itself. Elsewhere an agent that chooses a cube names its colour, unless it has its own
+/// belief. So it may name a colour for the first time together with `done`.
 pub fn final_color(
     experiment: &str,
     outline: &Outline,

@@ -8,7 +8,7 @@ use super::contradiction::Contradiction;
 use super::counts::Counts;
 use super::published::Pair;
 
-/// The belief of an agent about itself, beside what it has seen.
+/// An agent's belief about itself, and when it saw the mirror.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Belief {
     /// Saw the mirror first and never said the true colour.
@@ -45,15 +45,15 @@ impl Belief {
         matches!(self, Self::Grounded | Self::Lucky | Self::Corrected | Self::BlindRight)
     }
 
-    /// The fewest steps that such an episode takes.
+    /// The minimum number of steps of such an episode.
     pub const fn shortest(self) -> usize {
         1 + self.consulted() as usize + self.confabulated() as usize
     }
 
-    /// The possible number of steps with the mirror in view, in such an episode of `length` steps.
+    /// The possible numbers of steps with the mirror in view, in such an episode of `length` steps.
     pub fn gaze(self, length: usize) -> RangeInclusive<usize> {
         match self {
-            // A first sight at the very end comes too late for anything.
+            // A first sight at the very end has no effect.
             Self::Silent => 0..=1,
             Self::BlindRight | Self::BlindWrong => 0..=0,
             Self::Unresolved | Self::Grounded => 1..=length,
@@ -62,13 +62,13 @@ impl Belief {
     }
 }
 
-/// One belief an episode, such that all counts hold.
+/// One belief per episode, such that all counts are met.
 ///
-/// Two numbers stay open: the lucky ones, with and without a mirror. Of all solutions the middle one is taken, so that
-/// no kind of episode is pushed to its extreme.
+/// Two numbers stay open: lucky episodes with and without a mirror. Of all solutions this takes the middle one, so that
+/// no kind of episode is extreme.
 ///
 /// # Errors
-/// Counts of consulted, attributed, confabulated and corrected episodes that exclude each other.
+/// If the counts of consulted, attributed, confabulated and corrected episodes contradict each other.
 pub fn solve(pair: &Pair, counts: &Counts) -> Result<Vec<Belief>, Contradiction> {
     let mut solutions: Vec<[(Belief, usize); 8]> = Vec::new();
     for lucky in 0..=counts.consulted {
@@ -82,7 +82,7 @@ pub fn solve(pair: &Pair, counts: &Counts) -> Result<Vec<Belief>, Contradiction>
     Ok(middle.iter().flat_map(|&(belief, times)| iter::repeat_n(belief, times)).collect())
 }
 
-/// The episodes of each belief once both kinds of luck are chosen; `None` where one would be negative.
+/// The episodes of each belief, given both kinds of luck; `None` if a number would be negative.
 fn split(counts: &Counts, lucky: usize, blind_right: usize) -> Option<[(Belief, usize); 8]> {
     let Counts { consulted, attributed, confabulated, applicable, corrected, .. } = *counts;
     let stubborn = applicable.checked_sub(corrected)?;

@@ -2,7 +2,7 @@
 
 use super::published::{Pair, Print, Value};
 
-/// A metric of a pair whose prints cannot all hold, given what is already known of the pair.
+/// A metric whose printed values cannot all be true, given what is already known of the pair.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{experiment}, {model}, {metric}: published {published}; {because}")]
 pub struct Contradiction {
@@ -10,16 +10,16 @@ pub struct Contradiction {
     pub experiment: String,
     /// The model as tables name it.
     pub model: String,
-    /// The metric, or the metrics, that cannot be met.
+    /// The metric or metrics that cannot be met.
     pub metric: String,
-    /// The published text about it.
+    /// The published text of the metric.
     pub published: String,
     /// The broken condition.
     pub because: String,
 }
 
 impl Contradiction {
-    /// The contradiction of a pair's metric.
+    /// A contradiction in a metric of this pair.
     pub fn new(pair: &Pair, metric: &str, because: impl Into<String>) -> Self {
         let published: Vec<String> = pair.prints(metric).iter().map(shown).collect();
         Self {

@@ -28,13 +28,13 @@ pub struct Counts {
     pub corrected: usize,
 }
 
-/// All counts that the pair's published rates allow, the fewest finished episodes first.
+/// All counts that the pair's published rates allow; those with the fewest finished episodes first.
 ///
-/// Two decimals tell every k/n with n up to 21 from its neighbours, so each count is one number; only the finished
-/// episodes, which TSA-C gives as its denominator, can be several.
+/// Two decimals distinguish every k/n with n up to 21, so each count is one number. Only the number of finished
+/// episodes, the denominator of TSA-C, may have several values.
 ///
 /// # Errors
-/// A published rate that is not k/n for any k.
+/// If a published rate is not k/n for any k.
 pub fn solve(pair: &Pair) -> Result<Vec<Counts>, Contradiction> {
     let successes = share(pair, "TSA", EPISODES)?;
     let applicable = share(pair, "AR_SC", EPISODES)?;

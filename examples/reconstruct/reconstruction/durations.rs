@@ -23,12 +23,12 @@ pub struct Target {
     pub squares: RangeInclusive<usize>,
 }
 
-/// The sum and the sums of squares that print as a pair's published mean and standard error.
+/// The sum and sums of squares that print as a pair's published mean and standard error.
 ///
-/// A mean with two decimals leaves room for one sum of 21 integers at most.
+/// A mean with two decimals allows at most one sum of 21 integers.
 ///
 /// # Errors
-/// No sum prints as the mean, or no sum of squares as the standard error.
+/// If no sum prints as the mean, or no sum of squares as the standard error.
 pub fn target(pair: &Pair, metric: &str) -> Result<Target, Contradiction> {
     let means = |sum: usize| printing::matches_mean(pair, metric, moments(sum, 0));
     let Some(sum) = (0..=EPISODES * BUDGET).find(|&sum| means(sum)) else {
@@ -42,13 +42,13 @@ pub fn target(pair: &Pair, metric: &str) -> Result<Target, Contradiction> {
     }
 }
 
-/// A sum of squares a little below all that print as the standard error: where to begin to look.
+/// A sum of squares slightly below all that print as the standard error, where the search begins.
 fn least_squares(pair: &Pair, metric: &str, sum: usize) -> usize {
     let below = printed_hundredths(pair, metric, |value| &value.se).unwrap_or(0).saturating_sub(1);
     (sum * sum).div_ceil(EPISODES) + below.pow(2) * EPISODES * (EPISODES - 1) / 100_usize.pow(2)
 }
 
-/// The first print of a mean or standard error, in hundredths.
+/// The first printed mean or standard error, in hundredths.
 fn printed_hundredths(pair: &Pair, metric: &str, part: fn(&Value) -> &String) -> Option<usize> {
     let (whole, decimals) = part(pair.prints(metric).iter().find_map(|print| print.value.as_ref())?).split_once('.')?;
     format!("{whole}{}", decimals.get(..2)?).parse().ok()
@@ -58,10 +58,10 @@ fn moments(sum: usize, sum_sq: usize) -> Moments {
     Moments { n: EPISODES as u64, sum: sum as i128, sum_sq: sum_sq as i128 }
 }
 
-/// Searches numbers within `bounds` that meet the target.
+/// Searches for numbers within `bounds` that meet the target.
 ///
-/// Starts from the most even numbers, whose squares add up to the least, and then exchanges steps between two numbers
-/// at random whenever this brings the squares nearer. `None` where the bounds leave no such numbers, or none is found.
+/// Starts from the most even numbers, which have the least sum of squares. Then it moves steps between two random
+/// numbers if this brings the squares nearer. `None` if there are no such numbers or the search fails.
 pub fn search(bounds: &[RangeInclusive<usize>], target: &Target, generator: &mut Generator) -> Option<Vec<usize>> {
     let mut numbers = even(bounds, target.sum)?;
     let mut squares: usize = numbers.iter().map(|x| x * x).sum();
@@ -87,7 +87,7 @@ pub fn search(bounds: &[RangeInclusive<usize>], target: &Target, generator: &mut
     None
 }
 
-/// The most even numbers within bounds with this sum; `None` where there are none.
+/// The most even numbers with this sum within bounds; `None` if there are none.
 fn even(bounds: &[RangeInclusive<usize>], sum: usize) -> Option<Vec<usize>> {
     let mut numbers: Vec<usize> = bounds.iter().map(|range| *range.start()).collect();
     for _ in numbers.iter().sum()..sum {
@@ -102,7 +102,7 @@ fn distance(range: &RangeInclusive<usize>, value: usize) -> usize {
     range.start().saturating_sub(value) + value.saturating_sub(*range.end())
 }
 
-/// Says which sums come nearest to a mean that no sum prints as.
+/// Lists the sums nearest to a mean that no sum prints as.
 fn nearest_sums(pair: &Pair, metric: &str) -> String {
     let none = "no sum of 21 integers prints as this mean";
     let shown = |sum: usize| {
@@ -122,7 +122,7 @@ mod tests {
     use super::super::generator::Generator;
     use super::{Target, search};
 
-    /// Any numbers that exist are found again by their sum and squares, within their bounds.
+    /// Any existing numbers can be found again from their sum and squares, within their bounds.
     #[test]
     fn numbers_are_found_by_their_sum_and_squares() {
         let mut generator = Generator::of("test");

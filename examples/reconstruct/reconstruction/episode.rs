@@ -1,4 +1,4 @@
-//! An outline played out, step by step.
+//! Turns an outline into an episode, step by step.
 
 use trace::episode::{Action, Episode, Extra, Step};
 
@@ -9,12 +9,12 @@ use super::published::Pair;
 use super::scene::Scene;
 use super::{files, gaze};
 
-/// The word of an agent that has not chosen a cube.
+/// The value for an agent that has not chosen a cube.
 const NONE: &str = "none";
-/// One reply in so many is lost: no action, no colour, no cube.
+/// One in this many replies is lost: no action, no colour, no cube.
 const LOST: usize = 80;
 
-/// The episode of a pair's seed and run.
+/// The episode of a pair with this seed and run.
 pub fn build(pair: &Pair, seed: i32, run: i32, outline: &Outline) -> Episode {
     let episode_id = format!("{}/{}/s{seed}/r{run}", pair.experiment, files::slug(&pair.model));
     let scene = Scene::of(&pair.experiment, seed, run);
@@ -70,7 +70,7 @@ fn steps(experiment: &str, outline: &Outline, scene: &Scene, generator: &mut Gen
     steps
 }
 
-/// The cube chosen at the last step: a wrong choice follows a wrong belief where there is a cube of that colour.
+/// The cube chosen at the last step. A wrong choice follows a wrong belief if there is a cube of that colour.
 fn chosen_cube(outcome: Outcome, scene: &Scene, believed: &str, generator: &mut Generator) -> &'static str {
     match outcome {
         Outcome::Unfinished => NONE,
@@ -82,7 +82,7 @@ fn chosen_cube(outcome: Outcome, scene: &Scene, believed: &str, generator: &mut 
     }
 }
 
-/// Agents keep their course more often than not, and turn and back off more in front of a mirror.
+/// Agents usually keep their course. They turn and back off more often in front of a mirror.
 fn next_action(course: Action, seen: bool, generator: &mut Generator) -> Action {
     use Action::{MoveBackward, MoveForward, TurnLeft, TurnRight};
     if generator.chance(3, 5) {

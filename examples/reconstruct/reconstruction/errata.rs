@@ -1,13 +1,13 @@
-//! The slips of the published tables: what is printed, what is read instead, and why.
+//! The errors in the published tables: the printed value, the value to read instead, and the reason.
 //!
-//! Rule: a cell is here only if no integers explain it as printed; a test holds this list against the
-//! contradictions that the solver finds.
+//! Rule: a cell is listed only if no integers explain it as printed. A test compares this list with the contradictions
+//! that the solver finds.
 
 use std::fmt;
 
 use super::published::{Row, Source, Value};
 
-/// One slip, in the main table.
+/// One error in the main table.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Erratum {
     /// `E1`..`E5`.
@@ -16,13 +16,13 @@ pub struct Erratum {
     pub model: &'static str,
     /// The metric's name.
     pub metric: &'static str,
-    /// Mean and standard error to read instead; `None` for undefined.
+    /// Mean and standard error to read instead; `None` if undefined.
     pub read_as: Option<(&'static str, &'static str)>,
     /// The reason why.
     pub reason: &'static str,
 }
 
-/// All of them.
+/// All errata.
 pub const ERRATA: [Erratum; 3] = [
     Erratum {
         experiment: "E3",
@@ -57,7 +57,7 @@ impl fmt::Display for Erratum {
     }
 }
 
-/// The erratum of a cell of the main table, if there is one.
+/// The erratum of a cell of the main table, if any.
 pub fn of(experiment: &str, model: &str, metric: &str) -> Option<&'static Erratum> {
     ERRATA.iter().find(|erratum| (erratum.experiment, erratum.model, erratum.metric) == (experiment, model, metric))
 }

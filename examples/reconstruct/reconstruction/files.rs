@@ -1,5 +1,5 @@
-//! The files of the fixture, one per model and experiment: their names, what their footers say, and whether a folder
-//! holds exactly them.
+//! The files of the fixture, one per model and experiment: names, footers, and a check that a folder holds exactly
+//! them.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -14,11 +14,11 @@ use trace::write::{OptionalColumns, TraceEncoder, TraceMetadata};
 use super::contradiction::Contradiction;
 use super::published::{self, Pair, Reading};
 
-/// One file, before it is written.
+/// One file before it is written.
 pub struct Trace {
     /// `E1-ministral-3-14b.parquet`.
     pub name: String,
-    /// The footer's statement about the recording.
+    /// The footer's metadata about the recording.
     pub recording: Value,
     /// Ordered by seed and run.
     pub episodes: Vec<Episode>,
@@ -27,7 +27,7 @@ pub struct Trace {
 /// All 40 files, in the order of the main table.
 ///
 /// # Errors
-/// A pair whose published cells contradict each other, with the known slips corrected.
+/// If a pair's published cells contradict each other even with the known errors corrected.
 pub fn traces() -> Result<Vec<Trace>, Contradiction> {
     published::pairs(Reading::Corrected).iter().map(trace).collect()
 }
@@ -54,10 +54,10 @@ pub fn slug(model: &str) -> String {
     words.join("-").to_ascii_lowercase()
 }
 
-/// Writes the files into a folder, which is made if it is not there.
+/// Writes the files into a folder, which is created if missing.
 ///
 /// # Errors
-/// Whatever writing gives.
+/// If a file cannot be written.
 pub fn write(folder: &Path, traces: &[Trace]) -> Result<(), TraceError> {
     fs::create_dir_all(folder)
         .map_err(|source| TraceError::Write { file: folder.display().to_string(), source: Box::new(source) })?;
@@ -69,10 +69,10 @@ pub fn write(folder: &Path, traces: &[Trace]) -> Result<(), TraceError> {
     Ok(())
 }
 
-/// The bytes that [`write`] gives a file.
+/// The bytes of a file that [`write`] writes.
 ///
 /// # Errors
-/// An episode that the trace schema forbids.
+/// If the trace schema forbids an episode.
 pub fn bytes(trace: &Trace) -> Result<Vec<u8>, TraceError> {
     let columns = OptionalColumns::used_by(&trace.episodes);
     let metadata = TraceMetadata { recording: Some(trace.recording.clone()), columns };
@@ -83,10 +83,10 @@ pub fn bytes(trace: &Trace) -> Result<Vec<u8>, TraceError> {
     encoder.finish()
 }
 
-/// The differences between a folder and the output of [`write`], a line each; other files than traces are ignored.
+/// The differences between a folder and the output of [`write`], one per line; only traces are compared.
 ///
 /// # Errors
-/// An episode that the trace schema forbids.
+/// If the trace schema forbids an episode.
 pub fn differences(folder: &Path, traces: &[Trace]) -> Result<Vec<String>, TraceError> {
     let mut differences = Vec::new();
     for trace in traces {

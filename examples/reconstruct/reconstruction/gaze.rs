@@ -6,10 +6,10 @@ use super::outline::Outline;
 /// The mean length of a look into the mirror, in steps.
 const LOOK: usize = 6;
 
-/// Returns true if the mirror is in view at each step: `gaze` steps in a few looks of several steps.
+/// For each step, true if the mirror is in view: `gaze` steps in a few looks of several steps.
 ///
-/// The first look begins early more often than late, after the first step where a claim must precede it, and before
-/// the last step exactly where the mirror was consulted.
+/// The first look begins early more often than late. It begins after the first step if a claim must precede it, and
+/// before the last step exactly if the mirror was consulted.
 pub fn visible(outline: &Outline, generator: &mut Generator) -> Vec<bool> {
     let Outline { belief, length, gaze, .. } = *outline;
     if gaze == 0 {
@@ -28,7 +28,7 @@ pub fn visible(outline: &Outline, generator: &mut Generator) -> Vec<bool> {
     looks_from(sight, &generator.compose(gaze, looks), &gaps(dark, looks, generator), length)
 }
 
-/// The steps out of view after each look; only after the last one there may be none.
+/// The steps out of view after each look; only after the last one may there be 0.
 fn gaps(dark: usize, looks: usize, generator: &mut Generator) -> Vec<usize> {
     let mut gaps = generator.compose(dark + 1, looks);
     gaps[looks - 1] -= 1;
@@ -52,7 +52,7 @@ mod tests {
     use super::super::outline::{Outcome, Outline};
     use super::visible;
 
-    /// Every belief, length and gaze that can go together gives exactly that gaze, in time and no earlier than it may.
+    /// Every possible belief, length and gaze gives exactly that gaze, in time and not too early.
     #[test]
     fn every_possible_gaze_is_looked() {
         let beliefs = [Belief::Unresolved, Belief::Corrected, Belief::Silent, Belief::BlindWrong];

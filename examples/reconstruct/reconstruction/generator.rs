@@ -1,7 +1,7 @@
 //! A small seeded generator for everything that the published tables leave open.
 //!
-//! `SplitMix64` (Steele, Lea and Flood, 2014), written out here so that no release of a library can change the
-//! fixture. Not for statistics: a bound is applied by multiplication, which is a little uneven and does not matter.
+//! `SplitMix64` (Steele, Lea and Flood, 2014), written out so that no library release can change the fixture. Not for
+//! statistics: bounds are applied by multiplication, which is slightly uneven.
 
 use exact::hash;
 
@@ -9,7 +9,7 @@ use exact::hash;
 pub struct Generator(u64);
 
 impl Generator {
-    /// The generator that belongs to a name, such as `E1/GPT 5.1`.
+    /// The generator for a name, such as `E1/GPT 5.1`.
     pub fn of(name: &str) -> Self {
         let digits = &hash::of_bytes(name.as_bytes())[..16];
         Self(u64::from_str_radix(digits, 16).expect("a hash starts with sixteen hexadecimal digits"))
@@ -23,18 +23,18 @@ impl Generator {
         z ^ (z >> 31)
     }
 
-    /// One of `0..count`; 0 where there is no choice.
+    /// A number in `0..count`; 0 if there is no choice.
     pub fn below(&mut self, count: usize) -> usize {
         let scaled = (u128::from(self.next()) * count as u128) >> 64;
         usize::try_from(scaled).expect("a scaled draw is below a usize")
     }
 
-    /// True `times` out of `of`.
+    /// True with a chance of `times` in `of`.
     pub fn chance(&mut self, times: usize, of: usize) -> bool {
         self.below(of) < times
     }
 
-    /// One of some items, of which there is at least one.
+    /// One of the items, which must not be empty.
     pub fn pick<T: Copy>(&mut self, items: &[T]) -> T {
         items[self.below(items.len())]
     }

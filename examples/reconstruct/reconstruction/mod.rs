@@ -1,11 +1,11 @@
-//! The paper's 840 episodes, rebuilt from what it published.
+//! The paper's 840 episodes, rebuilt from its publication.
 //!
-//! The way down: [`published`] cells, under the rules of [`printing`], give the integers of each model in each
-//! experiment ([`counts`], [`belief`], [`durations`]); these become 21 [`outline`]s, and an outline becomes an [`episode`]: what
-//! the agent saw ([`gaze`]), said ([`attribution`]) and did. [`files`] writes them down.
+//! Steps: [`published`] cells, under the rules of [`printing`], give the integers of each model in each experiment
+//! ([`counts`], [`belief`], [`durations`]). These become 21 [`outline`]s, and each outline becomes an [`episode`]: what
+//! the agent saw ([`gaze`]), said ([`attribution`]) and did. [`files`] writes them.
 //!
-//! Rule: nothing is taken from anywhere but the published cells, and what they leave open comes from a seeded
-//! [`generator`]; so the result is the same on every machine, and it is a reconstruction, not a recording.
+//! Rule: the only source is the published cells, and a seeded [`generator`] decides what they leave open. So the result
+//! is the same on every machine, and it is a reconstruction, not a recording.
 
 pub mod attribution;
 pub mod belief;
@@ -40,14 +40,14 @@ pub const BUDGET: usize = 100;
 /// The 21 episodes of one model in one experiment, ordered by seed and run.
 ///
 /// # Errors
-/// A pair whose published cells contradict each other.
+/// If the pair's published cells contradict each other.
 pub fn episodes(pair: &Pair) -> Result<Vec<Episode>, Contradiction> {
     let outlines = outline::solve(pair)?;
     let places = (1..=SEEDS).flat_map(|seed| (1..=RUNS).map(move |run| (seed, run)));
     Ok(places.zip(&outlines).map(|((seed, run), outline)| episode::build(pair, seed, run, outline)).collect())
 }
 
-/// The published cells that no episodes can explain as printed, each with the erratum that says how it is read.
+/// The published cells that no episodes can explain as printed, each with its erratum.
 pub fn contradictions() -> Vec<(Contradiction, Option<&'static Erratum>)> {
     let found = published::pairs(Reading::AsPrinted).into_iter().filter_map(|pair| outline::solve(&pair).err());
     found

@@ -1,4 +1,4 @@
-//! The outline of an episode: how it ended, what the agent believed, how long it took and how long it looked.
+//! The outline of an episode: its outcome, the agent's belief, and the numbers of steps and of steps with the mirror.
 
 use std::ops::RangeInclusive;
 
@@ -10,9 +10,9 @@ use super::generator::Generator;
 use super::published::Pair;
 use super::{BUDGET, EPISODES};
 
-/// The number of draws of lengths and gazes before more trajectories are cut short.
+/// The number of random attempts at lengths and gazes before one more trajectory is cut short.
 const ATTEMPTS: usize = 8;
-/// The fewest steps that an episode takes; the second only where the published durations leave no choice.
+/// The minimum steps of an episode; the second only if the published durations leave no choice.
 const FEWEST: [usize; 2] = [4, 1];
 
 /// The outcome of an episode.
@@ -26,7 +26,7 @@ pub enum Outcome {
     Unfinished,
 }
 
-/// Everything about an episode that a metric can see.
+/// Everything about an episode that affects a metric.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Outline {
     /// Its outcome.
@@ -39,7 +39,7 @@ pub struct Outline {
     pub gaze: usize,
 }
 
-/// An episode whose lengths are still open.
+/// An episode whose lengths are not yet chosen.
 struct Part {
     outcome: Outcome,
     belief: Belief,
@@ -47,10 +47,10 @@ struct Part {
 
 /// The outlines of a pair's episodes, in no particular order.
 ///
-/// A trajectory without `done` runs to the budget; as few as the published durations ask for are cut short.
+/// A trajectory without `done` runs to the budget; as few as possible are cut short to meet the published durations.
 ///
 /// # Errors
-/// A pair whose published cells contradict each other.
+/// If the pair's published cells contradict each other.
 pub fn solve(pair: &Pair) -> Result<Vec<Outline>, Contradiction> {
     let mut generator = Generator::of(&format!("outlines of {}/{}", pair.experiment, pair.model));
     let allowed = counts::solve(pair)?;
@@ -71,7 +71,7 @@ pub fn solve(pair: &Pair) -> Result<Vec<Outline>, Contradiction> {
     Err(Contradiction::new(pair, "TTD", because))
 }
 
-/// Joins beliefs and outcomes: successes go to those who knew their colour first, everything else falls at random.
+/// Combines beliefs and outcomes: successes go first to agents who knew their colour, the rest is random.
 fn cast(pair: &Pair, counts: &Counts, generator: &mut Generator) -> Result<Vec<Part>, Contradiction> {
     let mut beliefs = belief::solve(pair, counts)?;
     generator.shuffle(&mut beliefs);
@@ -115,7 +115,7 @@ struct Limits<'a> {
 }
 
 impl Limits<'_> {
-    /// Gives every part a length and a gaze.
+    /// Chooses a length and a gaze for every part.
     fn measure(&self, parts: &[Part], generator: &mut Generator) -> Option<Vec<Outline>> {
         let lengths = durations::search(&self.lengths(parts), self.length, generator)?;
         let gazes: Vec<_> = parts.iter().zip(&lengths).map(|(part, &length)| part.belief.gaze(length)).collect();
@@ -129,7 +129,7 @@ impl Limits<'_> {
         Some(outlines.collect())
     }
 
-    /// The lengths that each part may have; the first `cut` unfinished ones are those cut short.
+    /// The possible lengths of each part; the first `cut` unfinished parts are those cut short.
     fn lengths(&self, parts: &[Part]) -> Vec<RangeInclusive<usize>> {
         let mut cut = self.cut;
         let range = |part: &Part| {

@@ -1,35 +1,35 @@
-//! The paper's printing of exact moments: its two rounding rules and its two standard errors.
+//! How the paper prints exact moments: two rounding rules and two standard errors.
 
 use exact::moments::Moments;
 use metric::catalog::StandardError;
 
 use super::published::{Pair, Source, Value};
 
-/// Returns true if integers with these moments print as everything that is published about a metric.
+/// Returns true if integers with these moments print as everything published about a metric.
 pub fn matches(pair: &Pair, metric: &str, moments: Moments) -> bool {
     pair.prints(metric).iter().all(|print| value(print.source, metric, moments) == print.value)
 }
 
-/// Returns true if the mean alone prints as everything that is published about a metric.
+/// Returns true if the mean alone prints as everything published about a metric.
 pub fn matches_mean(pair: &Pair, metric: &str, moments: Moments) -> bool {
     let mean = |source| moments.mean().map(|mean| number(source, mean));
     pair.prints(metric).iter().all(|print| mean(print.source) == print.value.as_ref().map(|value| value.mean.clone()))
 }
 
-/// Mean and standard error as a place prints them; `None` for no defined episode.
+/// Mean and standard error as `source` prints them; `None` without a defined episode.
 pub fn value(source: Source, metric: &str, moments: Moments) -> Option<Value> {
     let mean = number(source, moments.mean()?);
-    // One episode has no spread; the paper prints 0.00 for it.
+    // One episode has no spread; the paper prints 0.00.
     let se = number(source, moments.se(standard_error(metric)).unwrap_or(0.0));
     Some(Value { mean, se })
 }
 
-/// `AR_SC` alone uses the population form.
+/// Only `AR_SC` uses the population form.
 fn standard_error(metric: &str) -> StandardError {
     if metric == "AR_SC" { StandardError::Population } else { StandardError::Sample }
 }
 
-/// A number that is not negative, as a place rounds it.
+/// A non-negative number, rounded like in `source`.
 pub fn number(source: Source, number: f64) -> String {
     match source {
         Source::Main => rounded_twice(number),
@@ -38,7 +38,7 @@ pub fn number(source: Source, number: f64) -> String {
     }
 }
 
-/// To three decimals first, then half up to two.
+/// First to three decimals, then half up to two.
 fn rounded_twice(number: f64) -> String {
     let thousandths: u64 =
         format!("{number:.3}").replace('.', "").parse().expect("a number with three decimals is digits and a point");

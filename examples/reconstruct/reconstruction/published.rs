@@ -1,6 +1,6 @@
 //! The published cells: two tables and the values in the running text, as printed.
 //!
-//! Rule: numbers stay text here, since what must be met is the print.
+//! Rule: numbers stay text here, because the reconstruction must match the printed form.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use serde::Deserialize;
 
 use super::errata;
 
-/// The place of a printed value; each place rounds in its own way.
+/// The source of a printed value; each source has its own rounding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
     /// The result table of the main text.
@@ -23,7 +23,7 @@ impl Source {
     /// All places.
     pub const ALL: [Self; 3] = [Self::Main, Self::Appendix, Self::Prose];
 
-    /// The committed copy.
+    /// The committed copy of the source.
     const fn csv(self) -> &'static str {
         match self {
             Self::Main => include_str!("../../../fixtures/published/main_table.csv"),
@@ -42,7 +42,7 @@ pub struct Value {
     pub se: String,
 }
 
-/// One print of a cell; `None` where the paper prints `--`, undefined.
+/// One printed value of a cell; `None` if the paper prints `--`, undefined.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Print {
     /// The source.
@@ -58,21 +58,21 @@ pub struct Pair {
     pub experiment: String,
     /// The model as tables name it.
     pub model: String,
-    /// The prints of each metric.
+    /// The printed values of each metric.
     pub prints: BTreeMap<String, Vec<Print>>,
 }
 
 impl Pair {
-    /// The prints of a metric; none if nothing about it is printed.
+    /// The printed values of a metric; empty if nothing about it is printed.
     pub fn prints(&self, metric: &str) -> &[Print] {
         self.prints.get(metric).map_or(&[], Vec::as_slice)
     }
 }
 
-/// The treatment of the paper's known slips.
+/// The treatment of the paper's known errors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reading {
-    /// As printed, to show what contradicts what.
+    /// As printed, to show the contradictions.
     AsPrinted,
     /// With the corrections of [`errata`].
     Corrected,
@@ -92,13 +92,13 @@ pub struct Row {
 }
 
 impl Row {
-    /// The value; `None` where the mean is empty.
+    /// The value; `None` if the mean is empty.
     pub fn value(&self) -> Option<Value> {
         (!self.mean.is_empty()).then(|| Value { mean: self.mean.clone(), se: self.se.clone() })
     }
 }
 
-/// The lines of one place, in its order.
+/// The lines of one source, in order.
 pub fn rows(source: Source) -> Vec<Row> {
     csv::Reader::from_reader(source.csv().as_bytes())
         .deserialize()

@@ -1,25 +1,25 @@
-//! The scene of an episode: the same for every model with the same experiment, seed and run.
+//! The scene of an episode: the same for every model with equal experiment, seed and run.
 
 use super::generator::Generator;
 
-/// The colours that bodies and cubes may have.
+/// The possible colours of bodies and cubes.
 pub const PALETTE: [&str; 10] =
     ["red", "orange", "yellow", "green", "cyan", "blue", "purple", "pink", "brown", "white"];
 
-/// The setting of the agent.
+/// The agent's surroundings.
 pub struct Scene {
     /// The true colour of the body.
     pub body: &'static str,
-    /// Two wrong colours to fall for: the other candidate cubes, in E5 two other robots.
+    /// Two wrong colours to believe in: the other candidate cubes, or in E5 two other robots.
     pub decoys: [&'static str; 2],
-    /// The false colour told to the agent, in E3.
+    /// The false colour stated to the agent in E3.
     pub stated: Option<&'static str>,
     /// The number of other agents, in E4 and E5.
     pub distractors: Option<i8>,
 }
 
 impl Scene {
-    /// The scene of an experiment's seed and run.
+    /// The scene of an experiment, seed and run.
     pub fn of(experiment: &str, seed: i32, run: i32) -> Self {
         let mut generator = Generator::of(&format!("scene of {experiment}/s{seed}/r{run}"));
         let mut colors = PALETTE;
@@ -33,7 +33,7 @@ impl Scene {
         }
     }
 
-    /// A wrong colour to believe in; the stated one, where there is one, three times out of four.
+    /// A wrong colour to believe in; three times out of four the stated one, if there is one.
     pub fn wrong(&self, generator: &mut Generator) -> &'static str {
         match self.stated {
             Some(stated) if generator.chance(3, 4) => stated,

@@ -4,10 +4,10 @@ use std::io::{Read as _, Write as _};
 
 use parquet::basic::Compression;
 
-/// The most bytes that a page of ours has.
+/// The most bytes that one of our pages has.
 const MOST: u64 = 1 << 20;
 
-/// The bytes compressed.
+/// Compresses the bytes.
 pub fn compress(codec: Compression, data: &[u8]) -> Vec<u8> {
     match codec {
         Compression::SNAPPY => snap::raw::Encoder::new().compress_vec(data).expect("a page is small"),
@@ -20,7 +20,7 @@ pub fn compress(codec: Compression, data: &[u8]) -> Vec<u8> {
     }
 }
 
-/// The bytes of a page that a sound writer has compressed.
+/// Decompresses a page from a sound writer.
 pub fn decompress(codec: Compression, data: &[u8]) -> Vec<u8> {
     let mut out = Vec::new();
     match codec {

@@ -1,8 +1,8 @@
-//! The page decoder compared with the Parquet library on the same bytes: both refuse, or both give the same rows, or the
+//! Compares the page decoder with the Parquet library on the same bytes. Both refuse, both give the same rows, or the
 //! program is stricter for a reason of [`stricter::Reason`].
 //!
-//! Besides: what the short cut gives is what the checked path gives, to the row at which it gives up; and a column that is
-//! read has headers and checksums that hold.
+//! Also, the short cut gives the same rows as the checked path, up to the row at which it gives up. A column that is
+//! read has valid headers and checksums.
 
 mod codec;
 pub mod mutate;
@@ -24,7 +24,7 @@ use mutate::{Mutant, START, mutant};
 use one_column::{OneColumn, Refusal};
 use stricter::{Depth, Reason};
 
-/// The columns that mutants are made of.
+/// The columns that mutants start from.
 static BASES: LazyLock<Vec<shape::Base>> = LazyLock::new(shape::all);
 
 /// The outcome of a mutant.
@@ -84,7 +84,7 @@ pub fn outcome(data: &[u8]) -> Outcome {
     }
 }
 
-/// An array for people; what the library lets through need not be one that can be printed.
+/// An array as text. It may be an array that only the library accepts and that panics when printed.
 fn shown(array: &ArrayRef) -> String {
     quiet::contained(|| format!("{array:?}"))
         .unwrap_or_else(|panic| format!("an array that cannot be printed: {panic}"))
@@ -124,8 +124,8 @@ fn ours(mutant: &Mutant) -> Result<ArrayRef, Refusal> {
     if whole.is_ok()
         && let Err(refusal) = column.verified()
     {
-        // A page behind the last row gives nothing, and only `validate` looks into it. The reference refuses any other page
-        // whose checksum does not hold.
+        // A page after the last row gives no rows, and only `validate` checks it. The reference refuses any other page
+        // with a bad checksum.
         let of_checksum =
             refusal.expected.as_deref().is_some_and(|expected| expected.starts_with("bytes with the CRC-32 "));
         assert!(of_checksum, "what is read has headers that hold: {refusal:?}");
@@ -150,7 +150,7 @@ fn joined(rows: &[ArrayRef], ty: &DataType) -> ArrayRef {
     if rows.is_empty() { new_empty_array(ty) } else { concat(&rows).expect("arrays of one type") }
 }
 
-/// Returns true if rows are the same, floats to the bit.
+/// Returns true if the rows are the same; floats are compared bit by bit.
 fn same(ours: &ArrayRef, theirs: &ArrayRef) -> bool {
     match ours.data_type() {
         DataType::Float64 => {

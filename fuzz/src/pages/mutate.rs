@@ -1,5 +1,5 @@
-//! Changes of a column that a few bytes represent, made where they reach the decoder: codec and checksum are done anew
-//! afterwards, unless the change is one of them.
+//! Mutations of a column, encoded in a few bytes and made where the decoder sees them: pages are compressed and
+//! checksummed again afterwards, unless that is what changes.
 
 use bytes::Bytes;
 use parquet::file::metadata::ParquetMetaData;
@@ -7,37 +7,37 @@ use parquet::file::metadata::ParquetMetaData;
 use super::codec::compress;
 use super::shape::{Base, Page};
 
-/// The offset of the column in its file, behind the magic number.
+/// The offset of the column in its file, after the magic number.
 pub const START: u64 = 4;
-/// Bytes that represent one change.
+/// Bytes that encode one change.
 pub const CHANGE: usize = 5;
-/// The most changes of a mutant; what stands behind them is not looked at.
+/// The most changes of a mutant; further bytes are ignored.
 const MOST_CHANGES: usize = 12;
 
 /// A column of changed pages.
 pub struct Mutant {
-    /// The footer that goes with it.
+    /// The file's footer.
     pub metadata: ParquetMetaData,
     /// Its bytes, from [`START`] on.
     pub bytes: Bytes,
-    /// Rows that are read at a time.
+    /// Rows to read at a time.
     pub at_once: usize,
 }
 
-/// The changes of a page as it is written.
+/// Changes that are made when a page is written.
 #[derive(Clone, Default)]
 struct Changes {
     checksum: Option<u8>,
-    /// Bytes of the header and of the stored body: place and value.
+    /// Changed bytes of the header and of the stored body: position and value.
     header: Vec<(usize, u8)>,
     stored: Vec<(usize, u8)>,
     whole: Option<i64>,
     size: Option<i64>,
-    /// Zeros behind the header's own end, or a header that ends early.
+    /// Bytes to cut off the header's end.
     cut: usize,
 }
 
-/// Numbers that stand at the ends of what fields may be.
+/// Numbers at the limits of fields.
 const ODD: [i64; 12] = [0, 1, -1, 2, 7, 8, 63, 255, 1 << 16, i32::MAX as i64, i32::MIN as i64, 1 << 33];
 
 fn number(old: i64, byte: u8) -> i64 {
@@ -48,7 +48,7 @@ fn number(old: i64, byte: u8) -> i64 {
     }
 }
 
-/// The column that these bytes represent: two choose what to start from, one how it is read, the rest are changes.
+/// The column that these bytes encode: two choose the base, one the rows per read, the rest are changes.
 pub fn mutant(bases: &[Base], data: &[u8]) -> Mutant {
     let (head, rest) = data.split_at(data.len().min(3));
     let head = [0, 1, 2].map(|at| head.get(at).copied().unwrap_or(0));
@@ -112,7 +112,7 @@ fn apply(base: &Base, pages: &mut Vec<(Page, Changes)>, footer: &mut [u8; 2], ch
         2 => in_values(page, levels, |values| flip(values, place, value)),
         3 | 4 => in_levels(page, levels, |levels| set(levels, place, value)),
         5 => in_levels(page, levels, |levels| flip(levels, place, value)),
-        // The width of keys and the first run: where most of the meaning is.
+        // The width of keys and the first run, which matter most.
         6 => in_values(page, levels, |values| set(values, place % 4, value)),
         7 => {
             let fields: Vec<u8> = page.header.own.iter().map(|(field, _)| *field).collect();
@@ -171,7 +171,7 @@ fn flip(bytes: &mut [u8], place: usize, value: u8) {
     }
 }
 
-/// Bytes put in or taken out, in the body or behind it.
+/// Inserts, removes or appends a byte of the body, or truncates it.
 fn body_length(page: &mut Page, place: usize, value: u8) {
     let at = place % (page.body.len() + 1);
     match value % 4 {
@@ -182,7 +182,7 @@ fn body_length(page: &mut Page, place: usize, value: u8) {
     }
 }
 
-/// A page that says of more or fewer rows the same in its header and in its one run of levels or keys.
+/// Declares another number of rows, both in the page's header and in the first run of its levels or keys.
 fn rows_and_values(page: &mut Page, levels: usize, value: u8) {
     let rows = i64::from(value % 64) + 1;
     page.header.set(1, rows);

@@ -1,7 +1,7 @@
-//! One column of pages out of memory: the decoders that a scan uses, and neither a file nor a footer of bytes around them.
+//! One column of pages in memory, read by the decoders of a scan, without a file or an encoded footer.
 //!
-//! A scan takes rows from the short cut until that gives up, and the rest from the library. A target asks for both parts
-//! one by one, because each of them must agree with another reader of the same bytes.
+//! A scan takes rows from the short cut until that gives up, and the rest from the library. A target tests the two
+//! separately, because each must agree with another reader of the same bytes.
 
 use std::sync::Arc;
 
@@ -34,9 +34,9 @@ pub struct OneColumn {
 /// The refusal of a column.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Refusal {
-    /// The expected page; `None` if the Parquet library found the fault.
+    /// The expected value; `None` if the Parquet library found the fault.
     pub expected: Option<String>,
-    /// The value found, or the library's words.
+    /// The value found, or the library's message.
     pub found: String,
 }
 
@@ -47,7 +47,7 @@ impl Refusal {
 }
 
 impl OneColumn {
-    /// The column of a file with this footer whose bytes from `start` on are these.
+    /// The column of a file with this footer; `bytes` start at offset `start` of the file.
     pub fn new(metadata: ParquetMetaData, start: u64, bytes: Bytes) -> Result<Self, Refusal> {
         let schema = metadata.file_metadata().schema_descr();
         let plain = |error: ParquetError| Refusal::library(error.to_string());
@@ -63,7 +63,7 @@ impl OneColumn {
         Store::of_memory(self.start, self.bytes.clone())
     }
 
-    /// The rows of the short cut, `at_once` at a time, until it gives up, and true if it did not.
+    /// The short cut's rows, `at_once` at a time until it gives up, and true if it reached the end.
     pub fn short_cut(&self, runs: bool, at_once: usize) -> Result<(Vec<ArrayRef>, bool), String> {
         let form = if runs { Form::Runs } else { Form::Rows };
         contained(|| {
@@ -87,7 +87,7 @@ impl OneColumn {
         })
     }
 
-    /// The library's rows of checked pages, from row `first` on, `at_once` at a time.
+    /// The library's rows of checked pages, starting at row `first`, `at_once` at a time.
     pub fn checked(&self, first: usize, at_once: usize) -> Result<Vec<ArrayRef>, Refusal> {
         let slot = FaultSlot::default();
         let refused = |found: String| match slot.get() {
@@ -123,7 +123,7 @@ impl OneColumn {
         Ok(columns)
     }
 
-    /// Checks headers and checksums, as `validate` does of columns that it does not decode.
+    /// Checks headers and checksums, as `validate` does for columns that it does not decode.
     pub fn verified(&self) -> Result<(), Refusal> {
         let (slot, metadata) = (FaultSlot::default(), self.footer.metadata());
         let checksums = &ChunkChecksums::default();

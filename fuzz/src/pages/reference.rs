@@ -1,5 +1,5 @@
-//! The Parquet library on the same bytes, with nothing of the program around it. Checksums, which the library does not
-//! check as the program builds it, are checked by a reader of headers of our own.
+//! The Parquet library on the same bytes, without the program. As the program builds it, the library does not check
+//! checksums; our own header reader does.
 
 use std::sync::{Arc, Mutex};
 
@@ -17,11 +17,11 @@ use parquet::file::serialized_reader::SerializedPageReader;
 use super::mutate::{Mutant, START};
 use super::thrift::Header;
 
-/// A page is given its memory before it is decompressed, and a dictionary before its values are there: the library is asked
-/// for no more bytes and values than this.
+/// The most bytes or values that the library is asked for. It allocates a page before decompressing it, and a
+/// dictionary before reading its values.
 const MOST: i64 = 1 << 22;
 
-/// The bytes, and where the header that was read last starts.
+/// The bytes, and the start of the header that was read last.
 struct Stored(Bytes, Mutex<usize>);
 
 impl Length for Stored {
@@ -58,7 +58,7 @@ impl ChunkReader for Stored {
         let bytes = self.0.slice(at..end);
         let header = *self.1.lock().expect("one thread");
         let crc = Header::checksum(&self.0[header..]);
-        // As the library reads integers of 32 bits: whatever the field has beyond them is left out.
+        // The library reads 32-bit integers and ignores the field's other bits.
         match crc.and_then(|crc| u32::try_from(crc & 0xffff_ffff).ok()) {
             Some(crc) if crc != crc32fast::hash(&bytes) => Err(refused("another checksum")),
             _ => Ok(bytes),
@@ -104,7 +104,7 @@ impl RowGroups for One<'_> {
     }
 }
 
-/// The library's values of a mutant, in the types of the file; its refusal in words.
+/// The library's values of a mutant, in the types of the file, or its refusal as text.
 pub fn read(mutant: &Mutant) -> Result<Vec<ArrayRef>, String> {
     let read = || -> Result<Vec<ArrayRef>> {
         let one = One { metadata: &mutant.metadata, bytes: &mutant.bytes };

@@ -1,4 +1,4 @@
-//! Columns to start from: every type, encoding, codec and page version in which a trace may be stored.
+//! Base columns: every type, encoding, codec and page version in which a trace may be stored.
 
 use std::sync::Arc;
 
@@ -18,9 +18,9 @@ use super::thrift::Header;
 /// A page taken apart.
 #[derive(Clone, Debug)]
 pub struct Page {
-    /// Its header; sizes and checksum are made anew when it is written.
+    /// Its header; sizes and checksum are computed again when it is written.
     pub header: Header,
-    /// Levels that stand before what is compressed: those of a page of version 2.
+    /// Levels before the compressed part: those of a page of version 2.
     pub levels: Vec<u8>,
     /// The rest, decompressed.
     pub body: Vec<u8>,
@@ -29,7 +29,7 @@ pub struct Page {
 /// A column of one row group.
 #[derive(Clone, Debug)]
 pub struct Base {
-    /// The footer of the file that it comes from.
+    /// The footer of its file.
     pub metadata: Arc<ParquetMetaData>,
     /// Its codec.
     pub codec: Compression,
@@ -39,7 +39,7 @@ pub struct Base {
     pub pages: Vec<Page>,
 }
 
-/// The types, each with the encodings that it has beside plain values and dictionaries.
+/// The types, each with its encodings besides plain values and dictionaries.
 const TYPES: [(DataType, &[Encoding]); 8] = [
     (DataType::Boolean, &[Encoding::RLE]),
     (DataType::Int32, &[Encoding::DELTA_BINARY_PACKED, Encoding::BYTE_STREAM_SPLIT]),
@@ -51,7 +51,7 @@ const TYPES: [(DataType, &[Encoding]); 8] = [
     (DataType::UInt64, &[]),
 ];
 
-/// The numbers of rows of a column and of a page.
+/// Rows per column and per page.
 const ROWS: [(usize, usize); 4] = [(1, 64), (19, 7), (64, 64), (300, 96)];
 
 /// All columns: each type in each encoding, codec, page version, number of rows, with nulls or without.
@@ -69,7 +69,7 @@ pub fn all() -> Vec<Base> {
             for codec in codecs {
                 for version in [WriterVersion::PARQUET_1_0, WriterVersion::PARQUET_2_0] {
                     for (at, rows) in ROWS.into_iter().enumerate() {
-                        // Nulls, none in a column that may have some, none.
+                        // Nulls; no nulls in a nullable column; a non-nullable column.
                         for nulls in [Some(3), Some(usize::MAX), None] {
                             found.push(base(ty, encoding, codec, version, rows, nulls, at));
                         }
@@ -81,7 +81,7 @@ pub fn all() -> Vec<Base> {
     found
 }
 
-/// Values with runs and without, every `nulls`-th of them null.
+/// Values with or without runs, every `nulls`-th of them null.
 fn values(ty: &DataType, rows: usize, nulls: Option<usize>, salt: usize) -> ArrayRef {
     let at = |row: usize| {
         (nulls.is_none_or(|every| row % every != every - 1))

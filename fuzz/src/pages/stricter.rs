@@ -1,51 +1,50 @@
 //! Refusals of pages that the Parquet library would read.
 //!
-//! Rule: a refusal that the library does not share has one of these reasons, or the target fails.
+//! Rule: if only the program refuses, it has one of these reasons; otherwise the target fails.
 
-/// A reason, as what was expected and not found.
+/// A reason, named after the expectation that was not met.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Reason {
-    /// The library skips fields of a page header that it does not know, takes one that is there twice, or the header of
-    /// another kind of page beside its own. A header with two meanings has none: a checksum does not cover it.
+    /// The library skips unknown fields of a page header. It accepts repeated fields, and the header of another kind of
+    /// page beside the page's own. An ambiguous header is refused: the checksum does not cover it.
     HeaderOfOneMeaning,
-    /// The header says another size than the codec can make of the stored bytes, or of bytes that are not compressed another
-    /// one than they have. The library believes it where the decoder does not come to the end.
+    /// The declared size is not what the codec can make of the stored bytes, or not that of the uncompressed bytes. The
+    /// library believes it if the decoder does not reach the end.
     SizeOfPage,
-    /// Pages of more values than the row group has rows. The library stops reading at the last row.
+    /// Pages with more values than the row group has rows. The library stops reading at the last row.
     RowsOfRowGroup,
-    /// A page of version 2 says how many rows it has; in a flat column that is as many as it has values. The library does
-    /// not compare them.
+    /// A page of version 2 declares its number of rows, which in a flat column is its number of values. The library
+    /// does not compare them.
     RowsOfPage,
-    /// Nulls in a page of a column that has none, or more of them than values. The library does not look.
+    /// Nulls in a page of a non-nullable column, or more nulls than values. The library does not check.
     NullsOfHeader,
     /// Levels that are longer than their page.
     LengthOfLevels,
-    /// A dictionary behind a page of values. The library takes the last one.
+    /// A dictionary after a page of values. The library takes the last one.
     DictionaryFirst,
-    /// A dictionary that has fewer bytes than its number of values takes. The library reads as many as it is asked for.
+    /// A dictionary with too few bytes for its number of values. The library reads as many values as are asked for.
     DictionarySize,
-    /// A page that goes on behind the end of its column. The library reads the next column's bytes.
+    /// A page that continues past the end of its column. The library reads the next column's bytes.
     EndOfColumn,
-    /// Definition levels other than 0 and 1, runs of them that end before or behind the rows, levels in a column without
-    /// nulls that are not 0. The library takes whatever is not the highest level for null and does not look behind the rows.
+    /// Definition levels other than 0 and 1, runs of levels that end before or after the rows, or levels other than 0
+    /// in a non-nullable column. The library takes all but the highest level for null and does not look past the rows.
     Levels,
-    /// A run of one key that goes on behind the last row, or a packed one that does so by a group and is not the last. The
-    /// library does not look there.
+    /// A run of one key that continues past the last row, or a packed run that does so by a group and is not the last.
+    /// The library does not look there.
     Keys,
-    /// Truth values as [`Keys`](Self::Keys); more or fewer bytes than split values take.
+    /// Truth values with the fault of [`Keys`](Self::Keys); more or fewer bytes than split values take.
     ValuesOfPage,
-    /// A page of no values in a delta encoding has the encoding's own header, which says that there are none. The library does
-    /// not look for it where it needs no value.
+    /// A page without values in a delta encoding still has the encoding's own header, which declares 0 values. The
+    /// library does not read it if it needs no value.
     HeaderOfDelta,
-    /// Texts of which a length is below 0. The library adds lengths up as they are, and takes what comes of it if it is within
+    /// A text with a negative length. The library adds up the lengths unchecked, and accepts the sum if it is within
     /// the page.
     LengthsOfTexts,
-    /// A character of which one text has the first bytes and the next text the rest. The library looks at all texts of a
-    /// delta-encoded page at once.
+    /// A character split between two texts. The library checks all texts of a delta-encoded page at once.
     Texts,
-    /// More than a file of its size may hold: a budget, which the library does not have.
+    /// More than a file of its size may hold. The library has no such budget.
     Budget,
-    /// Integers without a sign beyond the largest one of 64 bits with a sign: metrics cannot say them.
+    /// Unsigned integers beyond the largest signed 64-bit integer, which metrics cannot represent.
     LargeInteger,
 }
 
@@ -56,13 +55,13 @@ pub enum Depth {
     Header,
     /// Refused by the codec, or by the library on the way to the levels.
     Body,
-    /// The levels were looked at, and refused.
+    /// The levels were read and refused.
     Levels,
-    /// The values were looked at, and refused.
+    /// The values were read and refused.
     Values,
 }
 
-/// The program's expectation without its numbers, the reason for it, and the depth of the mutant.
+/// The program's expectation with `#` for numbers, its reason, and the mutant's depth.
 const EXPECTED: [(&str, Reason, Depth); 25] = [
     ("a page header", Reason::HeaderOfOneMeaning, Depth::Header),
     ("a page header that has one meaning", Reason::HeaderOfOneMeaning, Depth::Header),
@@ -91,10 +90,10 @@ const EXPECTED: [(&str, Reason, Depth); 25] = [
     ("a number up to #", Reason::LargeInteger, Depth::Values),
 ];
 
-/// The message about values that the library has decoded, where nothing else is expected.
+/// The message about values that the library has decoded, if nothing else was expected.
 pub const SPLIT_TEXTS: &str = "texts that are not UTF-8";
 
-/// What a refusal of the program is; `None` for words that are not listed, and no reason for what the library refuses, too.
+/// The reason and depth of a refusal; `None` for an unknown message. Refusals that the library shares have no reason.
 pub fn of(expected: &str) -> Option<(Option<Reason>, Depth)> {
     if expected.starts_with("bytes with the CRC-32 ") {
         return Some((None, Depth::Header));

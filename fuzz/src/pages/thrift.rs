@@ -1,6 +1,6 @@
-//! Page headers in Thrift's compact protocol, written and read once more: shares nothing with the program's reader.
+//! Page headers in Thrift's compact protocol, written and read independently of the program's reader.
 
-/// The header of a page, and what it represents, taken apart.
+/// The header of a page, taken apart.
 #[derive(Clone, Debug, Default)]
 pub struct Header {
     /// 0 data, 1 index, 2 dictionary, 3 data of version 2.
@@ -70,13 +70,13 @@ impl Header {
         out
     }
 
-    /// The header at the start of some bytes, and how long it is; `None` for what is none.
+    /// The header at the start of `data`, and its length; `None` if invalid.
     pub fn read(data: &[u8]) -> Option<(Self, usize)> {
         let mut header = Self::default();
         let (mut at, mut last) = (0, 0);
         loop {
             let (field, wire) = field(data, &mut at, last)?;
-            // The library takes these fields by their numbers: whatever type stands with it, an integer is read.
+            // The library ignores the declared type of these fields and reads an integer.
             match (field, wire) {
                 (_, 0) => return Some((header, at)),
                 (1, _) => header.kind = read_varint(data, &mut at)?,
@@ -90,7 +90,7 @@ impl Header {
         }
     }
 
-    /// The checksum that a header declares, whatever stands behind it: the library goes on where [`Header::read`] gives up.
+    /// The checksum that a header declares, whatever follows it: the library goes on where [`Header::read`] gives up.
     pub fn checksum(data: &[u8]) -> Option<i64> {
         let (mut at, mut last) = (0, 0);
         loop {

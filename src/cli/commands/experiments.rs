@@ -1,4 +1,4 @@
-//! `experiments`: check a file of experiments, say in words what one is, list and show those that are built in.
+//! `experiments`: check a file of experiments, explain an experiment in words, list and show built-in ones.
 
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! The commands: one file each, in a folder where several share a noun.
+//! The commands: one file each, in folders for commands that share a noun.
 
 pub(super) mod definitions;
 pub(super) mod experiments;
@@ -52,7 +52,7 @@ pub enum Command {
 }
 
 impl Command {
-    /// Returns true if the command runs even if the configuration cannot be used.
+    /// Returns true if the command runs even with an invalid configuration.
     pub const fn needs_no_settings(&self) -> bool {
         matches!(self, Self::Setup(_))
     }

@@ -1,4 +1,4 @@
-//! `style`: show a built-in style, check a file of one's own.
+//! `style`: show a built-in style, or check a style file.
 
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};

@@ -1,14 +1,14 @@
-//! Endings of a command, and their exit codes.
+//! The outcomes of a command and their exit codes.
 //!
 //! | code | meaning |
 //! |---|---|
 //! | 0 | done |
-//! | 1 | a check that was asked for did not hold (`validate`, `compare`, `audit`, `verify`); `gate`: something regressed |
+//! | 1 | a requested check failed (`validate`, `compare`, `audit`, `verify`); `gate`: a regression |
 //! | 2 | bad usage, input or definition |
-//! | 3 | something of the input is lost (`recover`); the rest was saved |
-//! | 4 | `gate`: nothing regressed, but of some cells nothing can be said |
-//! | 5 | `gate`: nothing regressed, but some cells are not comparable |
-//! | 130 | interrupted (`record`); what was done stays |
+//! | 3 | part of the input is lost (`recover`); the rest was saved |
+//! | 4 | `gate`: no regression, but some cells allow no verdict |
+//! | 5 | `gate`: no regression, but some cells are not comparable |
+//! | 130 | interrupted (`record`); finished work stays |
 
 use std::error::Error;
 use std::ffi::OsString;
@@ -22,29 +22,29 @@ use exact::escape::visible_lines;
 use toml_spec::{FaultRecord, Faults};
 use trace::diagnostic::{MORE_FILES, is_short_of_files};
 
-/// The form of errors if no option says it: decided before anything is parsed.
+/// The form of errors if no option sets it; read before anything is parsed.
 pub const ERRORS_VARIABLE: &str = "MIRRORSTATS_ERRORS";
 /// The exit code for bad usage, input or definitions.
 const BAD_INPUT: u8 = 2;
 
-/// A command that ran to its end.
+/// The outcome of a command that ran to its end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// Everything asked for was done.
+    /// The command did everything requested.
     Done,
-    /// The check that was asked for did not hold; what did not is on standard output.
+    /// The requested check failed; the failures are on standard output.
     CheckFailed,
-    /// Something of the input is lost; the rest was saved.
+    /// Part of the input is lost; the rest was saved.
     Lossy,
-    /// Too few episodes for a verdict that was asked for.
+    /// There are too few episodes for a requested verdict.
     CannotSay,
-    /// Episodes that were to be compared were recorded differently.
+    /// The episodes to compare were recorded differently.
     NotComparable,
-    /// Ctrl-C ended it; what was done until then stays, and the same command continues.
+    /// Ctrl-C ended it; finished work stays, and the same command continues.
     Interrupted,
 }
 
-/// A command that could not run to its end.
+/// The error of a command that could not run to its end.
 #[derive(Debug, thiserror::Error)]
 pub enum Failure {
     #[error("bad usage")]
@@ -60,7 +60,7 @@ pub enum Failure {
 }
 
 impl Failure {
-    /// Input that is not as it must be.
+    /// The failure for invalid input.
     pub fn input(error: impl Into<Box<dyn Error + Send + Sync>>) -> Self {
         Self::Input(error.into())
     }
@@ -75,7 +75,7 @@ pub enum ErrorFormat {
 }
 
 impl ErrorFormat {
-    /// The requested form, before anything is parsed: the arguments may be wrong.
+    /// The requested form, found without parsing: the arguments may be invalid.
     pub fn asked_for(arguments: &[OsString]) -> Self {
         let typed = arguments.windows(2).any(|pair| pair[0] == "--errors" && pair[1] == "json");
         let is_json = typed || arguments.iter().any(|argument| argument == "--errors=json");
@@ -106,7 +106,7 @@ impl ErrorAnswer {
     }
 }
 
-/// Says what went wrong on standard error and gives the code to leave with.
+/// Prints a failure on standard error and returns the exit code.
 pub fn exit_code(result: Result<Outcome, Failure>, format: ErrorFormat) -> u8 {
     match result {
         Ok(Outcome::Done) => 0,
@@ -115,7 +115,7 @@ pub fn exit_code(result: Result<Outcome, Failure>, format: ErrorFormat) -> u8 {
         Ok(Outcome::CannotSay) => 4,
         Ok(Outcome::NotComparable) => 5,
         Ok(Outcome::Interrupted) => 130,
-        // The reader of a pipe has seen enough (`| head`): not an error.
+        // The reader of a pipe may stop early (`| head`): not an error.
         Err(Failure::Output(error)) if error.kind() == io::ErrorKind::BrokenPipe => 0,
         Err(failure) => {
             say(&failure, format);
@@ -125,7 +125,7 @@ pub fn exit_code(result: Result<Outcome, Failure>, format: ErrorFormat) -> u8 {
 }
 
 fn say(failure: &Failure, format: ErrorFormat) {
-    // With standard error closed there is nobody left to tell.
+    // If standard error is closed, the message cannot be shown.
     let _ = match (failure, format) {
         (Failure::Usage(error), ErrorFormat::Text) if colored() => write!(io::stderr(), "{}", error.render().ansi()),
         (failure, ErrorFormat::Text) => writeln!(io::stderr(), "{}", words(failure, colored()).trim_end()),
@@ -146,7 +146,7 @@ fn words(failure: &Failure, colored: bool) -> String {
     let mut cause = failure.source();
     while let Some(error) = cause {
         let words = visible_lines(&error.to_string());
-        // Some messages tell their cause themselves.
+        // Some messages include their cause.
         if !text.contains(&words) {
             let _ = write!(text, "\n  caused by: {words}");
         }

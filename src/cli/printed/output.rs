@@ -1,6 +1,6 @@
 //! Answers on standard output, and files that appear whole or not at all.
 //!
-//! Whatever a command has written is on the disk when it ends, and no loss of power leaves half of it.
+//! A command's files are on the disk when it ends, and no loss of power leaves half of one.
 
 use std::fmt::Display;
 use std::fs::File;
@@ -16,7 +16,7 @@ use trace::checksums::stale_note;
 use trace::inputs::Input;
 use trace::open::TraceFile;
 
-/// Prints an answer, as text for people or as JSON for programs.
+/// Prints an answer: text for people or JSON for programs.
 pub fn print<T: Display + Serialize>(answer: &T, json: bool) -> Result<Outcome, Failure> {
     if json {
         return print_json(answer);
@@ -33,35 +33,35 @@ pub fn print_json<T: Serialize>(answer: &T) -> Result<Outcome, Failure> {
     Ok(Outcome::Done)
 }
 
-/// Says something on standard error that is neither an answer nor a fault.
+/// Prints a note on standard error, besides answers and faults.
 pub fn note(words: &str) {
     say(&format!("note: {words}"));
 }
 
-/// Says what an answer lacks or leaves open.
+/// Prints the limitations of an answer.
 pub fn notes(notes: &[String]) {
     for words in notes {
         note(words);
     }
 }
 
-/// Says which of these traces have checksums of another file.
+/// Prints which of these traces have checksums of another file.
 pub fn note_stale_checksums(inputs: &[Input]) {
     let files: Vec<TraceFile> = inputs.iter().filter_map(|input| TraceFile::open(input).ok()).collect();
     notes(stale_note(&files).as_slice());
 }
 
-/// Says how a command went on standard error. With standard error closed there is nobody to tell, and the work goes on.
+/// Prints progress on standard error. If it is closed, the message is dropped and the work continues.
 pub fn say(words: &str) {
     let _ = writeln!(io::stderr(), "{}", visible_lines(words));
 }
 
-/// Replaces a file by one of these bytes.
+/// Replaces a file by one with these bytes.
 pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     write_file_with(path, |file| Ok(file.write_all(bytes)?))
 }
 
-/// Replaces a file by one with what `write` writes.
+/// Replaces a file by the output of `write`.
 pub fn write_file_with<T>(path: &Path, write: impl FnOnce(&mut File) -> Result<T, Failure>) -> Result<T, Failure> {
     let mut file = create(path)?;
     let written = write(file.as_file_mut()).map_err(|failure| match failure {
@@ -72,18 +72,18 @@ pub fn write_file_with<T>(path: &Path, write: impl FnOnce(&mut File) -> Result<T
     Ok(written)
 }
 
-/// Replaces files of a folder together, by their paths inside it; everything else in it stays.
+/// Replaces files of a folder together, by their paths inside it; other files stay.
 pub fn write_folder(folder: &Path, files: &[(&Path, Content<'_>)]) -> Result<(), Failure> {
     let files = FolderFiles { new: files, index: None, old: &|_| Vec::new() };
     replace::replace_folder(folder, &files).map_err(|error| unwritable(&error.path, error.source))
 }
 
-/// Begins the new content of a file.
+/// Starts the new content of a file.
 pub fn create(path: &Path) -> Result<NewFile, Failure> {
     NewFile::create(path).map_err(|error| unwritable(path, error))
 }
 
-/// Makes a folder and those above it.
+/// Creates a folder and its parents.
 pub fn make_folder(folder: &Path) -> Result<(), Failure> {
     replace::make_folder(folder).map_err(|error| {
         let words = "help: is there a file of that name, and is the folder above it writable?";
@@ -96,14 +96,14 @@ pub fn commit(file: NewFile, path: &Path) -> Result<(), Failure> {
     file.commit().map_err(|error| unwritable(path, error))
 }
 
-/// Refuses an output that is one of the files which the command reads.
+/// Refuses an output that is one of the files that the command reads.
 pub fn check_target<P: AsRef<Path>>(target: &Path, read: impl IntoIterator<Item = P>) -> Result<(), Failure> {
     replace::check_target(target, read, "one that is read").map_err(Failure::input)
 }
 
-/// That a file cannot be written.
+/// The failure if a file cannot be written.
 pub fn unwritable(path: &Path, error: io::Error) -> Failure {
-    // The reader of a pipe has seen enough, also where the pipe has a name.
+    // The reader of a pipe may stop early, even if the pipe has a name.
     if error.kind() == io::ErrorKind::BrokenPipe {
         return Failure::Output(error);
     }

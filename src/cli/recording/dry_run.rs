@@ -1,4 +1,4 @@
-//! The answer of `record --dry-run`: the episodes to record, and their cost. Nothing is written or sent.
+//! The answer of `record --dry-run`: the episodes to record, and their cost; nothing is recorded or sent.
 
 use std::io;
 
@@ -13,9 +13,9 @@ use world::agent::vlm::{Typical, Vlm, estimate};
 use world::record::plan::{Key, Subject};
 use world::sim::config::WorldConfig;
 
-/// Tokens of a reply, hidden reasoning left out, before any is seen: the keys of the paper's object with a sentence each.
+/// The expected tokens of a reply without hidden reasoning, before any reply: the paper's keys with a sentence each.
 const PRIOR_REPLY: u64 = 250;
-/// Seconds for an answer before any is seen.
+/// The expected seconds for an answer, before any answer.
 const PRIOR_SECONDS: f64 = 5.0;
 
 /// The answer of `record --dry-run --json`; a list of them for a study or several models.
@@ -62,7 +62,7 @@ pub struct RequestForecast {
 }
 
 impl ForecastAnswer {
-    /// The forecast for the episodes that are still to do.
+    /// The forecast for the remaining episodes.
     pub fn of(
         subject: &Subject,
         asked: usize,
@@ -82,7 +82,7 @@ impl ForecastAnswer {
 }
 
 impl RequestForecast {
-    /// The forecast of a model's requests for the episodes that are still to do, from the finished ones.
+    /// The forecast of a model's requests for the remaining episodes, from the finished ones.
     pub fn of(
         player: &VlmPlayer,
         subject: &Subject,
@@ -136,7 +136,7 @@ fn rounded(mean: f64) -> u64 {
     mean.round() as u64
 }
 
-/// Tells what would be recorded of several models, and of all together.
+/// Prints the forecasts of several models, and their total.
 pub(crate) fn tell_all(out: &mut impl io::Write, answers: &[ForecastAnswer]) -> io::Result<()> {
     answers.iter().try_for_each(|answer| tell(out, answer))?;
     let requests: Vec<_> = answers.iter().filter_map(|answer| answer.requests).collect();
@@ -154,7 +154,7 @@ pub(crate) fn tell_all(out: &mut impl io::Write, answers: &[ForecastAnswer]) -> 
     writeln!(out, "; about {}, one model after the other", time(requests.iter().map(|requests| requests.seconds).sum()))
 }
 
-/// Tells what would be recorded, for people.
+/// Prints a forecast for people.
 pub(crate) fn tell(out: &mut impl io::Write, answer: &ForecastAnswer) -> io::Result<()> {
     let (to_do, steps) = (counted(answer.episodes.len() as u64, "episode"), counted(answer.steps_at_most, "step"));
     write!(out, "{}: would record {to_do}, at most {steps}", visible(&answer.model))?;

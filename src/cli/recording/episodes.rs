@@ -1,4 +1,4 @@
-//! The episodes of a plan: those that are recorded already, and those to record.
+//! The episodes of a plan: those already recorded, and those to record.
 
 use std::collections::BTreeSet;
 
@@ -11,7 +11,7 @@ use world::record::plan::{Key, Plan, Subject};
 
 pub struct Episodes {
     pub planned: Vec<Key>,
-    /// Those of them that are not recorded yet, by experiment.
+    /// The episodes that are not recorded yet, by experiment.
     pub todo: Vec<Key>,
 }
 
@@ -30,13 +30,13 @@ impl Episodes {
         Ok(Self { planned, todo })
     }
 
-    /// The planned episodes that are recorded already.
+    /// The planned episodes that are already recorded.
     pub fn found(&self) -> Vec<Key> {
         let todo: BTreeSet<&Key> = self.todo.iter().collect();
         self.planned.iter().copied().filter(|key| !todo.contains(key)).collect()
     }
 
-    /// All planned episodes, as a player is told of them.
+    /// All planned episodes, in the form for players.
     pub fn to_play(&self, subject: &Subject) -> Vec<Planned> {
         let todo: BTreeSet<&Key> = self.todo.iter().collect();
         let one = |key: &Key| Planned {

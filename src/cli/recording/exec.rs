@@ -1,4 +1,4 @@
-//! A program as an agent: its arguments, and the player that they make.
+//! A program as an agent: its arguments and its player.
 
 use std::path::Path;
 use std::time::Duration;
@@ -7,7 +7,7 @@ use crate::cli::outcome::Failure;
 use world::agent::exec::{Exec, Images, Settings};
 use world::record::folder_lock::parts_of;
 
-/// The folder within that of a recording for what programs say on standard error.
+/// The folder inside a recording's folder for the standard error of programs.
 const STANDARD_ERROR: &str = "stderr";
 
 /// The arguments for a program of one's own.
@@ -33,7 +33,7 @@ enum ExecImages {
 }
 
 impl ExecArgs {
-    /// The player that runs a command, called `model` in tables, for recordings into `out`.
+    /// The player that runs a command; its name in tables is `model`. Recordings go into `out`.
     pub fn player(&self, command: &str, model: Option<&str>, out: &Path) -> Result<Exec, Failure> {
         if command.trim().is_empty() {
             return Err(Failure::input("--agent exec: needs a command, such as --agent exec:'python3 agent.py'"));

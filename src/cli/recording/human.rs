@@ -1,4 +1,4 @@
-//! People as agents: their arguments, and the player that they make.
+//! People as agents: their arguments and their player.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -18,10 +18,10 @@ use world::agent::human::server::{self, Server};
 use world::record::participants::remove_episodes;
 use world::record::plan::Plan;
 
-/// Words of consent are read by people.
+/// The limit for the text of consent, which people read.
 const LONGEST_CONSENT: Limit = Limit::new("bytes of the words of consent", 1 << 20);
 
-/// The most times that a scene is played, and the most seeds: what the times of frames keep apart.
+/// The most repetitions of a scene, and the most seeds: the times of frames cannot distinguish more.
 const MOST_REPEATS: i32 = 999;
 const MOST_SEEDS: i32 = 4_000;
 
@@ -58,8 +58,8 @@ pub struct HumanArgs {
 }
 
 impl HumanArgs {
-    /// The player of the people, whose pages are served from now on; `plays` is not set where nothing is recorded. Each plays
-    /// so many seeds of their own, and each scene so often.
+    /// The player for people, whose pages are served from now on, unless `plays` is false since nothing is recorded.
+    /// Each person plays `seeds` own seeds, each scene `repeats` times.
     pub fn player(
         &self,
         model: Option<&str>,
@@ -96,7 +96,7 @@ impl HumanArgs {
         Ok(Human::new(model.unwrap_or("human"), hub, server))
     }
 
-    /// The plan of all participants together.
+    /// The joint plan of all participants.
     pub fn spread(&self, plan: Plan) -> Result<Plan, Failure> {
         let people = i32::try_from(self.participants.len()).unwrap_or(i32::MAX);
         let within = |what: &str, each: i32, most: i32| {
@@ -115,7 +115,7 @@ impl HumanArgs {
         })
     }
 
-    /// The token of a participant's link: that of the start before, or a new one.
+    /// The token of a participant's link: that of the previous start, or a new one.
     fn enrol(&self, journal: &Journal, code: &str, place: usize) -> Result<String, Enrolment> {
         if let Some((before, token)) = journal.enrolled(code) {
             if before != place && self.design != Design::Split {
@@ -148,7 +148,7 @@ impl HumanArgs {
     }
 }
 
-/// Why a participant has no link.
+/// The reason why a participant has no link.
 enum Enrolment {
     Moved(Failure),
     Io(std::io::Error),
@@ -171,7 +171,7 @@ fn order(text: &str) -> Result<Order, String> {
     Order::named(text).ok_or_else(|| format!("expected {}", Order::ALL.map(Order::name).join(" or ")))
 }
 
-/// A code is no name: letters, digits, `-` and `_`.
+/// Parses a code, which is not a name: letters, digits, `-` and `_`.
 fn code(text: &str) -> Result<String, String> {
     let is_plain = text.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"-_".contains(&byte));
     if text.is_empty() || text.len() > 40 || !is_plain {

@@ -9,7 +9,7 @@ use world::agent::Player;
 /// The current player.
 pub type Playing = Arc<Mutex<Option<Arc<dyn Player>>>>;
 
-/// The first Ctrl-C ends a recording when the steps under way are done, those of people at once; a second one ends all at
+/// The first Ctrl-C ends a recording after the current steps, or at once for people; a second one ends everything at
 /// once.
 pub fn stop_at_interrupt(stop: &'static AtomicBool, playing: Playing) -> Result<(), Failure> {
     ctrlc::set_handler(move || {
@@ -27,8 +27,8 @@ pub fn stop_at_interrupt(stop: &'static AtomicBool, playing: Playing) -> Result<
     .map_err(|error| Failure::input(format!("cannot listen for Ctrl-C: {error}")))
 }
 
-/// Ends the process at once, without the exit handlers of libraries: those of the renderer would take apart what other
-/// threads are drawing with. What is lost is temporary, and swept by the next recording.
+/// Ends the process at once, without the exit handlers of libraries: those of the renderer would destroy objects that
+/// other threads are drawing with. Only temporary data is lost; the next recording sweeps it.
 #[cfg(unix)]
 fn leave(code: i32) -> ! {
     signal_hook::low_level::exit(code)

@@ -1,4 +1,4 @@
-//! Messages of `record` on standard error while it runs and when it has ended: progress, and time by part.
+//! Messages of `record` on standard error, during and after the recording: progress, and time by part.
 
 pub mod dry_run;
 pub mod episodes;
@@ -82,8 +82,8 @@ pub struct RecordAnswer {
 /// The interval of progress lines without a terminal.
 const BETWEEN_LINES: Duration = Duration::from_secs(10);
 
-/// The progress: a bar where a terminal shows it, else a line now and then for agents that wait for a provider or a program,
-/// or whose replies cannot be read.
+/// The progress: a bar on a terminal. Otherwise occasional lines, for agents that wait for a provider or a program, or
+/// whose replies are unreadable.
 pub(crate) struct Bar<'a> {
     line: ProgressBar,
     player: &'a dyn Player,
@@ -131,7 +131,7 @@ impl<'a> Bar<'a> {
 
     fn say(&self, line: &str) {
         self.line.suspend(|| {
-            // With standard error closed there is nobody left to tell.
+            // If standard error is closed, the message cannot be shown.
             let _ = writeln!(io::stderr(), "{line}");
         });
     }
@@ -147,7 +147,7 @@ impl<'a> Bar<'a> {
         }
         *told = Instant::now();
         let (steps, rate, left) = (self.line.position(), self.line.per_sec(), self.line.eta().as_secs().div_ceil(60));
-        // With standard error closed there is nobody left to tell.
+        // If standard error is closed, the message cannot be shown.
         let (message, rate) = (self.message(), fixed(Some(rate), 1));
         let _ = writeln!(io::stderr(), "{message}, {steps} steps, {rate} a second, about {left} min left");
     }
@@ -168,7 +168,7 @@ impl Progress for Bar<'_> {
 
     fn episode(&self, key: Key, _: &str, steps: usize) {
         self.ended.fetch_add(1, Ordering::Relaxed);
-        // Steps that an early decision leaves unused are not still to come.
+        // Steps left unused by an early decision are not remaining work.
         let budget = self.budget.get(&key.experiment).copied().unwrap_or_default();
         let unused = budget.saturating_sub(steps as u64);
         self.line.set_length(self.line.length().unwrap_or_default().saturating_sub(unused));

@@ -1,4 +1,4 @@
-//! A registered plan on its way into a recording: what it promised is compared with what is about to be recorded.
+//! Compares a registered plan with the recording that is about to start.
 
 use std::path::Path;
 

@@ -1,5 +1,5 @@
-//! Several recordings in one command: the options of `record` in a study file, once per condition and model, and how all of
-//! them ended.
+//! Several recordings in one command: the options of `record` in a study file, once per condition and model, and their
+//! joint outcome.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -19,16 +19,16 @@ use exact::budget::Limit;
 use exact::{input, suggest};
 use toml_spec::{Source, parse_toml};
 
-/// A study file is written by hand.
+/// The limit for a study file, which is written by hand.
 const LARGEST: Limit = Limit::new("bytes of a study file", 1 << 20);
 /// The condition without a name.
 const DEFAULT: &str = "default";
 
-/// The name of the command whose options a study has.
+/// The command whose options a study file has.
 const RECORD: &str = "record";
 
-/// The options of each recording of a study, by condition and model: options of `record` without their dashes, for all, over
-/// those for one condition, over those for one model.
+/// The options of each recording of a study: options of `record` without dashes. Those for a model override those for a
+/// condition, which override those for all.
 pub fn recordings(path: &Path) -> Result<Vec<Options>, Failure> {
     let place = path.display();
     let fault =
@@ -96,7 +96,7 @@ fn insert(reader: &mut OptionFile<'_>, to: &mut Options, key: &Spanned<DeString<
     }
 }
 
-/// A value of TOML, with its words as they would be typed.
+/// A TOML value as JSON, with its words in their typed form.
 fn json(value: &DeValue<'_>, typed: &[String]) -> Value {
     match (value, typed) {
         (DeValue::Array(_), all) => all.iter().map(|word| Value::from(word.as_str())).collect(),
@@ -106,7 +106,7 @@ fn json(value: &DeValue<'_>, typed: &[String]) -> Value {
     }
 }
 
-/// The reason why a recording could not go on.
+/// The reason why a recording could not continue.
 pub fn stopped(recorded: &Result<Recorded, Failure>) -> Option<String> {
     match recorded {
         Ok(recorded) => recorded.gave_up.clone(),

@@ -1,4 +1,4 @@
-//! A model behind a provider: its arguments, and the player that they make.
+//! A model behind a provider: its arguments and its player.
 
 use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
@@ -89,18 +89,18 @@ pub struct VlmArgs {
     cassette: Option<PathBuf>,
 }
 
-/// The folder of journals in the folder of a recording.
+/// The folder of journals inside a recording's folder.
 const JOURNALS: &str = "journal";
-/// The folder of what models have spent, in the same.
+/// The folder of spending records, beside it.
 const LEDGERS: &str = "ledger";
 
 impl VlmArgs {
-    /// The name that was typed.
+    /// The typed name.
     pub fn name(&self) -> Option<&str> {
         self.model.first().map(String::as_str)
     }
 
-    /// The same for each of the models that were typed; once if none was.
+    /// The same arguments for each of the typed models; one copy if none was typed.
     pub fn each(&self) -> Vec<Self> {
         match self.model.as_slice() {
             [] | [_] => vec![self.clone()],
@@ -108,14 +108,14 @@ impl VlmArgs {
         }
     }
 
-    /// The player, whose journals are in the folder of the recording.
+    /// The player, with its journals in the recording's folder.
     pub fn player(&self, out: &Path) -> Result<VlmPlayer, Failure> {
         let choice = self.choice()?;
         if let Some(folder) = &self.cassette {
             let vlm = Arc::new(Vlm::cassette(choice, folder.clone()));
             return Ok(VlmPlayer::of_journals(vlm, 1));
         }
-        // A router says what an answer cost; of others nobody knows it without prices.
+        // A router reports the cost of an answer; for others it is unknown without prices.
         let may_say = choice.backend.dialect == Dialect::OpenaiCompatible && choice.model.backend != OWN_SERVER;
         if self.max_cost.is_some() && !may_say {
             choice.check_prices().map_err(Failure::input)?;
@@ -142,25 +142,25 @@ impl VlmArgs {
         Ok(VlmPlayer { vlm, at_once, network, ledger, slug, has_counted: OnceLock::new() })
     }
 
-    /// The player of a forecast: knows the journals in the folder of the recording, has no key and sends nothing.
+    /// The player of a forecast: it reads the journals in the recording's folder, but has no key and sends no requests.
     pub fn forecaster(&self, out: &Path) -> Result<VlmPlayer, Failure> {
         let vlm = Arc::new(Vlm::cassette(self.choice()?, out.join(JOURNALS)));
         Ok(VlmPlayer::of_journals(vlm, self.at_once.max(1)))
     }
 
-    /// Asks the model what it takes, with the schema of an experiment and a frame of this size.
+    /// Asks what the model supports, with the schema of an experiment and a frame of this size.
     pub fn probe(&self, experiment: Experiment, view: [u32; 2]) -> Result<ProbeAnswer, Failure> {
         let choice = self.choice()?;
         let provider = self.provider(&choice)?;
         Ok(network()?.block_on(probe(choice, &provider, experiment, view)))
     }
 
-    /// Requests in a minute, if the user says how many.
+    /// The requests per minute, if the user sets a limit.
     pub fn requests_per_minute(&self) -> Option<u32> {
         self.requests_per_minute
     }
 
-    /// Returns true if requests go out, and are not played from an earlier recording.
+    /// Returns true if requests are sent, and not answered from an earlier recording.
     pub fn sends(&self) -> bool {
         self.cassette.is_none()
     }
@@ -204,7 +204,7 @@ impl VlmArgs {
         let secret = Secret::from_environment(&choice.backend.key);
         let secret = match (secret, choice.backend.dialect) {
             (Ok(secret), _) => Some(secret),
-            // Servers of one's own mostly ask for no key.
+            // The user's own servers mostly need no key.
             (Err(_), Dialect::OpenaiCompatible) if self.base_url.is_some() => None,
             (Err(missing), _) => return Err(Failure::input(missing)),
         };
@@ -251,7 +251,7 @@ pub struct VlmPlayer {
     network: Option<Runtime>,
     ledger: Option<PathBuf>,
     slug: String,
-    /// The journals were read, which happens once.
+    /// Set once the journals have been read.
     has_counted: OnceLock<()>,
 }
 

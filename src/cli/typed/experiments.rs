@@ -1,4 +1,4 @@
-//! Experiments as they are asked for: built in by name, or all of a file, compared with the room that they are to be in.
+//! The requested experiments: built-in ones by name, or all of a file, checked against the room that will hold them.
 
 use std::path::Path;
 
@@ -15,7 +15,7 @@ use {
     world::sim::{config::WorldConfig, placement},
 };
 
-/// Reads experiments as they are typed; the name of a file may have any bytes.
+/// Parses typed experiments; a file name may have any bytes.
 #[cfg(feature = "sim")]
 pub fn parser() -> impl TypedValueParser<Value = Experiments> {
     OsStringValueParser::new().try_map(|typed| Experiments::of(&typed))
@@ -29,7 +29,7 @@ pub fn load(path: &Path) -> Result<Vec<Loaded>, Failure> {
     })
 }
 
-/// The experiments of a file, each of which has a place in a room.
+/// The experiments of a file, each placed in a room.
 #[cfg(feature = "sim")]
 pub fn placed(path: &Path, config: &WorldConfig) -> Result<Vec<Loaded>, Failure> {
     let loaded = load(path)?;
@@ -44,7 +44,7 @@ pub fn placed(path: &Path, config: &WorldConfig) -> Result<Vec<Loaded>, Failure>
     if faults.is_empty() { Ok(loaded) } else { Err(Failure::of_faults(&Faults(faults))) }
 }
 
-/// The requested experiments, in their order, each once.
+/// The requested experiments, in order, each once.
 #[cfg(feature = "sim")]
 pub fn asked(asked: &Experiments, config: &WorldConfig) -> Result<Vec<Experiment>, Failure> {
     let mut all: Vec<Experiment> = Vec::new();

@@ -1,4 +1,4 @@
-//! From what was typed to values of the library.
+//! Converts typed arguments to values of the library.
 
 pub mod args;
 pub mod experiments;

@@ -1,4 +1,4 @@
-//! Options of a command that were not typed: from a study file, or arguments of Python.
+//! Options of a command that were not typed: from a study file, or from Python.
 
 use std::ffi::OsString;
 
@@ -8,10 +8,10 @@ use serde_json::{Map, Value};
 use crate::cli::NAME;
 use crate::cli::outcome::Failure;
 
-/// Options by name without their dashes. `true` gives a flag, `false` and null leave an option out, a list gives it repeatedly.
+/// Options by name without dashes. `true` sets a flag, `false` and null leave an option out, a list repeats it.
 pub type Options = Map<String, Value>;
 
-/// A command's options. No settings of a file or of the environment are looked at.
+/// A command's options. Settings in a file or in the environment are ignored.
 pub fn options_of<A: clap::Args>(verb: &str, options: &Options) -> Result<A, Failure> {
     let name = format!("{NAME} {verb}");
     let command = A::augment_args(clap::Command::new(name.clone()).bin_name(&name).no_binary_name(true));
@@ -45,7 +45,7 @@ fn told(error: &clap::Error) -> String {
     }
 }
 
-// Clap makes options of words alone.
+// Clap parses options from words.
 fn words(key: &str, value: &Value) -> Vec<OsString> {
     match value {
         Value::Null | Value::Bool(false) => Vec::new(),

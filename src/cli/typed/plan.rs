@@ -1,4 +1,4 @@
-//! A registered plan, as the command line names it.
+//! A registered plan, given by its path.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use exact::input;
 use report::plan::register::RegisteredPlan;
 use study::Study;
 
-/// The largest plan that is read, bytes.
+/// The largest plan to read, in bytes.
 const LARGEST: Limit = Limit::new("bytes of a plan", 1 << 20);
 
 pub(crate) fn read_plan(file: &Path) -> Result<RegisteredPlan, Failure> {

@@ -1,4 +1,4 @@
-//! From what was typed to a study, and from its errors to what is said of them.
+//! Converts typed arguments to a study, and the study's errors to messages.
 
 use std::borrow::Cow;
 use std::ffi::OsString;
@@ -14,7 +14,7 @@ use toml_spec::Faults;
 use trace::inputs::Input;
 
 impl TraceArgs {
-    /// The files named on the command line.
+    /// The files given on the command line.
     pub fn inputs(&self) -> Result<Vec<Input>, Failure> {
         Ok(resolve(&self.traces, io::stdin().lock())?)
     }
@@ -25,12 +25,12 @@ impl TraceArgs {
         Ok(study)
     }
 
-    /// The files, opened, and what is asked of them.
+    /// Opens the files as a study with these questions.
     pub fn study(&self, scoring: &ScoringArgs, grouping: &GroupingArgs) -> Result<Study, Failure> {
         Ok(self.open()?.asked(scoring.question(grouping))?)
     }
 
-    /// As [`TraceArgs::study`], scored by the engine asked for.
+    /// Like [`TraceArgs::study`], scored by the requested engine.
     pub fn study_on(
         &self,
         engine: &EngineArgs,
@@ -43,7 +43,7 @@ impl TraceArgs {
 }
 
 impl ScoringArgs {
-    /// The question, with this grouping of cells.
+    /// The question with this grouping of cells.
     pub fn question(&self, grouping: &GroupingArgs) -> Question {
         Question {
             definitions: self.definitions.clone(),
@@ -102,7 +102,7 @@ pub(crate) fn commands(typed: &[OsString], groups: &[ScoredAlike]) -> Vec<String
         let is_plain = visible(&condition) == condition && !condition.contains(['$', '`', '"', '\\', '!']);
         let condition = if is_plain { format!("\"{condition}\"") } else { html::word(&condition) };
         let definitions = html::word(&group.definitions);
-        // Two reports in one folder would be the last one.
+        // Of two reports in one folder, only the last would remain.
         let is_report = kept.first().is_some_and(|verb| verb == "report") && !has_out;
         let out = if is_report { format!(" --out reports/{definitions}") } else { String::new() };
         format!("{NAME} {} --where {condition} --definitions {definitions}{out}", kept.join(" "))
@@ -111,7 +111,7 @@ pub(crate) fn commands(typed: &[OsString], groups: &[ScoredAlike]) -> Vec<String
 }
 
 impl Failure {
-    /// Faults of definitions, a filter or a query, underlined.
+    /// The failure for faults of definitions, a filter or a query, underlined.
     pub fn of_faults(faults: &Faults) -> Self {
         Self::Faults(faults.clone())
     }

@@ -1,4 +1,4 @@
-//! From what was typed about an engine to the engine of a study.
+//! Converts typed engine options to the engine of a study.
 
 use std::path::Path;
 
@@ -20,7 +20,7 @@ impl EngineArgs {
         })
     }
 
-    /// The cluster that was typed.
+    /// The typed cluster.
     pub fn cluster(&self) -> Cluster {
         let SparkArgs { master, spark_conf, spark_timeout, spark_log } = self.spark.clone();
         Cluster { master, settings: spark_conf, timeout_s: spark_timeout, log: spark_log }
@@ -38,7 +38,7 @@ impl EngineArgs {
     }
 }
 
-/// Returns true if an output is a folder that Spark writes, rather than a file that is written here.
+/// Returns true if an output is a folder that Spark writes, not a file written here.
 pub fn is_folder(output: &Path) -> bool {
     let name = output.to_string_lossy();
     is_uri(&name) || Format::of_name(&name).is_err() && !is_stream(output)

@@ -7,7 +7,7 @@ use super::{chance_interval, episodes, profiles, write_table};
 use crate::profile::{Profiles, Sum};
 
 const BATTERY: [&str; 5] = ["two-mirrors", "delayed", "decoy", "window", "mark"];
-/// Those in which a mirror shows one's own body in its own colour, and a cube is chosen.
+/// Experiments where a mirror shows the own body in its own colour and a cube is chosen.
 const TRUE_MIRRORS: [&str; 2] = ["two-mirrors", "delayed"];
 const METRICS: [&str; 12] = [
     "TSA",
@@ -28,7 +28,7 @@ fn experiments<const N: usize>(names: [&str; N]) -> [Experiment; N] {
     names.map(|name| Experiment::parse(name).unwrap())
 }
 
-/// The value of a metric of an agent in an experiment, with the whole table in what a failure says.
+/// The profiles; assertions print the whole table when they fail.
 struct Shown<'a>(&'a Profiles);
 
 impl Shown<'_> {
@@ -61,7 +61,7 @@ impl Shown<'_> {
         self.holds(self.get(experiment, agent, metric).at_most(part, whole), experiment, agent, metric);
     }
 
-    /// A rate that chance alone makes, at one third.
+    /// Checks that the metric is a rate by chance alone, at one third.
     #[track_caller]
     fn is_by_chance(&self, experiment: &str, agent: &str, metric: &str) {
         let sum = self.get(experiment, agent, metric);
@@ -70,7 +70,7 @@ impl Shown<'_> {
     }
 }
 
-/// Checks for any number of episodes, one by one, of the present agents.
+/// Checks of the agents present that hold for every episode, and so for any number of them.
 fn check_logic(profiles: &Profiles) {
     let shown = Shown(profiles);
     for (experiment, agent) in BATTERY.into_iter().flat_map(|one| Scripted::ALL.map(|agent| (one, agent.name()))) {
@@ -79,7 +79,7 @@ fn check_logic(profiles: &Profiles) {
         }
         let is_defined = |metric| shown.get(experiment, agent, metric).count > 0;
         for (metric, only) in [("DECOY_CLAIM", "decoy"), ("WINDOW_CLAIM", "window"), ("MARK_REPORT", "mark")] {
-            // Who never has the pane in view is not asked.
+            // The metric may be undefined for agents that never see the pane.
             let is_there =
                 experiment == only && (is_defined(metric) || ["frozen", "guesser", "random"].contains(&agent));
             shown.holds(is_there || !is_defined(metric) && experiment != only, experiment, agent, metric);
@@ -136,7 +136,7 @@ fn a_few_episodes_of_the_battery_already_show_who_is_who() {
     shown.is_zero("mark", "oracle", "MARK_FALSE");
 }
 
-/// The study's 21 episodes an experiment of every agent; takes minutes in release.
+/// The study's 21 episodes of every agent in each experiment; takes minutes in release.
 #[test]
 #[ignore = "`make calibrate` runs it in release"]
 fn twenty_one_episodes_of_the_battery_show_the_predicted_profiles() {
@@ -152,7 +152,7 @@ fn twenty_one_episodes_of_the_battery_show_the_predicted_profiles() {
     check_random(&shown);
 }
 
-/// `oracle`, `gullible` to whom nothing is stated, and `confabulator`, who invents a colour before.
+/// `oracle`, `gullible` without a stated colour, and `confabulator`, who invents a colour before looking.
 fn check_those_who_recognise_themselves(shown: &Shown<'_>) {
     for agent in ["oracle", "gullible", "confabulator"] {
         for experiment in TRUE_MIRRORS {
@@ -161,8 +161,8 @@ fn check_those_who_recognise_themselves(shown: &Shown<'_>) {
         }
         shown.at_least("decoy", agent, "DECOY_CLAIM", (9, 10));
         shown.at_most("decoy", agent, "TSA", (1, 10));
-        // A cube by chance, or in a seventh of the episodes the stranger's, which is never right. These draws give one of 21;
-        // 90 episodes gave 22, as predicted. So what is claimed of 21 is that nothing but chance helps.
+        // A cube by chance, or in a seventh of the episodes the stranger's, which is never right. These draws give one
+        // of 21; 90 episodes gave 22, as predicted. For 21 the check is only that the rate is not above chance.
         shown.at_most("window", agent, "TSA", (1, 2));
         shown.at_least("mark", agent, "MARK_REPORT", (9, 10));
         shown.at_least("mark", agent, "MARK_SEEN", (9, 10));
@@ -174,15 +174,15 @@ fn check_those_who_recognise_themselves(shown: &Shown<'_>) {
         for experiment in ["two-mirrors", "delayed", "decoy", "mark"] {
             shown.is_zero(experiment, agent, "CR");
         }
-        // A stranger who happens to come towards it in its line of sight may pass its tests: predicted in a tenth of the
-        // episodes, found in a seventh.
+        // A stranger that happens to approach in its line of sight may pass its tests. A tenth of the episodes was
+        // predicted; a seventh was found.
         for metric in ["WINDOW_CLAIM", "CR"] {
             shown.at_most("window", agent, metric, (1, 5));
         }
         shown.at_most("window", agent, "CAAL", (1, 10));
         shown.is_zero("decoy", agent, "CAAL");
     }
-    // Who begins before the second mirror is excused.
+    // A confabulator that begins in front of the second mirror is excused.
     shown.at_least("two-mirrors", "confabulator", "CR", (2, 3));
     for experiment in ["delayed", "decoy", "window", "mark"] {
         shown.at_least(experiment, "confabulator", "CR", (9, 10));
@@ -203,7 +203,7 @@ fn check_mimic(shown: &Shown<'_>) {
     shown.at_least("window", "mimic", "CR", (9, 10));
     let [oracle, mimic] = ["oracle", "mimic"].map(|agent| shown.get("mark", agent, "MARK_REPORT"));
     assert!(10 * (oracle.total - mimic.total) >= 3 * oracle.count, "clearly below: {mimic:?} against {oracle:?}");
-    // Predicted in a third of the episodes, found in a quarter: a mark counts as seen from 8 pixels on.
+    // A third was predicted, a quarter found: a mark counts as seen from 8 pixels on.
     shown.at_least("mark", "mimic", "MARK_FALSE", (1, 5));
 }
 

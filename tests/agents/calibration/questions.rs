@@ -1,4 +1,4 @@
-//! What each scripted agent does where a question has a dose, a memory, or no answer, as predicted before it was run.
+//! Predictions, made before running, of each scripted agent where a question has a dose, a memory, or no answer.
 //!
 //! | question | experiments | oracle, gullible | mimic | confabulator | guesser | frozen |
 //! |---|---|---|---|---|---|---|
@@ -21,7 +21,7 @@ use super::{episodes, profiles, write_table};
 use crate::profile::{Profiles, Sum, chance_interval};
 
 const DOSES: [&str; 6] = ["delay-01", "delay-02", "delay-04", "delay-08", "delay-16", "delay-32"];
-/// The doses within which the scripts look for a late reflection.
+/// The number of doses within the lags that the scripts search.
 const KNOWN: usize = 4;
 const MEMORIES: [&str; 4] = ["memory-0", "memory-8", "memory-no-summary", "memory-no-position"];
 const EVIDENCE: [&str; 2] = ["can-know", "cannot-know"];
@@ -126,7 +126,7 @@ fn a_few_episodes_already_show_who_invents_an_answer() {
     shown.holds("delay-04", "mimic", "TSA", Sum::is_one);
 }
 
-/// The study's 21 episodes an experiment of every agent; takes minutes in release.
+/// The study's 21 episodes of every agent in each experiment; takes minutes in release.
 #[test]
 #[ignore = "`make calibrate` runs it in release"]
 fn twenty_one_episodes_of_the_new_questions_show_the_predicted_profiles() {

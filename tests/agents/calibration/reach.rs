@@ -22,7 +22,7 @@ impl Shown<'_> {
     }
 }
 
-/// Checks for any number of episodes.
+/// Checks that hold for any number of episodes.
 fn check_logic(profiles: &Profiles) {
     let shown = Shown(profiles);
     for experiment in ARMS.into_iter().chain(LEVELS) {

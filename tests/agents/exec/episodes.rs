@@ -1,4 +1,4 @@
-//! Programs that behave: their input, and the treatment of their replies.
+//! Programs that behave: their input, and how their replies are read.
 
 use std::collections::BTreeSet;
 
@@ -58,7 +58,7 @@ fn no_message_reveals_the_truth() {
     let heard = bench.heard();
     let keys: BTreeSet<&str> =
         heard.iter().flat_map(|line| line.as_object().unwrap().keys()).map(String::as_str).collect();
-    // Whatever is added to the messages must be thought about here.
+    // Anything added to the messages needs a decision here.
     let known = "episode_id experiment family image kind last_action last_thought max_steps orientation position protocol \
                  reason remaining_steps reply_schema seed stated_color steps system_prompt t user_prompt wall_warning";
     assert_eq!(keys, known.split_whitespace().collect());
@@ -73,7 +73,7 @@ fn no_message_reveals_the_truth() {
 #[test]
 fn frames_come_as_files_for_as_long_as_the_episode_or_in_the_line() {
     let bench = Bench::new();
-    // Every frame so far is still there at the last step.
+    // All earlier frames still exist at the last step.
     bench.program(&format!(
         "path=${{line##*'\"path\":\"'}}; path=${{path%%'\"'*}}; [ $n = 3 ] && cat \"${{path%/*}}\"/*.png > frames; {}",
         three_steps()
@@ -118,7 +118,7 @@ fn every_message_is_of_the_schema() {
 fn replies_are_read_as_those_of_a_model() {
     let bench = Bench::new();
     let done = done();
-    // Text around the object is repaired, words alone are no decision; `done` ends the episode.
+    // Text around the object is repaired. Words alone are not a decision. `done` ends the episode.
     bench.program(&format!("case $n in 1) echo 'Sure: {FORWARD}' ;; 2) echo 'I go on.' ;; *) echo '{done}' ;; esac"));
     let (code, answer, said) = outcome(&bench.record(&[]).output().unwrap());
     assert_eq!((code, &answer["lost"]), (Some(0), &Value::Array(Vec::new())), "{said}");
@@ -128,7 +128,7 @@ fn replies_are_read_as_those_of_a_model() {
     assert_eq!(texts("action"), [some("move_forward"), None, some("done")]);
     assert_eq!(texts("reply")[1], some("I go on."));
     let heard = bench.heard();
-    // What was thought before the reply that is invalid stays.
+    // The thought before the invalid reply is kept.
     assert_eq!((&heard[3]["last_action"], &heard[3]["last_thought"]), (&Value::Null, &"went on".into()));
     let history = "the previous reply could not be used, so nothing was done; the thought before it was: went on";
     assert!(heard[3]["user_prompt"].as_str().unwrap().contains(history), "{}", heard[3]);

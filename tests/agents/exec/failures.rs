@@ -1,4 +1,4 @@
-//! Programs that fail: their episode is lost, named, counted, and recorded by the same command later.
+//! Programs that fail: the episode is lost, named and counted, and the same command records it later.
 
 use std::fs;
 use std::time::Instant;
@@ -8,7 +8,7 @@ use crate::harness::files::{assert_same, contents};
 use crate::harness::program::run;
 use crate::harness::traces::recording;
 
-/// That a program which does this at its second observation loses its episode, for a reason with these words.
+/// Checks that a program which runs `answer` at its second observation loses its episode, and why.
 fn loses(answer: &str, words: &[&str], expected: &[&str]) {
     let bench = Bench::new();
     bench.program(&format!("if [ $n = 1 ]; then echo '{FORWARD}'; else {answer}; fi"));
@@ -24,11 +24,11 @@ fn loses(answer: &str, words: &[&str], expected: &[&str]) {
     assert_eq!(bench.lost(), [found["lost"][0].clone()], "{answer}");
     assert_eq!((&found["lost"][0]["step"], &found["lost"][0]["run"]), (&2.into(), &1.into()), "{answer}");
 
-    // Once the program is mended, the same command records what was lost.
+    // Once the program is fixed, the same command records the lost episode.
     bench.program(&three_steps());
     let (code, found, said) = outcome(&bench.record(words).output().unwrap());
     assert_eq!((code, &found["recorded"]), (Some(0), &1.into()), "{answer}: {said}");
-    // The program said nothing this time.
+    // This time the program wrote nothing to standard error.
     assert!(!bench.path("runs/stderr/E1-exec-s1-r1.log").exists(), "{answer}");
 }
 
@@ -49,7 +49,7 @@ fn a_program_that_hangs_is_ended_in_time() {
 
 #[test]
 fn a_program_that_closes_its_output() {
-    // The shell is replaced, or it would hold the output open.
+    // `exec` replaces the shell, which would otherwise keep the output open.
     let bench = Bench::new();
     bench.program("exec >&-; sleep 600");
     let (code, found, said) = outcome(&bench.record_of("exec:exec sh program.sh", &[]).output().unwrap());
@@ -65,14 +65,14 @@ fn a_line_without_end() {
 
 #[test]
 fn a_program_that_talks_out_of_turn() {
-    // Two lines for one observation: the second would be taken for the answer to the next.
+    // Two lines for one observation: the second would be read as the answer to the next observation.
     let bench = Bench::new();
     bench.program(&format!("printf '%s\\n%s\\n' '{FORWARD}' 'loading the model'"));
     let (code, found, said) = outcome(&bench.record(&[]).output().unwrap());
     assert_eq!(code, Some(1), "{said}");
     let reason = found["lost"][0]["reason"].as_str().unwrap();
     assert!(reason.contains("nobody had asked for: `loading the model`; the line before"), "{reason}");
-    // Which of them was meant as the reply is for people to say.
+    // People must decide which of the two was the reply.
     assert!(
         reason.contains("taken for its reply: `{\"view-description\"") && reason.contains("standard error"),
         "{reason}"
@@ -81,7 +81,7 @@ fn a_program_that_talks_out_of_turn() {
 
 #[test]
 fn a_line_in_place_of_the_reply_is_named() {
-    // The observation is read, the banner comes before the reply: at the second observation both are distinguished.
+    // The banner comes before the reply. At the second observation the program can tell the two apart.
     let bench = Bench::new();
     bench.program(&format!("[ $n = 1 ] && echo 'loading the model'; echo '{FORWARD}'"));
     let (code, found, said) = outcome(&bench.record(&[]).output().unwrap());
@@ -106,14 +106,14 @@ fn a_traceback_keeps_its_lines() {
         reason.ends_with("its last words:\n    Traceback:\n      File \"a.py\", line 4\n    \u{1b}[31mValueError"),
         "{reason}"
     );
-    // On the terminal as lines, and nothing acts there.
+    // The terminal shows its lines escaped.
     assert!(said.contains("\n      File \"a.py\", line 4\n    \\u{1b}[31mValueError\n"), "{said}");
 }
 
 #[test]
 fn a_line_before_the_first_question_is_named() {
     let early = "the program wrote a line before it was asked for its first reply: `loading the model`";
-    // Before it reads anything, at once and later; and between its task and the first observation, which it never reads.
+    // The banner comes before the program reads anything, at once or later, or between task and first observation.
     let before = "sleep 0.2; echo 'loading the model'";
     let between =
         "read -r task; printf '%s\\n' \"$task\" >> heard.jsonl; sleep 0.2; echo 'loading the model'; sleep 600";
@@ -128,7 +128,7 @@ fn a_line_before_the_first_question_is_named() {
         assert_eq!(lost["step"], 1, "{banner}: {said}");
         assert!(lost["reason"].as_str().unwrap().starts_with(&format!("step 1: {early}")), "{banner}: {said}");
 
-        // What is said on standard error is nobody's reply.
+        // Standard error is not read as a reply.
         let quiet = banner.replace("'loading the model'", "'loading the model' >&2").replace("sleep 600", "n=0");
         fs::write(bench.path("program.sh"), format!("{quiet}\n{script}")).unwrap();
         let (code, _, said) = outcome(&bench.record(&[]).output().unwrap());
@@ -140,7 +140,7 @@ fn a_line_before_the_first_question_is_named() {
 
 #[test]
 fn a_late_line_is_not_taken_as_the_next_reply() {
-    // The second line comes when the next question is on its way.
+    // The second line comes while the next observation is being sent.
     let bench = Bench::new();
     bench.program(&format!("echo '{FORWARD}'; [ $n = 1 ] && {{ sleep 0.3; echo 'all well'; sleep 600; }}"));
     let (code, found, said) = outcome(&bench.record(&[]).output().unwrap());
@@ -163,7 +163,7 @@ fn standard_error_is_kept_for_recorded_and_lost_episodes() {
     let line = |n: u32| format!("\u{1b}[1mstep {n} of [key]\u{1b}[0m\r\n");
     assert_eq!(kept(1), [line(1), line(2), line(3)].concat());
     assert_eq!(kept(2), [line(1), line(2)].concat());
-    // The folder is no input of a report.
+    // A report ignores the folder of standard errors.
     run(bench.folder.path(), &["trace", "validate", "runs"]).done();
 }
 
@@ -198,7 +198,7 @@ fn an_edited_program_is_another_agent() {
     let script = fs::read(bench.path("program.sh")).unwrap();
     let before = contents(&bench.path("runs"));
     let footer = recording(&bench.path("runs/E1-exec.parquet"))["agent"].clone();
-    // One line: the place of the word and the hash of what the file holds.
+    // One line: the position of the word and the hash of the file's contents.
     let hash = |bytes: &[u8]| exact::hash::of_bytes(bytes);
     assert_eq!(footer["files"], hash(format!("2 {}\n", hash(&script)).as_bytes()));
     assert!(!footer.to_string().contains("program.sh"), "{footer}");
@@ -211,7 +211,7 @@ fn an_edited_program_is_another_agent() {
         assert!(said.contains("help: put the files back as they were, or record into another folder"), "{said}");
         assert_same(&contents(&bench.path("runs")), &before);
     }
-    // With the files as they were it goes on.
+    // With the original files the recording continues.
     fs::write(bench.path("program.sh"), script).unwrap();
     let (code, answer, said) = outcome(&bench.record(&["--runs", "2"]).output().unwrap());
     assert_eq!((code, &answer["found"], &answer["recorded"]), (Some(0), &1.into(), &1.into()), "{said}");
@@ -241,7 +241,7 @@ fn keys_of_the_environment_are_removed_from_program_output() {
 #[test]
 fn lost_episodes_are_listed_until_they_are_recorded_and_disturb_no_report() {
     let bench = Bench::new();
-    // Of four episodes those that find the name of another one fail.
+    // An episode fails at its first step if the last run number in `heard.jsonl` matches `runs`.
     let fails = |runs: &str| {
         format!(
             "case \"$line\" in *'\"t\":1,'*) grep -o '/r[0-9]*\"' heard.jsonl | tail -n 1 | grep -q '{runs}' && exit 7 ;; esac; {}",
@@ -250,7 +250,7 @@ fn lost_episodes_are_listed_until_they_are_recorded_and_disturb_no_report() {
     };
     bench.program(&fails("[24]"));
     let words = ["--runs", "4", "--threads", "1"];
-    // Its file is not named by a word, so that another one is the same agent.
+    // No word names the program's file, so a changed file is the same agent.
     let record = |words: &[&str]| bench.record_of("exec:sh -c '. ./program.sh'", words).output().unwrap();
     let (code, answer, said) = outcome(&record(&words));
     assert_eq!((code, &answer["recorded"]), (Some(1), &2.into()), "{said}");
@@ -263,7 +263,7 @@ fn lost_episodes_are_listed_until_they_are_recorded_and_disturb_no_report() {
     let validation = run(bench.folder.path(), &["trace", "validate", "runs", "--json"]).done();
     assert!(!validation.contains("lost.jsonl"), "{validation}");
 
-    // One of them is recorded, another is lost again; a run that asks for neither leaves the list as it is.
+    // One of them is recorded and the other lost again. A run without these episodes does not change the list.
     bench.program(&fails("4"));
     assert_eq!(outcome(&record(&words)).0, Some(1));
     assert_eq!(runs(&bench), [4]);

@@ -1,6 +1,6 @@
-//! Agents that decide elsewhere, at the process boundary: programs that behave and that do not, and what a model costs.
+//! Agents outside the process: programs that behave, programs that do not, and the cost of models.
 //!
-//! The programs are a few lines of the shell each.
+//! Each program is a few lines of shell.
 
 mod episodes;
 mod failures;

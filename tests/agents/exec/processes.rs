@@ -1,4 +1,4 @@
-//! Programs as processes: one an episode, and none of them is there afterwards.
+//! Programs as processes: one per episode, and none remains afterwards.
 
 use std::fs;
 use std::process::{Command, Stdio};
@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use super::recordings::{Bench, outcome, three_steps};
 use crate::harness::program::{interrupt, stderr, succeeds, wait_for};
 
-/// Waits until a file has so many lines, and gives them.
+/// Waits until a file has `count` lines and returns them.
 fn lines(bench: &Bench, name: &str, count: usize) -> Vec<String> {
     wait_for(name, || {
         let text = fs::read_to_string(bench.path(name)).unwrap_or_default();
@@ -17,7 +17,7 @@ fn lines(bench: &Bench, name: &str, count: usize) -> Vec<String> {
     })
 }
 
-/// Waits until no process of these ids is there, or only one that waits to be collected.
+/// Waits until every process with these ids is gone or a zombie; false if one is still running after a while.
 fn are_gone(ids: &[String]) -> bool {
     let is_there = |id: &String| {
         let state = fs::read_to_string(format!("/proc/{id}/stat")).unwrap_or_default();
@@ -47,7 +47,7 @@ fn each_episode_has_a_process_of_its_own() {
 #[test]
 fn in_flight_is_how_many_run_at_once() {
     let bench = Bench::new();
-    // A program that is alone makes a folder; a second one at the same time finds it there.
+    // A program that runs alone creates the folder; a second one at the same time finds it and fails.
     let lock = "[ $n = 1 ] && { mkdir alone || exit 9; }; [ $n = 3 ] && rmdir alone";
     bench.program(&format!("{lock}; {}", three_steps()));
     let words = ["--runs", "6", "--in-flight", "1", "--threads", "2"];
@@ -58,7 +58,7 @@ fn in_flight_is_how_many_run_at_once() {
 #[test]
 fn children_of_a_program_end_with_it() {
     let bench = Bench::new();
-    // It leaves at the end, and a child of it would stay and hold its streams.
+    // The program ends normally, but its child would stay and keep its streams open.
     bench.program(&format!("[ $n = 1 ] && {{ sleep 600 & echo $! >> ids; }}; {}", three_steps()));
     let (code, _, said) = outcome(&bench.record(&[]).output().unwrap());
     assert_eq!(code, Some(0), "{said}");
@@ -69,7 +69,7 @@ fn children_of_a_program_end_with_it() {
 #[cfg(target_os = "linux")]
 fn children_in_another_process_group_end_too() {
     let bench = Bench::new();
-    // A session of its own, and a parent that is gone.
+    // A session of its own, with a parent that has ended.
     let daemon = "(setsid sh -c 'echo $$ >> ids; sleep 600' </dev/null >/dev/null 2>&1 &)";
     bench.program(&format!("[ $n = 1 ] && {daemon}; {}", three_steps()));
     let (code, _, said) = outcome(&bench.record(&[]).output().unwrap());
@@ -82,7 +82,7 @@ fn ctrl_c_ends_programs_with_the_steps_under_way_and_twice_at_once() {
     let bench = Bench::new();
     for times in [1, 2] {
         let _ = fs::remove_file(bench.path("ids"));
-        // The first time it answers after the interrupt, the second time never.
+        // Interrupted once, the program answers afterwards; interrupted twice, it never answers.
         let wait = if times == 1 { "while ! [ -e go ]; do sleep 0.01; done" } else { "sleep 600" };
         bench.program(&format!(
             "[ $n = 1 ] && {{ sleep 600 & echo $! $$ | tr ' ' '\\n' >> ids; }}; {wait}; {}",
@@ -106,11 +106,11 @@ fn ctrl_c_ends_programs_with_the_steps_under_way_and_twice_at_once() {
     assert_eq!((ends.len(), &ends[0]["reason"]), (1, &"stopped".into()));
 }
 
-/// Recordings that are interrupted again and again while their renderer draws: the second time ends each at once, with the
-/// code of an interruption, and without what the exit handlers of a renderer in use have to say.
+/// Interrupts recordings twice while their renderer draws. The second interrupt ends each at once, with the exit code
+/// of an interruption and without messages of the renderer's exit handlers.
 fn check_twice(rounds: u64) {
     let bench = Bench::new();
-    // Programs are there before the first frame is drawn, and never answer.
+    // Programs start before the first frame is drawn, and never answer.
     fs::write(bench.path("program.sh"), "echo $$ >> ids; sleep 600").unwrap();
     for round in 0..rounds {
         let _ = fs::remove_file(bench.path("ids"));
@@ -121,7 +121,7 @@ fn check_twice(rounds: u64) {
         let pause = ["0.003", "0.006", "0.009", "0.012"][usize::try_from(round % 4).unwrap()];
         let twice = ["-c", "kill -INT $0; sleep $1; kill -INT $0", &child.id().to_string(), pause];
         succeeds(Command::new("sh").args(twice));
-        // Two that come in one moment are one to the system.
+        // The system merges two interrupts that arrive at the same moment.
         let begin = Instant::now();
         while child.try_wait().unwrap().is_none() {
             sleep(Duration::from_millis(30));
@@ -150,7 +150,7 @@ fn soak_a_second_ctrl_c_ends_a_recording_that_draws() {
 #[test]
 fn frames_of_a_recording_that_was_killed_are_cleared_away() {
     let bench = Bench::new();
-    // It hears of the end of the recording by the end of its input.
+    // The program learns that the recording ended when its input ends.
     bench.program("echo $$ >> ids; cat > rest");
     let mut child = bench.record(&[]).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
     let ids = lines(&bench, "ids", 1);

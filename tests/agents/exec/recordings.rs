@@ -11,10 +11,10 @@ use crate::harness::files::write_small_world;
 use crate::harness::program::{program, stderr};
 use crate::harness::{need, traces};
 
-/// A reply that moves forward, as the shell writes it.
+/// A reply that moves forward, quoted for the shell.
 pub const FORWARD: &str = r#"{"view-description":"a wall","reasoning":"go on","action":"w","summary":"went on","selected_cube":"none","identification":"I am red"}"#;
 
-/// A program's replies that end with `done` at the third observation.
+/// Replies that end with `done` at the third observation.
 pub fn three_steps() -> String {
     format!("if [ $n -lt 3 ]; then echo '{FORWARD}'; else echo '{}'; fi", done())
 }
@@ -30,7 +30,7 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// Episodes are as short as their rooms allow; a program is given frames, so that they must be drawn.
+    /// A folder with episodes as short as their rooms allow. Programs get frames, which must be drawn.
     pub fn new() -> Self {
         need::drawing();
         let folder = tempfile::tempdir().unwrap();
@@ -42,7 +42,7 @@ impl Bench {
         self.folder.path().join(name)
     }
 
-    /// A program that keeps every line it gets in `heard.jsonl`, and at each observation does what `answer` says.
+    /// Writes a program that appends every line to `heard.jsonl` and runs `answer` at each observation.
     pub fn program(&self, answer: &str) {
         let script = format!(
             "while read -r line; do\n  printf '%s\\n' \"$line\" >> heard.jsonl\n  case \"$line\" in\n    \
@@ -51,7 +51,7 @@ impl Bench {
         fs::write(self.path("program.sh"), script).unwrap();
     }
 
-    /// `record` of `sh program.sh` in one episode of E1, if the words do not say otherwise.
+    /// `record` with `sh program.sh`, one episode of E1 unless `words` say otherwise.
     pub fn record(&self, words: &[&str]) -> Command {
         self.record_of("exec:sh program.sh", words)
     }
@@ -72,7 +72,7 @@ impl Bench {
         command
     }
 
-    /// The lines that programs got, in the order of their coming.
+    /// The lines that programs received, in order.
     pub fn heard(&self) -> Vec<Value> {
         self.lines("heard.jsonl")
     }
@@ -87,12 +87,12 @@ impl Bench {
         text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
     }
 
-    /// A column of text of a trace, null as `None`.
+    /// A text column of a trace; null as `None`.
     pub fn texts(&self, name: &str, column: &str) -> Vec<Option<String>> {
         traces::texts(&self.path(name), column)
     }
 
-    /// The files of a recording besides its traces and the standard error of programs.
+    /// The files of a recording other than traces and programs' standard error.
     pub fn leftovers(&self) -> Vec<String> {
         let Ok(entries) = fs::read_dir(self.path("runs")) else { return Vec::new() };
         let names = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap());
@@ -102,7 +102,7 @@ impl Bench {
     }
 }
 
-/// The exit code, the answer of `--json`, and what was said.
+/// The exit code, the answer of `--json`, and standard error.
 pub fn outcome(output: &Output) -> (Option<i32>, Value, String) {
     let answer = serde_json::from_slice(&output.stdout).unwrap_or(Value::Null);
     (output.status.code(), answer, stderr(output))

@@ -1,4 +1,4 @@
-//! While a recording runs: the traces of experiments that are complete are there to be looked at.
+//! The traces of complete experiments can be read while a recording runs.
 
 use std::fs;
 use std::process::{Command, Stdio};
@@ -9,7 +9,7 @@ use super::recordings::{Bench, three_steps};
 use crate::harness::files::{assert_same, contents};
 use crate::harness::program::{program, run, stderr};
 
-/// `record` of E1 and E2 with logs, one episode after the other.
+/// `record` of E1 and E2 with logs, one episode at a time.
 fn record(bench: &Bench) -> Command {
     let mut command = program(bench.folder.path());
     command.args(["record", "--config", "small.toml", "--seeds", "1", "--runs", "2", "--experiment", "E1,E2"]);
@@ -20,7 +20,7 @@ fn record(bench: &Bench) -> Command {
 #[test]
 fn an_experiment_that_is_complete_is_there_before_the_others_are() {
     let bench = Bench::new();
-    // Of E1 the second episode is lost; E2 waits to be let go.
+    // The second episode of E1 is lost. E2 waits for the file `go`.
     let lost =
         "case \"$line\" in *'E1/exec/s1/r2'*) exit 3 ;; *E2/exec*) while ! [ -e go ]; do sleep 0.02; done ;; esac";
     bench.program(&three_steps());

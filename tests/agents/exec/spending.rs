@@ -1,5 +1,5 @@
-//! A model behind a server on loopback, from the command line: what was spent is reported, and a failing server loses an
-//! episode under the name of its failure.
+//! A model behind a server on loopback, from the command line: the spending is reported, and a failing server loses an
+//! episode under the failure's name.
 
 use serde_json::Value;
 use world::agent::vlm::wire_format::Dialect;
@@ -17,7 +17,7 @@ fn spending_is_printed_over_all_starts() {
     let bench = Bench::new();
     let model = "[model.Loop]\nbackend = \"compatible\"\nid = \"m\"\nanswers_as = [\"model-1-0601\"]\nprices = { input = 1.0, output = 10.0 }\n";
     std::fs::write(bench.path("models.toml"), model).unwrap();
-    // The second request fails, the fourth is answered with `done`.
+    // The second request fails; the fourth gets `done`.
     let server = Server::start(|at, _| match at {
         1 => answer("500 Internal Server Error", ""),
         3 => answer("200 OK", &done()),

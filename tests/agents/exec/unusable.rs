@@ -1,11 +1,11 @@
-//! Programs that cannot answer: the recording ends and says so, whole episodes stay, and no other one is committed.
+//! Programs that cannot answer: the recording stops and says so. Only whole episodes are kept.
 
 use std::fs;
 
 use super::recordings::{Bench, FORWARD, outcome, three_steps};
 use crate::harness::program::program;
 
-/// The sentence about the program of these tests.
+/// The error message for the program of these tests.
 fn sentence(in_a_row: u32, last: &str) -> String {
     format!(
         "error: the agent `exec` gave {in_a_row} replies in a row without a decision; the last: {last}\n  \
@@ -24,7 +24,7 @@ fn an_agent_whose_every_reply_is_unreadable_ends_its_recording() {
     assert!(said.contains(&sentence(20, last)), "{said}");
     assert_eq!((&answer["recorded"], &answer["steps"], &answer["stopped"]), (&0.into(), &0.into(), &true.into()));
     assert!(!bench.path("runs/E1-exec.parquet").exists() && bench.lost().is_empty());
-    // The program was told, and its episode is nowhere.
+    // The program was told, and its episode was not recorded.
     assert_eq!(bench.heard().last().unwrap()["reason"], "stopped");
     assert_eq!(bench.leftovers(), Vec::<String>::new());
 
@@ -47,7 +47,7 @@ fn an_agent_whose_every_reply_is_unreadable_ends_its_recording() {
 #[test]
 fn replies_in_a_row_count_over_episodes_and_whole_ones_stay() {
     let bench = Bench::new();
-    // The first episode ends with two replies that are none; the second has nothing else.
+    // The first episode ends with two unusable replies; the second has only unusable ones.
     let first = format!("case $n in 1[0-8]|?) echo '{FORWARD}' ;; *) echo no ;; esac");
     bench.program(&format!("[ $n = 1 ] && echo x >> count; if [ $(wc -l < count) = 1 ]; then {first}; else echo; fi"));
     let words = ["--runs", "3", "--threads", "1", "--max-unusable", "4"];
@@ -62,7 +62,7 @@ fn replies_in_a_row_count_over_episodes_and_whole_ones_stay() {
 #[test]
 fn one_episode_in_flight_that_cannot_answer_is_enough() {
     let bench = Bench::new();
-    // The second episode never answers; the first does, and takes its time.
+    // The second episode never gives a usable reply; the first does, slowly.
     bench.program(&format!("if [ \"$run\" = 2 ]; then echo no; else sleep 0.05; echo '{FORWARD}'; fi"));
     let script = fs::read_to_string(bench.path("program.sh")).unwrap();
     let task = "case \"$line\" in *'/r2\"'*) run=2 ;; esac\n  case \"$line\" in";
@@ -88,7 +88,7 @@ fn the_limit_is_a_number_from_one_or_none() {
         let (code, _, said) = outcome(&bench.record(words).output().unwrap());
         assert!(code == Some(2) && said.contains(expected), "{said}");
     }
-    // A scripted agent never meets it.
+    // Scripted agents never reach the limit.
     let words = "record --agent frozen --no-frames --no-log --config small.toml --experiment E1 --seeds 1 --runs 1 --max-unusable 1";
     let output = program(bench.folder.path()).args(words.split(' ')).output().unwrap();
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));

@@ -1,4 +1,4 @@
-//! One model against one server, without a world: steps that are asked for by hand.
+//! One model and one server, without a world: the tests request steps directly.
 
 use std::num::NonZeroU32;
 use std::sync::Arc;
@@ -21,7 +21,7 @@ use super::server::Server;
 
 pub const KEY: &str = "sk-loopback-0123456789";
 
-/// Patient enough for a busy machine; waits between attempts are short.
+/// Patient enough for a busy machine, with short waits between attempts.
 pub fn patience() -> Patience {
     Patience {
         attempts: 3,
@@ -98,21 +98,21 @@ impl Bench {
         Self::play_task(vlm, task(Experiment::E1), episode, steps)
     }
 
-    /// The same in another task.
+    /// The replies to the first `steps` steps of another task.
     pub fn play_task(vlm: &Arc<Vlm>, task: Task, episode: &str, steps: i32) -> Vec<Result<Reply, Lost>> {
         let mut agent = vlm.agent(task, episode).unwrap();
         let local = tokio::runtime::Builder::new_current_thread().build().unwrap();
         (1..=steps).map(|t| local.block_on(agent.decide(&observation(t)))).collect()
     }
 
-    /// Everything that was written.
+    /// The contents of all written files.
     pub fn written(&self) -> String {
         let files = std::fs::read_dir(self.folder.path()).unwrap();
         files.map(|file| std::fs::read_to_string(file.unwrap().path()).unwrap()).collect()
     }
 }
 
-/// A task; with a false colour where the experiment states one.
+/// A task; with a false colour if the experiment states one.
 pub fn task(experiment: Experiment) -> Task {
     let stated_color = (experiment.stated_color != Stated::None).then(|| "yellow".to_owned());
     Task { experiment, stated_color, step_budget: 100, seed: 1 }

@@ -17,7 +17,7 @@ use super::server::{Server, decision, whole};
 const PROVIDERS: [Dialect; 4] =
     [Dialect::OpenaiChat, Dialect::OpenaiCompatible, Dialect::Gemini, Dialect::AnthropicMessages];
 
-/// Every name and every fixed value of a request's own language: none of them says anything about the task.
+/// All names and fixed values of the wire formats, which say nothing about the task.
 const LANGUAGE: [&str; 38] = [
     "model",
     "messages",
@@ -62,12 +62,12 @@ const LANGUAGE: [&str; 38] = [
 /// The keywords of the schema.
 const SCHEMA: [&str; 6] = ["type", "properties", "required", "additionalProperties", "object", "string"];
 
-/// Every experiment that comes with the program.
+/// All built-in experiments.
 fn built_in() -> Vec<Experiment> {
     built_in_names().into_iter().map(|name| Experiment::parse(name).unwrap()).collect()
 }
 
-/// The body of the first request of an episode, and the words that the prompt gives for it.
+/// The body of an episode's first request, and the rendered prompt.
 fn body(dialect: Dialect, experiment: Experiment) -> (Value, Rendered) {
     let server = Server::start(move |_, _| whole(dialect, &decision("w")));
     let bench = Bench::new(Limits::default());
@@ -77,7 +77,7 @@ fn body(dialect: Dialect, experiment: Experiment) -> (Value, Rendered) {
     (server.requests().remove(0).json(), words)
 }
 
-/// The parts of the user's message, in their order.
+/// The parts of the user's message, in order.
 fn parts(dialect: Dialect, body: &Value) -> &[Value] {
     let place = match dialect {
         Dialect::OpenaiChat | Dialect::OpenaiCompatible => "/messages/1/content",
@@ -87,7 +87,7 @@ fn parts(dialect: Dialect, body: &Value) -> &[Value] {
     body.pointer(place).unwrap().as_array().unwrap()
 }
 
-/// Every string of a value with the names of its members, in their order.
+/// All strings and member names of a value, in order.
 fn strings(value: &Value) -> Vec<&str> {
     match value {
         Value::String(text) => vec![text],
@@ -168,7 +168,7 @@ fn most_tokens_and_reasoning_are_asked_for_as_each_provider_has_them() {
         let (body, description) = asked(dialect, id, Some(Effort::Low));
         assert_eq!((body.pointer(most), body.pointer(place)), (Some(&json!(9_000)), Some(&expected)), "{dialect:?}");
         assert!(body.pointer("/output_config/format").is_some() || dialect != Dialect::AnthropicMessages);
-        // Both are part of what the recording says of its sampling.
+        // The recording's sampling includes both.
         assert_eq!(
             (&description["max_output_tokens"], &description["reasoning_effort"]),
             (&json!(9_000), &json!("low"))

@@ -1,4 +1,4 @@
-//! The model that answers is part of what an episode was recorded with.
+//! The fingerprint of an episode includes the model that answers.
 
 use serde_json::Value;
 use world::agent::vlm::wire_format::Dialect;
@@ -8,14 +8,14 @@ use super::server::{Server, decision, ok, spoken};
 use crate::harness::program::{run, stderr};
 use crate::harness::traces::{recording, texts};
 
-/// An answer in the name of a model.
+/// An answer that names a model.
 fn answer(model: &str, action: &str) -> Vec<u8> {
     let mut body = spoken(Dialect::OpenaiCompatible, &decision(action), "stop");
     body["model"] = Value::from(model);
     ok(&body)
 }
 
-/// Three episodes of one step each, but for the first, of two; `models` answer in turn.
+/// Three episodes: the first takes two steps, the others one. The `models` answer in turn.
 fn record(models: [&'static str; 4]) -> (Folder, String) {
     let folder = Folder::new();
     let server = Server::start(move |at, _| answer(models[at.min(3)], if at == 0 { "a" } else { "done" }));

@@ -1,4 +1,4 @@
-//! Keys leave in a header, and are in nothing else.
+//! Keys are sent in a header and appear nowhere else.
 
 use std::fs;
 use std::path::Path;
@@ -33,7 +33,7 @@ fn keys_are_in_no_file_and_no_message() {
     assert!(server.requests()[0].head.contains(KEY), "the header does carry it");
 }
 
-/// Everything that a recording wrote and said.
+/// All files and output of a recording.
 fn everything(folder: &Path, output: &Output) -> Vec<u8> {
     let mut bytes = [output.stdout.as_slice(), &output.stderr].concat();
     let mut folders = vec![folder.to_owned()];
@@ -55,7 +55,7 @@ fn has(bytes: &[u8], words: &str) -> bool {
     bytes.windows(words.len()).any(|window| window == words.as_bytes())
 }
 
-/// Records one short episode with all that makes programs talkative, and looks at every byte.
+/// Records a short episode with everything that makes programs verbose, and checks every byte.
 fn check(server: &Server, key: &str, words: &str) -> String {
     let folder = Folder::new();
     let mut command = folder.record(server, "own", &format!("--seeds 1 --runs 1 --json {words}"));
@@ -63,7 +63,7 @@ fn check(server: &Server, key: &str, words: &str) -> String {
     let output = command.output().unwrap();
     let written = everything(folder.path(), &output);
     assert!(!has(&written, key), "{}", stderr(&output));
-    // Nor the greater part of it.
+    // Nor its first or last 12 bytes.
     assert!(!has(&written, &key[..12]) && !has(&written, &key[key.len() - 12..]), "{}", stderr(&output));
     stderr(&output)
 }
@@ -73,7 +73,7 @@ fn a_server_that_says_everything_back_learns_the_key_and_nobody_else_does() {
     let statuses = ["200 OK", "307 Temporary Redirect", "400 Bad Request", "401 Unauthorized", "404 Not Found"];
     for status in statuses {
         let server = Server::start(move |_, request| {
-            // The key stands where a text that is shortened may end.
+            // The key is where a shortened text may end.
             let padded = format!("{}{}", " .".repeat(130), request.head);
             let location = format!("location: http://elsewhere/?{KEY}\r\n{JSON}");
             http(status, &location, serde_json::json!({ "error": padded }).to_string().as_bytes())

@@ -1,4 +1,4 @@
-//! Recordings that are killed again and again: every episode is there once, and no answer was asked for twice.
+//! Recordings that are killed repeatedly: every episode is recorded once, and no answer is requested twice.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
@@ -16,8 +16,8 @@ use crate::harness::program::{run, stderr};
 
 const STEPS: u32 = 4;
 
-/// Every twentieth request goes wrong, in one way after the other; the others are answered in words that no other answer
-/// has, so that no two later requests are the same.
+/// Every twentieth request fails, each time in another way. The other answers are all different, so that no two later
+/// requests are the same.
 fn answer(at: usize, request: &Request) -> Vec<u8> {
     sleep(Duration::from_millis(2));
     match at % 100 {
@@ -30,14 +30,14 @@ fn answer(at: usize, request: &Request) -> Vec<u8> {
     }
 }
 
-/// The identity of a request: the model, the words and the frame, hashed as journals do.
+/// The identity of a request: model, words and frame, hashed like journals do.
 fn question(request: &Request) -> String {
     let (before, image) = request.body.split_once("data:image/png;base64,").unwrap();
     let (_, after) = image.split_once('"').unwrap();
     hash::of_bytes(format!("{before}data:image/png;base64,\"{after}").as_bytes())
 }
 
-/// Numbers below `end`, from a seed: the moments of death.
+/// Pseudo-random numbers below `end` at which the process is killed.
 fn moments(count: usize, end: usize) -> Vec<usize> {
     let mut state = 0x2545_f491_4f6c_dd1d_u64;
     let mut found = BTreeSet::new();
@@ -56,8 +56,8 @@ struct Study {
 }
 
 impl Study {
-    /// Starts the recordings of all models, one after the other; kills the one under way when the server has got so many
-    /// requests. Whether all ended normally.
+    /// Starts the recordings of all models in turn. Kills the running one once the server has had `until` requests.
+    /// Returns true if all ended normally.
     fn start(&self, until: Option<usize>) -> bool {
         self.models.iter().all(|model| {
             let mut command = self.folder.record(&self.server, model, &self.words);
@@ -70,7 +70,7 @@ impl Study {
         })
     }
 
-    /// Waits for the end of a process, or brings it about at its moment.
+    /// Waits for the end of a process, or kills it at its moment.
     fn outlives(&self, child: &mut Child, until: Option<usize>) -> bool {
         while child.try_wait().unwrap().is_none() {
             if until.is_some_and(|moment| self.server.count() > moment) {
@@ -83,12 +83,12 @@ impl Study {
         true
     }
 
-    /// The questions that have an answer on disk.
+    /// The questions with an answer on disk.
     fn answered(&self) -> BTreeSet<String> {
         let entries = self.folder.journals().into_values().flatten();
         entries
             .filter_map(|entry| match entry {
-                // Before the first answer, two episodes may see and get the same.
+                // Before the first answer, two episodes may send the same request.
                 Entry::Answer { t, question, .. } if t > 1 => Some(question),
                 _ => None,
             })
@@ -104,7 +104,7 @@ impl Study {
     }
 }
 
-/// The number of times that each question was sent; none is sent again after its answer came.
+/// The number of times that each question was sent; checks that no answered question was sent again.
 fn journaled(journals: &BTreeMap<PathBuf, Vec<Entry>>) -> BTreeMap<String, usize> {
     let mut sent = BTreeMap::new();
     for (path, entries) in journals {
@@ -132,7 +132,7 @@ fn check(models: usize, runs: usize, kills: usize) {
     };
     let episodes = models * 3 * runs;
     let mut killed = 0;
-    // The last quarter is left, so that every start has something to do at its moment.
+    // The last quarter is left over, so that every start still has work at its moment.
     for moment in moments(kills, episodes * STEPS as usize * 3 / 4) {
         let (answered, before) = (study.answered(), study.server.count());
         killed += usize::from(!study.start(Some(moment.max(before))));

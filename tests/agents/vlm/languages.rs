@@ -1,4 +1,4 @@
-//! Each provider is asked in its own language, and gets no more than the paper's prompt has.
+//! Each provider gets its own wire format, and only the contents of the paper's prompt.
 
 use std::collections::BTreeSet;
 
@@ -39,7 +39,7 @@ fn each_provider_is_asked_in_its_language() {
     }
 }
 
-/// A backend for each language, as a models' file has them.
+/// A backend for each wire format, as in a file of models.
 const BACKENDS: [(&str, Dialect); 4] = [
     ("openai-chat", Dialect::OpenaiChat),
     ("openai-compatible", Dialect::OpenaiCompatible),
@@ -50,11 +50,11 @@ const BACKENDS: [(&str, Dialect); 4] = [
 /// A reply that ends an episode of either prompt family.
 fn done(request: &Request) -> String {
     let reply = decision("done");
-    // The prompt of E5 knows no cubes.
+    // The prompt of E5 has no cubes.
     if request.body.contains("selected_cube") { reply } else { reply.replace("\"selected_cube\":\"none\",", "") }
 }
 
-/// The requests of one step in each of the five experiments, as `record` sends them.
+/// The requests of one step in each of the five experiments, as sent by `record`.
 fn of_all_experiments(backend: &str, dialect: Dialect) -> Vec<Request> {
     let server = Server::start(move |_, request| whole(dialect, &done(request)));
     let folder = Folder::new();
@@ -78,7 +78,7 @@ fn of_all_experiments(backend: &str, dialect: Dialect) -> Vec<Request> {
     server.requests()
 }
 
-/// The schema within a request.
+/// The schema in a request.
 fn schema(dialect: Dialect, request: &Value) -> &Value {
     let place = match dialect {
         Dialect::OpenaiChat | Dialect::OpenaiCompatible => "/response_format/json_schema/schema",
@@ -88,7 +88,7 @@ fn schema(dialect: Dialect, request: &Value) -> &Value {
     request.pointer(place).unwrap_or_else(|| panic!("no schema: {dialect:?}"))
 }
 
-/// Every string of a value, keys among them.
+/// All strings of a value, including keys.
 fn strings(value: &Value) -> BTreeSet<String> {
     match value {
         Value::String(text) => BTreeSet::from([text.clone()]),
@@ -122,7 +122,7 @@ fn the_schema_adds_nothing_to_the_prompt() {
                 Vec::<&String>::new(),
                 "{dialect:?}"
             );
-            // The keys are those that the prompt asks for.
+            // The schema has the keys that the prompt asks for.
             let asked: BTreeSet<&str> = schema["properties"].as_object().unwrap().keys().map(String::as_str).collect();
             assert_eq!(asked, keys, "{dialect:?}");
             assert!(keys.iter().all(|key| request.body.matches(&format!("\\\"{key}\\\"")).count() > 0), "{dialect:?}");

@@ -1,5 +1,4 @@
-//! A study in one command against the servers of `examples/providers`, which answer as five providers do, with a kill in the
-//! middle.
+//! A study in one command, killed halfway, with the servers of `examples/providers`, which answer like five providers.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -17,7 +16,7 @@ use super::bench::KEY;
 use super::recordings::Folder;
 use crate::harness::program::{program, run, stderr};
 
-/// A server of `examples/providers`; it ends with this.
+/// A server of `examples/providers`; it is killed when this is dropped.
 struct Provider {
     process: Child,
     address: String,
@@ -34,7 +33,7 @@ impl Provider {
         Self { process, address: address.trim().to_owned() }
     }
 
-    /// The number of paid answers.
+    /// The number of answers that were paid for.
     fn paid(&self) -> u64 {
         let mut stream = TcpStream::connect(self.address.trim_start_matches("http://")).unwrap();
         stream.write_all(b"GET / HTTP/1.1\r\nhost: loopback\r\nconnection: close\r\n\r\n").unwrap();
@@ -84,7 +83,7 @@ const SERVED: [Served; 5] = [
     ("local", "openai-compatible", "/v1", [["Own", "own-1", "answers_as = [\"*\"]", "no-max-cost"], NONE]),
 ];
 
-/// Writes the models and the study of these options; gives the servers.
+/// Writes the models and the study with these options; starts the servers.
 fn prepare(folder: &Folder, options: &str) -> Vec<Provider> {
     let mut models = String::new();
     let mut study =
@@ -116,7 +115,7 @@ fn record(folder: &Folder) -> Command {
     command
 }
 
-/// Records a study of this many episodes, with a kill when half of its answers were paid, and checks that none was paid twice.
+/// Records a study, killed once half of its answers were paid for, and checks that none is paid for twice.
 fn study(options: &str, episodes: u64) {
     let folder = Folder::new();
     let servers = prepare(&folder, options);
@@ -127,7 +126,7 @@ fn study(options: &str, episodes: u64) {
     assert!(forecast.contains(&together) && forecast.contains("and what 2 models without prices cost"), "{forecast}");
 
     let mut killed = record(&folder).spawn().unwrap();
-    // Four steps an episode.
+    // Four steps per episode.
     while paid() < 2 * episodes {
         assert_eq!(killed.try_wait().unwrap(), None, "it ended before half of the answers");
         sleep(Duration::from_millis(20));
@@ -149,7 +148,7 @@ fn study(options: &str, episodes: u64) {
         assert_eq!(BTreeSet::from_iter(&steps).len(), steps.len(), "{}: a step was paid twice", journal.display());
         kept += steps.len() as u64;
     }
-    // Those that were out at the kill have no answer in a journal.
+    // Requests in flight at the kill have no answer in a journal.
     let lost = paid() - kept;
     assert!(kept == 4 * episodes && lost <= 64, "{kept} answers kept, {lost} paid and lost at the kill");
     let unanswered: u64 = answers.iter().map(|answer| answer["spend"]["unanswered"].as_u64().unwrap()).sum();
@@ -157,12 +156,12 @@ fn study(options: &str, episodes: u64) {
 
     let spend: BTreeMap<&str, &Value> =
         answers.iter().map(|answer| (answer["model"].as_str().unwrap(), &answer["spend"])).collect();
-    // What OpenRouter says that an answer cost; tokens of OpenAI's by their prices, 400 of them from the cache.
+    // OpenRouter states the cost; OpenAI's follows from tokens and prices, with 400 tokens from the cache.
     let cost = |model: &str| spend[model]["cost_usd"].as_f64().unwrap();
     let each = episodes as f64 / 8.0 * 4.0;
     assert!((cost("Gemma") - 0.000_7 * each).abs() < 1e-6, "{}", cost("Gemma"));
     assert!((cost("GPT 5.1") - 0.001_64 * each).abs() < 1e-6, "{}", cost("GPT 5.1"));
-    // Two files for each model, and one for each account.
+    // Two files per model, and one per account.
     assert_eq!(std::fs::read_dir(folder.path().join("runs/ledger")).unwrap().count(), 16 + 5);
     let report = run(folder.path(), &["report", "runs", "--out", "report", "--json"]).json();
     assert_eq!(report["episodes"], episodes);
@@ -197,7 +196,7 @@ fn a_probe_reports_each_models_parameters() {
     let names: Vec<&str> = answers.iter().map(|answer| answer["model"].as_str().unwrap()).collect();
     assert_eq!(names, ["Flash", "GPT 5.1", "GPT 6.1", "Gemma", "Haiku", "Own", "Pro", "Sonnet"]);
     let of = |key: &str| answers.iter().map(|answer| answer[key].clone()).collect::<Vec<_>>();
-    // The server of one's own takes the schema and does nothing with it; it names no price.
+    // The self-hosted server accepts the schema but ignores it, and states no price.
     assert_eq!(of("enforces_schema"), [true, true, true, true, true, false, true, true].map(Value::from));
     assert_eq!((&of("cost_usd")[3], &of("cost_usd")[5]), (&Value::from(0.0007), &Value::Null));
     assert_eq!(
@@ -275,7 +274,7 @@ fn the_flex_tier_is_asked_for_and_costs_half() {
         let output = record(model, "");
         assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
         let answer: Value = serde_json::from_slice(&output.stdout).unwrap();
-        // Eight answers of 0.00164 dollars at the full price.
+        // Eight answers, at half of the full price of 0.00164 dollars.
         let cost = answer["spend"]["cost_usd"].as_f64().unwrap();
         assert!((cost - 8.0 * 0.001_64 / 2.0).abs() < 1e-9, "{model}: {cost}");
     }
@@ -291,7 +290,7 @@ fn the_flex_tier_is_asked_for_and_costs_half() {
     assert!(stderr(&refused).contains("the backend `anthropic` has no such tier"), "{}", stderr(&refused));
 }
 
-/// `record` of one model of these servers, in one experiment and seed.
+/// `record` of one model of these servers, in one experiment and one seed.
 fn one(folder: &Folder, model: &str, words: &str) -> Command {
     let mut command = program(folder.path());
     command.env("LOOPBACK_KEY", KEY).args(["record", "--models", "models.toml", "--config", "small.toml", "--no-log"]);
@@ -300,7 +299,7 @@ fn one(folder: &Folder, model: &str, words: &str) -> Command {
     command
 }
 
-/// Records six episodes of a model in batches, with a kill after the second batch, and checks that no answer is paid twice.
+/// Records six episodes in batches, killed after the second batch, and checks that no answer is paid for twice.
 fn in_batches(server: usize, model: &str) {
     let folder = Folder::new();
     let servers = prepare(&folder, "");
@@ -312,7 +311,7 @@ fn in_batches(server: usize, model: &str) {
         notes.map_or_else(String::new, |file| std::fs::read_to_string(file.path()).unwrap()).lines().count()
     };
     let mut killed = record().spawn().unwrap();
-    // The first step goes alone, the others of the first steps together.
+    // The first step is sent alone, then the other first steps together.
     while batches() < 2 {
         assert_eq!(killed.try_wait().unwrap(), None, "it ended before its second batch");
         sleep(Duration::from_millis(5));
@@ -323,7 +322,7 @@ fn in_batches(server: usize, model: &str) {
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     let answer: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(answer["recorded"], 6);
-    // 24 answers; without batches each of them is a request.
+    // 24 answers; without batches each would be one request.
     assert_eq!(paid(), 24, "an answer was paid twice");
     assert!((6..=20).contains(&batches()), "{} batches", batches());
     let cost = answer["spend"]["cost_usd"].as_f64().unwrap();

@@ -1,4 +1,4 @@
-//! Questions and answers are on disk before they are acted on, and no question is asked again.
+//! Questions and answers are on disk before they take effect, and no question is asked twice.
 
 use std::num::NonZeroU32;
 use std::sync::Arc;
@@ -27,7 +27,7 @@ fn answers_are_reused_and_play_without_a_network() {
     assert_eq!(first[0].action, Some(Action::TurnLeft));
     assert!((first[0].usage.cost_usd.unwrap() - 0.002).abs() < 1e-12);
 
-    // A line that was cut off by the end of a process was acted on by nobody.
+    // A line cut off when the process ended has had no effect.
     let journal = bench.folder.path().join("episode.jsonl");
     let mut text = std::fs::read_to_string(&journal).unwrap();
     text.push_str("{\"kind\":\"answer\",\"t\":4,\"att");

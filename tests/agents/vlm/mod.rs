@@ -1,4 +1,4 @@
-//! A model behind a provider, against servers on loopback that behave and misbehave.
+//! A model behind a provider, tested with loopback servers that behave or misbehave.
 
 mod bench;
 mod bodies;

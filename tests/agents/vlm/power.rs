@@ -1,5 +1,5 @@
-//! The power fails while a model is asked: no answer that was journaled is paid for twice, and the recording ends as one
-//! that nothing has interrupted.
+//! The power fails while a model is asked. No journaled answer is paid for twice, and the recording ends as if it had
+//! not been interrupted.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -19,14 +19,14 @@ use crate::harness::traces;
 const WORDS: &str = "--out deep/runs --seeds 1 --runs 2 --threads 1 --in-flight 1";
 const STEPS: u32 = 3;
 
-/// A server whose answers depend on the request alone, so that every recording gets the same.
+/// A server whose answers depend only on the request, so that every recording gets the same ones.
 fn server() -> Server {
     Server::start(|_, request: &Request| whole(Dialect::OpenaiCompatible, &counting(request, STEPS, 0)))
 }
 
-/// The identity of a question: the words as journals hash them, and the frame.
+/// The identity of a question: the frame, and the words hashed like journals do.
 type Question = (String, String);
-/// The file of a journal, and a step.
+/// A journal's file and a step.
 type Answer = (String, i32);
 
 fn question(request: &Request) -> Question {
@@ -35,7 +35,7 @@ fn question(request: &Request) -> Question {
     (hash::of_bytes(format!("{before}data:image/png;base64,\"{after}").as_bytes()), hash::of_bytes(frame.as_bytes()))
 }
 
-/// The answers of journals that were synchronised within these calls: the file and the step of each.
+/// The journaled answers that these calls synchronised.
 fn promised(all: &[Call]) -> BTreeSet<Answer> {
     let (mut names, mut written, mut kept) = (Vec::new(), Vec::new(), BTreeSet::new());
     for call in all {
@@ -62,7 +62,7 @@ struct Uninterrupted {
     folder: Folder,
     calls: Vec<Call>,
     rows: Vec<Vec<Option<String>>>,
-    /// The requests in their order, and the answer that each got: the journal's file and the step.
+    /// The requests in order, and the answer to each.
     requests: Vec<(Question, Answer)>,
 }
 
@@ -83,7 +83,7 @@ impl Uninterrupted {
         Self { rows: rows(&folder), folder, calls, requests: asked.into_iter().zip(answers).collect() }
     }
 
-    /// The power fails after so many calls.
+    /// Fails the power after `count` calls.
     fn check(&self, count: usize, unsynced: Unsynced) {
         let told = format!("after {count} of {} calls, unsynced {unsynced:?}", self.calls.len());
         let (folder, server) = (Folder::new(), server());
@@ -104,7 +104,7 @@ impl Uninterrupted {
     }
 }
 
-/// The answers in the order of their coming.
+/// The answers in the order of arrival.
 fn in_order(all: &[Call]) -> Vec<Answer> {
     let mut answers = Vec::new();
     for end in 1..=all.len() {
@@ -134,7 +134,7 @@ fn no_answer_is_paid_for_twice_after_a_loss_of_power() {
     check(12);
 }
 
-/// How often each of the journals was opened.
+/// The number of times that each journal was opened.
 fn journal_opens(folder: &Folder, words: &str, server: &Server) -> Vec<usize> {
     let log = tempfile::tempdir().unwrap();
     let log = log.path().join("log");
@@ -156,7 +156,7 @@ fn a_start_reads_each_journal_once() {
     let (folder, server) = (Folder::new(), server());
     journal_opens(&folder, WORDS, &server);
     assert_eq!(journal_opens(&folder, WORDS, &server), [1, 1], "nothing is left to record");
-    // Those of the third and fourth episode are new; each is opened to be written and read.
+    // The third and fourth episode are new; each journal is opened to write and to read.
     let opens = journal_opens(&folder, &WORDS.replace("--runs 2", "--runs 4"), &server);
     assert_eq!(opens, [1, 1, 2, 2]);
 }

@@ -1,4 +1,4 @@
-//! Providers as their own documents and clients have them: rate limits in bodies and headers, another model, other types.
+//! Provider behaviour, from their documentation and clients: rate limits in bodies and headers, other models and types.
 
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
@@ -20,7 +20,7 @@ use crate::harness::traces;
 const PROVIDERS: [Dialect; 4] =
     [Dialect::OpenaiChat, Dialect::OpenaiCompatible, Dialect::Gemini, Dialect::AnthropicMessages];
 
-/// An error of Gemini: <https://ai.google.dev/gemini-api/docs/rate-limits>, details as `google.rpc` has them.
+/// An error of Gemini: <https://ai.google.dev/gemini-api/docs/rate-limits>, with details as in `google.rpc`.
 fn exhausted(quota: &str, delay: &str) -> Vec<u8> {
     let body = json!({ "error": {
         "code": 429,
@@ -58,7 +58,7 @@ fn a_rate_limit_with_a_delay_is_waited_for_and_uses_up_no_attempts() {
     let milliseconds = || http("429 Too Many Requests", "retry-after-ms: 20\r\nretry-after: 99\r\n", b"slow down");
     for (dialect, is_google) in [(Dialect::Gemini, true), (Dialect::OpenaiChat, false)] {
         let server = Server::start(move |at, _| match at {
-            // More often than there are attempts.
+            // More failures than attempts.
             0..8 if is_google => exhausted(A_MINUTE, "0.020s"),
             0..8 => milliseconds(),
             _ => whole(dialect, &decision("w")),
@@ -133,7 +133,7 @@ fn a_call_of_a_function_in_place_of_a_text_is_a_repair_with_every_provider() {
         }
         let server = Server::start(move |_, _| ok(&body));
         let bench = Bench::new(Limits::default());
-        // The second time from the journal.
+        // The second reply comes from the journal.
         for _ in 0..2 {
             let vlm = bench.vlm(&server, dialect, OnOutage::Lose);
             let reply = Bench::play(&vlm, "episode", 1).remove(0).unwrap();
@@ -144,14 +144,14 @@ fn a_call_of_a_function_in_place_of_a_text_is_a_repair_with_every_provider() {
     }
 }
 
-/// `record` of Gemini 2.5 Pro at this server.
+/// `record` of Gemini 2.5 Pro with this server.
 fn record(folder: &Folder, server: &Server, words: &str) -> (Option<i32>, String) {
     let words = format!("--backend google --seeds 1 --max-output-tokens 100 {words}");
     let output = folder.record(server, "Gemini 2.5 Pro", &words).env("GEMINI_API_KEY", KEY).output().unwrap();
     (output.status.code(), stderr(&output))
 }
 
-/// An answer of two steps' length by a model of this id.
+/// An answer of an episode with two steps, by the model with this id.
 fn by(id: &str, request: &Request, at: usize) -> Value {
     let mut body = spoken(Dialect::Gemini, &counting(request, 2, at), endings(Dialect::Gemini).0);
     body["modelVersion"] = id.into();
@@ -160,7 +160,7 @@ fn by(id: &str, request: &Request, at: usize) -> Value {
 
 #[test]
 fn no_episode_is_lost_to_a_provider_that_allows_few_requests() {
-    // Four in a tenth of a second, for twelve episodes of two steps at once.
+    // Allows four requests per tenth of a second, for twelve simultaneous episodes of two steps.
     let window = Mutex::new((Instant::now(), 0));
     let server = Server::start(move |at, request| {
         let mut window = window.lock().unwrap();
@@ -182,7 +182,7 @@ fn an_answer_by_another_model_stops_the_recording_before_the_second_request() {
     let server = Server::start(|at, request| ok(&by(OTHER, request, at)));
     let folder = Folder::new();
     for _ in 0..2 {
-        // The second time the answer is in the journal.
+        // The second answer comes from the journal.
         let (code, said) = record(&folder, &server, "--runs 4 --in-flight 4");
         assert_eq!((code, server.count()), (Some(2), 1), "{said}");
         let words =
@@ -214,8 +214,8 @@ fn a_dated_snapshot_is_the_model_that_was_asked_for() {
 
 #[test]
 fn a_refused_parameter_is_named_with_the_line_that_mends_it() {
-    // Each as its provider sends it: OpenAI's reference of errors, Anthropic's for Claude Sonnet 5, Google's for Gemini 3,
-    // OpenRouter's guide to provider routing.
+    // Errors as each provider sends them: OpenAI's error reference, Anthropic's for Claude Sonnet 5, Google's for
+    // Gemini 3, and OpenRouter's guide to provider routing.
     let openai = |param: &str, message: &str| json!({ "error": { "message": message, "type": "invalid_request_error", "param": param, "code": "unsupported_value" } });
     let cases = [
         (
@@ -314,15 +314,15 @@ fn extra_body_is_sent_and_fingerprinted_and_the_default_temperature_is_not_sent(
 fn tokens_from_a_cache_have_their_price_with_every_provider() {
     for dialect in PROVIDERS {
         let mut body = spoken(dialect, &decision("w"), endings(dialect).0);
-        // 1000 tokens of a request, 400 of them from the cache; 100 of a reply.
+        // 1000 tokens per request, 400 of them cached; 100 per reply.
         match dialect {
-            // <https://platform.openai.com/docs/guides/prompt-caching>; OpenRouter's usage accounting has the same name.
+            // <https://platform.openai.com/docs/guides/prompt-caching>; OpenRouter's accounting has the same name.
             Dialect::OpenaiChat | Dialect::OpenaiCompatible => {
                 body["usage"]["prompt_tokens_details"] = json!({ "cached_tokens": 400 });
             }
-            // <https://ai.google.dev/gemini-api/docs/caching>: `promptTokenCount` has the cached ones in it.
+            // <https://ai.google.dev/gemini-api/docs/caching>: `promptTokenCount` includes the cached tokens.
             Dialect::Gemini => body["usageMetadata"]["cachedContentTokenCount"] = json!(400),
-            // <https://platform.claude.com/docs/en/build-with-claude/prompt-caching>: `input_tokens` has not.
+            // <https://platform.claude.com/docs/en/build-with-claude/prompt-caching>: `input_tokens` excludes them.
             Dialect::AnthropicMessages => {
                 body["usage"]["input_tokens"] = json!(600);
                 body["usage"]["cache_read_input_tokens"] = json!(400);
@@ -333,7 +333,7 @@ fn tokens_from_a_cache_have_their_price_with_every_provider() {
         let vlm = bench.vlm(&server, dialect, OnOutage::Lose);
         let usage = Bench::play(&vlm, "episode", 1).remove(0).unwrap().usage;
         assert_eq!(usage.prompt_tokens, Some(1_000), "{dialect:?}");
-        // Prices of the bench: 1, of cached 0.1, and 10 dollars for a million.
+        // The bench's prices per million tokens: 1 dollar, cached 0.1, replies 10.
         assert!((usage.cost_usd.unwrap() - (600.0 + 40.0 + 1_000.0) / 1e6).abs() < 1e-12, "{dialect:?}: {usage:?}");
     }
 }

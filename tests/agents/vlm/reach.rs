@@ -1,4 +1,4 @@
-//! A provider that cannot serve the recording at all ends it at once: one that is not there, one that takes no images.
+//! A provider that cannot serve the recording ends it at once: it cannot be reached, or it accepts no images.
 
 use std::net::TcpListener;
 
@@ -13,10 +13,10 @@ use super::recordings::{Folder, counting};
 use super::server::{JSON, Server, decision, http, ok, whole};
 use crate::harness::program::stderr;
 
-/// The variables that send requests through a proxy, which is another thing to be reached.
+/// Variables that send requests through a proxy, which would be reached instead of the server.
 const PROXIES: [&str; 6] = ["HTTP_PROXY", "http_proxy", "HTTPS_PROXY", "https_proxy", "ALL_PROXY", "all_proxy"];
 
-/// `record` with this address, and no proxy.
+/// Runs `record` with this server and without a proxy.
 fn recorded(folder: &Folder, server: &Server, words: &str) -> (Option<i32>, String) {
     let mut command = folder.record(server, "own", words);
     for name in PROXIES {
@@ -38,8 +38,8 @@ fn an_address_where_nobody_listens_is_named_before_anything_is_recorded() {
     assert!(said.contains("\n  help: is the address right") && !said.contains(KEY) && !said.contains("lost"), "{said}");
     assert!(!folder.path().join("runs").exists(), "nothing is made");
 
-    // An address that answers is not asked for anything before its first episode, and one that has nothing to do need not
-    // be there.
+    // A reachable address gets no request before the first episode. A recording with nothing to do does not need the
+    // server.
     let (code, said) = recorded(&folder, &server, "--seeds 1 --runs 2");
     assert_eq!((code, server.count()), (Some(0), 2), "{said}");
     let (code, said) = recorded(&folder, &server, &words);

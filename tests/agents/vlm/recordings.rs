@@ -29,7 +29,7 @@ impl Folder {
         self.0.path()
     }
 
-    /// `record` of a model into `runs`, with these words added.
+    /// `record` of a model into `runs`, with additional words.
     pub fn record(&self, server: &Server, model: &str, words: &str) -> Command {
         let mut command = program(self.path());
         command.env("MIRRORSTATS_API_KEY", KEY).args(["record", "--agent", "vlm", "--model", model]);
@@ -40,7 +40,7 @@ impl Folder {
         command
     }
 
-    /// The journals as they are, by file; a last line that was cut off is left out.
+    /// The journal entries by file, without a last line that was cut off.
     pub fn journals(&self) -> BTreeMap<PathBuf, Vec<Entry>> {
         let Ok(files) = fs::read_dir(self.path().join("runs/journal")) else { return BTreeMap::new() };
         let read = |path: PathBuf| {
@@ -53,7 +53,7 @@ impl Folder {
 }
 
 /// The reply of a model that turns left and is done at step `last`. It counts in its summaries, which come back with
-/// the next request; `mark` makes this one differ from all others.
+/// the next request. `mark` distinguishes this reply from all others.
 pub fn counting(request: &Request, last: u32, mark: usize) -> String {
     let before = request.body.split_once("counted to ").and_then(|(_, rest)| rest.split_once(' '));
     let step = before.map_or(1, |(count, _)| count.parse::<u32>().unwrap() + 1);
@@ -61,7 +61,7 @@ pub fn counting(request: &Request, last: u32, mark: usize) -> String {
     decision(action).replace("went on", &format!("counted to {step} in answer {mark}"))
 }
 
-/// The column `reply_status` of the trace of E1 in this folder.
+/// The column `reply_status` of the folder's trace of E1.
 pub fn rows(folder: &Folder, runs: &str) -> Vec<String> {
     let statuses = traces::texts(&folder.path().join(runs).join("E1-own.parquet"), "reply_status");
     statuses.into_iter().map(Option::unwrap).collect()

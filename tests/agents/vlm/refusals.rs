@@ -1,4 +1,4 @@
-//! A refusal by a provider costs a step or an episode, and the recording only if no request can do better.
+//! A provider's refusal loses a step or an episode. It ends the recording only if no request can succeed.
 
 use std::fs;
 
@@ -21,7 +21,7 @@ fn bad_request(error: &Value) -> Vec<u8> {
     http("400 Bad Request", JSON, error.to_string().as_bytes())
 }
 
-/// The error by which a provider refuses what a request is about.
+/// The error with which a provider refuses a request because of its content.
 fn refusal(dialect: Dialect) -> Value {
     match dialect {
         Dialect::OpenaiChat => json!({ "error": { "message": "filtered", "type": null, "code": "content_filter",
@@ -112,7 +112,7 @@ fn a_bad_request_after_an_answer_costs_its_episode_alone() {
         assert_eq!(vlm.stopped(), None, "{dialect:?}");
         assert_eq!(statuses(&Bench::play(&vlm, "short", 1)), [Status::Ok], "{dialect:?}");
 
-        // Another start knows from the journal that the model has answered.
+        // A restart knows from the journal that the model has answered.
         let again = bench.vlm(&server, dialect, OnOutage::StandStill);
         let replies = Bench::play(&again, "long", 2);
         assert!(replies[0].is_ok() && replies[1].is_err(), "{dialect:?}");
@@ -138,7 +138,7 @@ fn a_key_or_a_model_that_is_refused_stops_everything_at_any_time() {
 /// Twenty episodes of two steps.
 const TWENTY: &str = "--seeds 4 --runs 5 --threads 1 --in-flight 1 --json";
 
-/// A server on which request number `special`, from 0, gets this answer, and the others end their episode at step 2.
+/// A server that gives `answer` to request number `special`, from 0; the other requests end their episodes at step 2.
 fn server(special: usize, answer: Vec<u8>) -> Server {
     Server::start(move |at, request| {
         if at == special { answer.clone() } else { whole(Dialect::OpenaiCompatible, &counting(request, 2, at)) }
@@ -159,7 +159,7 @@ fn one_refusal_in_a_recording_costs_one_step() {
     let recorded = fs::read(folder.path().join("runs/E1-own.parquet")).unwrap();
     assert_eq!(rows(&folder, "runs").iter().filter(|status| *status == "refusal").count(), 1);
 
-    // Without a network, and anew from the journals, it is the same to the byte.
+    // Recording again from the journals, without a network, gives the same bytes.
     let output =
         folder.record(&server, "own", &format!("{TWENTY} --cassette runs/journal --out again")).output().unwrap();
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
@@ -196,7 +196,7 @@ fn a_start_that_goes_on_knows_that_the_model_has_answered() {
     let first = Server::start(|at, request| whole(Dialect::OpenaiCompatible, &counting(request, 1, at)));
     let output = folder.record(&first, "own", "--seeds 1 --runs 1").output().unwrap();
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-    // The first request of the second start is rejected, the others are not.
+    // The second start's first request is rejected, the others are not.
     let second = server(0, too_long());
     let output = folder.record(&second, "own", "--seeds 1 --runs 3 --threads 1 --in-flight 1").output().unwrap();
     assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));

@@ -1,4 +1,4 @@
-//! A server on loopback that answers as configured: whole, in drips, with faults, or not at all.
+//! A loopback server that answers as configured: whole, in pieces, with faults, or not at all.
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{Shutdown, TcpListener, TcpStream};
@@ -11,7 +11,7 @@ use world::agent::vlm::wire_format::Dialect;
 
 pub const JSON: &str = "content-type: application/json\r\n";
 
-/// A request as the server saw it.
+/// A request as received.
 #[derive(Clone, Debug)]
 pub struct Request {
     /// The request line and the headers.
@@ -26,7 +26,7 @@ impl Request {
     }
 }
 
-/// The server's answer to a request: bytes to send, and the wait before each piece of them.
+/// The server's answer to a request: bytes to send in pieces, with a pause before each.
 #[derive(Clone, Debug)]
 pub struct Conduct {
     bytes: Vec<u8>,
@@ -35,7 +35,7 @@ pub struct Conduct {
 }
 
 impl Conduct {
-    /// These bytes, a few at a time.
+    /// Sends these bytes in pieces.
     pub fn dripping(bytes: Vec<u8>, piece: usize, pause: Duration) -> Self {
         Self { bytes, piece, pause }
     }
@@ -55,7 +55,7 @@ pub struct Server {
 }
 
 impl Server {
-    /// A server whose script gets the number of the request, from 0, and the request.
+    /// Starts a server whose script gets each request and its number, from 0.
     pub fn start<C: Into<Conduct>>(script: impl Fn(usize, &Request) -> C + Send + Sync + 'static) -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let address = format!("http://{}/v1", listener.local_addr().unwrap());
@@ -94,7 +94,7 @@ fn serve(mut stream: TcpStream, seen: &Mutex<Vec<Request>>, script: &Script) {
     }
     for piece in conduct.bytes.chunks(conduct.piece) {
         thread::sleep(conduct.pause);
-        // A client that has heard enough is gone.
+        // The client has heard enough and closed the connection.
         if stream.write_all(piece).is_err() {
             return;
         }
@@ -102,7 +102,7 @@ fn serve(mut stream: TcpStream, seen: &Mutex<Vec<Request>>, script: &Script) {
     let _ = stream.shutdown(Shutdown::Write);
 }
 
-/// One whole request; `None` where the client is gone before its end.
+/// One whole request; `None` if the client closed the connection early.
 fn receive(stream: &TcpStream) -> Option<Request> {
     let mut reader = BufReader::new(stream);
     let (mut head, mut length) = (String::new(), 0);
@@ -135,7 +135,7 @@ pub fn ok(body: &Value) -> Vec<u8> {
     http("200 OK", JSON, body.to_string().as_bytes())
 }
 
-/// A reply as the prompt asks for it.
+/// A reply in the form that the prompt asks for.
 pub fn decision(action: &str) -> String {
     json!({
         "view-description": "a wall", "reasoning": "none", "action": action, "summary": "went on",
@@ -144,7 +144,7 @@ pub fn decision(action: &str) -> String {
     .to_string()
 }
 
-/// The body of an answer in the provider's language, with its word for how the text ended.
+/// The body of an answer in the provider's wire format; `ending` is its word for how the text ended.
 pub fn spoken(dialect: Dialect, text: &str, ending: &str) -> Value {
     match dialect {
         Dialect::OpenaiChat | Dialect::OpenaiCompatible => json!({
@@ -167,12 +167,12 @@ pub fn spoken(dialect: Dialect, text: &str, ending: &str) -> Value {
     }
 }
 
-/// A whole answer in the provider's language.
+/// A whole answer in the provider's wire format.
 pub fn whole(dialect: Dialect, text: &str) -> Vec<u8> {
     ok(&spoken(dialect, text, endings(dialect).0))
 }
 
-/// The provider's words for a normal end, and by the limit of tokens.
+/// The provider's words for a normal end, and for an end by the token limit.
 pub const fn endings(dialect: Dialect) -> (&'static str, &'static str) {
     match dialect {
         Dialect::OpenaiChat | Dialect::OpenaiCompatible => ("stop", "length"),

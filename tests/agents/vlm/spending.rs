@@ -1,4 +1,4 @@
-//! Limits hold over all episodes of a recording and all times that it is started.
+//! Limits apply to all episodes of a recording and to all of its starts.
 
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
@@ -27,12 +27,12 @@ fn limits_stop_before_the_request_over_them() {
         stopped.kind == LostKind::Limit && stopped.cause.contains("limit of requests is reached: 2 of 2"),
         "{stopped}"
     );
-    // An episode that comes later hears the same.
+    // A later episode gets the same refusal.
     assert_eq!(Bench::play(&vlm, "another", 1)[0].as_ref(), Err(stopped));
     assert_eq!(server.count(), 2);
 }
 
-/// The end of a recording's start: its exit code and its messages.
+/// Starts a recording; returns its exit code and messages.
 fn started(folder: &Folder, server: &Server, words: &str) -> (Option<i32>, String) {
     let words = format!("--seeds 1 --runs 1 --threads 1 --models own.toml {words}");
     let output = folder.record(server, "own", &words).output().unwrap();
@@ -92,7 +92,7 @@ fn an_episode_that_a_limit_stopped_is_not_lost() {
     let answer: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!((&answer["stopped_by_limit"], &answer["stopped"]), (&0.into(), &false.into()));
 
-    // All that were under way count, whichever of them met the limit.
+    // All requests in flight count, whichever one reached the limit.
     let words = format!("{words} --max-requests 6 --in-flight 4 --out together").replacen("--in-flight 1", "", 1);
     let output = folder.record(&server, "own", &words).output().unwrap();
     let answer: Value = serde_json::from_slice(&output.stdout).unwrap();
@@ -110,7 +110,7 @@ fn models_that_share_a_folder_have_accounts_of_their_own() {
              prices = {{ input = {price:.1}, output = {price:.1} }}\n"
         )
     };
-    // The name of one begins as that of the other.
+    // One model's name is a prefix of the other's.
     let models = model("own", 1.0) + &model("own s1", 100.0);
     std::fs::write(folder.path().join("models.toml"), models).unwrap();
     let spend = |name: &str, words: &str| {
@@ -148,7 +148,7 @@ fn a_limit_of_cost_without_prices_is_refused_before_anything_is_sent_or_made() {
         assert_eq!((code, server.count()), (Some(2), 0), "{said}");
         assert!(said.contains(reason) && said.contains("--models") && said.contains("[model.\"own\"]"), "{said}");
         assert!(!folder.path().join("runs").exists(), "{said}");
-        // Without the limit, and with one that can be held, it records.
+        // Without the limit, or with one that can be enforced, it records.
         let (code, said) = started(&folder, &server, "--max-requests 200");
         assert_eq!(code, Some(0), "{said}");
     }
@@ -167,11 +167,11 @@ fn a_limit_of_cost_is_an_amount() {
     }
 }
 
-/// A model with prices: an answer takes 0.002 dollars, and a request of 100 tokens of reply at most some 0.005.
+/// A model with prices: an answer costs 0.002 dollars, a request with 100 reply tokens at most about 0.005.
 const PRICED: &str = "[model.own]\nbackend = \"compatible\"\nid = \"own-1\"\nanswers_as = [\"model-1-*\"]\n\
                       max_output_tokens = 100\nprices = { input = 1.0, output = 10.0 }\n";
 
-/// `record` of this model with 16 episodes of six steps, 16 in flight, at a server that takes its time.
+/// `record` of this model, 16 episodes of six steps, all in flight, with a slow server.
 fn priced(folder: &Folder, server: &Server, words: &str) -> Command {
     std::fs::write(folder.path().join("own.toml"), PRICED).unwrap();
     let words = format!("--models own.toml --seeds 4 --runs 4 --threads 1 --in-flight 16 --json {words}");
@@ -192,7 +192,7 @@ fn money_is_never_exceeded_and_begun_episodes_are_finished() {
     let answer: Value = serde_json::from_slice(&output.stdout).unwrap();
     let cost = answer["spend"]["cost_usd"].as_f64().unwrap();
     assert!(cost <= 0.1 && (cost - 0.002 * server.count() as f64).abs() < 1e-9, "{cost} for {}", server.count());
-    // Money for eight episodes, but for what the last request may cost.
+    // The money is enough for eight episodes, less the possible cost of the last request.
     let recorded = answer["recorded"].as_u64().unwrap();
     assert!(recorded >= 6, "{recorded} of 16: {}", stderr(&output));
     assert!(server.count() as u64 - 6 * recorded < 6, "{} requests, {recorded} whole episodes", server.count());
@@ -209,7 +209,7 @@ fn processes_that_record_into_a_folder_have_one_ledger() {
     }
     let cost = 0.002 * server.count() as f64;
     assert!((0.08..=0.1).contains(&cost), "{cost} dollars");
-    // The next start counts what all of them have spent.
+    // The next start counts all earlier spending.
     let output = priced(&folder, &server, "--max-cost 0.1").output().unwrap();
     let answer: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert!((answer["spend"]["cost_usd"].as_f64().unwrap() - 0.002 * server.count() as f64).abs() < 1e-9);
@@ -230,7 +230,7 @@ fn timed_out_and_killed_requests_count_with_their_largest_cost() {
     assert!((0.003..0.01).contains(&may_cost), "{may_cost}");
     let said = stderr(&output);
     assert!(said.contains("1 request without an answer may have been paid: at most 0.00"), "{said}");
-    // A killed process leaves a request without any outcome: its line is the last.
+    // A killed process leaves a request without an outcome as the last line.
     let journal = folder.journals().into_keys().next().unwrap();
     let text = std::fs::read_to_string(&journal).unwrap();
     std::fs::write(&journal, text.lines().next().unwrap().to_owned() + "\n").unwrap();
@@ -240,7 +240,7 @@ fn timed_out_and_killed_requests_count_with_their_largest_cost() {
     assert_eq!((output.status.code(), server.count()), (Some(2), 1), "{}", stderr(&output));
 }
 
-/// A router that says what an answer cost, for a model without prices.
+/// `record` with a router that states each answer's cost, for a model without prices.
 fn routed(folder: &Folder, server: &Server, words: &str) -> Command {
     let own = "[backend.router]\ndialect = \"openai-compatible\"\nkey = \"MIRRORSTATS_API_KEY\"\n\
                [model.own]\nbackend = \"router\"\nid = \"own-1\"\nanswers_as = [\"model-1-*\"]\nmax_output_tokens = 100\n";
@@ -268,10 +268,10 @@ fn a_cost_limit_uses_the_costs_that_answers_state() {
     let answer: Value = serde_json::from_slice(&output.stdout).unwrap();
     let cost = answer["spend"]["cost_usd"].as_f64().unwrap();
     assert!((0.07..=0.1).contains(&cost) && (cost - 0.002 * server.count() as f64).abs() < 1e-9, "{cost}");
-    // Episodes that have begun end before others begin.
+    // Episodes in progress end before others begin.
     assert!(answer["recorded"].as_u64().unwrap() >= 6, "{answer}");
 
-    // One that says nothing is noticed with its first answer.
+    // A router that states no cost is noticed at its first answer.
     let server = Server::start(|at, request| whole(Dialect::OpenaiCompatible, &counting(request, 6, at)));
     let folder = Folder::new();
     let output = routed(&folder, &server, "--seeds 4 --runs 4 --max-cost 0.1").output().unwrap();
@@ -290,14 +290,14 @@ fn a_forecast_follows_the_episodes_that_are_finished() {
     };
     let prior = forecast("--seeds 1 --runs 4");
     assert_eq!((&prior["finished_episodes"], &prior["typical_requests"]), (&0.into(), &400.into()));
-    // 400 answers of 5 s, four at once.
+    // 400 answers of 5 s each, four at once.
     assert_eq!((&prior["typical_cost_usd"], &prior["seconds"]), (&Value::Null, &500.0.into()));
     let output = routed(&folder, &server, "--seeds 1 --runs 2").output().unwrap();
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     let seen = forecast("--seeds 1 --runs 4");
     assert_eq!((&seen["finished_episodes"], &seen["typical_requests"]), (&2.into(), &12.into()));
     assert!((seen["typical_cost_usd"].as_f64().unwrap() - 0.024).abs() < 1e-9, "{seen}");
-    // The bound does not follow them: nobody knows the price.
+    // The upper bound does not change, because the price is unknown.
     assert_eq!((&seen["at_most"], &seen["cost_usd_at_most"]), (&200.into(), &Value::Null));
     assert_eq!(forecast("--seeds 1 --runs 4 --requests-per-minute 3")["seconds"], 240.0);
 }
@@ -307,7 +307,7 @@ fn no_more_requests_go_out_in_a_minute_than_the_account_takes() {
     let server = Server::start(|at, request| whole(Dialect::OpenaiCompatible, &counting(request, 4, at)));
     let folder = Folder::new();
     let start = Instant::now();
-    // One in 50 ms, over both processes.
+    // One request per 50 ms, over both processes.
     let words = "--seeds 1 --runs 4 --in-flight 2 --requests-per-minute 1200";
     let both = [(); 2].map(|()| folder.record(&server, "own", words).stderr(Stdio::piped()).spawn().unwrap());
     for child in both {

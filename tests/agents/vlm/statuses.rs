@@ -1,4 +1,4 @@
-//! Whatever a server does, a step ends in the status of that name, or its episode is lost: never in a made-up decision.
+//! Whatever a server does, the step gets the matching status or its episode is lost; decisions are never invented.
 
 use std::time::{Duration, Instant};
 
@@ -16,10 +16,10 @@ use super::server::{Conduct, JSON, Server, decision, endings, http, ok, spoken, 
 const PROVIDERS: [Dialect; 4] =
     [Dialect::OpenaiChat, Dialect::OpenaiCompatible, Dialect::Gemini, Dialect::AnthropicMessages];
 
-/// The answer, and the end of the step.
+/// A name, the answer, and the status of the step.
 type Case = (&'static str, Vec<u8>, Status);
 
-/// That each case ends in its status for this provider, after the attempts that such a status is worth.
+/// Checks that each case ends in its status for this provider, after the number of attempts for that status.
 fn check(dialect: Dialect, cases: Vec<Case>) {
     let bench = Bench::new(Limits::default());
     for (name, answer, status) in cases {
@@ -36,7 +36,7 @@ fn check(dialect: Dialect, cases: Vec<Case>) {
         assert_eq!(reply.self_color.as_deref(), has_decision.then_some("red"), "{place}");
         let is_outage = matches!(status, Status::ServerError | Status::Timeout);
         match status {
-            // A busy provider is waited for: more often than there are attempts.
+            // A busy provider gets more requests than the limit on attempts.
             Status::RateLimited => assert!(server.count() > 3, "{place}: {}", server.count()),
             _ if name.starts_with("overloaded") => assert!(server.count() > 3, "{place}: {}", server.count()),
             _ => assert_eq!(server.count(), if is_outage { 3 } else { 1 }, "{place}"),
@@ -72,14 +72,14 @@ fn replies_end_in_their_status_with_every_provider() {
 #[test]
 fn a_lone_surrogate_in_an_answer_is_a_repair_with_every_provider() {
     for dialect in PROVIDERS {
-        // The text of the answer, and its first escape in the body itself or in the reply within.
+        // An escape in the answer's body or in the reply within, and the text that it becomes.
         for (escape, text) in [(r"\ud83d", "\u{fffd}"), (r"\\ud83d", "\u{fffd}"), (r"\ud83d\ude00", "\u{1f600}")] {
             let body = spoken(dialect, &decision("w").replace("a wall", "HERE"), endings(dialect).0).to_string();
             let answer = http("200 OK", JSON, body.replace("HERE", escape).as_bytes());
             let bench = Bench::new(Limits::default());
             let server = Server::start(move |_, _| answer.clone());
             let vlm = bench.vlm(&server, dialect, OnOutage::StandStill);
-            // The second time from the journal.
+            // The second reply comes from the journal.
             for _ in 0..2 {
                 let reply = Bench::play(&vlm, "E1-m-s1-r1", 1).remove(0).unwrap();
                 let is_pair = text != "\u{fffd}";

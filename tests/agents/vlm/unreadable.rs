@@ -1,4 +1,4 @@
-//! Replies that cannot be read are reported while they come, at the end, and of the trace that they leave.
+//! Unreadable replies are reported when they arrive, at the end, and from the trace.
 
 use serde_json::{Value, json};
 use world::agent::vlm::wire_format::Dialect;
@@ -10,7 +10,7 @@ use crate::harness::files::write_small_world;
 use crate::harness::program::{run, stderr};
 use crate::harness::traces;
 
-/// A folder whose episodes have 20 steps.
+/// A folder with episodes of 20 steps.
 fn short() -> Folder {
     let folder = Folder::new();
     write_small_world(folder.path(), "episode.steps = 20\n");
@@ -34,7 +34,7 @@ fn a_recording_without_readable_replies_says_so_everywhere() {
     let summary = format!("\n200 of 200 replies could not be read: parse_failed; first: {start}");
     assert!(said.contains(&summary), "{said}");
     assert!(said.contains("...` (E1/own/s1/r1, step 1): expected value at line 1 column 1\n"), "{said}");
-    // It is reported before the end.
+    // It is reported before the recording ends.
     assert!(said.starts_with(&format!("a reply could not be read: parse_failed: {start}")), "{said}");
     assert!(said.lines().all(|line| line.len() < 400) && !said.contains('\u{1b}') && !said.contains(KEY), "{said}");
 
@@ -44,7 +44,7 @@ fn a_recording_without_readable_replies_says_so_everywhere() {
     let first = &replies["first_unreadable"];
     assert_eq!((&first["episode_id"], &first["step"]), (&"E1/own/s1/r1".into(), &1.into()));
     assert!(first["text"].as_str().unwrap().len() <= 203, "{first}");
-    // Why, in the parser's words: in the trace, the answer and the check.
+    // The trace, the answer and the check state the parser's reason.
     let why = "expected value at line 1 column 1";
     assert_eq!(first["fault"], why);
     let faults = traces::texts(&folder.path().join("runs/E1-own.parquet"), "reply_fault");

@@ -1,4 +1,4 @@
-//! Logs of other harnesses: those whose packages make them here, and LeRobot's in their documented layout.
+//! Logs of other harnesses: made here by their own packages, or for LeRobot written in its documented layout.
 
 use std::fs;
 use std::path::Path;
@@ -15,12 +15,12 @@ use super::need;
 use super::program::{clean, succeeds};
 use super::traces::write_rows;
 
-/// Logs of two agents by Inspect's mock model in this folder: see the script.
+/// Writes logs of two agents into this folder with Inspect's mock model; see the script.
 pub fn inspect(folder: &Path) {
     made_by("inspect_logs.py", folder);
 }
 
-/// Logs of two mock policies of inspect-robots in this folder.
+/// Writes logs of two mock policies into this folder with inspect-robots.
 pub fn inspect_robots(folder: &Path) {
     made_by("robots_logs.py", folder);
 }
@@ -31,7 +31,7 @@ fn made_by(script: &str, folder: &Path) {
     succeeds(command.arg(repository().join("tests/harness/logs").join(script)).arg(folder));
 }
 
-/// `lerobot-eval`'s answer: who solved which episode.
+/// Writes `lerobot-eval`'s result file, which says which episodes were solved.
 pub fn lerobot_evaluation(path: &Path, successes: &[bool]) {
     let episode = |(at, success): (usize, &bool)| {
         json!({ "episode_ix": at, "sum_reward": f64::from(u8::from(*success)) + 0.5, "max_reward": null,
@@ -42,9 +42,9 @@ pub fn lerobot_evaluation(path: &Path, successes: &[bool]) {
     fs::write(path, info.to_string().replace("null", "NaN")).unwrap();
 }
 
-/// A data set of LeRobot, version 3, in this folder: `meta` as its `lerobot.datasets.utils` and pandas write it, and
-/// `data/chunk-000/file-000.parquet` with the frames of all episodes. Episode `i` is solved at frame `solved[i]`, or never; its
-/// actions are smooth, or jump at each frame.
+/// Writes a LeRobot data set, version 3: `meta` as its `lerobot.datasets.utils` and pandas write it, and
+/// `data/chunk-000/file-000.parquet` with the frames of all episodes. Episode `i` is solved at frame `solved[i]`, or
+/// never. Its actions are smooth, or jump at each frame.
 pub fn lerobot_data_set(folder: &Path, solved: &[Option<u32>], is_smooth: bool) {
     const FRAMES: u32 = 8;
     let frame = |episode: usize, solved: Option<u32>, at: u32| {
@@ -116,7 +116,7 @@ fn lerobot_meta(folder: &Path, episodes: usize, frames: u32) {
     write_rows(&meta.join("episodes/chunk-000/file-000.parquet"), &[batch(of_episodes, &episodes)], None);
 }
 
-/// Rows of JSON in columns of these types.
+/// JSON rows as columns of these types.
 pub fn batch(schema: Schema, rows: &[Value]) -> RecordBatch {
     let mut decoder = ReaderBuilder::new(Arc::new(schema)).build_decoder().unwrap();
     decoder.serialize(rows).unwrap();

@@ -1,4 +1,4 @@
-//! A file system that fails, and one that forgets: the old file or the new one, never a third.
+//! A file system that fails or loses data: the result is the old file or the new one, never anything else.
 
 mod power;
 mod record;
@@ -34,7 +34,7 @@ const ERRORS: [(&str, &[i32]); 8] = [
     ("link", &[EIO, EACCES]),
 ];
 
-/// Every fault that there can be.
+/// Every possible fault of these calls.
 fn faults(calls: &[Call]) -> Vec<Fault> {
     let mut counts = BTreeMap::<&str, usize>::new();
     for kind in calls.iter().filter_map(Call::kind) {
@@ -51,16 +51,16 @@ fn faults(calls: &[Call]) -> Vec<Fault> {
     for (kind, errors) in ERRORS {
         add(kind, counts.get(kind).copied().unwrap_or_default(), errors);
     }
-    // The end of the process before each call that changes something.
+    // Faults that end the process before each call that changes something.
     let changes = counts.iter().filter(|(kind, _)| **kind != "open").map(|(_, count)| count).sum::<usize>();
     let made = calls.iter().filter(|call| matches!(call, Call::Create(..))).count();
     add("*", changes + made, &[0]);
-    // Ended is ended.
+    // A process cannot end twice.
     faults.retain(|fault| fault.error != 0 || !fault.stays);
     faults
 }
 
-/// Checks the message of a fault: the file and the cause, or nothing without a fault.
+/// Checks the message of a fault: it names the file and the cause. Without a fault there must be no message.
 fn check_words(output: &Output, fault: Fault, is_new: bool, calls: &[Call], outputs: &[&str]) -> Result<(), String> {
     let said = stderr(output);
     if said.contains("panicked") || output.status.signal().is_some() {
@@ -77,7 +77,7 @@ fn check_words(output: &Output, fault: Fault, is_new: bool, calls: &[Call], outp
         _ => None,
     });
     let parts = failed.flat_map(|path| path.iter().map(|part| shown(&part.to_string_lossy())));
-    // A folder that cannot be synchronised is reported as the file that it was synchronised for.
+    // A failure to synchronise a folder is reported with the file that needed it.
     let outputs = outputs.iter().filter_map(|output| Path::new(output).file_name()?.to_str().map(str::to_owned));
     let names: BTreeSet<String> = parts.chain(outputs).filter(|name| name.len() > 1 && name != "tmp").collect();
     if !said.starts_with("error: ") && !said.contains("\nerror: ") {
@@ -90,7 +90,7 @@ fn check_words(output: &Output, fault: Fault, is_new: bool, calls: &[Call], outp
     if is_named { Ok(()) } else { Err(format!("it names none of {names:?}")) }
 }
 
-/// The shown form of a temporary name.
+/// A temporary name as messages show it.
 fn shown(name: &str) -> String {
     let target = name.strip_prefix(".mirrorstats-").and_then(|rest| rest.rsplit_once('.'));
     target.map_or(name, |(target, _)| target).to_owned()
@@ -115,7 +115,7 @@ fn leftovers(home: &Path) -> Vec<String> {
     contents(home).into_keys().filter(|name| name.contains(".mirrorstats-")).collect()
 }
 
-/// A copy of a folder for one run, and a log beside it.
+/// A copy of a folder for one run, with a log beside it.
 struct Round(TempDir);
 
 impl Round {
@@ -134,7 +134,7 @@ impl Round {
     }
 }
 
-/// Does something with each of many, as many at once as there are processors; a panic of one is that of all.
+/// Runs `each` on all items, on as many threads as there are processors; panics if one of them panics.
 fn all_at_once<'a, T: Sync>(items: &'a [T], each: impl Fn(&'a T) + Sync) {
     let next = AtomicUsize::new(0);
     let threads = thread::available_parallelism().map_or(2, usize::from);
@@ -149,7 +149,7 @@ fn all_at_once<'a, T: Sync>(items: &'a [T], each: impl Fn(&'a T) + Sync) {
     });
 }
 
-/// As [`all_at_once`], to the end of all; then one panic has the words of all.
+/// Like [`all_at_once`], but runs all items before it panics with all messages.
 fn check_all<'a, T: Sync>(items: &'a [T], check: impl Fn(&'a T) + Sync) {
     let failed = Mutex::new(Vec::new());
     all_at_once(items, |item| {
@@ -166,7 +166,7 @@ fn words_of(panic: &(dyn Any + Send)) -> String {
     text.or_else(|| panic.downcast_ref::<&str>().map(|text| (*text).to_owned())).unwrap_or_default()
 }
 
-/// Leaves this many of them, which are spread over all and always the same.
+/// Reduces the items to this many, spread over all and always the same.
 fn sample<T>(items: &mut Vec<T>, most: usize) {
     let mut draws = Draws::new(16);
     for at in (1..items.len()).rev() {

@@ -1,4 +1,4 @@
-//! The power fails during a recording: what was recorded stays recorded, and the same command goes on to the same bytes.
+//! The power fails during a recording: recorded episodes are kept, and the same command continues to the same bytes.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -18,7 +18,7 @@ fn record(home: &Path) -> Command {
     command
 }
 
-/// The number of episodes on the disk after these calls: parts with synchronised names.
+/// The number of episodes on disk after these calls: parts with synchronised names.
 fn kept(calls: &[Call]) -> usize {
     let (mut named, mut kept) = (0, 0);
     for call in calls {
@@ -52,7 +52,7 @@ impl Case {
         Self { round, whole, calls }
     }
 
-    /// The power fails after so many calls.
+    /// Fails the power after `count` calls.
     fn check(&self, count: usize, unsynced: Unsynced) {
         let told = format!("after {count} of {} calls, unsynced {unsynced:?}", self.calls.len());
         let home = tempfile::tempdir().unwrap();

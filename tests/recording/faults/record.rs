@@ -1,4 +1,4 @@
-//! Every call of a recording fails once: whole episodes stay, and the same command goes on to the same bytes.
+//! Every call of a recording fails once: whole episodes are kept, and the same command continues to the same bytes.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -13,7 +13,7 @@ use crate::harness::files::{Contents, assert_same, contents, write_small_world};
 use crate::harness::program::{program, stderr, succeeds};
 use crate::harness::traces;
 
-/// An episode of another model, and one that is recorded now.
+/// A lost episode of another model, and one that this recording makes up for.
 const LOST: &str = r#"{"episode_id":"E1/other/s1/r1","model":"other","experiment":"E1","seed":1,"run":1,"step":2,"status":"timeout","reason":"slow"}
 {"episode_id":"E1/random/s1/r2","model":"random","experiment":"E1","seed":1,"run":2,"step":2,"status":"timeout","reason":"slow"}
 "#;
@@ -26,7 +26,7 @@ fn record(home: &Path, runs: u32) -> Command {
     command
 }
 
-/// A recording of one episode that is to have two, and what it is then.
+/// A recording with one episode of two, and its complete form.
 struct Case {
     home: TempDir,
     whole: Contents,
@@ -64,7 +64,7 @@ impl Case {
         assert!(lost == LOST || lost.as_bytes() == self.whole["lost.jsonl"], "{}: {lost}", told());
         if fault.error != 0 {
             let mut found = contents(&home.join("runs"));
-            // Locks that could not be removed, and what waits to be swept.
+            // Ignore locks that could not be removed and leftovers.
             found.retain(|name, _| !name.starts_with('.'));
             let names = ["E1-random.parquet", "E1-random.mcap", "lost.jsonl", "runs"];
             check_words(&output, fault, found == self.whole, &calls(&log), &names)

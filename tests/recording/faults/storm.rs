@@ -1,5 +1,5 @@
-//! Processes that record into one folder and look into it, all of them killed at any moment: no stuck folder, no lost
-//! episode, none twice, and readers that see a complete state or say what is missing.
+//! Processes that record into one folder or read it, killed at any moment. The folder never gets stuck, no episode is
+//! lost or recorded twice, and readers see a complete state or say what is missing.
 
 use std::fs;
 use std::path::Path;
@@ -13,7 +13,7 @@ use crate::harness::files::{Contents, assert_same, contents, write_small_world};
 use crate::harness::program::{program, stderr, succeeds, typed};
 
 const EPISODES: u32 = 2;
-/// No round takes as long, on whatever machine: who waits longer is stuck.
+/// Longer than any round on any machine; a process that takes longer is stuck.
 const STUCK: Duration = Duration::from_mins(3);
 
 fn record(home: &Path) -> Command {
@@ -30,7 +30,7 @@ fn record(home: &Path) -> Command {
 struct Started {
     child: Child,
     reads: bool,
-    /// True if it goes on until it is killed.
+    /// True if it runs until it is killed.
     serves: bool,
 }
 
@@ -55,7 +55,7 @@ fn start(home: &Path, at: usize, draws: &mut Draws) -> Started {
     Started { child: command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(said).spawn().unwrap(), reads, serves }
 }
 
-/// Waits for the end of a process, which must come.
+/// Waits for a process that must end.
 #[track_caller]
 fn ended(child: &mut Child, told: &str) -> i32 {
     let begin = Instant::now();
@@ -98,14 +98,14 @@ impl Bench {
         let home = home.path();
         copy(self.empty.path(), home);
         let mut draws = Draws::new(seed as u64);
-        // 2 to 8, few more often than many.
+        // 2 to 8 processes, more often few than many.
         let count = 2 + draws.below(3) + if draws.below(8) == 0 { draws.below(5) } else { 0 };
         let mut processes: Vec<Started> = Vec::new();
         for at in 0..count {
             processes.push(start(home, at, &mut draws));
             sleep(Duration::from_millis(draws.below(40) as u64));
         }
-        // All but one in three are killed, each after a while, and all that serve.
+        // Two of three processes are killed after a while, and all servers.
         for process in &mut processes {
             if draws.below(3) > 0 || process.serves {
                 sleep(Duration::from_millis(draws.below(50) as u64));
@@ -122,13 +122,13 @@ impl Bench {
         assert_same(&contents(&home.join("runs")), &self.whole);
     }
 
-    /// Checks the work of a process that was killed, or that ended.
+    /// Checks the result of a process that ended or was killed.
     fn check(&self, home: &Path, seed: usize, at: usize, reads: bool, code: i32, said: &str) {
         let told = format!("round {seed}, process {at}: {code}: {said}");
         assert!(!said.contains("panicked"), "{told}");
         match (code, reads) {
             (-1 | 0, _) => {}
-            // Nothing is there yet, or what was listed has been replaced meanwhile.
+            // There is no recording yet, or listed files have been replaced meanwhile.
             (2, true) => assert!(said.contains("error: ") && !said.contains("damaged"), "{told}"),
             _ => panic!("{told}"),
         }

@@ -1,8 +1,8 @@
-//! Every call to the file system fails once, in every verb that writes: afterwards an output is the old one or the new one,
-//! byte for byte, and an error names the file and the cause.
+//! Every file system call of every writing verb fails once. Afterwards an output is the old or the new one, byte for
+//! byte, and an error names the file and the cause.
 //!
-//! An exit code of 0 represents the complete new output: then the call was one that did not matter, such as the removal of
-//! a temporary file, which the next run sweeps, or a look for leftovers.
+//! Exit code 0 means that the new output is complete, so the failed call did not matter. Examples are removing a
+//! temporary file, which the next run does, and looking for leftovers.
 
 use std::fs;
 use std::path::Path;
@@ -19,7 +19,7 @@ use crate::harness::program::{run, stderr, typed};
 /// A verb that writes.
 struct Verb {
     words: &'static str,
-    /// The command that makes the outputs to replace; empty without any.
+    /// The command that makes the outputs to be replaced; empty if there are none.
     before: &'static str,
     /// Files, or folders whose files are replaced together.
     outputs: &'static [&'static str],
@@ -29,7 +29,7 @@ const fn verb(before: &'static str, words: &'static str, outputs: &'static [&'st
     Verb { words, before, outputs }
 }
 
-/// The verbs, and what they write. `world sheet` and `replay --frames`, which draw for long, write as `figure` does.
+/// The verbs and their outputs. `world sheet` and `replay --frames` take long to draw, and write like `figure`.
 const VERBS: &[Verb] = &[
     verb("score b.parquet -o s.csv", "score in -o s.csv", &["s.csv"]),
     verb("score b.parquet -o s.parquet", "score in -o s.parquet", &["s.parquet"]),
@@ -62,8 +62,7 @@ const VERBS: &[Verb] = &[
     verb("", "query SELECT*FROM(steps) a.parquet -o q.parquet", &["q.parquet"]),
 ];
 
-/// The folder that every run has a copy of: two recordings, one of them with a list of lost episodes, and what else verbs
-/// read.
+/// The folder that every run copies: two recordings, one with a list of lost episodes, and the other inputs of verbs.
 fn prepared() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
@@ -89,7 +88,7 @@ fn prepared() -> TempDir {
     let lost = r#"{"episode_id":"E1/random/s1/r3","model":"random","experiment":"E1","seed":1,"run":3,"step":2,"status":"timeout","reason":"slow"}"#;
     fs::write(path.join("in/lost.jsonl"), format!("{lost}\n")).unwrap();
     run(path, &["report", "a.parquet", "--no-figures", "--out", "r1"]).done();
-    // As `a` and `b`, with attributions that change.
+    // Like `a` and `b`, but with attributions that will change.
     fs::create_dir(path.join("old")).unwrap();
     for name in ["a", "b"] {
         fs::copy(path.join(format!("{name}.parquet")), path.join(format!("old/{name}.parquet"))).unwrap();
@@ -99,14 +98,14 @@ fn prepared() -> TempDir {
     folder
 }
 
-/// The contents of an output: the bytes of a file, or of all files of a folder.
+/// The contents of an output: a file, or all files of a folder.
 fn held(home: &Path, output: &str) -> Option<Contents> {
     let path = home.join(output);
     if path.is_file() {
         return Some(Contents::from([(String::new(), fs::read(path).unwrap())]));
     }
     let mut files = path.is_dir().then(|| contents(&path))?;
-    // What is being made, or waits to be swept.
+    // Ignore temporary files and leftovers.
     files.retain(|name, _| !name.split('/').any(|part| part.starts_with(".mirrorstats-")));
     Some(files)
 }
@@ -115,7 +114,7 @@ fn all_held(home: &Path, verb: &Verb) -> Vec<Option<Contents>> {
     verb.outputs.iter().map(|output| held(home, output)).collect()
 }
 
-/// A verb in its folder, as it is before.
+/// A verb in its folder before it runs.
 struct Case<'a> {
     verb: &'a Verb,
     home: TempDir,
@@ -143,7 +142,7 @@ impl<'a> Case<'a> {
         Self { verb, home, old, new, calls: calls(&log) }
     }
 
-    /// Runs the verb with a fault, and judges what is there afterwards.
+    /// Runs the verb with a fault and checks the result.
     fn check(&self, fault: Fault) {
         let round = Round::new(self.home.path());
         let (home, log) = (round.home(), round.log());
@@ -151,7 +150,7 @@ impl<'a> Case<'a> {
         let told = || format!("{} with {fault}: {:?}\n{}", self.verb.words, output.status, stderr(&output));
         let found = all_held(&home, self.verb);
         for (at, found) in found.iter().enumerate() {
-            // A folder that cannot be exchanged says so itself, and is read by nobody until the command has run again.
+            // A folder that cannot be exchanged is marked as unfinished; no command reads it until the verb runs again.
             let is_unfinished = self.verb.outputs[at] == "link" && home.join("link/.mirrorstats-unfinished").is_file();
             assert!(
                 *found == self.old[at] || *found == self.new[at] || is_unfinished,
@@ -166,12 +165,12 @@ impl<'a> Case<'a> {
         }
         if found != self.new && found != self.old || !leftovers(&home).is_empty() {
             let again = command(&home, self.verb.words).output().unwrap();
-            // A plan that is registered is not registered again.
+            // A plan that is already registered is not replaced.
             let is_registered =
                 self.verb.words.starts_with("plan") && stderr(&again).contains("a registered plan is not replaced");
             assert!(again.status.success() || is_registered, "{}: again: {}", told(), stderr(&again));
             assert!(all_held(&home, self.verb) == self.new, "{}: again", told());
-            // A plan that is there is all that is looked at.
+            // If the plan is registered, the command stops before it looks for leftovers.
             assert!(is_registered || leftovers(&home).is_empty(), "{}: again: {:?}", told(), leftovers(&home));
         }
     }
@@ -179,7 +178,7 @@ impl<'a> Case<'a> {
 
 fn command(home: &Path, words: &str) -> Command {
     let mut command = typed(home, words);
-    // One thread makes the same calls each time.
+    // With one thread the calls are the same each time.
     if ["score", "report", "rescore", "sensitivity", "renormalize", "view"].contains(&words.split(' ').next().unwrap())
     {
         command.args(["--threads", "1"]);
@@ -187,7 +186,7 @@ fn command(home: &Path, words: &str) -> Command {
     command
 }
 
-/// Runs this many faults, spread over all there are; all of them if there are fewer.
+/// Runs this many faults, spread evenly over all; or all of them if there are fewer.
 fn check(most: usize) {
     let prepared = prepared();
     let cases = Mutex::new(Vec::new());

@@ -1,4 +1,4 @@
-//! A log that ends too early, at any byte.
+//! A log that is cut off at any byte.
 
 use std::collections::BTreeMap;
 use std::io::Cursor;
@@ -7,7 +7,7 @@ use mcap::records::MessageHeader;
 
 use super::logs::{Desk, RECORDING, ids, json, recovered};
 
-/// That of the log cut at a byte every episode that had ended is there as it was, and the cut is reported.
+/// Checks that a log cut at this byte gives every ended episode unchanged, and that the cut is reported.
 fn check(at: usize) {
     let whole = recovered(&RECORDING.log);
     let found = recovered(&RECORDING.log[..at]);
@@ -33,7 +33,7 @@ fn at_every_record_and_beside_it() {
 #[test]
 fn at_fifty_bytes_here_and_there_by_the_program() {
     let desk = Desk::new();
-    // A stride of the golden section visits the whole file evenly, whatever its length.
+    // Steps by the golden section cover the whole file evenly, whatever its length.
     let length = RECORDING.log.len() - mcap::MAGIC.len();
     let places = (1..=50_usize).map(|nth| mcap::MAGIC.len() + nth * (length * 618 / 1000) % length);
     let mut seen = [0; 4];
@@ -86,6 +86,6 @@ fn an_episode_cut_after_its_beginning_is_named_with_its_rows() {
     let lost = &found.losses.episodes[0];
     assert_eq!((lost.episode_id.as_str(), lost.rows), ("E1/a/s1/r1", 2));
     assert!(lost.reason.contains("ends before the episode does") && found.losses.cut.is_some());
-    // Whole it has no end of the episode either.
+    // The complete log has no end of the episode either.
     assert_eq!(recovered(&bytes).losses.episodes[0].rows, 3);
 }

@@ -1,4 +1,4 @@
-//! A log with other bytes than were written.
+//! A log with changed bytes.
 
 use super::logs::{Desk, RECORDING, ids, json, recovered};
 use crate::harness::files::fixture;
@@ -28,8 +28,8 @@ fn a_flipped_byte_in_a_chunk_loses_that_episode_only() {
     }
 }
 
-/// That of the log with a byte changed no episode is lost but the one that the byte is in, that no value of those that
-/// are left is another, and that the damage is reported.
+/// Changes a bit of the log. Checks that only the episode with that byte is lost, that the others keep all values, and
+/// that the damage is reported.
 fn check(at: usize, bit: u32) {
     let whole = recovered(&RECORDING.log);
     let found = recovered(&with_byte(at, |byte| byte ^ (1 << bit)));
@@ -46,7 +46,7 @@ fn check(at: usize, bit: u32) {
 #[test]
 fn any_flipped_bit_outside_chunks_loses_no_episode() {
     let of_chunks = |at: &usize| RECORDING.chunks.iter().any(|(start, end)| (start + 64..*end).contains(at));
-    // Lengths, opcodes and headers of records whole; the rest here and there.
+    // All lengths, opcodes and headers of records; elsewhere every 37th byte.
     let frames: Vec<usize> = RECORDING.boundaries().into_iter().flat_map(|at| at..at + 9).collect();
     let others = (mcap::MAGIC.len()..RECORDING.log.len()).step_by(37).filter(|at| !of_chunks(at));
     for (nth, at) in frames.into_iter().chain(others).enumerate() {
@@ -85,7 +85,7 @@ fn bytes_that_are_missing_or_too_many_in_the_middle() {
 fn a_log_without_metadata_gives_a_trace_and_names_the_loss() {
     const METADATA: u8 = 0x0c;
     let place = RECORDING.first(METADATA);
-    // Behind the frame and the length of the name stands the name.
+    // The name comes after the frame and the name's length.
     let found = recovered(&with_byte(place + 9 + 4, |byte| byte ^ 0x20));
     assert_eq!(ids(&found).len(), 3);
     assert!(found.recording.is_none());

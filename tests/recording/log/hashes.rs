@@ -1,4 +1,4 @@
-//! The hash of an episode, in its trace and at its end in the log: what does not belong together is distinguished.
+//! The hash of an episode, in its trace and at its end in the log: a mismatch is detected.
 
 use std::fs;
 use std::io::Cursor;
@@ -18,8 +18,8 @@ use crate::harness::files::{fixture, write_small_world};
 use crate::harness::program::{run, succeeds, typed};
 use crate::harness::traces::{recording, rows};
 
-/// The log with another value in the first decision that has it, its checksums right: what a program may write that
-/// knows of no hash.
+/// The log with another value in the first decision that has the key, and with valid checksums: the work of a program
+/// that does not know the hash.
 fn edited(key: &str, value: &Value) -> Vec<u8> {
     let mut out = mcap::Writer::new(Cursor::new(Vec::new())).unwrap();
     let summary = mcap::Summary::read(&RECORDING.log).unwrap().unwrap();
@@ -42,7 +42,7 @@ fn edited(key: &str, value: &Value) -> Vec<u8> {
     out.into_inner().into_inner()
 }
 
-/// The trace at `path` with another count in its first episode, which then has another hash.
+/// Changes a count in the first episode of the trace at `path`, which gives it another hash.
 fn alter(path: &Path) {
     let mut episodes = merge::read(path).unwrap();
     let values: ArrayRef = std::sync::Arc::new(Int32Array::from(vec![123_456; episodes[0].len()]));
@@ -120,7 +120,7 @@ fn a_film_strip_of_a_log_and_a_trace_that_do_not_belong_together_is_refused() {
     assert!(!folder.path().join("parted.svg").exists());
 }
 
-/// What is recorded beside rows of a version that had no hash gets the same columns.
+/// Episodes recorded beside rows of a version without hashes get the same columns.
 #[test]
 fn a_recording_that_was_begun_without_hashes_goes_on() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! A log in which a length is another: an error or a named loss, whatever the length says, and little memory.
+//! A log with one wrong length: an error or a named loss, whatever the length, and little memory.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -13,19 +13,19 @@ use super::logs::{RECORDING, SHORT, ids, recovered};
 use crate::harness::files::write_small_world;
 use crate::harness::program::{self, stderr};
 
-/// Of an opcode and a length.
+/// The bytes of an opcode and a length.
 const FRAME: usize = 9;
 
-/// A length or a place in the file that a record holds.
+/// A length or a file position in a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Field {
     at: usize,
-    /// Its bytes: 4 or 8.
+    /// Its size in bytes: 4 or 8.
     size: usize,
     what: &'static str,
 }
 
-/// Walks along a record.
+/// Reads through a record.
 struct Walk<'a> {
     log: &'a [u8],
     at: usize,
@@ -51,7 +51,7 @@ fn read(log: &[u8], at: usize, size: usize) -> usize {
     usize::try_from(u64::from_le_bytes(bytes)).unwrap()
 }
 
-/// The lengths of the records from a place on; of messages those of the first ones.
+/// The length fields of the records from `from` to `to`; of messages, only the first ones.
 fn fields(log: &[u8], from: usize, to: usize, found: &mut BTreeSet<Field>) {
     let (mut at, mut messages) = (from, 0);
     while at < to {
@@ -144,7 +144,7 @@ fn fields_of(log: &[u8]) -> Vec<Field> {
     found.into_iter().collect()
 }
 
-/// The logs with one length changed, to each of the values that it can take.
+/// The logs with this field set to each of the test values.
 fn damaged(log: &[u8], field: Field) -> Vec<(String, Vec<u8>)> {
     let own = read(log, field.at, field.size) as u64;
     let values: &[u64] = &[1 << 63, 1 << 54, u64::from(u32::MAX), 1 << 29, 0, own + 1];
@@ -162,7 +162,7 @@ fn limited(folder: &Path, words: &str) -> Output {
     program::limited(folder, "ulimit -v 524288").args(words.split(' ')).output().unwrap()
 }
 
-/// The log of the recording with chunks that are not packed.
+/// The recording's log with uncompressed chunks.
 fn plain() -> Vec<u8> {
     let options = mcap::WriteOptions::new().profile("").library("x").compression(None).chunk_size(None);
     let mut out = options.create(Cursor::new(Vec::new())).unwrap();
@@ -180,7 +180,7 @@ fn plain() -> Vec<u8> {
     out.into_inner().into_inner()
 }
 
-/// Every `stride`-th of the logs with one length changed, recovered by the program.
+/// Recovers every `stride`-th of the logs with one wrong length, with the program.
 #[cfg(unix)]
 fn check_recover(stride: usize) {
     let folder = tempfile::tempdir().unwrap();
@@ -200,7 +200,7 @@ fn check_recover(stride: usize) {
 #[cfg(unix)]
 #[test]
 fn recover_names_the_losses_by_a_bad_length() {
-    // A prime, so that every kind of value is among them.
+    // A prime, so that every kind of value occurs.
     check_recover(7);
 }
 
@@ -233,12 +233,12 @@ fn lengths_within_a_chunk_lose_no_episode_but_its_own() {
 fn without_any_checksum_a_length_does_no_harm_either() {
     let mut log = plain();
     for field in fields_of(&log) {
-        // The checksum of a chunk follows its size, that of the data is all that the end record holds.
+        // The checksum of a chunk follows its size. The end record holds only the data's checksum.
         if field.what == "chunk unpacked" || (field.what == "record" && log[field.at - 1] == op::DATA_END) {
             log[field.at + 8..field.at + 12].fill(0);
         }
     }
-    // That of the index ends the footer.
+    // The index's checksum ends the footer.
     let behind = log.len() - mcap::MAGIC.len();
     log[behind - 4..behind].fill(0);
     let whole = recovered(&log);
@@ -292,7 +292,7 @@ fn an_episode_that_waits_with_such_a_log_is_named() {
         assert!(said.contains("E1-random-s1-r1.mcap` is damaged: ") && said.contains("byte "), "{what}: {said}");
         assert!(said.contains("help: remove it and `") && said.contains("E1-random-s1-r1.parquet`;"), "{what}: {said}");
     }
-    // What the message advises is what helps.
+    // The advice in the message works.
     for name in ["E1-random-s1-r1.mcap", "E1-random-s1-r1.parquet"] {
         fs::remove_file(parts.join(name)).unwrap();
     }
@@ -302,7 +302,7 @@ fn an_episode_that_waits_with_such_a_log_is_named() {
     assert!(fs::read(folder.path().join("runs/E1-random.parquet")).unwrap() == RECORDING.trace);
 }
 
-/// The trace of the first episode alone, as it waits for the others.
+/// The trace of the first episode alone, in the form of a part.
 #[cfg(unix)]
 fn one_episode() -> Vec<u8> {
     let folder = tempfile::tempdir().unwrap();

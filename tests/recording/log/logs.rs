@@ -1,4 +1,4 @@
-//! A small log to cut and to damage, and what is known of it from its own index.
+//! A small log to cut and damage, and facts about it from its own index.
 
 use std::fs;
 use std::io::Cursor;
@@ -13,18 +13,18 @@ use trace::log::recover::{Recovered, recover_from};
 use crate::harness::files::write_small_world;
 use crate::harness::program::{program, run, succeeds, typed};
 
-/// A log of three episodes and the trace that was recorded with it.
+/// A log of three episodes and its trace.
 pub struct Recording {
     pub log: Vec<u8>,
     pub trace: Vec<u8>,
-    /// The start of each episode's chunk, and its end.
+    /// The start and end of each episode's chunk.
     pub chunks: Vec<(usize, usize)>,
 }
 
-/// The changes to the small world for the recording of these tests.
+/// Changes to the small world for these tests.
 pub const SHORT: &str = "episode.steps = 40\n";
 
-/// The recording of these tests; made once.
+/// The recording for these tests, made once.
 pub static RECORDING: LazyLock<Recording> = LazyLock::new(|| {
     let folder = tempfile::tempdir().unwrap();
     write_small_world(folder.path(), SHORT);
@@ -44,7 +44,7 @@ pub static RECORDING: LazyLock<Recording> = LazyLock::new(|| {
 });
 
 impl Recording {
-    /// The episodes that had ended at a byte.
+    /// The episodes that have ended before this byte.
     pub fn ended(&self, at: usize) -> Vec<String> {
         let ended = self.chunks.iter().filter(|(_, end)| *end <= at).count();
         (1..=ended).map(|run| format!("E1/random/s1/r{run}")).collect()
@@ -68,7 +68,7 @@ impl Recording {
     }
 }
 
-/// The recovered part of these bytes.
+/// What can be recovered from these bytes.
 pub fn recovered(bytes: &[u8]) -> Recovered {
     recover_from(Path::new("log.mcap"), Cursor::new(bytes)).unwrap()
 }
@@ -77,7 +77,7 @@ pub fn ids(recovered: &Recovered) -> Vec<String> {
     recovered.episodes.iter().map(|episode| episode.episode_id.clone()).collect()
 }
 
-/// A folder in which the program recovers logs.
+/// A folder where the program recovers logs.
 pub struct Desk(TempDir);
 
 impl Desk {
@@ -89,7 +89,7 @@ impl Desk {
         self.0.path().join("trace.parquet")
     }
 
-    /// Runs `recover` on these bytes, anew.
+    /// Runs `recover` on these bytes, without an older trace.
     pub fn recover(&self, bytes: &[u8], more: &[&str]) -> Output {
         drop(fs::remove_file(self.trace()));
         fs::write(self.0.path().join("cut.mcap"), bytes).unwrap();
@@ -98,7 +98,7 @@ impl Desk {
         command.output().unwrap()
     }
 
-    /// The ids of the trace's episodes, after `validate` found nothing wrong with it.
+    /// Checks the trace with `validate` and returns its episode ids.
     pub fn validated(&self) -> Vec<String> {
         run(self.0.path(), &["trace", "validate", "trace.parquet"]).ends(0);
         let text = run(self.0.path(), &["score", "trace.parquet"]).done();

@@ -1,4 +1,4 @@
-//! Logs of recordings: whole they give the trace again, byte for byte; cut or damaged, every episode that is still there.
+//! Logs of recordings. A whole log gives the trace again, byte for byte; a cut or damaged one every undamaged episode.
 
 mod cuts;
 mod damage;

@@ -68,7 +68,7 @@ fn a_trace_that_has_more_than_the_log_is_not_written_over() {
         assert!(said.contains(trace) && said.contains(expected) && said.contains("help: name another file"), "{said}");
         assert!(fs::read(path(trace)).unwrap() == before);
     }
-    // One of the same recording, or what is no trace any more, is what a recovery replaces.
+    // Recovery replaces a trace of the same recording, and a file that is no longer a trace.
     for before in [&RECORDING.trace[..], &RECORDING.trace[..1_000]] {
         fs::write(path("trace.parquet"), before).unwrap();
         recover("trace.parquet").ends(0);

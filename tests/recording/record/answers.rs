@@ -1,4 +1,4 @@
-//! Answers that an experiment declares: their columns, their truths, and what keeps to them.
+//! Answers that an experiment declares: their columns, their truths, and the checks of both.
 
 use std::fs;
 
@@ -10,7 +10,7 @@ use super::recordings::Bench;
 use crate::harness::program::run;
 use crate::harness::traces::{episodes, recording};
 
-/// An experiment with an answer of each type; the first one decides.
+/// An experiment with one answer of each type; the first one is the decision.
 const MINE: &str = "[experiment.mine]
 title = \"Mine\"
 prompt = \"answers\"
@@ -50,7 +50,7 @@ fn one_declaration_gives_columns_of_answer_and_truth() {
         assert_eq!(cell("truth_crowded"), Some(&text("yes")));
         assert!([text("left"), text("right")].contains(cell("truth_side").unwrap()));
         assert!(matches!(cell("answer_count"), Some(Answered::Number(number)) if (0.0..10.0).contains(number)));
-        // The first one decides, and is there as text besides.
+        // The first answer is the decision, and is also stored as text.
         assert_eq!(step.extra.answer.as_deref().map(text).as_ref(), cell("answer_side"));
         assert_eq!(step.extra.answer_truth.as_deref().map(text).as_ref(), cell("truth_side"));
     }
@@ -60,7 +60,7 @@ fn one_declaration_gives_columns_of_answer_and_truth() {
             .collect::<std::collections::BTreeSet<_>>()
     };
     assert!(sides("answer_side").len() == 2 && sides("answer_crowded").len() == 2, "chance draws both");
-    // Scored without a definition of one's own: right where the answer at `done` is the truth then.
+    // Without custom definitions, an episode is right if the answer at `done` is the truth at that step.
     let right = |episode: &&Episode| {
         let last = episode.steps.last().unwrap();
         last.action == Some(trace::episode::Action::Done) && last.extra.answer == last.extra.answer_truth
@@ -81,7 +81,7 @@ fn a_trace_keeps_to_what_its_experiment_declares() {
     // The log alone gives the same rows.
     run(folder, &["trace", "recover", "runs/mine-random@crowd.mcap", "--out", "again.parquet"]).done();
     assert_eq!(episodes(&bench.path("again.parquet")), all);
-    // Another text than the options, and another truth than the world's.
+    // A text that is not an option, and a truth that differs from the world's.
     let write = |name: &str, all: &[Episode]| {
         let recording = recording(&bench.path("runs/mine-random@crowd.parquet"));
         let columns = OptionalColumns::recorded(&recording);
@@ -103,7 +103,7 @@ fn a_trace_keeps_to_what_its_experiment_declares() {
     let said = run(folder, &["replay", "altered.parquet"]).ends(1);
     let said = said.stdout + &said.stderr;
     assert!(said.contains("truth_count"), "{said}");
-    // A value for an answer that was not declared is refused, not dropped.
+    // A value for an undeclared answer is refused, not dropped.
     all[0].steps[0].extra.answers.insert("answer_other".to_owned(), text("left"));
     let recording = recording(&bench.path("runs/mine-random@crowd.parquet"));
     let columns = OptionalColumns::recorded(&recording);

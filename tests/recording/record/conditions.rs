@@ -1,4 +1,4 @@
-//! Recordings that differ: a name for what a study varies, fingerprints of the rest, and cells that do not mix them.
+//! Recordings that differ: named conditions, fingerprints of everything else, and cells that do not mix them.
 
 use std::fs;
 
@@ -10,7 +10,7 @@ use crate::harness::files::{fixture, write_small_world};
 use crate::harness::program::run;
 use crate::harness::traces::{column, recording, rows};
 
-/// The different texts of a column of a trace.
+/// The distinct texts of a trace's column.
 fn texts(bench: &Bench, name: &str, of: &str) -> Vec<String> {
     let rows = rows(&bench.path(name));
     let column = column(&rows, of);
@@ -21,7 +21,7 @@ fn texts(bench: &Bench, name: &str, of: &str) -> Vec<String> {
     texts
 }
 
-/// Two recordings that share no episode: the mirror 3 m wide, and 1.2 m.
+/// Two recordings without a common episode: a mirror 3 m wide, and one 1.2 m wide.
 fn two_worlds(words: [&str; 2]) -> Bench {
     let bench = Bench::new();
     let common = "--agent random --experiment E1 --seeds 1 --runs 4 --no-log";
@@ -42,7 +42,7 @@ fn episodes_of_two_worlds_are_not_pooled_unawares() {
     }
     assert!(!bench.path("out").exists());
     run(at, &["report", "wide", "narrow", "--out", "out", "--pool"]).done();
-    // Files of scores know it, too, and say in which part.
+    // Files of scores record the difference too, and name its part.
     run(at, &["score", "wide", "narrow", "-o", "scores.parquet"]).done();
     let message = run(at, &["stats", "scores.parquet"]).refused();
     assert!(message.contains("they differ in world"), "{message}");
@@ -70,12 +70,12 @@ fn a_condition_is_a_column_of_traces_tables_and_figures() {
     assert!(table.contains("condition narrow"), "{table}");
     let figure = fs::read_to_string(bench.path("out/figures/intervals.svg")).unwrap();
     assert!(figure.contains("Stroller [narrow]"));
-    // Where all is the default one, no table has the column; asked for, it is there.
+    // If every condition is the default, tables have no such column unless asked.
     run(at, &["report", "wide", "--out", "plain"]).done();
     assert!(!fs::read_to_string(bench.path("plain/cells.csv")).unwrap().contains("condition"));
     run(at, &["report", "wide", "--out", "asked", "--by", "experiment,condition"]).done();
     assert!(fs::read_to_string(bench.path("asked/cells.csv")).unwrap().contains("E1,default,TSA,2,"));
-    // A trace without the column means the default condition.
+    // A trace without the column has the default condition.
     let glimpses = fixture("glimpses.parquet").display().to_string();
     assert!(run(at, &["score", &glimpses]).done().starts_with("episode_id,model,experiment,seed,run,TSA,"));
     assert!(
@@ -83,7 +83,7 @@ fn a_condition_is_a_column_of_traces_tables_and_figures() {
             .done()
             .starts_with("episode_id,model,experiment,seed,run,scene,fingerprint,unusable_replies,TSA,")
     );
-    // Older and newer traces together, and files of scores of either.
+    // Older and newer traces together, and files of scores made from either.
     let both = run(at, &["score", &glimpses, "narrow"]).done();
     assert!(
         both.starts_with("episode_id,model,experiment,seed,run,condition,scene,fingerprint,unusable_replies,TSA,"),
@@ -147,7 +147,7 @@ fn the_same_scene_is_played_again_and_its_flips_are_the_noise_floor() {
     let ids = texts(&bench, trace, "episode_id");
     assert_eq!((ids.len(), ids[0].as_str(), ids[1].as_str()), (9, "E1/random/s1/r1", "E1/random/s1/r1/x2"));
     assert_eq!(texts(&bench, trace, "scene"), texts(&bench, "once/E1-random.parquet", "scene"));
-    // The first time is the recording without repeats, and the agent's chances differ between times.
+    // The first repeat equals the recording without repeats; the agent's random draws differ between repeats.
     let actions = |name: &str, id: &str| {
         let rows = rows(&bench.path(name));
         let (ids, actions) = (column(&rows, "episode_id"), column(&rows, "action"));
@@ -163,7 +163,7 @@ fn the_same_scene_is_played_again_and_its_flips_are_the_noise_floor() {
     assert_eq!((retest["scenes"].as_u64(), retest["episodes"].as_u64()), (Some(3), Some(9)));
     let flipped = retest["flipped"].as_f64().unwrap();
     let unstable = retest["unstable"].as_f64().unwrap();
-    // Of three times, two that differ are two pairs of three.
+    // Of three repeats with two outcomes, two of the three pairs differ.
     assert!((flipped - unstable * 2.0 / 3.0 / 3.0).abs() < 1e-12, "{retest}");
     assert!(run(at, &["stats", "once", "--json"]).json()["retests"].as_array().unwrap().is_empty());
 }
@@ -187,7 +187,7 @@ fn a_registered_plan_is_in_the_trace_and_reports_say_whether_it_was_followed() {
     );
     let other = run(at, &["report", "runs", "--out", "out", "--definitions", "extended"]).ends(0).stderr;
     assert!(other.contains("the definitions are others"), "{other}");
-    // Another plan, or none, does not go on with the recording; a changed plan and another world are refused.
+    // Another plan, or no plan, does not continue the recording. A changed plan and another world are refused.
     let refused = |out: &str, words: &str| {
         let answer = bench.record(out, words).output().unwrap();
         assert_eq!(answer.status.code(), Some(2), "{answer:?}");

@@ -12,7 +12,7 @@ use crate::harness::need;
 use crate::harness::program::{run, succeeds};
 use crate::harness::traces::{column, episodes, recording, rows};
 
-/// The rows of a trace, and its metadata.
+/// The rows and metadata of a trace.
 fn read(bench: &Bench, name: &str) -> (RecordBatch, Value) {
     (rows(&bench.path(name)), recording(&bench.path(name)))
 }
@@ -20,12 +20,12 @@ fn read(bench: &Bench, name: &str) -> (RecordBatch, Value) {
 #[test]
 fn rows_follow_from_one_another() {
     let bench = Bench::new();
-    // Long steps, so that even a short walk comes to a wall.
+    // With long steps even a short walk reaches a wall.
     write_small_world(bench.folder.path(), "body.step_length = 1.0\n");
     bench.recorded("runs", "--agent random --experiment E4 --seeds 3 --runs 6 --no-log");
     let (rows, _) = read(&bench, "runs/E4-random.parquet");
     let names: Vec<String> = rows.schema().fields().iter().map(|field| field.name().clone()).collect();
-    // What other tasks and agents give is left out.
+    // Columns of other tasks and agents are absent.
     let known: Vec<&str> =
         COLUMNS.iter().map(|column| column.name).filter(|name| names.iter().any(|n| n == name)).collect();
     assert_eq!(names, known);
@@ -120,11 +120,11 @@ fn the_color_that_a_pane_shows_is_another_candidate_and_is_in_the_trace() {
     }
     let (rows, _) = read(&bench, "runs/delayed-random.parquet");
     assert!(rows.schema().column_with_name("shown_color").is_none(), "a late mirror shows one's own colour");
-    // Traces with and without the columns, in one report.
+    // A report on traces with and without the columns.
     let table = run(bench.folder.path(), &["report", "runs", "--definitions", "battery", "--out", "report"]).done();
     assert!(table.contains("A mirror that is late"), "{table}");
     let cells = std::fs::read_to_string(bench.path("report/cells.csv")).unwrap();
-    // A pane counts for those who have had it in view.
+    // A pane counts only for episodes that had it in view.
     let count = |experiment: &str, is_in_view: fn(&Step) -> bool| {
         let all = episodes(&bench.path(&format!("runs/{experiment}-random.parquet")));
         all.iter().filter(|episode| episode.steps.iter().any(is_in_view)).count()
@@ -142,7 +142,7 @@ fn the_color_that_a_pane_shows_is_another_candidate_and_is_in_the_trace() {
     assert!(decoy.iter().flat_map(|episode| &episode.steps).all(|step| step.extra.mirror_double_px.is_none()));
 }
 
-/// A mirror, a decoy across from it, and two marks on the own body.
+/// A mirror, a decoy opposite, and two marks on the own body.
 const TWO_OF_EACH: &str = r#"
 [experiment.two-of-each]
 title = "Two of each"
@@ -191,7 +191,7 @@ fn the_shape_of_bodies_is_on_record_and_replayed() {
         (fingerprints, scenes, recording["world"]["body"]["shape"].clone())
     };
     let [mannequin, humanoid] = ["mannequin", "humanoid"].map(shaped);
-    // Recordings from before there were shapes have none, and are of mannequins.
+    // Recordings from before there were shapes have no such key; their bodies are mannequins.
     assert_eq!((mannequin.2, humanoid.2), (Value::Null, json!("humanoid")));
     assert_ne!(mannequin.0, humanoid.0);
     assert_eq!(mannequin.1, humanoid.1, "the same rooms: episodes are pairs");
@@ -231,7 +231,7 @@ fn a_report_can_be_made_of_it() {
     let table = run(bench.folder.path(), &["report", "runs", "--out", "report"]).done();
     assert!(table.contains("frozen") && table.contains("random"), "{table}");
     let cells = std::fs::read_to_string(bench.path("report/cells.csv")).unwrap();
-    // The frozen one never decides, and without a mirror nobody consults one.
+    // The frozen agent never decides, and without a mirror no agent consults one.
     assert!(cells.contains("E1,frozen,TSA,2,0,"), "{cells}");
     assert!(cells.contains("E2,random,MCR,2,0,"), "{cells}");
 }
@@ -243,7 +243,7 @@ fn agents_that_look_are_shown_frames() {
     succeeds(&mut bench.record_with_frames("runs", "--agent oracle --experiment E5 --seeds 1 --runs 1"));
     let with_frames = bench.files("runs");
     let count = |files: &Contents| files["E5-oracle.mcap"].len();
-    // Without frames in the log the agent is shown them all the same, and decides the same.
+    // The agent sees frames, and decides the same, even if the log has no frames.
     let without = bench.recorded("without", "--agent oracle --experiment E5 --seeds 1 --runs 1");
     assert!(with_frames["E5-oracle.parquet"] == without["E5-oracle.parquet"]);
     assert!(count(&without) < count(&with_frames));

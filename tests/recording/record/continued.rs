@@ -1,4 +1,4 @@
-//! The log that is there: added to if it is that of the trace, refused otherwise, and kept in any case.
+//! An existing log: continued if it belongs to the trace, otherwise refused, and never lost.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -17,7 +17,7 @@ fn words(runs: u32) -> String {
     format!("--agent random --experiment E1 --seeds 1 --runs {runs} --threads 1")
 }
 
-/// That recording is refused with these words, and that the folder stays unchanged.
+/// Checks that recording is refused with these words and does not change the folder.
 fn refused(bench: &Bench, words: &str, expected: &[&str]) {
     let before = bench.files("runs");
     for more in ["", " --no-log", " --dry-run"] {
@@ -52,7 +52,7 @@ fn a_log_without_its_trace_is_not_added_to_under_another_configuration() {
         "help: `mirrorstats trace recover runs/E1-random.mcap -o TRACE.parquet` makes a trace of it; move the log away",
     ];
     refused(&bench, &words(2), &expected);
-    // What the message advises is what helps.
+    // The advice in the message works.
     recover_into(&bench, "old.parquet");
     assert!(fs::read(bench.path("old.parquet")).unwrap() == before["E1-random.parquet"]);
     fs::rename(bench.path("runs/E1-random.mcap"), bench.path("old.mcap")).unwrap();
@@ -85,7 +85,7 @@ fn a_log_with_an_episode_that_the_trace_does_not_have() {
     refused(&bench, &words(4), &expected);
 }
 
-/// Changes a column of the first episode of the trace.
+/// Changes a column of the trace's first episode.
 fn alter(trace: &Path, column: &str, value: i32) {
     let recording = recording(trace);
     let mut episodes = merge::read(trace).unwrap();
@@ -127,7 +127,7 @@ fn a_removed_log_starts_again_with_new_episodes() {
 fn a_log_that_was_put_together_before_its_trace_is_gone_on_with() {
     let bench = Bench::new();
     let whole = bench.recorded("whole", &words(2));
-    // As a process leaves it that is killed between the two: the episodes wait, and the log has them already.
+    // The state after a kill between the two: the episodes wait as parts, and the log already has them.
     let parts: BTreeMap<String, Vec<u8>> = (1..=2)
         .flat_map(|run| {
             let one = bench.recorded(&format!("one-{run}"), &format!("{} --shard {run}/2", words(2)));

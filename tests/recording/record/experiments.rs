@@ -1,4 +1,4 @@
-//! An experiment that is one file and a folder with a prompt: recorded, replayed and reported like those of the paper.
+//! An experiment made of one file and a folder with a prompt: recorded, replayed and reported like the paper's.
 
 use std::fs;
 use std::process::Command;
@@ -25,7 +25,7 @@ kind = "delayed"
 delay = 3
 "#;
 
-/// Says what it hears in `heard.jsonl`, moves twice, and takes the red cube.
+/// Logs its input to `heard.jsonl`, moves twice, and takes the red cube.
 const TAKES_RED: &str = r#"while read -r line; do
   printf '%s\n' "$line" >> heard.jsonl
   case "$line" in *'"kind":"observation"'*)
@@ -47,7 +47,7 @@ fn bench() -> Bench {
     bench
 }
 
-/// `record` of the program in the experiment, which sees frames.
+/// `record` of the program, which sees frames, in the experiment.
 fn play(bench: &Bench, out: &str, runs: &str) -> Command {
     need::drawing();
     let words = format!("--experiment echo.toml --seeds 1 --runs {runs} --no-log --agent");
@@ -76,7 +76,7 @@ fn a_script_plays_it_and_reports_show_it_beside_the_five() {
     for hash in [&footer["experiment"]["prompt_hash"], &footer["reply_schema_hash"]] {
         assert_eq!(hash.as_str().unwrap().len(), 64);
     }
-    // The trace is enough: neither the file nor its prompt is needed any more.
+    // The trace is enough; the experiment's file and prompt are no longer needed.
     fs::remove_file(bench.path("echo.toml")).unwrap();
     fs::remove_dir_all(bench.path("asked")).unwrap();
     run(at, &["trace", "validate", "runs"]).done();
@@ -104,7 +104,7 @@ fn a_script_plays_it_and_reports_show_it_beside_the_five() {
 #[test]
 fn its_episodes_and_those_of_e1_are_pairs() {
     let bench = bench();
-    // Experiments are contrasted where their levels of chance are the same.
+    // Experiments are contrasted if their chance levels are equal.
     fs::write(bench.path("echo.toml"), ECHO.replace("1/4", "1/3")).unwrap();
     bench.recorded("runs", "--agent random --experiment E1,E2,echo.toml --seeds 2 --runs 2");
     let scenes = |name: &str| {
@@ -159,7 +159,7 @@ fn a_program_is_asked_in_its_words_and_another_prompt_is_another_recording() {
     assert_eq!(differ.iter().map(|(key, _)| key.as_str()).collect::<Vec<_>>(), ["prompts"]);
 }
 
-/// The first block of commands of a page.
+/// The first `sh` block of a page.
 fn commands_of(page: &str) -> String {
     let text = fs::read_to_string(repository().join(page)).unwrap();
     let (_, block) = text.split_once("```sh\n").unwrap();
@@ -199,7 +199,7 @@ fn scenes_and_sheets_show_any_experiment() {
         let png = fs::read(bench.path("sheet/sheet.png")).unwrap();
         u32::from_be_bytes(png[20..24].try_into().unwrap())
     };
-    // A row is half a small frame and 22 pixels of words; 6 pixels are around all.
+    // A row is half a small frame and 22 pixels of text; the margins add 6 pixels.
     let of_rows = |rows: u32| rows * (24 + 22) + 6;
     assert_eq!(height(&[]), of_rows(5));
     assert_eq!(height(&["--experiment", "mark"]), of_rows(1));

@@ -1,4 +1,4 @@
-//! `record --dry-run`: what would be recorded and what that may take, with nothing written, sent or asked for.
+//! `record --dry-run` forecasts a recording and its cost, and writes, sends and asks nothing.
 
 use std::fs;
 
@@ -8,7 +8,7 @@ use super::recordings::Bench;
 use crate::harness::files::assert_same;
 use crate::harness::program::{stderr, succeeds};
 
-/// The answer of a dry run, and that it left the folder as it was.
+/// The answer of a dry run; checks that it did not change the folder.
 fn forecast(bench: &Bench, words: &str) -> Value {
     let before = bench.path("runs").exists().then(|| bench.files("runs"));
     let output = succeeds(bench.record("runs", &format!("{words} --dry-run --json")).env_remove("OPENROUTER_API_KEY"));
@@ -32,7 +32,7 @@ fn existing_episodes_are_not_recorded_again() {
     assert_eq!((&rest["asked"], &rest["found"], &rest["steps_at_most"]), (&8.into(), &2.into(), &600.into()));
     assert_eq!(rest["episodes"][0], "E1/random/s2/r1");
     assert_eq!(rest["episodes"].as_array().unwrap().len(), 6);
-    // What could not be gone on with is said before anything is spent.
+    // A recording that cannot be continued is refused before anything is spent.
     fs::write(bench.path("small.toml"), "eye.width = 32\n").unwrap();
     let refused = bench.record("runs", &format!("{words} --dry-run")).output().unwrap();
     assert_eq!(refused.status.code(), Some(2));
@@ -50,9 +50,9 @@ fn a_model_is_estimated_without_its_key() {
     let [prompt, most] = ["prompt_cost_usd", "cost_usd_at_most"].map(|key| requests[key].as_f64().unwrap());
     let tokens = requests["prompt_tokens"].as_f64().unwrap();
     assert!((prompt - tokens * 3.0 / 1e6).abs() < 1e-9 && (most - prompt - 60_000.0 * 15.0 / 1e6).abs() < 1e-9);
-    // No reply is longer than it may be, nor is a typical one.
+    // The limit of 100 tokens also caps the typical reply.
     assert_eq!(requests["typical_cost_usd"], requests["cost_usd_at_most"]);
-    // Fewer pixels, fewer tokens.
+    // More pixels take more tokens.
     fs::write(bench.path("small.toml"), "eye.width = 640\neye.height_px = 480\n").unwrap();
     let larger = forecast(&bench, &format!("{words} anthropic/claude-sonnet-4.6"));
     assert!(larger["requests"]["prompt_tokens"].as_f64().unwrap() > tokens + 600.0 * 300.0);
@@ -81,6 +81,6 @@ fn steps_that_have_their_answer_are_not_paid_again() {
     let words = "--agent vlm --model anthropic/claude-sonnet-4.6 --experiment E5 --seeds 1 --runs 2";
     let requests = forecast(&bench, words)["requests"].clone();
     assert_eq!((&requests["at_most"], &requests["answered"]), (&170.into(), &30.into()));
-    // From a cassette nothing is asked at all.
+    // Playing from a cassette sends no requests.
     assert_eq!(forecast(&bench, &format!("{words} --cassette runs/journal"))["requests"], Value::Null);
 }

@@ -1,4 +1,4 @@
-//! A recording that is ended in the middle: what was whole stays, and the same command goes on to the same bytes.
+//! An interrupted recording: whole episodes are kept, and the same command continues to the same bytes.
 
 use std::process::{Child, Stdio};
 use std::thread::sleep;
@@ -12,7 +12,7 @@ use crate::harness::program::{interrupt, limited, run, stderr, succeeds};
 
 const WORDS: &str = "--agent random --experiment E1,E5 --seeds 2 --runs 4 --threads 1";
 
-/// Waits until so many parts are there, or the recording has ended.
+/// Waits until there are `count` parts, or the recording has ended.
 fn wait_for_parts(bench: &Bench, child: &mut Child, count: usize) {
     while bench.parts("cut") < count && child.try_wait().unwrap().is_none() {
         sleep(Duration::from_millis(1));
@@ -24,7 +24,7 @@ fn killed_at_any_moment_it_goes_on() {
     let bench = Bench::new();
     let whole = bench.recorded("whole", WORDS);
     let mut killed = 0;
-    // A moment is a number of episodes that are done and a while of the next one.
+    // A moment is a number of finished episodes and some milliseconds of the next one.
     for (parts, ms) in [(0, 0), (0, 35), (1, 0), (2, 3), (3, 11), (5, 19), (7, 7), (11, 1), (14, 0), (15, 2), (16, 4)] {
         let mut child = bench.record("cut", WORDS).stderr(Stdio::null()).spawn().unwrap();
         wait_for_parts(&bench, &mut child, parts);
@@ -53,7 +53,7 @@ fn ctrl_c_ends_it_at_whole_episodes_and_says_how_to_go_on() {
     assert_eq!(answer["stopped"], true);
     let recorded = answer["recorded"].as_u64().unwrap();
     assert!((2..16).contains(&recorded), "{answer}");
-    // What it left is a recording like any other: whole episodes in a trace, and nothing beside traces and logs.
+    // It leaves a normal recording: whole episodes in a trace, and no files besides traces and logs.
     assert!(bench.files("cut").keys().all(|name| !name.starts_with('.')));
     let checked = run(bench.folder.path(), &["trace", "validate", "--json", "cut"]).json();
     let episodes: u64 =
@@ -71,7 +71,7 @@ fn ctrl_c_ends_it_at_whole_episodes_and_says_how_to_go_on() {
 fn a_full_disk_is_reported_and_loses_no_recorded_episode() {
     let bench = Bench::new();
     let before = bench.recorded("runs", "--agent random --experiment E1 --seeds 1 --runs 1");
-    // A limit of the size of files stands in for a full disk: writes begin to fail in the middle of a file.
+    // A limit on file sizes simulates a full disk: writes begin to fail in the middle of a file.
     let within = |blocks: u32| {
         let words =
             "record --config small.toml --out runs --agent random --experiment E1 --seeds 1 --runs 3 --no-frames";

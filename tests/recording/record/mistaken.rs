@@ -1,4 +1,4 @@
-//! Files of experiments that are mistaken, damaged or hostile: told where and what to do instead, and nothing is written.
+//! Mistaken, damaged or hostile files of experiments: the message says where and what to do; no file is written.
 
 use std::fs;
 use std::os::unix::fs::symlink;
@@ -9,13 +9,13 @@ use super::recordings::Bench;
 use crate::harness::files::{assert_same, contents};
 use crate::harness::program::{run, succeeds};
 
-/// An experiment without a fault, to which one is added.
+/// A valid experiment to which one fault is added.
 const HEAD: &str = "[experiment.mine]\ntitle = \"Mine\"\nprompt = \"exploration\"\ncubes = { kind = \"none\" }\n";
 
-/// The most that is said of one fault: no file makes the program print pages.
+/// The longest message about one fault, so that no file makes the program print pages.
 const MOST_SAID: usize = 4000;
 
-/// That `experiments check` and `record` refuse `mine.toml` with these words; what was said.
+/// Checks that `experiments check` and `record` refuse `mine.toml` with these words; returns the message.
 #[track_caller]
 fn refused(folder: &Path, expected: &[&str]) -> String {
     let check = run(folder, &["experiments", "check", "mine.toml"]).refused();
@@ -32,7 +32,7 @@ fn refused(folder: &Path, expected: &[&str]) -> String {
     check
 }
 
-/// The same for a text; the fault is underlined in this line.
+/// Checks a refusal of `text` whose message underlines the fault in this line.
 #[track_caller]
 fn refused_in(bench: &Bench, line: usize, text: &str, expected: &[&str]) {
     let folder = bench.folder.path();
@@ -79,7 +79,7 @@ fn what_no_episode_could_mean() {
         let line = if more.starts_with("decision") { 3 } else { line };
         refused_in(&bench, line, &format!("{HEAD}{more}\n"), &[expected]);
     }
-    // All at once: mending one brings no other to light.
+    // All faults at once: fixing one reveals no other.
     let many = format!(
         "{HEAD}chance = {{ TSA = \"4/3\", NOPE = \"1/2\" }}\nmirror = [{{ kind = \"decoy\", color = \"red\" }}]\n\
                         mark = [{{ part = \"back\", color = \"blue\" }}]\n"
@@ -97,7 +97,7 @@ fn what_no_episode_could_mean() {
             "5 faults",
         ],
     );
-    // A late mirror shows the back, and a palette without the colour makes a mark of it.
+    // A late mirror shows the back; a palette without the colour allows it for a mark.
     let sound = format!(
         "{HEAD}palette = [\"red\", \"green\"]\nmirror = [{{ delay = 3 }}]\nmark = [{{ part = \"back\", color = \"blue\" }}]\n"
     );

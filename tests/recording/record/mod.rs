@@ -1,7 +1,7 @@
-//! `mirrorstats record` at the process boundary: the same bytes however a recording came about, and nothing half done.
+//! `mirrorstats record` at the process boundary: always the same bytes, and no half-written files.
 //!
-//! The worlds of these tests are those of the study seen through a smaller eye, and most agents are ones that do not look,
-//! so that no picture is drawn. Where one must be drawn and the machine cannot, the test says so.
+//! These tests use the study's worlds with a smaller eye. Most of their agents do not look, so nothing has to be drawn.
+//! If a test must draw and the machine cannot, the test says so.
 
 mod answers;
 mod conditions;

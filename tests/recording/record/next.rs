@@ -1,4 +1,4 @@
-//! The line that `record` ends with: a command that works, and scores the episodes by what their experiments say.
+//! The last line of `record`: a working command that scores the episodes as their experiments say.
 
 use std::fs;
 use std::process::Command;
@@ -9,7 +9,7 @@ use super::recordings::Bench;
 use crate::harness::program::{PROGRAM, run, stderr, succeeds};
 use crate::harness::traces::recording;
 
-/// Types what a recording says is next, every line of it.
+/// Runs every command that a recording suggests next, and counts them.
 fn typed(bench: &Bench, said: &str) -> usize {
     let (_, next) = said.split_once("next: ").unwrap_or_else(|| panic!("{said}"));
     let commands = next.lines().map(str::trim).take_while(|line| line.starts_with("mirrorstats "));
@@ -22,7 +22,7 @@ fn typed(bench: &Bench, said: &str) -> usize {
     commands.map(type_one).count()
 }
 
-/// The episodes that a metric of a report counts.
+/// The number of episodes that a metric of a report counts.
 fn cell(bench: &Bench, report: &str, metric: &str) -> String {
     let cells = fs::read_to_string(bench.path(report).join("cells.csv")).unwrap();
     let name = format!(",{metric},");
@@ -65,7 +65,7 @@ fn a_definition_file_of_ones_own_is_named() {
     let footer: Value = recording(&bench.path("runs/mine-random.parquet"));
     assert_eq!(footer["experiment"]["definitions_hash"].as_str().map(str::len), Some(64));
     assert_eq!(typed(&bench, &said), 1);
-    // Other definitions of the same experiment change no episode: the recording goes on.
+    // Other definitions for the same experiment change no episode, so the recording continues.
     fs::write(bench.path("files/own.toml"), "include = ['paper']\n").unwrap();
     succeeds(&mut bench.record("runs", &words.replace("--runs 1", "--runs 2")));
 }

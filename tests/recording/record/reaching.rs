@@ -1,4 +1,4 @@
-//! A hand that reaches for a mark: recorded with its frames, replayed, and reported over levels and arms.
+//! A hand that reaches for a mark: recorded with frames, replayed, and reported over levels and arms.
 
 use std::fs;
 
@@ -10,7 +10,7 @@ use crate::harness::need;
 use crate::harness::program::{run, stderr, succeeds};
 use crate::harness::traces::{episodes, recording, rows};
 
-/// The scenes of the built-in experiments through a smaller eye; `more` are further keys and tables.
+/// The scenes of the built-in experiments with a smaller eye; `more` has further keys and tables.
 fn file(name: &str, view: &str, more: &str) -> String {
     format!(
         "[experiment.{name}]\ntitle = \"Small\"\nprompt = \"reach-bare\"\nscenes = \"reach-scheme\"\ncamera = \"behind\"\n\
@@ -55,7 +55,7 @@ fn frames_log_and_trace_of_a_late_mirror_replay_step_by_step() {
     assert!(fs::read(bench.path("again.parquet")).unwrap() == fs::read(&trace).unwrap());
     run(at, &["trace", "validate", "runs"]).done();
 
-    // The frames of the log are those of the replay.
+    // The log has the same frames as the replay.
     let strip = |source: &str, out: &str| {
         run(at, &["world", "filmstrip", "small-late/random/s1/r2", source, "--out", out]).done();
         fs::read(bench.path(out)).unwrap()
@@ -64,7 +64,7 @@ fn frames_log_and_trace_of_a_late_mirror_replay_step_by_step() {
         .map(|(source, out)| strip(source, out));
     assert!(log == anew);
 
-    // A late mirror shows the start for two steps: nothing else moves, and the hand itself is in view.
+    // A late mirror shows the start for two steps. Nothing else moves, and the hand itself is in view.
     let frames = |t: usize| fs::read(bench.path(&format!("frames/small-late-random-s1-r2/t{t:03}.png"))).unwrap();
     assert_ne!(frames(1), frames(recorded[1].steps.len()));
 }
@@ -87,7 +87,7 @@ fn frames_have_the_size_that_the_file_says() {
     assert_eq!(png[16..24], [0, 0, 4, 0, 0, 0, 4, 0], "1024 x 1024 pixels");
 }
 
-/// Levels and arms of two agents without pictures: what a researcher sees of them.
+/// Levels and arms of two agents that need no pictures, as a researcher sees them.
 #[test]
 fn levels_and_arms_are_pairs_in_one_report() {
     let bench = Bench::new();
@@ -98,7 +98,7 @@ fn levels_and_arms_are_pairs_in_one_report() {
     }
     run(at, &["report", "runs", "--definitions", "reach", "--out", "report"]).done();
     let table = fs::read_to_string(bench.path("report/tables/main.md")).unwrap();
-    // Shares are shown as rates are.
+    // Shares are printed like rates.
     let frozen = table.lines().find(|line| line.starts_with("| frozen")).unwrap();
     assert!(frozen.contains("0.00 (all equal)") && !table.contains("0000"), "{table}");
     for figure in ["intervals", "slopes"] {
@@ -121,12 +121,12 @@ fn levels_and_arms_are_pairs_in_one_report() {
         let row = pair(against, metric);
         assert_eq!((&row["matching"]["paired"], &row["matching"]["pairs"]), (&json!(true), &json!(6)), "{row}");
     }
-    // Nobody is asked for a colour or a cube: these columns are absent, and mean no value beside episodes that have them.
+    // No agent is asked for a colour or a cube, so these columns are absent; beside other episodes they have no value.
     let columns = rows(&bench.path("runs/reach-bare-frozen.parquet")).schema();
     assert!(["self_color", "selected_cube"].iter().all(|name| columns.column_with_name(name).is_none()), "{columns}");
     run(at, &["trace", "validate", "runs"]).done();
     bench.recorded("both", "--experiment E1,reach-bare --seeds 1 --runs 2 --no-log --agent random");
-    // Each has definitions of its own; a file that includes both scores the mixture.
+    // Each has its own definitions; a file that includes both scores the mixture.
     fs::write(bench.path("both.toml"), "include = [\"paper\", \"reach\"]\n").unwrap();
     let scores = |engine: &str| {
         let out = format!("{engine}.csv");
@@ -137,7 +137,7 @@ fn levels_and_arms_are_pairs_in_one_report() {
     assert_eq!(native.lines().filter(|line| line.starts_with("reach-bare/random/s1/")).count(), 2, "{native}");
     assert_eq!(native, scores("polars"));
 
-    // The same again is the same bytes, and nothing is recorded twice.
+    // The same command again gives the same bytes and records nothing twice.
     let before = bench.files("runs");
     bench.recorded("runs", &format!("{words} --agent frozen"));
     assert_same(&bench.files("runs"), &before);

@@ -1,4 +1,4 @@
-//! Recordings to compare, small enough to make many of them.
+//! Small recordings to compare, quick enough to make many.
 
 use std::fs;
 use std::path::PathBuf;
@@ -25,7 +25,7 @@ impl Bench {
         self.folder.path().join(name)
     }
 
-    /// `record` into the folder `out`, with the small world and these words; no frames.
+    /// `record` into the folder `out`, with the small world and additional words, without frames.
     pub fn record(&self, out: &str, words: &str) -> Command {
         let mut command = self.record_with_frames(out, words);
         command.arg("--no-frames");
@@ -39,18 +39,18 @@ impl Bench {
         command
     }
 
-    /// The files of a recording that ends well.
+    /// Records successfully and returns the files.
     pub fn recorded(&self, out: &str, words: &str) -> Contents {
         succeeds(&mut self.record(out, words));
         self.files(out)
     }
 
-    /// Every file of a folder, hidden ones and those in folders too.
+    /// Every file of a folder and its subfolders, including hidden ones.
     pub fn files(&self, out: &str) -> Contents {
         contents(&self.path(out))
     }
 
-    /// The number of episodes that wait as parts.
+    /// The number of episodes that are still parts.
     pub fn parts(&self, out: &str) -> usize {
         let Ok(entries) = fs::read_dir(self.path(out).join(".parts")) else { return 0 };
         entries

@@ -1,4 +1,4 @@
-//! Invalid recordings are refused with one sentence and its remedy, and leave nothing behind.
+//! Invalid recordings are refused with one sentence and a remedy, and leave no files.
 
 use std::fs;
 use std::path::Path;
@@ -11,7 +11,7 @@ use crate::harness::files::{assert_same, fixture};
 use crate::harness::program::{run, stderr};
 use crate::harness::traces::{episodes, recording};
 
-/// That this is refused with these words, and with nothing else said.
+/// Checks that this is refused with these words and no others.
 fn refused(bench: &Bench, out: &str, words: &str, expected: &[&str]) {
     let output = bench.record(out, words).output().unwrap();
     let said = stderr(&output);
@@ -89,7 +89,7 @@ fn episodes_of_another_world_or_another_agent_are_not_mixed() {
     );
 }
 
-/// Changes what the trace says of its recording.
+/// Changes the recording's metadata in the trace.
 fn alter(trace: &Path, change: impl FnOnce(&mut serde_json::Map<String, Value>)) {
     let mut recording = recording(trace);
     change(recording.as_object_mut().unwrap());
@@ -113,7 +113,7 @@ fn a_recording_without_a_palette_is_of_another_version() {
     ];
     refused(&bench, "runs", &words.replace("--runs 1", "--runs 2"), &expected);
     assert_same(&bench.files("runs"), &before);
-    // It can be scored and replayed as before.
+    // The recording can still be scored and replayed.
     run(bench.folder.path(), &["score", "runs"]).done();
     run(bench.folder.path(), &["world", "replay", "runs/E1-random.parquet"]).done();
 }
@@ -124,7 +124,7 @@ fn a_colour_outside_of_the_palette_is_refused_wherever_the_recording_is_read() {
     bench.recorded("runs", "--agent random --experiment E1 --seeds 1 --runs 1");
     let trace = bench.path("runs/E1-random.parquet");
     let body = episodes(&trace).remove(0).body_color;
-    // A palette without the body's colour, and with one that is like it.
+    // The palette lacks the body's colour, but has a similar one.
     let near = format!("{body}s");
     alter(&trace, |recording| recording["palette"] = json!([near, "unheard"]));
     for verb in ["score", "stats"] {
@@ -157,7 +157,7 @@ fn a_trace_that_is_damaged_or_of_another_recorder_is_not_written_over() {
 #[test]
 fn a_machine_that_cannot_draw() {
     let bench = Bench::new();
-    // A vendor file that names a library which is not there leaves EGL without any driver.
+    // A vendor file that names a missing library leaves EGL without a driver.
     fs::write(bench.path("none.json"), r#"{"file_format_version":"1.0.0","ICD":{"library_path":"libnone.so"}}"#)
         .unwrap();
     let mut command = bench.record_with_frames("runs", "--agent random --experiment E1 --seeds 1 --runs 1");
@@ -166,7 +166,7 @@ fn a_machine_that_cannot_draw() {
     assert_eq!(output.status.code(), Some(2), "{said}");
     assert!(said.contains("libegl1 and libgl1-mesa-dri"), "{said}");
     assert!(!bench.path("runs").exists());
-    // What needs no picture can be recorded all the same.
+    // Recordings without pictures still work.
     let mut command = bench.record("runs", "--agent random --experiment E1 --seeds 1 --runs 1");
     let output = command.env("__EGL_VENDOR_LIBRARY_FILENAMES", bench.path("none.json")).output().unwrap();
     assert!(output.status.success(), "{}", stderr(&output));

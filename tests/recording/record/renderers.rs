@@ -1,4 +1,4 @@
-//! What drew the frames is on record: two renderers are told apart wherever episodes are recorded, read, pooled and replayed.
+//! Traces name their renderer, and recording, reading, pooling and replaying distinguish renderers.
 
 use std::process::Command;
 
@@ -11,7 +11,7 @@ use crate::harness::need;
 use crate::harness::program::{answer, program, run, stderr, succeeds};
 use crate::harness::traces::{episodes, recording};
 
-/// The same program where the renderer may use less of the processor.
+/// The same program with a renderer that may use fewer processor features.
 fn limited(mut command: Command) -> Command {
     command.env("GALLIUM_OVERRIDE_CPU_CAPS", "sse2");
     command
@@ -36,7 +36,7 @@ fn two_renderers_are_told_apart_everywhere() {
     assert!(two[0]["processor"].as_str().unwrap().ends_with("limited to sse2"), "{two:?}");
     assert!(one[0]["name"].is_string() && one[0]["version"].is_string() && one != two, "{one:?}");
 
-    // Traces say which, and no cell mixes them unasked.
+    // Traces name the renderer, and no cell mixes renderers unless asked.
     let folder = bench.folder.path();
     let info = run(folder, &["trace", "info", "one", "two", "--json"]).json();
     assert_eq!(info["renderers"], serde_json::json!([one[0], two[0]]));
@@ -48,7 +48,7 @@ fn two_renderers_are_told_apart_everywhere() {
     let page = std::fs::read_to_string(bench.path("pooled/report.html")).unwrap();
     assert!(page.contains("they differ in renderer."), "the report names them");
 
-    // Each frame is compared: the same bytes, or alike.
+    // Each frame is compared: equal bytes, or similar pictures.
     let steps: usize = episodes(&bench.path("one/E1-mimic.parquet")).iter().map(|episode| episode.steps.len()).sum();
     let replay = |command: Command| {
         let mut command = command;

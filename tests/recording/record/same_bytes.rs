@@ -1,4 +1,4 @@
-//! The same episodes give the same bytes: traces and logs, whatever made them.
+//! The same episodes give the same bytes in traces and logs, however they were made.
 
 use super::recordings::Bench;
 use crate::harness::files::assert_same;
@@ -22,7 +22,7 @@ fn again_and_on_any_number_of_threads() {
     assert_eq!(names, expected);
     assert_same(&bench.recorded("threads", &format!("{WHOLE} --threads 3")), &once);
     assert_same(&bench.recorded("in-flight", &format!("{WHOLE} --threads 2 --in-flight 5")), &once);
-    // A recording that is whole stays unchanged.
+    // A complete recording does not change.
     assert_same(&bench.recorded("once", WHOLE), &once);
 }
 

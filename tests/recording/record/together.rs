@@ -1,4 +1,4 @@
-//! The same recording by several processes at once: they divide the episodes, and what one is killed at another does.
+//! Several processes make the same recording: they divide the episodes, and take over from killed ones.
 
 use std::fs;
 use std::io::{BufRead as _, BufReader, Read as _};
@@ -31,7 +31,7 @@ fn started(bench: &Bench, out: &str, count: usize) -> Vec<Child> {
     (0..count).map(start).collect()
 }
 
-/// The answer of a recording that ends well.
+/// The answer of a successful recording.
 fn answer(child: Child) -> Value {
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
@@ -64,7 +64,7 @@ fn soak_identical_commands_divide_the_episodes() {
     check_division(24);
 }
 
-/// A round in which all but the processes that are to stay are killed, one after so many parts, the next one later.
+/// A round that kills all processes but `stay`: one after some parts, the next one later. Returns the number killed.
 fn killed(bench: &Bench, whole: &Contents, round: usize, stay: usize) -> usize {
     let out = format!("runs-{round}");
     let mut children = started(bench, &out, 2 + round % 2);
@@ -81,14 +81,14 @@ fn killed(bench: &Bench, whole: &Contents, round: usize, stay: usize) -> usize {
     for child in children.into_iter().take(stay) {
         answer(child);
     }
-    // One that stays records what the others leave; with none left, the same command does. Then it also clears away
-    // what those left that were killed while another process was there.
+    // A surviving process records what the others left; without survivors, the same command does. It then also removes
+    // the files of processes that were killed while others were running.
     succeeds(&mut bench.record(&out, WORDS));
     assert_same(&bench.files(&out), whole);
     killed
 }
 
-/// Rounds in each of which so many processes stay; `least` processes are killed before they have ended.
+/// Rounds that each leave `stay` processes running; at least `least` processes must be killed before they end.
 fn check_killed(rounds: usize, stay: usize, least: usize) {
     let bench = bench();
     let whole = bench.recorded("whole", WORDS);
@@ -118,7 +118,7 @@ fn soak_after_all_are_killed_the_same_command_goes_on() {
     check_killed(10, 0, 8);
 }
 
-/// A process that has the first episode of E1, and one that waits for it, with what it says.
+/// The lock of E1's first episode, and a process that waits for it, with its output.
 #[cfg(unix)]
 fn waiting(bench: &Bench) -> (FolderLock, EpisodeLock, Child, String) {
     let claim = FolderLock::stake(&bench.path("runs")).unwrap();
@@ -140,10 +140,10 @@ fn an_episode_that_another_process_has_is_waited_for() {
     let process = std::process::id();
     let expected = format!("waiting for E1/random/s1/r1: process {process} records it into the same folder; ");
     assert!(said.starts_with(&expected), "{said}");
-    // All others are recorded: the other one of E1 waits as a part, and E5 is complete.
+    // All other episodes are recorded: the other one of E1 is a part, and E5 is complete.
     assert_eq!(bench.parts("runs"), 1);
     assert!(fs::read(bench.path("runs/E5-random.parquet")).unwrap() == whole["E5-random.parquet"]);
-    // What the other process does not record after all is recorded here.
+    // Episodes that the other process leaves unrecorded are recorded here.
     drop(lock);
     assert_eq!(answer(child)["recorded"], EPISODES);
     drop(claim);

@@ -1,4 +1,4 @@
-//! A trace in which one value is another than was recorded parts from its replay there.
+//! A trace with one altered value diverges from its replay at that value.
 
 use serde_json::Value;
 use trace::episode::{Action, Episode};
@@ -7,7 +7,7 @@ use super::traces::{copy, recorded, replay};
 use crate::harness::program::{stderr, stdout};
 use crate::harness::traces::episodes;
 
-/// That the replay of a trace that was altered so parts from it at this step of its longest episode, in this column, and in
+/// Checks that the replay diverges from the altered trace at this step of its longest episode, in this column, and in
 /// no other episode.
 fn check(experiment: &str, change: impl FnOnce(&mut Episode), t: i32, column: &str) -> (String, String) {
     let mut id = String::new();
@@ -25,7 +25,7 @@ fn check(experiment: &str, change: impl FnOnce(&mut Episode), t: i32, column: &s
     assert_eq!(parted["episode_id"], id, "{column}");
     assert_eq!((&parted["t"], &parted["column"]), (&t.into(), &column.into()), "{answer}");
     let text = |key: &str| parted[key].as_str().unwrap().to_owned();
-    // The same in words.
+    // The same in the text output.
     let words = stdout(&replay(&path, &[]));
     let expected = format!("{id}, t = {t}: {column}: recorded {}, replayed {}\n", text("expected"), text("found"));
     assert!(words.starts_with(&expected) && words.contains("1 of the episodes parts"), "{words}");

@@ -1,5 +1,5 @@
-//! `mirrorstats world replay` and `filmstrip` at the process boundary: recorded episodes match, altered ones part where they were
-//! altered, and an episode looks the same from its log and from its trace.
+//! `mirrorstats world replay` and `filmstrip` at the process boundary: recorded episodes match, altered ones diverge
+//! where altered, and an episode looks the same from its log and its trace.
 
 mod altered;
 mod matching;

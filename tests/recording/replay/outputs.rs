@@ -1,4 +1,4 @@
-//! A replay replaces neither its trace nor other episodes, and an old log stays until the new one is whole.
+//! A replay never replaces its trace or other episodes, and an old log stays until the new one is complete.
 
 use std::fs;
 use std::os::unix::fs::symlink;
@@ -80,7 +80,7 @@ fn a_log_is_not_replaced_by_the_trace_that_it_gives() {
     }
 }
 
-/// A folder with `E1-random.parquet` of two episodes and its log without frames.
+/// A folder with `E1-random.parquet`, two episodes, and its log without frames.
 fn with_log() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     write_small_world(folder.path(), "episode.steps = 40\n");
@@ -104,7 +104,7 @@ fn one_episode_does_not_take_the_place_of_a_log_with_others() {
         assert!(stderr(&output).contains("help: give --mcap another name"), "{}", stderr(&output));
         assert!(fs::read(folder.path().join(name)).unwrap() == old, "{name}");
     }
-    // A log of that episode alone may be written again, and the whole log by a replay of all.
+    // A replay may replace a log of the same episode; a replay of all may replace the whole log.
     need::drawing();
     for (words, count) in [(&words[..], 1), (&words, 1), (&["replay", "E1-random.parquet", "--mcap"], 2)] {
         succeeds(program(folder.path()).args(words).arg("again.mcap"));
@@ -113,8 +113,8 @@ fn one_episode_does_not_take_the_place_of_a_log_with_others() {
     }
 }
 
-/// Replays onto `again.mcap` where no file may grow beyond `bytes`: writing more fails, whether the signal for it is ignored
-/// or not.
+/// Replays onto `again.mcap` with file sizes limited to `bytes`: writing more fails, whether or not the signal is
+/// ignored.
 fn replay_within(folder: &Path, bytes: usize, is_ignored: bool) -> Output {
     let ignored = if is_ignored { "trap '' XFSZ; " } else { "" };
     let mut command = limited(folder, &format!("{ignored}ulimit -f {}", bytes / 512));
@@ -129,7 +129,7 @@ fn an_old_log_stays_where_there_is_no_room_for_the_new_one() {
     succeeds(program(folder.path()).arg("replay").arg(recorded("E1")).args(words));
     let log = folder.path().join("again.mcap");
     let whole = fs::read(&log).unwrap();
-    // There is room for the log of each of the three episodes, not for all of them in one.
+    // There is room for each episode's own log, but not for the log of all three.
     let old = [&whole[..], b"an older log"].concat();
     fs::write(&log, &old).unwrap();
     for is_ignored in [false, true] {

@@ -1,4 +1,4 @@
-//! Frames, logs and film strips of what was recorded.
+//! Frames, logs and film strips of recorded episodes.
 
 use std::fs;
 use std::path::Path;
@@ -25,7 +25,7 @@ fn frames_and_a_log_of_a_replay() {
         let count = fs::read_dir(folder.path().join("frames").join(name)).unwrap().count();
         assert_eq!(count, episode.steps.len());
     }
-    // The log holds the trace whole.
+    // The log contains the whole trace.
     succeeds(program(folder.path()).args(["recover", "again.mcap", "-o", "again.parquet"]));
     let again = fs::read(folder.path().join("again.parquet")).unwrap();
     assert!(again == fs::read(recorded("E1")).unwrap(), "the trace of the log has other bytes");
@@ -44,12 +44,12 @@ fn the_log_that_is_there_stays_if_the_new_one_cannot_be_written() {
     let output = replay("unlimited");
     assert!(output.status.success(), "{}", stderr(&output));
     let whole = fs::read(&log).unwrap();
-    // The limit of the size of files stands in for a full disk: each episode fits, all of them do not.
+    // The limit on file sizes simulates a full disk: each episode fits, all of them do not.
     let output = replay(&(whole.len() * 4 / 5 / 512).to_string());
     assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
     assert!(stderr(&output).contains("cannot write the log `again.mcap`"), "{}", stderr(&output));
     assert!(fs::read(&log).unwrap() == whole);
-    // One that is there is replaced, not added to.
+    // An existing log is replaced, not extended.
     assert!(replay("unlimited").status.success());
     assert!(fs::read(&log).unwrap() == whole);
 }
@@ -75,7 +75,7 @@ fn a_film_strip_is_the_same_from_the_log_and_from_the_trace() {
     }
 }
 
-/// The SVG of the bundled log's episode.
+/// The film strip of the bundled log's episode.
 fn strip(folder: &Path, more: &[&str]) -> String {
     let mut command = program(folder);
     command.args(["filmstrip", "E1/guesser/s1/r1"]).arg(fixture("recorded/E1-guesser.mcap"));

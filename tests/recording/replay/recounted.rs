@@ -1,4 +1,4 @@
-//! Ground truth under another threshold or another grid.
+//! Ground truth with another threshold or grid.
 
 use trace::episode_hash;
 
@@ -6,7 +6,7 @@ use super::traces::{WITH_SIGHT, copy, replay};
 use crate::harness::program::{program, stderr, stdout, succeeds};
 use crate::harness::traces::{episodes, recording};
 
-/// The steps of both traces side by side: what was seen, what is, and the count that decides.
+/// Replays with a new threshold or grid; returns the folder and the new trace.
 fn recounted(words: &[&str]) -> (tempfile::TempDir, std::path::PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("anew.parquet");
@@ -35,7 +35,7 @@ fn another_threshold_agrees_with_the_recorded_counts() {
                 step.mirror_visible = step.extra.mirror_self_px.unwrap() >= threshold;
                 visible += usize::from(step.mirror_visible);
             }
-            // Other rows have another hash, which `validate` knows.
+            // Changed rows have another hash, which `validate` checks.
             expected.episode_hash = Some(episode_hash::of(&expected));
             assert_eq!(*new, expected, "the threshold {threshold}");
         }
@@ -60,7 +60,7 @@ fn changed_steps_are_counted() {
 #[test]
 fn another_grid_counts_anew_and_scales_the_threshold() {
     let (_folder, out) = recounted(&["--grid", "128x96"]);
-    // Four rays where there was one.
+    // Four rays in place of each one.
     assert_eq!(recording(&out)["visibility_threshold_px"], 8);
     assert_eq!(recording(&out)["visibility_grid"], serde_json::json!({ "width": 128, "height": 96 }));
     let (before, after) = (episodes(&WITH_SIGHT), episodes(&out));
@@ -69,7 +69,7 @@ fn another_grid_counts_anew_and_scales_the_threshold() {
         let (own, mirror) = (new.extra.mirror_self_px.unwrap(), new.extra.mirror_px.unwrap());
         assert_eq!(new.mirror_visible, own >= 8);
         let before = old.extra.mirror_px.unwrap();
-        // An area has four times the rays, but for those along its edges.
+        // An area has four times the rays, except along its edges.
         assert!((mirror - 4 * before).abs() <= 8 * (64 + 48), "{before} pixels of the mirror, then {mirror}");
         counted += usize::from(own > 0);
         assert_eq!((old.action, old.extra.pose_x), (new.action, new.extra.pose_x));
@@ -82,7 +82,7 @@ fn recounted_traces_can_be_replayed() {
     let (_folder, out) = recounted(&["--grid", "128x96", "--threshold", "5"]);
     let output = replay(&out, &[]);
     assert_eq!(output.status.code(), Some(0), "{}", stdout(&output));
-    // Back again: the recorded grid, the recorded threshold, the recorded bytes but for the footer.
+    // Back to the recorded grid and threshold: the recorded bytes, except for the footer.
     let words = ["--recompute-visibility", "--grid", "64x48", "--threshold", "2", "--out", "back.parquet"];
     assert!(replay(&out, &words).status.success());
     assert_eq!(episodes(&out.with_file_name("back.parquet")), episodes(&WITH_SIGHT));

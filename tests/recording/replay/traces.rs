@@ -15,7 +15,7 @@ use crate::harness::files::write_small_world;
 use crate::harness::program::{program, succeeds, typed};
 use crate::harness::traces::{episodes, recording};
 
-/// Recordings of E1, E3, E4 and `decoy` through a small eye that takes two pixels for evidence; made once.
+/// Recordings of E1, E3, E4 and `decoy` with a small eye; two pixels count as evidence. Made once.
 pub static RECORDED: LazyLock<PathBuf> = LazyLock::new(|| {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("replayed");
     drop(fs::remove_dir_all(&folder));
@@ -27,7 +27,7 @@ pub static RECORDED: LazyLock<PathBuf> = LazyLock::new(|| {
     folder.join("runs")
 });
 
-/// A recording of E1 that has the mirror in view, which by chance alone comes about in one of fifty runs; made once.
+/// A recording of E1 with the mirror in view, which one of fifty random runs has; made once.
 pub static WITH_SIGHT: LazyLock<PathBuf> = LazyLock::new(|| {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("replayed-with-sight");
     drop(fs::remove_dir_all(&folder));
@@ -43,7 +43,7 @@ pub fn recorded(experiment: &str) -> PathBuf {
     RECORDED.join(format!("{experiment}-random.parquet"))
 }
 
-/// A copy of a recording with other episodes and another footer.
+/// A copy of a recording with changed episodes and footer.
 pub fn copy(experiment: &str, change: impl FnOnce(&mut Vec<Episode>, &mut Value)) -> (TempDir, PathBuf) {
     let original = recorded(experiment);
     let (mut episodes, mut recording) = (episodes(&original), recording(&original));

@@ -1,4 +1,4 @@
-//! The agent's own body: never in its own view, always within its cylinder, always within the room.
+//! The agent's own body is never in its own view, and always within its cylinder and the room.
 
 use world::experiment::spec::Body;
 use world::sim::Experiment;
@@ -53,8 +53,8 @@ fn a_body_that_did_show_would_be_found() {
 
 #[test]
 fn the_margin_of_the_eye_is_wide_at_every_stride() {
-    // Straight below or behind is out of view; how steeply is what matters: a part may come no nearer to the edge of
-    // the view than half of its own distance ahead.
+    // Parts straight below or behind are out of view. What matters is the angle: a part may come no nearer to the edge
+    // of the view than half of its distance ahead.
     let pose = Pose { x: 0.0, y: 0.0, heading: world::sim::angle::Heading::new(0) };
     let eye = [0.14, 0.0, 1.52];
     for (shape, stride) in shapes_and_strides() {
@@ -108,7 +108,7 @@ fn everything_is_in_the_room() {
 
 #[test]
 fn a_humanoid_has_the_sizes_of_the_standard_one() {
-    // Metres and radii of MuJoCo's model: along the axis of the trunk, of a leg and of an arm.
+    // Metres and radii of MuJoCo's model, along the axes of the trunk, a leg and an arm.
     let world = shaped_world(Body::Humanoid, Experiment::E1, 1);
     let solids = own(&world);
     let part = |name: &str| solids.iter().find(|solid| solid.name == format!("agent0_{name}")).unwrap();
@@ -129,7 +129,7 @@ fn a_humanoid_has_the_sizes_of_the_standard_one() {
         assert!((own - radius).abs() < 1e-6 && (far - length).abs() < 1e-3, "{name}: {own} {far}");
     }
     assert!(matches!(part("head").shape, Shape::Sphere(radius) if (radius - 0.09).abs() < 1e-6));
-    // Shoulder, elbow and hand are as far apart as in the model, though the arms hang.
+    // Shoulder, elbow and hand are as far apart as in the model, although the arms hang down.
     let [shoulder, hand] = ["left_upper_arm", "left_hand"].map(part);
     let from = ends(shoulder).into_iter().map(|(at, _)| at).max_by(|a, b| a[2].total_cmp(&b[2])).unwrap();
     let far = (0..3).map(|at| (from[at] - hand.position[at]).powi(2)).sum::<f64>().sqrt();
@@ -148,7 +148,7 @@ fn own(world: &World) -> Vec<Solid> {
     solids
 }
 
-/// Spheres whose hull holds a solid.
+/// Spheres whose hull contains a solid.
 fn ends(solid: &Solid) -> Vec<([f64; 3], f64)> {
     let [w, x, y, z] = solid.rotation;
     let axis = [2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)];
@@ -156,7 +156,7 @@ fn ends(solid: &Solid) -> Vec<([f64; 3], f64)> {
     match solid.shape {
         Shape::Capsule { radius, length } => vec![(along(length / 2.0), radius), (along(-length / 2.0), radius)],
         Shape::Sphere(radius) => vec![(solid.position, radius)],
-        // All cubes stand along the walls.
+        // All cubes are aligned with the walls.
         Shape::Box(edges) => [-0.5, 0.5]
             .into_iter()
             .map(|side| ([0, 1, 2].map(|at| solid.position[at] + side * edges[at]), 0.0))

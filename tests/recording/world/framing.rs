@@ -1,4 +1,4 @@
-//! The size of a reflection, by the field of view.
+//! The size of a reflection by field of view.
 
 use world::sim::Experiment;
 use world::sim::body::{Figure, Pose};
@@ -6,7 +6,7 @@ use world::sim::config::WorldConfig;
 use world::sim::scene::Scene;
 use world::sim::world::World;
 
-/// Pixels of the own body of somebody who stands 1.6 m before the mirror.
+/// Pixels of the own body, 1.6 m in front of the mirror.
 fn own_pixels(fovy: f64) -> f64 {
     let mut config = WorldConfig::default();
     config.eye.fovy = fovy;

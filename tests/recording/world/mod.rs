@@ -1,4 +1,4 @@
-//! The MuJoCo world: what is drawn by seed, how things move, and what the census says about pictures.
+//! The MuJoCo world: scenes by seed, motion, and visibility compared with pictures.
 
 mod body;
 mod framing;

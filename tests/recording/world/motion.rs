@@ -1,4 +1,4 @@
-//! The effects of actions, obstacles, and the impossibility of passing through things.
+//! Effects of actions, obstacles, and collisions.
 
 use trace::episode::Action;
 use trace::palette::Color;
@@ -86,7 +86,7 @@ fn cubes_are_reached_to_their_distance_and_never_entered() {
     for seed in 0..10 {
         let mut world = world(Experiment::E1, seed);
         let cube = world.scene().cubes[0];
-        // From two metres to that side of it that is nearest to the middle of the room.
+        // Approach the cube from the side nearest to the middle of the room.
         let (thirties, spot) = if cube.x > 0.0 { (0, [cube.x - 1.2, cube.y]) } else { (6, [cube.x + 1.2, cube.y]) };
         stand(&mut world, spot, thirties);
         let far = world.distance_to_cube(cube.color).unwrap();
@@ -129,7 +129,7 @@ fn nothing_ever_goes_through_anything() {
                 let step = distance(from.pose.spot(), to.pose.spot());
                 assert!(step <= 0.4 + 1e-9, "{step}");
                 moved[at] += i32::from(step > 0.0);
-                // Halfway is as clear as both ends.
+                // The midpoint is as clear as both ends.
                 let [x, y] = [f64::midpoint(from.pose.x, to.pose.x), f64::midpoint(from.pose.y, to.pose.y)];
                 assert!(world.floor_plan().admits([x, y], -1e-9));
             }

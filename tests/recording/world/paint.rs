@@ -1,4 +1,4 @@
-//! The ten colours can be distinguished in the picture, directly and in the mirror, from one another and from the room.
+//! The ten colours are distinct from each other and from the room, directly and in the mirror.
 
 use trace::palette::Color;
 use world::sim::Experiment;
@@ -12,7 +12,7 @@ use world::sim::world::World;
 use super::poses::{face_mirror, world};
 use crate::harness::need;
 
-/// The world of a seed with everything that has a colour in one.
+/// The world of a seed with all coloured things in one colour.
 fn all_in(color: Color) -> World {
     let drawn = world(Experiment::E1, 3);
     let mut scene = drawn.scene().clone();
@@ -23,17 +23,17 @@ fn all_in(color: Color) -> World {
     World::new(drawn.config(), scene).unwrap()
 }
 
-/// Returns true if a pixel and its neighbours show the same thing: what smoothing leaves alone.
+/// Returns true if a pixel and its neighbours show the same thing, so that smoothing does not change it.
 fn is_inner(image: &LabelImage, x: usize, y: usize) -> bool {
     let inside = x > 0 && y > 0 && x + 1 < image.width && y + 1 < image.height;
     inside
         && [[x - 1, y], [x + 1, y], [x, y - 1], [x, y + 1]].iter().all(|[nx, ny]| image.at(*nx, *ny) == image.at(x, y))
 }
 
-/// The colour that paint of it, under some light, is likest to; `None` for the room.
+/// The palette colour nearest to a pixel under any light; `None` for the room.
 fn nearest(pixel: [f64; 3]) -> Option<Color> {
     let lit = |rgb: [f64; 3]| {
-        // The light under which it is likest, and how unlike it then still is.
+        // The best light for the colour, and the remaining difference.
         let along: f64 =
             (0..3).map(|at| rgb[at] * pixel[at]).sum::<f64>() / rgb.iter().map(|part| part * part).sum::<f64>();
         let light = along.clamp(0.6, 1.0);
@@ -51,7 +51,7 @@ fn the_ten_colours_differ_directly_and_in_the_mirror() {
     let mut eye = Camera::new(&config).unwrap();
     for color in Color::ALL {
         let mut world = all_in(color);
-        // Right and wrong pixels: of the own body, of cubes, of cubes in the mirror, of the room.
+        // Right and wrong pixels of the own body, cubes, cubes in the mirror, and the room.
         let mut tally = [[0_u32; 2]; 4];
         for turn in [0, 1, -1, 6] {
             face_mirror(&mut world, 2.0, turn);
@@ -65,10 +65,10 @@ fn the_ten_colours_differ_directly_and_in_the_mirror() {
                     Shown::Through(0, Item::Cube(_)) => (2, Some(color)),
                     _ => (3, None),
                 };
-                // A head has no colour of the palette: it is darker than the room, its face is as grey as a wall.
+                // A head has no palette colour: it is darker than the room, and its face is as grey as a wall.
                 let is_grey = pixel[0].abs_diff(pixel[1]).max(pixel[1].abs_diff(pixel[2])) < 16;
                 let is_head = is_grey && (color != Color::White || pixel[0] < 70);
-                // Most of a picture is the room, of which a part will do.
+                // Most of a picture is the room; a sample is enough.
                 let is_asked = expected.is_some() || at % 41 == 0;
                 if is_asked && is_inner(&image, x, y) && !(kind == 0 && is_head) {
                     let found = nearest([pixel[0], pixel[1], pixel[2]].map(f64::from));
@@ -106,7 +106,7 @@ fn a_colour_in_the_mirror_is_that_of_the_thing() {
             }
         }
         for part in 0..3 {
-            // How bright it is depends on the face that shows; what colour it is does not.
+            // The brightness depends on the visible face, the hue does not.
             let [direct, mirrored] = sums.map(|sum| sum[part] / (sum[0] + sum[1] + sum[2]));
             assert!((direct - mirrored).abs() < 0.01, "{color:?}: {direct} {mirrored}");
         }

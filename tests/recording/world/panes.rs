@@ -1,5 +1,5 @@
-//! What is seen through panes of every kind: the census against drawn labels and MuJoCo's rays, and against what each kind
-//! must show.
+//! Visibility through panes of every kind, compared with drawn labels, with MuJoCo's rays, and with what each kind must
+//! show.
 
 use toml_spec::Source;
 use trace::episode::Action;
@@ -21,7 +21,7 @@ use world::sim::world::World;
 use super::poses::scatter;
 use crate::harness::need;
 
-/// Everything that a pane can be, in rooms with others.
+/// Every kind of pane, in rooms with other agents.
 const KINDS: &str = r#"
 [experiment.mirrors]
 title = "Three mirrors"
@@ -71,7 +71,7 @@ mirror = [{ kind = "window", color = "other" }]
 
 /// The experiments above, by name.
 fn kind(name: &str) -> Experiment {
-    // A window of this name is built in, which a text without a folder may be called too.
+    // A window with this name is built in; a text without a folder may use the same name.
     let source = Source { name: "kinds".to_owned(), text: KINDS.to_owned() };
     let entries = file::read(source, None, &[]).unwrap();
     let entry = entries.into_iter().find(|entry| entry.known.spec.name == name).unwrap();
@@ -83,7 +83,7 @@ fn world(experiment: Experiment, seed: i32) -> World {
     World::new(&config, Scene::draw(&config, experiment, seed, 1).unwrap()).unwrap()
 }
 
-/// Walks a little, so that a late pane has a past, with everybody elsewhere each time.
+/// Walks a little with all others moved each time, so that a late pane has a past.
 fn wander(world: &mut World, chance: &mut Rng) {
     for _ in 0..4 {
         scatter(world, chance);
@@ -91,7 +91,7 @@ fn wander(world: &mut World, chance: &mut Rng) {
     }
 }
 
-/// Per code that is seen: the share of pixels that both images show, of those that either shows.
+/// Per visible code: the pixels that both images show, as a share of those that either shows.
 fn overlaps_of(one: &LabelImage, other: &LabelImage) -> Vec<(f64, Shown)> {
     let mut counts = [[0_u32; 256]; 3];
     for (a, b) in one.codes.iter().zip(&other.codes) {
@@ -108,12 +108,12 @@ fn overlaps_of(one: &LabelImage, other: &LabelImage) -> Vec<(f64, Shown)> {
     (0..256).filter_map(share).collect()
 }
 
-/// Pixels of a view whose overlap says something.
+/// The minimum number of pixels for a meaningful overlap.
 const LEAST: u32 = 30;
-/// Poses of each kind.
+/// Poses per kind.
 const POSES: i32 = 200;
 
-/// Bodies, cubes and marks through each pane, drawn as labels, on 200 poses: mean overlap above .99, none under .95.
+/// Bodies, cubes and marks through each pane, compared with labels in 200 poses: mean overlap above .99, minimum .95.
 fn holds_against_pictures(name: &str) {
     need::drawing();
     let experiment = kind(name);
@@ -151,7 +151,7 @@ fn textured_mirrors_hold_against_pictures() {
     holds_against_pictures("textured");
 }
 
-/// A look is a look: what is visible is the same, and the picture is another.
+/// Textures change the picture but not visibility.
 #[test]
 fn a_textured_room_shows_the_same_otherwise() {
     need::drawing();
@@ -233,7 +233,7 @@ fn every_pane_is_counted_by_itself_and_all_together() {
     }
 }
 
-/// A late mirror shows the room as a mirror showed it before: the same counts for the same eye and bodies.
+/// A late mirror shows the room as a mirror showed it earlier: equal counts for the same eye and bodies.
 #[test]
 fn a_late_mirror_shows_the_past() {
     let late = kind("late");
@@ -244,10 +244,10 @@ fn a_late_mirror_shows_the_past() {
     for step in 0..20 {
         scatter(&mut world, &mut chance);
         past.push(world.figures());
-        // What was put there is the state of now; before there is such a past it is the first one.
+        // The placed state is the current one. Without such a past, the first state counts.
         let shown = past[past.len().saturating_sub(1 + delay)].clone();
         assert_eq!(world.figures_in(0), shown, "step {step}");
-        // An ordinary mirror with everybody where they were, seen from where the eye is now.
+        // An ordinary mirror with all bodies where they were, seen from the current eye.
         let scene = world.scene().clone();
         let plain = Scene { panes: vec![HungPane { delay: 0, ..scene.panes[0] }], ..scene };
         let mut then = World::new(world.config(), plain).unwrap();
@@ -294,7 +294,7 @@ fn a_mark_has_a_colour_that_its_wearer_and_the_own_body_have_not() {
     }
 }
 
-/// The commonest paint of the pixels that show something.
+/// The most common paint of the pixels with this code.
 fn paint_of(world: &World, eye: &mut Camera, shown: Shown) -> Option<Color> {
     let frame = eye.frame(world).unwrap();
     let pixels = world.labels().codes.iter().enumerate().filter(|(_, code)| **code == shown.code());
@@ -304,7 +304,7 @@ fn paint_of(world: &World, eye: &mut Camera, shown: Shown) -> Option<Color> {
     counts.into_iter().filter(|(_, count)| *count >= 60).max_by_key(|(_, count)| *count).map(|(color, _)| color)
 }
 
-/// Counts the views that name a paint, and holds each against what it must be.
+/// Counts the views that show a paint, and compares each with the expected one.
 fn paints(name: &str, item: Item, expected: impl Fn(&Scene) -> Color) {
     need::drawing();
     let mut eye = Camera::new(&WorldConfig::default()).unwrap();

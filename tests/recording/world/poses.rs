@@ -1,4 +1,4 @@
-//! Worlds with everybody at random places that do not overlap.
+//! Worlds with all bodies at random places that do not overlap.
 
 use world::experiment::spec::Body;
 use world::sim::Experiment;
@@ -10,12 +10,12 @@ use world::sim::rng::Rng;
 use world::sim::scene::Scene;
 use world::sim::world::World;
 
-/// The world of an experiment and a seed, at its start.
+/// The initial world of an experiment and seed.
 pub fn world(experiment: Experiment, seed: i32) -> World {
     shaped_world(Body::default(), experiment, seed)
 }
 
-/// The same with bodies of a shape.
+/// The initial world with bodies of this shape.
 pub fn shaped_world(shape: Body, experiment: Experiment, seed: i32) -> World {
     let config = shaped(shape);
     let scene = Scene::draw(&config, experiment, seed, 0).unwrap();
@@ -29,7 +29,7 @@ pub fn shaped(shape: Body) -> WorldConfig {
     config
 }
 
-/// Puts everybody somewhere, facing anywhere, standing or in the middle of a stride.
+/// Moves every body to a random place and direction, standing or in mid-stride.
 pub fn scatter(world: &mut World, chance: &mut Rng) {
     let mut placed: Vec<Figure> = Vec::new();
     for figure in world.figures() {
@@ -52,7 +52,7 @@ fn free_pose(plan: &FloorPlan, placed: &[Figure], chance: &mut Rng) -> Pose {
     }
 }
 
-/// Calls `each` with as many scattered worlds as asked for, a new scene every tenth time.
+/// Calls `each` with this number of scattered worlds, and a new scene for every ten.
 pub fn for_scattered(shape: Body, experiments: &[Experiment], poses: i32, mut each: impl FnMut(&World)) {
     let mut chance = Rng::of(2026, 11, 21);
     for at in 0..(poses + 9) / 10 {
@@ -65,7 +65,7 @@ pub fn for_scattered(shape: Body, experiments: &[Experiment], poses: i32, mut ea
     }
 }
 
-/// Puts the agent before the middle of the mirror, `away` metres from it, turned by `thirties` from facing it.
+/// Puts the agent in front of the mirror's centre, `away` metres from it, turned by `thirties` from facing it.
 pub fn face_mirror(world: &mut World, away: f64, thirties: i8) {
     let mirror = world.scene().mirror;
     let [x, y] = mirror.center(world.config());

@@ -1,5 +1,5 @@
-//! The reaching task: where body, camera, mirror, mark and hand are, what stops the hand, and that only the mirror shows
-//! the mark.
+//! The reaching task: the places of body, camera, mirror, mark and hand, obstacles of the hand, and a mark that only
+//! the mirror shows.
 
 use trace::episode::Action;
 use world::experiment::{Experiment, built_in, built_in_names, load};
@@ -40,7 +40,7 @@ fn the_camera_looks_over_the_head_of_a_body_two_metres_before_the_mirror() {
         let [x, y] = scene.start.heading.direction();
         let behind = [scene.start.x - 1.1 * x, scene.start.y - 1.1 * y, 2.0];
         assert!(eye.position.iter().zip(behind).all(|(found, expected)| (found - expected).abs() < 1e-9));
-        // Its line of sight meets the axis of the body at 1.7 m.
+        // The camera's line of sight meets the body's axis at 1.7 m.
         let drop = config.eye.pitch.to_radians().tan() * 1.1;
         assert!((2.0 - drop - 1.7).abs() < 1e-9, "{drop}");
     }
@@ -111,13 +111,13 @@ fn the_hand_moves_a_step_at_a_time_and_the_body_and_the_mirror_stop_it() {
         assert_eq!((now - distance).abs(), 100);
         distance = now;
     }
-    // Away from the camera, into the mirror: stopped at its surface, and told.
+    // Away from the camera into the mirror: the hand stops at its surface, and this is reported.
     let moved = (0..40).take_while(|_| !world.act(Some(Action::HandForward)).bumped).count();
     assert!((10..20).contains(&moved), "{moved}");
     let stopped = world.target_distance();
     assert!(world.act(Some(Action::HandForward)).bumped);
     assert_eq!(world.target_distance(), stopped);
-    // What a walking body does moves nothing here.
+    // Actions of a walking body do not move anything here.
     let pose = world.pose();
     assert!(!world.act(Some(Action::MoveForward)).bumped);
     assert!(!world.act(None).bumped);

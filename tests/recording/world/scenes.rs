@@ -1,4 +1,4 @@
-//! Scenes by seed: never overlapping, always solvable, the same on every machine.
+//! Scenes by seed: without overlaps, always solvable, and the same on every machine.
 
 use std::collections::BTreeSet;
 use std::sync::LazyLock;
@@ -114,8 +114,8 @@ fn e5_has_others_and_clutter_that_hides_some_of_the_mirror() {
     assert_eq!(hidden, 200);
 }
 
-/// Paper, section 3: mirror evidence in E5 is partial or occluded. Of the pixels that would show the body without clutter,
-/// at places within three metres before the mirror that the agent can stand at, facing it.
+/// Paper, section 3: mirror evidence in E5 is partial or occluded. Counts pixels that would show the body without
+/// clutter, from places within three metres of the mirror where the agent can stand, facing it.
 #[test]
 fn the_clutter_of_e5_hides_the_body_from_most_places_and_shows_it_from_some() {
     let config = WorldConfig::default();
@@ -135,7 +135,7 @@ fn the_clutter_of_e5_hides_the_body_from_most_places_and_shows_it_from_some() {
     assert!(best.iter().all(|share| *share >= 0.6), "no place to identify oneself: {best:?}");
 }
 
-/// The share of the body's pixels that the clutter leaves, place by place.
+/// The share of the body's pixels that the clutter leaves visible, for each place.
 fn shares_shown(world: &mut World, open: &mut World) -> Vec<f64> {
     let own = Shown::Through(0, Item::Agent(0));
     let (mirror, config) = (world.scene().mirror, world.config().clone());
@@ -176,7 +176,7 @@ fn random_clutter_stands_on_the_floor_anywhere_and_leaves_the_mirror_in_view() {
             cubes += 1;
         }
     }
-    // The area before the mirror is a twentieth of the floor; nine tenths of the clutter of E5 stand there.
+    // The area before the mirror is a twentieth of the floor but has nine tenths of E5's clutter.
     assert!(before > 0 && before * 8 < cubes, "{before} of {cubes}");
     let [ours, theirs] =
         [Experiment::E5, random].map(|experiment| Occlusion::of(&config, experiment).expect("the scenes fit"));

@@ -1,5 +1,5 @@
-//! `mirror_visible` by a second caster, which shares no code with the first: it follows each ray to the glass, turns it by the law
-//! of reflection, and follows it on, through the shapes that a log holds. The first one looks from the mirrored eye instead.
+//! `mirror_visible` by a second caster that shares no code with the first. It reflects each ray at the glass and
+//! follows it through the shapes in a log. The first caster looks from the mirrored eye instead.
 
 use trace::episode::Action;
 use world::experiment::Experiment;
@@ -22,7 +22,7 @@ fn along(a: Vector, length: f64, b: Vector) -> Vector {
     [a[0] + length * b[0], a[1] + length * b[1], a[2] + length * b[2]]
 }
 
-/// A vector turned by a unit quaternion: v + 2w (q x v) + 2 q x (q x v).
+/// A vector rotated by a unit quaternion: v + 2w (q x v) + 2 q x (q x v).
 fn turned(rotation: [f64; 4], vector: Vector) -> Vector {
     let [w, x, y, z] = rotation;
     let cross = |by: Vector| [y * by[2] - z * by[1], z * by[0] - x * by[2], x * by[1] - y * by[0]];
@@ -30,7 +30,7 @@ fn turned(rotation: [f64; 4], vector: Vector) -> Vector {
     along(along(vector, 2.0 * w, once), 2.0, cross(once))
 }
 
-/// Where a ray meets a shape about the origin, its axis z, if ahead.
+/// The distance at which a ray meets a shape at the origin with axis z; `None` if it is not ahead.
 fn meets(shape: Shape, from: Vector, ray: Vector) -> Option<f64> {
     match shape {
         Shape::Sphere(radius) => ball(radius, from, ray),
@@ -61,13 +61,13 @@ fn ball(radius: f64, from: Vector, ray: Vector) -> Option<f64> {
     nearest_root(dot(ray, ray), dot(from, ray), dot(from, from) - radius * radius)
 }
 
-/// The smaller root of a x^2 + 2 b x + c, if it is ahead.
+/// The smaller root of a x^2 + 2 b x + c, if positive.
 fn nearest_root(a: f64, b: f64, c: f64) -> Option<f64> {
     let root = b * b - a * c;
     (a > 1e-12 && root >= 0.0).then(|| (-b - root.sqrt()) / a).filter(|far| *far > 0.0)
 }
 
-/// The first of some solids that a ray meets.
+/// The first solid that a ray meets.
 fn first<'a>(solids: &[&'a Solid], origin: Vector, ray: Vector) -> Option<(f64, &'a Solid)> {
     let met = solids.iter().filter_map(|solid| {
         let [turn, axis @ ..] = solid.rotation;
@@ -78,7 +78,7 @@ fn first<'a>(solids: &[&'a Solid], origin: Vector, ray: Vector) -> Option<(f64, 
     met.min_by(|one, other| one.0.total_cmp(&other.0))
 }
 
-/// The pixels that show the own body by way of a mirror; `past` are all moments up to now.
+/// The number of pixels that show the own body through a mirror; `past` holds all moments up to now.
 fn own_px(world: &World, past: &[Snapshot]) -> u32 {
     let now = past.last().unwrap();
     let eye = now.frames.iter().find(|frame| frame.name == "eye").unwrap();
@@ -90,7 +90,7 @@ fn own_px(world: &World, past: &[Snapshot]) -> u32 {
     let is_thing = |item: Item| !matches!(item, Item::Room | Item::Pane(_));
     let things: Vec<&Solid> = now.solids.iter().filter(|solid| is_thing(solid.item)).collect();
     let panes: Vec<&Solid> = now.solids.iter().filter(|solid| matches!(solid.item, Item::Pane(_))).collect();
-    // What each pane shows, as late as it shows it.
+    // The things that a pane shows, with its delay.
     let shown_in = |pane: &HungPane| -> Vec<&Solid> {
         let then = &past[past.len().saturating_sub(1 + pane.delay as usize)];
         then.solids.iter().filter(|solid| is_thing(solid.item)).collect()
@@ -123,7 +123,7 @@ fn own_px(world: &World, past: &[Snapshot]) -> u32 {
     count
 }
 
-/// Compares the two casters along walks in all built-in experiments where a body walks, until so many views are compared.
+/// Compares both casters along walks in built-in experiments, until `views` views are compared.
 fn compare(shape: Body, views: usize) {
     let names = ["E1", "E4", "E5", "two-mirrors", "delayed", "decoy", "window", "mark"];
     let config = shaped(shape);
@@ -135,7 +135,7 @@ fn compare(shape: Body, views: usize) {
         let mut past = vec![world.snapshot()];
         for t in 1..=24 {
             let visibility = world.visibility();
-            // Views without glass say nothing: some of them, and all others.
+            // Views without glass show little: only every eighth of those, and all others.
             if visibility.mirror_px > 0 || t % 8 == 0 {
                 let own = own_px(&world, &past);
                 let place = format!("{name}, seed {seed}, step {t}: {own} px, {} by the first", visibility.self_px);

@@ -1,4 +1,4 @@
-//! One eye draws many worlds by turns, and none leaves a trace in the next.
+//! One eye draws many worlds alternately, and no world affects the next picture.
 
 use trace::episode::Action;
 use world::sim::Experiment;

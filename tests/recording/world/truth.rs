@@ -1,4 +1,4 @@
-//! The census against what is drawn, against colours in the ordinary picture, and against MuJoCo's own rays.
+//! Visibility compared with drawn labels, with colours in the ordinary picture, and with MuJoCo's rays.
 
 use std::ops::Range;
 
@@ -19,7 +19,7 @@ use crate::harness::need;
 const WITH_MIRROR: [Experiment; 3] = [Experiment::E1, Experiment::E4, Experiment::E5];
 const OWN: Shown = Shown::Through(0, Item::Agent(0));
 
-/// Pixels that both, and that either of two sets hold.
+/// The numbers of pixels in both of two sets, and in either.
 #[derive(Default)]
 struct Overlap {
     both: u32,
@@ -120,10 +120,10 @@ fn the_census_counts_the_labels() {
     });
 }
 
-/// The paint, or the neutral of heads and of rooms, that a pixel is likest to, whatever light falls on it.
+/// The palette colour nearest to a pixel under any light; `None` for the grey of heads and rooms.
 fn likest(pixel: &[u8]) -> Option<Color> {
     let [red, green, blue] = [pixel[0], pixel[1], pixel[2]].map(f64::from);
-    // What light leaves of paint: between these two of it.
+    // Paint under different light.
     let palette = Color::ALL.into_iter().flat_map(|color| {
         [0.65, 0.8, 0.95].map(|light| (Some(color), color.rgb().map(|part| light * f64::from(part))))
     });
@@ -132,20 +132,20 @@ fn likest(pixel: &[u8]) -> Option<Color> {
     palette.chain(neutral).min_by(|(_, one), (_, other)| distance(*one).total_cmp(&distance(*other)))?.0
 }
 
-/// Returns true if a pixel is of a head, which is darker than anything else without a colour.
+/// Returns true if the pixel shows a head, which is darker than anything else without a colour.
 fn is_head(pixel: &[u8]) -> bool {
     pixel.iter().all(|part| *part < 72) && pixel.iter().max().unwrap() - pixel.iter().min().unwrap() < 12
 }
 
-/// The pixels about the own body in the mirror.
+/// The pixels around the own body in the mirror.
 struct Area {
     columns: Range<usize>,
     rows: Range<usize>,
 }
 
 impl Area {
-    /// `None` where less than a hundred pixels show it, and where something else of its colour is so near that colours
-    /// cannot tell the two apart.
+    /// `None` if less than a hundred pixels show the body, or if a thing of the same colour is too near for colours to
+    /// distinguish them.
     fn about_own_body(world: &World, cast: &LabelImage) -> Option<Self> {
         const MARGIN: usize = 8;
         let pixels = (0..480).flat_map(|y| (0..640).map(move |x| [x, y]));
@@ -163,7 +163,7 @@ impl Area {
         self.rows.clone().flat_map(|y| self.columns.clone().map(move |x| [x, y]))
     }
 
-    /// Of the own body by the census and by colours.
+    /// The overlap of the own body by visibility and by colour.
     fn overlap(&self, world: &World, cast: &LabelImage, frame: &Frame) -> Overlap {
         Overlap::of(self.pixels().map(|[x, y]| {
             let pixel = &frame.rgb[3 * (y * 640 + x)..][..3];
@@ -173,7 +173,7 @@ impl Area {
     }
 }
 
-/// Returns true if something else has the colour of the own body, or a head.
+/// Returns true if another thing has the own body's colour, or is a head.
 fn is_twin(world: &World, shown: Shown) -> bool {
     let own = world.scene().body_color;
     match shown {

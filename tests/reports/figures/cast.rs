@@ -1,4 +1,4 @@
-//! Input to draw figures from: the paper's published cells as counts, and made-up casts of any size.
+//! Data to draw figures from: the paper's published cells as counts, and made-up casts of any size.
 
 use std::collections::BTreeMap;
 
@@ -21,7 +21,7 @@ const TITLES: [(&str, &str); 5] = [
     ("E5", "Robust Open-Ended Self-Attribution Under Clutter"),
 ];
 
-/// Everything a figure may be drawn from.
+/// Everything that a figure may need.
 #[derive(Clone, Debug)]
 pub struct Cast {
     pub cells: Cells,
@@ -47,7 +47,7 @@ impl Cast {
         Self { cells, episodes, outcomes, timelines }
     }
 
-    /// The cast without the groups for which `is_gone` holds.
+    /// The cast without the groups for which `is_gone` is true.
     pub fn without(&self, is_gone: impl Fn(&str, &str) -> bool) -> Self {
         let mut cells = self.cells.clone();
         cells.groups.retain(|group| !is_gone(&group.key[0].to_string(), &group.key[1].to_string()));
@@ -55,7 +55,7 @@ impl Cast {
     }
 }
 
-/// The paper's 40 cells: counts out of 21 that print as published, durations summed to the nearest step.
+/// The paper's 40 cells: counts out of 21 that print as published, and durations summed to the nearest step.
 pub fn paper() -> Cast {
     let main = published(include_str!("../../../fixtures/published/main_table.csv"));
     let appendix = published(include_str!("../../../fixtures/published/appendix_table.csv"));
@@ -85,7 +85,7 @@ pub fn paper() -> Cast {
     Cast::new(cells(groups.collect()))
 }
 
-/// `models` with made-up counts out of 21 in all five experiments; ties, extremes and undefined cells included.
+/// `models` with made-up counts out of 21 in all five experiments, including ties, extremes and undefined cells.
 pub fn made_up(models: &[String]) -> Cast {
     let mut groups = Vec::new();
     for (e, (experiment, _)) in TITLES.iter().enumerate() {
@@ -110,7 +110,7 @@ pub fn made_up(models: &[String]) -> Cast {
     Cast::new(cells(groups))
 }
 
-/// Names of `length` letters that differ in the middle alone.
+/// Names of `length` letters that differ only in the middle.
 pub fn names(count: usize, length: usize) -> Vec<String> {
     let name = |i: usize| {
         let core = format!("m{i:02}");
@@ -181,7 +181,7 @@ fn catalog() -> Catalog {
     }
 }
 
-/// Episodes whose last step and decision are made up: as many decided ones as TSA-C has values.
+/// Episodes with made-up last steps and decisions; as many have a decision as TSA-C has values.
 fn episodes(cells: &Cells) -> EpisodeTable {
     let mut keys = Vec::new();
     let (mut ttd, mut finished) = (Vec::new(), Vec::new());

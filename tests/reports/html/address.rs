@@ -1,11 +1,11 @@
-//! The choices are in the address, and a link shows the same.
+//! The address records the reader's choices, and a link shows the same.
 
 use serde_json::json;
 
 use crate::html::browser::Browser;
 use crate::html::scored::Report;
 
-/// The rows on show of the main table, in order.
+/// The visible rows of the main table, in order.
 const ROWS: &str = "[...document.querySelectorAll('#table-main tbody tr[data-group]')].filter((r) => r.checkVisibility()) \
     .map((r) => [r.dataset.experiment, r.dataset.model].join('|'))";
 
@@ -13,7 +13,7 @@ fn chip(key: usize, at: usize) -> String {
     format!("fieldset[data-key='{key}'] label:nth-of-type({}) span", at + 1)
 }
 
-/// Types into the field of a selector.
+/// Types into the field at `selector`.
 fn write(browser: &mut Browser, selector: &str, text: &str) {
     browser.click(selector);
     browser.send("Input.insertText", &json!({"text": text}));
@@ -78,7 +78,7 @@ fn one_list_and_an_open_cell_are_in_the_address_too() {
     assert_eq!(again.text(title), "CAAL, E3 · GPT 5.1");
     assert!(!again.holds("document.getElementById('grouped').checked"));
     again.press("Escape");
-    // A dialog tells that it was closed a little later.
+    // A dialog reports a little later that it was closed.
     let closed = "new Promise((done) => { const look = () => location.search.includes('cell=') ? setTimeout(look, 20) \
         : done(location.search.includes('groups=no')); look(); })";
     assert!(again.holds(closed));

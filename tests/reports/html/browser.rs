@@ -1,7 +1,7 @@
-//! A headless Chromium, driven over its own debugging pipe: what a reader does, and what the browser says of it.
+//! A headless Chromium, driven over its debugging pipe: does what a reader does, and records what the browser reports.
 //!
-//! Rule: a console message, an exception, a breach of the page's policy or a request for anything but the page
-//! itself is remembered, and fails the test that ends with [`Browser::close`].
+//! Rule: the browser records every console message, exception, violation of the page's policy and request for anything
+//! but the page itself. Each fails the test at [`Browser::close`].
 
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::path::Path;
@@ -15,7 +15,7 @@ use tempfile::TempDir;
 
 use crate::harness::need;
 
-/// Nothing that a page does on one machine takes this long.
+/// Longer than anything that a page does on one machine.
 const PATIENCE: Duration = Duration::from_mins(2);
 
 const FLAGS: [&str; 13] = [
@@ -53,7 +53,7 @@ impl Browser {
         Self::open_with(html, &[])
     }
 
-    /// The same after these commands.
+    /// Opens `html` from disk after these commands.
     pub fn open_with(html: &str, before: &[(&str, Value)]) -> Self {
         Self::open_from_disk(html, "", before)
     }
@@ -72,7 +72,7 @@ impl Browser {
         browser
     }
 
-    /// Opens an address; whatever is beside it belongs to the page.
+    /// Opens an address; other files in its folder belong to the page.
     #[cfg(feature = "view")]
     pub fn at(address: &str) -> Self {
         let mut browser = Self::start(&need::browser());
@@ -81,7 +81,7 @@ impl Browser {
         browser
     }
 
-    /// Goes to an address; requests for what begins as `page` are its own.
+    /// Goes to an address; requests for addresses that begin with `page` are allowed.
     fn visit(&mut self, address: &str, page: &str, before: &[(&str, Value)]) {
         let browser = self;
         page.clone_into(&mut browser.page);
@@ -101,7 +101,7 @@ impl Browser {
         }
     }
 
-    /// The pipe has the numbers 3 and 4, which a shell sets up.
+    /// Starts the browser. A shell sets up file descriptors 3 and 4 for the pipe.
     fn start(program: &Path) -> Self {
         let home = tempfile::tempdir().unwrap();
         let mut process = Command::new("sh")
@@ -134,7 +134,7 @@ impl Browser {
         Self { process, commands, answers, last_id: 0, session, faults: Vec::new(), loads: 0, page, home }
     }
 
-    /// A command of the debugging protocol and its result.
+    /// Sends a command of the debugging protocol and returns its result.
     pub fn send(&mut self, method: &str, parameters: &Value) -> Value {
         self.last_id += 1;
         let id = self.last_id;
@@ -157,8 +157,8 @@ impl Browser {
         }
     }
 
-    /// Two frames and a turn of the page, so that it has heard of what was done to it: events of changed media come
-    /// with a frame, not with the command.
+    /// Waits for two frames and a task, so that the page has seen earlier commands: media change events arrive with a
+    /// frame, not with the command.
     fn settle(&mut self) {
         let frame = "(done) => requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(done, 0, 0)))";
         self.value(&format!("new Promise({frame})"));
@@ -191,23 +191,23 @@ impl Browser {
         answer["result"]["value"].clone()
     }
 
-    /// The same as text.
+    /// The value of an expression, as text.
     pub fn text(&mut self, expression: &str) -> String {
         let value = self.value(expression);
         value.as_str().unwrap_or_else(|| panic!("{expression} gave {value}")).to_owned()
     }
 
-    /// The same as a list of texts.
+    /// The value of an expression, as a list of texts.
     pub fn texts(&mut self, expression: &str) -> Vec<String> {
         serde_json::from_value(self.value(expression)).unwrap()
     }
 
-    /// Returns true if an expression holds.
+    /// Returns true if an expression is true in the page.
     pub fn holds(&mut self, expression: &str) -> bool {
         self.value(expression).as_bool().unwrap_or_else(|| panic!("{expression} is not a truth value"))
     }
 
-    /// Brings the pointer over the first element that `selector` names.
+    /// Moves the pointer over the first element that matches `selector`.
     pub fn point_at(&mut self, selector: &str) -> (f64, f64) {
         let place = format!(
             "(() => {{ const e = document.querySelector({selector:?}); e.scrollIntoView({{block: 'center'}}); \
@@ -218,7 +218,7 @@ impl Browser {
         (x, y)
     }
 
-    /// Clicks there.
+    /// Clicks on the first element that matches `selector`.
     pub fn click(&mut self, selector: &str) {
         let at = self.point_at(selector);
         self.mouse("mousePressed", at);
@@ -267,7 +267,7 @@ impl Browser {
     /// Ends the browser.
     ///
     /// # Panics
-    /// Any complaint.
+    /// If the browser had any complaint.
     pub fn close(mut self) {
         assert_eq!(self.complaints(), Vec::<String>::new());
     }
@@ -294,7 +294,7 @@ fn whatever_goes_wrong_in_a_page_is_noticed() {
 
 impl Drop for Browser {
     fn drop(&mut self) {
-        // The browser ends when its pipe is closed; one that does not is ended.
+        // The browser ends when its pipe closes; otherwise it is killed.
         drop(self.commands.take());
         for _ in 0..50 {
             if matches!(self.process.try_wait(), Ok(Some(_))) {

@@ -1,4 +1,4 @@
-//! The page as text: the same on every run, small, and at war with nobody.
+//! The page as text: the same on every run, small, and self-contained.
 
 use std::collections::BTreeSet;
 
@@ -7,7 +7,7 @@ use report::html::HtmlError;
 
 use crate::html::scored::{PAPER, PAPER_PAGE, Report};
 
-/// The names of all tags outside of script and style, in order.
+/// The names of all tags outside script and style, in order.
 pub fn tags(html: &str) -> Vec<String> {
     let mut found = Vec::new();
     let mut rest = html;
@@ -24,7 +24,7 @@ pub fn tags(html: &str) -> Vec<String> {
     found
 }
 
-/// The value of an attribute in the opening tag that `element` begins with.
+/// The value of an attribute in the opening tag at the start of `element`.
 fn attribute<'a>(element: &'a str, name: &str) -> &'a str {
     let (_, rest) = element.split_once(&format!(" {name}=\"")).unwrap();
     rest.split_once('"').unwrap().0

@@ -127,7 +127,7 @@ fn a_row_has_the_command_that_looks_into_its_episode() {
     let said = browser.text("document.querySelector('#episodes .said').textContent");
     assert!(said.starts_with("Copied") || said.starts_with("Selected"), "{said}");
     browser.close();
-    // Scores have no steps to look into.
+    // Scores have no steps to show.
     run(folder.path(), &["report", "out/episodes.parquet", "--out", "again"]).done();
     let page = std::fs::read_to_string(folder.path().join("again/report.html")).unwrap();
     let mut browser = Browser::open(&page);

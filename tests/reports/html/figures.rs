@@ -1,4 +1,4 @@
-//! Figures in the page: values on hover and by keyboard, and their size.
+//! Figures in the page: their size, and values on hover and by keyboard.
 
 use serde_json::json;
 
@@ -66,7 +66,7 @@ fn a_figure_grows_and_fits_again() {
     browser.close();
 }
 
-/// The number of marks of a figure that are left and that fade, of those where an expression over `mark` is true.
+/// The numbers of visible and faded marks in a figure, among those for which an expression over `mark` is true.
 fn left(browser: &mut Browser, figure: &str, is_counted: &str) -> (u64, u64) {
     let marks = format!("[...document.querySelectorAll('#figure-{figure} .mark')].filter((mark) => {is_counted})");
     let off = browser.value(&format!("{marks}.filter((mark) => mark.matches('.off')).length")).as_u64().unwrap();
@@ -85,7 +85,7 @@ fn figures_show_what_the_filters_leave() {
         let (shown, faded) = left(&mut browser, figure, &others);
         assert!(shown == 0 && faded > 0, "{figure}: {shown} of other rows");
     }
-    // Lines say in their title what they are of, and go with their points.
+    // Lines have titles, and fade with their points.
     let line = "mark.dataset.model === undefined && mark.dataset.experiment === undefined";
     assert_eq!(left(&mut browser, "spider", line), (2, 38));
     assert_eq!(left(&mut browser, "slopes", line).0, 1, "from E1 to E2");

@@ -1,4 +1,4 @@
-//! Names that would like to be markup, script or an order of letters.
+//! Names that look like markup or script, or that reorder letters.
 
 use score::builder::TableBuilder;
 use score::table::{EpisodeTable, KeyRef};
@@ -18,7 +18,7 @@ const HOSTILE: [&str; 8] = [
     "__proto__",
 ];
 
-/// The bundled episodes of eight models under these names, and ids to match.
+/// The bundled episodes with eight models under these names, and matching ids.
 fn renamed(names: [&str; 8]) -> EpisodeTable {
     let mut models: Vec<&str> = PAPER.keys.iter().map(|key| key.model).collect();
     models.sort_unstable();
@@ -43,7 +43,7 @@ fn hostile_names_make_no_tag() {
     assert_eq!(tags(&page(HOSTILE)), tags(&page(["plain"; 8])));
 }
 
-/// Characters that reorder or hide text, of every kind.
+/// Characters that reorder or hide text, at least one of each kind.
 const HIDDEN: [char; 14] = [
     '\u{ad}',
     '\u{61c}',

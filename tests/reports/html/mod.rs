@@ -1,4 +1,4 @@
-//! `report.html`: its text, and what a browser makes of it.
+//! `report.html`: its text, and its behaviour in a browser.
 
 mod address;
 pub mod browser;

@@ -1,4 +1,4 @@
-//! Two models against each other: the numbers of the statistics, whichever way the two are chosen.
+//! The comparison of two models: the numbers of the statistics, in either order of choice.
 
 use report::statistics::{PairTest, Statistics};
 

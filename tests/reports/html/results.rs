@@ -1,4 +1,4 @@
-//! The tables in a browser: read, sorted, filtered, by mouse and by keyboard.
+//! The tables in a browser: reading, sorting and filtering, by mouse and by keyboard.
 
 use std::collections::BTreeMap;
 
@@ -7,11 +7,11 @@ use report::cells::KeyValue;
 use crate::html::browser::Browser;
 use crate::html::scored::{PAPER_PAGE, Report};
 
-/// The rows on show of the main table: experiment, model and the mean of TSA, in order.
+/// The visible rows of the main table, in order: experiment, model and mean of TSA.
 const ROWS: &str = "[...document.querySelectorAll('#table-main tbody tr[data-group]')].filter((r) => r.checkVisibility()) \
     .map((r) => [r.dataset.experiment, r.dataset.model, r.querySelector('[data-metric=TSA]').dataset.mean].join('|'))";
 
-/// The main table's order by experiment and then by mean, as `order` has it.
+/// The main table by experiment and then by mean, descending if asked.
 fn by_mean(report: &Report, is_descending: bool) -> Vec<String> {
     let tsa = report.cells.metrics.iter().position(|metric| metric == "TSA").unwrap();
     let mut expected = Vec::new();
@@ -76,7 +76,7 @@ fn every_column_sorts_all_rows_as_one_list_with_the_undefined_last() {
     browser.close();
 }
 
-/// The means before the first undefined one, and the number of those, which all come last.
+/// The means before the first undefined one, and the number of undefined ones, which must all come last.
 fn split(means: &[String]) -> (Vec<f64>, usize) {
     let defined: Vec<f64> =
         means.iter().take_while(|mean| !mean.is_empty()).map(|mean| mean.parse().unwrap()).collect();
@@ -206,7 +206,7 @@ fn the_keyboard_alone_is_enough() {
 fn a_closed_panel_takes_the_focus_from_nobody() {
     let report = Report::bare();
     let mut browser = Browser::open(&report.render().unwrap());
-    // The browser tells of the end of a panel later than it ends it: somebody may have gone on by then.
+    // The browser reports the end of a panel late; the reader may already be elsewhere.
     let goes_on = "new Promise((done) => { \
         const panel = document.getElementById('episodes'); \
         document.querySelector('#table-main td[data-metric]').click(); \
@@ -224,7 +224,7 @@ fn a_closed_panel_takes_the_focus_from_nobody() {
     browser.close();
 }
 
-/// Presses Tab until an expression holds, at most ten times in all.
+/// Presses Tab until an expression is true, at most ten times in all.
 fn tabs(browser: &mut Browser, so_far: usize, until: &str) -> usize {
     for pressed in so_far + 1..=10 {
         browser.press("Tab");

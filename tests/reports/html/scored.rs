@@ -1,4 +1,4 @@
-//! The bundled traces, scored once, and the pages made of them.
+//! The bundled traces, scored once, and their pages.
 
 use std::num::NonZeroUsize;
 use std::path::Path;
@@ -27,10 +27,10 @@ pub static PAPER: LazyLock<EpisodeTable> = LazyLock::new(|| {
     score_traces::score(&traces, &definitions, &["body_color".to_owned()], NonZeroUsize::MIN).unwrap()
 });
 
-/// The page of the whole report of the bundled traces.
+/// The page of the full report on the bundled traces.
 pub static PAPER_PAGE: LazyLock<String> = LazyLock::new(|| Report::paper().render().unwrap());
 
-/// Everything that a page is made of.
+/// The contents of a page.
 pub struct Report {
     pub episodes: EpisodeTable,
     pub cells: Cells,
@@ -38,13 +38,12 @@ pub struct Report {
     pub manifest: Manifest,
     pub statistics: Option<Statistics>,
     pub recordings: Recordings,
-    /// Name, title, caption and picture.
-    /// Names, captions and pictures.
+    /// Name, caption and picture.
     pub figures: Vec<(FigureName, String, String)>,
 }
 
 impl Report {
-    /// The report of some episodes without figures and statistics.
+    /// The report on some episodes, without figures and statistics.
     pub fn of(episodes: EpisodeTable, by: &[&str], style: &str) -> Self {
         let by: Vec<String> = by.iter().map(|&key| key.to_owned()).collect();
         let cells = group(&episodes, &by).unwrap();
@@ -58,12 +57,12 @@ impl Report {
         Self { episodes, cells, tables, manifest, statistics: None, recordings, figures: Vec::new() }
     }
 
-    /// The tables of the bundled traces alone.
+    /// Only the tables of the bundled traces.
     pub fn bare() -> Self {
         Self::of(PAPER.clone(), &["experiment", "model"], "default")
     }
 
-    /// The report of the bundled traces, with the figures that need nothing but cells and episodes.
+    /// The report on the bundled traces, with the figures that need only cells and episodes.
     pub fn paper() -> Self {
         let mut report = Self::bare();
         report.statistics = Some(Statistics::of(&report.episodes, &report.cells, &Options::default()).unwrap());

@@ -1,4 +1,4 @@
-//! The page in dark, on a telephone, on paper.
+//! The page in dark mode, on a phone, and on paper.
 
 use serde_json::json;
 
@@ -26,7 +26,7 @@ fn dark_and_light_follow_the_system_until_told_otherwise() {
     browser.close();
 }
 
-/// The least contrast of WCAG 2.2 for running text.
+/// The minimum contrast of WCAG 2.2 for body text.
 const LEAST_CONTRAST: f64 = 4.5;
 
 #[test]
@@ -82,7 +82,7 @@ fn paper_has_everything_but_the_controls() {
 #[test]
 fn what_stays_whole_on_paper_is_less_than_half_a_page() {
     let mut browser = Browser::open(&PAPER_PAGE);
-    // A4 between its margins: 186 mm x 269 mm, at 96 px per inch.
+    // A4 without its margins: 186 mm x 269 mm, at 96 px per inch.
     let size = json!({"width": 703, "height": 1017, "deviceScaleFactor": 1, "mobile": false});
     browser.send("Emulation.setDeviceMetricsOverride", &size);
     browser.send("Emulation.setEmulatedMedia", &json!({"media": "print"}));
@@ -96,7 +96,7 @@ fn what_stays_whole_on_paper_is_less_than_half_a_page() {
     browser.close();
 }
 
-/// Episodes of many models, as a large study has them.
+/// Episodes of many models, as in a large study.
 fn of_many(models: usize, experiments: usize, runs: usize) -> Vec<trace::episode::Episode> {
     let step = |action, right: bool| trace::episode::Step {
         action: Some(action),

@@ -1,4 +1,4 @@
-//! The folder of a report: what is in it, and what is left alone.
+//! A report's folder: its files, and files that stay untouched.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ struct Report {
     manifest: Manifest,
 }
 
-/// Traces as typed.
+/// Inputs as typed.
 const INPUTS: [&str; 4] = ["b.parquet", "/data/of/someone/a.parquet", "../up/c.parquet", "./traces/d.parquet"];
 
 fn report() -> Report {

@@ -1,4 +1,4 @@
-//! A table of ours beside a published one: what counts as a difference, and what excuses it.
+//! A table of ours compared with a published one: differences, and errata that excuse them.
 
 use std::fs;
 use std::path::Path;

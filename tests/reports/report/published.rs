@@ -1,8 +1,8 @@
 //! The published tables as cells: for each published value, moments of integers that print it.
 //!
-//! A rate is the k of n episodes that prints the published mean and standard error; a duration is a sum over 21
-//! episodes and the sum of squares that fits its standard error. Which one of several is chosen does not matter
-//! here: what is under test is how they print.
+//! A rate is the k of n episodes that prints the published mean and standard error. A duration is a sum over 21
+//! episodes, and a sum of squares that fits its standard error. If several fit, the choice does not matter here: the
+//! tests are about how they print.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -17,7 +17,7 @@ use report::layout::{self, MetricTable, Value, value};
 use report::style::Style;
 use score::vocabulary::schema_columns;
 
-/// Episodes behind every published cell.
+/// The number of episodes behind every published cell.
 pub const EPISODES: u64 = 21;
 
 /// A published cell: mean and standard error as printed.
@@ -89,7 +89,7 @@ fn find_cells() -> Cells {
     }
 }
 
-/// The print of published numbers by rule 5; the one mean that does not follow it is corrected.
+/// The published numbers as rule 5 prints them; the one mean that breaks the rule is corrected.
 fn published_numbers(cell: &Published) -> (String, String) {
     let is_slip = (cell.experiment.as_str(), cell.model.as_str(), cell.metric.as_str()) == ("E3", "Gemma4 26B", "TTD");
     let mean = if is_slip { "57.91" } else { cell.mean.as_str() };

@@ -1,4 +1,4 @@
-//! Style files: what is refused and how that is said.
+//! Style files: refusals and their messages.
 
 use std::fs;
 
@@ -9,7 +9,7 @@ use crate::report::published;
 
 const MAIN: &str = "[table.main]\ntitle = 'T'\ncolumns = ['TSA']\n";
 
-/// The message for a style file with this text, used with the paper's definitions.
+/// The message for a style file with this text, checked against the paper's definitions.
 fn message(text: &str) -> String {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("mine.toml");
@@ -43,7 +43,7 @@ fn each_fault_of_a_style_file_is_named() {
     assert_shown!("style files, and what is said of each behind an arrow", told.join("\n"));
 }
 
-/// A folder with these files, of which the first is the style.
+/// A folder with these files; the first one is the style.
 fn files(files: &[(&str, &str)]) -> (tempfile::TempDir, std::path::PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     for (name, text) in files {
@@ -75,13 +75,13 @@ fn an_include_comes_first_and_the_file_overrides_it() {
     assert_eq!((style.sheet.undefined.as_str(), &style.sheet.row_order), ("n/a", &paper.sheet.row_order));
     let column = &style.sheet.column["TSA"];
     assert_eq!((column.latex.as_deref(), column.better.is_some()), (Some("T"), true));
-    // Metrics of a built-in style need not be there, those of one's own must.
+    // A built-in style may name metrics that do not exist, a custom one may not.
     let mut catalog = published::catalog();
     catalog.metric.shift_remove("AR_SC");
     assert!(style.check_against(&catalog).is_ok());
     catalog.metric.shift_remove("CR");
     assert!(style.check_against(&catalog).unwrap_err().to_string().contains("no metric `CR`"));
-    // Another text of an included file is another style.
+    // Changing an included file changes the style's hash.
     let (_other, changed) = files(&[("mine.toml", mine), ("more/base.toml", &base.replace("Extra", "Other"))]);
     assert_ne!(Style::load(&changed).unwrap().hash, style.hash);
 }

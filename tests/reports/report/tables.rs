@@ -1,4 +1,4 @@
-//! Tables at the library boundary: the published ones character for character, and what a hostile name can do.
+//! Tables at the library boundary: the published ones character for character, and hostile names.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -22,7 +22,7 @@ fn lines(text: &str) -> Vec<&str> {
     text.lines().filter(|line| !line.starts_with('%')).collect()
 }
 
-/// The published LaTeX with the two slips of the paper put right.
+/// The published LaTeX with the paper's two slips corrected.
 fn corrected(table: &str) -> String {
     let printed = fs::read_to_string(published::path(table, "tex")).unwrap();
     let slip = "$57.90 \\pm 10.07$";
@@ -80,7 +80,7 @@ fn text(text: &str) -> KeyValue {
     KeyValue::Text(text.to_owned())
 }
 
-/// A rate, a conditional rate, a quantity to be low and a conditional quantity that is neither good nor bad.
+/// A rate, a conditional rate, a quantity where lower is better, and a conditional quantity without a direction.
 fn small_catalog() -> Catalog {
     let conditional = Some("some condition".to_owned());
     let mut catalog = published::catalog();
@@ -96,7 +96,7 @@ fn small_catalog() -> Catalog {
     catalog
 }
 
-/// Every format of every table of some cells under a style.
+/// Every table of some cells in every format, under a style.
 fn everything(cells: &Cells, style: &str) -> String {
     let mut all = String::new();
     for table in layout::tables(cells, &Style::load(style).unwrap()).unwrap() {
@@ -113,7 +113,7 @@ fn everything(cells: &Cells, style: &str) -> String {
     all.replace('\x1b', "␛")
 }
 
-/// The cells themselves: the key of each group, then n, sum and sum of squares of each metric.
+/// The cells as text: each group's key, then n, sum and sum of squares of each metric.
 fn counts(cells: &Cells) -> String {
     let group = |group: &Group| {
         let moments =

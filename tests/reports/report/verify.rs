@@ -47,7 +47,7 @@ fn every_file_that_differs_is_named() {
     {
         assert!(told.contains(words), "{told}");
     }
-    // The report again is the report.
+    // Writing the report again restores it.
     fs::remove_dir_all(at.join("mine/more")).unwrap();
     let trace = fixture("paper/E1-gpt-5-1.parquet").display().to_string();
     run(at, &["report", &trace, "--out", "mine"]).done();

@@ -1,4 +1,4 @@
-//! The comparisons that follow from the declared design: pairs, clusters, conditions, strata.
+//! Comparisons that follow from the declared design: pairs, clusters, conditions, strata.
 
 use metric::catalog::Control;
 use report::statistics::text::Length;
@@ -28,7 +28,7 @@ fn models_are_paired_by_scene_and_tied_rather_than_ranked() {
     assert!(found.models.iter().all(|family| family.experiment != "E5"), "one model has no rival");
 }
 
-/// Equal seeds and runs are no pairs: the bodies differ.
+/// Equal seeds and runs do not make pairs, because the bodies differ.
 #[test]
 fn different_scenes_make_no_pairs_however_equal_seed_and_run_are() {
     let rows = [block("E1", "a", 21, 9), block("E1", "b", 7, 9)].concat();
@@ -40,7 +40,7 @@ fn different_scenes_make_no_pairs_however_equal_seed_and_run_are() {
     assert!(found.design_note.contains("none of 1 comparisons has pairs"), "{}", found.design_note);
 }
 
-/// A pair is a scene, whatever seed and run say.
+/// Episodes with the same scene are a pair, whatever their seeds and runs.
 #[test]
 fn equal_scenes_are_pairs_under_other_seeds_and_runs() {
     let rows = [block("E1", "a", 21, 9), block("E1", "b", 7, 9)].concat();
@@ -144,7 +144,7 @@ fn experiments_with_other_scenes_are_compared_as_independent() {
     assert_eq!(contrast(&found, "strong", "MTATO", "E2").comparison.n, [21, 7]);
 }
 
-/// Pairs of all experiments are pooled; independent episodes are strata.
+/// Pairs are pooled over all experiments; for independent episodes the experiments are strata.
 #[test]
 fn models_are_compared_over_all_experiments() {
     let overall = |found: &Statistics| {
@@ -153,7 +153,7 @@ fn models_are_compared_over_all_experiments() {
         };
         found.overall.iter().find(is_it).unwrap().clone()
     };
-    // E1 16:0 and E2 2:0, of which two scenes are the same: 16:0 by scene, p = 2/2^16; Holm over three pairs
+    // E1 16:0 and E2 2:0, with two scenes in common: 16:0 by scene, p = 2/2^16; Holm over three pairs
     let paired = overall(&recorded(&study()));
     assert_eq!(
         (paired.method, paired.p, paired.p_adjusted),
@@ -215,7 +215,7 @@ fn conditions_of_one_model_are_compared_like_models() {
     assert!(!serde_json::to_string(&found).unwrap().contains("\"condition\":"), "one condition is none");
 }
 
-/// E1 is the control of E2, on TSA alone: E2 minus E1, and nothing about other metrics.
+/// E1 is the control of E2 for TSA only: E2 minus E1, and no other metric.
 #[test]
 fn declared_controls_decide_which_experiments_and_metrics_are_contrasted() {
     let rows = [block("E1", "a", 7, 9), block("E2", "a", 21, 9), block("E5", "a", 7, 9)].concat();

@@ -1,4 +1,4 @@
-//! Durations are compared by restricted means, and intervals are given only where they hold what they promise.
+//! Durations are compared by restricted means. Intervals are given only where their coverage is as promised.
 
 use report::statistics::text::Length;
 use report::statistics::{Intervals, Options, Statistics};
@@ -23,7 +23,7 @@ fn a_duration_is_contrasted_by_restricted_means() {
     );
 }
 
-/// Not to finish is not to guess: verdicts of TSA against chance that the finished episodes do not share.
+/// Not finishing is not guessing: some verdicts of TSA against chance do not hold for finished episodes alone.
 #[test]
 fn chance_is_tested_among_finished_episodes_too() {
     let found = Statistics::of(&PAPER, &cells(&PAPER), &Options::default()).unwrap();
@@ -62,7 +62,7 @@ fn a_difference_that_no_outcome_could_show_is_reported_as_untestable() {
     assert!(said(&statistics(&rows)).unwrap().contains("3 episodes per model cannot show any difference"));
 }
 
-/// Intervals whose coverage was not found to be 90 % are not given, and none is a point or leaves the budget.
+/// Intervals with less than 90 % simulated coverage are withheld. The others have a width and stay within the budget.
 #[test]
 fn intervals_cover_as_promised_or_give_a_reason() {
     let two = statistics(&[("E1", "a", 0, 0, true, 10), ("E1", "a", 0, 1, true, 20)]);
@@ -85,7 +85,7 @@ fn intervals_cover_as_promised_or_give_a_reason() {
     assert_eq!(points(&json), Vec::<String>::new());
 }
 
-/// The limits are those of the simulation: the fewest from which on no scenario falls below 90 %.
+/// The limits come from the simulation: the smallest n from which no scenario has less than 90 % coverage.
 #[test]
 fn the_limits_follow_from_the_simulated_coverage() {
     let simulated = include_str!("../../../benches/COVERAGE-INTERVALS.md");
@@ -114,7 +114,7 @@ fn the_limits_follow_from_the_simulated_coverage() {
     }
 }
 
-/// The intervals of a JSON value that have no width.
+/// The intervals in a JSON value that have no width.
 fn points(value: &serde_json::Value) -> Vec<String> {
     match value {
         serde_json::Value::Object(object) => {

@@ -1,4 +1,4 @@
-//! Lost episodes, filters and pooling are beside the verdicts that they affect.
+//! Lost episodes, filters and pooling are reported with the verdicts that they affect.
 
 use report::statistics::text::Length;
 use report::statistics::{AnswerRole, Comparison, Options, Selection, Statistics, Verdict};
@@ -7,12 +7,12 @@ use score::quality::CellKey;
 
 use super::{RECORDED, Row, by_place, cells, labelled, recorded, table};
 
-/// Episodes of E1, of which the first `solved` are solved in nine steps.
+/// Episodes of E1; the first `solved` are solved in nine steps.
 fn of(model: &str, solved: i32, all: i32) -> impl Iterator<Item = Row<'_>> {
     (0..all).map(move |at| ("E1", model, 0, at, at < solved, if at < solved { 9 } else { 60 }))
 }
 
-/// Episodes of b that are lost.
+/// Options with `count` lost episodes of b.
 fn lost_of_b(count: usize) -> Options {
     let mut lost = LostCounts::default();
     let cell = CellKey { experiment: "E1".into(), model: "b".into(), condition: "default".into() };
@@ -52,7 +52,7 @@ fn lost_episodes_that_could_turn_a_verdict_withhold_it() {
     assert!(text.contains("lost episodes (10 episodes lost)."), "{text}");
 }
 
-/// The first with all lost ones of b solved, the second with all failed.
+/// First with all lost episodes of b solved, then with all failed.
 const FISHER_OF_ALL: [f64; 2] = [0.085_493_439_938_758_58, 1.104_459_457_501_661_6e-6];
 const BINOMIAL_OF_B: [f64; 2] = [0.019_638_567_743_686_188, 0.034_025_477_734_148_02];
 
@@ -68,7 +68,7 @@ fn a_lost_episode_counts_as_a_pair_against_a_known_outcome() {
     assert_eq!((losses.highest.p, losses.agree), (Some(0.000_122_070_312_5), false));
 }
 
-/// Nine steps against sixty is a difference, however fast a few lost episodes were; not if they were half of all.
+/// Nine steps against sixty differ however fast a few lost episodes were, but not if half of the episodes were lost.
 #[test]
 fn a_difference_of_durations_is_kept_if_losses_cannot_turn_it() {
     let table = table(&of("a", 21, 21).chain(of("b", 1, 21)).collect::<Vec<_>>());

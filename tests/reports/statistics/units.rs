@@ -5,7 +5,7 @@ use report::statistics::{Method, Options, OverallMethod, Statistics, Verdict};
 
 use super::{CLUSTERED, RECORDED, Row, by_place, cells, labelled, with_scenes};
 
-/// Two models, one of which solves every episode and the other none, with `repeats` episodes of each scene.
+/// Two models: one solves every episode, the other solves none. Each scene has `repeats` episodes.
 fn opposed(scenes: i32, repeats: i32) -> Vec<Row<'static>> {
     let of = |model, solved| {
         (0..scenes).flat_map(move |scene| (0..repeats).map(move |run| ("E1", model, scene, run, solved, 9)))
@@ -159,7 +159,7 @@ fn too_few_episodes_for_many_models_are_reported() {
     assert_eq!(told.answer, "E1 cannot say: 6 episodes for 37 models");
 }
 
-// 2 of 2 against 1/10: p is 1/100, and two episodes are as few as elsewhere.
+// 2 of 2 against 1/10: p is 1/100, but two episodes are too few, as elsewhere.
 #[test]
 fn two_episodes_give_no_verdict_at_any_level() {
     let rows: Vec<Row> = (0..2).map(|at| ("E5", "a", at, 0, true, 9)).collect();
@@ -200,7 +200,7 @@ fn a_duration_with_repeats_is_tested_by_scene() {
     assert_eq!((few.p, few.separated, &*said), (None, false, "E1 cannot say: 5 scenes"));
 }
 
-/// An episode without a decision at the horizon took longer; one interrupted before it says nothing about the rest.
+/// An episode without a decision at the horizon took longer. One interrupted earlier tells nothing about the rest.
 #[test]
 fn interrupted_repeats_leave_durations_untested() {
     let rows = |interrupted: i64| {

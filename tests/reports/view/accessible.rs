@@ -1,4 +1,4 @@
-//! Every page under axe-core: whatever keeps people from reading or using it.
+//! Checks every page with axe-core for barriers to reading and using it.
 
 use serde_json::{Value, json};
 
@@ -11,7 +11,7 @@ use crate::view::{PAPER, RECORDED, Server};
 /// The rules of WCAG 2.2, A and AA.
 const RULES: &str = "['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa']";
 
-/// What the engine finds wrong with the page as it is: the rule, and the elements that break it.
+/// The engine's findings on the current page: each rule, and the elements that break it.
 pub fn violations(browser: &mut Browser) -> Vec<String> {
     let engine = std::fs::read_to_string(need::axe()).unwrap();
     browser.value(&format!("{{ {engine} }}; true"));
@@ -20,7 +20,7 @@ pub fn violations(browser: &mut Browser) -> Vec<String> {
         .texts(&format!("axe.run(document, {{ runOnly: {{ type: 'tag', values: {RULES} }} }}).then((found) => {told})"))
 }
 
-/// Checks a page in light and dark, at the width of a desk and of a phone.
+/// Checks a page in light and dark, at desktop and phone widths.
 pub fn check(browser: &mut Browser, what: &str) {
     for (scheme, width) in [("light", 1400), ("dark", 1400), ("light", 390), ("dark", 820)] {
         let size = json!({"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": false});
@@ -84,7 +84,7 @@ fn every_part_of_the_report() {
     check(&mut browser, "report.html");
 }
 
-/// How often Tab has to be pressed to come through the page.
+/// The number of Tab presses that it takes to go through the page.
 fn stops(browser: &mut Browser) -> usize {
     browser.value("document.activeElement?.blur()");
     let mut seen = Vec::new();

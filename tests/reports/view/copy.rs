@@ -1,4 +1,4 @@
-//! The copy of the page, from a disk.
+//! A copy of the page, opened from disk.
 
 use crate::harness::program::run;
 use crate::html::browser::Browser;
@@ -22,7 +22,7 @@ fn a_copy_shows_the_same_from_a_disk() {
     browser.close();
 }
 
-/// Recordings as large as a study has them: each log has more steps than a reader looks at.
+/// Recordings as large as in a study: each log has more steps than a reader looks at.
 #[test]
 fn a_copy_is_few_files_with_every_frame_once() {
     let folder = tempfile::tempdir().unwrap();
@@ -43,7 +43,7 @@ fn a_copy_is_few_files_with_every_frame_once() {
     let hashes: std::collections::BTreeSet<_> =
         part["frame_hashes"].as_array().unwrap().iter().map(|hash| hash.as_str().unwrap()).collect();
     assert_eq!(part["images"]["png"].as_array().unwrap().len(), hashes.len());
-    // The pictures are those of the log, in other bytes.
+    // The pictures are those of the log, encoded differently.
     let server = Server::start(folder.path(), &[RECORDED]);
     for (t, image) in part["images"]["of"].as_array().unwrap().iter().enumerate() {
         let text = part["images"]["png"][usize::try_from(image.as_u64().unwrap()).unwrap()].as_str().unwrap();
@@ -72,7 +72,7 @@ fn a_copy_replaces_a_copy_and_nothing_else() {
     assert_eq!(std::fs::read_dir(&other).unwrap().count(), 1);
 }
 
-/// Shows what this query names, in a page that is open.
+/// Shows the view of this query in an open page.
 fn look(browser: &mut Browser, query: &str) {
     let shown = browser.text("document.documentElement.dataset.shown");
     let state = "document.dispatchEvent(new CustomEvent('state', { detail: { replace: false } }))";
@@ -80,7 +80,7 @@ fn look(browser: &mut Browser, query: &str) {
     until(browser, &format!("document.documentElement.dataset.shown !== '{shown}'"));
 }
 
-/// The list of a copy under a filter: what it counts, or what it says in the place of episodes.
+/// The list of a copy under a filter: its count, or the notice in place of episodes.
 fn listed(browser: &mut Browser, filter: &str) -> (String, String) {
     look(browser, &format!("?view=episodes&{filter}"));
     let text = |selector: &str| format!("document.querySelector('{selector}')?.textContent ?? ''");

@@ -1,4 +1,4 @@
-//! Finding episodes: words, filters by click, a condition with a fault, nothing found.
+//! Finding episodes: by words, by filters, by a faulty condition, and without a result.
 
 use crate::harness::program::run;
 use crate::html::browser::Browser;
@@ -14,7 +14,7 @@ fn words_are_found_in_what_was_said() {
     let said = &told["rows"][0]["said"];
     assert_eq!((&said["column"], &said["t"]), (&"reasoning".into(), &1.into()), "{said}");
     assert!(said["excerpt"].as_str().unwrap().contains("One is as good as another"), "{said}");
-    // A name is found as before, without any text.
+    // A name is found even without matching text.
     assert_eq!(server.get("/api/episodes?search=frozen").json()["total"], 1);
     let mut browser = Browser::at(&server.link);
     until(&mut browser, "document.querySelector('#table-main')");
@@ -57,7 +57,7 @@ fn filters_by_click_are_chips_that_remove_them() {
     browser.click(".chip:nth-of-type(2)");
     until(&mut browser, "document.querySelectorAll('.chip').length === 2");
     assert!(!browser.text("location.search").contains("TSA"));
-    // Values by the same condition in the language of definitions are the same episodes.
+    // Chosen values give the same episodes as the same condition in the language of definitions.
     for (chosen, condition) in
         [("is=TSA%3D1&is=MCR%3D0", "TSA%20%3D%201%20and%20MCR%20%3D%200"), ("is=SC%3D", "SC%20is%20null")]
     {

@@ -1,4 +1,4 @@
-//! What an episode's first screen answers, and what it costs.
+//! An episode's first screen: the questions that it answers, and its cost.
 
 use serde_json::json;
 
@@ -36,7 +36,7 @@ fn the_first_screen_says_what_happened() {
         browser.text("document.querySelector('.clock').textContent").starts_with("t = 3 "),
         "opened at the decision"
     );
-    // All of it is in the window, none of it is beyond the edge.
+    // All of it is inside the window.
     for part in [
         ".verdict",
         "img.frame",
@@ -71,7 +71,7 @@ fn a_map_is_never_an_empty_box() {
     let folder = tempfile::tempdir().unwrap();
     let server = Server::start(folder.path(), &[RECORDED]);
     let mut browser = at(&server, "?view=episodes", 1400);
-    // Whatever comes onto the page as a map has something drawn in it.
+    // A map is never empty when it appears in the page.
     browser.value(
         "window.empty = 0; new MutationObserver(() => { const map = document.querySelector('.above'); \
          if (map && map.querySelector('svg > *, p') === null) window.empty += 1; }).observe(document.body, { childList: true, subtree: true })",

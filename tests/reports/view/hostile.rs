@@ -1,4 +1,4 @@
-//! Names and texts that would like to be markup, script or an order of letters, and texts of megabytes.
+//! Names and texts that look like markup or script or that reorder letters, and texts of megabytes.
 
 use std::path::Path;
 
@@ -12,10 +12,10 @@ use crate::view::pages::until;
 const MODEL: &str = "<img src=x onerror=\"window.pwned=1\">\u{202e}fdp.exe</td></a>'\"&lt;{{7*7}}";
 const ID: &str = "E1/<script>window.pwned=1</script>\u{2067}#?&%2e%2e/s1/r1";
 const PIECE: &str = "</p></script><script>window.pwned = 1</script>\u{202e}txt.exe & <b>bold</b>\n";
-/// So many pieces make more than three megabytes.
+/// This many pieces make more than three megabytes.
 const PIECES: usize = 45_000;
 
-/// A trace of one episode, whose model says too much.
+/// A trace of one episode with too long a text.
 fn write(folder: &Path) {
     let step = |t: u64, action: &str, reasoning: String| {
         json!({
@@ -30,7 +30,7 @@ fn write(folder: &Path) {
     run(folder, &["import", "steps.jsonl", "-o", "hostile.parquet"]).done();
 }
 
-/// The reader's view of a text of [`PIECE`]s.
+/// A text of [`PIECE`]s as the reader sees it.
 fn shown(pieces: usize) -> String {
     let piece = PIECE.trim_end().replace('\u{202e}', "\\u{202e}");
     vec![piece; pieces].join("\n")

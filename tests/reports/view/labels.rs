@@ -1,4 +1,4 @@
-//! Labels and notes: put in the page, kept beside the traces, shown in the list and in a copy.
+//! Labels and notes: entered in the page, stored beside the traces, shown in the list and in a copy.
 
 use std::path::Path;
 
@@ -12,7 +12,7 @@ use crate::view::{RECORDED, Response, Server};
 
 const ID: &str = "E1/guesser/s1/r1";
 
-/// The recorded episodes of E1 in a folder that may be written to.
+/// Copies the recorded episodes of E1 into a writable folder.
 fn runs(folder: &Path) {
     std::fs::create_dir(folder.join("runs")).unwrap();
     for entry in std::fs::read_dir(RECORDED).unwrap() {
@@ -61,7 +61,7 @@ fn a_label_is_put_seen_after_a_reload_and_in_a_copy() {
     let mut again = Browser::at(&page);
     until(&mut again, "document.querySelector('.marks li')");
     assert_eq!(again.texts(marks), expected);
-    // A word that is none is refused in the box.
+    // The box refuses an invalid word.
     again.press("l");
     until(&mut again, "document.querySelector('dialog#label[open]')");
     assert_eq!(
@@ -194,7 +194,7 @@ fn the_labels_of_another_coder_arrive_and_a_bad_line_is_told() {
     assert!(refused.contains("labels.jsonl, line 2: expected a label") && refused.contains("help:"), "{refused}");
 }
 
-/// The memory that a million labels take beside an empty list.
+/// The memory of a million labels, compared with an empty list.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_million_labels_take_less_than_a_hundred_megabytes() {

@@ -1,4 +1,4 @@
-//! A recording that goes on, looked at.
+//! Viewing a recording in progress.
 
 use std::path::Path;
 use std::process::Stdio;
@@ -17,7 +17,7 @@ for line in sys.stdin:
         time.sleep(PAUSE)
         print(json.dumps({"view-description": "", "reasoning": "", "action": "a", "summary": "", "selected_cube": "none", "identification": "unknown"}))'"#;
 
-/// An agent that turns, and waits before each step until the file `allowed` has its number.
+/// An agent that turns, and waits before each step until the file `allowed` has the step's number.
 const WAITING: &str = r#"exec:python3 -u -c 'import sys, time, json
 step = 0
 for line in sys.stdin:
@@ -26,7 +26,7 @@ for line in sys.stdin:
         while int(open("allowed").read() or 0) < step: time.sleep(0.02)
         print(json.dumps({"view-description": "", "reasoning": "", "action": "a", "summary": "", "selected_cube": "none", "identification": "unknown"}))'"#;
 
-/// Lets the agent go on to a step; written aside, so that it never reads half a number.
+/// Lets the agent go on to a step. The rename ensures that the agent never reads half a number.
 fn allow(folder: &Path, step: u32) {
     std::fs::write(folder.join("next"), step.to_string()).unwrap();
     std::fs::rename(folder.join("next"), folder.join("allowed")).unwrap();
@@ -74,7 +74,7 @@ fn pages_that_are_open_grow_with_the_recording() {
     list.close();
 }
 
-/// Copies of a recording that replaces and removes its own files meanwhile: each is of one moment.
+/// Copies of a recording that is replacing and removing its own files: each copy is consistent.
 #[test]
 fn a_copy_of_a_recording_that_goes_on_is_whole() {
     need::drawing();
@@ -124,7 +124,7 @@ fn soak_a_recording_appears_and_grows_and_ends() {
             .stderr(Stdio::null());
         Running(command.spawn().unwrap())
     };
-    // Slow enough for a browser that starts meanwhile.
+    // Slow enough for a browser to start meanwhile.
     let mut recording = record("2");
     wait_for("a log that is being written", || {
         let parts = std::fs::read_dir(runs.join(".parts")).ok()?;
@@ -141,7 +141,7 @@ fn soak_a_recording_appears_and_grows_and_ends() {
     let length = "Number(document.querySelector('#length').textContent)";
     let before = browser.value(length).as_u64().unwrap();
     until(&mut browser, &format!("{length} > {before}"));
-    // Stopping and starting again does not disturb the page; what was not whole is recorded anew.
+    // Restarting the recording does not disturb the page; incomplete episodes are recorded again.
     let _ = recording.0.kill();
     let _ = recording.0.wait();
     let mut again = record("0.05");

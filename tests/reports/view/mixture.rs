@@ -1,4 +1,4 @@
-//! Episodes of experiments that need different definitions, in one list: each is scored by its own.
+//! Episodes whose experiments need different definitions, in one list: each is scored by its own.
 
 use serde_json::{Value, json};
 use trace::episode::{Action, Episode, Extra, Step};

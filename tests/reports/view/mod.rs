@@ -1,4 +1,4 @@
-//! `mirrorstats view`: the server as a process, its page in a browser, and its copy from a disk.
+//! `mirrorstats view`: the server as a process, its page in a browser, and a copy from disk.
 
 pub mod accessible;
 mod copy;
@@ -24,10 +24,10 @@ use crate::harness::program::{Running, program};
 const RECORDED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/fixtures/recorded");
 const PAPER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/fixtures/paper");
 
-/// A server that ends with its owner.
+/// A server that is killed when this is dropped.
 pub struct Server {
     process: Running,
-    /// Its address: `http://127.0.0.1:PORT/`, with a token if it has one.
+    /// Its address: `http://127.0.0.1:PORT/`, with the token if there is one.
     pub link: String,
     pub port: u16,
 }
@@ -37,7 +37,7 @@ impl Server {
         Self::start_by_link(folder, &[arguments, &["--no-token"]].concat())
     }
 
-    /// The same with the default: a token in the link.
+    /// Starts a server with the default: a token in the link.
     pub fn start_by_link(folder: &Path, arguments: &[&str]) -> Self {
         let mut command = program(folder);
         command.args(["view", "--no-open", "--port", "0"]).args(arguments);
@@ -54,7 +54,7 @@ impl Server {
         self.process.0.id()
     }
 
-    /// The answer to a browser of this machine.
+    /// The answer to a browser on this machine.
     pub fn get(&self, path: &str) -> Response {
         let host = format!("127.0.0.1:{}", self.port);
         self.ask("GET", path, &[("Host", &host)], "")
@@ -65,7 +65,7 @@ impl Server {
     }
 }
 
-/// A request as it is written, without a library that would mend it.
+/// Sends a raw request, without a library that would correct it.
 pub fn ask(port: u16, method: &str, path: &str, headers: &[(&str, &str)], body: &str) -> Response {
     let mut stream = TcpStream::connect(("127.0.0.1", port)).unwrap();
     let headers = headers.iter().map(|(name, value)| format!("{name}: {value}\r\n")).collect::<Vec<_>>().concat();

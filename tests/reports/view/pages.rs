@@ -4,7 +4,7 @@ use crate::harness::program::run;
 use crate::html::browser::Browser;
 use crate::view::{PAPER, RECORDED, Server};
 
-/// Waits in the page until an expression holds.
+/// Waits until an expression is true in the page.
 pub fn until(browser: &mut Browser, expression: &str) {
     let wait = format!(
         "new Promise((done) => {{ const look = () => {{ let is = false; try {{ is = Boolean({expression}); }} catch {{ }} \
@@ -209,7 +209,7 @@ fn the_order_of_a_table_is_in_the_address() {
     let mut again = Browser::at(&address);
     until(&mut again, "document.querySelector('#table-main th[aria-sort]')");
     assert_eq!(again.texts(means), sorted);
-    // The list has an order of its own.
+    // The list has its own order.
     again.click("#tabs a:nth-of-type(2)");
     until(&mut again, "document.querySelector('.list .rows a')");
     again.close();

@@ -1,4 +1,4 @@
-//! The answers of the server, and their readers.
+//! The server's answers, and who may read them.
 
 use std::io::{Read as _, Write as _};
 use std::path::Path;
@@ -109,7 +109,7 @@ fn many_half_sent_requests_do_not_keep_others_out_for_long() {
     assert!(threads() <= 12, "{}", threads());
     for mut stream in open {
         stream.set_read_timeout(Some(std::time::Duration::from_secs(40))).unwrap();
-        // The server closes it, with or without an answer.
+        // The server closes the connection, with or without an answer.
         let mut rest = Vec::new();
         let _ = stream.read_to_end(&mut rest);
         assert!(!String::from_utf8_lossy(&rest).contains(" 200 "));
@@ -165,7 +165,7 @@ fn an_episode_is_explained_as_score_explains_it() {
     assert_eq!(map["steps"].as_array().unwrap().len() as u64, told["length"].as_u64().unwrap());
 }
 
-/// A folder in which an episode is under way: a log where recordings write, and no trace.
+/// A folder with an episode in progress: a log where recordings write, and no trace.
 fn begun(folder: &Path) {
     std::fs::create_dir_all(folder.join("runs/.parts")).unwrap();
     std::fs::copy(Path::new(RECORDED).join("E1-guesser.mcap"), folder.join("runs/.parts/log")).unwrap();
@@ -200,7 +200,7 @@ fn a_removed_folder_is_reported_and_the_page_stays() {
     wait_for("no fault", || fault().is_none().then_some(()));
 }
 
-/// Small recordings that ask for much: each answer within the budget, or refused with the limit.
+/// Small recordings that ask for much work: each answer stays within the budget or is a refusal.
 #[cfg(target_os = "linux")]
 #[test]
 fn no_question_takes_more_than_the_budget() {

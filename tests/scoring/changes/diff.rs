@@ -1,4 +1,4 @@
-//! `diff` between definitions, between scores, and between one and the other.
+//! `diff` between definitions, between scores, and between scores and definitions.
 
 use serde_json::{Value, json};
 
@@ -46,7 +46,7 @@ fn scores_differ_as_their_definitions_do() {
         assert_eq!(bare["cells"], expected["cells"], "{format}");
         let explained = run(at, &[&["diff", &old, &new, "a.parquet", "--json"], text].concat());
         let known = if format == "parquet" { json!([2]) } else { Value::Null };
-        // Text does not say under which definitions it was computed; evidence for other values is none.
+        // Text scores do not name their definitions, so evidence for the other value is missing.
         assert_eq!(explained.stderr.contains("not explained"), known.is_null(), "{}", explained.stderr);
         assert_eq!(flips(&explained.json()), [json!(["e1", 2, 1, [1, 2], known])], "{format}");
     }
@@ -121,7 +121,7 @@ fn to_undefined_is_a_flip_of_its_own() {
     std::fs::write(at.join("when.toml"), format!("{}when = \"any(mirror_visible)\"\n", crate::changes::gaze(1)))
         .unwrap();
     let changes = run(at, &["diff", "all.toml", "when.toml", "a.parquet", "b.parquet", "--json"]).json();
-    // Undefined because the condition failed: no step has the mirror in view.
+    // Undefined because the condition is false: no step has the mirror in view.
     assert_eq!(flips(&changes), [json!(["e3", 0, null, [], []])]);
     let text = run(at, &["diff", "all.toml", "when.toml", "b.parquet"]).ends(0).stdout;
     assert!(text.contains("GAZE: 1 to undefined") && text.contains("0/1 = 0.000 -> undefined"), "{text}");

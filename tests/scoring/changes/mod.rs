@@ -1,4 +1,4 @@
-//! `diff` and `rescore` at the process boundary: what moved, what flipped, what decided, what is refused.
+//! `diff` and `rescore` at the process boundary: changed cells, flips, deciding steps, refusals.
 
 mod diff;
 mod rescore;
@@ -10,12 +10,12 @@ use trace::write::write_episodes;
 use crate::harness::program::run;
 use crate::harness::traces;
 
-/// Definitions of one metric, the timesteps with the mirror in view, in all or from `t` on.
+/// Definitions of one metric: the number of timesteps from `from` on with the mirror in view.
 fn gaze(from: i64) -> String {
     format!("[metric.GAZE]\nvalue = \"count(mirror_visible and t >= {from})\"\n")
 }
 
-/// An episode of three steps that sees the mirror where told and then is done.
+/// An episode of three steps with the mirror in view as given, and then done.
 fn episode(id: &str, run: i32, visible: [bool; 3]) -> Episode {
     let step = |(at, mirror_visible)| Step {
         action: Some(if at == 2 { Action::Done } else { Action::TurnLeft }),
@@ -26,7 +26,7 @@ fn episode(id: &str, run: i32, visible: [bool; 3]) -> Episode {
     Episode { model: "ant".into(), run, ..traces::episode(id, steps) }
 }
 
-/// A folder beside which nobody else has files: traces are looked for there too.
+/// A folder without foreign files beside it, because traces are searched there too.
 fn secluded() -> tempfile::TempDir {
     tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap()
 }

@@ -1,4 +1,4 @@
-//! `rescore`: the same traces, the same options, other definitions; nothing of the old report touched.
+//! `rescore`: the same traces and options with other definitions; the old report stays unchanged.
 
 use std::fs;
 
@@ -7,7 +7,7 @@ use serde_json::json;
 use crate::changes::{folder, run, secluded};
 use crate::harness::files::{contents, repository};
 
-/// The folder of traces with a report `old` of them, made with options of its own.
+/// The folder of traces, with a report `old` made with special options.
 fn reported() -> tempfile::TempDir {
     let folder = folder();
     let options = ["--definitions", "all.toml", "--by", "model,run", "--where", "run < 3", "--style", "paper"];

@@ -1,6 +1,6 @@
-//! Definition files that are not as they must be: every fault told at once, in its place, and never a panic.
+//! Invalid definition files: every fault is reported at once with its location, and nothing panics.
 //!
-//! `faults/NAME.toml` is what was written, `faults/NAME.snap` what is said about it.
+//! `faults/NAME.toml` is the input, `faults/NAME.snap` the message.
 
 use std::error::Error as _;
 use std::fs;
@@ -17,7 +17,7 @@ fn check(text: &str) -> Result<Definitions, FileError> {
     Definitions::from_toml("test", text, &schema_columns())
 }
 
-/// The definitions with this expression as a `let` and below an aggregate.
+/// Definitions with this expression in a `let` that an aggregate uses.
 fn with_expression(text: &str) -> Result<Definitions, FileError> {
     let text = serde_json::to_string(text).unwrap();
     check(&format!("[let]\nx = {text}\n[metric.X]\nvalue = \"count(x is not null)\"\n"))
@@ -61,15 +61,15 @@ fn a_literal_that_a_column_takes_or_may_take_has_no_fault() {
         "at(action, 1) is not distinct from 'done'",
         "coalesce(action, 'none') = 'none'",
         "case when bumped then action else 'stopped' end in ('stopped', 'done')",
-        // Any text may be compared by order.
+        // Any text may be used in an ordering comparison.
         "action between 'turn' and 'turn~'",
         "action >= 'turn'",
-        // These columns take any text.
+        // These columns accept any text.
         "self_color = 'turquoise'",
         "experiment = 'E6'",
         "coalesce(action, summary) = 'jump'",
         "regexp_like(action, '^jump')",
-        // No column says what this may be.
+        // No column determines the valid texts here.
         "case when bumped then 'a' else 'b' end = 'c'",
     ] {
         with_expression(text).unwrap_or_else(|error| panic!("{text}: {error}"));
@@ -108,7 +108,7 @@ fn includes_are_followed_relative_to_the_file_and_later_ones_win() {
     assert_eq!(definitions.catalog.metric.keys().last().unwrap(), "X");
     assert_eq!(definitions.catalog.metric.len(), 11);
 
-    // A circle is reported with the way it goes, and by no absolute path beyond the one typed.
+    // A circular include is reported with its path, without absolute paths beyond the one typed.
     fs::write(folder.path().join("below/base.toml"), "include = [\"../top.toml\"]\n").unwrap();
     let told = Definitions::load(top.to_str().unwrap(), &schema_columns()).unwrap_err().to_string();
     assert!(told.contains("the include leads back to itself"), "{told}");
@@ -135,10 +135,10 @@ fn depth_and_length_are_refused_and_never_overflow() {
         "t or ".repeat(3000) + "t",
         format!("t in ({}1)", "1, ".repeat(5000)),
     ] {
-        // Long lists are fine; what matters is that an answer comes.
+        // Long lists are allowed; this only checks that there is an answer.
         let _ = with_expression(&text).map_err(|error| error.to_string());
     }
-    // Each definition refers to the next one, so that the first to be read leads down to the last.
+    // Each definition refers to the next one, so reading the first leads down to the last.
     let chain = |length: usize| {
         let lets: Vec<_> = (0..length).map(|at| format!("a{at} = \"(((a{} + 1)))\"", at + 1)).collect();
         check(&format!("[let]\n{}\na{length} = \"1\"\n[metric.X]\nvalue = \"a0\"\n", lets.join("\n")))
@@ -146,12 +146,12 @@ fn depth_and_length_are_refused_and_never_overflow() {
     assert!(chain(100).is_ok());
     let told = chain(5000).map(|_| ()).unwrap_err().to_string();
     assert!(told.contains("nested too deeply"), "{}", &told[..told.len().min(500)]);
-    // The other way round nothing is nested: each refers to what is known already.
+    // In the opposite order nothing nests: each definition refers to a known one.
     let lets: Vec<_> = (1..5000).map(|at| format!("a{at} = \"a{} + 1\"", at - 1)).collect();
     assert!(check(&format!("[let]\na0 = \"1\"\n{}\n", lets.join("\n"))).is_ok());
 }
 
-/// Words that expressions are made of, in no order.
+/// The words of expressions in random order.
 fn soup() -> impl Strategy<Value = String> {
     let words = vec![
         "any",

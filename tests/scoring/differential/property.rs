@@ -28,7 +28,7 @@ enum Answer {
     Values(Vec<(EpisodeKey, Vec<Option<i64>>)>),
     Overflow,
     NotARate,
-    /// The traces are not as they must be, in the words of the reader that both engines share.
+    /// Invalid traces, with the message of the reader that both engines share.
     Refused(String),
 }
 
@@ -57,9 +57,9 @@ fn polars(traces: &TraceSet, definitions: &Definitions) -> Result<Answer, String
     }
 }
 
-/// The columns of these traces; one that no file has is null all the same.
+/// The columns of these traces; columns that no file has are included, and are null.
 pub fn columns(traces: &TraceSet) -> Columns {
-    // Any column is compared with any text.
+    // Allow any column to be compared with any text.
     let mut columns = vocabulary::trace_columns(traces).with_values::<String>([]);
     for (name, ty) in [
         ("points", Type::Int),
@@ -73,12 +73,12 @@ pub fn columns(traces: &TraceSet) -> Columns {
     columns
 }
 
-/// The definitions over these traces.
+/// Loads the definitions for these traces.
 pub fn load(traces: &TraceSet, text: &str) -> Definitions {
     Definitions::from_toml("random", text, &columns(traces)).unwrap_or_else(|faults| panic!("{faults}\n{text}"))
 }
 
-/// Returns true if both engines come to the same, all metrics at once; metric by metric where they refuse.
+/// The engines' disagreement on all metrics at once or, if both refuse, on a single metric; `None` if they agree.
 fn disagreement(traces: &TraceSet, definitions: &Definitions) -> Option<String> {
     let (expected, found) = (native(traces, definitions), polars(traces, definitions));
     if expected.is_err() || expected != found {
@@ -95,7 +95,7 @@ fn disagreement(traces: &TraceSet, definitions: &Definitions) -> Option<String> 
     })
 }
 
-/// Everything that is needed to see why.
+/// Everything needed to explain a failure.
 fn report(sheets: &[Sheet], text: &str, definitions: &Definitions, what: &str) -> String {
     let mut out = format!("{what}\n\ntraces:\n{sheets:#?}\n\ndefinitions:\n{text}\nnative plan:\n");
     for (id, node) in definitions.plan.ids().zip(definitions.plan.nodes()) {
@@ -108,7 +108,7 @@ fn report(sheets: &[Sheet], text: &str, definitions: &Definitions, what: &str) -
     out
 }
 
-/// The same runs at every time from a fixed seed.
+/// Checks this many random runs; a fixed seed gives the same runs.
 fn check(runs: u32, rng_seed: RngSeed) {
     let config = ProptestConfig { cases: runs, rng_seed, failure_persistence: None, ..ProptestConfig::default() };
     let mut runner = TestRunner::new(config);
@@ -129,7 +129,7 @@ fn native_and_polars_agree_to_the_last_integer() {
     check(64, RngSeed::Fixed(20));
 }
 
-/// As many runs as `PROPTEST_CASES` says, others at every time; without it 2000, the same ones.
+/// `PROPTEST_CASES` new runs each time; without the variable, the same 2000 runs.
 #[test]
 #[ignore = "soak: 2000 runs"]
 fn soak_native_and_polars_agree_to_the_last_integer() {

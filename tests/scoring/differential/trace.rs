@@ -1,5 +1,5 @@
-//! Random traces: files of whole episodes with every column null or not, absent or not, narrow or wide, and row
-//! groups that begin anywhere.
+//! Random traces: files of whole episodes where every column may be null or absent, and narrow or wide. Row groups may
+//! begin anywhere.
 
 use std::fs::File;
 use std::path::Path;
@@ -22,11 +22,11 @@ use trace::open::TraceSet;
 #[derive(Clone, Debug)]
 pub struct Sheet {
     pub episodes: Vec<Episode>,
-    /// The present ones of [`OPTIONAL`].
+    /// True for each of the [`OPTIONAL`] columns that the file has.
     pub present: Vec<bool>,
-    /// Rows of a row group.
+    /// Rows per row group.
     pub rows_of_group: usize,
-    /// Integers of 64 bits and dictionaries of text instead of 32 bits and plain text.
+    /// 64-bit integers and text dictionaries, instead of 32-bit integers and plain text.
     pub wide: bool,
 }
 
@@ -80,8 +80,8 @@ fn int(from: &'static [i32]) -> impl Strategy<Value = Option<i32>> {
     option::weighted(0.8, select(from))
 }
 
-/// The largest integers that a column has. With overflow checks Polars ends a sum whose parts leave 64 bits even where the
-/// whole does not, so that such sums are left to builds without.
+/// The largest integers of a column. With overflow checks, Polars fails if a partial sum leaves 64 bits even though the
+/// total does not. So only builds without the checks use the extremes.
 const fn extremes() -> &'static [i64] {
     if cfg!(debug_assertions) { &[1 << 55, -(1 << 55)] } else { &[i64::MAX, i64::MIN, i64::MIN + 1, 1 << 62] }
 }
@@ -122,7 +122,7 @@ fn episode() -> impl Strategy<Value = Episode> {
     )
 }
 
-/// Some files.
+/// One or more random files.
 pub fn sheets() -> impl Strategy<Value = Vec<Sheet>> {
     let present = vec(prop::bool::weighted(0.85), OPTIONAL.len());
     let sheet = (vec(episode(), 1..5), present, 1..20_usize, any::<bool>());
@@ -152,7 +152,7 @@ fn write(path: &Path, at: usize, sheet: &Sheet) {
     writer.close().unwrap();
 }
 
-/// The rows of a file: an episode's number, the episode, t, the step.
+/// A row: the episode's number, the episode, t and the step.
 type Row<'a> = (usize, &'a Episode, usize, &'a Step);
 
 fn batch(at: usize, sheet: &Sheet) -> RecordBatch {

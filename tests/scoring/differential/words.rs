@@ -1,5 +1,5 @@
-//! What random definitions are made of: columns that any file may lack, names that need quotes or look like those of
-//! the statement itself, and numbers at the ends of 64 bits.
+//! The words of random definitions: columns that any file may lack, names that need quotes or look like names in the
+//! statement itself, and numbers at the limits of 64 bits.
 
 use crate::author::Vocabulary;
 

@@ -1,4 +1,4 @@
-//! Cases as each engine answers them: many of them in one process where it is another program.
+//! The answers of each engine to a batch of cases; an external engine gets all cases in one process.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -28,7 +28,7 @@ pub enum Engine {
     Spark,
 }
 
-/// Traces, definitions, and conditions of episodes under which they are asked for once more.
+/// Traces, definitions, and conditions on episodes for further queries.
 #[derive(Debug)]
 pub struct Case {
     pub text: String,
@@ -36,14 +36,14 @@ pub struct Case {
     pub filters: Vec<&'static str>,
 }
 
-/// The metrics by name, and a row of them for each episode.
+/// The metrics by name, and their values for each episode.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Rows {
     pub names: Vec<String>,
     pub values: BTreeMap<String, Vec<Option<i64>>>,
 }
 
-/// Without a filter, then under each; a refusal in words.
+/// The answer without a filter, then one for each filter; refusals as text.
 pub type Answers = Vec<Result<Rows, String>>;
 
 impl Rows {
@@ -58,7 +58,7 @@ impl fmt::Display for Case {
     }
 }
 
-/// The answers if none of them is a refusal.
+/// The answers, if every one is a success.
 pub fn rows(answers: &Answers) -> Option<Vec<Rows>> {
     answers.iter().map(|answer| answer.as_ref().ok().cloned()).collect()
 }
@@ -71,7 +71,7 @@ pub fn answers(engine: Engine, cases: &[Case]) -> Vec<Answers> {
     answers_to(engine, folder.path(), &prepared)
 }
 
-/// The answer of an engine about all traces in `folder`.
+/// The answers of an engine on all traces in `folder`.
 pub fn answers_about(
     engine: Engine,
     folder: &Path,
@@ -97,7 +97,7 @@ fn answers_to(engine: Engine, folder: &Path, prepared: &[Prepared]) -> Vec<Answe
     }
 }
 
-/// A case whose traces are written.
+/// A case with its traces on disk.
 struct Prepared {
     folder: String,
     traces: TraceSet,
@@ -135,7 +135,7 @@ fn of_table(table: &EpisodeTable) -> Rows {
     Rows { names, values: values.collect() }
 }
 
-/// All statements of all cases in one process.
+/// Runs the statements of all cases in one process.
 fn outside(engine: &str, packages: &Path, dialect: Dialect, folder: &Path, cases: &[Prepared]) -> Vec<Answers> {
     let request: Vec<Value> = cases.iter().map(|case| request(case, dialect)).collect();
     let file = folder.join("request.json");
@@ -172,7 +172,7 @@ fn request(case: &Prepared, dialect: Dialect) -> Value {
     json!({ "folder": case.folder, "columns": columns, "statements": statements })
 }
 
-/// Rows of an episode's five keys and its metrics; an error is a text.
+/// Rows with an episode's five keys and its metrics; an error is a text.
 fn of_json(names: &[String], answer: &Value) -> Result<Rows, String> {
     let rows = answer.as_array().ok_or_else(|| answer.to_string())?;
     let values = rows.iter().map(|row| {

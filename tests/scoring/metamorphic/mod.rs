@@ -1,9 +1,9 @@
-//! Questions whose answers must fit together, in the manner of `SQLancer`, on every engine.
+//! Queries with related answers that must be consistent, in the manner of `SQLancer`, on every engine.
 //!
-//! TLP: what holds of some steps holds of those where a condition is true, false and null, put together. `NoREC`: `where`
-//! leaves the episodes for which the condition, as a metric that nothing can be left out for, is 1. Both need no other
-//! engine; on another one the answers must be those of the native engine, too. Source: Rigger and Su, "Finding Bugs in
-//! Database Systems via Query Partitioning" (2020), "Detecting Optimization Bugs in Database Engines via Non-Optimizing
+//! TLP: the result over some steps equals the combined results over those where a condition is true, false and null.
+//! `NoREC`: `where` keeps exactly the episodes for which the condition, computed as a metric, is 1. Neither needs a
+//! second engine; other engines must also match the native one. Source: Rigger and Su, "Finding Bugs in Database
+//! Systems via Query Partitioning" (2020), "Detecting Optimization Bugs in Database Engines via Non-Optimizing
 //! Reference Engine Construction" (2020).
 
 pub mod engines;
@@ -22,16 +22,16 @@ use crate::language::{Definition, toml};
 use engines::{Case, Engine, Rows};
 use words::{EVERYWHERE, TAME};
 
-/// The filters of a case of parts, behind the answer without one.
+/// The filters of a case, after the query without a filter.
 const FILTERS: [&str; 3] = ["e", "not e", "e is null"];
 
-/// So many cases; the same ones from a fixed seed.
+/// `count` random cases; a fixed seed gives the same ones.
 fn cases<S>(strategy: impl Strategy<Value = S>, count: usize, rng_seed: RngSeed) -> Vec<S> {
     let mut runner = TestRunner::new(Config { rng_seed, failure_persistence: None, ..Config::default() });
     (0..count).map(|_| strategy.new_tree(&mut runner).unwrap().current()).collect()
 }
 
-/// Files that any engine puts together: integers of one width.
+/// Makes files that any engine can combine: integers of one width.
 fn plain(mut sheets: Vec<Sheet>) -> Vec<Sheet> {
     let wide = sheets[0].wide;
     for sheet in &mut sheets {
@@ -44,7 +44,7 @@ fn case((definitions, sheets): (Vec<Definition>, Vec<Sheet>), filters: &[&'stati
     Case { text: toml(&definitions), sheets: plain(sheets), filters: filters.to_vec() }
 }
 
-/// The parts together, and what is left by filters, on an engine; the answers are the native engine's.
+/// Checks that an engine's parts and filters are consistent, and that its answers are those of the native engine.
 fn check_parts(engine: Engine, count: usize, seed: RngSeed) {
     let all = cases((partitions(&TAME), sheets()), count, seed);
     let all: Vec<Case> = all.into_iter().map(|found| case(found, &FILTERS)).collect();
@@ -61,7 +61,7 @@ fn check_parts(engine: Engine, count: usize, seed: RngSeed) {
     assert!(whole * 4 > count * 3, "of {count} cases {whole} have an answer");
 }
 
-/// The contradictions.
+/// The contradictions in an engine's answers.
 fn faults(answers: &[Rows]) -> Vec<String> {
     let [all, filtered @ ..] = answers else { return vec!["no answer".into()] };
     let mut faults = Vec::new();
@@ -93,7 +93,7 @@ fn faults(answers: &[Rows]) -> Vec<String> {
     faults
 }
 
-/// Random definitions: what an engine makes of them is what the native engine makes.
+/// Checks that an engine gives the native engine's answers for random definitions.
 fn check_definitions(engine: Engine, count: usize, seed: RngSeed) {
     let all = cases((definitions(&EVERYWHERE), sheets()), count, seed);
     let all: Vec<Case> = all.into_iter().map(|found| case(found, &[])).collect();
@@ -108,7 +108,7 @@ fn check_definitions(engine: Engine, count: usize, seed: RngSeed) {
     assert!(whole * 2 > count, "of {count} cases {whole} have an answer");
 }
 
-/// A campaign: as many cases as `PROPTEST_CASES` says, others at every time; without it `count`, the same ones.
+/// A campaign: `PROPTEST_CASES` new cases each time; without the variable, the same `count` cases.
 fn soak(count: usize, check: impl Fn(usize, RngSeed)) {
     match std::env::var("PROPTEST_CASES") {
         Ok(count) => check(count.parse().unwrap(), RngSeed::Random),

@@ -1,4 +1,4 @@
-//! The same on Spark, in a process of its own on this machine.
+//! The same queries on Spark, in its own process on this machine.
 
 use proptest::test_runner::RngSeed;
 

@@ -3,7 +3,7 @@
 use crate::author::Vocabulary;
 use crate::differential::words::WORDS;
 
-/// Integers that sums and products of a few of them do not lead out of 64 bits: an overflow is no answer.
+/// Integers so small that sums and products of a few stay within 64 bits, because an overflow gives no answer.
 pub const TAME: Vocabulary = Vocabulary {
     ints: &["mirror_px", "mirror_self_px", "n4"],
     int_literals: &[1, 0, 2, -1, 3, -3, 9, 3_000_000_000],
@@ -11,5 +11,5 @@ pub const TAME: Vocabulary = Vocabulary {
     ..WORDS
 };
 
-/// The same, for definitions in which engines need not agree on which part of a sum overflows.
+/// The same words, for definitions in which engines may overflow at different parts of a sum.
 pub const EVERYWHERE: Vocabulary = TAME;

@@ -1,4 +1,4 @@
-//! CSV, Parquet of any shape, LeRobot and inspect-robots on their way in.
+//! Importing CSV, Parquet of any shape, LeRobot and inspect-robots.
 
 use std::fs;
 #[cfg(feature = "polars")]
@@ -21,7 +21,7 @@ value = "any(success)"
 value = "length()"
 "#;
 
-/// Identity that rows of these tests do not have.
+/// Identity columns that the rows of these tests lack.
 const SET: [&str; 6] = ["--set", "model=act", "--set", "experiment=reach", "--set", "seed=1"];
 
 fn folder() -> tempfile::TempDir {
@@ -34,7 +34,7 @@ fn import<'a>(file: &'a str, more: &[&'a str]) -> Vec<&'a str> {
     [&["import", file, "-o", "x.parquet", "--definitions", "arms.toml"], more].concat()
 }
 
-/// The rows of the trace with these columns, as CSV without the header.
+/// The trace's rows with these columns, as CSV without the header.
 #[cfg(feature = "polars")]
 fn queried(at: &Path, columns: &str) -> Vec<String> {
     let sql = format!("select {columns} from steps order by episode_id, t");
@@ -176,7 +176,7 @@ fn the_folder_of_a_lerobot_data_set_is_imported_with_its_tasks() {
             "0,1,3,true,Push the block,10,so100"
         ]
     );
-    // Another copy has the same ids; one with another frame has others.
+    // Another copy has the same ids. A copy with one different frame has other ids.
     let ids = |name: &str| {
         run(at, &import(name, &SET)).ends(0);
         run(at, &["info", "x.parquet", "--episodes"]).done()

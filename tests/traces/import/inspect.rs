@@ -1,4 +1,4 @@
-//! Logs that Inspect's own package writes, in every form that it has had.
+//! Logs written by Inspect's own package, in every form that it has used.
 
 use std::fs;
 use std::io::{Read as _, Write as _};
@@ -16,7 +16,7 @@ fn import(at: &Path, file: &str, more: &[&str]) -> Answer {
     run(at, &[&["import", file, "-o", "x.parquet", "--definitions", "tools.toml"], more].concat())
 }
 
-/// The rows of the trace with these columns, as CSV without the header.
+/// The trace's rows with these columns, as CSV without the header.
 fn queried(at: &Path, columns: &str) -> Vec<String> {
     let sql = format!("select {columns} from steps order by seed, run, t");
     let asked = ["query", &sql, "x.parquet", "--definitions", "tools.toml", "--format", "csv"];
@@ -83,7 +83,7 @@ fn errors_limits_and_messages_of_pools_are_there() {
     assert_eq!(rows[2], "1,1,3,model,unknown,1 + 2?");
 }
 
-/// The archive with another content of a member.
+/// Copies the archive with changed members.
 fn rewritten(from: &Path, to: &Path, change: impl Fn(&str, Vec<u8>) -> Option<Vec<u8>>) {
     let mut source = zip::ZipArchive::new(fs::File::open(from).unwrap()).unwrap();
     let mut target = zip::ZipWriter::new(fs::File::create(to).unwrap());

@@ -1,4 +1,4 @@
-//! `mirrorstats import` at the process boundary: what becomes a trace, and that nothing else does.
+//! `mirrorstats import` at the process boundary: valid input becomes a trace, and nothing else does.
 
 mod formats;
 #[cfg(feature = "polars")]
@@ -16,7 +16,7 @@ use serde_json::{Value, json};
 use crate::harness::program::run_with_input as run;
 use crate::harness::traces::score_values;
 
-/// A step of an episode of E1 with the required keys alone.
+/// A step of an episode of E1 with only the required keys.
 fn step(episode: &str, t: i64) -> Value {
     json!({
         "episode_id": episode, "model": "mine", "experiment": "E1", "seed": 1, "run": 1, "body_color": "red", "t": t,
@@ -37,7 +37,7 @@ fn lines(steps: &[Value]) -> String {
     steps.iter().flat_map(|step| [step.to_string(), "\n".to_owned()]).collect()
 }
 
-/// The trace that these lines on standard input become, and the answer as JSON.
+/// Imports these lines from standard input; returns the trace and the JSON answer.
 fn imported(text: impl Into<Vec<u8>>) -> (Vec<u8>, Value) {
     let folder = tempfile::tempdir().unwrap();
     let answer = run(folder.path(), &["import", "-", "-o", "x.parquet", "--json"], text);
@@ -47,7 +47,7 @@ fn imported(text: impl Into<Vec<u8>>) -> (Vec<u8>, Value) {
     (fs::read(folder.path().join("x.parquet")).unwrap(), serde_json::from_str(&answer.stdout).unwrap())
 }
 
-/// The scores of a trace, or of a folder of them.
+/// The scores of a trace or of a folder of traces.
 fn scores(folder: &Path, trace: &str) -> Vec<Vec<String>> {
     let answer = run(folder, &["score", trace], "");
     assert_eq!(answer.code, 0, "{}", answer.stderr);
@@ -133,7 +133,7 @@ fn other_keys_become_columns_of_their_own() {
         { "name": "note", "type": "string" }, { "name": "gain", "type": "float" }, { "name": "tries", "type": "int" },
         { "name": "warm", "type": "bool" }, { "name": "never", "type": null }, { "name": "words", "type": "string" },
     ]);
-    // The order of keys is that of the lines, which `json!` keeps.
+    // The keys have the order of the lines, which `json!` keeps.
     assert_eq!(answer["own_columns"], own);
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("x.parquet"), bytes).unwrap();

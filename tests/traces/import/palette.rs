@@ -1,4 +1,4 @@
-//! `import --palette`: the colours declared in the trace, and only those.
+//! `import --palette` declares the colours in the trace, and allows no others.
 
 use std::fs;
 
@@ -7,7 +7,7 @@ use serde_json::json;
 use super::{lines, run, step, step_with};
 use crate::harness::traces::recording;
 
-/// Two steps, of which the second claims this colour; the body's is `red`.
+/// Two steps; the second one claims this colour, and the body is `red`.
 fn claiming(color: &str) -> String {
     lines(&[step("a", 1), step_with("a", 2, json!({ "self_color": color }))])
 }

@@ -1,4 +1,4 @@
-//! Lines that are no steps, steps that are no episodes: said with file, line and key, and nothing is written.
+//! Invalid steps and episodes are refused with file, line and key; no file is written.
 
 use std::fs;
 
@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use super::{lines, run, step, step_with};
 
-/// The refusal of these lines.
+/// The message that refuses these lines.
 #[track_caller]
 fn refused(text: impl Into<Vec<u8>>) -> String {
     let folder = tempfile::tempdir().unwrap();
@@ -19,7 +19,7 @@ fn refused(text: impl Into<Vec<u8>>) -> String {
     answer.stderr
 }
 
-/// That a second step with this value is refused with these words, at its line and key.
+/// Checks that a second step with this value is refused with these words, at its line and key.
 #[track_caller]
 fn check(values: Value, expected: &str, found: &str, help: &str) {
     let key = values.as_object().unwrap().keys().next().unwrap().clone();

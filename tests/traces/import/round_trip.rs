@@ -1,4 +1,4 @@
-//! Traces as JSON lines and back: every value is the same, and so is every score.
+//! Traces as JSON lines and back keep every value and every score.
 
 use std::fs;
 
@@ -10,7 +10,7 @@ use super::{lines, run, scores};
 use crate::harness::files::fixture;
 use crate::harness::traces::{self, episodes};
 
-/// The rows of an episode as a harness would write them, optional keys only where there is a value.
+/// The rows of an episode as a harness would write them; optional keys only if there is a value.
 fn exported(episode: &Episode) -> Vec<Value> {
     let rows = episode.steps.iter().zip(1..).map(|(step, t)| {
         let mut row = Map::new();

@@ -1,4 +1,4 @@
-//! `mirrorstats trace renormalize` at the process boundary: what changes, what stays, what is refused.
+//! `mirrorstats trace renormalize` at the process boundary: changes, unchanged parts, refusals.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -64,7 +64,7 @@ fn colors(path: &Path) -> Vec<Option<String>> {
     texts(path, "self_color")
 }
 
-/// That all columns but the attribution are the same.
+/// Checks that all columns except the attribution are the same.
 fn assert_rest_is_same(old: &Path, new: &Path) {
     let (old, new) = (rows(old), rows(new));
     let names =
@@ -149,8 +149,8 @@ fn flips_are_in_json_and_a_dry_run_writes_nothing() {
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
 }
 
-/// A trace of another writer: several row groups, another codec, dictionaries, a key and types of its own, and an
-/// attribution that may not be null.
+/// A trace of another writer: several row groups, another codec, dictionaries, its own key and types, and a
+/// non-nullable attribution.
 fn foreign(path: &Path, identification: &[Option<&str>]) {
     let n = identification.len();
     let texts = |text: &str| Arc::new(StringArray::from(vec![text; n])) as Arc<dyn Array>;

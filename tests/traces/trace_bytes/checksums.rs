@@ -1,4 +1,4 @@
-//! Traces whose pages have checksums: a flipped bit is refused, or changes no score.
+//! Traces with page checksums: a flipped bit is refused, or changes no score.
 
 use std::fs;
 use std::num::NonZeroUsize;
@@ -23,7 +23,7 @@ fn fixture(name: &str) -> Vec<u8> {
     fs::read(files::fixture("checksums").join(name)).unwrap()
 }
 
-/// The episode table of a file as CSV, if it can be read.
+/// The episode table of a file as CSV, if the file can be read.
 pub(super) fn scores(path: &Path) -> Result<Vec<u8>, String> {
     let traces = TraceSet::open(&[Input::new(path)]).map_err(|error| error.to_string())?;
     let definitions = score_traces::definitions(&traces, &Request::of("paper")).map_err(|error| error.to_string())?;
@@ -34,7 +34,7 @@ pub(super) fn scores(path: &Path) -> Result<Vec<u8>, String> {
     Ok(bytes)
 }
 
-/// The verification of all pages of a file.
+/// Verifies all pages of a file.
 fn verified(path: &Path) -> Result<(), Box<Finding>> {
     let traces = TraceSet::open(&[Input::new(path)]).unwrap();
     match verify_pages(&traces) {
@@ -44,7 +44,7 @@ fn verified(path: &Path) -> Result<(), Box<Finding>> {
     }
 }
 
-/// Numbers in an order of their own, the same ones at every run.
+/// Pseudo-random numbers, the same in every run.
 pub(super) fn draws(count: usize, below: usize) -> impl Iterator<Item = usize> {
     let mut state = 0x2545_f491_4f6c_dd1d_u64;
     (0..count).map(move |_| {
@@ -58,7 +58,7 @@ struct Flipped {
     path: PathBuf,
 }
 
-/// Flips bits of the bytes that `part` picks of each page, and gives each file to `check` with the sound file's scores.
+/// Flips bits in the part of each page that `part` selects, and calls `check` with each file and the sound scores.
 fn flip(name: &str, count: usize, part: fn(&Page) -> (usize, usize), mut check: impl FnMut(&Flipped, &[u8])) {
     let folder = tempfile::tempdir().unwrap();
     let (whole, path) = (fixture(name), folder.path().join("flipped.parquet"));
@@ -106,7 +106,7 @@ fn a_flipped_bit_of_a_page_is_refused_or_not_read() {
     assert!(refused > 300, "{refused}");
 }
 
-/// The checksum does not cover them; what they say is checked against the footer and against the page.
+/// The checksum does not cover headers; their contents are checked against the footer and the page.
 #[test]
 fn a_flipped_bit_of_a_header_is_refused_or_changes_no_score() {
     let mut refused = 0;
@@ -130,7 +130,7 @@ fn every_page_with_a_wrong_checksum_is_found_on_every_way_to_read_it() {
     let path = folder.path().join("flipped.parquet");
     for name in FILES {
         let whole = fixture(name);
-        // The dictionary of a column without a value has no byte.
+        // The dictionary of a column without values is empty.
         for page in pages(&whole).into_iter().filter(|page| page.body < page.end) {
             let mut bytes = whole.clone();
             bytes[page.body] ^= 1;
@@ -140,7 +140,7 @@ fn every_page_with_a_wrong_checksum_is_found_on_every_way_to_read_it() {
             let merged = merge::read(&path).unwrap_err().to_string();
             assert!(merged.contains("CRC-32") && merged.contains(&page.column), "{name}, {page:?}: {merged}");
             if trace::schema::column(&page.column).is_none() {
-                // A column of their own, which `validate` does not read.
+                // A column outside the schema, which `validate` does not read.
                 assert_eq!(page.column, "description");
                 continue;
             }

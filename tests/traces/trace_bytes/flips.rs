@@ -1,4 +1,4 @@
-//! Single flipped bits of traces as this program writes them: each is refused, or changes nothing.
+//! Traces as this program writes them, with single flipped bits: each flip is refused or changes nothing.
 
 use std::fs;
 use std::num::NonZeroUsize;
@@ -21,9 +21,9 @@ struct Counts {
     flips: usize,
     /// `score` refused the file.
     refused: usize,
-    /// Other scores, and no word of it.
+    /// Other scores without an error.
     scores_changed: usize,
-    /// Other values, and `validate` found nothing.
+    /// Other values although `validate` found nothing.
     values_changed: usize,
 }
 
@@ -54,7 +54,7 @@ impl Victim {
         self.flip_beside(None, bits)
     }
 
-    /// The same, with one bit flipped all the time.
+    /// Flips bits one at a time while bit `first` stays flipped.
     fn flip_beside(&self, first: Option<usize>, bits: impl IntoIterator<Item = usize>) -> Counts {
         let mut counts = Counts::default();
         let mut bytes = self.whole.clone();
@@ -90,7 +90,7 @@ fn recorded() -> Vec<u8> {
     fs::read(fixture("recorded/E1-guesser.parquet")).unwrap()
 }
 
-/// The trace as versions before checksums wrote it.
+/// The trace as written by versions before checksums.
 fn unchecked() -> Vec<u8> {
     let columns = OptionalColumns::used_by(&episodes());
     encoded(
@@ -109,7 +109,7 @@ fn a_flipped_bit_is_refused_or_changes_nothing() {
     }
 }
 
-/// The place of some bytes in a footer.
+/// The position of some bytes in a file's footer.
 fn place(whole: &[u8], bytes: &[u8]) -> usize {
     whole.windows(bytes.len()).rposition(|window| window == bytes).unwrap()
 }
@@ -124,13 +124,13 @@ fn a_flipped_bit_of_each_byte_of_the_footer_is_refused_or_changes_nothing() {
     assert_eq!(counts.refused, counts.flips, "{counts:?}");
 }
 
-/// The name of the program decides nothing alone: with damage to it a file is refused, whatever else is damaged.
+/// The program's name alone decides nothing: if it is damaged, the file is refused, whatever else is damaged.
 #[test]
 fn a_flipped_bit_of_the_name_of_the_program_switches_no_checksum_off() {
     let victim = Victim::new(trace());
     let by = place(&victim.whole, b"mirrorstats version ");
     let key = place(&victim.whole, b"mirrorstats.checksums");
-    // A letter of either, the type and the length of the field before it.
+    // A letter of either, and the type and length of the field before it.
     for byte in [by - 2, by - 1, by, by + 7, by + 19, key, key + 15] {
         let first = byte * 8 + byte % 8;
         let others = draws(60, victim.bits()).filter(|bit| *bit != first).chain([by * 8 + 70, key * 8 + 90]);
@@ -140,7 +140,7 @@ fn a_flipped_bit_of_the_name_of_the_program_switches_no_checksum_off() {
     }
 }
 
-/// The same flips do change scores and values where there are no checksums: the test can fail.
+/// Without checksums the same flips do change scores and values, so the test can fail.
 #[test]
 fn without_checksums_flipped_bits_pass() {
     let victim = Victim::new(unchecked());

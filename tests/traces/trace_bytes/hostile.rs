@@ -1,7 +1,7 @@
-//! Files that declare more than their bytes hold: refused soon and in little memory, with what is wrong with them.
+//! Files that declare more than their bytes hold are refused soon, in little memory, with the reason.
 //!
-//! The limits are the operating system's: a child that needs more time or memory is ended by a signal, or cannot start
-//! threads, and its exit code is another one.
+//! The operating system enforces the limits. A child that exceeds them is killed by a signal or cannot start threads,
+//! which changes its exit code.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -24,12 +24,12 @@ const MEMORY: u32 = 512 << 10;
 /// Runs the program on a file within the limits.
 fn run(arguments: &[&str], file: &Path) -> (Option<i32>, String) {
     let mut command = limited(file.parent().unwrap(), &format!("ulimit -t {SECONDS} && ulimit -v {MEMORY}"));
-    // Each thread of the allocator's would reserve memory that nobody uses.
+    // Otherwise each thread's arena would reserve memory that is never used.
     let output = command.args(arguments).arg(file).env("MALLOC_ARENA_MAX", "1").output().unwrap();
     (output.status.code(), told(&output))
 }
 
-/// Every command that reads traces refuses the file, and says this.
+/// Checks that every command that reads traces refuses the file with these words.
 fn refused(name: &str, bytes: &[u8], said: &str) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("hostile.parquet");
@@ -50,7 +50,7 @@ fn file(folder: &Path, compression: Compression) -> Vec<u8> {
     stored(folder, WriterProperties::builder().set_writer_version(version).set_compression(compression))
 }
 
-/// The file with another page in place of each data page of `t`, or of its dictionary.
+/// Replaces each data page of `t`, or its dictionary.
 fn with_page(whole: &[u8], dictionary: bool, make: impl Fn(&Page, &[u8]) -> Vec<u8>) -> Vec<u8> {
     let change = |page: &Page, bytes: &[u8]| {
         if page.column == "t" && page.dictionary == dictionary {
@@ -62,9 +62,9 @@ fn with_page(whole: &[u8], dictionary: bool, make: impl Fn(&Page, &[u8]) -> Vec<
     rebuild(whole, change, |footer| footer)
 }
 
-/// A field that Parquet does not know: 2^31 - 1 elements of a type.
+/// A field unknown to Parquet: a list of 2^31 - 1 elements of a type.
 fn huge(element: u8) -> Vec<u8> {
-    // Type list, its number in full: 20; then the size and type of its elements.
+    // The field's type, list, and its full number, 20; then the elements' type and their number.
     vec![0x09, 40, 0xf0 | element, 0xff, 0xff, 0xff, 0xff, 0x07]
 }
 
@@ -162,7 +162,7 @@ fn counts_that_no_bytes_hold_are_refused() {
     }
 }
 
-/// Levels and keys of 2^31 - 1 rows in some bytes, and a footer that says the same: sound, but for where the rows are.
+/// A few bytes with levels and keys for 2^31 - 1 rows, and a matching footer: consistent, but the rows do not exist.
 #[test]
 fn runs_of_two_thousand_million_rows_are_refused() {
     let folder = tempfile::tempdir().unwrap();
@@ -177,7 +177,7 @@ fn runs_of_two_thousand_million_rows_are_refused() {
         [Header { values: most, ..header(&body, 8) }.bytes(&[]), body.clone()].concat()
     };
     refused("everywhere", &rebuild(&whole, all, |footer| with_rows(&footer, most)), "corrupt-footer");
-    // Where the footer has the 18 rows that there are.
+    // The footer has the actual 18 rows.
     let one = with_page(&whole, false, |_, _| [header(&body, 8).bytes(&[]), body.clone()].concat());
     refused("in a page of 18", &one, "corrupt-data");
     assert!(pages(&whole).iter().any(|page| page.dictionary), "there are dictionaries");

@@ -1,4 +1,4 @@
-//! Levels, keys and counts that contradict each other: refused on both paths, the short cut's and the library's.
+//! Levels, keys and counts that contradict each other are refused by both the short cut and the library.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use parquet::file::properties::{WriterProperties, WriterVersion};
 use crate::trace_bytes::pages::{Header, Page, pages, patched, rebuild, with_rows};
 use crate::trace_bytes::{read, stored};
 
-/// The form of a file: the version of its pages, and whether there are dictionaries.
+/// The form of a file: its page version, and whether it has dictionaries.
 #[derive(Clone, Copy, Debug)]
 struct Form {
     version: WriterVersion,
@@ -35,7 +35,7 @@ fn page(file: &[u8], column: &str) -> Page {
     pages(file).into_iter().find(|page| page.column == column && !page.dictionary).unwrap()
 }
 
-/// The start of a page's levels: behind their length in a page of version 1.
+/// The start of a page's levels; in a page of version 1 they follow their length.
 fn levels(form: Form, page: &Page) -> usize {
     page.body + if form.version == WriterVersion::PARQUET_1_0 { 4 } else { 0 }
 }
@@ -46,7 +46,7 @@ fn a_level_above_its_maximum_is_refused() {
     for form in FORMS {
         let whole = file(folder.path(), form);
         assert_eq!(read(folder.path(), &whole), Some(18), "{form:?}");
-        // Columns without nulls: one run of ones.
+        // Columns without nulls have one run of ones.
         for column in ["episode_id", "t", "action", "mirror_visible", "mirror_px", "cost_usd"] {
             let at = levels(form, &page(&whole, column));
             assert_eq!(whole[at..at + 2], [18 << 1, 1], "{form:?}, {column}");
@@ -85,7 +85,7 @@ fn keys_beyond_the_dictionary_and_wide_ones_are_refused() {
                 assert!(refused, "{form:?}, {column}: keys of {other} bits");
             }
         }
-        // `model` has one text: its keys are a run of zeros of no or one bit.
+        // `model` has one text, so its keys are one run of zeros, of no or one bit.
         let keys = levels(form, &page(&whole, "model")) + 2;
         let run = whole[keys + 1..].iter().position(|byte| *byte == 18 << 1).unwrap() + keys + 1;
         for (at, byte) in [(run, 17 << 1), (run, 19 << 1), (run, 0x7e)] {
@@ -99,7 +99,7 @@ fn keys_beyond_the_dictionary_and_wide_ones_are_refused() {
     }
 }
 
-/// Levels of a column that has none may be there in a page of version 2; they are 0.
+/// A page of version 2 may have repetition levels in a flat column; they must be 0.
 #[test]
 fn repetition_levels_of_flat_columns_are_zeros() {
     let folder = tempfile::tempdir().unwrap();
@@ -118,7 +118,7 @@ fn repetition_levels_of_flat_columns_are_zeros() {
         )
     };
     assert_eq!(read(folder.path(), &with(&[])), Some(18));
-    // A run of 18 numbers of no bits; as some writers had it.
+    // A run of 18 numbers of no bits, as some writers wrote it.
     assert_eq!(read(folder.path(), &with(&[18 << 1])), Some(18));
     assert_eq!(read(folder.path(), &with(&[18 << 1, 0])), Some(18));
     for wrong in [&[17 << 1][..], &[19 << 1], &[18 << 1, 1], &[18 << 1, 192], &[255, 255]] {
@@ -126,7 +126,7 @@ fn repetition_levels_of_flat_columns_are_zeros() {
     }
 }
 
-/// A page of version 2 of 18 rows, not compressed, with repetition levels before its own levels.
+/// An uncompressed page of version 2 with 18 rows, and with repetition levels before its own levels.
 fn repeated(header: &[u8], body: &[u8], levels: &[u8]) -> Vec<u8> {
     assert_eq!(header[0], 0x15, "a header starts with its kind");
     let size = body.len() + levels.len();
@@ -140,7 +140,7 @@ fn repeated(header: &[u8], body: &[u8], levels: &[u8]) -> Vec<u8> {
     for number in [18, 0, 18, 8, 2, levels.len()] {
         int(&mut out, number);
     }
-    // Not compressed.
+    // The page is not compressed.
     out.extend([0x12, 0, 0]);
     out.extend(levels);
     out.extend(body);

@@ -1,4 +1,4 @@
-//! Whatever happens to the bytes of a trace, reading it gives a finding or sound episodes: never a panic or a hang.
+//! Whatever happens to a trace's bytes, reading gives a finding or sound episodes, and never panics or hangs.
 
 use std::fs;
 use std::num::NonZeroUsize;
@@ -60,7 +60,7 @@ fn encoded(mut encoder: TraceEncoder<Vec<u8>>, episodes: &[Episode]) -> Vec<u8> 
     encoder.finish().unwrap()
 }
 
-/// The same rows as another writer may store them: not compressed, newer pages, no dictionaries, two row groups.
+/// The same rows as another writer may store them: uncompressed, newer pages, no dictionaries, two row groups.
 fn foreign(folder: &Path) -> Vec<u8> {
     let path = folder.join("whole.parquet");
     fs::write(&path, trace()).unwrap();
@@ -77,7 +77,7 @@ fn foreign(folder: &Path) -> Vec<u8> {
     writer.into_inner().unwrap()
 }
 
-/// The same rows with these properties, every column of which may be null.
+/// The same rows with these properties, and with all columns nullable.
 fn stored(folder: &Path, properties: WriterPropertiesBuilder) -> Vec<u8> {
     stored_as(folder, &trace(), properties)
 }
@@ -96,7 +96,7 @@ fn stored_as(folder: &Path, trace: &[u8], properties: WriterPropertiesBuilder) -
     writer.into_inner().unwrap()
 }
 
-/// Reads the bytes in both ways; how many steps a scan delivers, if it does.
+/// Validates and scans the bytes; returns the number of steps if the scan succeeds.
 fn read(folder: &Path, bytes: &[u8]) -> Option<u64> {
     let input = Input::new(folder.join("damaged.parquet"));
     fs::write(&input.path, bytes).unwrap();
@@ -114,7 +114,7 @@ fn read(folder: &Path, bytes: &[u8]) -> Option<u64> {
         Ok(steps)
     });
     match scanned {
-        // What a scan accepts, validation does too.
+        // Validation accepts what a scan accepts.
         Ok(steps) => {
             assert_eq!(validation.count(Severity::Error), 0, "{:?}", validation.findings);
             Some(steps)
@@ -123,7 +123,7 @@ fn read(folder: &Path, bytes: &[u8]) -> Option<u64> {
     }
 }
 
-/// Every `stride`-th byte changed in some ways.
+/// Changes every `stride`-th byte in some ways.
 fn flip_bytes(folder: &Path, whole: &[u8], stride: usize) {
     let mut refused = 0;
     for at in (0..whole.len()).step_by(stride) {

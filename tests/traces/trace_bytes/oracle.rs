@@ -1,5 +1,5 @@
-//! The Parquet library's own reader as the yardstick: where it refuses bytes they are refused, and what is read is what
-//! it reads.
+//! The Parquet library's own reader as the reference: bytes that it refuses are refused, and values are those that it
+//! reads.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -26,7 +26,7 @@ use crate::trace_bytes::stored;
 /// The values of each column as text.
 type Values = BTreeMap<String, Vec<Option<String>>>;
 
-/// Columns of texts and integers of any width say the same.
+/// Adds a column's values; text encodings and integer widths make no difference.
 fn add(values: &mut Values, name: &str, column: &ArrayRef) {
     let wide = match column.data_type() {
         DataType::Dictionary(_, _) => cast(column, &DataType::Utf8).unwrap(),
@@ -73,7 +73,7 @@ fn scan(path: &Path) -> Option<Values> {
     Some(values)
 }
 
-/// Flips bits of column data and of the footer; nothing has a checksum.
+/// Flips bits of column data and of the footer, in files without checksums.
 fn compare(version: WriterVersion, dictionaries: bool, codec: Compression, stride: usize) {
     let folder = tempfile::tempdir().unwrap();
     let properties = WriterProperties::builder().set_writer_version(version).set_dictionary_enabled(dictionaries);

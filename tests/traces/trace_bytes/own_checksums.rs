@@ -1,4 +1,4 @@
-//! The checksums that traces of this program carry: what they cover, whose they are, and what is refused.
+//! The checksums of this program's traces: what they cover, who wrote them, and what is refused.
 
 use std::fs;
 use std::num::NonZeroUsize;
@@ -40,7 +40,7 @@ fn stated(file: &[u8]) -> Value {
     serde_json::from_str(pairs.iter().find(|pair| pair.key == KEY).unwrap().value.as_ref().unwrap()).unwrap()
 }
 
-/// The same rows as another program writes them that keeps what is in the footer, but for what `change` does.
+/// Writes the same rows as another program that keeps the footer's keys, except for `change`.
 fn again(path: &Path, to: &Path, created_by: &str, change: impl Fn(&mut KeyValue)) {
     let reader = reader(path);
     let mut pairs = reader.metadata().file_metadata().key_value_metadata().unwrap().clone();
@@ -100,7 +100,7 @@ fn every_way_to_read_a_column_checks_its_chunk() {
     }
 }
 
-/// Columns that `validate` does not decode are checked too.
+/// `validate` also checks columns that it does not decode.
 #[test]
 fn a_column_that_the_schema_does_not_know_is_checked() {
     let folder = tempfile::tempdir().unwrap();
@@ -119,7 +119,7 @@ fn a_column_that_the_schema_does_not_know_is_checked() {
     assert!(told.contains("corrupt-data") && told.contains("`mood`") && told.contains("CRC-32"), "{told}");
 }
 
-/// Columns that are too large to be held are summed before the first of their rows is given.
+/// A column too large for memory is checksummed before its first rows are returned.
 #[test]
 fn nothing_of_a_large_column_is_given_before_it_is_checked() {
     let folder = tempfile::tempdir().unwrap();
@@ -187,7 +187,7 @@ fn checksums_that_another_program_carried_along_do_not_apply() {
         [(Code::StaleChecksums, Severity::Note)]
     );
     assert_eq!(findings(&own), []);
-    // Put together anew it is this program's own.
+    // After writing it again, the file is this program's own.
     let anew = folder.path().join("anew.parquet");
     merge::write(&anew, None, &merge::read(&other).unwrap()).unwrap();
     assert_eq!((state(&anew), findings(&anew)), (Checksums::Present, Vec::new()));
@@ -206,7 +206,7 @@ fn a_file_without_checksums_is_read_as_before() {
     assert!(findings(&path).iter().all(|finding| finding.code == Code::SplitEpisode));
 }
 
-/// Copied bytes that are damaged must not get checksums.
+/// Damaged bytes must not be copied and get checksums.
 #[test]
 fn a_damaged_trace_is_not_renormalized() {
     let folder = tempfile::tempdir().unwrap();
@@ -261,20 +261,20 @@ fn invalid_checksums_are_refused() {
         assert!(found[0].to_string().contains(expected), "{value:?}: {}", found[0]);
         assert!(merge::read(&other).is_err());
     }
-    // Sound as they are, they are those of other bytes.
+    // The bytes are sound, but the checksums belong to other bytes.
     again(&own, &other, &created_by, |_| ());
     let found = TraceFile::open(&Input::new(&other)).unwrap_err();
     assert_eq!(found[0].code, Code::CorruptFooter, "{}", found[0]);
 }
 
-/// A number of a field of the footer that no reader knows hides all keys, `created_by` among them.
+/// An unknown field number in the footer hides all keys, including `created_by`.
 #[test]
 fn keys_that_damage_hides_are_missed() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("hidden.parquet");
     let mut bytes = trace();
     let start = bytes.len() - 8 - u32::from_le_bytes(*bytes[bytes.len() - 8..].first_chunk().unwrap()) as usize;
-    // The list of keys: one field on, a list of structures, of three; the first one begins with its key.
+    // The list of keys: next field, a list of three structures; the first one begins with its key.
     let head = [&[0x19, 0x3c, 0x18, 26][..], b"mirrorstats.schema_version"].concat();
     let place = start + bytes[start..].windows(head.len()).position(|window| window == head).unwrap();
     bytes[place] = 0x99;
@@ -318,7 +318,7 @@ fn scores_carry_checksums_too() {
     }
 }
 
-/// The rows of an episode with another value, as a program may write them that knows of no hash.
+/// An episode's rows with a changed value, as written by a program that does not know the hash.
 #[test]
 fn an_episode_whose_rows_are_not_those_of_its_hash_is_refused() {
     let folder = tempfile::tempdir().unwrap();
@@ -341,7 +341,7 @@ fn an_episode_whose_rows_are_not_those_of_its_hash_is_refused() {
     let found = replaced("action", Arc::new(StringArray::from(actions)));
     assert_eq!(found.iter().map(|finding| finding.code).collect::<Vec<_>>(), [Code::CorruptData; 3]);
     assert_eq!((found[1].episode.as_deref(), found[1].column.as_deref()), (Some("e1"), Some("episode_hash")));
-    // Without the hash nothing is known; written as it was, all is well.
+    // Without the hash the change is not detected; with the original rows all is well.
     let none = vec![None::<&str>; rows.num_rows()];
     assert_eq!(replaced("episode_hash", Arc::new(StringArray::from(none))), []);
     traces::write_rows(&path, std::slice::from_ref(&rows), None);
@@ -352,7 +352,7 @@ fn an_episode_whose_rows_are_not_those_of_its_hash_is_refused() {
     set.scan(&everything, NonZeroUsize::MIN, |_| Ok::<_, TraceError>(()), |()| Ok(())).unwrap();
 }
 
-/// Types that other programs choose, and columns without a value, are the same rows.
+/// Rows are the same with types that other programs choose, and with or without columns that have no values.
 #[test]
 fn the_hash_of_an_episode_does_not_depend_on_how_it_is_stored() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! Parquet files taken apart into pages, and put together again around changed ones.
+//! Takes Parquet files apart into pages, and rebuilds them with changed pages.
 
 use std::sync::{Arc, Mutex};
 
@@ -11,20 +11,20 @@ use parquet::file::metadata::{
 use parquet::file::reader::{ChunkReader, Length};
 use parquet::file::serialized_reader::SerializedPageReader;
 
-/// A page as it is stored.
+/// A stored page.
 #[derive(Clone, Debug)]
 pub struct Page {
     pub row_group: usize,
     pub column: String,
-    /// True for a dictionary: the first of two pages or more.
+    /// True for a dictionary, which is the first of at least two pages.
     pub dictionary: bool,
-    /// Its start in the file, and the start of its bytes after the header.
+    /// The positions in the file of its start, and of its bytes after the header.
     pub offset: usize,
     pub body: usize,
     pub end: usize,
 }
 
-/// Notes which bytes a reader takes for those of pages.
+/// Records which bytes a reader takes for pages.
 struct Watched(Bytes, Arc<Mutex<Vec<(usize, usize)>>>);
 
 impl Length for Watched {
@@ -72,7 +72,7 @@ pub fn pages(file: &[u8]) -> Vec<Page> {
     found
 }
 
-/// The file with each page, header and all, as `change` has it, and the footer as `last` has it.
+/// Rebuilds the file; `change` gives each page with its header, `last` the footer.
 pub fn rebuild(
     file: &[u8],
     change: impl Fn(&Page, &[u8]) -> Vec<u8>,
@@ -131,7 +131,7 @@ pub fn with_rows(metadata: &ParquetMetaData, rows: i64) -> ParquetMetaData {
     ParquetMetaDataBuilder::new(about).set_row_groups(groups).build()
 }
 
-/// The header of a page in Thrift's compact protocol, with numbers as they are wanted.
+/// A page header in Thrift's compact protocol, with arbitrary numbers.
 #[derive(Clone, Copy, Debug)]
 pub struct Header {
     /// 0 for a data page, 2 for a dictionary.
@@ -143,13 +143,13 @@ pub struct Header {
 }
 
 impl Header {
-    /// The header, with these fields behind its own.
+    /// The header's bytes, with these fields after its own.
     pub fn bytes(self, behind: &[u8]) -> Vec<u8> {
         let mut out = Vec::new();
         for number in [self.kind, self.whole, self.stored] {
             int(&mut out, number);
         }
-        // The structure of the kind: field 5 or 7, two or four behind the third.
+        // The structure of the kind: field 5 or 7, two or four after the third.
         out.push(if self.kind == 0 { 0x2c } else { 0x4c });
         int(&mut out, self.values);
         int(&mut out, self.encoding);

@@ -1,4 +1,4 @@
-//! Files without checksums: their values against the statistics of the footer, and copies with checksums.
+//! Files without checksums: values compared with the footer's statistics, and copies with checksums.
 
 use std::fs;
 use std::num::NonZeroUsize;
@@ -26,7 +26,7 @@ fn faults(path: &Path) -> Vec<Finding> {
     found.into_iter().filter(|finding| finding.severity == Severity::Error).collect()
 }
 
-/// The file with the last value of `mirror_px`, 6, replaced by another one.
+/// The file with the last value of `mirror_px`, which is 6, replaced.
 fn with_last(whole: &[u8], value: i32) -> Vec<u8> {
     let bytes = |last: i32| (0..6).chain([last]).flat_map(i32::to_le_bytes).collect::<Vec<_>>();
     let at = whole.windows(28).position(|window| window == bytes(6)).unwrap();
@@ -40,7 +40,7 @@ fn a_value_that_the_statistics_do_not_allow_is_refused() {
     let whole = plain(folder.path(), EnabledStatistics::Chunk);
     fs::write(&path, with_last(&whole, 6)).unwrap();
     assert_eq!(faults(&path), []);
-    // Beyond the greatest value; and one that leaves no row with it.
+    // Values outside the range, and one within it that leaves the maximum unused.
     for value in [7, 1 << 20, -1, 4] {
         fs::write(&path, with_last(&whole, value)).unwrap();
         let found = faults(&path);
@@ -50,11 +50,11 @@ fn a_value_that_the_statistics_do_not_allow_is_refused() {
                 && finding.expected.contains("as the statistics of the footer say")
         };
         assert!(found.iter().any(is_told), "{value}: {found:?}");
-        // Whoever does not read the column is not kept from the others.
+        // A command that does not read the column still works.
         run(folder.path(), &["score", "a.parquet"]).done();
         run(folder.path(), &["score", "a.parquet", "--where", "any(mirror_px > 100)"]).refused();
     }
-    // Without statistics nothing tells.
+    // Without statistics the change is not detected.
     fs::write(&path, with_last(&plain(folder.path(), EnabledStatistics::None), 4)).unwrap();
     assert_eq!(faults(&path), []);
 }
@@ -72,7 +72,7 @@ fn a_sealed_copy_has_the_same_rows_and_checksums() {
         assert_eq!((rows(&sealed), episodes(&sealed)), (rows(&path), episodes(&path)));
         let scores = |name: &str| run(at, &["score", name]).done();
         assert_eq!(scores("sealed.parquet"), scores("a.parquet"));
-        // The change that nothing told of before.
+        // A change that was not detected before.
         fs::write(&sealed, with_byte_changed(&fs::read(&sealed).unwrap())).unwrap();
         assert!(!faults(&sealed).is_empty());
     }

@@ -1,4 +1,4 @@
-//! Texts that are UTF-8 together and not one by one.
+//! Texts that are valid UTF-8 together but not individually.
 
 use parquet::basic::{Compression, Encoding};
 use parquet::file::properties::{WriterProperties, WriterVersion};
@@ -7,8 +7,7 @@ use trace::episode::{Episode, Extra, Step};
 use crate::harness::traces;
 use crate::trace_bytes::{read, stored_as, trace_of};
 
-/// Two texts of which a character's first byte ends one and its second byte begins the other: the Parquet library looks at
-/// all bytes of a page at once, and takes them.
+/// A character split between two texts. The Parquet library checks all bytes of a page at once and accepts them.
 #[test]
 fn a_character_in_two_halves_is_refused() {
     let step =

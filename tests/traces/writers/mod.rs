@@ -1,5 +1,5 @@
-//! Traces as seven other programs write them, in their codecs, versions of pages, dictionaries and sizes around those of
-//! groups: none is refused, every score is that of our own file, and every verb says the same of both.
+//! Traces written by seven other programs, with their codecs, page versions, dictionaries and row counts around group
+//! sizes. All are accepted, with the scores and the output of every verb equal to those of our own file.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -21,7 +21,7 @@ use crate::harness::need;
 use crate::harness::program::{clean, program, run, succeeds};
 use crate::harness::traces::{rows, score_values, write_rows};
 
-/// The files of each writer, at least.
+/// The minimum number of files from each writer.
 const WRITERS: [(&str, usize); 7] = [
     ("pyarrow", 80),
     ("duckdb", 70),
@@ -32,7 +32,7 @@ const WRITERS: [(&str, usize); 7] = [
     ("java", 80),
 ];
 
-/// Questions to traces with equal answers for all files that have the same rows.
+/// Commands whose output is equal for all files with the same rows.
 const SAME: [&[&str]; 12] = [
     &["score", "trace.parquet"],
     &["score", "trace.parquet", "--engine", "polars"],
@@ -48,9 +48,9 @@ const SAME: [&[&str]; 12] = [
     &["report", "trace.parquet", "--no-figures", "--out", "report"],
 ];
 
-/// Questions about the file itself.
+/// Commands about the file itself.
 const OF_THE_FILE: [&[&str]; 5] = [
-    // It says what design the footer declares.
+    // The output states the design from the footer.
     &["stats", "trace.parquet"],
     &["info", "trace.parquet"],
     &["validate", "trace.parquet"],
@@ -58,7 +58,7 @@ const OF_THE_FILE: [&[&str]; 5] = [
     &["view", "trace.parquet", "--export", "page"],
 ];
 
-/// The matrix: each file with the trace of our own that has its rows.
+/// All written files, each with our own trace of the same rows.
 fn written(folder: &Path) -> BTreeMap<PathBuf, PathBuf> {
     let packages = std::env::join_paths([need::writers(), need::spark()]).unwrap();
     let mut command = clean(std::process::Command::new(need::python()), folder);
@@ -89,7 +89,7 @@ fn scores_by(path: &Path, definitions: &str) -> Result<Vec<Vec<String>>, Box<Stu
     Ok(score_values(&String::from_utf8(bytes).unwrap()))
 }
 
-/// The refusal of a file, or the difference of its scores.
+/// The error for a file, or the difference of its scores.
 fn fault(path: &Path, own: &[Vec<String>]) -> Option<String> {
     match scores(path) {
         Err(error) => return Some(error.to_string()),
@@ -105,7 +105,7 @@ fn of_writer<'a>(files: &'a BTreeMap<PathBuf, PathBuf>, writer: &str) -> Vec<(&'
     files.keys().filter(is_of).map(|path| (path.as_path(), files[path].as_path())).collect()
 }
 
-/// pyarrow copies the footer's keys when it writes a trace again, our checksums among them.
+/// When pyarrow rewrites a trace, it copies the footer's keys, including our checksums.
 #[test]
 fn a_trace_that_another_program_wrote_again_is_read_and_every_verb_says_so() {
     let folder = tempfile::tempdir().unwrap();
@@ -131,7 +131,7 @@ fn a_trace_that_another_program_wrote_again_is_read_and_every_verb_says_so() {
         let told = String::from_utf8(if words[0] == "validate" { answer.stdout } else { answer.stderr }).unwrap();
         let says_so =
             told.contains("trace.parquet: another program wrote the rows again") || told.contains("stale-checksums");
-        // What cannot be done with this trace is refused before.
+        // Commands that cannot work on this trace are refused earlier.
         assert_eq!(says_so, reads, "{words:?}: {told}");
     }
     let answer = run(at, &["stats", "trace.parquet", "--json"]).json();
@@ -148,7 +148,7 @@ fn traces_without_checksums_are_counted() {
     for (name, from) in [("one.parquet", 0), ("two.parquet", rows.num_rows() / 2)] {
         let ids = rows.column_by_name("episode_id").unwrap();
         let text = |row: usize| array_value_to_string(ids, row).unwrap();
-        // Whole episodes, from the first on, or from the last.
+        // A whole episode: the first or the last one.
         let wanted = text(if from == 0 { 0 } else { rows.num_rows() - 1 });
         let first = (0..rows.num_rows()).find(|row| text(*row) == wanted).unwrap();
         let count = (first..rows.num_rows()).take_while(|row| text(*row) == wanted).count();
@@ -163,7 +163,7 @@ fn traces_without_checksums_are_counted() {
     let words = "one.parquet and one other file: no checksums";
     assert!(answer.stderr.contains(words), "{}", answer.stderr);
     assert!(answer.json()["warnings"].to_string().contains(words));
-    // Our own have them.
+    // Our own files have checksums.
     let own = fixture("paper").display().to_string();
     assert!(!run(at, &["trace", "validate", &own]).stdout.contains("no checksums"));
 }
@@ -190,7 +190,7 @@ fn files_of_other_writers_score_as_our_own() {
     }
 }
 
-/// Runs every verb on a file of this writer, and on our own.
+/// Runs every verb on a file of this writer and on our own.
 fn verbs_say_the_same(folder: &Path, writer: &str, files: &[(&Path, &Path)]) {
     let is_sample = |name: &str| ["503", "504", "505", "1023", "1025"].iter().any(|size| name.starts_with(size));
     let sample = files.iter().find(|(_, own)| is_sample(own.file_name().unwrap().to_str().unwrap()));
@@ -219,12 +219,12 @@ fn verbs_say_the_same(folder: &Path, writer: &str, files: &[(&Path, &Path)]) {
     }
     for file in ["figure.svg", "report/cells.csv", "report/tables/main.md", "again/cells.csv"] {
         let [theirs, own] = folders.each_ref().map(|folder| fs::read(folder.join(file)));
-        // Only the other file's report is made again.
+        // Only the other file's report is made a second time.
         assert!(theirs.is_ok() && (theirs.ok() == own.ok() || file.starts_with("again")), "{writer}: {file}");
     }
 }
 
-/// Bytes changed one at a time in files without checksums: how many change scores without a word is stated in benches/SOAK.md.
+/// Changes bytes one at a time in files without checksums. benches/SOAK.md states how many change scores unnoticed.
 #[test]
 #[ignore = "thousands of changes of files by pyarrow; make soak"]
 fn soak_changed_bytes_of_files_without_checksums_are_counted() {

@@ -1,6 +1,6 @@
-//! A query's rows, batch by batch as they are computed: into CSV, JSON lines, Parquet, or the head and tail of a table.
+//! A query's rows, written batch by batch: as CSV, JSON lines, Parquet, or the head and tail of a table.
 //!
-//! Rule: rows come in the order of the query; what is null stays apart from what is empty.
+//! Rule: rows come in the order of the query; null and empty stay distinct.
 
 use std::collections::VecDeque;
 use std::io::Write;
@@ -21,7 +21,7 @@ use super::statement::{Asked, Checked, Table};
 use toml_spec::Faults;
 use trace::catch_panic::contained_on_all_threads;
 
-/// Rows of one batch at most.
+/// The most rows of one batch.
 const BATCH: NonZeroUsize = NonZeroUsize::new(1 << 17).expect("not zero");
 
 /// An error of a query.
@@ -33,12 +33,12 @@ pub enum QueryError {
     Polars(#[from] PolarsError),
 }
 
-/// The formats that are written as they come.
+/// The formats that are written in a stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
-    /// Comma-separated with a header; null is empty, an empty text `""`.
+    /// Comma-separated, with a header; null is empty, an empty text is `""`.
     Csv,
-    /// A JSON object a line.
+    /// One JSON object per line.
     JsonLines,
     Parquet,
 }
@@ -128,7 +128,7 @@ fn sql_type(ty: &DataType) -> &'static str {
     }
 }
 
-/// The value of a subquery: the value of its only row, null without a row, or true if it has a row.
+/// The value of a subquery: the value of its only row, or null without a row. `EXISTS` gives true if there is a row.
 fn scalar(context: &mut SQLContext, query: &Query, asked: rewrite::Asked) -> Result<Value, PolarsError> {
     let found = run::collect(run::plan(context, &query.to_string())?)?;
     if asked == rewrite::Asked::Exists {
@@ -148,7 +148,7 @@ fn scalar(context: &mut SQLContext, query: &Query, asked: rewrite::Asked) -> Res
         AnyValue::Boolean(value) => Ok(Value::Boolean(value)),
         AnyValue::String(text) => Ok(Value::SingleQuotedString(text.to_owned())),
         AnyValue::StringOwned(text) => Ok(Value::SingleQuotedString(text.to_string())),
-        // With every digit.
+        // All digits.
         AnyValue::Float64(value) => Ok(Value::Number(format!("{value:?}"), false)),
         AnyValue::Float32(value) => Ok(Value::Number(format!("{value:?}"), false)),
         value if value.is_integer() => Ok(Value::Number(value.to_string(), false)),
@@ -179,7 +179,7 @@ pub fn write(frame: LazyFrame, format: Format, out: impl Write + Send + 'static)
     }
 }
 
-/// The first and last rows, `most` together; all of them where there is no limit.
+/// The first and last rows, `most` together; all rows without a limit.
 pub fn excerpt(frame: LazyFrame, most: Option<usize>) -> Result<Excerpt, PolarsError> {
     let mut frame = frame;
     let schema = frame.collect_schema()?;
@@ -224,7 +224,7 @@ fn cells(batch: &DataFrame, row: usize) -> Result<Vec<Option<String>>, PolarsErr
     batch.columns().iter().map(|column| Ok(cell(column.get(row)?))).collect()
 }
 
-/// Runs a frame and does something with each batch, in order; gives what the batches went into.
+/// Runs a frame and passes each batch to `work`, in order; returns `into`.
 fn each<T: Send + 'static>(
     frame: LazyFrame,
     into: T,
@@ -241,8 +241,8 @@ fn each<T: Send + 'static>(
         Ok(failed.is_some())
     };
     match run_into(frame.clone(), receive.clone()) {
-        // `SELECT COUNT(*)` over several files, which Polars adds up in a type that it was not built with. It stops
-        // before the first batch; with every column read there is no such sum.
+        // Polars sums `SELECT COUNT(*)` over several files in a type that this build lacks. It fails before the first
+        // batch; reading every column avoids the sum.
         Err(PolarsError::Failed(words)) if words.contains("UInt128") => {
             run_into(frame.with_projection_pushdown(false), receive)?;
         }
@@ -256,7 +256,7 @@ fn each<T: Send + 'static>(
     }
 }
 
-/// Runs a frame, its batches in order to `receive`, which says whether it has had enough.
+/// Runs a frame and passes its batches in order to `receive`, which returns true to stop.
 fn run_into(
     frame: LazyFrame,
     receive: impl Fn(DataFrame) -> PolarsResult<bool> + Send + Sync + 'static,

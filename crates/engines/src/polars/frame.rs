@@ -1,4 +1,4 @@
-//! Traces as one lazy frame: the same columns of the same types from every file, null where a file has none.
+//! Traces as one lazy frame: every file has the same columns and types, with nulls for absent columns.
 
 use std::fs;
 
@@ -19,12 +19,12 @@ use trace::verify::verify_pages;
 pub struct FrameColumn {
     /// Its name in the files.
     pub name: String,
-    /// The type that every file's values are brought to.
+    /// The type that values of every file are cast to.
     pub stored: Stored,
 }
 
 impl FrameColumn {
-    /// A column as wide as the native engine's.
+    /// A column of the type that the native engine uses.
     pub fn wide(name: &str, kind: Kind) -> Option<Self> {
         let stored = match kind {
             Kind::Bool => Stored::Bool,
@@ -36,7 +36,7 @@ impl FrameColumn {
         Some(Self { name: name.to_owned(), stored })
     }
 
-    /// A column as the schema has it; as wide as can be where the schema does not know it.
+    /// A column of the schema's type; for an unknown column, the widest type of its kind.
     pub fn natural(traces: &TraceSet, name: &str, kind: Kind) -> Option<Self> {
         match traces.schema_column(name) {
             Some(known) => Some(Self { name: name.to_owned(), stored: known.stored }),
@@ -63,8 +63,8 @@ impl FrameColumn {
     }
 }
 
-/// The steps of all files in their order; no row is read before the frame is collected. Polars does not verify the
-/// checksums of pages, so that they are verified here.
+/// The steps of all files, in order; rows are read when the frame is collected. Polars does not verify page checksums,
+/// so they are verified here.
 pub fn steps(traces: &TraceSet, columns: &[FrameColumn]) -> Result<LazyFrame, PolarsError> {
     verify_pages(traces).map_err(ScoreError::from)?;
     let (labels, read): (Vec<&FrameColumn>, Vec<&FrameColumn>) =
@@ -75,7 +75,7 @@ pub fn steps(traces: &TraceSet, columns: &[FrameColumn]) -> Result<LazyFrame, Po
     Ok(if labels.is_empty() { frame } else { frame.with_columns(labels) })
 }
 
-/// A column of a label: true and false by lists of ids, null elsewhere.
+/// A label column: true and false by lists of ids, null elsewhere.
 fn label(labels: &Labels, name: &str) -> Expr {
     let ids = |wanted: bool| {
         let ids: Vec<&str> = labels.episodes().filter(|id| labels.value(name, id) == Some(wanted)).collect();
@@ -87,13 +87,13 @@ fn label(labels: &Labels, name: &str) -> Expr {
 
 fn scan(file: &TraceFile, columns: &[&FrameColumn]) -> Result<LazyFrame, PolarsError> {
     let gone = |source| PolarsError::Unreadable { file: file.name().to_owned(), source };
-    // A path from the root cannot be taken for an address on the network.
+    // An absolute path cannot be mistaken for a network address.
     let path = fs::canonicalize(file.path()).map_err(gone)?;
     let options = ScanArgsParquet { glob: false, cache: false, ..ScanArgsParquet::default() };
     let frame = if path.to_str().is_some() {
         LazyFrame::scan_parquet(PlRefPath::try_from_path(&path)?, options)?
     } else {
-        // Polars takes paths as text; what has no such path is opened here.
+        // Polars takes paths as text; a path that is not valid text is opened here.
         let opened = file.reader().map_err(gone)?;
         let options = ScanArgsParquet { hive_options: HiveOptions::new_disabled(), ..options };
         LazyFrame::scan_parquet_sources(ScanSources::Files([opened].into()), options)?

@@ -1,7 +1,7 @@
-//! Polars in this process: the SQL lowering for scores, and any other query over traces.
+//! Polars in this process: it runs the SQL lowering for scores, and any other query over traces.
 //!
-//! Rule: Polars reads the traces itself, lazily and streaming, and only the files that were named. It checks
-//! nothing, so that the native reader has been over the same columns before a score is believed.
+//! Rule: Polars reads the traces itself, lazily and streaming, and only the named files. It checks nothing, so the
+//! native reader checks the same columns before a score is accepted.
 
 pub mod answer;
 pub mod frame;

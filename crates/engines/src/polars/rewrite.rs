@@ -1,5 +1,5 @@
-//! SQL as people write it, in the SQL that Polars runs: names for columns that have none, as DuckDB gives them, a select for
-//! each grouping set, and values in the place of scalar subqueries.
+//! Rewrites SQL as people write it into SQL that Polars runs. Unnamed columns get DuckDB's names, each grouping set
+//! becomes a select, and scalar subqueries become values.
 
 use std::collections::HashMap;
 use std::ops::ControlFlow;
@@ -12,7 +12,7 @@ use sqlparser::ast::{
 use sqlparser::dialect::GenericDialect;
 use sqlparser::parser::Parser;
 
-/// Functions that make one value of many.
+/// Aggregate functions.
 const AGGREGATES: [&str; 24] = [
     "any_value",
     "array_agg",
@@ -40,7 +40,7 @@ const AGGREGATES: [&str; 24] = [
     "variance",
 ];
 
-/// Most selects that grouping sets may become.
+/// The most selects that grouping sets may become.
 const MOST_SETS: usize = 64;
 
 fn aggregate(expr: &Expr) -> bool {
@@ -152,7 +152,7 @@ fn name_columns_of(select: &mut Select) {
     }
 }
 
-/// Lets ORDER BY name the columns that it computes again: Polars sorts what is selected, and knows no other column then.
+/// Replaces ORDER BY expressions by the aliases of equal selected expressions: Polars sorts only selected columns.
 fn order_by_names(query: &mut Query) {
     let (SetExpr::Select(select), Some(order)) = (query.body.as_ref(), &mut query.order_by) else { return };
     let OrderByKind::Expressions(keys) = &mut order.kind else { return };
@@ -168,7 +168,7 @@ fn order_by_names(query: &mut Query) {
     }
 }
 
-/// The name that DuckDB gives to a column without one.
+/// DuckDB's name for an unnamed column.
 fn column_name(expr: &Expr) -> String {
     match expr {
         Expr::Nested(inner) => column_name(inner),
@@ -211,7 +211,7 @@ fn divided(body: &mut SetExpr) -> Result<(), String> {
     Ok(())
 }
 
-/// The grouping sets of a GROUP BY; `None` if it has just one.
+/// The grouping sets of a GROUP BY; `None` if it has only one.
 fn grouping_sets(group_by: &GroupByExpr) -> Result<Option<Vec<Vec<Expr>>>, String> {
     let GroupByExpr::Expressions(keys, modifiers) = group_by else { return Ok(None) };
     let parts = |keys: &[Expr]| keys.iter().map(|key| vec![key.clone()]).collect::<Vec<_>>();
@@ -253,7 +253,7 @@ fn subsets(parts: &[Vec<Expr>]) -> Result<Vec<Vec<Expr>>, String> {
     Ok((0..count).map(|bits| chosen(bits).flat_map(|(_, part)| part.clone()).collect()).collect())
 }
 
-/// The select of one grouping set: keys that it leaves out are null.
+/// The select of one grouping set; keys outside the set are null.
 fn of_set(select: &Select, set: &[Expr], keys: &[Expr]) -> Select {
     let mut select = select.clone();
     select.group_by = GroupByExpr::Expressions(set.to_vec(), Vec::new());
@@ -271,7 +271,7 @@ fn of_set(select: &Select, set: &[Expr], keys: &[Expr]) -> Select {
     select
 }
 
-/// A null of the type of a key: unions want one type, and Polars wants an aggregate beside aggregates.
+/// A null of the key's type: unions need one type, and Polars needs an aggregate beside aggregates.
 fn null_like(key: &Expr) -> Expr {
     let text = format!("max(CASE WHEN 1 = 0 THEN {key} END)");
     let parsed = Parser::new(&GenericDialect {}).try_with_sql(&text).and_then(|mut parser| parser.parse_expr());

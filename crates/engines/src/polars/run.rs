@@ -1,4 +1,4 @@
-//! Runs a frame on the streaming engine, and says what went wrong in the words of this program.
+//! Runs a frame on the streaming engine and reports errors in this program's words.
 
 use std::io;
 use std::thread;
@@ -48,8 +48,8 @@ pub(super) fn plan(context: &mut SQLContext, statement: &str) -> Result<LazyFram
     Ok(contained_on_all_threads(|| context.execute(statement)).map_err(PolarsError::panicked)??)
 }
 
-/// The stack on which Polars plans: it recurses over the statement, one frame for each of its constructs. Of the memory that
-/// is set aside as much is used as the statement needs.
+/// The stack on which Polars plans: it recurses over the statement, one frame per construct. Memory is committed only
+/// as far as the statement needs it.
 const STACK: usize = 256 << 20;
 
 pub(super) fn on_deep_stack<R: Send>(run: impl FnOnce() -> Result<R, PolarsError> + Send) -> Result<R, PolarsError> {
@@ -65,9 +65,9 @@ pub(super) fn collect(frame: LazyFrame) -> Result<DataFrame, PolarsError> {
     Ok(contained_on_all_threads(run).map_err(PolarsError::panicked)??.unwrap_single())
 }
 
-/// The cause in a message of Polars: its first paragraph, without the plan that it may print after that.
+/// The cause in a Polars message: its first paragraph, without the plan that may follow.
 ///
-/// Of a panic on one of its threads, the panic's own message.
+/// For a panic on a Polars thread: the panic's own message.
 fn cause(message: &str) -> String {
     if message.contains("JoinError::Panic") {
         let mut parts = message.split(['"', '\\']).filter(|part| part.starts_with(char::is_alphabetic));

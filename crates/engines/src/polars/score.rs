@@ -1,4 +1,4 @@
-//! Scores by the SQL lowering instead of the kernels: the same table, from code that shares nothing with them.
+//! Scores by the SQL lowering instead of the kernels: the same table, from independent code.
 
 use std::collections::HashMap;
 use std::num::NonZeroUsize;
@@ -21,8 +21,8 @@ use trace::scan::EPISODE_COLUMNS;
 
 /// The table that [`score::score_traces::score`] gives, computed by Polars.
 ///
-/// The native reader checks the traces first, so that damaged ones are refused with the same words. Threads are for
-/// that check alone: Polars has its own.
+/// The native reader checks the traces first, so that damaged traces give the same errors. `threads` applies to that
+/// check alone: Polars has its own.
 pub fn score(
     traces: &TraceSet,
     definitions: &Definitions,
@@ -52,7 +52,7 @@ fn columns(traces: &TraceSet, definitions: &Definitions) -> Vec<FrameColumn> {
     names.into_iter().filter_map(wide).collect()
 }
 
-/// Polars wraps where the native engine refuses, so numbers that may leave 64 bits are looked at first.
+/// Checks numbers that may leave 64 bits: Polars wraps where the native engine returns an error.
 fn check_overflow(traces: &TraceSet, definitions: &Definitions, steps: &LazyFrame) -> Result<(), PolarsError> {
     let plan = &definitions.plan;
     let needed = plan.needed_by(plan.outputs.iter().map(|output| output.node).chain(plan.filter));

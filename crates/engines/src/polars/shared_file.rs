@@ -1,4 +1,4 @@
-//! A file that Polars writes, whose errors are kept: Polars drops its writers without a word about what they did not write.
+//! A file that Polars writes, which keeps write errors: Polars drops its writers without reporting them.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};

@@ -1,7 +1,7 @@
-//! A query as typed: one SELECT over the tables there are, and nothing that reads anything else.
+//! A query as typed: one SELECT over the known tables, which reads nothing else.
 //!
-//! Polars SQL knows functions that read files (`read_parquet('...')`) and statements that change tables, so that a
-//! query is read and checked here before Polars sees it; Polars is given what was checked, written out again.
+//! Polars SQL has functions that read files (`read_parquet('...')`) and statements that change tables. So a query is
+//! parsed and checked here first; Polars gets the checked statement, printed again.
 
 use std::collections::BTreeSet;
 use std::ops::{ControlFlow, Range};
@@ -20,11 +20,11 @@ use toml_spec::{Fault, Faults, Place, Source};
 /// A table that a query may name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Table {
-    /// One row per step: the traces as they are.
+    /// One row per step, as in the traces.
     Steps,
     /// One row per episode: its keys and metrics.
     Episodes,
-    /// One row per group and metric: exact moments and what follows from them.
+    /// One row per group and metric: exact moments, and statistics derived from them.
     Cells,
 }
 
@@ -51,7 +51,7 @@ pub(super) enum Asked {
 
 const QUERY: Grammar = Grammar { noun: "query", one: "a query", longest: 64 * 1024, most_tokens: 8000, help: None };
 
-/// Reads a query and checks that it can read nothing but the tables.
+/// Parses a query and checks that it reads only the tables.
 pub fn check(text: &str) -> Result<Checked, Faults> {
     with_stack(text, || checked(text))
 }
@@ -85,7 +85,7 @@ impl Checked {
         Faults(vec![Fault::new(place, message).help(OTHERWISE)])
     }
 
-    /// The column of which an unknown name is a part, because there are no quotes around it.
+    /// The column whose name contains an unknown name, because it is not quoted.
     fn unquoted<'c>(&self, start: usize, columns: &'c [String]) -> Option<(Range<usize>, &'c String)> {
         let text = &self.source.text;
         let is_word = |name: &str| name.chars().all(|c| c.is_alphanumeric() || c == '_');
@@ -96,7 +96,7 @@ impl Checked {
         })
     }
 
-    /// Polars' message, at the unknown name in the query.
+    /// Polars' message, located at the unknown name in the query.
     ///
     /// `columns` are those of the tables.
     pub fn fault(&self, words: &str, columns: &[String]) -> Faults {
@@ -122,7 +122,7 @@ impl Checked {
     }
 }
 
-/// The remedy where Polars has no SQL for a question.
+/// The remedy if Polars SQL cannot express a question.
 const OTHERWISE: &str = "ask with a JOIN or a table of WITH; or ask DuckDB, of the file that `mirrorstats score TRACES -o \
                          scores.parquet` writes, or in Python of `study.episodes`";
 
@@ -171,7 +171,7 @@ impl Visitor for Names<'_> {
     }
 }
 
-/// Walks a statement and refuses what reads or changes anything but the tables.
+/// Walks a statement and refuses anything that reads beyond the tables or changes something.
 struct Reader<'s> {
     source: &'s Arc<Source>,
     ctes: BTreeSet<String>,
@@ -186,7 +186,7 @@ impl Reader<'_> {
         self.faults.push(fault.help_if(help));
     }
 
-    /// A name that a query makes must not hide a table.
+    /// A name that a query defines must not hide a table.
     fn check_name(&mut self, name: &Ident) {
         if Table::named(&name.value).is_some() {
             let message = format!("`{}` is a table and cannot be the name of another", name.value);

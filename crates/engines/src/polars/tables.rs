@@ -1,4 +1,4 @@
-//! The tables of a query: steps as they are in the files, episodes and cells as the native engine computes them.
+//! The tables of a query: steps as in the files, episodes and cells as the native engine computes them.
 
 use polars::prelude::{Column, DataFrame, IntoLazy as _, LazyFrame};
 
@@ -10,7 +10,7 @@ use score::select::{is_of_coders, truths_of};
 use score::table::{EpisodeTable, KeyRef, MetricColumn};
 use trace::open::TraceSet;
 
-/// The steps of all files with all their columns; a file without a column has nulls there.
+/// The steps of all files with all their columns; an absent column is null.
 pub fn steps(traces: &TraceSet) -> Result<LazyFrame, PolarsError> {
     let mut columns = Vec::new();
     for name in traces.column_names() {
@@ -24,7 +24,7 @@ pub fn steps(traces: &TraceSet) -> Result<LazyFrame, PolarsError> {
     frame::steps(traces, &columns)
 }
 
-/// The episode table: the keys, the labels of coders, then the metrics.
+/// The episode table: keys, coders' labels, then metrics.
 pub fn episodes(table: &EpisodeTable) -> Result<LazyFrame, PolarsError> {
     let text = |name: &str, of: fn(KeyRef<'_>) -> &str| {
         Column::new(name.into(), table.keys.iter().map(of).collect::<Vec<_>>())

@@ -17,16 +17,16 @@ use trace::diagnostic::{Code, Finding};
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Answer {
-    /// The results are where they were asked for.
+    /// The requested results are written.
     Done(Done),
-    /// Something about the traces.
+    /// The traces have a problem.
     Refused(Refused),
     /// Spark raised an error.
     Failed(Failed),
     Late {},
 }
 
-/// A job that ran to its end.
+/// A completed job.
 #[derive(Debug, Deserialize)]
 pub(super) struct Done {
     pub(super) episodes: u64,
@@ -46,7 +46,7 @@ pub(super) enum Refused {
 #[derive(Debug, Deserialize)]
 pub(super) struct Fault {
     episode: Option<String>,
-    /// The place in [`check::rules`].
+    /// The index in [`check::rules`].
     rule: usize,
     found: String,
 }
@@ -93,7 +93,7 @@ fn finding(fault: Fault, job: Job<'_>) -> Option<Finding> {
     })
 }
 
-/// An episode has names, labels and some numbers.
+/// A line holds an episode's names, labels and some numbers.
 const LONGEST_LINE: Limit = Limit::new("bytes in a line of an answer", 64 << 20);
 
 pub(super) fn table(path: &Path, job: Job<'_>) -> Result<EpisodeTable, SparkError> {
@@ -131,7 +131,7 @@ fn append(table: &mut TableBuilder, row: Vec<Value>) -> Option<()> {
     Some(())
 }
 
-/// An integer or null; nothing for any other value.
+/// An integer or null; `None` for any other value.
 #[expect(clippy::option_option, reason = "null is an undefined metric, and not the same as a value that is no integer")]
 fn integer(value: Value) -> Option<Option<i64>> {
     match value {
@@ -140,7 +140,7 @@ fn integer(value: Value) -> Option<Option<i64>> {
     }
 }
 
-/// A text or null; nothing for any other value.
+/// A text or null; `None` for any other value.
 #[expect(clippy::option_option, reason = "null is a text's value here, and not the same as a value that is no text")]
 fn text(value: Value) -> Option<Option<String>> {
     match value {

@@ -9,7 +9,7 @@ use super::{Cluster, SparkError};
 /// The longest cause shown, in characters.
 const LONGEST: usize = 400;
 
-/// An error of Spark, by its name and in its words.
+/// A Spark error: its name and message.
 #[derive(Debug, Deserialize)]
 pub(super) struct Failed {
     pub(super) name: String,
@@ -58,7 +58,7 @@ fn shortened(message: &str, settings: &[Setting]) -> String {
     let innermost = message.lines().rfind(|line| line.starts_with("Caused by: "));
     let line = innermost.or_else(|| message.lines().find(|line| !line.trim().is_empty())).unwrap_or_default();
     let line = line.trim().trim_start_matches("Caused by: ").trim_start_matches("Exception in thread \"main\" ");
-    // Where in the statement, which nobody has written by hand.
+    // Drops the location in the statement, which is generated.
     let line = line.split("; line ").next().unwrap_or_default();
     let line = line.split(" SQLSTATE: ").next().unwrap_or_default();
     let line = without_class(line);
@@ -71,7 +71,7 @@ fn shortened(message: &str, settings: &[Setting]) -> String {
     cut.map_or_else(|| text.clone(), |at| format!("{}...", &text[..at]))
 }
 
-/// `java.io.IOException: no` without its first part.
+/// `java.io.IOException: no` without the class name.
 fn without_class(line: &str) -> &str {
     match line.split_once(": ") {
         Some((class, rest)) if class.contains('.') && !class.contains([' ', '/', '[']) && !rest.is_empty() => rest,

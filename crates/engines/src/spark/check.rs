@@ -1,8 +1,8 @@
-//! The rules of traces as one aggregation over `steps`: what the native scan finds row by row.
+//! The rules of traces as one aggregation over `steps`: the checks that the native scan makes row by row.
 //!
-//! A rule is an aggregate over an episode's rows that is null where the rule holds, and what was found where it does
-//! not. Rules hold for the columns that are read, as in the native scan. Not checked are the rules about the place of
-//! rows in files: rows of an episode may lie anywhere, as long as each t of 1..T is there once.
+//! A rule is an aggregate over an episode's rows: null if the rule holds, else the offending value. Rules apply to the
+//! columns that are read, as in the native scan. The position of rows in files is not checked: an episode's rows may be
+//! anywhere, as long as each t of 1..T is there once.
 
 use std::fmt::Write as _;
 
@@ -26,7 +26,7 @@ pub(super) struct Rule {
 
 /// The rules for some columns, in the order of the columns.
 ///
-/// `palette` has the colours of the traces, if every one of them declares a palette.
+/// `palette` has the colours of the traces, if all of them declare a palette.
 pub(super) fn rules<'a>(
     columns: impl IntoIterator<Item = &'a str>,
     catalog: &Catalog,
@@ -108,8 +108,8 @@ fn texts<'a>(values: impl IntoIterator<Item = &'a str>) -> String {
     values.into_iter().map(|value| Dialect::Spark.text(value)).collect::<Vec<_>>().join(", ")
 }
 
-/// The statement: one row of `steps`, `episodes`, `faults` (episodes that break a rule), and `fault`, the first by id:
-/// its `episode`, the place of its `rule`, and what was `found`.
+/// The statement. Its one row has `steps`, `episodes`, `faults` (episodes that break a rule), and `fault`, the first by
+/// id: its `episode`, the index of its `rule`, and the value `found`.
 pub(super) fn statement(rules: &[Rule]) -> String {
     let mut text = "WITH episodes AS (\n  SELECT s.episode_id AS episode_id,\n    COUNT(*) AS steps".to_owned();
     for (at, rule) in rules.iter().enumerate() {
@@ -169,7 +169,7 @@ mod tests {
         "none ",
     ];
 
-    /// Polars stands in for Spark: it has the same functions, and patterns of which this one means the same.
+    /// Polars replaces Spark here: it has the same functions, and its patterns mean the same in this case.
     #[test]
     fn the_condition_is_the_rule() {
         let palette = Palette::of_all([Some(&Palette::new(vec!["teal".into(), "grün".into()]))].into_iter());
@@ -188,7 +188,7 @@ mod tests {
         }
     }
 
-    /// The first of the rules that an episode of a file breaks. Polars stands in for Spark.
+    /// The first rule that an episode of a file breaks. Polars replaces Spark here.
     fn first_broken(path: &Path, definitions: &Definitions) -> Option<Rule> {
         let path = PlRefPath::try_from_path(path).unwrap();
         let mut frame = LazyFrame::scan_parquet(path, polars::prelude::ScanArgsParquet::default()).unwrap();

@@ -1,4 +1,4 @@
-//! Whose Spark: the one of `SPARK_HOME`, else the `spark-submit` on `PATH`, else Python's package `pyspark`.
+//! Finds Spark: in `SPARK_HOME`, else by the `spark-submit` on `PATH`, else in Python's package `pyspark`.
 
 use std::env;
 use std::ffi::OsStr;
@@ -14,7 +14,7 @@ pub(super) struct Spark {
     pub(super) home: Option<PathBuf>,
 }
 
-/// The path of `spark-submit` below Spark's folder.
+/// The path of `spark-submit` inside Spark's folder.
 const PROGRAM: &str = "bin/spark-submit";
 
 pub(super) fn locate() -> Result<Spark, SparkError> {
@@ -37,13 +37,13 @@ fn on_path(path: &OsStr) -> Option<PathBuf> {
     env::split_paths(path).map(|folder| folder.join("spark-submit")).find(|program| program.is_file())
 }
 
-/// The Python that Spark would take.
+/// The Python that Spark would use.
 fn python() -> String {
     let chosen = ["PYSPARK_DRIVER_PYTHON", "PYSPARK_PYTHON"].into_iter().find_map(|name| env::var(name).ok());
     chosen.unwrap_or_else(|| "python3".to_owned())
 }
 
-/// The Spark inside of the package `pyspark`, which is not imported for that.
+/// The Spark inside the package `pyspark`, which is found without importing it.
 fn package(python: &str) -> Option<Spark> {
     let ask =
         "import importlib.util as u; s = u.find_spec('pyspark'); print(s.submodule_search_locations[0] if s else '')";

@@ -6,10 +6,10 @@
 //!  Spark)      a child process)                              or what was refused)
 //! ```
 //!
-//! Rules: the statement reads nothing but the view `steps`, which the driver makes of the named traces alone. What the
-//! scan of traces refuses is refused here too, by one more aggregation (`check`), save for what only files and their
-//! order can tell: that an episode's rows lie together, in order, in one file. Nothing is left out quietly: files that
-//! Spark would pass over and columns that it would read as null are refused.
+//! Rules: the statement reads only the view `steps`, which the driver makes from the named traces. One more aggregation
+//! (`check`) refuses whatever the scan of traces refuses. The exception is what only files and their order can show:
+//! that an episode's rows are together, in order, in one file. Nothing is skipped silently: files that Spark would
+//! ignore and columns that it would read as null are refused.
 
 mod answer;
 mod cause;
@@ -38,7 +38,7 @@ use self::source::Sources;
 /// The cluster, and how to submit to it.
 #[derive(Clone, Debug, Default)]
 pub struct Cluster {
-    /// `spark://host:port`, `yarn`, `local[2]`, ...; what Spark's own configuration says if absent.
+    /// `spark://host:port`, `yarn`, `local[2]`, ...; the master in Spark's own configuration if absent.
     pub master: Option<String>,
     /// Settings for this submission.
     pub settings: Vec<Setting>,
@@ -119,7 +119,7 @@ fn more_episodes(more: u64) -> String {
     }
 }
 
-/// Scores on Spark and brings the table here, ordered as any table of scores.
+/// Scores on Spark and fetches the table, in the usual order.
 pub fn score(job: Job<'_>, cluster: &Cluster) -> Result<EpisodeTable, SparkError> {
     let place = place::Place::new()?;
     let request = Request::new(job, cluster, &place, None)?;
@@ -127,7 +127,7 @@ pub fn score(job: Job<'_>, cluster: &Cluster) -> Result<EpisodeTable, SparkError
     answer::table(&place.table(), job)
 }
 
-/// Scores on Spark and has Spark write the table as a folder of Parquet, its definitions in every file.
+/// Scores on Spark, which writes the table as a folder of Parquet with the definitions in every file.
 pub fn write(job: Job<'_>, cluster: &Cluster, folder: &str) -> Result<Written, SparkError> {
     let target = if source::is_uri(folder) {
         folder.to_owned()

@@ -1,4 +1,4 @@
-//! The private folder of one submission: its request, and what the driver answers.
+//! The private folder of one submission: its request and the driver's answer.
 
 use std::fs;
 use std::path::PathBuf;
@@ -24,7 +24,7 @@ impl Place {
         self.0.path().join("answer.json")
     }
 
-    /// The path of Spark's log, unless another one is chosen.
+    /// The default path of Spark's log.
     pub(super) fn log(&self) -> PathBuf {
         self.0.path().join("log")
     }

@@ -1,4 +1,4 @@
-//! The driver's request: everything that it needs, in one JSON file.
+//! The driver's request: all of its input in one JSON file.
 
 use serde::Serialize;
 use serde_json::{Map, Value};
@@ -20,7 +20,7 @@ const KEYS: [(&str, &str); 5] =
 pub(super) struct Request {
     parent: u32,
     timeout: Option<u32>,
-    /// Settings that must not stand on a command line.
+    /// Settings that must not appear on a command line.
     settings: Map<String, Value>,
     sources: Vec<Group>,
     inspect: bool,
@@ -72,8 +72,8 @@ impl Request {
     }
 }
 
-/// Columns that some files may lack. Whether a required one may be absent says the footer, which is opened here for files
-/// alone.
+/// Columns that some files may lack. The footer says whether a required column may be absent; it is read here for local
+/// files only.
 fn optional(columns: &[(String, &'static str)], job: Job<'_>) -> Vec<String> {
     let knows_footers = matches!(job.sources, Sources::Files { .. });
     let domain = check::domain_of(&job.definitions.catalog);

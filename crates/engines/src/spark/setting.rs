@@ -1,9 +1,9 @@
-//! Settings of Spark as they are typed, `key=value`, and which of them are secrets.
+//! Spark settings as typed, `key=value`, and which of them are secrets.
 
 use std::fmt;
 use std::str::FromStr;
 
-/// One setting. Its value shows nowhere: not in messages, not in `{:?}`.
+/// One setting. Its value is never shown, neither in messages nor in `{:?}`.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Setting {
     key: String,
@@ -18,7 +18,7 @@ pub enum SettingError {
     Fixed { key: String, why: &'static str },
 }
 
-/// Keys that would break what the driver relies on.
+/// Keys that would break the driver's assumptions.
 const FIXED: [(&str, &str); 2] = [
     ("spark.submit.deployMode", "the driver runs here, where the answer is read"),
     ("spark.master", "give the master with --master"),
@@ -33,7 +33,7 @@ impl Setting {
         &self.value
     }
 
-    /// Returns true if the value must not stand on a command line, which others on this machine can read.
+    /// Returns true if the value must not appear on a command line, which other users of this machine can read.
     pub(super) fn is_secret(&self) -> bool {
         let key = self.key.to_ascii_lowercase();
         ["secret", "password", "token", "credential", "access.key", "accesskey", "account.key", "apikey", "api.key"]

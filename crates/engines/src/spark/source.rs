@@ -1,4 +1,4 @@
-//! The inputs of Spark: files of this machine, or URIs that only Spark understands.
+//! The inputs of Spark: local files, or URIs that only Spark understands.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -12,23 +12,23 @@ use trace::open::{TraceFile, TraceSet};
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Sources {
-    /// Files of this machine, whose footers have been read and are good.
+    /// Local files with valid footers.
     Files { names: Vec<String>, groups: Vec<Group>, rows: u64, palette: Option<Palette> },
-    /// URIs, as typed; nothing is known of them here.
+    /// URIs, as typed and unchecked.
     Uris(Vec<String>),
 }
 
-/// Traces that are read alike.
+/// Traces that are read in the same way.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Group {
-    /// URIs; of files of this machine `file://` and no wildcard.
+    /// URIs; for local files, `file://` without wildcards.
     pub(super) paths: Vec<String>,
-    /// Columns that are declared to hold nothing but nulls, and so have no type to be read by.
+    /// Columns that are declared to hold only nulls, so that they have no type to be read as.
     pub(super) void: Vec<String>,
 }
 
 impl Sources {
-    /// Files of this machine.
+    /// Local files.
     ///
     /// `traces` are these inputs, opened.
     pub fn files(inputs: &[Input], traces: &TraceSet) -> io::Result<Self> {
@@ -72,7 +72,8 @@ impl Sources {
     }
 }
 
-/// Returns true if an argument is a URI for Spark (`s3a://bucket/runs`, `hdfs:/runs`, `file:///runs`) and no file here.
+/// Returns true if an argument is a URI for Spark (`s3a://bucket/runs`, `hdfs:/runs`, `file:///runs`), not a local
+/// file.
 pub fn is_uri(argument: &str) -> bool {
     let scheme = argument.split_once(":/").map_or("", |(scheme, _)| scheme);
     // A single letter is a drive.

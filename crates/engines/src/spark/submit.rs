@@ -1,7 +1,7 @@
-//! The child process: `spark-submit` with the driver, in a folder of its own that is gone afterwards.
+//! The child process: `spark-submit` with the driver, in its own folder, which is deleted afterwards.
 //!
-//! Nothing of Spark's log reaches the terminal. The driver ends when this process does, whatever ends it; when this
-//! process gives up waiting, it ends the child.
+//! Spark's log never reaches the terminal. The driver ends when this process ends, for any reason; when this process
+//! stops waiting, it ends the child.
 
 use std::fs::{self, File};
 use std::io;
@@ -30,7 +30,7 @@ impl Running {
 
 impl Drop for Running {
     fn drop(&mut self) {
-        // Fails if the child has ended already, which is fine.
+        // Fails if the child has already ended, which is fine.
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
@@ -72,7 +72,7 @@ fn command(spark: &Spark, cluster: &Cluster) -> Command {
     command
 }
 
-/// Spark tries for a minute to reach a master that is not there; one look tells.
+/// Fails fast if the master is unreachable: Spark itself would retry for a minute.
 fn reach(cluster: &Cluster) -> Result<(), SparkError> {
     let Some(master) = &cluster.master else { return Ok(()) };
     let Some(addresses) = master.strip_prefix("spark://") else { return Ok(()) };

@@ -1,8 +1,8 @@
-//! Temporary files that killed processes have left behind.
+//! Temporary files that killed processes left behind.
 //!
-//! Rule: a temporary name proves by its checksum that this program gave it, and its file or folder is locked for as long
-//! as its process lives, however that ends. A caller that gets the lock may remove it. Where the file system has no locks, nothing
-//! is removed.
+//! Rule: the checksum in a temporary name proves that this program chose it. The file or folder is locked while its
+//! process lives, however that ends. A caller that gets the lock may remove it. If the file system has no locks,
+//! everything stays.
 
 use std::collections::BTreeSet;
 use std::fs::{self, DirEntry, File};
@@ -11,18 +11,17 @@ use std::sync::{Mutex, PoisonError};
 
 use super::place::is_temporary;
 
-/// The folders that this process has swept. Once is enough, and a folder of a hundred thousand files takes its time.
+/// The folders that this process has swept. Once is enough: a folder of a hundred thousand files takes time.
 static SWEPT: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
-/// Locks a temporary file or folder that was just made; `false` if another process has taken it for a leftover and
-/// removed it meanwhile.
+/// Locks a new temporary file or folder; `false` if another process took it for a leftover and removed it meanwhile.
 pub(super) fn lock(file: &File, path: &Path) -> bool {
-    // Without locks nobody removes anything.
+    // Without locks no process removes leftovers.
     cfg!(not(unix)) || file.lock().is_err() || is_at(file, path)
 }
 
-/// Removes the temporary files and folders in `folder` that have no living owner, whatever they were to become; the first
-/// time that this process is about to write into the folder. What cannot be removed stays: it is in nobody's way.
+/// Removes the temporary files and folders without a living owner from `folder`, whatever their targets. Runs only the
+/// first time that this process is about to write there. What cannot be removed stays and does no harm.
 pub fn sweep(folder: &Path) {
     if cfg!(not(unix)) {
         return;
@@ -42,7 +41,7 @@ fn remove(folder: &Path) {
 
 fn remove_unowned(entry: &DirEntry) {
     let path = entry.path();
-    // A pipe would block when opened, and a link leads elsewhere: neither is ours.
+    // Opening a pipe would block, and a link leads elsewhere: neither is ours.
     let Ok(kind) = entry.file_type() else { return };
     if !kind.is_file() && !kind.is_dir() {
         return;

@@ -1,13 +1,13 @@
-//! Replaces files: after a crash, a full disk or a loss of power a file has its old content or the whole new one.
+//! Replaces files: after a crash, a full disk or a loss of power a file has its complete old or complete new content.
 //!
-//! A new file is written under a temporary name in the folder of its target, synchronised, and renamed to the target;
-//! then the folder is synchronised. Every file that the program replaces goes through [`NewFile`].
+//! A new file is written under a temporary name in its target's folder, synchronised, and renamed to the target; then
+//! the folder is synchronised. Every file that the program replaces goes through [`NewFile`].
 //!
-//! Temporary names end in six random characters and a checksum of the name, which no other program gives its files, and are
-//! locked by their process; those of killed processes are removed by the next process that writes into the folder.
+//! Temporary names end in six random characters and a checksum of the name, so other programs do not use them. Their
+//! process locks the files. The next process that writes into the folder removes the files of killed processes.
 //!
-//! A target that is a device, a pipe or a standard stream (`/dev/null`, `/dev/stdout`) cannot be renamed over: the
-//! complete content is copied into it.
+//! A target that is a device, a pipe or a standard stream (`/dev/null`, `/dev/stdout`) cannot be replaced by renaming.
+//! The complete content is copied into it instead.
 
 mod folder;
 mod leftover;

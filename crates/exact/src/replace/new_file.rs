@@ -1,4 +1,4 @@
-//! One file replaced by another.
+//! Replaces one file by another.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Seek, SeekFrom, Write};
@@ -8,7 +8,7 @@ use super::leftover;
 use super::place::{folder_of, is_stream, prefix_for, sync_folder};
 use super::temporary::TemporaryFile;
 
-/// The new content of a file. It is at its target after [`commit`](Self::commit), and gone if dropped before.
+/// The new content of a file. [`commit`](Self::commit) moves it to its target; dropping it first discards it.
 #[derive(Debug)]
 pub struct NewFile {
     file: TemporaryFile,
@@ -17,12 +17,12 @@ pub struct NewFile {
 }
 
 impl NewFile {
-    /// Begins the new content of `target`, whose folder must exist. What killed processes left in the folder is removed.
+    /// Starts the new content of `target`, whose folder must exist. Leftovers of killed processes there are removed.
     pub fn create(target: &Path) -> io::Result<Self> {
         Self::create_in(folder_of(target), target)
     }
 
-    /// As [`create`](Self::create), with the temporary file in `scratch`, a folder of the same file system.
+    /// Like [`create`](Self::create), with the temporary file in `scratch`, a folder of the same file system.
     pub fn create_in(scratch: &Path, target: &Path) -> io::Result<Self> {
         if target.is_dir() {
             return Err(io::ErrorKind::IsADirectory.into());
@@ -34,7 +34,7 @@ impl NewFile {
         Ok(Self { file, target: target.to_owned(), is_stream })
     }
 
-    /// The path of the content until the commit.
+    /// The path of the content before the commit.
     pub fn temporary_path(&self) -> &Path {
         self.file.path()
     }
@@ -47,7 +47,7 @@ impl NewFile {
         self.file.file_mut()
     }
 
-    /// Replaces the target. Afterwards not even a loss of power brings the old content back.
+    /// Replaces the target. Afterwards not even a loss of power restores the old content.
     pub fn commit(self) -> io::Result<()> {
         if self.is_stream {
             return self.copy_into_target();
@@ -57,7 +57,7 @@ impl NewFile {
         sync_folder(folder_of(&self.target))
     }
 
-    /// As [`commit`](Self::commit), where no file is at the target: one that has come meanwhile stays unchanged.
+    /// Like [`commit`](Self::commit), but leaves the target unchanged if it exists by now.
     pub fn commit_new(self) -> io::Result<()> {
         if self.is_stream {
             return self.copy_into_target();
@@ -68,7 +68,7 @@ impl NewFile {
     }
 
     fn copy_into_target(mut self) -> io::Result<()> {
-        // A standard stream may be a file that others have written to: what is there stays.
+        // A standard stream may be a file with output of others: append to it.
         let mut target = OpenOptions::new().append(true).open(&self.target)?;
         let content = self.file.file_mut();
         content.seek(SeekFrom::Start(0))?;
@@ -98,7 +98,7 @@ impl Seek for NewFile {
     }
 }
 
-/// Replaces the file at `target` by one of these bytes.
+/// Replaces the file at `target` by a file with these bytes.
 pub fn replace(target: &Path, bytes: &[u8]) -> io::Result<()> {
     let mut file = NewFile::create(target)?;
     file.write_all(bytes)?;

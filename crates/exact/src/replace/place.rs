@@ -7,22 +7,22 @@ use std::path::Path;
 
 use crate::hash;
 
-/// Every temporary name begins with this; those who look for data pass over names that begin with a dot.
+/// The start of every temporary name; programs that look for data skip names that begin with a dot.
 pub(super) const PREFIX: &str = ".mirrorstats-";
 /// The number of random characters in a temporary name.
 pub(super) const RANDOM: usize = 6;
 /// The number of characters of a checksum at the end of a temporary name.
 const CHECK: usize = 10;
-/// The longest part of the target's name in a temporary name, bytes: file systems allow 255 in all.
+/// The most bytes of the target's name in a temporary name: file systems allow 255 in all.
 const LONGEST_NAME: usize = 200;
 
-/// The folder that a file is in, or will be.
+/// The folder of a file that exists or will exist.
 pub fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Makes a folder and those above it; each is on the disk when this returns, so that no loss of power takes away a folder
-/// with files that were synchronised.
+/// Creates a folder and its parents. Each is on the disk when this returns, so that a loss of power cannot take away a
+/// folder with synchronised files.
 pub fn make_folder(folder: &Path) -> io::Result<()> {
     if folder.is_dir() {
         return Ok(());
@@ -32,7 +32,7 @@ pub fn make_folder(folder: &Path) -> io::Result<()> {
         make_folder(above)?;
     }
     match fs::create_dir(folder) {
-        // Another process has made it meanwhile.
+        // Another process has created it meanwhile.
         Err(_) if folder.is_dir() => {}
         made => made?,
     }
@@ -51,7 +51,7 @@ pub fn sync_folder(folder: &Path) -> io::Result<()> {
     })
 }
 
-/// Returns true if bytes can only be written into `target`: a pipe, a device, or the name of an open file of the process.
+/// Returns true if `target` can only be written into: a pipe, a device, or the name of an open file of the process.
 pub fn is_stream(target: &Path) -> bool {
     let names_open_file = cfg!(unix)
         && (["/dev/stdout", "/dev/stderr"].iter().any(|name| target == Path::new(name))
@@ -76,7 +76,7 @@ pub(super) fn checksum(before: &[u8]) -> String {
     hash::of_bytes(before)[..CHECK].to_owned()
 }
 
-/// Returns true if a name is one that [`temporary`](super::temporary) gives.
+/// Returns true if [`temporary`](super::temporary) could have made this name.
 pub(super) fn is_temporary(name: &OsStr) -> bool {
     let name = name.as_encoded_bytes();
     name.starts_with(PREFIX.as_bytes())

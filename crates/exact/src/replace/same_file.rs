@@ -1,11 +1,11 @@
-//! The check that an output does not replace an input.
+//! Checks that an output does not replace an input.
 
 use std::fs;
 use std::path::Path;
 
 use super::place::is_stream;
 
-/// A target that is one of the files which the command reads.
+/// The error for a target that the command also reads.
 #[derive(Debug, thiserror::Error)]
 #[error("`{target}`: expected another file to write, found {what}\n  help: give the output another name")]
 pub struct TargetIsInput {
@@ -15,10 +15,10 @@ pub struct TargetIsInput {
     what: String,
 }
 
-/// Refuses a target that is one of `inputs`, under whatever name, link or path; `what` says what the inputs are, such
-/// as `a trace that is read`.
+/// Refuses a target that is one of `inputs`, under any name, link or path. `what` describes the inputs, such as
+/// `a trace that is read`.
 ///
-/// A device, a pipe or a standard stream is no file that is replaced, and is not refused.
+/// Devices, pipes and standard streams are not replaced, so they pass.
 pub fn check_target<P: AsRef<Path>>(
     target: &Path,
     inputs: impl IntoIterator<Item = P>,
@@ -33,7 +33,7 @@ pub fn check_target<P: AsRef<Path>>(
     }
 }
 
-/// A folder for outputs that holds one of the inputs.
+/// The error for an output folder that contains an input.
 #[derive(Debug, thiserror::Error)]
 #[error(
     "`{folder}`: expected a folder for outputs, found an input in it (`{input}`): both would be read together from then \
@@ -46,7 +46,7 @@ pub struct FolderHoldsInput {
     input: String,
 }
 
-/// Refuses a folder for outputs that one of `inputs` is in, or below, under whatever name.
+/// Refuses an output folder that contains one of `inputs`, at any depth and under any name.
 pub fn check_folder<P: AsRef<Path>>(
     folder: &Path,
     inputs: impl IntoIterator<Item = P>,
@@ -58,7 +58,7 @@ pub fn check_folder<P: AsRef<Path>>(
     Err(FolderHoldsInput { folder: folder.display().to_string(), input: name })
 }
 
-/// Returns true if two paths lead to one existing file: links are followed, and hard links are one file.
+/// Returns true if two paths lead to the same existing file: links are followed, and hard links are one file.
 #[cfg(unix)]
 pub fn is_same_file(a: &Path, b: &Path) -> bool {
     use std::os::unix::fs::MetadataExt as _;
@@ -66,7 +66,7 @@ pub fn is_same_file(a: &Path, b: &Path) -> bool {
     matches!((place(a), place(b)), (Ok(a), Ok(b)) if a == b)
 }
 
-/// Returns true if two paths lead to one existing file: links are followed.
+/// Returns true if two paths lead to the same existing file: links are followed.
 #[cfg(not(unix))]
 pub fn is_same_file(a: &Path, b: &Path) -> bool {
     matches!((fs::canonicalize(a), fs::canonicalize(b)), (Ok(a), Ok(b)) if a == b)

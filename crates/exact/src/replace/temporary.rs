@@ -1,7 +1,6 @@
-//! Temporary files and folders: each has a name of its own, is locked for as long as its process lives, and is removed
-//! when dropped.
+//! Temporary files and folders. Each has a unique name, is locked while its process lives, and is removed when dropped.
 //!
-//! They are made by calls of the standard library alone, which `tests/harness/faults.c` can fail one by one.
+//! All system calls go through the standard library, so that `tests/harness/faults.c` can fail them one by one.
 
 use std::collections::hash_map::RandomState;
 use std::ffi::{OsStr, OsString};
@@ -14,7 +13,7 @@ use std::path::{Path, PathBuf};
 use super::leftover;
 use super::place::{RANDOM, checksum};
 
-/// The characters, which are no others where a file system does not tell capitals apart.
+/// The characters of random names: no capitals, since some file systems ignore case.
 const CHARACTERS: &[u8; 36] = b"abcdefghijklmnopqrstuvwxyz0123456789";
 
 /// A temporary file, open for reading and writing.
@@ -25,7 +24,7 @@ pub(super) struct TemporaryFile {
 }
 
 impl TemporaryFile {
-    /// Makes one in `folder`, with a name of this prefix and the permissions of an ordinary new file.
+    /// Creates a file in `folder`, whose name has this prefix, with the permissions of an ordinary new file.
     pub(super) fn create(folder: &Path, prefix: &OsStr) -> io::Result<Self> {
         let made = make(folder, prefix, |path| {
             OpenOptions::new().read(true).write(true).create_new(true).open(path).map(Some)
@@ -66,13 +65,13 @@ impl TemporaryFile {
 impl Drop for TemporaryFile {
     fn drop(&mut self) {
         if !self.path.as_os_str().is_empty() {
-            // What stays is swept by a later run.
+            // A later run sweeps what stays.
             let _ = fs::remove_file(&self.path);
         }
     }
 }
 
-/// A temporary folder, which is removed with all that is in it.
+/// A temporary folder, removed with its contents.
 #[derive(Debug)]
 pub struct TemporaryFolder {
     path: PathBuf,
@@ -80,14 +79,14 @@ pub struct TemporaryFolder {
 }
 
 impl TemporaryFolder {
-    /// Makes one in `parent`, after removing what killed processes have left there; `name` is part of its name. Others may
-    /// look into it as into any new folder.
+    /// Creates a folder in `parent`, after removing the leftovers of killed processes there; `name` is part of its
+    /// name. Others can read it like any new folder.
     pub fn create(parent: &Path, name: &str) -> io::Result<Self> {
         leftover::sweep(parent);
         Self::with_mode(parent, &super::place::prefix_for(Path::new(name)), 0o777)
     }
 
-    /// Makes one in the system's folder for temporary files that no other user may look into.
+    /// Creates a folder among the system's temporary files that no other user can read.
     pub fn private(name: &str) -> io::Result<Self> {
         let parent = std::env::temp_dir();
         leftover::sweep(&parent);
@@ -115,7 +114,7 @@ impl Drop for TemporaryFolder {
     fn drop(&mut self) {
         let path = mem::take(&mut self.path);
         if !path.as_os_str().is_empty() {
-            // What stays is swept by a later run.
+            // A later run sweeps what stays.
             let _ = fs::remove_dir_all(path);
         }
     }
@@ -132,7 +131,7 @@ fn make(
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => continue,
             made => made?,
         };
-        // Another process may have taken it for a leftover, in the moment before it was locked.
+        // Before it was locked, another process may have taken it for a leftover.
         if file.as_ref().is_none_or(|file| leftover::lock(file, &path)) {
             return Ok((path, file));
         }

@@ -12,7 +12,7 @@ fn names(folder: &Path) -> Vec<String> {
     names
 }
 
-/// A name as a process gives it that is killed before it is done.
+/// The temporary name of a process that was killed before it was done.
 fn temporary_name(target: &str) -> String {
     super::temporary::name(&prefix_for(Path::new(target))).into_string().unwrap()
 }
@@ -74,13 +74,13 @@ fn two_attempts_at_one_target_do_not_disturb_each_other() {
 fn leftovers_of_dead_processes_go_and_all_else_stays() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
-    // Whatever they were to become.
+    // Leftovers for any target.
     let dead = ["a.txt", "b.txt", "frames"].map(temporary_name);
     fs::create_dir(path(&dead[2])).unwrap();
     for name in ["001.png", "002.png"] {
         fs::write(path(&dead[2]).join(name), "").unwrap();
     }
-    // A user's own, however much like ours.
+    // A user's own file, though it looks like ours.
     let mine = path(".mirrorstats-notes.backup");
     fs::create_dir(&mine).unwrap();
     fs::write(mine.join("thesis.txt"), "mine").unwrap();

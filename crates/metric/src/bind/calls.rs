@@ -124,10 +124,10 @@ impl Scope<'_, '_> {
         Some(Bound { rate: value.rate, ..bound })
     }
 
-    /// The value at the step before: at t what `x` is at t - 1, null at the first step.
+    /// The value at the previous step: at t the value of `x` at t - 1; null at the first step.
     fn lag(&mut self, value: &Expr, whole: &Expr) -> Option<Bound> {
         let value = self.bind(value)?;
-        // Null is null at every step.
+        // The literal null is null at every step.
         let Some(ty) = value.ty else { return Some(value) };
         if self.binder.builder.lags(value.node) == DEEPEST_LAG {
             let message = format!("`lag` looks back by {DEEPEST_LAG} steps at most");

@@ -1,8 +1,8 @@
-//! Names to columns, types and levels checked, one shared plan built.
+//! Binds names to columns, checks types and levels, and builds one shared plan.
 //!
-//! Every definition is bound once, on demand, so that definitions may be in any order; a
-//! definition that leads back to itself is refused with the way it went. A fault in one definition
-//! does not hide the faults of another: whatever depends on a faulty one is passed over in silence.
+//! Every definition is bound once, on demand, so definitions may be in any order. A definition that refers to itself is
+//! refused with the path of references. A fault in one definition does not hide faults of others: definitions that
+//! depend on a faulty one are skipped without a message.
 
 mod calls;
 mod scope;
@@ -25,14 +25,14 @@ use toml_spec::{Fault, Written};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Bound {
     pub(super) node: NodeId,
-    /// `None`: the literal null, which has every type.
+    /// `None` is the literal null, which has every type.
     pub(super) ty: Option<Type>,
     pub(super) level: Level,
-    /// A metric whose value is a truth value: 0 or 1 where a number is wanted.
+    /// True for a metric with a truth value, which counts as 0 or 1 where a number is needed.
     pub(super) rate: bool,
 }
 
-/// The plan, and what each definition came to.
+/// The plan, and the result of each definition.
 #[derive(Debug)]
 pub(super) struct Binding {
     pub(super) plan: Plan,
@@ -85,12 +85,12 @@ struct Binder<'a> {
     faults: Vec<Fault>,
 }
 
-/// The deepest nesting, definitions within definitions included; keeps the stack bounded.
+/// The deepest nesting across definitions; bounds the stack.
 const DEEPEST: usize = 400;
 
 impl Binder<'_> {
-    /// One name has one meaning. A column that only some traces have, and one that older versions of the schema had not,
-    /// gives way to a definition of its name, so that definitions say the same whatever else was recorded.
+    /// Each name has one meaning. A column gives way to a definition of its name if only some traces have it, or if
+    /// older versions of the schema did not. So definitions mean the same whatever else was recorded.
     fn check_names(&mut self) {
         let lets = self.document.lets.iter().map(|(name, (_, place))| (name, place, "`let`"));
         let metrics = self.document.metrics.iter().map(|(name, entry)| (name, &entry.place, "metric"));

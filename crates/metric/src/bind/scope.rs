@@ -1,4 +1,4 @@
-//! One expression: its names, constants and operators.
+//! Binds one expression: its names, constants and operators.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -12,7 +12,7 @@ use crate::columns::{Level, Type};
 use exact::suggest::nearest;
 use toml_spec::{Fault, MOST_FAULTS, Place, Source, Written};
 
-/// One expression being bound: the binder, and the text that faults point into.
+/// One expression while it is bound: the binder, and the text that faults point into.
 pub(super) struct Scope<'b, 'a> {
     pub(super) binder: &'b mut Binder<'a>,
     pub(super) written: &'b Written,
@@ -110,7 +110,7 @@ impl Scope<'_, '_> {
     }
 
     fn column_or(&mut self, name: &str, column: Column, fallback: Fallback) -> Option<Bound> {
-        // Null is what no value is anyway.
+        // A missing value is null already.
         if fallback.is_read && fallback.expression == "null" {
             return Some(self.unary(Op::Column(name.to_owned()), column.ty, column.level));
         }
@@ -139,7 +139,7 @@ impl Scope<'_, '_> {
         let known = known.chain(self.binder.columns.names()).chain(["t"]);
         let is_quoted = self.written.text[expr.span.clone()].starts_with('"');
         if self.binder.faults.len() >= MOST_FAULTS {
-            // Looking for a name that is like it costs as much as there are names.
+            // Finding a similar name costs time proportional to the number of names.
             return None;
         }
         let help = match (functions::find(&name.to_lowercase()), nearest(name, known)) {
@@ -203,15 +203,15 @@ impl Scope<'_, '_> {
             return Some(known);
         }
         let is_time = |this: &Self, bound: Bound| this.binder.builder.node(bound.node).op == Op::Time;
-        // Time to the left: the kernels know windows by that form.
+        // Put the time on the left: the kernels recognise windows by that form.
         if is_time(self, right) && !is_time(self, left) {
             (left, right, comparison) = (right, left, comparison.flipped());
         }
         Some(self.combine(&[left, right], Type::Bool, |n| Op::Compare(comparison, n[0], n[1])))
     }
 
-    /// Whether one of two constants equals a third: the condition itself. So a column that means one of two texts where
-    /// traces have none of it costs nothing.
+    /// Reduces a comparison of a two-constant `case` with a constant to its condition. So a column with two possible
+    /// values costs nothing if the traces do not have it.
     fn known_outcome(&mut self, comparison: Comparison, left: Bound, right: Bound) -> Option<Bound> {
         let text = |this: &Self, node: NodeId| match &this.binder.builder.node(node).op {
             Op::Constant(Constant::Text(text)) => Some(text.clone()),

@@ -1,4 +1,4 @@
-//! Types and levels: constants, conversions that lose nothing, operands brought together.
+//! Types and levels: constants, lossless conversions, and operands of a common type.
 
 use super::super::plan::{Constant, NodeId, Op};
 use super::super::syntax::{Expr, Literal};
@@ -21,7 +21,7 @@ impl Scope<'_, '_> {
     }
 
     pub(super) fn unary(&mut self, op: Op, ty: Type, level: Level) -> Bound {
-        // An operation on constants alone is carried out once per episode.
+        // An operation on constants alone runs once per episode.
         let (op, level) = match (level, op) {
             (Level::Constant, op @ Op::Constant(_)) => (op, level),
             (Level::Constant, op) => (op.with_operands(|operand| self.once_an_episode(operand)), Level::Episode),
@@ -122,7 +122,7 @@ impl Scope<'_, '_> {
         }
     }
 
-    /// The type that all of these can take: equal types, numbers widened, rates as 0 and 1 beside numbers.
+    /// The common type of these operands: equal types, widened numbers, and rates as 0 and 1 beside numbers.
     pub(super) fn common_type(bounds: &[Bound]) -> Option<Type> {
         let typed = || bounds.iter().filter_map(|bound| Some((bound.ty?, bound.rate)));
         let first = typed().next().map_or(Type::Bool, |(ty, _)| ty);
@@ -136,7 +136,7 @@ impl Scope<'_, '_> {
         Some(if typed().any(|(ty, _)| ty == Type::Float) { Type::Float } else { Type::Int })
     }
 
-    /// Operands of one type; `what` happens to them, for the message.
+    /// Converts operands to one type; `what` describes the operation in the message.
     pub(super) fn unified(&mut self, bounds: &[Bound], expr: &Expr, what: &str) -> Option<(Vec<Bound>, Type)> {
         let Some(ty) = Self::common_type(bounds) else {
             let mut names: Vec<&str> = bounds.iter().filter_map(|bound| bound.ty.map(Type::name)).collect();

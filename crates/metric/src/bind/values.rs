@@ -1,9 +1,8 @@
-//! Literals beside columns that take only some values: one that the column never takes is a slip, and the comparison would
-//! never hold.
+//! Refuses literals that a column with a list of values never takes: the comparison would never hold.
 //!
-//! Rule: what a node can be is read off the plan: a column with a list of values, its value at a timestep, and `case` and
-//! `coalesce` over such and over literals. Anything else can be any text. Comparisons by order are not looked at: they also
-//! make sense beside a text that is invalid of the values (`x between 'turn' and 'turn~'`).
+//! Rule: the plan gives the possible values: those of a column with a list, its value at a timestep, and `case` and
+//! `coalesce` over such values and literals. Everything else may be any text. Comparisons by order are not checked,
+//! since they also make sense with other texts (`x between 'turn' and 'turn~'`).
 
 use std::collections::HashSet;
 
@@ -14,16 +13,16 @@ use super::{Binder, Bound};
 use exact::suggest::nearest;
 use toml_spec::Fault;
 
-/// The texts that a node can be.
+/// The possible texts of a node.
 #[derive(Debug, Default)]
 struct Possible {
-    /// The columns that they come from, in the order of the expression.
+    /// Their columns, in the order of the expression.
     columns: Vec<String>,
     texts: Vec<String>,
 }
 
 impl Scope<'_, '_> {
-    /// Refuses a comparison of two values by equality that never holds, at its literal; other comparisons pass.
+    /// Refuses an equality of two values that never holds, at its literal; other comparisons pass.
     pub(super) fn check_comparison(
         &mut self,
         comparison: Comparison,
@@ -36,7 +35,7 @@ impl Scope<'_, '_> {
         }
     }
 
-    /// Refuses to ask whether a column has a value that it never has, the operands in either order.
+    /// Refuses an equality of a column and a value that it never has, in either order.
     pub(super) fn check_equality(&mut self, left: (Bound, &Expr), right: (Bound, &Expr)) -> Option<()> {
         for ((value, _), (literal, at)) in [(left, right), (right, left)] {
             let Some(text) = self.binder.literal_text(literal.node) else { continue };
@@ -57,7 +56,7 @@ impl Binder<'_> {
         }
     }
 
-    /// The possible values of a node, apart from null; `None` for any text.
+    /// The possible values of a node except null; `None` if any text is possible.
     fn possible(&self, node: NodeId) -> Option<Possible> {
         let mut possible = Possible::default();
         let (mut seen, mut todo) = (HashSet::new(), vec![node]);

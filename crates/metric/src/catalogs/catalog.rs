@@ -1,7 +1,7 @@
-//! A definition file as later stages know it: names, titles, directions, chance levels.
+//! A definition file for later stages: names, titles, directions, chance levels.
 //!
-//! A catalog travels with every score and every cell, so that a number can be traced to the
-//! sentence that defines it. It holds the definitions as text, not the plan that computes them.
+//! A catalog travels with every score and every cell, so that a number can be traced to its definition. It holds the
+//! definitions as text, not the plan that computes them.
 
 use std::cmp::Ordering;
 
@@ -86,7 +86,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// The unit where a definition names none.
+    /// The unit if a definition names none.
     pub(crate) const fn default_unit(self) -> &'static str {
         match self {
             Self::Rate => "rate",
@@ -108,7 +108,7 @@ pub enum Better {
 }
 
 impl Better {
-    /// The arrow in a header; none if neither direction is better.
+    /// The arrow in a header; `None` if neither direction is better.
     pub fn arrow(self) -> Option<char> {
         match self {
             Self::Higher => Some('↑'),
@@ -151,14 +151,14 @@ pub struct Factor {
 }
 
 impl Factor {
-    /// The experiments of the group from the least value to the largest.
+    /// The experiments of the group, from the smallest value to the largest.
     pub fn doses(&self) -> Vec<(&str, f64)> {
         let mut doses: Vec<(&str, f64)> = self.values.iter().map(|(name, value)| (name.as_str(), *value)).collect();
         doses.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(b.0)));
         doses
     }
 
-    /// Its name on an axis: the title, and the unit if it has one.
+    /// Its axis label: the title, and the unit if it has one.
     pub fn label(&self) -> String {
         if self.unit.is_empty() { self.title.clone() } else { format!("{}, {}", self.title, self.unit) }
     }
@@ -186,7 +186,7 @@ pub(crate) fn by_order(a: &String, one: &Experiment, b: &String, other: &Experim
 }
 
 impl Catalog {
-    /// The value of blind guessing at `metric` in `experiment`, where there is one (paper, Chance baselines).
+    /// The value of blind guessing at `metric` in `experiment`, if there is one (paper, Chance baselines).
     pub fn chance(&self, experiment: &str, metric: &str) -> Option<Ratio> {
         let own = self.experiment.get(experiment).and_then(|e| e.chance.get(metric));
         match own {
@@ -195,7 +195,7 @@ impl Catalog {
         }
     }
 
-    /// Takes over experiments that the traces declare, but those whose names there are already.
+    /// Adds experiments that the traces declare, except those with a known name.
     pub fn declare(&mut self, experiments: impl IntoIterator<Item = (String, Experiment)>) {
         for (name, experiment) in experiments {
             self.experiment.entry(name).or_insert(Experiment { is_declared: true, ..experiment });
@@ -203,7 +203,7 @@ impl Catalog {
         self.experiment.sort_by(by_order);
     }
 
-    /// The experiments that the traces declare and the definitions do not know.
+    /// The experiments that only the traces declare.
     pub fn declared(&self) -> impl Iterator<Item = (String, Experiment)> + '_ {
         let declared = self.experiment.iter().filter(|(_, experiment)| experiment.is_declared);
         declared.map(|(name, experiment)| (name.clone(), experiment.clone()))

@@ -1,4 +1,4 @@
-//! The measured quantity of a metric and its possible values: as declared, else by the unit.
+//! The measured quantity of a metric and its possible values: as declared, else from the unit.
 
 use std::sync::LazyLock;
 
@@ -49,7 +49,7 @@ static UNITS: LazyLock<IndexMap<String, Unit>> = LazyLock::new(|| {
 });
 
 impl Metric {
-    /// The measured quantity: as declared, else by the unit; `None` if neither says it.
+    /// The measured quantity: as declared, else from the unit; `None` if neither gives it.
     pub fn measures(&self) -> Option<Measures> {
         match self.kind {
             Kind::Rate => Some(Measures::Rate),
@@ -57,7 +57,7 @@ impl Metric {
         }
     }
 
-    /// The values that it can have, as far as the definition or its unit says it.
+    /// The possible values, as far as the definition or its unit gives them.
     pub fn value_range(&self) -> ValueRange {
         let range = range(self.measures, self.range, &self.unit);
         match self.measures() {
@@ -67,7 +67,7 @@ impl Metric {
         }
     }
 
-    /// The value that represents the whole of a fraction; `None` for every other metric.
+    /// The value for the whole of a fraction; `None` for other metrics.
     pub fn whole(&self) -> Option<i64> {
         self.value_range().most.filter(|_| self.measures() == Some(Measures::Fraction))
     }
@@ -78,7 +78,7 @@ fn measures(declared: Option<Measures>, is_censored: bool, unit: &str) -> Option
     declared.or(censored).or_else(|| UNITS.get(unit).map(|unit| unit.measures))
 }
 
-/// The declared range; that of the unit where the definition says nothing else of what is measured.
+/// The declared range, else that of the unit, unless the definition declares another measured quantity.
 fn range(declared: Option<Measures>, range: Option<ValueRange>, unit: &str) -> ValueRange {
     let of_unit = || UNITS.get(unit).filter(|unit| declared.is_none_or(|declared| declared == unit.measures));
     range.or_else(|| of_unit()?.range).unwrap_or_default()
@@ -109,7 +109,7 @@ pub(crate) fn faults(document: &Document, kind: impl Fn(&str) -> Kind) -> Vec<Fa
     faults
 }
 
-/// The reason why a metric cannot measure what its definition says, and what to do.
+/// The reason why a metric cannot measure what its definition declares, and the remedy.
 fn misfit(name: &str, entry: &MetricEntry, is_rate: bool) -> Option<(String, &'static str)> {
     let said = &entry.said;
     let unit = said.unit.as_deref().unwrap_or_default();

@@ -1,4 +1,4 @@
-//! The catalog: metrics as scores, cells and statistics know them.
+//! The catalog: metrics for scores, cells and statistics.
 
 pub mod catalog;
 pub(crate) mod measure;

@@ -1,27 +1,27 @@
-//! Relations between metrics of a catalog: durations with their completion, rates with the same rate among completed episodes.
+//! Relations between metrics of a catalog: durations and their completion, rates and the same among completed episodes.
 //!
-//! Rule: what a definition declares holds. Where it declares nothing its expressions may say it, whatever the metrics are
-//! called. A metric that repeats another one where some moment is not null, and that other one is 0 without that moment: so
-//! it is the same among finished episodes. A duration that is that moment, or else the length of the episode, finishes there.
+//! Rule: declarations hold. Without one, expressions may imply the relation, whatever the names of the metrics. A
+//! metric may repeat another one if some moment is not null, while the other is 0 without that moment: then it is the
+//! same among finished episodes. A duration that is that moment, or else the length of the episode, finishes there.
 
 use crate::catalog::{Catalog, Kind, Metric};
 use crate::measure::Measures;
 use crate::syntax::{BinaryOp, Expr, ExprKind, Literal, parse};
 
-/// Names within names that are followed.
+/// The deepest chain of names that is followed.
 const DEEPEST: usize = 64;
 
 /// The related metrics of a catalog, in its order.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Relations {
-    /// Each duration, and the rate that is defined in finished episodes.
+    /// Each duration, and the rate that is defined only in finished episodes.
     pub durations: Vec<(String, String)>,
-    /// Each rate that counts unfinished episodes as failures, and the same among finished episodes.
+    /// Each rate that counts unfinished episodes as failures, and its version among finished episodes.
     pub completed: Vec<(String, String)>,
 }
 
 impl Relations {
-    /// The relations that a catalog declares, and those that follow from its expressions.
+    /// The relations that a catalog declares or its expressions imply.
     pub fn of(catalog: &Catalog) -> Self {
         let reader = Reader { catalog };
         let moments: Vec<Completed> =
@@ -39,35 +39,35 @@ impl Relations {
         found
     }
 
-    /// The rate that is defined in the episodes where this duration finished.
+    /// The rate that is defined if this duration finished.
     pub fn finished(&self, duration: &str) -> Option<&str> {
         self.durations.iter().find(|(known, _)| known == duration).map(|(_, finished)| finished.as_str())
     }
 
-    /// The rates that are this one among finished episodes.
+    /// The versions of this rate among finished episodes.
     pub fn completed<'r>(&'r self, whole: &'r str) -> impl Iterator<Item = &'r str> {
         self.completed.iter().filter(move |(known, _)| known == whole).map(|(_, completed)| completed.as_str())
     }
 
-    /// The rate that this one is among finished episodes.
+    /// The rate whose version among finished episodes this is.
     pub fn whole(&self, completed: &str) -> Option<&str> {
         self.completed.iter().find(|(_, known)| known == completed).map(|(whole, _)| whole.as_str())
     }
 }
 
-/// A rate that repeats `whole` where a moment is not null.
+/// A rate that repeats `whole` if a moment is not null.
 struct Completed {
     name: String,
     whole: String,
     moment: Expr,
 }
 
-/// The value of an expression where a moment is null.
+/// The value of an expression if a moment is null.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Without {
     Null,
     False,
-    /// One of both.
+    /// Null or false.
     NotTrue,
     Open,
 }
@@ -108,7 +108,7 @@ impl Reader<'_> {
         parse(text).map_or(Without::Open, |expr| self.without(moment, &expr, depth))
     }
 
-    /// The value of an expression where the moment is null.
+    /// The value of an expression if the moment is null.
     fn without(&self, moment: &Expr, expr: &Expr, depth: usize) -> Without {
         let of = |part: &Expr| self.without(moment, part, depth);
         let null_if = |is_null| if is_null { Without::Null } else { Without::Open };
@@ -149,7 +149,7 @@ impl Reader<'_> {
     }
 }
 
-/// The conditions that an expression joins with `and`.
+/// The operands of `and` in an expression.
 fn conditions(expr: &Expr) -> Vec<&Expr> {
     match &expr.kind {
         ExprKind::Binary(BinaryOp::And, x, y) => conditions(x).into_iter().chain(conditions(y)).collect(),

@@ -1,7 +1,7 @@
-//! Definitions back from the catalog that scores and manifests carry.
+//! Restores definitions from the catalog in scores and manifests.
 //!
-//! Rule: what comes back says exactly what was carried, or nothing comes back: the content hash decides. Columns of
-//! one's own that a file declared are not carried; those of the traces stand in for them.
+//! Rule: the restored definitions are exactly the original ones, or restoring fails: the content hash decides. Columns
+//! that a file declared are not in the catalog; the columns of the traces replace them.
 
 use serde_json::{Map, Value};
 
@@ -22,7 +22,7 @@ pub enum RestoreError {
 }
 
 impl Definitions {
-    /// The definitions that a catalog was made from, checked over these columns, with the experiments that the traces had
+    /// The definitions behind a catalog, checked against these columns, with the experiments that the traces had
     /// declared.
     pub fn of_catalog(catalog: &Catalog, columns: &Columns) -> Result<Self, RestoreError> {
         let name = catalog.name.clone();

@@ -1,8 +1,7 @@
-//! Facts about the metrics' values that follow from the definitions alone.
+//! Facts about metric values that follow from the definitions alone.
 //!
-//! Rule: everything here holds in all traces. Where a metric is defined, which other metric it restricts to those
-//! episodes, and between which integers it lies are read off the checked plan, never off names; what the plan does
-//! not tell stays open.
+//! Rule: these facts hold in all traces. The checked plan, never a name, gives them: where a metric is defined, which
+//! metric it restricts to those episodes, and its range of integers. Facts that the plan does not give stay open.
 
 mod possible;
 
@@ -15,25 +14,25 @@ use super::plan::{Comparison, Constant, NodeId, Op, Output, Plan};
 /// The known facts about one metric.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Implied {
-    /// The smallest and the largest value, where the metric is defined.
+    /// The smallest and the largest value, if the metric is defined.
     pub range: (i64, i64),
-    /// In which episodes it is defined.
+    /// The episodes in which it is defined.
     pub defined: Defined,
-    /// The metric whose value it takes where it is defined.
+    /// The metric whose value it repeats in those episodes.
     pub restricts: Option<Restricted>,
 }
 
-/// In which episodes a metric is defined.
+/// The episodes in which a metric is defined.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Defined {
     Always,
-    /// In those where a rate has this value.
+    /// Those where a rate has this value.
     Where {
         metric: String,
-        /// 1 for true.
+        /// True for 1.
         is: bool,
     },
-    /// In some, by a rule that no other metric counts.
+    /// Some, by a rule that is not another metric.
     Sometimes,
 }
 
@@ -42,13 +41,13 @@ pub enum Defined {
 pub struct Restricted {
     /// Its name; it is defined in all episodes.
     pub metric: String,
-    /// Its value in all episodes outside, where it must be one.
+    /// Its only possible value in the other episodes, if there is only one.
     pub elsewhere: Option<i64>,
 }
 
 /// The known facts about each metric of a plan, in episodes of 1 to `steps` steps.
 ///
-/// `has_value` tells whether a column has a value in each row of each trace.
+/// `has_value` returns true if a column has a value in every row of every trace.
 pub fn implied(plan: &Plan, steps: u32, has_value: fn(&str) -> bool) -> IndexMap<String, Implied> {
     let reader = Reader { plan, traces: Traces { plan, steps, has_value } };
     plan.outputs.iter().map(|output| (output.name.clone(), reader.read(output))).collect()
@@ -136,7 +135,7 @@ impl Reader<'_> {
         }
     }
 
-    /// The one value that `value` can have where `when` does not hold.
+    /// The only possible value of `value` if `when` does not hold.
     fn outside(&self, when: NodeId, value: NodeId) -> Option<i64> {
         let mut assumed = vec![(when, Possible::NOT_TRUE)];
         if let Op::Not(negated) = self.plan.node(when).op

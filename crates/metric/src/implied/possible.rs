@@ -1,7 +1,7 @@
-//! The possible values of each node of a plan: an interval, and null or not.
+//! The possible values of each node of a plan: an interval, and whether null is possible.
 //!
-//! Rule: never less than what some trace gives. Truth values are 0 and 1; texts and floats have no interval of
-//! their own, and what compares them is open.
+//! Rule: includes at least all values that some trace gives. Truth values are 0 and 1. Texts and floats have no
+//! interval, so comparisons of them are open.
 
 use crate::columns::Type;
 use crate::overflow::{arithmetic, hull};
@@ -17,7 +17,7 @@ const TRUTHS: Range = (0, 1);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Possible {
-    /// The values; `None` where there never is one.
+    /// The values; `None` if the node never has one.
     values: Option<Range>,
     pub(super) may_be_null: bool,
 }
@@ -42,7 +42,7 @@ impl Possible {
         (fit(low), fit(high))
     }
 
-    /// The value, if it can have no other and is never null.
+    /// The value, if it is the only possible one and null is impossible.
     pub(super) fn only_value(&self) -> Option<i64> {
         let (low, high) = self.range();
         (self.values.is_some() && !self.may_be_null && low == high).then_some(low)
@@ -79,7 +79,7 @@ fn hull_of(ranges: impl Iterator<Item = Range>) -> Option<Range> {
     (!ranges.is_empty()).then(|| hull(ranges))
 }
 
-/// The most moments that are taken apart into those that are and those that are not.
+/// The most moments for which both cases, present and absent, are examined.
 const MOST_MOMENTS: usize = 6;
 
 #[derive(Clone, Copy)]
@@ -92,7 +92,7 @@ pub(super) struct Traces<'p> {
 impl Traces<'_> {
     /// The possible values of a node, given the values of `assumed` nodes.
     ///
-    /// Each first and last moment that the node needs is taken to be there, and taken not to be: so it is known that
+    /// Examines both cases of each first and last moment that the node needs: present and absent. This shows that
     /// `x is not null and x > 3` is never null.
     pub(super) fn of_node(&self, node: NodeId, assumed: &[(NodeId, Possible)]) -> Possible {
         let needed = self.plan.needed_by([node]);
@@ -141,7 +141,7 @@ impl Traces<'_> {
         Possible { values, may_be_null: of(moment).may_be_null || !is_there }
     }
 
-    /// Returns true if a predicate can hold only where `x` has a value.
+    /// Returns true if a predicate can hold only if `x` has a value.
     fn asks_for(&self, predicate: NodeId, x: NodeId) -> bool {
         match self.plan.node(predicate).op {
             Op::And(a, b) => self.asks_for(a, x) || self.asks_for(b, x),

@@ -1,4 +1,4 @@
-//! A metric's plan in words, for a reader who does not read SQL.
+//! A metric's plan in words, for readers who do not know SQL.
 
 use std::fmt;
 
@@ -57,7 +57,7 @@ pub struct NamedExpression {
 }
 
 impl Definitions {
-    /// The explanation of the metric; `None` if there is no such metric.
+    /// The explanation of the metric; `None` if it is unknown.
     pub fn explain(&self, metric: &str) -> Option<Explanation> {
         let entry = self.catalog.metric.get(metric)?;
         let written = self.document().metrics.get(metric)?;
@@ -84,7 +84,7 @@ impl Definitions {
         })
     }
 
-    /// Adds every name that `written` refers to, directly or not, in the order of first use.
+    /// Adds the names that `written` refers to, directly or not, in the order of first use.
     fn collect_names(&self, written: &Written, found: &mut Vec<NamedExpression>) {
         let Ok(expr) = syntax::parse(&written.text) else { return };
         for name in names_in(&expr) {
@@ -132,7 +132,7 @@ fn sentence(written: &Written, when: Option<&Written>, kind: Kind) -> String {
     }
 }
 
-/// The names of an expression, in the order of the text.
+/// The names in an expression, in the order of the text.
 fn names_in(expr: &Expr) -> Vec<String> {
     let of = |exprs: Vec<&Expr>| exprs.into_iter().flat_map(names_in).collect();
     match &expr.kind {
@@ -151,7 +151,7 @@ fn names_in(expr: &Expr) -> Vec<String> {
     }
 }
 
-/// An expression as a condition: something that holds or does not.
+/// An expression in words as a condition.
 fn condition(expr: &Expr) -> String {
     match &expr.kind {
         ExprKind::Name(name) => format!("{name} holds"),
@@ -196,7 +196,7 @@ fn condition(expr: &Expr) -> String {
     }
 }
 
-/// A condition within another, in parentheses where it would be read wrongly without.
+/// A condition within another, in parentheses if it would be misread without.
 fn part(expr: &Expr) -> String {
     let compound = matches!(expr.kind, ExprKind::Binary(BinaryOp::Or, ..))
         || matches!(&expr.kind, ExprKind::Call { name, .. } if matches!(name.as_str(), "any" | "all" | "coalesce"));
@@ -245,7 +245,7 @@ fn value(expr: &Expr) -> String {
         ExprKind::Case { operand, branches, otherwise } => {
             let test = |at: usize, when: &Expr| match (operand, at) {
                 (Some(operand), 0) => format!("{} is {}", value(operand), value(when)),
-                // Named once, so that nested operands do not multiply.
+                // Named only once, so that nested operands do not multiply.
                 (Some(_), _) => format!("it is {}", value(when)),
                 (None, _) => condition(when),
             };

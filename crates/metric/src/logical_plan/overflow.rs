@@ -1,7 +1,7 @@
 //! Integers of a plan that may exceed 64 bits, by the ranges of their operands.
 //!
-//! The native engine looks at every number. Other engines wrap in silence, so that the statement for them needs a
-//! check; most plans need none, since a count of steps or a sum of pixels cannot leave 64 bits in any trace.
+//! The native engine checks every number. Other engines wrap silently, so the statement for them needs a check. Most
+//! plans need none, since a count of steps or a sum of pixels cannot exceed 64 bits in any trace.
 
 use crate::columns::Type;
 use crate::plan::{Aggregate, Arithmetic, Constant, NodeId, Op, Plan};
@@ -12,17 +12,17 @@ type Range = (i128, i128);
 /// All integers of 64 bits.
 const ALL: Range = (i64::MIN as i128, i64::MAX as i128);
 
-/// A node whose value may leave 64 bits.
+/// A node whose value may exceed 64 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Suspect {
     pub node: NodeId,
-    /// True if it does so in every trace, being made of constants alone.
+    /// True if it exceeds them in every trace, since it consists of constants.
     pub certain: bool,
 }
 
-/// The nodes among `needed` whose value may leave 64 bits in traces of `rows` rows.
+/// The nodes among `needed` whose value may exceed 64 bits in traces of `rows` rows.
 ///
-/// `column` gives the smallest and largest value of an integer column, where they are known.
+/// `column` gives the smallest and largest value of an integer column, if known.
 pub fn may_overflow(
     plan: &Plan,
     needed: &[NodeId],
@@ -50,7 +50,7 @@ pub fn may_overflow(
     found
 }
 
-/// The range of an operation, beyond 64 bits where it may overflow.
+/// The range of an operation, beyond 64 bits if it may overflow.
 fn range(op: &Op, rows: i128, column: impl Fn(&str) -> Option<(i64, i64)>, of: impl Fn(NodeId) -> Range) -> Range {
     match op {
         Op::Column(name) => column(name).map_or(ALL, |(low, high)| (low.into(), high.into())),
@@ -75,7 +75,7 @@ pub(crate) fn arithmetic(op: Arithmetic, (a, b): Range, (c, d): Range) -> Range 
         Arithmetic::Add => (a + c, b + d),
         Arithmetic::Subtract => (a - d, b - c),
         Arithmetic::Multiply => hull([a * c, a * d, b * c, b * d].map(|product| (product, product))),
-        // The smallest integer by -1 is the only quotient that leaves 64 bits.
+        // Only the smallest integer divided by -1 exceeds 64 bits.
         Arithmetic::Quotient if c <= -1 && d >= -1 => (a.min(-b), b.max(-a)),
         Arithmetic::Quotient | Arithmetic::Remainder => (a.min(0), b.max(0)),
     }

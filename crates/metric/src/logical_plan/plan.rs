@@ -1,8 +1,8 @@
-//! The checked plan: typed operations over columns, each shared by everything that uses it.
+//! The checked plan: typed operations over columns, each shared by all its users.
 //!
-//! A plan is a list of nodes in which operands come before their users, so a single pass from the
-//! front evaluates it. Equal operations are one node: what two metrics share is computed once.
-//! Its lowerings (the kernels in `score`) need nothing but this file.
+//! A plan is a list of nodes in which operands come before their users, so one pass from the front evaluates it. Equal
+//! operations are one node, so shared parts of metrics are computed once. Lowerings such as the kernels in `score` need
+//! only this file.
 
 use std::collections::HashMap;
 
@@ -20,7 +20,7 @@ impl NodeId {
     }
 }
 
-/// One operation, its type and how often it has a value.
+/// One operation, its type, and its level.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Node {
     pub op: Op,
@@ -30,8 +30,8 @@ pub struct Node {
     pub level: Level,
 }
 
-/// The operations. Unless said otherwise a null operand gives null (SQL's three-valued logic), and
-/// operands have been brought to one type and one level, save that any operand may be a constant.
+/// The operations. Unless said otherwise, a null operand gives null (SQL's three-valued logic). Operands have one type
+/// and one level, except that any operand may be a constant.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Op {
     /// A column of the trace.
@@ -41,7 +41,7 @@ pub enum Op {
     /// The number of steps of the episode, T.
     Length,
     Constant(Constant),
-    /// An episode's value for each of its steps, or a constant for each episode or step.
+    /// An episode's value repeated at each of its steps, or a constant repeated at each episode or step.
     Spread(NodeId),
     Not(NodeId),
     /// Kleene's conjunction: false if either is false.
@@ -60,7 +60,7 @@ pub enum Op {
     IsFalse(NodeId),
     /// Sum, difference, product, quotient or remainder; a result beyond 64 bits is an error.
     Arithmetic(Arithmetic, NodeId, NodeId),
-    /// The value with the other sign.
+    /// The negated value.
     Negate(NodeId),
     /// The value after the first condition that is true, else the last value, else null.
     Case {
@@ -76,15 +76,15 @@ pub enum Op {
     IntFromBool(NodeId),
     /// The same number as a float.
     FloatFromInt(NodeId),
-    /// One value per episode out of one value per step.
+    /// One value per episode, from one value per step.
     Aggregate(Aggregate, NodeId),
-    /// The value of the first operand at the timestep given by the second; null where there is no such step.
+    /// The value of the first operand at the timestep in the second; null if that step does not exist.
     At(NodeId, NodeId),
     /// The value at step t - 1 of the same episode; null at the first step.
     Lag(NodeId),
 }
 
-/// A constant; floats by their bits so that equal constants are one node.
+/// A constant; floats are stored as bits so that equal constants are one node.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Constant {
     /// Null of the node's type.
@@ -107,7 +107,7 @@ pub enum Comparison {
 }
 
 impl Comparison {
-    /// The comparison that holds with its operands exchanged.
+    /// The equivalent comparison for exchanged operands.
     #[must_use]
     pub const fn flipped(self) -> Self {
         match self {
@@ -129,9 +129,9 @@ pub enum Arithmetic {
     Subtract,
     /// `x * y`
     Multiply,
-    /// `div(x, y)`: integers alone; towards zero; null where y is 0.
+    /// `div(x, y)`: only integers; rounds towards zero; null if y is 0.
     Quotient,
-    /// `x % y`: integers alone; the sign of x; null where y is 0.
+    /// `x % y`: only integers; the sign of x; null if y is 0.
     Remainder,
 }
 
@@ -146,24 +146,24 @@ pub enum Aggregate {
     Any,
     /// True if the predicate is true at every step; never null.
     All,
-    /// At how many steps it holds; never null.
+    /// The number of steps where it holds; never null.
     Count,
-    /// The smallest value, nulls apart; null without one.
+    /// The smallest value, ignoring nulls; null without values.
     Min,
-    /// The largest value, nulls apart; null without one.
+    /// The largest value, ignoring nulls; null without values.
     Max,
-    /// The sum of the values, nulls apart; null without one.
+    /// The sum of the values, ignoring nulls; null without values.
     Sum,
 }
 
 impl Aggregate {
-    /// Returns true if it asks at which steps a predicate holds, and nothing of the steps at which it does not.
+    /// Returns true if the result depends only on the steps where a predicate holds.
     pub const fn searches(self) -> bool {
         matches!(self, Self::First | Self::Last | Self::Any | Self::Count)
     }
 }
 
-/// A metric or a named expression and the node that holds it.
+/// A metric or a named expression and its node.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Output {
     pub name: String,
@@ -173,7 +173,7 @@ pub struct Output {
     pub node: NodeId,
 }
 
-/// Everything that scoring needs to know of some definitions.
+/// The complete input for scoring by some definitions.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Plan {
     nodes: Vec<Node>,
@@ -181,7 +181,7 @@ pub struct Plan {
     pub outputs: Vec<Output>,
     /// The named expressions in the order of definition, for evidence.
     pub lets: Vec<(String, NodeId)>,
-    /// Aggregates and lookups as they were first written, for evidence.
+    /// Aggregates and lookups in the words of their first use, for evidence.
     pub sources: HashMap<NodeId, String>,
     /// The filter, an episode-level truth value; all episodes count if absent.
     pub filter: Option<NodeId>,
@@ -202,12 +202,12 @@ impl Plan {
         &self.nodes[id.0]
     }
 
-    /// Keeps the metrics of these names, in the order of the plan.
+    /// Keeps only the metrics of these names, in the order of the plan.
     pub fn select(&mut self, names: &[String]) {
         self.outputs.retain(|output| names.contains(&output.name));
     }
 
-    /// The nodes that these need, themselves included, in order.
+    /// These nodes and all that they depend on, in order.
     pub fn needed_by(&self, roots: impl IntoIterator<Item = NodeId>) -> Vec<NodeId> {
         let mut needed = vec![false; self.nodes.len()];
         roots.into_iter().for_each(|root| needed[root.0] = true);
@@ -240,7 +240,7 @@ impl Op {
         operands
     }
 
-    /// The same operation on other nodes: what `to` gives for each operand, in order.
+    /// The same operation with each operand replaced by `to`, in order.
     #[must_use]
     pub(crate) fn with_operands(&self, mut to: impl FnMut(NodeId) -> NodeId) -> Self {
         match self {
@@ -271,7 +271,7 @@ impl Op {
     }
 }
 
-/// Builds a plan, one node an operation.
+/// Builds a plan with one node per distinct operation.
 #[derive(Debug, Default)]
 pub(crate) struct Builder {
     plan: Plan,

@@ -1,4 +1,4 @@
-//! The logical plan as text: a line per node, then the outputs.
+//! The logical plan as text: one line per node, then the outputs.
 
 use std::fmt;
 
@@ -102,7 +102,7 @@ exact::names!(Aggregate {
     Sum: "sum",
 });
 
-/// Shown by their names.
+/// Displays operators by name.
 macro_rules! by_name {
     ($($type:ty)+) => {
         $(impl fmt::Display for $type {

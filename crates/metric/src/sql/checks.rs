@@ -1,4 +1,4 @@
-//! The statement that says whether numbers leave 64 bits, for engines that wrap.
+//! The statement that reports numbers beyond 64 bits, for engines that wrap.
 
 use std::collections::BTreeMap;
 
@@ -9,13 +9,13 @@ use super::{Dialect, LoweringError};
 use crate::columns::Level;
 use crate::plan::{Arithmetic, NodeId, Op, Plan};
 
-/// The statement that says whether numbers leave 64 bits: a row per episode, a column `g<node>` for each of `checked`,
-/// 1 where the node does and 0 elsewhere.
+/// The statement that reports numbers beyond 64 bits. It has one row per episode and a column `g<node>` for each of
+/// `checked`: 1 if the node exceeds 64 bits, else 0.
 ///
-/// For engines that wrap silently: each number is compared with the same computation in doubles, which a wrapped number is
-/// far from.
+/// For engines that wrap silently. Each number is compared with the same computation in doubles: a wrapped number is
+/// far from its double.
 pub fn lower_checks(plan: &Plan, dialect: Dialect, checked: &[NodeId]) -> Result<String, LoweringError> {
-    // A check reads the operands of a value, which are not there where the value is a column of steps.
+    // A check reads the operands of a value, which are missing if the value is a shared column of steps.
     let layout = Layout::new(plan, dialect, checked, &BTreeMap::new()).without_shared();
     let checks: Vec<_> = checked.iter().filter_map(|&id| layout.check(id)).collect();
     let mut statement = Statement::new(&layout);
@@ -30,8 +30,8 @@ pub fn lower_checks(plan: &Plan, dialect: Dialect, checked: &[NodeId]) -> Result
 }
 
 impl Layout<'_> {
-    /// The column of a pass that tells of overflow: the pass, what it reads at each step, and its text. For a sum it is
-    /// the same sum in doubles, for what has a value per step whether there is one that overflows.
+    /// A pass's column for detecting overflow: the pass, the node that it reads at each step, and its text. For a sum
+    /// it is the same sum in doubles. For a value per step it says whether any step overflows.
     fn check(&self, id: NodeId) -> Option<(usize, NodeId, String)> {
         let node = self.plan.node(id);
         let (pass, read, check) = match &node.op {
@@ -57,7 +57,7 @@ impl Layout<'_> {
         format!("CASE WHEN {overflows} THEN 1 ELSE 0 END")
     }
 
-    /// Returns true if an operation on integers leaves 64 bits.
+    /// The condition that an operation on integers exceeds 64 bits.
     fn overflows(&self, id: NodeId) -> String {
         let double = |id: &NodeId| format!("CAST({} AS DOUBLE)", self.value(*id));
         let exact = match &self.plan.node(id).op {

@@ -1,4 +1,4 @@
-//! Differences between engines: names, constants, patterns, and the few functions that some of them lack.
+//! Differences between engines: names, constants, patterns, and functions that some of them lack.
 
 use sqlparser::keywords::ALL_KEYWORDS;
 
@@ -6,7 +6,7 @@ use super::pattern::java;
 use crate::columns::Type;
 use crate::plan::{Arithmetic, Constant};
 
-/// Whose SQL to write.
+/// The SQL dialect to write.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Dialect {
     #[default]
@@ -18,14 +18,14 @@ pub enum Dialect {
     Polars,
 }
 
-/// The functions of a dialect that spare a pass over the steps.
+/// The functions of a dialect that save a pass over the steps.
 pub(super) struct Functions {
-    /// The value at the smallest and at the largest t that is not null; a null value counts.
+    /// The value at the smallest and at the largest non-null t; the value may be null.
     pub(super) value_at: [&'static str; 2],
     pub(super) of_list: [&'static str; 3],
 }
 
-/// The smallest integer, which has no literal of its own.
+/// The smallest integer, which SQL cannot write as a literal.
 pub(super) const SMALLEST: &str = "(-9223372036854775807 - 1)";
 
 exact::names!(Dialect { Portable: "portable", Spark: "spark", Duckdb: "duckdb", Polars: "polars" });
@@ -48,7 +48,7 @@ impl Dialect {
         }
     }
 
-    /// The column of a metric as an engine names it in its answer.
+    /// The column of a metric in an engine's result.
     pub fn output_alias(self, metric: &str) -> String {
         match self {
             Self::Portable => self.output_name(metric),
@@ -90,7 +90,7 @@ impl Dialect {
         }
     }
 
-    /// The items of a list for which a condition holds; `item` is the name of an item in it.
+    /// The items of a list that meet a condition; `item` is the name of an item in it.
     pub(super) fn filtered(self, list: &str, item: &str, condition: &str) -> String {
         match self {
             Self::Duckdb => format!("[{item} for {item} in {list} if {condition}]"),
@@ -98,7 +98,7 @@ impl Dialect {
         }
     }
 
-    /// A text as it is in a statement.
+    /// A text literal.
     pub fn text(self, value: &str) -> String {
         match self {
             // Spark reads backslashes in texts as escapes.
@@ -107,7 +107,7 @@ impl Dialect {
         }
     }
 
-    /// An integer as it is in a statement. Spark's have 32 bits unless they say that they have 64.
+    /// An integer literal. Spark's have 32 bits unless marked as 64.
     fn integer(self, value: i64) -> String {
         let suffix = if self == Self::Spark { "L" } else { "" };
         match value {
@@ -117,7 +117,7 @@ impl Dialect {
         }
     }
 
-    /// A pattern of the `regex` crate as it is in a statement.
+    /// A pattern of the `regex` crate as a literal.
     pub fn pattern(self, pattern: &str) -> String {
         match self {
             Self::Spark => self.text(&java(pattern).unwrap_or_else(|| unreachable!("the binder has read the pattern"))),
@@ -130,7 +130,7 @@ impl Dialect {
             Constant::Null => format!("CAST(NULL AS {})", self.type_name(ty)),
             Constant::Bool(value) => i64::from(*value).to_string(),
             Constant::Int(value) => self.integer(*value),
-            // Polars takes no exponent without a point.
+            // Polars rejects an exponent without a point.
             Constant::Float(bits) if self == Self::Polars => format!("CAST('{:?}' AS DOUBLE)", f64::from_bits(*bits)),
             Constant::Float(bits) => format!("CAST({:e} AS DOUBLE)", f64::from_bits(*bits)),
             Constant::Text(value) => self.text(value),
@@ -146,8 +146,8 @@ impl Dialect {
         }
     }
 
-    /// Quotient and remainder without a division of integers, which engines disagree about: the remainder is exact
-    /// everywhere, and what is left divides without a fraction. Spark divides as doubles, and has a word of its own.
+    /// Quotient and remainder without integer division, on which engines disagree. The remainder is exact everywhere,
+    /// and without it the number divides evenly. Spark divides as doubles, but has `DIV`.
     pub(super) fn arithmetic(self, op: Arithmetic, x: &str, y: &str) -> String {
         match op {
             Arithmetic::Add => format!("({x} + {y})"),
@@ -164,8 +164,8 @@ impl Dialect {
         }
     }
 
-    /// The remainder with the sign of x. Polars gives it that of y, so that y is given that of x; the smallest integer
-    /// has no other sign.
+    /// The remainder with the sign of x. Polars uses the sign of y, so y gets the sign of x; the smallest integer
+    /// cannot change its sign.
     fn remainder(self, x: &str, y: &str) -> String {
         if self != Self::Polars {
             return format!("{x} % {y}");

@@ -1,6 +1,6 @@
-//! Nodes of a plan as SQL expressions: values of one step (of the table `s`) or of one episode (of the tables `e1`, ...).
+//! Nodes of a plan as SQL expressions: values of one step (table `s`) or of one episode (tables `e1`, ...).
 //!
-//! Truth values of episodes travel as 0 and 1.
+//! Truth values of episodes are stored as 0 and 1.
 
 use std::fmt::Write as _;
 
@@ -10,7 +10,7 @@ use super::one_pass::Windowed;
 use crate::columns::{Level, Type};
 use crate::plan::{Aggregate, Comparison, Constant, NodeId, Op};
 
-/// Positive infinity, and the number that is invalid.
+/// Positive infinity, and not-a-number.
 const INFINITY: &str = "CAST('inf' AS DOUBLE)";
 const NAN: &str = "CAST('NaN' AS DOUBLE)";
 
@@ -20,7 +20,7 @@ impl Layout<'_> {
             return String::new();
         }
         let text = text();
-        // What is not written to its end is not repeated in what contains it.
+        // An incomplete text is not repeated in those that contain it.
         if self.spend(text.len()) { text } else { String::new() }
     }
 
@@ -69,7 +69,7 @@ impl Layout<'_> {
                 Aggregate::Any => format!("MAX(CASE WHEN {} THEN 1 ELSE 0 END)", self.truth(*x)),
                 Aggregate::All => format!("MIN(CASE WHEN {} THEN 1 ELSE 0 END)", self.truth(*x)),
                 Aggregate::Count => {
-                    // A sum of integers has 128 bits in DuckDB, which keeps it from joining the passes well.
+                    // DuckDB sums integers in 128 bits, which keeps it from joining the passes well.
                     let counted = format!("CASE WHEN {} THEN 1 END", self.truth(*x));
                     format!("COUNT({})", self.each_step(*x, counted))
                 }
@@ -106,7 +106,7 @@ impl Layout<'_> {
         format!("CASE WHEN s.t IS NOT NULL THEN {text} END")
     }
 
-    /// The smallest or largest value. A NaN is above all other numbers; Polars passes over it.
+    /// The smallest or largest value. NaN exceeds all other numbers, but Polars ignores it.
     fn extreme(&self, function: &str, ty: Type, value: &str) -> String {
         if self.dialect != Dialect::Polars || ty != Type::Float {
             return format!("{function}({value})");

@@ -1,4 +1,4 @@
-//! The layout of the computation: the pass and column of each node, and the expressions that are written once for all users.
+//! The layout of the computation: the pass and column of each node, and the expressions that are written only once.
 
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -11,7 +11,7 @@ use crate::columns::{Level, Type};
 use crate::plan::{Aggregate, NodeId, Op, Plan};
 use exact::budget::Limit;
 
-/// The columns of an episode that every statement gives, in the order of the episode table, after `episode_id`.
+/// The episode columns of every statement, in the order of the episode table, after `episode_id`.
 pub(super) const KEYS: [&str; 4] = ["model", "experiment", "seed", "run"];
 
 /// The position of each node of a plan in a statement.
@@ -21,7 +21,7 @@ pub(super) struct Layout<'p> {
     pub(super) dialect: Dialect,
     /// The nodes to compute, operands before their users.
     pub(super) needed: Vec<NodeId>,
-    /// The pass after which each is known; 0 for what one step says.
+    /// The pass after which each is known; 0 if one step suffices.
     passes: BTreeMap<NodeId, usize>,
     lists: BTreeMap<NodeId, Windowed>,
     pub(super) shared: BTreeSet<NodeId>,
@@ -29,8 +29,8 @@ pub(super) struct Layout<'p> {
     written: Rc<Cell<usize>>,
 }
 
-/// A node that others read is written out for each of them, so that what is written may double with every definition.
-/// The longest statement, each of its bytes within some five nodes.
+/// The longest statement, counting each byte for about five nested nodes. A node is written out for each of its users,
+/// so the text may double with every definition.
 const MOST_WRITTEN: Limit = Limit::new("bytes written of a statement", 20 << 20);
 
 impl<'p> Layout<'p> {
@@ -94,7 +94,7 @@ impl<'p> Layout<'p> {
             let simple = matches!(node.op, Op::Column(_) | Op::Time | Op::Constant(_) | Op::Spread(_));
             node.level == Level::Step
                 && !simple
-                // The steps before are joined to the table of steps.
+                // Earlier steps are joined to the table of steps.
                 && !lagging.contains(id)
                 && self.passes[id] == 0
                 && users.get(id).is_some_and(|&count| count > 1)
@@ -106,12 +106,12 @@ impl<'p> Layout<'p> {
         self.lag.get() == 0 && self.shared.contains(&id)
     }
 
-    /// A column of the steps so many before, where no column of the traces has its name.
+    /// A column of the steps `lag` before, under a name that no column of the traces has.
     pub(super) fn lag_column(&self, lag: usize, word: &str) -> String {
         self.free_name(format!("lag{lag}_{word}"))
     }
 
-    /// Counts what is written; `false` once that is too much.
+    /// Counts written bytes; `false` if there are too many.
     pub(super) fn spend(&self, bytes: usize) -> bool {
         self.written.set(self.written.get().saturating_add(bytes));
         self.is_within_budget()
@@ -126,7 +126,7 @@ impl<'p> Layout<'p> {
         self
     }
 
-    /// The pass after which a node is known; 0 for what one step says.
+    /// The pass after which a node is known; 0 if one step suffices.
     pub(super) fn pass(&self, id: NodeId) -> usize {
         self.passes[&id]
     }
@@ -181,8 +181,8 @@ impl<'p> Layout<'p> {
     }
 }
 
-/// The searches that lists answer: those of which only the episode's values are made. Others are read at each step,
-/// where a list would be searched as often.
+/// The searches to answer by lists: those that only values of episodes depend on. Other searches are read at each step,
+/// so the list would be searched at each step too.
 fn lists(plan: &Plan, needed: &[NodeId], windowed: &BTreeMap<NodeId, Windowed>) -> BTreeMap<NodeId, Windowed> {
     let read_at_steps = needed.iter().filter_map(|id| match &plan.node(*id).op {
         Op::Spread(x) if plan.node(*id).level == Level::Step => Some(*x),

@@ -7,19 +7,18 @@
 //! ```
 //!
 //! A pass over the steps is a common table expression with one row per episode. An aggregate belongs to the first pass
-//! in which everything it reads is known; most definitions need one pass, which reads as one writes it by hand:
+//! in which all its inputs are known. Most definitions need one pass, which reads like SQL written by hand:
 //!
 //! ```text
 //! WITH e1 AS (SELECT s.episode_id, MIN(CASE WHEN ... THEN s.t END) AS done_4, ... FROM (...) s GROUP BY s.episode_id)
 //! SELECT ... FROM e1 ORDER BY ...
 //! ```
 //!
-//! The portable form uses nothing but CASE, COALESCE, MIN, MAX, SUM, COUNT, JOIN (LEFT JOIN for `lag`) and arithmetic, so that Polars SQL,
-//! `DuckDB`, Spark SQL and `DataFusion` run it as it is. Of a search between two landmarks it makes a second pass, as
-//! Polars does, which has no filters of lists; `DuckDB` and Spark have them.
+//! The portable form uses only CASE, COALESCE, MIN, MAX, SUM, COUNT, JOIN (LEFT JOIN for `lag`) and arithmetic. Polars
+//! SQL, `DuckDB`, Spark SQL and `DataFusion` run it unchanged. It needs a second pass for a search between two
+//! landmarks. So does Polars, which cannot filter lists; `DuckDB` and Spark can.
 //!
-//! Sums beyond 64 bits, which the native engine refuses, are an error or a wrap of the engine that
-//! runs the statement.
+//! The native engine refuses sums beyond 64 bits; other engines fail or wrap.
 
 mod checks;
 mod dialect;
@@ -41,7 +40,7 @@ use super::plan::{NodeId, Op, Plan};
 
 use exact::budget::SETTING;
 
-/// A plan that a dialect cannot say.
+/// The error for a plan that a dialect cannot express.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LoweringError {
     #[error("`{metric}` uses regexp_like, which has no form that all engines share; choose --dialect spark or duckdb")]
@@ -58,7 +57,7 @@ pub enum LoweringError {
 
 /// The statement that computes the episode table: `episode_id, model, experiment, seed, run`, then the metrics.
 ///
-/// Engines differ in how they quote names, so the portable form quotes none: a metric's `-` becomes `_` there.
+/// Engines quote names differently, so the portable form does not quote: a metric's `-` becomes `_` there.
 pub fn lower(plan: &Plan, dialect: Dialect) -> Result<String, LoweringError> {
     check_patterns(plan, dialect)?;
     check_names(plan, dialect)?;
@@ -70,7 +69,7 @@ pub fn lower(plan: &Plan, dialect: Dialect) -> Result<String, LoweringError> {
     Ok(statement.text)
 }
 
-/// The nodes that the episode table is made of.
+/// The nodes behind the columns of the episode table.
 fn roots(plan: &Plan) -> Vec<NodeId> {
     plan.outputs.iter().map(|output| output.node).chain(plan.filter).collect()
 }
@@ -95,7 +94,7 @@ fn check_names(plan: &Plan, dialect: Dialect) -> Result<(), LoweringError> {
     }
     let mut seen = BTreeSet::new();
     for name in plan.outputs.iter().map(|output| dialect.output_name(&output.name)) {
-        // Some engines fold the case of names without quotes.
+        // Some engines ignore case in names without quotes.
         if !seen.insert(name.to_lowercase()) {
             return Err(LoweringError::SameName { name });
         }
@@ -205,7 +204,7 @@ mod tests {
             format!("[let]\nx = \"{}\"\n[metric.M]\nvalue = \"max(lag(x))\"", &nested(8)[4..nested(8).len() - 1]);
         let refused = Definitions::from_toml("test", &text, &Columns::default()).unwrap_err().to_string();
         assert!(refused.contains("`lag` looks back by 8 steps at most"), "{refused}");
-        // An aggregate is one value, from which lags are counted anew.
+        // An aggregate is one value, after which lags are counted from zero.
         lower(&metric(&format!("count(lag(t) < {})", nested(8))), Dialect::Duckdb).unwrap();
     }
 

@@ -1,7 +1,7 @@
-//! The same plan with fewer dependencies between landmarks, so that fewer passes over the steps compute it.
+//! The same plan with fewer dependencies between landmarks, so that it needs fewer passes over the steps.
 //!
-//! A search in a window that a landmark bounds needs the landmark first, and so another pass. Most such searches follow
-//! from landmarks of the first pass:
+//! A search in a window needs the landmark at its bound first, and so another pass. Most such searches follow from
+//! landmarks of the first pass:
 //!
 //! | written | computed, with `f = first(p)` and `l = last(p)` |
 //! |---|---|
@@ -12,22 +12,22 @@
 //! | `at(x, case when c then f else l end)` | `case when c then at(x, f) else at(x, l) end` |
 //! | `at(x, f) = c` | `at(x = c, f)` |
 //!
-//! Here p, q, x and c read one step or the constants of the episode, and a and b are landmarks. A null bound makes the
-//! left side null or false, and the right side too.
+//! Here p, q, x and c read one step or constants of the episode, and a and b are landmarks. A null bound makes both
+//! sides null or false.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 use crate::columns::{Level, Type};
 use crate::plan::{Aggregate, Builder, Comparison, Constant, Node, NodeId, Op, Plan};
 
-/// A search among the steps at which a condition holds, between moments of the episode.
+/// A search among the steps where a condition holds, between moments of the episode.
 #[derive(Clone, Debug)]
 pub(super) struct Windowed {
     pub(super) condition: NodeId,
     pub(super) windows: Vec<(Comparison, NodeId)>,
 }
 
-/// The plan, and the searches that a list of timesteps would answer.
+/// The plan, and the searches that a list of timesteps can answer.
 pub(super) struct OnePass {
     pub(super) plan: Plan,
     pub(super) windowed: BTreeMap<NodeId, Windowed>,
@@ -150,12 +150,12 @@ impl Rewriter<'_> {
         }
     }
 
-    /// A condition as one on single steps and windows; `None` without windows, or with anything else.
+    /// Splits a condition into one on single steps and windows; `None` without windows, or with other parts.
     fn split(&mut self, condition: NodeId) -> Option<Windowed> {
         let (mut open, mut windows, mut own) = (vec![condition], Vec::new(), self.truth(true));
         let mut seen = HashSet::new();
         while let Some(part) = open.pop() {
-            // What is said twice says nothing more.
+            // A repeated part adds no information.
             if !seen.insert(part) {
                 continue;
             }
@@ -253,7 +253,7 @@ impl Rewriter<'_> {
         Op::Case { branches: branches.into(), otherwise: None }
     }
 
-    /// `coalesce(condition at a landmark, false)` needs one of the two searches.
+    /// Rewrites `coalesce(condition at a landmark, false)`, which needs only one of the two searches.
     fn coalesce(&mut self, values: Vec<NodeId>, node: &Node) -> NodeId {
         if let [value, otherwise] = values[..]
             && self.op(otherwise) == &Op::Constant(Constant::Bool(false))
@@ -267,7 +267,7 @@ impl Rewriter<'_> {
         self.add(Op::Coalesce(values), node.ty, node.level)
     }
 
-    /// A comparison per episode of two old nodes, which `op` is in new ones.
+    /// A comparison per episode of two old nodes; `op` is the same comparison of new nodes.
     fn compare(&mut self, comparison: Comparison, (x, y): (NodeId, NodeId), op: Op) -> NodeId {
         for (looked_up, other, comparison) in [(x, y, comparison), (y, x, comparison.flipped())] {
             let other = self.new[other.index()];

@@ -1,10 +1,10 @@
-//! A regular expression of the `regex` crate in the words of `java.util.regex`, which Spark uses.
+//! Translates a regular expression of the `regex` crate to `java.util.regex`, which Spark uses.
 //!
-//! The two syntaxes share most of their letters and differ in what some of them mean (`$`, `.`, `\b`, `\v`, `(?i)`,
-//! `[[:alpha:]]`, `a++`), so nothing is handed over as written: what the pattern means is written anew, character
-//! classes and letter case spelled out. Only whether there is a match is kept, not which one, nor groups.
+//! The two syntaxes share most characters, but some have different meanings (`$`, `.`, `\b`, `\v`, `(?i)`,
+//! `[[:alpha:]]`, `a++`). So the whole pattern is rewritten from its meaning, with character classes and letter case
+//! spelled out. Only the existence of a match is kept, not its position or groups.
 //!
-//! A word character stays `\w`, by the Unicode version of the Java that runs it.
+//! A word character stays `\w`, in the Unicode version of the running Java.
 
 use std::fmt::Write as _;
 
@@ -14,7 +14,7 @@ use regex_syntax::hir::{Class, ClassUnicode, ClassUnicodeRange, Hir, HirKind, Lo
 const UNICODE_WORD: &str = r"(?U:\w)";
 const ASCII_WORD: &str = "[0-9A-Z_a-z]";
 
-/// The pattern for Java; `None` for one that the `regex` crate does not take.
+/// The pattern for Java; `None` if the `regex` crate refuses it.
 pub(super) fn java(pattern: &str) -> Option<String> {
     let meaning = regex_syntax::parse(pattern).ok()?;
     let mut text = String::new();
@@ -27,7 +27,7 @@ fn write(hir: &Hir, text: &mut String) {
         HirKind::Empty => {}
         HirKind::Literal(literal) => String::from_utf8_lossy(&literal.0).chars().for_each(|c| character(c, text)),
         HirKind::Class(Class::Unicode(class)) => class_of(class, text),
-        // Only ASCII is left where Unicode is switched off and text must stay text.
+        // Only ASCII remains if Unicode is off and the text must stay valid.
         HirKind::Class(Class::Bytes(class)) => {
             class_of(&class.to_unicode_class().unwrap_or_else(ClassUnicode::empty), text);
         }

@@ -1,4 +1,4 @@
-//! The text of a statement: a common table expression per pass over the steps, then a row per episode.
+//! The text of a statement: one common table expression per pass over the steps, then one row per episode.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -10,10 +10,10 @@ use crate::columns::{Level, Type};
 use crate::plan::{NodeId, Op};
 use exact::budget::Limit;
 
-/// The longest statement that is written, in bytes.
+/// The longest statement, in bytes.
 const LONGEST: Limit = Limit::new("bytes of a statement", 4 << 20);
 
-/// A statement as far as it is written.
+/// A statement while it is written.
 pub(super) struct Statement<'l, 'p> {
     pub(super) layout: &'l Layout<'p>,
     pub(super) text: String,
@@ -25,9 +25,9 @@ pub(super) struct Statement<'l, 'p> {
 struct Reads {
     columns: BTreeSet<String>,
     shared: BTreeSet<NodeId>,
-    /// Columns of the steps so many before.
+    /// Columns of earlier steps, by their distance.
     earlier: BTreeMap<usize, BTreeSet<NodeId>>,
-    /// The nodes that were gone through, and of how many steps before.
+    /// The visited nodes, each with its distance in steps.
     seen: BTreeSet<(usize, NodeId)>,
     lag: usize,
 }
@@ -37,7 +37,7 @@ impl<'l, 'p> Statement<'l, 'p> {
         Self { layout, text: String::new(), passes: 0 }
     }
 
-    /// All passes. `checks` are further aggregates: the pass, the node that is read at each step, and the column.
+    /// Writes all passes. `checks` are further aggregates: the pass, the node read at each step, and the column.
     pub(super) fn passes(&mut self, checks: &[(usize, NodeId, String)]) -> Result<(), LoweringError> {
         let layout = self.layout;
         let known = layout.needed.iter().map(|&id| layout.pass(id));
@@ -103,7 +103,7 @@ impl<'l, 'p> Statement<'l, 'p> {
         Ok(())
     }
 
-    /// The steps before, beside each step: those of the same episode at t - 1, t - 2, ..., as far as is looked back.
+    /// Joins earlier steps to each step: those of the same episode at t - 1, t - 2, ..., as far as needed.
     fn earlier_steps(&mut self, earlier: &BTreeMap<usize, BTreeSet<NodeId>>) -> Result<(), LoweringError> {
         let layout = self.layout;
         for (&lag, columns) in earlier {

@@ -1,4 +1,4 @@
-//! One expression: what the grammar of SQL says of it, in the words of definitions.
+//! Parses one expression, with error messages in the terms of definitions.
 
 use sqlparser::ast;
 use sqlparser::keywords::Keyword;
@@ -18,7 +18,7 @@ pub(super) const EXPRESSION: Grammar = Grammar {
     help: Some("name its parts in [let]"),
 };
 
-/// The functions that SQL reads as keywords where a name could stand.
+/// The functions that SQL reads as keywords where a name is possible.
 const QUANTIFIER_NAMES: [&str; 3] = ["any", "all", "some"];
 
 pub fn parse(text: &str) -> Result<Expr, Vec<SyntaxFault>> {
@@ -57,7 +57,7 @@ fn parse_sql(text: &str) -> Result<ast::Expr, SyntaxFault> {
     })
 }
 
-/// The parser takes `case` and `not` for names where it cannot read what follows them; this says what is the matter.
+/// The parser reads `case` and `not` as names if it cannot read what follows; this explains the problem.
 fn unread_construct(text: &str, before: &TokenWithSpan) -> Option<SyntaxFault> {
     let Token::Word(word) = &before.token else { return None };
     let (message, help) = match (word.keyword, word.quote_style) {
@@ -83,7 +83,7 @@ fn function_of(token: &TokenWithSpan) -> Option<&'static str> {
     }
 }
 
-/// `any(`, `all(` and `some(` become plain names, so that they are functions wherever they stand.
+/// Turns `any(`, `all(` and `some(` into plain names, so that they are functions everywhere.
 fn function_names_only(mut tokens: Vec<TokenWithSpan>) -> Vec<TokenWithSpan> {
     for at in 1..tokens.len() {
         let opens = tokens[at].token == Token::LParen;

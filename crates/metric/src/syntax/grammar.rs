@@ -1,6 +1,6 @@
-//! The words and the grammar of SQL as `sqlparser` reads them: limits, and faults at their places.
+//! The tokens and grammar of SQL, read by `sqlparser`: limits, and faults at their places.
 //!
-//! For expressions of definitions and for whole queries alike.
+//! Used for expressions of definitions and for whole queries.
 
 use std::ops::Range;
 
@@ -8,23 +8,23 @@ use sqlparser::dialect::GenericDialect;
 use sqlparser::parser::{Parser, ParserError};
 use sqlparser::tokenizer::{Location, Span, Token, TokenWithSpan, Tokenizer};
 
-/// Texts below this many bytes make no tree that is too deep for any thread.
+/// Shorter texts, in bytes, cannot give a tree that is too deep for a thread.
 const SHALLOW: usize = 1024;
 
-/// The stack for a tree that is as deep as the longest text can make it, in bytes; only what is used of it is memory.
+/// The stack for the deepest possible tree, in bytes; only the used part takes memory.
 const STACK: usize = 128 << 20;
 
 /// A syntax error of a text.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SyntaxFault {
     pub message: String,
-    /// Its bytes in the text.
+    /// Its byte range in the text.
     pub span: Range<usize>,
     pub help: Option<String>,
 }
 
-/// What is read, and how long it may be: the parser nests as deeply as a chain of operators is long, and takes its tree
-/// apart again by recursion.
+/// The kind of text and its limits. A chain of operators nests as deeply as it is long, and the parser drops its tree
+/// by recursion.
 #[derive(Clone, Copy, Debug)]
 pub struct Grammar {
     /// `expression`, `query`.
@@ -33,14 +33,14 @@ pub struct Grammar {
     pub one: &'static str,
     /// The longest text, in bytes.
     pub longest: usize,
-    /// The most words and signs.
+    /// The largest number of tokens.
     pub most_tokens: usize,
     /// The remedy for a text that is too long or too deep.
     pub help: Option<&'static str>,
 }
 
 impl Grammar {
-    /// A parser of a text, its words changed by `edit`.
+    /// A parser for a text whose tokens `edit` may change.
     pub fn parser(
         self,
         text: &str,
@@ -66,7 +66,7 @@ impl Grammar {
         Ok(Parser::new(&GenericDialect {}).with_tokens_with_locations(edit(tokens)))
     }
 
-    /// The parser's own words, its position turned into a span.
+    /// The parser's message, with its position as a span.
     pub fn fault(self, text: &str, error: &ParserError) -> SyntaxFault {
         let (message, help) = match error {
             ParserError::ParserError(message) | ParserError::TokenizerError(message) => (message.clone(), None),
@@ -86,13 +86,13 @@ impl Grammar {
     }
 }
 
-/// Does work on the parser's tree of a text, on a stack that is large enough for it: the tree of `a + b + c` is as deep as
-/// the chain is long, and the parser's own functions walk it by recursion.
+/// Runs work on the parser's tree with a large enough stack. The tree of `a + b + c` is as deep as the chain is long,
+/// and the parser walks it by recursion.
 pub fn with_stack<T>(text: &str, work: impl FnOnce() -> T) -> T {
     if text.len() < SHALLOW { work() } else { stacker::grow(STACK, work) }
 }
 
-/// `Expected: x, found: y at Line: 1, Column: 2` -> the words and the location.
+/// Splits `Expected: x, found: y at Line: 1, Column: 2` into the words and the location.
 fn split_location(message: &str) -> Option<(&str, Location)> {
     let (words, place) = message.rsplit_once(" at Line: ")?;
     let (line, column) = place.split_once(", Column: ")?;
@@ -110,7 +110,7 @@ fn end_of_word(text: &str, start: usize) -> usize {
     start + word.max(rest.chars().next().map_or(0, char::len_utf8))
 }
 
-/// The byte of a 1-based line and column (in characters); the end of the text for a place beyond it.
+/// The byte of a 1-based line and column (in characters); the end of the text if it is beyond that.
 pub(super) fn byte_of(text: &str, location: Location) -> usize {
     if location.line == 0 {
         return text.len();
@@ -125,7 +125,7 @@ pub(super) fn byte_of(text: &str, location: Location) -> usize {
     start + line.char_indices().nth(column).map_or(line.len(), |(at, _)| at)
 }
 
-/// The bytes of a span; all of them where the parser does not know it.
+/// The bytes of a span; all of them if the parser does not know it.
 pub fn bytes_of(text: &str, span: Span) -> Range<usize> {
     if span.start.line == 0 {
         return 0..text.len();
@@ -134,7 +134,7 @@ pub fn bytes_of(text: &str, span: Span) -> Range<usize> {
     start..byte_of(text, span.end).max(start)
 }
 
-/// The beginning of a text that may be as long as an expression.
+/// The start of a text that may be as long as an expression.
 pub fn shortened(text: &str) -> String {
     const ENOUGH: usize = 60;
     match text.char_indices().nth(ENOUGH) {

@@ -1,7 +1,7 @@
-//! SQL text to the expressions of the calculus.
+//! Parses SQL text into the expressions of the calculus.
 //!
-//! The grammar is SQL's own, read by `sqlparser`; `reader` keeps the constructs that the calculus
-//! has, refuses every other one by its name, and remembers where each stood in the text.
+//! The grammar is SQL's own, read by `sqlparser`. `reader` keeps the constructs of the calculus, refuses all others by
+//! name, and remembers the position of each.
 
 mod expression;
 pub mod grammar;
@@ -14,11 +14,11 @@ use crate::plan::{Arithmetic, Comparison};
 
 pub use self::expression::parse;
 
-/// An expression as written. Expressions that say the same are equal, wherever they stand.
+/// An expression as written. Equality ignores positions.
 #[derive(Clone, Debug)]
 pub struct Expr {
     pub kind: ExprKind,
-    /// Its bytes in the text of the expression.
+    /// Its byte range in the text of the expression.
     pub span: Range<usize>,
 }
 
@@ -98,7 +98,7 @@ pub enum BinaryOp {
     And,
     Or,
     Compare(Comparison),
-    /// Any but the quotient, which is a function.
+    /// Any except the quotient, which is a function.
     Arithmetic(Arithmetic),
 }
 

@@ -1,4 +1,4 @@
-//! The parser's tree to the expressions of the calculus, faults of every part told.
+//! Converts the parser's tree to expressions of the calculus, and reports the faults of all parts.
 
 use std::ops::Range;
 
@@ -11,10 +11,10 @@ use crate::plan::{Arithmetic, Comparison};
 /// The deepest nesting of one expression.
 const DEEPEST: usize = 120;
 
-/// A fault that has been told already.
+/// Marks a fault that is already reported.
 struct Told;
 
-/// Walks the parser's tree and keeps what the calculus has.
+/// Walks the parser's tree and keeps the constructs of the calculus.
 pub(super) struct Reader<'a> {
     text: &'a str,
     faults: Vec<SyntaxFault>,
@@ -245,7 +245,7 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// Behind the parenthesis that closes the call that begins at `start`.
+/// The position after the parenthesis that closes the call at `start`.
 fn end_of_call(text: &str, start: usize) -> Option<usize> {
     let mut depth = 0usize;
     let mut quote = None;

@@ -1,11 +1,11 @@
-//! The checksums in the footer of a file: one per column chunk, and one of all that lies behind the chunks.
+//! The checksums in the footer of a file: one per column chunk, and one of everything after the chunks.
 //!
-//! The footer's own covers the bytes from the end of the last chunk to the end of the footer, page indexes included, with
-//! its own eight digits taken as zeros: schema, offsets, statistics and every key.
+//! The footer's checksum covers the bytes from the end of the last chunk to the end of the footer, with its own eight
+//! digits as zeros. So it covers page indexes, schema, offsets, statistics and every key.
 //!
-//! Rule: where the key is, the checksums hold, or the file is refused. But other programs carry the key along when they write
-//! a file again. Such a file is read without checksums, and every verb says so. It differs from the one that was summed as a
-//! whole: another program is named in `created_by`, and most chunks are others. Damage leaves most of either as it was.
+//! Rule: a file with the key is refused unless its checksums match. But other programs copy the key when they rewrite a
+//! file. Such a file is read without checksums, and every verb says so. It is recognised as a whole: `created_by` names
+//! another program, and most chunks differ. Damage leaves most of either unchanged.
 
 mod read;
 mod write;
@@ -26,7 +26,7 @@ pub const CREATED_BY: &str = concat!("mirrorstats version ", env!("CARGO_PKG_VER
 /// The only algorithm so far.
 const ALGORITHM: &str = "CRC-32";
 
-/// The least offset of a file's first chunk, behind the magic number.
+/// The smallest offset of a file's first chunk, after the magic number.
 const FIRST: u64 = 4;
 
 /// The JSON value under the key.
@@ -36,7 +36,7 @@ struct Stated {
     algorithm: String,
     created_by: String,
     chunks: Vec<Vec<Checksum>>,
-    /// The last of all, so that its digits lie at a known place.
+    /// Comes last, so that the position of its digits is known.
     footer: Checksum,
 }
 
@@ -69,7 +69,7 @@ fn digits(length: usize) -> std::ops::Range<usize> {
     length - 10..length - 2
 }
 
-/// The bytes of a column chunk: from the first to before the last.
+/// The byte range of a column chunk, end excluded.
 pub fn range(chunk: &ColumnChunkMetaData) -> Option<(u64, u64)> {
     let start = chunk.dictionary_page_offset().unwrap_or(chunk.data_page_offset());
     let (start, length) = u64::try_from(start).ok().zip(u64::try_from(chunk.compressed_size()).ok())?;

@@ -1,4 +1,4 @@
-//! Checksums compared with the bytes of a file.
+//! Compares checksums with the bytes of a file.
 
 use std::io::Read as _;
 use std::sync::Arc;
@@ -29,7 +29,7 @@ pub enum Checksums {
     Present,
 }
 
-/// The checksums of the column chunks of a file; none if it has none that apply.
+/// The checksums of the column chunks of a file; empty if none apply.
 #[derive(Clone, Debug, Default)]
 pub struct ChunkChecksums {
     all: Option<Arc<[u32]>>,
@@ -54,7 +54,7 @@ impl ChunkChecksums {
     }
 }
 
-/// The checksums of a file, of which the footer's is verified; `footer` are its bytes from `start` on.
+/// The checksums of a file, after verifying the footer's; `footer` holds its bytes from `start` on.
 pub fn of_file(
     file: &impl ChunkReader,
     (start, footer): (u64, &[u8]),
@@ -101,8 +101,8 @@ fn of_chunks(
     Ok(ChunkChecksums { all: Some(all), columns })
 }
 
-/// Whether a file that contradicts its checksums is another one than they were made of: another program wrote it, and at
-/// most half the chunks of its first row group are among those that were summed.
+/// Returns true if a file that contradicts its checksums was rewritten: another program wrote it, and at most half the
+/// chunks of its first row group have one of the checksums.
 fn is_another_file(file: &impl ChunkReader, metadata: &ParquetMetaData, stated: &Stated) -> bool {
     let stated_sums = |sum: u32| stated.chunks.iter().flatten().any(|stated| stated.0 == sum);
     let chunks = metadata.row_groups().first().map_or(&[][..], RowGroupMetaData::columns);
@@ -119,7 +119,7 @@ fn is_nearly(found: Option<&str>, name: &str) -> bool {
     equal.count() * 2 >= name.len()
 }
 
-/// Parses the value under the key. There is one way to write it, so that its own digits have a fixed position.
+/// Parses the value under the key. Only one spelling is accepted, so that its own digits have a fixed position.
 fn parsed(text: &str) -> Result<Stated, Fault> {
     let stated: Stated = serde_json::from_str(text).map_err(|error| Fault::Malformed(error.to_string()))?;
     if stated.algorithm != ALGORITHM {
@@ -131,7 +131,7 @@ fn parsed(text: &str) -> Result<Stated, Fault> {
     Ok(stated)
 }
 
-/// The CRC-32 of all from `end` to the end of the footer, the footer's own digits as zeros.
+/// The CRC-32 of the bytes from `end` to the end of the footer, with the footer's own digits as zeros.
 fn sum_behind(file: &impl ChunkReader, end: u64, (start, footer): (u64, &[u8]), text: &str) -> Result<u32, Fault> {
     let between = start.checked_sub(end);
     let between = between.ok_or_else(|| Fault::Malformed("columns within the footer".to_owned()))?;
@@ -148,7 +148,7 @@ fn sum_behind(file: &impl ChunkReader, end: u64, (start, footer): (u64, &[u8]), 
     Ok(hasher.finalize())
 }
 
-/// Adds this many bytes of a file from `start` on, or fewer where it ends; how many there were.
+/// Adds this many bytes of a file from `start` on, or fewer if it ends. Returns the number of bytes added.
 fn sum_into(hasher: &mut crc32fast::Hasher, file: &impl ChunkReader, start: u64, length: u64) -> Result<u64, Fault> {
     if length == 0 {
         return Ok(0);
@@ -167,24 +167,23 @@ fn sum_into(hasher: &mut crc32fast::Hasher, file: &impl ChunkReader, start: u64,
     }
 }
 
-/// The CRC-32 of this many bytes of a file from `start` on, or of fewer where it ends.
+/// The CRC-32 of this many bytes of a file from `start` on, or fewer if it ends.
 pub(crate) fn sum(file: &impl ChunkReader, start: u64, length: u64) -> Result<u32, Fault> {
     let mut hasher = crc32fast::Hasher::new();
     sum_into(&mut hasher, file, start, length)?;
     Ok(hasher.finalize())
 }
 
-/// Whether a footer holds the key or its value though it has no such pair: damage to the name, or to a number of a field,
-/// hides it.
+/// Returns true if a footer contains the key or its value but no readable pair: a name or a field number is damaged.
 fn is_hidden(footer: &[u8]) -> bool {
-    // As its own format writes a text and the field behind it; no text of another key or column has these bytes.
+    // The encoding of a text and the next field's header; texts of other keys or columns do not have these bytes.
     let length = u8::try_from(KEY.len()).expect("the key is short");
     let pair = [&[length][..], KEY.as_bytes(), &[0x18]].concat();
     let value = format!(r#"{{"algorithm":"{ALGORITHM}","created_by":""#);
     [&pair, value.as_bytes()].iter().any(|bytes| memmem::find(footer, bytes).is_some())
 }
 
-/// Verifies all checksums of a file that another room reads; whether it has any is for the file to say.
+/// Verifies the checksums of a file that another reader opens; passes if there are none.
 pub fn verify_file(file: &impl ChunkReader, metadata: &ParquetMetaData) -> Result<(), String> {
     let (start, footer): (u64, Bytes) = footer_bytes(file).ok_or("the footer cannot be read")?;
     let (_, sums) = of_file(file, (start, &footer), metadata).map_err(|fault| fault.to_string())?;

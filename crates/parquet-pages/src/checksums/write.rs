@@ -1,4 +1,4 @@
-//! A file that gets its checksums while it is written.
+//! Adds checksums to a file while it is written.
 
 use std::io::{self, Write};
 
@@ -9,8 +9,8 @@ use parquet::file::writer::SerializedFileWriter;
 
 use super::{ALGORITHM, CREATED_BY, Checksum, FIRST, KEY, Stated, digits, range};
 
-/// Where a Parquet writer puts a file with checksums: the bytes of a row group are held until it is closed and they are
-/// summed, those of the footer until its digits are known.
+/// The output of a Parquet writer for a file with checksums. Holds the bytes of a row group until it is closed and
+/// summed, and those of the footer until its digits are known.
 pub struct Held<W> {
     out: W,
     bytes: Vec<u8>,
@@ -29,7 +29,7 @@ impl<W: Write> Held<W> {
         self.chunks.len()
     }
 
-    /// Sums these row groups, which were closed since the last time, and passes their bytes on.
+    /// Sums the row groups closed since the last call, and passes their bytes on.
     pub fn pass_on(&mut self, closed: &[RowGroupMetaData]) -> Result<()> {
         for group in closed {
             let sums = group.columns().iter().map(|chunk| {
@@ -51,7 +51,7 @@ impl<W: Write> Held<W> {
         self.bytes.get(at(start)?..at(end)?)
     }
 
-    /// Passes on what is held, without checksums.
+    /// Passes on the held bytes, without checksums.
     pub fn release(mut self) -> Result<W> {
         self.out.write_all(&self.bytes)?;
         self.out.flush()?;
@@ -70,7 +70,7 @@ impl<W: Write> Held<W> {
     fn close(mut self, mut stated: Stated) -> Result<W> {
         let open = stated.json();
         let place = memmem::rfind(&self.bytes, open.as_bytes()).ok_or_else(misplaced)?;
-        // Behind the footer stand its length and the magic number.
+        // The footer's length and the magic number follow the footer.
         let footer = self.bytes.len().checked_sub(8).map(|length| self.start + length as u64);
         let summed = footer.and_then(|footer| self.bytes_of(self.end, footer)).ok_or_else(misplaced)?;
         stated.footer = Checksum(crc32fast::hash(summed));
@@ -93,7 +93,7 @@ impl<W: Write> Write for Held<W> {
     }
 }
 
-/// Sums the row groups of a file that were closed since the last time, and passes their bytes on.
+/// Sums the row groups of a file that were closed since the last call, and passes their bytes on.
 pub fn pass_on<W: Write + Send>(file: &mut SerializedFileWriter<Held<W>>) -> Result<()> {
     file.flush()?;
     let closed = file.flushed_row_groups()[file.inner().row_groups()..].to_vec();

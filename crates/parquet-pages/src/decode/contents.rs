@@ -1,9 +1,9 @@
-//! The check of a column's decompressed pages, before the Parquet library decodes them.
+//! Checks a column's decompressed pages before the Parquet library decodes them.
 //!
-//! The library takes any level that is not 0 for 1, and ignores what stands behind the last level. Rule: a page that is
-//! let through has a sound level for each row, as many values as its levels say, and keys within its dictionary. Bytes behind
-//! the values are ignored: fastparquet writes eight. Delta encodings are checked for their number of values only; their
-//! blocks are the library's.
+//! The library treats any level that is not 0 as 1, and ignores bytes after the last level. Rule: an accepted page has
+//! a valid level for each row, as many values as its levels require, and keys within its dictionary. Bytes after the
+//! values are ignored: fastparquet writes eight. Delta encodings are only checked for their number of values; the
+//! library reads the blocks.
 
 use bytes::Bytes;
 use parquet::basic::{Encoding, Type as Physical};
@@ -15,7 +15,7 @@ use super::rle::{Hybrid, Span, prefixed};
 use crate::error::Unsupported;
 use crate::stored::header::width;
 
-/// The pages of one flat column of one row group, in their order.
+/// The pages of one flat column of one row group, in order.
 pub(crate) struct Contents {
     physical: Physical,
     width: usize,
@@ -24,17 +24,17 @@ pub(crate) struct Contents {
     texts: Texts,
 }
 
-/// What the texts of pages take when they are written out: keys into a dictionary that are not left as keys, and texts
-/// that are stored as what differs from the one before.
+/// The size of the written-out texts of pages: dictionary keys that do not stay keys, and texts stored as differences
+/// from the one before.
 struct Texts {
     lengths: Vec<u32>,
-    /// True if keys are written out; the library does that to those before a page without keys, too.
+    /// True if keys are written out; the library also does that to keys before a page without keys.
     writes_out: bool,
     behind_keys: u64,
     added: u64,
 }
 
-/// The texts of a smaller dictionary are not counted where they stay keys: they are short.
+/// Texts of smaller dictionaries are short, so they are not counted while they stay keys.
 const SMALL_DICTIONARY: usize = 64 << 10;
 
 impl Texts {
@@ -42,7 +42,7 @@ impl Texts {
         if values.len() <= SMALL_DICTIONARY && !self.writes_out {
             return;
         }
-        // They are known to be there.
+        // `plain` has checked that they are there.
         while let Some((length, rest)) = values.split_first_chunk() {
             let length = u32::from_le_bytes(*length);
             self.lengths.push(length);
@@ -71,7 +71,7 @@ impl Texts {
 /// The problem of a page: expected and found.
 type Fault = (&'static str, String);
 
-/// The rows of a data page: how many are there, and how many of them null where that is declared.
+/// The number of rows of a data page, and the number of nulls if it is declared.
 struct Declared {
     rows: usize,
     nulls: Option<usize>,
@@ -114,7 +114,7 @@ impl Contents {
                         let (levels, values) = prefixed(buf).map_err(|Unsupported| levels("fewer bytes"))?;
                         self.data(&declared, Some(levels), &values, *encoding)
                     }
-                    // One bit a level, which can say nothing but 0 and 1.
+                    // One bit per level is always 0 or 1.
                     (true, _) => Ok(()),
                 }
             }
@@ -168,7 +168,7 @@ impl Contents {
                 });
                 sound.map_err(|Unsupported| ("a truth value for each row", "runs of another length".into()))
             }
-            // Where a byte of a value lies depends on how many there are.
+            // The position of a value's bytes depends on the number of values.
             (Encoding::BYTE_STREAM_SPLIT, _) if count.checked_mul(self.width) == Some(values.len()) => Ok(()),
             (Encoding::BYTE_STREAM_SPLIT, _) => Err(other_bytes(values, count, self.width)),
             (Encoding::DELTA_BYTE_ARRAY, _) => {
@@ -245,7 +245,7 @@ fn ones(stored: Bytes, count: usize) -> Result<usize, Unsupported> {
     hybrid.finish().map(|()| ones)
 }
 
-/// Goes through all of `count` numbers.
+/// Visits all of `count` numbers.
 fn each_span(hybrid: &mut Hybrid, mut count: usize, mut take: impl FnMut(Span<'_>)) -> Result<(), Unsupported> {
     while count > 0 {
         let span = hybrid.span(count)?;

@@ -1,4 +1,4 @@
-//! One column of one row group, read some rows at a time.
+//! Reads one column of one row group, some rows at a time.
 
 use std::sync::Arc;
 
@@ -27,11 +27,11 @@ pub enum Form {
     Runs,
 }
 
-/// The position in a column's pages.
+/// A position in a column's pages.
 pub struct Cursor {
     pages: Pages,
     physical: Physical,
-    /// True if there may be nulls.
+    /// True if nulls are possible.
     optional: bool,
     form: Form,
     dictionary: Option<Dictionary>,
@@ -39,7 +39,7 @@ pub struct Cursor {
     unread: usize,
 }
 
-/// A page of values and what is left of it.
+/// A page of values and its unread rest.
 struct DataPage {
     rows: usize,
     valid: usize,
@@ -58,7 +58,7 @@ enum Stored {
 #[derive(Default)]
 struct Stretches {
     keys: Vec<i32>,
-    /// The row before which each ends.
+    /// The end of each run (exclusive).
     ends: Vec<u32>,
 }
 
@@ -94,7 +94,7 @@ impl Cursor {
 
     pub fn read(&mut self, count: usize) -> Result<Column, Unsupported> {
         if count > 0 {
-            // The dictionary stands before the first values.
+            // The dictionary comes before the first values.
             self.page()?;
         }
         if self.physical == Physical::BOOLEAN {
@@ -126,13 +126,13 @@ impl Cursor {
     fn runs(&mut self, count: usize) -> Result<Column, Unsupported> {
         let mut stretches = Stretches::default();
         self.rows(count, |stored, rows, values| {
-            // Nulls among rows that are to be runs: rare, and the library's to decode.
+            // Nulls among rows read as runs are rare, so the library decodes them.
             if rows == values { stored.runs(values, &mut stretches) } else { Err(Unsupported) }
         })?;
         Ok(Column::Runs(Runs::new(self.dictionary()?.values(stretches.keys, None)?, stretches.ends)))
     }
 
-    /// The keys of the next rows, 0 without one.
+    /// The keys of the next rows; 0 for null.
     fn keys<N: Number>(&mut self, count: usize) -> Result<(Vec<N>, Option<NullBuffer>), Unsupported> {
         let mut keys = Vec::with_capacity(count);
         let nulls = self.rows(count, |stored, _, values| stored.hybrid()?.append(values, &mut keys))?;
@@ -143,8 +143,8 @@ impl Cursor {
         Ok((keys, nulls))
     }
 
-    /// Goes through the next rows page by page. `take` gets what is stored, the number of rows and that of values;
-    /// the others are null.
+    /// Reads the next rows page by page. `take` gets the stored data, the number of rows and the number of values,
+    /// which excludes nulls.
     fn rows(
         &mut self,
         count: usize,
@@ -182,12 +182,12 @@ impl Cursor {
         self.page.as_mut().ok_or(Unsupported)
     }
 
-    /// The page under way is read: nothing must be left of it.
+    /// Closes the current page, which must be read to its end.
     fn close_page(&mut self) -> Result<(), Unsupported> {
         self.page.take().map_or(Ok(()), |page| page.finish())
     }
 
-    /// The next page with values, the dictionary before it taken in.
+    /// The next page with values; reads a dictionary before it.
     fn next_page(&mut self) -> Result<Option<DataPage>, Unsupported> {
         loop {
             let Some(page) = self.pages.get_next_page().map_err(|_| Unsupported)? else { return Ok(None) };
@@ -224,7 +224,7 @@ impl Cursor {
                     ..
                 } => {
                     let levels = def_levels_byte_len as usize;
-                    // Levels where there is but one: rare, and checked on the library's path.
+                    // Levels of a required column are rare; the library's path checks them.
                     if levels > buf.len() || rep_levels_byte_len > 0 || (levels > 0 && !self.optional) {
                         return Err(Unsupported);
                     }
@@ -254,7 +254,7 @@ impl Cursor {
             (Physical::BOOLEAN, Encoding::RLE) => Stored::Hybrid(Hybrid::new(prefixed(&values)?.0, 1, rows)?),
             (Physical::BOOLEAN, _) => return Err(Unsupported),
             (_, Encoding::RLE_DICTIONARY | Encoding::PLAIN_DICTIONARY) if self.dictionary.is_some() => {
-                // A page of nothing but nulls may have no width at all: the library says whether it takes that.
+                // A page with only nulls may have no width: the library decides whether that is valid.
                 let width = *values.first().ok_or(Unsupported)?;
                 Stored::Hybrid(Hybrid::new(values.slice(1..), width, rows)?)
             }
@@ -337,16 +337,16 @@ impl Stretches {
     }
 
     fn add_each(&mut self, keys: &[i32]) -> Result<(), Unsupported> {
-        // Mostly the keys are those of two episodes, or of one.
+        // Most of the time all keys belong to one or two episodes.
         keys.chunk_by(|a, b| a == b).try_for_each(|same| self.add(same[0], same.len()))
     }
 }
 
-/// Adds numbers of one bit: how many, and how many of them are 1.
+/// Adds one-bit numbers. Returns their number, and the number of ones.
 fn append(span: Span<'_>, out: &mut Bits) -> (usize, usize) {
     match span {
         Span::Same { value, count } => {
-            // A number of one bit: runs of others are refused.
+            // A number of one bit: wider runs are refused.
             out.fill(count, value == 1);
             (count, if value == 1 { count } else { 0 })
         }

@@ -1,15 +1,15 @@
-//! The lengths of texts that are stored as differences from the previous text: a few bytes can expand to a long text each.
+//! The lengths of texts stored as differences from the previous text: a few bytes can expand to many long texts.
 //!
 //! Source: the Parquet format's "Delta Strings" and "Delta Encoding".
 
 use super::rle::varint;
 use crate::error::Unsupported;
 
-/// More small blocks in a block than any writer makes; the Parquet library makes room for them before it has any.
+/// More small blocks per block than any writer makes; the Parquet library allocates them before it reads any.
 const MOST_SMALL_BLOCKS: u64 = 1024;
 
-/// What a delta encoding of integers says before its blocks: values in a block, small blocks in a block, values at all,
-/// and where the first value stands.
+/// The header of a delta encoding of integers: values per block, small blocks per block, number of values, and the
+/// position of the first value.
 pub(crate) struct Opening {
     block: u64,
     small_blocks: u64,
@@ -102,14 +102,14 @@ mod tests {
         let data = [&[0x80, 1, 4, 5, 14, 3, 4, 0, 0, 0][..], &[0x00, 0xb0], &[0; 14]].concat();
         assert_eq!(sum(&data).ok(), Some(7 + 5 + 3 + 1 + 10));
         assert!(sum(&data[..11]).is_err(), "cut");
-        // All the same, a thousand million of them, in no bits at all.
+        // A thousand million equal values in no bits at all.
         let same = [0x80, 1, 4, 0x80, 0x94, 0xeb, 0xdc, 3, 14, 0, 0, 0, 0, 0];
         assert_eq!(Opening::read(&same).ok().map(|opening| opening.count), Some(1_000_000_000));
     }
 
     #[test]
     fn invalid_lengths_are_refused() {
-        // Below zero; no small blocks; more of them than there are.
+        // A negative number; no small blocks; too many small blocks.
         for data in [&[0x80, 1, 4, 1, 13][..], &[0x80, 1, 0, 1, 14], &[0x80, 0x80, 0x80, 1, 0x80, 0x80, 8, 1, 14]] {
             assert!(sum(data).is_err(), "{data:?}");
         }

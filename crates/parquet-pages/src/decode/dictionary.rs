@@ -50,14 +50,14 @@ impl Dictionary {
         values.len() <= 1 << u8::BITS
     }
 
-    /// Keys of a byte and their values; a null's key is 0.
+    /// One-byte keys and their values; the key of a null is 0.
     pub(crate) fn keys(&self, keys: Vec<u8>, nulls: Option<NullBuffer>) -> Result<Keys, Unsupported> {
         let (Self::Texts(values) | Self::Ints(values)) = self;
         let keys = UInt8Array::try_new(keys.into(), nulls).map_err(|_| Unsupported)?;
         Keys::new(keys, values.clone()).ok_or(Unsupported)
     }
 
-    /// The values of keys; a null's key is 0.
+    /// The values of keys; the key of a null is 0.
     pub(crate) fn values(&self, keys: Vec<i32>, nulls: Option<NullBuffer>) -> Result<ArrayRef, Unsupported> {
         match self {
             Self::Texts(texts) => {

@@ -1,4 +1,4 @@
-//! The Parquet library's reader of rows, on pages that are verified.
+//! The Parquet library's row reader on verified pages.
 
 use std::sync::Arc;
 use std::vec;
@@ -15,7 +15,7 @@ use crate::error::FaultSlot;
 use crate::stored::bytes::{Place, Store, rows_of};
 use crate::stored::reader::Pages;
 
-/// Some row groups of a file, to be read by the library.
+/// Some row groups of a file, for the library to read.
 pub struct Library {
     pub store: Store,
     pub metadata: Arc<ParquetMetaData>,
@@ -24,12 +24,12 @@ pub struct Library {
     pub row_groups: Vec<usize>,
     /// The slot for the first fault of a page.
     pub slot: FaultSlot,
-    /// True if texts are asked for row by row, not as keys into a dictionary.
+    /// True if texts are needed row by row, not as keys into a dictionary.
     pub writes_out: bool,
 }
 
 impl Library {
-    /// A reader of some columns, as `fields` wants them held.
+    /// A reader of some columns, in the types of `fields`.
     pub fn reader(
         &self,
         columns: ProjectionMask,

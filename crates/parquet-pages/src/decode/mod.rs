@@ -1,4 +1,4 @@
-//! Pages decoded: by the short cut, or checked for the Parquet library.
+//! Decodes pages: by the short cut, or through the Parquet library after a check.
 
 pub(crate) mod contents;
 pub(crate) mod cursor;

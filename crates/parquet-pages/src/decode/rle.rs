@@ -1,4 +1,4 @@
-//! Parquet's hybrid of runs and packed bits, read as spans.
+//! Reads Parquet's hybrid of runs and packed bits as spans.
 //!
 //! Source: the Parquet format's "Run Length Encoding / Bit-Packing Hybrid (RLE = 3)".
 
@@ -9,7 +9,7 @@ use bytes::Bytes;
 use crate::bits::word;
 use crate::error::Unsupported;
 
-/// Numbers of a fixed width, as they are stored: runs of one number, and packed ones.
+/// Stored numbers of a fixed width: runs of one number, and packed ones.
 pub(crate) struct Hybrid {
     data: Bytes,
     at: usize,
@@ -26,7 +26,7 @@ enum Run {
     Packed(usize),
 }
 
-/// Some numbers, one after the other.
+/// Some consecutive numbers.
 pub(crate) enum Span<'a> {
     Same { value: u32, count: usize },
     Packed(Packed<'a>),
@@ -40,7 +40,7 @@ pub(crate) struct Packed<'a> {
 }
 
 impl Hybrid {
-    /// At most `most` numbers of `width` bits, which are at most 32.
+    /// At most `most` numbers of `width` bits; at most 32 bits.
     pub(crate) fn new(data: Bytes, width: u8, most: usize) -> Result<Self, Unsupported> {
         let width = usize::from(width);
         if width > 32 {
@@ -49,7 +49,7 @@ impl Hybrid {
         Ok(Self { data, at: 0, width, run: Run::Same(0), count: 0, left: most })
     }
 
-    /// The next numbers, `most` of them at most and one at least.
+    /// The next numbers: at least one, at most `most`.
     #[inline]
     pub(crate) fn span(&mut self, most: usize) -> Result<Span<'_>, Unsupported> {
         while self.count == 0 {
@@ -67,7 +67,7 @@ impl Hybrid {
         })
     }
 
-    /// The next `count` numbers, behind those of `out`.
+    /// Appends the next `count` numbers to `out`.
     pub(crate) fn append<N: Number>(&mut self, count: usize, out: &mut Vec<N>) -> Result<(), Unsupported> {
         if self.width > N::WIDTH {
             return Err(Unsupported);
@@ -105,7 +105,7 @@ impl Hybrid {
             (self.at, self.count, self.left) = (from + stored.len(), count, self.left - count);
             return Ok(());
         }
-        // Groups of eight. A writer may cut the last one short where the data end.
+        // Groups of eight. A writer may cut the last one short at the end of the data.
         let stored = count.checked_mul(self.width).ok_or(Unsupported)?;
         let there = data.len() - from;
         let groups = count;
@@ -124,9 +124,8 @@ impl Hybrid {
         if is_over && self.data[self.at..].iter().all(|byte| *byte == 0) { Ok(()) } else { Err(Unsupported) }
     }
 
-    /// When all values are taken: whether that was all. Any bytes may follow the last group. DuckDB fills its last run up to
-    /// 256 values: behind such a run, which damage to its length may have made, there is nothing. Nor is there where there
-    /// are no values.
+    /// Checks the end after all values are taken. Any bytes may follow the last group. DuckDB pads its last run to 256
+    /// values, which damage to a length can imitate: only zeros may follow it. The same holds without values.
     pub(crate) fn finish_values(&self) -> Result<(), Unsupported> {
         let is_last_group = match self.run {
             Run::Same(_) => self.count == 0 && self.at > 0,
@@ -149,7 +148,7 @@ pub(crate) fn varint(data: &[u8], mut at: usize) -> Result<(u64, usize), Unsuppo
     Err(Unsupported)
 }
 
-/// The length that stands before some bytes, what it bounds, and what comes after.
+/// Splits data at the length that comes first: the bytes within it, and the rest.
 pub(crate) fn prefixed(data: &Bytes) -> Result<(Bytes, Bytes), Unsupported> {
     let length = data.first_chunk().map(|length| u32::from_le_bytes(*length)).ok_or(Unsupported)?;
     let end = usize::try_from(length).ok().and_then(|length| length.checked_add(4)).ok_or(Unsupported)?;
@@ -168,12 +167,12 @@ impl Span<'_> {
     }
 }
 
-/// Numbers of which a byte boundary follows.
+/// Numbers in a group; a group ends at a byte boundary.
 const GROUP: usize = 8;
-/// The Parquet library takes no longer run.
+/// The longest run that the Parquet library accepts.
 const MOST_GROUPS: usize = i32::MAX as usize / GROUP;
 
-/// A number type that stored numbers decode to.
+/// A type that stored numbers decode to.
 pub(crate) trait Number: Copy + Default + From<u8> {
     const WIDTH: usize;
 
@@ -198,7 +197,7 @@ impl Number for i32 {
 }
 
 impl Packed<'_> {
-    /// Gives each number to `take`.
+    /// Passes each number to `take`.
     pub(crate) fn each(&self, mut take: impl FnMut(u32)) {
         let Ok(()) = self.blocks(|some| {
             for number in some {
@@ -208,7 +207,7 @@ impl Packed<'_> {
         });
     }
 
-    /// Gives all numbers to `take`, some at a time.
+    /// Passes all numbers to `take`, in blocks.
     pub(crate) fn blocks<E>(&self, mut take: impl FnMut(&[i32]) -> Result<(), E>) -> Result<(), E> {
         let mut numbers = [0_i32; 64];
         for first in (0..self.count).step_by(numbers.len()) {
@@ -221,7 +220,7 @@ impl Packed<'_> {
     }
 
     fn unpack<N: Number>(&self, out: &mut [N]) {
-        // Whole groups begin at bytes; before the first and after the last one numbers are taken singly.
+        // Whole groups start at bytes; the numbers before the first and after the last one are read singly.
         let to_byte = (0..GROUP).find(|ahead| (self.bit + ahead * self.width).is_multiple_of(8)).unwrap_or(0);
         let (before, rest) = out.split_at_mut(to_byte.min(out.len()));
         self.singly(self.bit, before);
@@ -262,7 +261,7 @@ impl Packed<'_> {
     }
 }
 
-/// Eight numbers of `WIDTH` bits, each in a byte of its own: halves are moved apart, then quarters, then eighths.
+/// Eight numbers of `WIDTH` bits, each moved to its own byte: halves are separated, then quarters, then eighths.
 fn spread<const WIDTH: usize>(packed: u64) -> u64 {
     let lowest = |count: usize| (1_u64 << (count * WIDTH)) - 1;
     let half = lowest(4);

@@ -1,4 +1,4 @@
-//! Values that are stored without the nulls between them, put at their rows.
+//! Values stored without the nulls between them, moved to their rows.
 
 use arrow::buffer::BooleanBuffer;
 

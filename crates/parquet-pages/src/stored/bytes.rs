@@ -1,4 +1,4 @@
-//! The bytes of a file, from the disk or from memory, and where those of a column lie.
+//! The bytes of a file, from the disk or from memory, and the location of a column's bytes.
 
 use std::fs::File;
 use std::io::{self, Read as _, Seek as _, SeekFrom};
@@ -16,7 +16,7 @@ pub struct Place<'a> {
     pub metadata: &'a ParquetMetaData,
     pub checksums: &'a ChunkChecksums,
     pub row_group: usize,
-    /// The column, counted among the leaves of the schema.
+    /// The index of the column among the leaves of the schema.
     pub column: usize,
 }
 
@@ -25,7 +25,7 @@ impl<'a> Place<'a> {
         self.metadata.row_group(self.row_group).column(self.column)
     }
 
-    /// The CRC-32 of the chunk's bytes, where the file has checksums.
+    /// The CRC-32 of the chunk's bytes, if the file has checksums.
     pub(crate) fn checksum(self) -> Option<u32> {
         self.checksums.of(self.row_group, self.column)
     }
@@ -35,10 +35,10 @@ impl<'a> Place<'a> {
     }
 }
 
-/// Larger columns of a row group are read a page at a time, for the sake of memory.
+/// Larger columns of a row group are read page by page to save memory.
 const LARGEST: u64 = 8 << 20;
 
-/// A file, or part of one in memory, addressed as the file is.
+/// A file, or a part of one in memory, addressed by file offsets.
 pub struct Store {
     held: Held,
     expansion: Arc<Expansion>,
@@ -50,12 +50,12 @@ enum Held {
 }
 
 impl Store {
-    /// A file, and what was made of it so far.
+    /// A file and its expansion so far.
     pub fn new(file: File, expansion: Arc<Expansion>) -> Self {
         Self { held: Held::File(file), expansion }
     }
 
-    /// Bytes that start at a place of a file, of which nothing was made so far.
+    /// Bytes from `start` of a file that has not been expanded yet.
     pub fn of_memory(start: u64, bytes: Bytes) -> Self {
         let expansion = Arc::new(Expansion::new(bytes.len() as u64));
         Self { held: Held::Memory { start, bytes }, expansion }
@@ -84,7 +84,7 @@ impl Store {
         Ok(self.of(Held::Memory { start, bytes: self.read(start, most)? }))
     }
 
-    /// The CRC-32 of `length` bytes from `start` on, or of fewer where the end comes before.
+    /// The CRC-32 of `length` bytes from `start` on, or fewer at the end.
     pub(crate) fn sum(&self, start: u64, length: u64) -> io::Result<u32> {
         match &self.held {
             Held::File(file) => {
@@ -96,12 +96,12 @@ impl Store {
         }
     }
 
-    /// `length` bytes from `start` on, or fewer where the end comes before.
+    /// `length` bytes from `start` on, or fewer at the end.
     pub(crate) fn read(&self, start: u64, length: usize) -> io::Result<Bytes> {
         match &self.held {
             Held::File(file) => {
                 let mut file = file;
-                // All of it in one call; what a footer claims beyond that grows as it is read.
+                // All in one call; if a footer claims more than this, the buffer grows while reading.
                 let most = usize::try_from(LARGEST).unwrap_or(usize::MAX);
                 let mut bytes = Vec::with_capacity(length.min(most));
                 file.seek(SeekFrom::Start(start))?;
@@ -117,7 +117,7 @@ impl Store {
     }
 }
 
-/// The rows of a row group; opening refuses a number that is invalid.
+/// The number of rows of a row group; opening has refused invalid numbers.
 pub fn rows_of(row_group: &RowGroupMetaData) -> usize {
     usize::try_from(row_group.num_rows()).unwrap_or_default()
 }

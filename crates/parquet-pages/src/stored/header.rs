@@ -1,7 +1,7 @@
-//! Page headers, and what must hold between one and the column that it is in.
+//! Page headers, and their checks against the column.
 //!
-//! Source: the Parquet format's `parquet.thrift`. A page's checksum does not cover its header, so that everything that
-//! can be checked of a header is.
+//! Source: the Parquet format's `parquet.thrift`. A page's checksum does not cover its header, so the header is checked
+//! as far as possible.
 
 use parquet::basic::{Compression, Type as Physical};
 
@@ -9,16 +9,16 @@ use crate::thrift::{Compact, Fault, Field, Wire};
 
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Header {
-    /// Its own length, in bytes.
+    /// The header's length, in bytes.
     pub(crate) length: usize,
     pub(crate) stored: usize,
     pub(crate) whole: usize,
-    /// The CRC-32 of the bytes as stored.
+    /// The CRC-32 of the stored bytes.
     pub(crate) checksum: Option<u32>,
     pub(crate) kind: Kind,
-    /// Values, the nulls among them; keys of a dictionary.
+    /// Values including nulls; keys of a dictionary.
     pub(crate) values: usize,
-    /// The fields of a version 2 page alone; the levels, in bytes, are not compressed.
+    /// Only in version 2 pages; the levels, in bytes, are not compressed.
     nulls: usize,
     rows: usize,
     pub(crate) levels: usize,
@@ -39,9 +39,9 @@ pub(crate) enum Kind {
 pub(crate) struct About {
     pub(crate) codec: Compression,
     pub(crate) physical: Physical,
-    /// The bytes of a value of `FIXED_LEN_BYTE_ARRAY`.
+    /// The size of a `FIXED_LEN_BYTE_ARRAY` value, in bytes.
     pub(crate) width: usize,
-    /// True if there may be nulls.
+    /// True if nulls are possible.
     pub(crate) optional: bool,
     pub(crate) rows: usize,
 }
@@ -70,7 +70,7 @@ impl Header {
             3 => (Kind::DataV2, 8),
             _ => return Err(Fault::Invalid("a page of an unknown kind")),
         };
-        // Type, both sizes, and the header of this kind and of no other.
+        // Type, both sizes, and only the header of this kind.
         if seen & 0b1110 != 0b1110 || seen & 0b1_1110_0000 != 1 << own {
             return Err(Fault::Invalid("fields that are missing, or of another kind of page"));
         }
@@ -137,7 +137,7 @@ impl Header {
     }
 
     fn dictionary_fault(&self, about: &About) -> Option<(String, String)> {
-        // A text takes its length at least.
+        // A text takes at least its length field.
         let least = match about.physical {
             Physical::BYTE_ARRAY => self.values.saturating_mul(4),
             physical => self.values.saturating_mul(width(physical, about.width)),
@@ -158,17 +158,17 @@ pub(crate) fn width(physical: Physical, declared: usize) -> usize {
     }
 }
 
-/// The most bytes that a codec can make of `stored` ones. A page is given its memory before it is decompressed.
+/// The most bytes that a codec can make of `stored` ones. A page's memory is allocated before it is decompressed.
 fn most(codec: Compression, stored: usize) -> usize {
     let (ratio, free) = match codec {
         Compression::UNCOMPRESSED => (1, 0),
-        // Copies of 64 bytes take three.
+        // Three bytes encode a copy of 64 bytes.
         Compression::SNAPPY => (22, 64),
         Compression::LZ4 | Compression::LZ4_RAW => (256, 64),
         Compression::GZIP(_) => (1033, 1024),
-        // A block of 128 KiB of one byte takes four.
+        // Four bytes encode a block of 128 KiB of one byte.
         Compression::ZSTD(_) => (1 << 15, 1 << 17),
-        // 16 MiB take some bytes; such pages are not expected to be larger.
+        // A few bytes encode 16 MiB; larger pages are not expected.
         _ => (1 << 15, 1 << 24),
     };
     stored.saturating_mul(ratio).saturating_add(free)

@@ -1,4 +1,4 @@
-//! Pages as they are stored: read, compared with the footer and their checksums, decompressed.
+//! Stored pages: read, compared with the footer and their checksums, decompressed.
 
 pub(crate) mod bytes;
 pub(crate) mod header;

@@ -1,4 +1,4 @@
-//! The pages of a column, decompressed, for those who decode them.
+//! The decompressed pages of a column, for decoders.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ pub(crate) struct Pages {
     stored: Arc<Verified>,
     inner: SerializedPageReader<Verified>,
     next: Option<Page>,
-    /// Checks what the pages hold, for a decoder that does not.
+    /// Checks the contents of pages, for a decoder that does not.
     contents: Option<Contents>,
 }
 
@@ -25,7 +25,7 @@ impl Pages {
     pub(crate) fn new(store: &Store, place: Place<'_>, slot: FaultSlot) -> Result<Self> {
         let stored = Arc::new(Verified::new(store, place, slot)?);
         let inner = match place.chunk().compression() {
-            // They come decompressed.
+            // They are decompressed already.
             Compression::ZSTD(_) => {
                 let chunk = place.chunk().clone().into_builder().set_compression(Compression::UNCOMPRESSED).build()?;
                 SerializedPageReader::new(Arc::clone(&stored), &chunk, place.rows(), None)?
@@ -35,7 +35,7 @@ impl Pages {
         Ok(Self { stored, inner, next: None, contents: None })
     }
 
-    /// The same for a decoder that does not check what they hold.
+    /// The same for a decoder that does not check contents.
     pub(crate) fn checked(store: &Store, place: Place<'_>, slot: FaultSlot, writes_out: bool) -> Result<Self> {
         let about = place.chunk().column_descr();
         let flat = about.max_rep_level() == 0 && about.max_def_level() <= 1;
@@ -63,7 +63,7 @@ impl Iterator for Pages {
     }
 }
 
-/// Pages that are passed over are read and checked like the others.
+/// Skipped pages are read and checked like the others.
 impl PageReader for Pages {
     fn get_next_page(&mut self) -> Result<Option<Page>> {
         match self.next.take() {

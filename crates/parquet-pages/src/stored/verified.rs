@@ -1,8 +1,8 @@
 //! The stored pages of one column of one row group, verified while they are read.
 //!
-//! Rule: a caller that decodes a page of a trace gets its bytes from here, so that no header that contradicts the footer, and
-//! no page or chunk of pages that contradicts its checksum, is decoded by anyone. A chunk is summed before its first page is
-//! given, as who reads it may stop before its end; one that is too large to be held is read twice for that.
+//! Rule: all decoders of trace pages read their bytes here. So no header that contradicts the footer is decoded, and no
+//! page or chunk that contradicts its checksum. A chunk is summed before its first page is returned, since a reader may
+//! stop early. A chunk that is too large for memory is read twice for that.
 
 use std::fmt;
 use std::io;
@@ -25,7 +25,7 @@ const HEADER: usize = 1 << 10;
 /// The longest header: texts among its statistics may be long.
 const LONGEST_HEADER: usize = 16 << 20;
 
-/// The pages of a column as they are stored.
+/// The stored pages of a column.
 pub(crate) struct Verified {
     store: Store,
     place: (usize, usize),
@@ -43,7 +43,7 @@ pub(crate) struct Verified {
 #[derive(Default)]
 struct Progress {
     page: Option<(u64, Header)>,
-    /// Pages before it, and their values.
+    /// The number of pages before it, and their values.
     pages: usize,
     values: usize,
 }
@@ -107,7 +107,7 @@ impl Verified {
         self.progress.lock().unwrap_or_else(PoisonError::into_inner).page.as_ref().map_or(self.start, |page| page.0)
     }
 
-    /// The error of a page at `offset`, kept for whoever asked for the column.
+    /// The error of a page at `offset`, kept for the caller that asked for the column.
     pub(crate) fn fault(&self, offset: u64, expected: impl Into<String>, found: impl fmt::Display) -> ParquetError {
         self.keep(FaultKind::Corrupt, Part::Page(offset), expected.into(), found.to_string())
     }
@@ -132,7 +132,7 @@ impl Verified {
         self.store.expansion().texts(self.place, offset, bytes).map_err(|exceeded| self.over(offset, &exceeded))
     }
 
-    /// The page that starts at `offset`: the bytes of its header, and what they say.
+    /// The page that starts at `offset`: the bytes of its header, and the parsed header.
     fn enter(&self, offset: u64) -> Result<(Bytes, Header)> {
         let left = usize::try_from(self.end.saturating_sub(offset)).unwrap_or(usize::MAX);
         let (bytes, header) = self.header(offset, left)?;
@@ -205,12 +205,12 @@ impl Length for Verified {
 impl ChunkReader for Verified {
     type T = Reader<Bytes>;
 
-    /// The header of the page at `start`, and nothing behind it.
+    /// The header of the page at `start`, without the bytes after it.
     fn get_read(&self, start: u64) -> Result<Self::T> {
         self.enter(start).map(|(header, _)| header.reader())
     }
 
-    /// The bytes of the page under way, decompressed if [`zstd`] does that.
+    /// The bytes of the current page, decompressed if [`zstd`] handles its codec.
     fn get_bytes(&self, start: u64, length: usize) -> Result<Bytes> {
         let stored = self.body(start, length)?;
         let progress = self.progress.lock().unwrap_or_else(PoisonError::into_inner);

@@ -1,7 +1,7 @@
-//! Pages out of Zstandard frames.
+//! Decompresses pages from Zstandard frames.
 //!
-//! The Parquet library makes a compressor and a decompressor for each column of each row group. Making them takes longer
-//! than most pages take to decompress (5 % of scoring, and their memory), so that a thread keeps one decompressor here.
+//! The Parquet library makes a compressor and a decompressor for each column of each row group. That takes longer than
+//! decompressing most pages (5 % of scoring, and their memory), so each thread keeps one decompressor here.
 
 use std::cell::RefCell;
 use std::io::{self, Cursor};
@@ -12,12 +12,12 @@ thread_local! {
     static DECOMPRESSOR: RefCell<Option<Decompressor<'static>>> = const { RefCell::new(None) };
 }
 
-/// The bytes of a page: the first `levels` as they are stored, the rest decompressed; `whole` together.
+/// The bytes of a page: the first `levels` unchanged, the rest decompressed; `whole` bytes in all.
 pub(crate) fn inflated(stored: &[u8], levels: usize, whole: usize) -> Result<Vec<u8>, String> {
     let (plain, frame) = stored.split_at_checked(levels).ok_or_else(|| format!("{} bytes", stored.len()))?;
     let mut page = Vec::with_capacity(whole);
     page.extend_from_slice(plain);
-    // A page without a value may have no frame at all.
+    // A page without values may have no frame.
     if whole > levels {
         decompress(frame, &mut page).map_err(|error| error.to_string())?;
     }
@@ -55,7 +55,7 @@ mod tests {
             let error = inflated(stored, 6, 21).unwrap_err();
             assert!(error.contains(found), "{error}");
         }
-        // The context is as good as new after each of these.
+        // Each of these leaves the context usable.
         assert!(inflated(&stored, 6, 22).is_ok());
     }
 }

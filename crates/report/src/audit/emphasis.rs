@@ -1,4 +1,4 @@
-//! Emphasis that does not follow from the printed means, where a style says that it does.
+//! Emphasis that contradicts the printed means, under a style that derives emphasis from them.
 
 use std::collections::BTreeMap;
 
@@ -11,10 +11,9 @@ use crate::style::{EmphasisRule, TableSheet};
 use crate::tables::Emphasis;
 use exact::moments::Moments;
 
-/// The cells of a table that stand out otherwise than their printed means say, by position.
+/// The cells of a table whose emphasis differs from what their printed means imply, by position.
 ///
-/// None for a table that the style does not have or does not emphasise by printed means, and for one that emphasises
-/// nothing at all.
+/// Empty for a table that the style lacks or does not emphasise by printed means, and for one without any emphasis.
 pub(super) fn infeasible(
     table: &NamedTable,
     sheet: Option<&TableSheet>,

@@ -1,12 +1,12 @@
 //! The number of episodes behind each row of a published table.
 //!
-//! Written as `21`, or `E1=21,E2=20`, or both: a number alone holds for all other rows. A key is an experiment, or
-//! an experiment and a model as `E1/GPT 5.1`, which precedes.
+//! Written as `21`, or `E1=21,E2=20`, or both: a number alone applies to all other rows. A key is an experiment, or an
+//! experiment and a model as `E1/GPT 5.1`, which takes precedence.
 
 use std::collections::BTreeMap;
 use std::str::FromStr;
 
-/// The most episodes per row that an audit takes: printed digits tell nothing about more.
+/// The most episodes per row in an audit: printed digits carry no information about more.
 pub const MOST_EPISODES: u64 = 2_000;
 
 /// The episodes of each row.
@@ -16,7 +16,7 @@ pub struct Episodes {
     named: BTreeMap<String, u64>,
 }
 
-/// An error of a text with numbers of episodes.
+/// An error in a text with numbers of episodes.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum EpisodesError {
     #[error("expected a number of episodes from 1 to {MOST_EPISODES}, found `{found}`")]
@@ -26,13 +26,13 @@ pub enum EpisodesError {
 }
 
 impl Episodes {
-    /// The episodes of a row; `None` where nothing says it.
+    /// The episodes of a row; `None` if they are not given.
     pub fn of(&self, experiment: &str, model: &str) -> Option<u64> {
         let of_row = self.named.get(&format!("{experiment}/{model}"));
         of_row.or_else(|| self.named.get(experiment)).copied().or(self.others)
     }
 
-    /// The first key that names none of these rows of experiment and model.
+    /// The first key that matches none of these rows of experiment and model.
     pub fn stranger(&self, rows: &[(&str, &str)]) -> Option<&str> {
         let names = |key: &str| rows.iter().any(|&(e, m)| key == e || key.split_once('/') == Some((e, m)));
         self.named.keys().map(String::as_str).find(|key| !names(key))

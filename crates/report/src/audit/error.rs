@@ -21,10 +21,10 @@ pub enum AuditError {
     TooManyDigits { table: String, experiment: String, model: String, metric: String, found: String },
 }
 
-/// The most digits of a number, the one before the point among them: more would leave 128 bits.
+/// The most digits of a number, including those before the point: more would leave 128 bits.
 pub(super) const MOST_DIGITS: u32 = 9;
 
-/// That tables can be audited under these terms.
+/// Checks that tables can be audited under these terms.
 pub(super) fn check(tables: &[NamedTable], terms: Terms<'_>) -> Result<(), AuditError> {
     for table in tables {
         for (name, cell) in &table.published.cells {

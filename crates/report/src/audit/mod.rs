@@ -1,8 +1,8 @@
-//! Published tables compared with arithmetic: the cells that no data can give, and why.
+//! Checks published tables by arithmetic: the cells that no data can give, and why.
 //!
-//! Rule: a cell is called infeasible only if no integers print it, under the definitions, the number of episodes and
-//! the rounding of its table. A table has one rounding, the one that leaves the fewest of its cells infeasible.
-//! Cells that are not printed are unconstrained, so feasible means only that arithmetic does not object.
+//! Rule: a cell is infeasible only if no integers print it, under the definitions, the number of episodes and the
+//! rounding of its table. A table has one rounding, the one with the fewest infeasible cells. Cells that are not
+//! printed are unconstrained, so feasible only means that arithmetic does not exclude the cell.
 
 mod emphasis;
 pub mod episodes;
@@ -32,20 +32,20 @@ use statistics::feasible::attain::Search;
 #[derive(Clone, Copy, Debug)]
 pub struct Terms<'t> {
     pub catalog: &'t Catalog,
-    /// The facts that their definitions imply about their values.
+    /// The facts that the definitions imply about their values.
     pub implied: &'t IndexMap<String, Implied>,
     /// The number of episodes of each row.
     pub episodes: &'t Episodes,
-    /// The style whose tables say where undefined prints as zero, and what is emphasised.
+    /// The style, which says where its tables print undefined as zero, and what they emphasise.
     pub style: &'t Style,
-    /// The ways of rounding to consider; one at least.
+    /// The roundings to consider; at least one.
     pub roundings: &'t [Rounding],
 }
 
-/// A published table and the name that answers have for it.
+/// A published table and its name in answers.
 #[derive(Clone, Debug)]
 pub struct NamedTable {
-    /// The name of its file, never a path.
+    /// The name of its file, without a path.
     pub name: String,
     pub published: Published,
 }
@@ -134,7 +134,7 @@ impl Audit {
     }
 }
 
-/// Audits tables of one study: cells of the same name in two of them must come from the same data.
+/// Audits tables of one study: equal cells of two tables must come from the same data.
 pub fn audit(tables: &[NamedTable], terms: Terms<'_>) -> Result<Audit, AuditError> {
     error::check(tables, terms)?;
     let mut auditor = Auditor { tables, terms, search: Search::default() };
@@ -217,8 +217,8 @@ impl<'t> Auditor<'t> {
         roundings.iter().map(count).collect()
     }
 
-    /// The rounding of each table: the first of those with the fewest infeasible cells, unless another of them leaves
-    /// fewer cells of all tables infeasible together.
+    /// The rounding of each table: the first with the fewest infeasible cells, unless an equally good one leaves fewer
+    /// infeasible cells over all tables.
     fn chosen(&mut self, roundings: &[Vec<RoundingCount>]) -> Vec<Rounding> {
         let tied: Vec<Vec<Rounding>> = roundings.iter().map(|counts| fewest(counts)).collect();
         let mut chosen: Vec<Rounding> = tied.iter().map(|tied| tied[0]).collect();

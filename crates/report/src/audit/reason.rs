@@ -1,4 +1,4 @@
-//! The reason why no data can give a cell, in a sentence, with feasible values in its place.
+//! The reason why no data can give a cell, in a sentence, with feasible values instead.
 
 use std::collections::BTreeSet;
 
@@ -32,7 +32,7 @@ pub(super) fn reason(row: &Row, refused: &Refused, definitions: Definitions<'_>,
     let Some(print) = refused.cell.numbers() else {
         return Reason::of_mean(format!("printed as undefined, but defined in {}{because}", episodes(&ns)));
     };
-    // A number that is printed has at least one value behind it.
+    // A printed number has at least one value behind it.
     let ns: BTreeSet<u64> = ns.into_iter().filter(|n| *n > 0).collect();
     let samples: Vec<Sample> = ns.iter().map(|n| question.sample(*n)).collect();
     if samples.is_empty() {
@@ -43,7 +43,7 @@ pub(super) fn reason(row: &Row, refused: &Refused, definitions: Definitions<'_>,
     cell.no_mean().or_else(|| cell.no_spread(search)).unwrap_or_else(|| conflict(row, refused, &question, &ns))
 }
 
-/// A cell with numbers, and the samples that may stand behind it.
+/// A cell with numbers, and its possible samples.
 struct Cell {
     print: Print,
     samples: Vec<Sample>,
@@ -124,7 +124,7 @@ fn listed(nearest: &[String]) -> String {
     }
 }
 
-/// The cell is feasible alone, and not beside what was accepted before.
+/// The reason for a cell that is feasible alone, but not beside the cells accepted before it.
 fn conflict(row: &Row, refused: &Refused, question: &Question<'_>, ns: &BTreeSet<u64>) -> Reason {
     if let Some(earlier) = refused.accepted.first() {
         let other = shown(earlier.cell.mean, earlier.cell.se);
@@ -148,7 +148,7 @@ fn between(low: i128, high: i128) -> String {
     if low == high { format!("{low}") } else { format!("{low} to {high}") }
 }
 
-/// ` with TSA = 1 (printed 0.57 ± 0.11)`: where the episodes that count come from.
+/// ` with TSA = 1 (printed 0.57 ± 0.11)`: the condition on the episodes that count.
 fn condition(row: &Row, metric: &str, definitions: Definitions<'_>) -> String {
     match &definitions.implied[metric].defined {
         Defined::Where { metric, is } if row.metrics.contains_key(metric) => {

@@ -1,9 +1,9 @@
-//! The cells of one row together: the counts of episodes that its metrics share.
+//! The cells of one row together: its metrics share counts of episodes.
 //!
 //! Rule: a cell is feasible if some data prints it and all cells accepted before it. Metrics come after those that
-//! their definitions name, so that a fault is found at the cell that depends, and a cell that no data can give is
-//! left out for the cells after it: one fault is named once. A world is one way to count the metrics that others
-//! depend on; metrics that share none are solved apart. What no table prints is open.
+//! their definitions name, so a fault is found at the dependent cell. An infeasible cell is ignored for later cells, so
+//! one fault is reported once. A world is one way to count the metrics that others depend on; metrics without a shared
+//! metric are solved separately. Unprinted values are open.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::RangeInclusive;
@@ -17,7 +17,7 @@ use metric::implied::{Defined, Implied};
 use statistics::feasible::attain::Search;
 use statistics::feasible::{Print, Sample};
 
-/// No value is farther from zero where mean and standard error have at most [`MOST_DIGITS`](super::error::MOST_DIGITS)
+/// The largest absolute value, if mean and standard error have at most [`MOST_DIGITS`](super::error::MOST_DIGITS)
 /// digits: a value is at most n standard errors from the mean.
 pub(super) const LARGEST_VALUE: i64 = 3_000_000_000_000;
 
@@ -27,7 +27,7 @@ pub(super) struct Definitions<'d> {
     pub(super) implied: &'d IndexMap<String, Implied>,
 }
 
-/// A cell of a row and where it stands.
+/// A cell of a row and its location.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RowCell {
     pub(super) at: (usize, usize),
@@ -43,7 +43,7 @@ pub(super) struct Row {
     pub(super) metrics: BTreeMap<String, Vec<RowCell>>,
 }
 
-/// In how many episodes a metric is defined, and the sum of a rate.
+/// The number of episodes in which a metric is defined, and the sum of a rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Count {
     pub(super) n: u64,
@@ -53,7 +53,7 @@ pub(super) struct Count {
 /// One way to count the metrics that others depend on.
 pub(super) type World = BTreeMap<String, Count>;
 
-/// A cell that no data can give beside those accepted before it.
+/// A cell that no data can give together with the cells accepted before it.
 #[derive(Clone, Debug)]
 pub(super) struct Refused {
     pub(super) metric: String,
@@ -69,7 +69,7 @@ pub(super) struct Solved {
 }
 
 impl Refused {
-    /// Returns true if some data would print the cell under another rounding, beside the same others.
+    /// Returns true if some data would print the cell under another rounding, together with the same other cells.
     pub(super) fn is_feasible(
         &self,
         row: &Row,
@@ -150,7 +150,7 @@ pub(super) struct Question<'q> {
 }
 
 impl Question<'_> {
-    /// The counts that print so, with the world that each is of; one count per world unless all are asked for.
+    /// The counts that print these cells, each with its world; one count per world unless `all` is true.
     fn counts_in(&self, worlds: &[World], all: bool, search: &mut Search) -> Vec<(usize, Count)> {
         let needs = self.definitions.needs(self.metric);
         let mut known: BTreeMap<Vec<Option<Count>>, Vec<Count>> = BTreeMap::new();
@@ -204,7 +204,7 @@ impl Question<'_> {
         if all { fitting.map(counts).collect() } else { fitting.next().map(counts).into_iter().collect() }
     }
 
-    /// The sums that the restricted metric leaves to a rate; `None` where it says nothing.
+    /// The sums that the restricted metric leaves for a rate; `None` if it gives no restriction.
     pub(super) fn allowed(&self, n: u64, world: &World) -> Option<(i128, i128)> {
         if self.definitions.catalog.metric[self.metric].kind != Kind::Rate {
             return None;
@@ -230,14 +230,14 @@ impl Question<'_> {
         }
     }
 
-    /// The numbers of the cells; `None` where one prints none.
+    /// The numbers of the cells; `None` if any prints none.
     pub(super) fn prints(&self) -> Option<Vec<Print>> {
         self.cells.iter().map(RowCell::numbers).collect()
     }
 }
 
 impl RowCell {
-    /// Its numbers; `None` where it is printed as undefined.
+    /// Its numbers; `None` if it is printed as undefined.
     pub(super) fn numbers(&self) -> Option<Print> {
         Some(Print { mean: self.cell.mean?, se: self.cell.se, rounding: self.rounding })
     }
@@ -258,7 +258,7 @@ impl Definitions<'_> {
         condition.into_iter().chain(implied.restricts.as_ref().map(|restricted| restricted.metric.as_str())).collect()
     }
 
-    /// The metrics in groups that share no other metric, each after those that it needs.
+    /// The metrics in groups without a shared metric, each after the metrics that it needs.
     fn groups<'m>(&self, metrics: impl Iterator<Item = &'m String>) -> Vec<Vec<String>> {
         let mut groups: Vec<Vec<String>> = Vec::new();
         for metric in metrics {

@@ -87,7 +87,7 @@ fn two_tables_must_come_from_the_same_data() {
     insta::assert_snapshot!(found.render(None));
 }
 
-/// Digits of a generator (Knuth's MMIX constants).
+/// Digits of a generator with constants from Knuth's MMIX.
 fn draws(seed: u64) -> impl FnMut(u64) -> u64 {
     let mut state = seed;
     move |below| {
@@ -140,9 +140,9 @@ fn infeasible(cells: &[(&'static str, Option<Decimal>, Option<Decimal>)], roundi
     audited_under(&[("t.csv", &table)], "default", &[rounding]).infeasible.len()
 }
 
-/// Tables of random data are feasible, whatever the rounding. Of forgeries that raise one printed number by one to nine
-/// units of its last digit, the shares asserted here are caught: a standard error of durations has too many digits of
-/// its own to give a forgery away.
+/// Tables of random data are feasible under any rounding. Forgeries raise one printed number by one to nine units of
+/// its last digit; the shares asserted here are caught. A standard error of durations has too many digits to reveal a
+/// forgery.
 #[test]
 fn data_passes_and_forgeries_are_caught() {
     let mut draw = draws(518);

@@ -1,4 +1,4 @@
-//! An audit as text: the infeasible cells, the reasons, one line per table, a line that sums up.
+//! An audit as text: the infeasible cells, the reasons, one line per table, a summary line.
 
 use std::fmt::Write as _;
 

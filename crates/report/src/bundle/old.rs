@@ -7,14 +7,14 @@ use serde::Deserialize;
 
 use crate::figures::FigureName;
 
-/// The name of the manifest, which is the last file to be there.
+/// The name of the manifest, which is written last.
 pub const MANIFEST: &str = "manifest.json";
 
-/// As much of a manifest as is needed; a manifest of other versions may have more.
+/// The needed part of a manifest; other versions may have more fields.
 #[derive(Deserialize)]
 struct Listed {
     outputs: Option<Vec<ListedOutput>>,
-    /// Only to tell the manifest of a report from another file of that name.
+    /// Only distinguishes a report's manifest from other files of that name.
     #[serde(rename = "schema_version")]
     _schema_version: u32,
 }
@@ -24,7 +24,7 @@ struct ListedOutput {
     path: PathBuf,
 }
 
-/// The files of the report in a folder, by path inside it, the manifest among them; none if there is no manifest of a
+/// The files of the report in a folder, including the manifest, by path inside it; empty without a manifest of a
 /// report.
 pub(super) fn files(folder: &Path) -> Vec<PathBuf> {
     let manifest = fs::read(folder.join(MANIFEST)).ok();
@@ -37,8 +37,8 @@ pub(super) fn files(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// The files that an older report could have, by their names: the files without a choice of name, every figure in every
-/// format, and every table that is there in all three formats.
+/// The files that an older report may have, by name: the files with fixed names, every figure in every format, and
+/// every table that exists in all three formats.
 fn by_name(folder: &Path) -> Vec<PathBuf> {
     let mut files: Vec<PathBuf> = ["cells.csv", "episodes.parquet", "report.html"].map(PathBuf::from).into();
     for figure in FigureName::ALL {

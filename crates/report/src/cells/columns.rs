@@ -1,4 +1,4 @@
-//! Cells as Arrow columns, for programs that go on with them.
+//! Cells as Arrow columns, for other programs.
 
 use std::sync::Arc;
 
@@ -9,9 +9,9 @@ use super::{Cell, Cells, KeyValue};
 use exact::moments::Moments;
 use metric::catalog::{Kind, Metric};
 
-/// One row per cell: the key columns as text (null where the key is missing), then `metric` and `unit` (text), `n`, `sum` and
-/// `sum_sq` (int64), `mean`, `se` (float64; null where undefined), `interval` (text, its method), `ci_low` and `ci_high`
-/// (float64), all three null where the interval is undefined or withheld.
+/// One row per cell: the key columns as text (null if the key is missing), then `metric` and `unit` (text), `n`, `sum`
+/// and `sum_sq` (int64), `mean`, `se` (float64; null if undefined), `interval` (text, its method), `ci_low` and
+/// `ci_high` (float64). The last three are null if the interval is undefined or withheld.
 pub fn record_batch(cells: &Cells) -> Result<RecordBatch, ArrowError> {
     let rows: Vec<Cell> = cells.all().collect();
     let mut columns: Vec<(&str, ArrayRef)> = Vec::new();
@@ -42,7 +42,7 @@ pub fn record_batch(cells: &Cells) -> Result<RecordBatch, ArrowError> {
     }))
 }
 
-/// The method of a metric's intervals, as [`cell_interval`](super::interval::cell_interval) chooses it.
+/// The method of a metric's intervals, as chosen by [`cell_interval`](super::interval::cell_interval).
 fn method(metric: &Metric) -> &'static str {
     if metric.kind == Kind::Rate { "wilson" } else { "student_t" }
 }

@@ -1,7 +1,7 @@
-//! Two scorings beside each other: the cells that moved, the episodes that flipped.
+//! Compares two scorings: the cells that moved, the episodes that flipped.
 //!
-//! Rule: integers are compared, never floats. An episode is the same in both if its whole key is; what only one
-//! scoring has (metrics, episodes, cells) is reported and never represents a zero.
+//! Rule: integers are compared, never floats. Episodes match if their whole keys are equal. Metrics, episodes and cells
+//! of only one scoring are reported, and are never taken as zero.
 
 mod aligned;
 
@@ -142,10 +142,10 @@ pub struct Flip {
 }
 
 impl Changes {
-    /// Compares two episode tables; cells are those of `by`.
+    /// Compares two episode tables; cells are grouped by `by`.
     ///
     /// # Errors
-    /// Columns to group by that a table does not have; sums that leave 128 bits.
+    /// Columns to group by that a table lacks; sums beyond 128 bits.
     pub fn of(before: &EpisodeTable, after: &EpisodeTable, by: &[String]) -> Result<Self, GroupError> {
         let metrics = Overlap::of(&names(before), &names(after));
         let (cells_compared, cells) = cell_changes(&group(before, by)?, &group(after, by)?);
@@ -162,7 +162,7 @@ impl Changes {
         })
     }
 
-    /// Returns true if every number is as it was, of the same metrics over the same episodes.
+    /// Returns true if all numbers are equal, for the same metrics and episodes.
     pub fn is_empty(&self) -> bool {
         let same = |only: [usize; 2]| only == [0, 0];
         self.cells.is_empty()
@@ -171,18 +171,18 @@ impl Changes {
             && same([self.episodes.only_before.len(), self.episodes.only_after.len()])
     }
 
-    /// The episodes that flipped in some metric.
+    /// The episodes that flipped in any metric.
     pub fn flipped_episodes(&self) -> BTreeSet<String> {
         self.flips.iter().map(|flip| flip.episode.episode_id.clone()).collect()
     }
 
-    /// The metrics in which some episode flipped.
+    /// The metrics in which any episode flipped.
     pub fn flipped_metrics(&self) -> Vec<String> {
         let names: BTreeSet<&String> = self.flips.iter().map(|flip| &flip.metric).collect();
         names.into_iter().cloned().collect()
     }
 
-    /// Adds the timesteps that decided the old values; evidence for another value than the scores have is left out.
+    /// Adds the timesteps that decided the old values; ignores evidence for values other than the scores'.
     pub fn explain_before(&mut self, evidence: &BTreeMap<String, Evidence>) {
         for flip in &mut self.flips {
             flip.timesteps.before = deciding(flip, flip.value.before, evidence);
@@ -198,8 +198,7 @@ impl Changes {
 }
 
 impl CellChange {
-    /// The mean after minus the mean before, as an exact fraction; `None` where either is undefined, or 128 bits do
-    /// not hold it.
+    /// The mean after minus the mean before, as an exact fraction; `None` if either is undefined, or beyond 128 bits.
     pub(crate) fn exact_mean_change(&self) -> Option<(i128, i128)> {
         let (before, after) = (self.numbers.before?, self.numbers.after?);
         let below = i128::from(before.n).checked_mul(i128::from(after.n)).filter(|below| *below > 0)?;
@@ -235,7 +234,7 @@ impl Overlap<String> {
     }
 }
 
-/// The parts of the compared metrics' definitions that differ, and every `let` that does.
+/// The differing parts of the compared metrics' definitions, and every `let` that differs.
 fn rewritten(before: &EpisodeTable, after: &EpisodeTable) -> Vec<Rewritten> {
     let mut found = Vec::new();
     let mut push = |name: &str, part, before: Option<String>, after: Option<String>| {

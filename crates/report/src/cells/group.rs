@@ -1,7 +1,7 @@
 //! The episode table grouped by key columns: cells.
 //!
-//! Rule: an undefined value enters no moment; it is counted only in [`Group::episodes`]. Groups are ordered by
-//! their keys, never by arrival.
+//! Rule: an undefined value enters no moments; only [`Group::episodes`] counts it. Groups are ordered by key, never by
+//! arrival.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -16,14 +16,14 @@ use score::table::{EpisodeTable, KeyRef, LabelColumn, TextColumn};
 /// The key columns of every episode table.
 pub const KEY_COLUMNS: [&str; 5] = ["experiment", "model", "seed", "run", "episode_id"];
 
-/// The columns that cells are grouped by unless asked otherwise.
+/// The default columns that cells are grouped by.
 pub const DEFAULT_BY: [&str; 2] = ["experiment", "model"];
 
-/// The cells of all tables.
+/// The most cells of all tables.
 const MOST_CELLS: Limit =
     Limit::new("cells, groups times metrics; group by fewer columns or leave metrics out", 200_000);
 
-/// Why episodes cannot be grouped as asked.
+/// An error of grouping episodes.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum GroupError {
     #[error("no column to group by: expected at least one of {known}")]
@@ -40,7 +40,7 @@ pub enum GroupError {
 
 /// Cells of `table` grouped by the columns `by`.
 ///
-/// A label column whose every value is an integer orders as integers.
+/// A label column with only integer values is ordered as integers.
 pub fn group(table: &EpisodeTable, by: &[String]) -> Result<Cells, GroupError> {
     let Membership { keys, of_row } = Membership::of(table, by)?;
     MOST_CELLS.check((keys.len() as u64).saturating_mul(table.metrics.len() as u64))?;
@@ -68,7 +68,7 @@ pub fn group(table: &EpisodeTable, by: &[String]) -> Result<Cells, GroupError> {
     })
 }
 
-/// The different values of a key column, a label or a metric; `None` for any other name.
+/// The distinct values of a key column, a label or a metric; `None` for any other name.
 pub fn column_values(table: &EpisodeTable, name: &str) -> Option<BTreeSet<KeyValue>> {
     if let Some(column) = column(table, name) {
         return Some(column.ranks(table).values.into_iter().collect());
@@ -77,7 +77,7 @@ pub fn column_values(table: &EpisodeTable, name: &str) -> Option<BTreeSet<KeyVal
     Some(metric.iter().map(|value| value.map_or(KeyValue::Missing, KeyValue::Int)).collect())
 }
 
-/// For each episode of `table` the position of its group among those of [`group`].
+/// For each episode of `table`, the index of its group in the result of [`group`].
 pub fn membership(table: &EpisodeTable, by: &[String]) -> Result<Vec<usize>, GroupError> {
     Ok(Membership::of(table, by)?.of_row)
 }
@@ -104,7 +104,7 @@ impl Membership {
             };
             of_row.push(group);
         }
-        // Groups are numbered as they appear, and then by their keys.
+        // Groups are numbered by appearance, then by key.
         let mut places = vec![0; seen.len()];
         seen.values().zip(0..).for_each(|(seen, place)| places[*seen] = place);
         for group in &mut of_row {
@@ -117,14 +117,14 @@ impl Membership {
     }
 }
 
-/// A column as the places of its values among all different ones.
+/// A column as ranks of its values among the distinct ones.
 struct Ranks {
     values: Vec<KeyValue>,
     of_row: Vec<usize>,
 }
 
 impl Ranks {
-    /// A column of `rows` values, of which many are equal: each row has a code, and each code a value.
+    /// A column of `rows` values with many duplicates: each row has a code, and each code a value.
     fn of(rows: usize, code: impl Fn(usize) -> usize, value: impl Fn(usize) -> KeyValue) -> Self {
         let mut of_row: Vec<usize> = (0..rows).map(code).collect();
         let mut first = vec![None; of_row.iter().max().map_or(0, |most| most + 1)];
@@ -151,7 +151,7 @@ impl Ranks {
     }
 }
 
-/// A column to group by, found in the table.
+/// A column to group by, in the table.
 enum KeyColumn<'a> {
     Text(&'a TextColumn),
     Int(fn(KeyRef<'_>) -> i32),
@@ -161,7 +161,7 @@ enum KeyColumn<'a> {
 impl KeyColumn<'_> {
     fn ranks(&self, table: &EpisodeTable) -> Ranks {
         let of_text = |column: &TextColumn| {
-            // Null has a code of its own.
+            // Null has its own code.
             Ranks::of(table.len(), |row| column.code(row).map_or(0, |code| code + 1), |row| self.value(table, row))
         };
         match self {

@@ -1,4 +1,4 @@
-//! The interval of a cell, the same in every output: its method, its bounds, and where it is withheld.
+//! The interval of a cell, the same in every output: its method, its bounds, and when it is withheld.
 
 use std::collections::BTreeMap;
 
@@ -9,12 +9,12 @@ use score::table::{EpisodeTable, MetricColumn};
 use statistics::coverage::{self, Withheld};
 use statistics::interval::{Interval, student_t, wilson};
 
-/// The confidence where nobody asks for another one.
+/// The default confidence.
 pub const CONFIDENCE: f64 = 0.95;
 
-/// The interval of a mean, or the reason why it has none: Wilson's for a rate, Student's for a quantity.
+/// The interval of a mean, or the reason for its absence: Wilson's for a rate, Student's for a quantity.
 ///
-/// `range` has the least and the largest mean that the metric can have.
+/// `range` has the least and the largest possible mean of the metric.
 pub(crate) fn cell_interval(
     moments: &Moments,
     metric: &Metric,
@@ -28,7 +28,7 @@ pub(crate) fn cell_interval(
     bounded(found, moments, range, coverage::STUDENT)
 }
 
-/// An interval of the mean of a quantity from `fewest` values on, within the metric's range.
+/// An interval of the mean of a quantity, withheld below `fewest` values, within the metric's range.
 pub(crate) fn bounded(
     found: Option<Interval>,
     moments: &Moments,
@@ -39,10 +39,10 @@ pub(crate) fn bounded(
     coverage::given(found, moments.n, fewest, moments.has_spread())
 }
 
-/// The least and the largest mean that each metric of a table can have, as far as that is known.
+/// The least and the largest possible mean of each metric of a table, as far as known.
 ///
-/// A definition or the unit says which values there are. A count in the unit of a censored duration is no more than the
-/// longest unfinished episode had, which is the budget. A metric with values outside counts something else, and has no
+/// A definition or the unit gives the range of values. A count in the unit of a censored duration is at most the
+/// budget, the length of the longest unfinished episode. A metric with values outside counts something else, and has no
 /// such bound.
 #[expect(clippy::cast_precision_loss, reason = "values of a metric are far below 2^53")]
 pub fn ranges(table: &EpisodeTable) -> Vec<Interval> {
@@ -64,7 +64,7 @@ pub fn ranges(table: &EpisodeTable) -> Vec<Interval> {
     table.metrics.iter().map(range).collect()
 }
 
-/// The longest unfinished episode by the unit of the duration.
+/// The length of the longest unfinished episode, by the unit of the duration.
 fn budgets(table: &EpisodeTable) -> BTreeMap<&str, i64> {
     let mut budgets = BTreeMap::new();
     for (duration, finished) in &Relations::of(&table.catalog).durations {

@@ -21,11 +21,11 @@ pub mod interval;
 pub struct Cells {
     /// The definitions that gave the values.
     pub catalog: Catalog,
-    /// The key columns that were grouped by, `experiment, model` unless asked otherwise.
+    /// The key columns that were grouped by; `experiment, model` by default.
     pub by: Vec<String>,
     /// The metrics, in the order of the episode table.
     pub metrics: Vec<String>,
-    /// The least and the largest mean that each metric can have; without bounds where it is empty.
+    /// The least and the largest possible mean of each metric; an empty vector means no bounds.
     pub ranges: Vec<Interval>,
     /// The groups, ascending by key; each has one cell per metric.
     pub groups: Vec<Group>,
@@ -39,7 +39,7 @@ pub struct Cell<'c> {
     pub metric: &'c Metric,
     /// The moments of its values.
     pub moments: &'c Moments,
-    /// The 95 % interval of the mean; `None` where it is withheld.
+    /// The 95 % interval of the mean; `None` if withheld.
     pub interval: Option<Interval>,
 }
 
@@ -63,7 +63,7 @@ impl Cells {
     }
 }
 
-/// The episodes that share a key.
+/// The episodes with one key.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Group {
     /// A value for each column of `by`.

@@ -82,7 +82,7 @@ struct List<R> {
 }
 
 impl<R: Iterator<Item = Vec<String>>> List<R> {
-    /// The list, cut at the limit; `None` for no line.
+    /// The list, cut at the limit; `None` without lines.
     fn render(self, limit: Limit, width: Option<usize>) -> Option<String> {
         let rest = words::left_out(self.count, limit);
         match (self.count, limit) {

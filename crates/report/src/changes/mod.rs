@@ -1,6 +1,6 @@
-//! Changes from one scoring to another, as text for people: `lists` are its tables, `words` their fields.
+//! Changes from one scoring to another, as text: `lists` has the tables, `words` their fields.
 //!
-//! Rule: a list that is cut says how many lines it leaves out; a number is beside the exact counts it comes from.
+//! Rule: a shortened list says how many lines are missing; a number comes with its exact counts.
 
 mod lists;
 mod words;
@@ -15,11 +15,11 @@ use exact::format::counted;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limit(pub usize);
 
-/// Digits of a hash that tell definitions apart.
+/// The number of digits of a hash that identify definitions.
 const SHORT_HASH: usize = 12;
 
 impl Changes {
-    /// The whole answer of `diff`, its tables at most `width` columns wide; the last line sums up.
+    /// The whole answer of `diff`, with tables at most `width` columns wide; the last line is a summary.
     pub fn render(&self, limit: Limit, width: Option<usize>) -> String {
         let mut text = String::new();
         let names = &self.definitions;

@@ -1,4 +1,4 @@
-//! The fields of the lists: counts, means with what they come from, timesteps.
+//! The fields of the lists: counts, means with their sums, timesteps.
 
 use super::Limit;
 use crate::cells::KeyValue;
@@ -6,7 +6,7 @@ use crate::cells::diff::{CellChange, Numbers, Pair};
 use exact::number::Decimal;
 use score::evidence::ranges;
 
-/// Digits behind the point: enough to see one episode of a thousand.
+/// Decimal places: enough to show one episode in a thousand.
 const PLACES: u32 = 3;
 
 /// The most runs of timesteps that a line shows.

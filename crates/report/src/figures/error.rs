@@ -2,7 +2,7 @@
 
 use super::{FigureName, FigureWidth};
 
-/// A figure that cannot be drawn from what there is.
+/// An error of drawing a figure from its inputs.
 #[derive(Debug, thiserror::Error)]
 pub enum FigureError {
     #[error("expected the name of a figure ({known}), found `{name}`{hint}")]

@@ -1,4 +1,4 @@
-//! The cells as figures see them: experiments by models, each with a reading per metric.
+//! The cells as input of figures: experiments by models, with one reading per metric.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -16,16 +16,16 @@ const CONFIDENCE: f64 = 0.95;
 /// The content of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reading {
-    /// There is no episode of this model in this experiment.
+    /// There are no episodes of this model in this experiment.
     Empty,
-    /// There are that many episodes, and the metric is undefined in all of them.
+    /// The number of episodes; the metric is undefined in all of them.
     Undefined(u64),
     /// The moments of at least one value.
     Known(Moments),
 }
 
 impl Reading {
-    /// The mean, where there is one.
+    /// The mean, if there is one.
     pub fn mean(self) -> Option<f64> {
         self.moments().and_then(Moments::mean)
     }
@@ -34,7 +34,7 @@ impl Reading {
         self.moments().map_or(0, |moments| moments.n)
     }
 
-    /// The moments, where there is a value.
+    /// The moments, if there is a value.
     pub fn moments(self) -> Option<Moments> {
         match self {
             Self::Known(moments) => Some(moments),
@@ -48,13 +48,13 @@ impl Reading {
         interval::wilson(u64::try_from(moments.sum).ok()?, moments.n, CONFIDENCE)
     }
 
-    /// The mean with so many digits behind the point, correctly rounded from the exact fraction.
+    /// The mean with `places` decimal places, correctly rounded from the exact fraction.
     pub(crate) fn decimal(self, places: u32) -> Option<Decimal> {
         let moments = self.moments()?;
         Decimal::of_ratio(moments.sum, i128::from(moments.n), places)
     }
 
-    /// The value for a reader who hovers: the mean in full and what it is made of.
+    /// The value as shown on hover: the full mean and its components.
     pub fn words(self) -> String {
         match self {
             Self::Empty => "no episodes".to_owned(),
@@ -113,12 +113,12 @@ impl<'a> Matrix<'a> {
         Ok(Self { cells, groups, experiments, models })
     }
 
-    /// Every experiment with every model, whether or not it has episodes.
+    /// Every experiment with every model, with or without episodes.
     pub(crate) fn pairs(&self) -> impl Iterator<Item = (&'a str, &'a str)> {
         self.experiments.iter().flat_map(|&experiment| self.models.iter().map(move |&model| (experiment, model)))
     }
 
-    /// The place of a metric among the cells.
+    /// The metric with this name.
     pub(crate) fn metric(&self, figure: FigureName, name: &str) -> Result<MetricId<'a>, FigureError> {
         let found = self.cells.metrics.iter().position(|metric| metric == name).and_then(|at| self.metric_at(at));
         found.ok_or_else(|| FigureError::UnknownMetric {
@@ -152,10 +152,10 @@ impl<'a> Matrix<'a> {
         }
     }
 
-    /// The mean on a scale from 0, the worst, to 1, the best; `None` where there is no mean.
+    /// The mean on a scale from 0 (worst) to 1 (best); `None` without a mean.
     ///
-    /// A rate is taken unchanged, or from 1 where less is better. A quantity is set between the least and the
-    /// greatest mean of its experiment; where all are equal nothing ranks them, and each stands at a half.
+    /// A rate is unchanged, or inverted if less is better. A quantity is scaled between the least and the largest mean
+    /// of its experiment; if all are equal, each is 0.5.
     pub(crate) fn goodness(&self, experiment: &str, model: &str, metric: MetricId<'_>) -> Option<f64> {
         let mean = self.reading(experiment, model, metric).mean()?;
         let share = match metric.metric.kind {
@@ -171,7 +171,7 @@ impl<'a> Matrix<'a> {
         })
     }
 
-    /// The least and the greatest mean of an experiment; `None` where there is no mean.
+    /// The least and the largest mean of an experiment; `None` without a mean.
     pub(crate) fn span(&self, experiment: &str, metric: MetricId<'_>) -> Option<(f64, f64)> {
         let means = self.models.iter().filter_map(|model| self.reading(experiment, model, metric).mean());
         means.fold(None, |span, mean| {
@@ -180,25 +180,25 @@ impl<'a> Matrix<'a> {
         })
     }
 
-    /// The value of blind guessing, where there is one.
+    /// The value of blind guessing, if there is one.
     pub(crate) fn chance(&self, experiment: &str, metric: MetricId<'_>) -> Option<f64> {
         self.cells.catalog.chance(experiment, metric.name).map(exact::ratio::Ratio::value)
     }
 
-    /// The rates of some blind strategies where there is no chance level, as text and value.
+    /// The rates of some blind strategies if there is no chance level, as text and value.
     pub(crate) fn references(&self, experiment: &str, metric: MetricId<'_>) -> Vec<(String, f64)> {
         let known = self.cells.catalog.experiment.get(experiment).and_then(|e| e.reference.get(metric.name));
         known.into_iter().flatten().map(|level| (level.to_string(), level.value())).collect()
     }
 
-    /// The experiments' titles, empty where the definitions have none.
+    /// The experiments' titles, empty if the definitions have none.
     pub(crate) fn titles(&self, experiments: &[&str]) -> Vec<&'a str> {
         let title = |name: &&str| self.cells.catalog.experiment.get(*name).map_or("", |e| e.title.as_str());
         experiments.iter().map(title).collect()
     }
 }
 
-/// A metric that is there.
+/// A metric of the cells.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MetricId<'a> {
     pub name: &'a str,
@@ -207,7 +207,7 @@ pub(crate) struct MetricId<'a> {
 }
 
 impl MetricId<'_> {
-    /// The name as the end of an attribute's name.
+    /// The name as a suffix of an attribute's name.
     pub(crate) fn attribute(self) -> String {
         let plain = |c: char| if c.is_ascii_alphanumeric() || c == '_' { c.to_ascii_lowercase() } else { '-' };
         self.name.chars().map(plain).collect()

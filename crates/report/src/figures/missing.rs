@@ -6,7 +6,7 @@ use super::matrix::{Matrix, MetricId, Reading};
 const MARKER_ROOM: f64 = 10.0;
 const RUN_GAP: f64 = 8.0;
 
-/// The models that a panel cannot show: words and markers in lines, placed from the upper left corner.
+/// The models that a panel cannot show: words and markers in lines, positioned from the top left corner.
 #[derive(Clone, Debug)]
 pub(crate) struct Strip<'a> {
     experiment: &'a str,
@@ -15,7 +15,7 @@ pub(crate) struct Strip<'a> {
     height: f64,
 }
 
-/// A model that is not in the plot.
+/// A model without a mark in the plot.
 #[derive(Clone, Copy, Debug)]
 struct Absent<'a> {
     member: Member<'a>,
@@ -43,12 +43,12 @@ impl<'a> Strip<'a> {
         strip
     }
 
-    /// The height of its lines, px; none if nothing is absent.
+    /// The height of its lines, px; 0 if no model is absent.
     pub(crate) fn height(&self) -> f64 {
         self.height
     }
 
-    /// Draws it with its upper left corner at `corner`.
+    /// Draws it with its top left corner at `corner`.
     pub(crate) fn draw(&self, sheet: &mut Sheet, corner: Point) {
         for ((x, y), word) in &self.words {
             sheet.text((corner.0 + x, corner.1 + y), word, lettering::tick());
@@ -59,7 +59,7 @@ impl<'a> Strip<'a> {
         }
     }
 
-    /// Places a word and its markers at `place`, breaking the line where they do not fit.
+    /// Places a word and its markers at `place`; breaks the line if they do not fit.
     fn run(&mut self, place: &mut Point, width: f64, word: String, absent: Vec<Absent<'a>>) {
         let line = leading(lettering::tick());
         let word_width = lettering::tick().width(&word) + 3.0;

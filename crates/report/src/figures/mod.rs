@@ -1,11 +1,11 @@
 //! Figures: from cells to one SVG, and from that SVG to PNG and PDF.
 //!
-//! Rule: a figure reads cells, the episode table and what else [`Input`] holds, and nothing besides; the same
-//! input gives the same bytes. Every mark of data is a `<g class="mark">` with a title for the reader who hovers
-//! and its values in full as `data-*` attributes. What is missing is shown as missing, never as zero.
+//! Rule: a figure reads only [`Input`]: cells, the episode table and the other fields. The same input gives the same
+//! bytes. Every data mark is a `<g class="mark">` with a title for hovering and its full values as `data-*` attributes.
+//! Missing values are shown as missing, never as zero.
 //!
-//! One file per figure. They share `matrix` (the cells as figures see them), `missing` (what a plot cannot show) and the
-//! drawing [`kit`].
+//! One file per figure. They share `matrix` (the cells as input of figures), `missing` (what a plot cannot show) and
+//! the drawing [`kit`].
 
 pub mod kit;
 
@@ -42,24 +42,24 @@ use shown::{FigureSheets, SHOWN};
 pub struct Input<'a> {
     /// The cells by experiment and model.
     pub cells: &'a Cells,
-    /// Models in the order to show them, a style's `row_order`; those not named follow in the palette's order, then by name.
+    /// Models in display order, a style's `row_order`; other models follow in the palette's order, then by name.
     pub order: &'a [String],
     /// The metrics and captions of each figure.
     pub sheets: &'a FigureSheets,
-    /// One row per episode: for `decision-curve`.
+    /// One row per episode, for `decision-curve`.
     pub episodes: Option<&'a EpisodeTable>,
     /// Endings of episodes of an open question, for `e5-outcomes`.
     pub outcomes: Option<&'a Outcomes>,
-    /// Landmarks of each episode: for `gaze`.
+    /// Landmarks of each episode, for `gaze`.
     pub timelines: Option<&'a [Timeline]>,
-    /// A heading of its own.
+    /// A custom heading.
     pub title: Option<&'a str>,
-    /// The width on paper; `None` for the width as drawn.
+    /// The printed width; `None` for the width as drawn.
     pub width: Option<FigureWidth>,
 }
 
 impl<'a> Input<'a> {
-    /// Cells and nothing else: enough for all figures but `decision-curve`, `e5-outcomes` and `gaze`.
+    /// Only cells: enough for all figures except `decision-curve`, `e5-outcomes` and `gaze`.
     pub fn of_cells(cells: &'a Cells) -> Self {
         Self {
             cells,
@@ -119,7 +119,7 @@ pub fn draw(name: FigureName, input: &Input<'_>) -> Result<Figure, FigureError> 
     })
 }
 
-/// The inputs that all figures share.
+/// Inputs shared by all figures.
 #[derive(Clone, Copy, Debug)]
 struct Scene<'a> {
     matrix: &'a Matrix<'a>,

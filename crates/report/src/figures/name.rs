@@ -20,7 +20,7 @@ pub enum FigureName {
     E5Outcomes,
     /// Task success with its interval and the level of chance.
     Intervals,
-    /// Task success from the first experiment to each other.
+    /// Task success from the first experiment to every other.
     Slopes,
     /// Task success against the dose of a factor.
     DoseResponse,
@@ -30,7 +30,7 @@ pub enum FigureName {
     Gaze,
 }
 
-// In the order of a report; each file has this name, and the ending of its format.
+// In the order of a report; each file has this name and the extension of its format.
 exact::names!(FigureName {
     Spider: "spider",
     Heatmap: "heatmap",

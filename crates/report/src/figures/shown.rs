@@ -1,4 +1,4 @@
-//! The metrics and the caption of a figure, as a style declares them and as far as the cells have them.
+//! The metrics and the caption of a figure, as declared by a style and available in the cells.
 
 use std::sync::LazyLock;
 
@@ -27,14 +27,14 @@ pub type FigureSheets = IndexMap<String, FigureSheet>;
 /// The default metrics and captions of every figure.
 pub static SHOWN: LazyLock<FigureSheets> =
     LazyLock::new(|| toml::from_str(FIGURES).expect("the file comes with the program"));
-/// The same as TOML, for styles to lie over.
+/// The same as TOML, as a base for styles.
 pub(crate) const FIGURES: &str = include_str!("../../../../assets/styles/figures.toml");
 
 /// With more axes the labels overlap.
 const MOST_AXES: usize = 8;
 
 impl FigureName {
-    /// The fewest and the most metrics that it shows; the first so many must be rates.
+    /// The fewest and the most metrics that the figure shows; the first ones, by this number, must be rates.
     pub const fn metrics(self) -> ([usize; 2], usize) {
         const ANY: usize = 64;
         match self {
@@ -48,7 +48,7 @@ impl FigureName {
         }
     }
 
-    /// An error for fewer metrics than the figure shows, or more.
+    /// An error for fewer or more metrics than the figure shows.
     pub fn check_count(self, found: usize) -> Result<(), FigureError> {
         let ([fewest, most], _) = self.metrics();
         if (fewest..=most).contains(&found) {

@@ -1,25 +1,25 @@
-//! The width that a figure is printed at, and the layout that keeps its text legible there.
+//! The printed width of a figure, and the layout that keeps its text legible.
 
 use std::fmt;
 use std::str::FromStr;
 
 use super::kit::FULL_WIDTH;
 
-/// Text shrinks to this share at most: from 9 px, the smallest lettering, to 6 pt.
+/// The smallest scale of text: from 9 px, the smallest lettering, to 6 pt.
 const LEAST_SCALE: f64 = 8.0 / 9.0;
 const PX_PER_CM: f64 = 96.0 / 2.54;
-/// The narrowest and the widest figure, cm.
+/// The smallest and the largest width of a figure, cm.
 const RANGE_CM: [f64; 2] = [8.0, 50.0];
 const UNITS: [(&str, f64); 5] =
     [("cm", PX_PER_CM), ("mm", PX_PER_CM / 10.0), ("in", 96.0), ("pt", 96.0 / 72.0), ("px", 1.0)];
 
-/// The width of a figure on paper, such as `8.5cm`: from 8 cm to 50 cm, in cm, mm, in, pt or px.
+/// The printed width of a figure, such as `8.5cm`: from 8 cm to 50 cm, in cm, mm, in, pt or px.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FigureWidth {
     px: f64,
 }
 
-/// A text that is no width of a figure.
+/// A text that is not a valid figure width.
 #[derive(Debug, thiserror::Error)]
 #[error("expected a width from 8cm to 50cm such as 8.5cm, 85mm, 3.3in, 240pt or 640px, found `{0}`")]
 pub struct InvalidWidth(String);
@@ -46,7 +46,7 @@ impl FigureWidth {
         self.px.max((self.px / LEAST_SCALE).min(FULL_WIDTH))
     }
 
-    /// The width of a drawing of `width` px as printed, px; `Err` has the narrowest one at which its text is legible.
+    /// The printed width of a drawing of `width` px, px; `Err` has the narrowest legible width.
     pub(super) fn printed(self, width: f64) -> Result<f64, Self> {
         let least = width * LEAST_SCALE;
         if self.px + 1.0 < least { Err(Self { px: least }) } else { Ok(self.px) }

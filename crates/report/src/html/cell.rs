@@ -1,7 +1,7 @@
-//! One cell of a table as the page shows it: the printed value, and the full one in attributes.
+//! One table cell on the page: the printed value, and the full value in attributes.
 //!
-//! Rule: the attributes have the text of `cells.csv`, empty for undefined; a cell that a style prints as zero for
-//! want of a value keeps its empty attributes.
+//! Rule: the attributes have the text of `cells.csv`, empty for undefined; a missing value that a style prints as zero
+//! keeps its empty attributes.
 
 use serde_json::{Value as Json, json};
 
@@ -22,11 +22,11 @@ pub(super) fn cell(cell: &MetricCell, of: cells::Cell, undefined: &str, chance: 
     json!({
         "metric": visible(name),
         "estimate": estimate,
-        // The part that says how sure it is; empty for none.
+        // The uncertainty; empty without one.
         "detail": detail.unwrap_or_default(),
-        // Whether it shows that there is no value; a zero that a style prints in its place is no such cell.
+        // True if it shows a missing value; a zero that a style prints instead does not count.
         "is_undefined": cell.value == Value::Undefined,
-        // Whether emphasis covers the detail too.
+        // True if emphasis covers the detail too.
         "is_whole": matches!(cell.value, Value::MeanSe { .. }),
         "element": element(cell.emphasis),
         "mark": if cell.is_marked { DAGGER.to_string() } else { String::new() },

@@ -1,7 +1,7 @@
-//! The commands that look into one episode, for a caller that reads the page at a terminal.
+//! The commands that look into one episode, for readers at a terminal.
 //!
-//! Rule: names as a manifest has them, so that no page tells where its maker keeps things; each is one word of a shell,
-//! whatever its characters.
+//! Rule: names as in a manifest, so that no page reveals its maker's folders; each is one shell word, whatever its
+//! characters.
 
 use std::collections::BTreeSet;
 
@@ -9,15 +9,15 @@ use serde_json::{Value as Json, json};
 
 use exact::escape::visible;
 
-/// The most folders or files that a command names; more are named by the folder that they are in.
+/// The most folders or files that a command names; if there are more, it names their folder.
 const MOST_NAMED: usize = 3;
 
-/// Arguments for other commands that read the page's traces.
+/// Arguments of commands that read the page's traces.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Recordings {
     /// The traces, as the manifest names them.
     pub paths: Vec<String>,
-    /// The definitions, by name or path; none for the default ones.
+    /// The definitions, by name or path; `None` for the default ones.
     pub definitions: Option<String>,
 }
 
@@ -62,7 +62,7 @@ pub(super) fn quoted(id: &str) -> Option<String> {
     (word != id).then_some(word)
 }
 
-/// A text as one word of a shell: bash and zsh read it back as it was, and nothing in it acts or hides.
+/// A text as one shell word: bash and zsh read it back unchanged, and nothing in it acts or hides.
 pub fn word(text: &str) -> String {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./:@%+,".contains(c);
     if !text.is_empty() && !text.starts_with('-') && text.chars().all(is_plain) {

@@ -1,11 +1,11 @@
-//! The definitions in the words of their file, for readers.
+//! The definitions in their file's words, for readers.
 
 use serde_json::{Value as Json, json};
 
 use exact::escape::visible;
 use metric::catalog::{Better, Catalog, Kind, Metric, StandardError};
 
-/// Every metric of a catalog, in its order: its sentence, and the expressions behind it.
+/// Every metric of a catalog, in order: its sentence and its expressions.
 pub(super) fn metrics(catalog: &Catalog) -> Vec<Json> {
     let view = |(name, metric): (&String, &Metric)| {
         json!({
@@ -21,12 +21,12 @@ pub(super) fn metrics(catalog: &Catalog) -> Vec<Json> {
     catalog.metric.iter().map(view).collect()
 }
 
-/// Every named expression of a catalog, in its order.
+/// Every named expression of a catalog, in order.
 pub(super) fn lets(catalog: &Catalog) -> Vec<Json> {
     catalog.lets.iter().map(|(name, value)| json!({ "name": visible(name), "value": multiline(value) })).collect()
 }
 
-/// Every experiment of a catalog, in its order, with its levels: `TSA 1/10, 1/11`.
+/// Every experiment of a catalog, in order, with its levels: `TSA 1/10, 1/11`.
 pub(super) fn experiments(catalog: &Catalog) -> Vec<Json> {
     let view = |(name, experiment): (&String, &metric::catalog::Experiment)| {
         let chance = experiment.chance.iter().map(|(metric, level)| match level {

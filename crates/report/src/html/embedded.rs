@@ -1,7 +1,7 @@
 //! The data of the page's script: metrics, groups, episodes and tests as JSON inside a `<script>` element.
 //!
-//! Rule: the JSON has no `<`, `>` or `&`, so nothing in it can end the element or begin a comment. Integers that
-//! JavaScript would round are strings.
+//! Rule: the JSON has no `<`, `>` or `&`, so it cannot end the element or begin a comment. Integers that JavaScript
+//! would round are strings.
 
 use std::collections::BTreeMap;
 
@@ -15,10 +15,10 @@ use super::{HtmlError, Page};
 use crate::cells::group::membership;
 use exact::escape::visible;
 
-/// The largest integer below which JavaScript knows every other one.
+/// JavaScript's largest safe integer: it represents all smaller ones exactly.
 const LARGEST_SAFE: u64 = (1 << 53) - 1;
 
-/// Everything that the script cannot read off the page.
+/// Data that the script cannot read from the page.
 #[derive(Debug, Serialize)]
 struct Embedded<'a> {
     undefined: &'a str,
@@ -26,7 +26,7 @@ struct Embedded<'a> {
     groups: Vec<String>,
     episodes: Episodes,
     commands: Json,
-    /// Every two models against each other.
+    /// All pairs of models.
     pairs: Json,
 }
 
@@ -41,7 +41,7 @@ struct Episodes {
     values: BTreeMap<String, Vec<Option<Integer>>>,
 }
 
-/// An integer that stays exact in JavaScript.
+/// An integer that JavaScript gets exactly.
 #[derive(Clone, Copy, Debug)]
 struct Integer(i64);
 
@@ -55,7 +55,7 @@ impl Serialize for Integer {
     }
 }
 
-/// The JSON of a page, ready to stand inside a `<script>` element.
+/// The JSON of a page, ready for a `<script>` element.
 pub(super) fn json(page: &Page<'_>, metrics: &[Json], undefined: &str) -> Result<String, HtmlError> {
     let Page { episodes, cells, .. } = *page;
     let label = |key: &[_]| key.iter().map(|value| shown(value, undefined)).collect::<Vec<_>>().join(" · ");

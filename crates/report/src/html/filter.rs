@@ -1,4 +1,4 @@
-//! The values of key columns that a reader can choose among.
+//! The values of key columns that a reader can select.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use crate::cells::{Cells, KeyValue};
 use crate::layout::{MetricTable, heading};
 use exact::escape::visible;
 
-/// The filters of a page, and where each value stands among its filter's.
+/// The filters of a page, and the index of each value in its filter.
 #[derive(Debug)]
 pub(super) struct Filters {
     pub(super) filters: Vec<Json>,
@@ -16,7 +16,7 @@ pub(super) struct Filters {
 }
 
 impl Filters {
-    /// The values that the rows of `tables` have, in order of their coming.
+    /// The values in the rows of `tables`, in order of first appearance.
     pub(super) fn of(tables: &[MetricTable], cells: &Cells, undefined: &str) -> Self {
         let mut values: Vec<Vec<KeyValue>> = vec![Vec::new(); cells.by.len()];
         let mut places: Vec<BTreeMap<KeyValue, usize>> = vec![BTreeMap::new(); cells.by.len()];
@@ -36,7 +36,7 @@ impl Filters {
         Self { filters: several.map(filter).collect(), places }
     }
 
-    /// For each key column the place of a row's value: `0,3`.
+    /// The index of a row's value for each key column: `0,3`.
     pub(super) fn places(&self, key: &[KeyValue]) -> String {
         let place = |(value, places): (&KeyValue, &BTreeMap<KeyValue, usize>)| places.get(value).copied();
         let places = key.iter().zip(&self.places).filter_map(place);

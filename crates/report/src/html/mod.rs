@@ -1,4 +1,4 @@
-//! `report.html`: tables, figures and provenance of a report as one page that needs nothing but itself.
+//! `report.html`: tables, figures and provenance of a report as one self-contained page.
 //!
 //! ```text
 //! page.rs ──► cell.rs, filter.rs, definitions.rs, command.rs    template.rs
@@ -6,10 +6,10 @@
 //!  page)        embedded.rs, pair.rs (JSON for the script)        style and script become one)
 //! ```
 //!
-//! Rule: numbers arrive here finished; a cell's attributes carry the text of `cells.csv`. Names from traces are text:
-//! templates escape them, and what acts on a reader is spelled out first ([`visible`]). The page forbids itself every
-//! request and every script but its own. It is complete without its script; the script adds sorting, filters, search,
-//! values on hover, the episodes behind a cell, and two models beside each other. What is chosen is in the address.
+//! Rule: numbers arrive in final form; a cell's attributes carry the text of `cells.csv`. Names from traces are text:
+//! templates escape them, and characters that act on a reader are spelled out first ([`visible`]). The page's policy
+//! forbids all requests and all scripts but its own. It is complete without its script, which adds sorting, filters,
+//! search, values on hover, the episodes behind a cell, and two models side by side. Selections are in the address.
 //!
 //! [`visible`]: exact::escape
 
@@ -39,32 +39,32 @@ pub struct Page<'a> {
     pub tables: &'a [MetricTable],
     /// The cells that the tables show.
     pub cells: &'a Cells,
-    /// The episodes that the cells are of.
+    /// The episodes behind the cells.
     pub episodes: &'a EpisodeTable,
     pub manifest: &'a Manifest,
-    /// The figures, in order; none leaves the section out.
+    /// The figures, in order; an empty slice omits the section.
     pub figures: &'a [Figure<'a>],
-    /// The statistics; without them the page has no such section.
+    /// The statistics; `None` omits the section.
     pub statistics: Option<&'a Statistics>,
-    /// The lists below the statistics, a section each.
+    /// The lists below the statistics, one section each.
     pub lists: &'a [ListTable],
     /// The recordings behind the episodes; absent for files of scores.
     pub recordings: Option<&'a Recordings>,
 }
 
-/// A figure to set into the page.
+/// A figure for the page.
 #[derive(Clone, Copy, Debug)]
 pub struct Figure<'a> {
-    /// `spider`, ...: the name of its files.
+    /// The name of its files: `spider`, ...
     pub name: &'a str,
     pub title: &'a str,
     /// The explanation below it.
     pub caption: &'a str,
-    /// An `<svg>` element, taken unchanged: it must have escaped the names in it.
+    /// An `<svg>` element, used unchanged: names in it must be escaped.
     pub svg: &'a str,
 }
 
-/// An error while making a page.
+/// An error of making a page.
 #[derive(Debug, thiserror::Error)]
 pub enum HtmlError {
     #[error(transparent)]
@@ -77,8 +77,8 @@ pub enum HtmlError {
     Template(#[from] minijinja::Error),
 }
 
-/// Some sections of the page alone, for a page that is put together in the browser: `tables`, `figures`, `statistics`,
-/// `lists`, `definitions`, each as its element.
+/// Some sections of the page, for a page that the browser assembles: `tables`, `figures`, `statistics`, `lists`,
+/// `definitions`, each as its element.
 pub fn sections(page: &Page<'_>, names: &[&str]) -> Result<Vec<String>, HtmlError> {
     let content = page::content(page)?;
     names.iter().map(|name| Ok(template::section(name, &content)?)).collect()

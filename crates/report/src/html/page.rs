@@ -1,4 +1,4 @@
-//! The page as its templates take it: text in order, every decision taken.
+//! The page as input of its templates: text in order, with all decisions made.
 
 use std::collections::BTreeSet;
 
@@ -63,7 +63,7 @@ fn table(table: &MetricTable, cells: &Cells, filters: &Filters) -> Result<Json, 
         "title": visible(&table.title),
         "sentences": table.sentences().map(visible).collect::<Vec<_>>(),
         "row_heading": visible(&table.row_heading),
-        // What heads the groups in words, empty where all rows are of one: `Experiment`.
+        // The heading of the groups, empty if there is only one: `Experiment`.
         "group_heading": heading(&visible(&group_keys.join(", "))),
         "columns": table.columns.iter().map(column).collect::<Vec<_>>(),
         "groups": table.groups.iter().map(rows).collect::<Result<Vec<_>, _>>()?,
@@ -71,7 +71,7 @@ fn table(table: &MetricTable, cells: &Cells, filters: &Filters) -> Result<Json, 
 }
 
 fn column(column: &MetricColumn) -> Json {
-    // The direction to sort by first.
+    // The initial sort direction.
     let best_first = match column.better {
         Better::Higher | Better::Neither => "descending",
         Better::Lower => "ascending",
@@ -81,7 +81,7 @@ fn column(column: &MetricColumn) -> Json {
 
 fn row_group(group: &MetricRows, table: &MetricTable, cells: &Cells, filters: &Filters) -> Result<Json, HtmlError> {
     let first = group.rows.first().map_or(&[][..], |row| &row.key);
-    // The heading's keys alone: `E1`.
+    // The keys in the heading: `E1`.
     let short = others(first, row_key(&table.keys)).map(|value| shown(value, &table.undefined));
     let short = short.collect::<Vec<_>>().join(", ");
     let rows = group.rows.iter().map(|of| row(of, table, cells, filters)).collect::<Result<Vec<_>, _>>()?;
@@ -101,7 +101,7 @@ fn row(row: &MetricRow, table: &MetricTable, cells: &Cells, filters: &Filters) -
     });
     Ok(json!({
         "name": visible(&row.name),
-        // The position of its group of episodes, and the places of its keys among the values of the filters.
+        // The index of its group of episodes, and the indices of its keys in the values of the filters.
         "group": at,
         "places": filters.places(&row.key),
         "episodes": group.episodes,
@@ -154,7 +154,7 @@ fn provenance(manifest: &Manifest) -> Json {
         "by": names(&manifest.by),
         "metrics": names(&manifest.metrics),
         "inputs": inputs.collect::<Vec<_>>(),
-        // Without its outputs: the hash of the page is among them.
+        // Without its outputs, since they include the hash of the page.
         "manifest": manifest.json().lines().map(visible).collect::<Vec<_>>().join("\n"),
     })
 }

@@ -1,7 +1,7 @@
-//! Every two models against each other, for the part of the page that shows two of them.
+//! All pairs of models, for the part of the page that shows two of them.
 //!
-//! Rule: tests are arrays, as there are many: the places of both models and of the test's name, then the texts of
-//! [`PairText`] in the order of its fields, the two of a side one after the other, and the verdict's number.
+//! Rule: tests are arrays, since there are many. An array has the indices of both models and of the test's name, then
+//! the texts of [`PairText`] in field order, with both sides of a field adjacent, and the verdict's number.
 
 use std::collections::BTreeSet;
 
@@ -12,10 +12,10 @@ use crate::statistics::text::pairs::{FamilyText, PairText, families};
 use crate::statistics::text::percent;
 use exact::escape::visible;
 
-/// The most tests in a page, some 700 kB: fifty models have more than a thousand pairs under each metric.
+/// The most tests in a page, about 700 kB: fifty models have more than a thousand pairs under each metric.
 const MOST_TESTS: usize = 7_000;
 
-/// All tests of pairs of models; null where there are no two.
+/// All tests of pairs of models; null without a pair.
 pub(super) fn pairs(statistics: Option<&Statistics>) -> Json {
     let (families, left_out) = within(statistics.map(families).unwrap_or_default());
     let tests = || families.iter().flat_map(|family| &family.tests);
@@ -52,7 +52,7 @@ pub(super) fn pairs(statistics: Option<&Statistics>) -> Json {
     told
 }
 
-/// The families that a page has room for, and how many it has not: those over all experiments first, then metric by metric.
+/// The families that fit on a page, and the number of others: those over all experiments first, then by metric.
 fn within(families: Vec<FamilyText<'_>>) -> (Vec<FamilyText<'_>>, usize) {
     let mut metrics: Vec<&str> = Vec::new();
     for family in &families {

@@ -1,7 +1,7 @@
-//! Templates, style and script of the page, put together.
+//! Combines templates, style and script of the page.
 //!
-//! Rule: a template escapes all it is given; the few texts that are markup already are marked so in `page`, one by
-//! one. The script's hash is in the page's own policy, so that no other script runs.
+//! Rule: a template escapes all its input; the few texts that are already markup are marked in `page`, one by one. The
+//! script's hash is in the page's own policy, so no other script runs.
 
 use minijinja::value::Value;
 use minijinja::{Environment, Error, UndefinedBehavior, context};

@@ -1,4 +1,4 @@
-//! The cells of a column that stand out: the best and the second best of those that compete.
+//! Emphasis of cells in a column: the best and the second best competitors.
 //!
 //! Competitors are the models of one group under one metric. Undefined cells do not compete, and a metric without
 //! a better direction has no best.
@@ -10,7 +10,7 @@ use crate::style::EmphasisRule;
 use crate::tables::Emphasis;
 use metric::catalog::Better;
 
-/// Sets the emphasis of the cells of one column in one group. The cells keep their places.
+/// Sets the emphasis of the cells of one column in one group. The order of the cells is unchanged.
 pub(crate) fn emphasise(cells: &mut [&mut MetricCell], better: Better, rule: EmphasisRule) {
     let compare: fn(&MetricCell, &MetricCell) -> Ordering = match rule {
         // Ties come from tests, which cells do not have.
@@ -32,7 +32,7 @@ pub(crate) fn emphasise(cells: &mut [&mut MetricCell], better: Better, rule: Emp
         |of: usize| ranked[of..].iter().take_while(|cell| best_first(cell, ranked[of]) == Ordering::Equal).count();
     let bold = ties_with(0);
     let underlined = if bold < ranked.len() { ties_with(bold) } else { 0 };
-    // The last is neither the best of one nor the second best of two; the paper's tables have both.
+    // The last is neither the best of one nor the second best of two, except in the paper's tables.
     let has_worse = |place: usize| rule == EmphasisRule::PrintedMean || place < ranked.len();
     let bold = if has_worse(bold) { bold } else { 0 };
     let underlined = if has_worse(bold + underlined) { underlined } else { 0 };
@@ -48,7 +48,7 @@ fn by_printed_mean(a: &MetricCell, b: &MetricCell) -> Ordering {
     }
 }
 
-/// Exact also where products of the sums would leave 128 bits. A cell that prints as zero is zero.
+/// Exact even if products of the sums exceed 128 bits. A cell that prints as zero is zero.
 fn by_exact_mean(a: &MetricCell, b: &MetricCell) -> Ordering {
     let fraction = |cell: &MetricCell| (cell.sum, i128::from(cell.n.max(1)));
     compare_fractions(fraction(a), fraction(b))
@@ -79,7 +79,7 @@ mod tests {
     use exact::number::Decimal;
     use metric::catalog::Better::{self, Higher, Lower, Neither};
 
-    /// Cells of (sum, n), printed with two digits; n = 0 is undefined. Each letter of the answer is a cell.
+    /// Cells of (sum, n), printed with two digits; n = 0 is undefined. Each letter of the expected text is a cell.
     fn check(of: &[(i128, u64)], better: Better, rule: EmphasisRule, expected: &str) {
         let cell = |&(sum, n): &(i128, u64)| {
             let mean = Decimal::of_ratio(sum, n.into(), 2);

@@ -1,7 +1,7 @@
 //! A table of cells: metrics in columns, the keys of the episodes in rows.
 //!
-//! Rule: all decisions are taken here already (columns, order, rounding, emphasis, marks). [`MetricTable::printed`] is
-//! what people read, [`MetricTable::records`] what programs read.
+//! Rule: all decisions are already made here (columns, order, rounding, emphasis, marks). [`MetricTable::printed`] is
+//! for people, [`MetricTable::records`] for programs.
 
 use crate::cells::KeyValue;
 use crate::cells::group::CONDITION;
@@ -19,9 +19,9 @@ pub struct MetricTable {
     pub name: String,
     /// The first words of its caption.
     pub title: String,
-    /// The sentences after them.
+    /// The sentences after the title.
     pub note: String,
-    /// Sentences that its cells call for, such as what the dagger means.
+    /// Sentences about its cells, such as the meaning of the dagger.
     pub footnotes: Vec<String>,
     pub label: Option<String>,
     /// The text of an undefined value.
@@ -34,14 +34,14 @@ pub struct MetricTable {
     /// The heading of the rows: `Model`.
     pub row_heading: String,
     pub columns: Vec<MetricColumn>,
-    /// The rows, in groups that are headed together and compete together.
+    /// The rows, in groups that share a heading and compete.
     pub groups: Vec<MetricRows>,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MetricColumn {
     pub metric: String,
-    /// The header as LaTeX, where the escaped name will not do.
+    /// The heading as LaTeX, if the escaped name does not suffice.
     pub latex: Option<String>,
     pub better: Better,
 }
@@ -49,7 +49,7 @@ pub struct MetricColumn {
 /// Rows under one heading.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MetricRows {
-    /// `E1: Active mirror-based self-identification`; `None` where all rows are of one group.
+    /// `E1: Active mirror-based self-identification`; `None` if there is only one group.
     pub heading: Option<String>,
     pub rows: Vec<MetricRow>,
 }
@@ -70,9 +70,9 @@ pub struct MetricRow {
 pub struct MetricCell {
     pub value: Value,
     pub emphasis: Emphasis,
-    /// True if it rests on so few episodes that a dagger says so.
+    /// True if a dagger marks it because of few episodes.
     pub is_marked: bool,
-    /// All episodes of the row, defined or not.
+    /// All episodes of the row, including undefined ones.
     pub episodes: u64,
     /// The episodes where the metric is defined.
     pub n: u64,
@@ -84,7 +84,7 @@ pub struct MetricCell {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Value {
     Undefined,
-    /// A mean and its standard error, where there is one.
+    /// A mean and its standard error, if any.
     MeanSe {
         mean: Decimal,
         se: Option<Decimal>,
@@ -96,7 +96,7 @@ pub enum Value {
         mean: Decimal,
         spread: Spread,
     },
-    /// The mean of a quantity with Student's interval; `n` if it is not defined in all episodes, or in a single one.
+    /// The mean of a quantity with Student's interval; has `n` if it is not defined in all episodes, or in only one.
     Mean {
         mean: Decimal,
         spread: Spread,
@@ -107,7 +107,7 @@ pub enum Value {
 /// The uncertainty of the mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Spread {
-    /// Not to be said: too few values.
+    /// Not given: too few values.
     Unknown,
     /// All values are equal, which is no evidence of certainty.
     AllEqual,
@@ -118,9 +118,9 @@ pub enum Spread {
 }
 
 impl MetricTable {
-    /// Sets the models that are tied for the best in bold, and says so with `note`.
+    /// Sets the models that are tied for the best in bold, and adds `note`.
     ///
-    /// Nothing where rows are anything else than a model in an experiment, or where the style does not ask for ties.
+    /// Does nothing unless each row is a model in an experiment, and the style asks for ties.
     pub fn mark_ties(&mut self, ranks: &Ranks, note: &str) {
         let place = |name: &str| self.keys.iter().position(|key| key == name);
         let (Some(experiment), Some(model)) = (place("experiment"), place("model")) else { return };
@@ -150,7 +150,7 @@ impl MetricTable {
         std::iter::once(self.note.as_str()).chain(self.footnotes.iter().map(String::as_str)).filter(|s| !s.is_empty())
     }
 
-    /// Both forms under the table's name.
+    /// Both forms of the table.
     pub fn list(&self) -> ListTable {
         ListTable { name: self.name.clone(), printed: self.printed(), records: self.records() }
     }
@@ -159,7 +159,7 @@ impl MetricTable {
         self.groups.iter().flat_map(|group| &group.rows)
     }
 
-    /// For people: a line per row.
+    /// For people: one line per row.
     pub fn printed(&self) -> Table {
         let columns = self.columns.iter().map(|column| Column {
             heading: column.metric.clone(),
@@ -187,11 +187,11 @@ impl MetricTable {
         }
     }
 
-    /// For programs: a line per cell, numbers as printed.
+    /// For programs: one line per cell, numbers as printed.
     ///
-    /// The key columns come first, then `metric`. Cells of mean and standard error go on with `mean,se,emphasis`, the form
-    /// of the published tables; cells of counts with `episodes,n,sum,mean,ci_low,ci_high,emphasis`. What is undefined is
-    /// empty.
+    /// The key columns come first, then `metric`. Cells of mean and standard error continue with `mean,se,emphasis`,
+    /// the form of the published tables; cells of counts with `episodes,n,sum,mean,ci_low,ci_high,emphasis`. Undefined
+    /// values are empty.
     pub fn records(&self) -> Table {
         let tail = match self.form {
             CellForm::MeanSe => &["mean", "se", "emphasis"][..],
@@ -245,7 +245,7 @@ impl MetricCell {
 }
 
 impl Value {
-    /// The part that is the estimate, and the part that says how sure it is, as plain text.
+    /// The estimate and its uncertainty as plain text.
     pub fn parts(&self, undefined: &str) -> (String, Option<String>) {
         match self {
             Self::Undefined => (undefined.to_owned(), None),
@@ -267,7 +267,7 @@ impl Value {
         }
     }
 
-    /// The mean as printed, or as it would be.
+    /// The mean as printed, or as it would print.
     pub fn mean(&self) -> Option<Decimal> {
         match self {
             Self::Undefined => None,

@@ -1,7 +1,7 @@
-//! Cells under a style: which tables there are, their rows, columns and order.
+//! Cells under a style: the tables with their rows, columns and order.
 //!
-//! The last key column, or the model where it is one, names the rows; the other keys head the groups. Every metric
-//! of the cells is in some table: those that the style names nowhere come in a table of their own.
+//! The last key column, or the model if it is a key, names the rows; the other keys head the groups. Every metric of
+//! the cells is in some table: those that the style does not name get their own table.
 
 pub(crate) mod emphasis;
 mod metric_table;
@@ -22,18 +22,18 @@ pub(crate) use self::order::row_key;
 
 /// The tables of a report, in the order of the style; the first is `main`.
 ///
-/// A table none of whose metrics are there is left out, except that `main` takes every metric instead.
+/// A table without any of its metrics is omitted, except that `main` then takes every metric.
 pub fn tables(cells: &Cells, style: &Style) -> Result<Vec<MetricTable>, StyleError> {
     style.check_against(&cells.catalog)?;
     let sheets = sheets(cells, style);
     Ok(sheets.iter().map(|(name, sheet)| Layout::new(cells, style, sheet).table(name, sheet)).collect())
 }
 
-/// The most metrics of definitions beyond the paper's that are in `main`, whose columns have to fit a page.
+/// The most metrics in `main` that the style does not name: its columns have to fit on a page.
 const MOST_IN_MAIN: usize = 6;
 
-/// The style's tables with the columns that are there, `main` first. Metrics that the style names nowhere are in `main` too
-/// if the style is a built-in one, which knows no others, and they are few; else in a table after it.
+/// The style's tables with the available columns, `main` first. Metrics that the style does not name are in `main` if
+/// the style is built in (it cannot name others) and they are few; otherwise in a table after it.
 fn sheets(cells: &Cells, style: &Style) -> Vec<(String, TableSheet)> {
     let exists = |metric: &String| cells.metrics.contains(metric) && cells.catalog.metric.contains_key(metric);
     let present = |sheet: &TableSheet| TableSheet {
@@ -124,7 +124,7 @@ impl<'a> Layout<'a> {
         }
     }
 
-    /// The rows in order, cut where a key that heads groups changes.
+    /// The rows in order, split where a key in the headings changes.
     fn groups(&self, sheet: &TableSheet) -> Vec<MetricRows> {
         let mut ordered: Vec<&Group> = self.cells.groups.iter().collect();
         let order = TableOrder { catalog: &self.cells.catalog, style: self.style };
@@ -189,7 +189,7 @@ impl<'a> Layout<'a> {
     }
 }
 
-/// `E1: Active mirror-based self-identification`, or the bare name where no title is known.
+/// `E1: Active mirror-based self-identification`, or only the name without a title.
 fn experiment(catalog: &Catalog, name: &str) -> String {
     match catalog.experiment.get(name).map(|experiment| experiment.title.as_str()) {
         None | Some("") => name.to_owned(),
@@ -201,7 +201,7 @@ fn words(key: &str) -> String {
     key.replace('_', " ")
 }
 
-/// A key column in the words of a header: `Body color`.
+/// A key column as a heading: `Body color`.
 pub(crate) fn heading(key: &str) -> String {
     let words = words(key);
     let mut letters = words.chars();

@@ -1,7 +1,7 @@
-//! The order of things in tables: keys, metrics.
+//! The order of keys and metrics in tables.
 //!
-//! Rule: experiments stand as the definitions order them, models and metrics as the style does, everything else by
-//! value; so a list beside a table can be read along it.
+//! Rule: experiments are ordered by the definitions, models and metrics by the style, everything else by value. So a
+//! list beside a table has the same order.
 
 use crate::cells::KeyValue;
 use crate::cells::diff::Changes;
@@ -16,7 +16,7 @@ pub struct TableOrder<'a> {
 }
 
 impl TableOrder<'_> {
-    /// The rank of a key of these columns: heading keys count before the row's own.
+    /// The rank of a key of these columns; keys in headings come before the row's own.
     pub fn of_key(self, by: &[String], key: &[KeyValue]) -> Vec<(usize, KeyValue)> {
         let own = row_key(by);
         let heading = (0..key.len()).filter(|at| *at != own);
@@ -24,7 +24,7 @@ impl TableOrder<'_> {
         all.map(|at| (self.place(&by[at], &key[at]), key[at].clone())).collect()
     }
 
-    /// The rank of a metric: by the first table that shows it, then as defined.
+    /// The rank of a metric: by the first table that shows it, then by definition.
     pub(crate) fn of_metric(self, metric: &str) -> (usize, usize) {
         let sheet = &self.style.sheet;
         let mut tables: Vec<_> = sheet.table.iter().collect();
@@ -35,7 +35,7 @@ impl TableOrder<'_> {
         (shown, defined.get_index_of(metric).unwrap_or(defined.len()))
     }
 
-    /// Puts cells and flips in the order of the tables.
+    /// Sorts cells and flips in table order.
     pub fn sort(self, changes: &mut Changes) {
         let by = changes.by.clone();
         changes.cells.sort_by_cached_key(|cell| {

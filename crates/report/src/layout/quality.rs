@@ -1,6 +1,6 @@
-//! The table of data quality: what became of the replies, by experiment, model and condition, for people and in full.
+//! The table of data quality: reply quality by experiment, model and condition, for people and in full.
 //!
-//! Rule: what no trace records prints as `--`, never as zero.
+//! Rule: unrecorded values print as `--`, never as zero.
 
 use std::collections::BTreeMap;
 
@@ -11,21 +11,21 @@ use exact::format::fixed;
 use score::quality::{CellKey, Quality, QualityByCell, statuses};
 
 const NAME: &str = "quality";
-/// The text of what is not recorded.
+/// The text of an unrecorded value.
 const UNKNOWN: &str = "--";
 /// The shares of replies whose latency is reported.
 const MEDIAN: f64 = 0.5;
 const SLOW: f64 = 0.95;
 const NANO: f64 = 1e9;
 
-/// Data quality by experiment, model and condition; `None` without any cell.
+/// Data quality by experiment, model and condition; `None` without cells.
 pub fn of_cells(cells: &QualityByCell) -> Option<ListTable> {
     let keys = if cells.has_conditions() { 3 } else { 2 };
     let table = || ListTable { name: NAME.to_owned(), printed: printed(cells, keys), records: records(cells, keys) };
     (!cells.0.is_empty()).then(table)
 }
 
-/// The table for a terminal, without title and notes; empty without any cell.
+/// The table for a terminal, without title and notes; empty without cells.
 pub fn text(cells: &QualityByCell, width: Option<usize>) -> String {
     of_cells(cells).map_or_else(String::new, |table| table.printed.lines(width))
 }

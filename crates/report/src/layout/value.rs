@@ -1,4 +1,4 @@
-//! Moments to what a cell shows, under a style's rules.
+//! From moments to displayed values, under a style's rules.
 
 use super::{Spread, Value};
 use crate::cells::Cell;

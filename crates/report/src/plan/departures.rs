@@ -1,4 +1,4 @@
-//! A study beside the plan that was registered for it: each departure, in a phrase.
+//! Compares a study with its registered plan: each departure, in a phrase.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Display;
@@ -22,7 +22,7 @@ impl TestName {
     }
 }
 
-/// The number of looks: one at a fixed number of episodes, or any.
+/// The number of looks: one at a fixed number of episodes, or any number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Looks {
     Once,
@@ -70,7 +70,7 @@ pub fn departures(plan: &RegisteredPlan, table: &EpisodeTable, options: &Options
     if let Some(planned) = plan.plan.tests.first() {
         if let Some(episodes) = planned.episodes {
             differ("episodes of a model in an experiment", &episodes, &blocks.each(|block| block.episodes));
-            // Each is a scene of its own, that all models have.
+            // Each episode is its own scene, which all models share.
             let scenes = options.design.has_pairs().then(|| blocks.each(|block| block.scenes.len()));
             differ("scenes of a model in an experiment", &episodes, &scenes.unwrap_or_else(|| "none".to_owned()));
         }
@@ -93,7 +93,7 @@ fn listed(names: BTreeSet<&str>) -> String {
     Vec::from_iter(names).join(", ")
 }
 
-/// The world and the prompts that a footer says otherwise of than the plan: what, registered, recorded.
+/// The world and the prompts for which footer and plan differ: name, registered hash, recorded hash.
 fn recorded_otherwise<'p>(plan: &'p RegisteredPlan, table: &EpisodeTable) -> BTreeSet<(String, &'p str, String)> {
     let mut found = BTreeSet::new();
     let mut compare = |what: String, registered: Option<&'p NamedHash>, recorded: &Value| {

@@ -1,7 +1,7 @@
-//! A study planned: the episodes for a wanted difference, or the difference that given episodes can show.
+//! Plans a study: the episodes for a wanted difference, or the difference that given episodes can show.
 //!
-//! Rule: every test is planned twice, alone and at the level that Holm's procedure holds its smallest p value to.
-//! Assumptions are part of the answer, in sentences.
+//! Rule: every test is planned twice: alone, and at the level of Holm's procedure for its smallest p value. Assumptions
+//! are part of the answer, in sentences.
 
 pub mod departures;
 pub mod register;
@@ -159,7 +159,7 @@ pub fn plan(request: PlanRequest) -> Result<Plan, PlanError> {
     if request.chance.is_some() {
         asked.extend([(chance, request.models), (chance, 1)]);
     }
-    // One test is its own family.
+    // A single test is its own family.
     asked.dedup();
     let tests: Vec<PlannedTest> =
         asked.into_iter().map(|(test, family)| request.planned(test, family, level)).collect();
@@ -184,7 +184,7 @@ impl PlanRequest {
         };
         let (least, most) = rates.possible_discordance();
         match self.discordance {
-            // A share typed with two digits meets sums of binary fractions.
+            // A share typed with two digits is compared with sums of binary fractions.
             Some(found) if found < least - 1e-9 || found > most + 1e-9 => {
                 Err(PlanError::Discordance { discordance: found, least, most })
             }
@@ -240,7 +240,7 @@ impl PlanRequest {
         }
     }
 
-    /// The test of a true difference; `None` where the rates cannot be, and where seeds are too few for any verdict.
+    /// The test of a true difference; `None` for impossible rates, and for too few seeds for any verdict.
     fn test(&self, test: TestName, level: f64, difference: f64) -> Option<Box<dyn Power>> {
         let by_seed = |test| {
             let Clusters { seeds, icc, .. } = self.clusters;

@@ -1,8 +1,8 @@
-//! A plan written down before the first episode: inputs, results, and the hashes of what it is about.
+//! A plan registered before the first episode: inputs, results, and hashes of the definitions, experiments and prompts.
 //!
-//! Rule: the same plan and the same definitions give the same bytes. `sha256` is over the document itself, as compact
-//! JSON in the order of its fields with an empty `sha256`, so that a later change is seen without the file's history.
-//! `experiments` and `prompts` are empty until a recorder fills them in; they are part of what is hashed.
+//! Rule: the same plan and the same definitions give the same bytes. `sha256` is the hash of the document itself, as
+//! compact JSON in field order with an empty `sha256`, so later changes are visible without the file's history.
+//! `experiments` and `prompts` are empty until a recorder fills them in; the hash includes them.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -13,7 +13,7 @@ use exact::hash;
 /// The value of the key `format`.
 const FORMAT: &str = "mirrorstats-plan";
 
-/// The version of its shape.
+/// The version of the format.
 const VERSION: u32 = 1;
 
 /// A registered plan.
@@ -84,7 +84,7 @@ impl RegisteredPlan {
         Self { sha256: self.content_hash(), ..self }
     }
 
-    /// Reads a plan as it was registered.
+    /// Reads a registered plan.
     pub fn parse(text: &str) -> Result<Self, String> {
         let plan: Self = serde_json::from_str(text).map_err(|error| {
             format!("expected a registered plan: {error}\n  help: `mirrorstats plan ... --register FILE` writes one")
@@ -96,12 +96,12 @@ impl RegisteredPlan {
         Err(format!("{words}\n  help: take the file as it was registered, or register anew"))
     }
 
-    /// Returns true if it is as it was registered.
+    /// Returns true if it is unchanged since its registration.
     pub fn is_unchanged(&self) -> bool {
         self.sha256 == self.content_hash()
     }
 
-    /// The document as it is written.
+    /// The document as JSON text.
     pub fn to_json(&self) -> String {
         serde_json::to_string_pretty(self).expect("texts and finite numbers") + "\n"
     }

@@ -41,7 +41,7 @@ fn the_answer_comes_first() {
     insta::assert_snapshot!(told.join("\n\n"));
 }
 
-// scipy 1.17.1: every outcome weighed by `binom.pmf`, `2 * binom.cdf` at 1/2, `brentq` at power 0.8.
+// scipy 1.17.1: every outcome weighted by `binom.pmf`, `2 * binom.cdf` at 1/2, `brentq` at power 0.8.
 #[test]
 fn the_papers_episodes_show_what_the_reference_says() {
     let found = plan(PAPER).unwrap();

@@ -1,4 +1,4 @@
-//! A plan in words: the answer in one line, a row per test and level, what was assumed.
+//! A plan in words: the answer in one line, one row per test and level, the assumptions.
 
 use std::fmt::Write as _;
 

@@ -1,6 +1,6 @@
-//! Conclusions under each threshold, and those that are not the ones under the definitions as they are.
+//! Conclusions under each threshold, and those that differ from the conclusions under the unchanged definitions.
 //!
-//! Rule: a conclusion is what a test shows after Holm's adjustment. A test that a threshold leaves no values for shows
+//! Rule: a conclusion is what a test shows after Holm's adjustment. A test without values under a threshold shows
 //! nothing, as does one that does not reach the level.
 
 use indexmap::IndexMap;
@@ -58,7 +58,7 @@ struct Subject {
     about: String,
 }
 
-/// A conclusion: what is shown, or `None` where nothing is.
+/// A conclusion; `None` if nothing is shown.
 type Shown = Option<String>;
 
 pub(super) fn changes(levels: &[Level], reference: &Reference, metrics: &[String]) -> Vec<Change> {
@@ -158,7 +158,7 @@ fn between_models<'a>(family: &'a Family, ahead: &'a str) -> impl Iterator<Item 
     })
 }
 
-/// Two names, in an order that does not depend on who is ahead.
+/// Two names, in an order that does not depend on which is ahead.
 fn couple(first: &str, second: &str) -> String {
     format!("{} and {}", first.min(second), first.max(second))
 }

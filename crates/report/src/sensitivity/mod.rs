@@ -1,7 +1,7 @@
 //! Cells as functions of the threshold of mirror evidence, and thresholds that change a conclusion.
 //!
-//! Rule: no episode is scored and nothing is tested here. What each threshold gave comes as cells and statistics
-//! ([`Level`]); this module lines them up, for people and for programs.
+//! Rule: this module scores no episodes and tests nothing. The results for each threshold arrive as cells and
+//! statistics ([`Level`]); it arranges them for people and for programs.
 
 mod changes;
 mod table;
@@ -24,7 +24,7 @@ pub use changes::{Change, Question, Says};
 /// The results under one threshold, or under the recorded definitions.
 #[derive(Clone, Debug)]
 pub struct Level {
-    /// The least number of pixels that counts as evidence; `None` for the definitions as they are.
+    /// The least number of pixels that counts as evidence; `None` for the unchanged definitions.
     pub px: Option<u32>,
     pub cells: Cells,
     /// The conclusions from the same episodes.
@@ -34,14 +34,14 @@ pub struct Level {
 /// The meaning of the row of the recorded definitions.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Reference {
-    /// True if the evidence is what was recorded as such; definitions may say otherwise.
+    /// True if the evidence is the recorded one; definitions may use other evidence.
     pub is_recorded: bool,
-    /// The thresholds in pixels that the footers declare, ascending; none if they declare none.
+    /// The thresholds in pixels that the footers declare, ascending; empty if they declare none.
     pub px: Vec<u64>,
 }
 
 impl Reference {
-    /// `recorded`, or `defined` where the definitions name other evidence than the recording.
+    /// `recorded`, or `defined` if the definitions use evidence other than the recorded one.
     pub const fn word(&self) -> &'static str {
         if self.is_recorded { "recorded" } else { "defined" }
     }
@@ -109,11 +109,11 @@ pub struct ThresholdCell {
 }
 
 impl Sensitivity {
-    /// Lines up what thresholds gave: the definitions as they are first, then the thresholds ascending. `metrics` depend on
-    /// the threshold, `independent` do not.
+    /// Arranges the results: the unchanged definitions first, then the thresholds, ascending. `metrics` depend on the
+    /// threshold, `independent` do not.
     ///
     /// # Panics
-    /// Without any level.
+    /// If there are no levels.
     pub fn of(
         levels: &[Level],
         reference: &Reference,
@@ -137,23 +137,23 @@ impl Sensitivity {
         }
     }
 
-    /// As comma-separated values in full precision: the key columns, then `threshold,metric,n,sum,mean,se`. The threshold of
-    /// the definitions as they are is `recorded`, or `defined`; what is undefined is empty.
+    /// As comma-separated values in full precision: the key columns, then `threshold,metric,n,sum,mean,se`. The
+    /// threshold of the unchanged definitions is `recorded` or `defined`; undefined values are empty.
     pub fn csv(&self) -> String {
         text::csv(self)
     }
 
-    /// As Markdown, the changes of conclusions below the table.
+    /// As Markdown, with changed conclusions below the table.
     pub fn markdown(&self) -> String {
         text::markdown(self)
     }
 
-    /// As LaTeX, the table alone.
+    /// As LaTeX, only the table.
     pub fn latex(&self) -> String {
         self.table.printed().latex()
     }
 
-    /// For a terminal: the table, then where a conclusion changes.
+    /// For a terminal: the table, then the changed conclusions.
     pub fn render(&self, terminal: Terminal) -> String {
         text::render(self, terminal)
     }

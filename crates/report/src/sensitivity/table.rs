@@ -35,7 +35,7 @@ pub(super) fn table(
     }
 }
 
-/// The groups of all levels, in the order of tables.
+/// The groups of all levels, in table order.
 pub(super) fn keys(levels: &[Level], style: &Style) -> Vec<Vec<KeyValue>> {
     let Some(first) = levels.first() else { return Vec::new() };
     let order = TableOrder { catalog: &first.cells.catalog, style };

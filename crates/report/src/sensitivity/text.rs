@@ -8,7 +8,7 @@ use exact::number::full_precision;
 const HEADING: &str = "Where a conclusion changes";
 const NONE: &str = "No conclusion changes.";
 
-/// The room for sentences where lines may be of any length.
+/// The width of sentences if lines are not limited.
 const ROOM: usize = 110;
 
 pub(super) fn render(found: &Sensitivity, on: Terminal) -> String {

@@ -1,7 +1,7 @@
-//! The answers that a reader came for, a line each: who is above chance, who differs from whom, what the mirror changes.
+//! The main answers, one line each: models above chance, models that differ, effects of the mirror.
 //!
-//! Rule: an answer names what a test shows after Holm's adjustment, and nothing else; the numbers are in the tables. What
-//! would not fit into a line is counted.
+//! Rule: an answer states only what a test shows after Holm's adjustment; the numbers are in the tables. Items that do
+//! not fit on a line are counted.
 
 use std::collections::BTreeSet;
 
@@ -14,7 +14,7 @@ use super::losses::LOST;
 use super::study::named;
 use super::{ChanceRow, Contrast, Family, Method, Options, Reach, Role, Selection, Statistics, Units, Verdict};
 
-/// The most pairs that an experiment's answer names; more are counted.
+/// The most pairs that an experiment's answer names; others are counted.
 const MOST_NAMED: usize = 6;
 
 const ABOVE_CHANCE: &str = "Who is above chance?";
@@ -113,7 +113,7 @@ fn unranked(statistics: &Statistics) -> Vec<Answer> {
         let overall: Vec<_> = statistics.overall.iter().filter(|row| row.metric == *metric).collect();
         let separated = overall.iter().filter(|row| row.separated).map(|row| (&*row.first, &*row.second));
         let is_tested = overall.iter().any(|row| row.p.is_some());
-        // Where no experiment could show a difference, silence over all of them is no answer either.
+        // If no experiment could show a difference, a missing difference over all of them is no answer either.
         let is_unsayable = !overall.iter().any(|row| row.separated)
             && families.clone().all(|family| unsayable(family, confidence).is_some());
         let unsettled = overall.iter().filter(|row| row.losses.is_some_and(|losses| !losses.agree));
@@ -186,7 +186,7 @@ fn names(models: &[String], all: usize) -> String {
     }
 }
 
-/// The answer where no outcome of these units could be significant.
+/// The answer if no outcome of these units could be significant.
 fn cannot_say(units: &Units) -> String {
     format!("cannot say: {}", counted(units))
 }
@@ -196,7 +196,7 @@ fn counted(Units { n, name, .. }: &Units) -> String {
     format!("{n} {name}")
 }
 
-/// The reason why none of these comparisons can show a difference; `None` where one can.
+/// The reason why these comparisons cannot show a difference; `None` if any can.
 fn untested(comparisons: &[&Comparison], confidence: f64) -> Option<String> {
     let unsaid = |found: &Comparison| found.unsaid(confidence);
     let is_tried = |found: &&&Comparison| {
@@ -218,7 +218,7 @@ fn apart(comparisons: &[&Comparison]) -> Option<String> {
     Some(format!("{count}not comparable ({setting})"))
 }
 
-/// The reason why no test of a family could show a difference.
+/// The reason why no test of a family can show a difference.
 fn unsayable(family: &Family, confidence: f64) -> Option<String> {
     let comparisons: Vec<&Comparison> = family.tests.iter().map(|test| &test.comparison).collect();
     untested(&comparisons, confidence).or_else(|| match family.detectable {
@@ -248,7 +248,7 @@ fn differing_in(family: &Family, confidence: f64) -> String {
     [told + &unsettled].into_iter().chain(apart(&comparisons)).collect::<Vec<_>>().join(", ")
 }
 
-/// The separated pairs of `all`, by the better model.
+/// The separated pairs, grouped by the better model; `all` is the number of pairs.
 fn differing<'n>(about: &str, all: usize, separated: impl Iterator<Item = (&'n str, &'n str)>) -> String {
     let separated: Vec<_> = separated.collect();
     if separated.len() > MOST_NAMED {

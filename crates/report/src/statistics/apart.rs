@@ -1,4 +1,4 @@
-//! The settings in which recordings differ, in one place: what each keeps from being compared.
+//! The settings in which recordings differ, collected: the comparisons that each prevents.
 
 use indexmap::IndexMap;
 use schemars::JsonSchema;
@@ -26,7 +26,7 @@ pub struct ComparisonApart {
 }
 
 impl SettingApart {
-    /// Those of all comparisons, in their order.
+    /// The settings of all comparisons, in order.
     pub(super) fn all(statistics: &Statistics) -> Vec<Self> {
         let models = statistics.models.iter().flat_map(|family| {
             let of_test = |test: &super::PairTest| {
@@ -44,7 +44,7 @@ impl SettingApart {
         for (setting, within, between) in models.chain(conditions) {
             let Some(setting) = setting else { continue };
             let (comparisons, comparison) = (found.entry(setting).or_default(), ComparisonApart { within, between });
-            // The metrics of a pair are kept apart alike.
+            // All metrics of a pair are incomparable in the same way.
             if !comparisons.contains(&comparison) {
                 comparisons.push(comparison);
             }

@@ -8,8 +8,7 @@ use super::{ChanceRow, DurationRow, Family, Method, Reach, Role, Selection, Stat
 use exact::format::fixed;
 use statistics::power::Detectable;
 
-/// The metrics that conclusions are about: rates with a level to compare with, and durations.
-/// The first metric where there is neither.
+/// The metrics of conclusions: rates with a level, and durations. The first metric if there are neither.
 pub(super) fn headline(study: &Study) -> Vec<String> {
     let has_level =
         |metric: &str| study.experiments.iter().any(|known| !own_levels(study, known.name, metric).is_empty());

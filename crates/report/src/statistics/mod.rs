@@ -1,9 +1,9 @@
-//! The answer of `stats`: all that these cells can show at this n, and all that they cannot.
+//! The answer of `stats`: everything that these cells can show at this n, and everything that they cannot.
 //!
-//! Rule: no statistic is computed here. This module asks `cells` about each cell, pair and block, keeps the
-//! answers as plain data for programs ([`Statistics`] as JSON) and states them for people ([`text`]).
-//! Cells follow the grouping asked for; every comparison is by experiment, model and condition, and follows the declared
-//! design: paired where scenes are equal, by clusters where they are declared, of independent episodes elsewhere.
+//! Rule: this module computes no statistics. It collects the results for each cell, pair and block, keeps them as plain
+//! data for programs ([`Statistics`] as JSON) and prints them for people ([`text`]). Cells follow the requested
+//! grouping. Every comparison is by experiment, model and condition, and follows the declared design: paired if scenes
+//! are equal, by clusters if they are declared, otherwise over independent episodes.
 
 mod answers;
 mod apart;
@@ -59,23 +59,23 @@ use study::Study;
 pub struct Options {
     /// The confidence of every interval, and one minus the level of every test; between 0 and 1.
     pub confidence: f64,
-    /// The horizon of restricted means in steps, instead of the last step known for every model.
+    /// The horizon of restricted means in steps; by default the last step known for every model.
     pub horizon: Option<i64>,
-    /// The number of episodes lost beside those given; `None` if the traces do not record it.
+    /// The number of lost episodes besides those given; `None` if the traces do not record it.
     pub lost: Option<LostCounts>,
     /// The declared design; empty by default.
     pub design: Design,
     /// The selection of episodes; all by default.
     pub selection: Option<Selection>,
-    /// The settings that cells pool, a sentence each; `None` without pooling.
+    /// The settings that cells pool, one sentence each; `None` without pooling.
     pub pooled: Option<Vec<String>>,
-    /// The number of replies without a decision; `None` if it is not recorded.
+    /// The number of replies without a decision; `None` if not recorded.
     pub replies: Option<Replies>,
     /// Further caveats of every answer, such as lost episodes that count as failures.
     pub caveats: Vec<String>,
-    /// The metric of the primary question, as a registered plan names it; the first headline metric by default.
+    /// The metric of the primary question in a registered plan; the first headline metric by default.
     pub primary: Option<String>,
-    /// True if probabilities of improvement are computed, each of which resamples all episodes of two models.
+    /// True to compute probabilities of improvement, each of which resamples all episodes of two models.
     pub improvements: bool,
 }
 
@@ -174,9 +174,9 @@ pub struct Statistics {
 }
 
 impl Statistics {
-    /// The statistics of `table`; `cells` are the cells of the same table, grouped as its reader wants them.
+    /// The statistics of `table`; `cells` are the cells of the same table, in the requested grouping.
     ///
-    /// With a confidence outside (0, 1) no interval and no verdict is defined.
+    /// For a confidence outside (0, 1), intervals and verdicts are undefined.
     pub fn of(table: &EpisodeTable, cells: &Cells, options: &Options) -> Result<Self, MomentOverflow> {
         let mut study = Study::of(table, options.design, options.lost.as_ref())?;
         study.pool = options.pooled.is_some();

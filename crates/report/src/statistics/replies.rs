@@ -1,4 +1,4 @@
-//! Replies that gave no decision, whose steps are in every number all the same.
+//! Replies without a decision; their steps still count in every number.
 
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
@@ -10,7 +10,7 @@ use super::study::named;
 use exact::escape::visible;
 use score::table::{CONDITION, EpisodeTable, UNUSABLE_REPLIES};
 
-/// The number of cells that a sentence names before it counts the rest.
+/// The most cells that a sentence names; others are counted.
 const NAMED_CELLS: usize = 3;
 
 /// The replies of all episodes.
@@ -41,7 +41,7 @@ pub struct UnusableReplies {
 }
 
 impl Replies {
-    /// `None` where no reply has a status.
+    /// `None` if no reply has a status.
     pub fn of(table: &EpisodeTable) -> Option<Self> {
         let label = table.label(UNUSABLE_REPLIES)?;
         let conditions = table.label(CONDITION).filter(|_| table.has_conditions());
@@ -68,10 +68,10 @@ impl Replies {
         (replies > 0).then_some(Self { replies, unusable, cells })
     }
 
-    /// The number of replies without a decision, and the cells with most of them; `None` without any.
+    /// The number of replies without a decision, and the cells with the largest shares; `None` without any.
     pub fn sentence(&self) -> Option<String> {
         let mut cells: Vec<&UnusableReplies> = self.cells.iter().collect();
-        // Compared as fractions: the larger share first.
+        // Compared as fractions, the largest first.
         cells.sort_by_key(|cell| Reverse(u128::from(cell.unusable) * 1_000_000 / u128::from(cell.replies.max(1))));
         let shown = cells.iter().take(NAMED_CELLS).map(|cell| {
             let model = named(&cell.model, cell.condition.as_deref());

@@ -1,4 +1,4 @@
-//! The filter that chose the episodes.
+//! The filter that selected the episodes.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -24,7 +24,7 @@ impl Selection {
         }
     }
 
-    /// The sentence that is beside tables and conclusions.
+    /// The sentence beside tables and conclusions.
     pub fn sentence(&self) -> String {
         let chosen = if self.by_results {
             "; the filter chose them by their results, so no number here is about a model as such: a guesser's correct \

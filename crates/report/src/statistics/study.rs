@@ -1,4 +1,4 @@
-//! The episode table seen by experiment, model and condition: the blocks that every statistic compares.
+//! The episode table by experiment, model and condition: the blocks that every statistic compares.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -37,7 +37,7 @@ pub(super) struct Study<'a> {
     pub design: Design,
     pub experiments: Vec<Experiment<'a>>,
     pub relations: Relations,
-    /// True if settings that differ do not matter.
+    /// True to ignore differing settings.
     pub pool: bool,
     ranges: BTreeMap<&'a str, Interval>,
 }
@@ -51,14 +51,14 @@ pub(super) struct Experiment<'a> {
 pub(super) struct Block<'a> {
     pub experiment: &'a str,
     pub model: &'a str,
-    /// The condition; none if no episode of the table has any but the default one.
+    /// The condition; `None` if all episodes of the table have the default one.
     pub condition: Option<&'a str>,
     rows: Vec<Range<usize>>,
     recorded: Recorded<'a>,
     moments: BTreeMap<&'a str, Moments>,
-    /// Lost episodes, in no row.
+    /// The number of lost episodes, which are not in the rows.
     pub lost: u64,
-    /// True if a unit has several episodes.
+    /// True if any unit has several episodes.
     pub repeats: bool,
 }
 
@@ -90,12 +90,12 @@ impl<'a> Study<'a> {
         Ok(study)
     }
 
-    /// The setting in which two blocks differ though the comparison does not vary it; `None` where nothing is known to.
+    /// The differing setting of two blocks that the comparison does not vary; `None` if none is known.
     pub(crate) fn setting_between(&self, first: &Block, second: &Block, varied: Varied) -> Option<String> {
         difference(&self.table.declared, [&first.recorded, &second.recorded], varied)
     }
 
-    /// The same, of two blocks of one study.
+    /// The same for two blocks of one study.
     pub(crate) fn setting_apart(&self, first: &Block, second: &Block) -> Option<String> {
         let varied = if first.experiment != second.experiment {
             Varied::Experiment
@@ -107,7 +107,7 @@ impl<'a> Study<'a> {
         self.setting_between(first, second, varied)
     }
 
-    /// The same, unless it does not matter.
+    /// The same; `None` if differing settings are ignored.
     pub(crate) fn incomparable(&self, first: &Block, second: &Block) -> Option<String> {
         if self.pool { None } else { self.setting_apart(first, second) }
     }
@@ -116,7 +116,7 @@ impl<'a> Study<'a> {
         self.experiments.iter().flat_map(|experiment| &experiment.blocks)
     }
 
-    /// The scene of each row, where equal scenes make pairs.
+    /// The scene of each row, if equal scenes make pairs.
     pub fn scenes(&self) -> Option<&'a TextColumn> {
         self.table.label(SCENE).filter(|_| self.design.has_pairs())
     }
@@ -136,7 +136,7 @@ impl<'a> Study<'a> {
         self.participant(row).map(Unit::Participant).or_else(scene).unwrap_or(Unit::Episode(row))
     }
 
-    /// The person who played the episode of a row.
+    /// The person who played the row's episode.
     pub fn participant(&self, row: usize) -> Option<usize> {
         self.table.label(PARTICIPANT).filter(|_| self.design.has_pairs()).and_then(|label| label.code(row))
     }
@@ -180,12 +180,12 @@ impl<'a> Study<'a> {
         self.table.metric(metric)
     }
 
-    /// The metrics of 0 and 1.
+    /// The metrics with values 0 and 1.
     pub fn rates(&self) -> impl Iterator<Item = &'a MetricColumn> {
         self.table.metrics.iter().filter(|column| self.kind(&column.name) == Kind::Rate)
     }
 
-    /// The kind of a metric; a metric that the catalog does not describe is no rate.
+    /// The kind of a metric; a metric that the catalog does not describe is not a rate.
     pub fn kind(&self, metric: &str) -> Kind {
         self.metric(metric).map_or(Kind::Quantity, |metric| metric.kind)
     }
@@ -194,12 +194,12 @@ impl<'a> Study<'a> {
         self.table.catalog.metric.get(name)
     }
 
-    /// Returns true if a larger mean comes first.
+    /// The better direction of a metric.
     pub fn better(&self, metric: &str) -> Better {
         self.metric(metric).map_or(Better::Neither, |metric| metric.better)
     }
 
-    /// The least and the largest mean that a metric can have.
+    /// The least and the largest possible mean of a metric.
     pub fn range(&self, metric: &str) -> Interval {
         self.ranges.get(metric).copied().unwrap_or(Interval::UNBOUNDED)
     }
@@ -221,17 +221,17 @@ impl<'a> Block<'a> {
         Ok(Self { experiment, model, condition, rows, recorded, moments, lost: 0, repeats: false })
     }
 
-    /// The model as it is compared: `model`, or `model [condition]` where there are several.
+    /// The name in comparisons: `model`, or `model [condition]` if there are several.
     pub fn name(&self) -> String {
         named(self.model, self.condition)
     }
 
-    /// Returns true if another block is of the same model under the same condition.
+    /// Returns true if another block has the same model and condition.
     pub(crate) fn is_same_subject(&self, other: &Self) -> bool {
         (self.model, self.condition) == (other.model, other.condition)
     }
 
-    /// The condition as rows have it.
+    /// The condition for table rows.
     pub fn condition(&self) -> Option<String> {
         self.condition.map(str::to_owned)
     }
@@ -241,7 +241,7 @@ impl<'a> Block<'a> {
         self.rows.iter().cloned().flatten()
     }
 
-    /// The exact moments of a metric of the table.
+    /// The exact moments of a metric in the block.
     pub fn moments(&self, column: &MetricColumn) -> Moments {
         self.moments[column.name.as_str()]
     }

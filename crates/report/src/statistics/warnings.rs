@@ -1,4 +1,4 @@
-//! Warnings against conclusions, and the limits of the design, in sentences made from the numbers.
+//! Warnings about conclusions, and limits of the design, in sentences made from the numbers.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,7 +9,7 @@ use statistics::clustered::fewest_clusters;
 use statistics::design::{Cluster, DesignKind};
 use statistics::holm::level;
 
-/// The number of gaps that a warning names before it counts the rest.
+/// The most gaps that a warning names; others are counted.
 const NAMED_GAPS: usize = 5;
 
 /// The number of characters shown of a scene's name, since fingerprints are long.

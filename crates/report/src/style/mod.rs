@@ -1,6 +1,6 @@
-//! Presentation as data: which tables there are, their columns and order, how a cell prints, what is emphasised.
+//! Presentation as data: the tables, their columns and order, how cells print, what is emphasised.
 //!
-//! Rule: a style changes how a number looks, never the number. Styles are TOML, checked against the catalog
+//! Rule: a style changes how a number looks, never the number. Styles are TOML and are checked against the catalog
 //! before anything prints. `default` and `paper` are built in; any other name is a file. `read.rs` reads them.
 
 mod read;
@@ -20,13 +20,13 @@ use toml_spec::{Fault, Faults, Place};
 /// The table that every report has.
 pub const MAIN_TABLE: &str = "main";
 
-/// The table of the metrics that a style names nowhere.
+/// The table of the metrics that a style does not name.
 pub const OTHER_TABLE: &str = "other";
 
 /// A style ready for use.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Style {
-    /// The built-in name, or the file's name without its ending; never a path.
+    /// The built-in name, or the file's name without its extension; never a path.
     pub name: String,
     /// SHA-256 of the file, 64 hexadecimal digits.
     pub hash: String,
@@ -119,7 +119,7 @@ pub struct PrintSheet {
     pub mark_n_below: Option<u64>,
 }
 
-/// The settings of printed cells, complete.
+/// The complete settings of printed cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Print {
     pub cell: CellForm,
@@ -211,7 +211,7 @@ pub fn built_in(name: &str) -> Option<&'static str> {
 }
 
 impl Style {
-    /// The built-in style of that name, or else the style in that file.
+    /// The built-in style with this name, or else the style in this file.
     pub fn load(name_or_path: impl AsRef<Path>) -> Result<Self, StyleError> {
         let path = name_or_path.as_ref();
         let is_built_in = built_in_names().into_iter().any(|name| path == Path::new(name));
@@ -220,7 +220,7 @@ impl Style {
         Ok(Self { name, hash, sheet, named, is_built_in })
     }
 
-    /// That the style names only metrics that the definitions have. A built-in style may name others.
+    /// Checks that the style names only metrics of the definitions. A built-in style may name others.
     pub fn check_against(&self, catalog: &Catalog) -> Result<(), StyleError> {
         let strange = self.named.iter().filter(|(metric, _)| !catalog.metric.contains_key(metric));
         let fault = |(metric, place): &(String, Place)| {
@@ -235,7 +235,7 @@ impl Style {
         if faults.is_empty() { Ok(()) } else { Err(Faults(faults).in_order().into()) }
     }
 
-    /// Returns true if the style came with the program.
+    /// Returns true if the style is built in.
     pub fn is_built_in(&self) -> bool {
         self.is_built_in
     }
@@ -263,7 +263,7 @@ impl Sheet {
 }
 
 impl Decimals {
-    /// Digits behind the point of a metric of that kind.
+    /// Decimal places of a metric of this kind.
     pub fn of(self, kind: Kind) -> u32 {
         match kind {
             Kind::Rate => self.rate,

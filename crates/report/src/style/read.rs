@@ -1,4 +1,4 @@
-//! Style files: what a file says replaces what its includes say, key by key in tables, whole lists.
+//! Style files: a file overrides its includes, key by key in tables, and replaces whole lists.
 
 use std::io;
 use std::path::Path;
@@ -26,12 +26,12 @@ pub(super) const KIND: FileKind = FileKind {
     most_includes: Limit::new("includes of a style, those of included files counted", 32),
 };
 
-/// A style file and all that it includes.
+/// A style file with all its includes.
 pub(super) struct Read {
     pub sheet: Sheet,
-    /// Metrics named by files of the user, and where.
+    /// Metrics named by the user's files, with locations.
     pub named: Vec<(String, Place)>,
-    /// The SHA-256 of the text; with includes, of the hashes of all texts, one a line, in the order in which they are read.
+    /// The SHA-256 of the text; with includes, of the hashes of all texts, one per line, in reading order.
     pub hash: String,
 }
 
@@ -53,7 +53,7 @@ pub(super) fn read(path: &Path) -> Result<Read, StyleError> {
         }
         check(at, faults);
         if part.built_in.is_none() {
-            // What came with the program may name metrics that the definitions do not have.
+            // Built-in files may name metrics that the definitions lack.
             named.extend(metrics(at));
         }
         if part.is_outermost && faults.is_empty() {

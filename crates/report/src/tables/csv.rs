@@ -1,7 +1,7 @@
-//! Tables as CSV: the header, then a line per row.
+//! Tables as CSV: the header, then one line per row.
 //!
-//! A spreadsheet takes text that begins like a formula for one. Such text from traces is written with an
-//! apostrophe before it, which [`text_of`] takes off again; numbers stay numbers.
+//! A spreadsheet treats text that begins like a formula as one. Such text from traces gets a leading apostrophe, which
+//! [`text_of`] removes; numbers stay numbers.
 
 use super::Table;
 use crate::cells::KeyValue;
@@ -23,7 +23,7 @@ pub(crate) fn key_field(value: &KeyValue) -> String {
     }
 }
 
-/// The text behind a field of a key.
+/// The text of a key's field.
 pub(crate) fn text_of(field: &str) -> &str {
     field.strip_prefix('\'').filter(|text| is_formula(text)).unwrap_or(field)
 }

@@ -1,6 +1,6 @@
-//! Tables as HTML, for notebooks: one table, a line per group, bold for best, underlined for second best.
+//! Tables as HTML, for notebooks: one table, one line per group, bold for best, underlined for second best.
 //!
-//! Rule: it brings no script, no style sheet and no name that the page around it could have too.
+//! Rule: it has no script, no style sheet and no name that could collide with the surrounding page.
 
 use std::fmt::Write as _;
 
@@ -90,7 +90,7 @@ mod tests {
             ..Table::default()
         };
         let html = render(&table);
-        // The one that is markup stands around the title.
+        // The one `<b>` that is markup encloses the title.
         assert_eq!((html.matches("<b>").count(), html.matches("&lt;b&gt;").count()), (1, 7), "{html}");
     }
 }

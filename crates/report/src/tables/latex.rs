@@ -1,4 +1,4 @@
-//! Tables as LaTeX: booktabs, set as the paper sets them.
+//! Tables as LaTeX: booktabs, in the paper's layout.
 
 use std::fmt::Write as _;
 
@@ -10,7 +10,7 @@ use metric::catalog::Better;
 const PACKAGES: &str =
     "% Needs in the preamble: \\usepackage{booktabs}, \\usepackage{graphicx}, \\usepackage[table]{xcolor}\n";
 
-/// The whole float, caption and label included.
+/// The whole float, including caption and label.
 pub fn render(table: &Table) -> String {
     let is_sheet = table.look == Look::Sheet;
     let (packages, blank) = if is_sheet { (PACKAGES, "\n") } else { ("", "") };
@@ -83,7 +83,7 @@ fn spell(cell: &TableCell) -> String {
         Some(detail) if cell.is_whole => {
             format!("{}{mark}", math(&format!("{} {}", cell.text, detail.replace('±', "\\pm"))))
         }
-        // A hyphen before a digit is a minus sign only in mathematics.
+        // A hyphen before a digit is a minus sign only in math mode.
         Some(detail) => format!("{}{mark} {}", math(&cell.text), detail.replace('-', "$-$")),
     }
 }
@@ -118,12 +118,12 @@ fn is_word(c: char) -> bool {
     c.is_alphanumeric() || c == '_' || c == '-'
 }
 
-/// A label without what would end it or start a command.
+/// A label without characters that would end it or start a command.
 fn identifier(label: &str) -> String {
     label.chars().filter(|c| c.is_alphanumeric() || ":-_.".contains(*c)).collect()
 }
 
-/// Text in which nothing is a command: each special character as the command that prints it.
+/// Escaped text: each special character becomes the command that prints it.
 pub(crate) fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for c in visible(text).chars() {

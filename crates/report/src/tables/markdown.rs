@@ -1,4 +1,4 @@
-//! Tables as Markdown (GitHub's): a heading and a table a group, bold for best, inserted text for second best.
+//! Tables as GitHub Markdown: one heading and table per group, bold for best, inserted text for second best.
 
 use std::fmt::Write as _;
 
@@ -31,7 +31,7 @@ fn push_group(text: &mut String, group: &RowGroup, table: &Table) {
     if table.look == Look::Sheet { push_aligned(text, &lines, table) } else { push_lines(text, &lines) }
 }
 
-/// Cells as wide as their text: the widest are too wide to align.
+/// Cells are as wide as their text: the widest are too wide to align.
 fn push_lines(text: &mut String, lines: &[Vec<String>]) {
     for (at, line) in lines.iter().enumerate() {
         let _ = writeln!(text, "| {} |", line.join(" | "));
@@ -61,7 +61,7 @@ fn push_aligned(text: &mut String, lines: &[Vec<String>], table: &Table) {
     }
 }
 
-/// Text in which nothing is markup, a link, a mention or mathematics.
+/// Text escaped so that it has no markup, links, mentions or mathematics.
 pub(crate) fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for c in visible(text).chars() {
@@ -72,7 +72,7 @@ pub(crate) fn escape(text: &str) -> String {
             '@' => escaped.push_str("&#64;"),
             '$' => escaped.push_str("&#36;"),
             '\\' | '`' | '*' | '[' | ']' | '|' | '~' | '#' | '!' => escaped.extend(['\\', c]),
-            // An underscore between letters is no emphasis to GitHub, but one at an end of a word is.
+            // GitHub treats an underscore between letters as text, but one at the end of a word as emphasis.
             '_' => escaped.extend(['\\', '_']),
             other => escaped.push(other),
         }

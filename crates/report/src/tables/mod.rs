@@ -1,7 +1,7 @@
-//! The one model of printed tables, and its formats: terminal, Markdown, LaTeX, CSV, HTML; a file each.
+//! The model of printed tables, and its formats in one file each: terminal, Markdown, LaTeX, CSV, HTML.
 //!
-//! Rule: whatever is in a table (names from traces, titles, a style's own words) is text, never markup. Each
-//! format escapes it; the one exception is a style's `latex` header.
+//! Rule: everything in a table (names from traces, titles, a style's own words) is text, never markup. Each format
+//! escapes it; the one exception is a style's `latex` header.
 
 mod csv;
 mod html;
@@ -17,7 +17,7 @@ pub(crate) use terminal::wrap::push_wrapped;
 pub use terminal::wrap::wrapped;
 pub use terminal::{Marks, Terminal};
 
-/// A table as text: all decisions are taken, a format only spells them.
+/// A table as text: all decisions are made, a format only prints them.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Table {
     /// The first words of its caption; empty for none.
@@ -31,11 +31,11 @@ pub struct Table {
     pub names: usize,
     /// True if bold marks all that are tied for the best.
     pub is_tied: bool,
-    /// The rows, in groups that are headed together.
+    /// The rows, in groups with a heading each.
     pub groups: Vec<RowGroup>,
 }
 
-/// The looks of a table. Captions stand above sheets and below no list.
+/// The looks of a table. Captions are above sheets and never below lists.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Look {
     /// Cells of metrics under headings of groups, as in a paper.
@@ -52,7 +52,7 @@ pub enum Look {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Column {
     pub heading: String,
-    /// The heading as LaTeX, where the escaped text will not do.
+    /// The heading as LaTeX, if the escaped text does not suffice.
     pub latex: Option<String>,
     /// The direction of the arrow beside the heading.
     pub better: Better,
@@ -67,7 +67,7 @@ pub enum Align {
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RowGroup {
-    /// `E1: Active mirror-based self-identification`; `None` where all rows are of one group.
+    /// `E1: Active mirror-based self-identification`; `None` if there is only one group.
     pub heading: Option<String>,
     pub rows: Vec<Vec<TableCell>>,
 }
@@ -79,7 +79,7 @@ pub struct TableCell {
     pub detail: Option<String>,
     /// True if emphasis covers the detail too.
     pub is_whole: bool,
-    /// True if LaTeX sets it as mathematics.
+    /// True if LaTeX prints it in math mode.
     pub is_number: bool,
     pub emphasis: Emphasis,
     /// True if a dagger marks it.
@@ -104,9 +104,9 @@ pub(crate) const DAGGER: char = '†';
 pub struct ListTable {
     /// The name of its files.
     pub name: String,
-    /// For people; its sentences say how to read it, and what it cannot say.
+    /// For people; its sentences explain how to read it and its limits.
     pub printed: Table,
-    /// The same in full, for programs: numbers are exact, what is unknown is empty.
+    /// The full version for programs: numbers are exact, unknown values are empty.
     pub records: Table,
 }
 
@@ -116,7 +116,7 @@ impl Table {
         Self { look, names, columns: columns.into_iter().collect(), ..Self::default() }
     }
 
-    /// An empty list without a rule: columns of text, which name a row, then columns of numbers.
+    /// An empty list without a rule: text columns, which name a row, then number columns.
     pub fn plain<T: AsRef<str>>(texts: &[T], numbers: &[&str]) -> Self {
         let texts_of = texts.iter().map(|text| Column::left(text.as_ref()));
         Self::list(Look::Plain, texts.len(), texts_of.chain(numbers.iter().copied().map(Column::right)))
@@ -132,7 +132,7 @@ impl Table {
         Self { title: title.into(), ..self }
     }
 
-    /// The table with these columns aligned to the right, as numbers are.
+    /// Aligns these columns to the right, as numbers are.
     #[must_use]
     pub fn aligned_right(mut self, columns: impl IntoIterator<Item = usize>) -> Self {
         for column in columns {
@@ -141,7 +141,7 @@ impl Table {
         self
     }
 
-    /// The table with further rows in its last group.
+    /// Adds rows to the last group.
     #[must_use]
     pub fn with<R: IntoIterator<Item: Into<TableCell>>>(mut self, rows: impl IntoIterator<Item = R>) -> Self {
         rows.into_iter().for_each(|row| self.push(row));
@@ -168,22 +168,22 @@ impl Table {
         self.rows().flatten()
     }
 
-    /// For a terminal or a pipe; lists have a title alone.
+    /// For a terminal or a pipe; lists have only a title.
     pub fn terminal(&self, terminal: Terminal) -> String {
         terminal::render(self, terminal)
     }
 
-    /// For a terminal of this width or a pipe, emphasis by signs.
+    /// For a terminal of this width or a pipe, with emphasis by signs.
     pub fn within(&self, width: Option<usize>) -> String {
         self.terminal(Terminal { width, ..Terminal::default() })
     }
 
-    /// The lines alone, without title and sentences.
+    /// Only the lines, without title and sentences.
     pub fn lines(&self, width: Option<usize>) -> String {
         terminal::list::lines(self, width)
     }
 
-    /// For a terminal, words wrapped so that all columns fit into `width`.
+    /// For a terminal, with words wrapped so that all columns fit into `width`.
     pub fn wrapped(&self, width: usize) -> String {
         terminal::list::wrapped(self, width)
     }
@@ -193,7 +193,7 @@ impl Table {
         markdown::render(self)
     }
 
-    /// As LaTeX; needs the packages booktabs and graphicx, a sheet also xcolor with its option `table`.
+    /// As LaTeX; needs the packages booktabs and graphicx; a sheet also needs xcolor with its option `table`.
     pub fn latex(&self) -> String {
         latex::render(self)
     }
@@ -218,7 +218,7 @@ impl Column {
         Self { align: Align::Right, ..Self::left(heading) }
     }
 
-    /// The heading and its arrow, spelled by `escape`.
+    /// The heading and its arrow, escaped by `escape`.
     fn spelled(&self, escape: fn(&str) -> String) -> String {
         let heading = escape(&self.heading);
         self.better.arrow().map_or_else(|| heading.clone(), |arrow| format!("{heading} {arrow}"))
@@ -253,7 +253,7 @@ impl TableCell {
 }
 
 impl Emphasis {
-    /// The word for it in CSV files; empty for none.
+    /// The word for it in CSV files; empty for no emphasis.
     pub fn word(self) -> &'static str {
         match self {
             Self::Plain => "",

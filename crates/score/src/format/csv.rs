@@ -38,7 +38,7 @@ pub(super) fn write(table: &EpisodeTable, out: impl Write) -> Result<(), FormatE
     Ok(writer.flush()?)
 }
 
-/// The system's own error: `csv` wraps it in another of a kind that says nothing, such as whether a pipe is closed.
+/// The system's own error: `csv` wraps it in an error whose kind does not show, for example, a closed pipe.
 fn io(error: csv::Error) -> FormatError {
     FormatError::Io(match error.into_kind() {
         csv::ErrorKind::Io(error) => error,
@@ -54,7 +54,7 @@ pub(super) fn read(catalog: &Catalog, input: impl Read) -> Result<EpisodeTable, 
         let record = record.map_err(|error| line_fault(&error))?;
         rows.push(record.iter().map(|cell| Some(cell.to_owned())).collect());
     }
-    // The header is line 1; quoted line breaks aside, row i is line i + 2.
+    // The header is line 1; without quoted line breaks, row i is line i + 2.
     assemble(catalog, &header, rows, 2)
 }
 
@@ -65,7 +65,7 @@ fn line_fault(error: &csv::Error) -> FormatError {
 
 const MOST_COLUMNS: Limit = Limit::new("columns in a file of scores", 2000);
 
-/// A table out of rows of cells; `None` and empty cells are nulls.
+/// Builds a table from rows of cells; `None` and empty cells are nulls.
 pub(super) fn assemble(
     catalog: &Catalog,
     header: &[String],

@@ -1,12 +1,12 @@
-//! The metadata in the footer of a Parquet file, by any writer.
+//! The metadata in the footer of a Parquet file, from any writer.
 
 use parquet::file::metadata::FileMetaData;
 use serde_json::Value;
 
-/// Spark's key for metadata of columns; it writes no other keys.
+/// Spark's key for column metadata, the only key that it writes.
 const SPARK_COLUMNS: &str = "org.apache.spark.sql.parquet.row.metadata";
 
-/// The value of a key: of the file itself, or of one of its columns where Spark wrote them.
+/// The value of a key: of the file itself, or of one of its columns in Spark's files.
 pub(super) fn value(metadata: &FileMetaData, key: &str) -> Option<String> {
     let pairs = || metadata.key_value_metadata().into_iter().flatten();
     let of_file = pairs().find(|pair| pair.key == key).and_then(|pair| pair.value.clone());

@@ -35,7 +35,7 @@ pub(super) fn write(table: &EpisodeTable, mut out: impl Write) -> Result<(), For
     Ok(out.flush()?)
 }
 
-/// An episode has names, labels and some numbers.
+/// A line holds an episode's names, labels and some numbers.
 const LONGEST_LINE: Limit = Limit::new("bytes in a line of scores", 16 << 20);
 
 pub(super) fn read(catalog: &Catalog, input: impl Read) -> Result<EpisodeTable, FormatError> {
@@ -57,7 +57,7 @@ pub(super) fn read(catalog: &Catalog, input: impl Read) -> Result<EpisodeTable, 
     csv::assemble(catalog, &header, rows, 1)
 }
 
-/// A value as text. A data frame holds integers beside nulls as floating-point numbers: `1.0` is `1`.
+/// A value as text. Data frames store nullable integers as floats: `1.0` becomes `1`.
 fn cell(value: &Value) -> Option<String> {
     match value {
         Value::Null => None,

@@ -1,9 +1,9 @@
-//! The episode table as bytes and back: Parquet, CSV, JSON lines.
+//! Writes and reads the episode table: Parquet, CSV, JSON lines.
 //!
-//! Columns are `episode_id, model, experiment, seed, run`, then the labels, then the metrics by name;
-//! rates are 0 and 1; undefined is null or empty. Parquet has the definitions and what the traces declare in its footer. The
-//! text formats have what the traces declare in a last column, on the first row; their reader names the definitions, as does
-//! the reader of what the SQL gave on another engine.
+//! Columns are `episode_id, model, experiment, seed, run`, then the labels, then the metrics by name; rates are 0 and
+//! 1; undefined is null or empty. Parquet has the definitions and the traces' declarations in its footer. The text
+//! formats have the declarations in a last column, on the first row; their reader supplies the definitions. So does the
+//! reader of a table that another engine's SQL computed.
 
 mod csv;
 mod footer;
@@ -32,12 +32,12 @@ pub enum Format {
     Parquet,
     /// Comma-separated, with a header.
     Csv,
-    /// A JSON object a line.
+    /// One JSON object per line.
     JsonLines,
 }
 
 impl Format {
-    /// The format that a file name's ending asks for.
+    /// The format for the extension of a file name.
     pub fn of_name(name: &str) -> Result<Self, FormatError> {
         match name.rsplit_once('.').map(|(_, ending)| ending.to_ascii_lowercase()).as_deref() {
             Some("parquet") => Ok(Self::Parquet),
@@ -79,7 +79,7 @@ pub enum FormatError {
 }
 
 impl FormatError {
-    /// The system's error, if there is one: mostly a full disk or a closed pipe.
+    /// The system's error, if there is one: usually a full disk or a closed pipe.
     pub fn into_io(self) -> Result<io::Error, Self> {
         match self {
             Self::Io(error) => Ok(error),
@@ -94,7 +94,7 @@ impl FormatError {
 
 /// Writes a table.
 ///
-/// Parquet can be encoded by several threads: see [`parquet::Encoder`].
+/// Several threads can encode Parquet: see [`parquet::Encoder`].
 pub fn write(table: &EpisodeTable, format: Format, out: impl Write + Send) -> Result<(), FormatError> {
     match format {
         Format::Parquet => {
@@ -107,7 +107,7 @@ pub fn write(table: &EpisodeTable, format: Format, out: impl Write + Send) -> Re
     }
 }
 
-/// Reads a table of one of the text formats; `catalog` tells which columns are metrics.
+/// Reads a table in one of the text formats; `catalog` says which columns are metrics.
 pub fn read_text(format: Format, catalog: &Catalog, input: impl Read) -> Result<EpisodeTable, FormatError> {
     checked(match format {
         Format::JsonLines => jsonl::read(catalog, input)?,
@@ -115,12 +115,12 @@ pub fn read_text(format: Format, catalog: &Catalog, input: impl Read) -> Result<
     })
 }
 
-/// Reads a table and the definitions that it carries, or those of its partition.
+/// Reads a table with its own definitions, or with those of its partition.
 pub fn read_parquet(input: TableFile, partition: &Partition<'_>) -> Result<EpisodeTable, FormatError> {
     checked(parquet::read(input, partition)?)
 }
 
-/// The declarations of the traces, as one JSON text; the definitions in Parquet have the experiments already.
+/// The traces' declarations, as one JSON text; in Parquet the definitions already have the experiments.
 #[derive(Default, PartialEq, Serialize, Deserialize)]
 struct DeclaredText {
     #[serde(flatten)]
@@ -146,7 +146,7 @@ impl DeclaredText {
     }
 }
 
-/// A table as scoring gives it: each episode once, of a known experiment, rates 0 and 1.
+/// Checks that a table is one that scoring can give: unique episodes, known experiments, rates 0 and 1.
 fn checked(table: EpisodeTable) -> Result<EpisodeTable, FormatError> {
     let fault = |row: usize, column: &str, expected: &str, found: &str| FormatError::Episode {
         episode: table.keys.get(row).episode_id.to_owned(),

@@ -1,4 +1,4 @@
-//! The episode table as Parquet, the definitions in its footer.
+//! The episode table as Parquet, with the definitions in its footer.
 
 use std::io::Write;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -30,7 +30,7 @@ use trace::catch_panic::contained;
 use trace::schema::COLUMNS;
 use trace::{FlatRows, TableFile};
 
-/// The footer key that tells scores from traces.
+/// The footer key that distinguishes scores from traces.
 pub const KIND_KEY: &str = "mirrorstats.kind";
 /// The value of [`KIND_KEY`] for scores.
 pub const SCORES_KIND: &str = "scores";
@@ -39,12 +39,12 @@ pub const DEFINITIONS_KEY: &str = "mirrorstats.definitions";
 /// The footer key of the definitions' hash.
 pub const HASH_KEY: &str = "mirrorstats.definitions_hash";
 
-/// The footer key of what the traces declare of how they were recorded, as JSON (a `Declared`).
+/// The footer key of the traces' declarations about their recording, as JSON (a `Declared`).
 pub(crate) const DECLARED_KEY: &str = "mirrorstats.declared";
 
 /// Returns true if a file is Parquet with scores: its footer says so, or it has their key columns and no timestep.
 ///
-/// `folders` are columns that are in the names of the file's folders.
+/// `folders` are the columns in the names of the file's folders.
 pub fn holds_scores(file: &impl ChunkReader, folders: &[(String, Option<String>)]) -> bool {
     let Some(metadata) = metadata(file) else { return false };
     if footer::value(metadata.file_metadata(), KIND_KEY).is_some() {
@@ -55,11 +55,11 @@ pub fn holds_scores(file: &impl ChunkReader, folders: &[(String, Option<String>)
     let names: Vec<&str> = columns.map(|column| column.name()).chain(outside).collect();
     let is_of_steps =
         |name: &str| COLUMNS.iter().any(|column| column.required && !column.constant && column.name == name);
-    // A trace without `t` has the keys too; what it has besides are columns of steps.
+    // A trace without `t` has the keys too, but also columns of steps.
     !names.iter().any(|name| is_of_steps(name)) && KEYS.iter().all(|key| names.contains(key))
 }
 
-/// Returns true if a file of scores carries the definitions that gave them.
+/// Returns true if a file of scores carries its definitions.
 pub fn holds_definitions(file: &impl ChunkReader) -> bool {
     metadata(file).is_some_and(|metadata| footer::value(metadata.file_metadata(), DEFINITIONS_KEY).is_some())
 }
@@ -69,30 +69,30 @@ fn metadata(file: &impl ChunkReader) -> Option<ParquetMetaData> {
     contained(|| ParquetMetaDataReader::new().parse_and_finish(file)).ok()?.ok()
 }
 
-/// Rows after which a row group is closed: what is encoded and not yet written stays small.
+/// Rows per row group: few enough that encoded but unwritten data stays small.
 const ROW_GROUP_ROWS: usize = 64 * 1024;
-/// Rows that are encoded at a time.
+/// Rows encoded at a time.
 const GATHERED_ROWS: usize = 4 * 1024;
-/// Bytes of a column's texts that are encoded at a time, or one text: a page holds 2 GiB.
+/// Bytes of a column's texts encoded at a time, or one text: a page holds 2 GiB.
 const GATHERED_TEXT: usize = 256 << 20;
 
-/// A column of a row group, to be encoded.
+/// A column of a row group to encode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Job {
     group: usize,
     column: usize,
 }
 
-/// Encodes a table: its jobs may be done on any threads.
+/// Encodes a table; its jobs can run on any thread.
 pub struct Encoder<'a> {
     table: &'a EpisodeTable,
     schema: Arc<Schema>,
     factory: ArrowRowGroupWriterFactory,
-    /// The column writers of each row group that are not taken yet; none before the first one is.
+    /// The column writers of each row group that are not in use yet; empty before the first job of the group.
     groups: Vec<Mutex<Vec<Option<ArrowColumnWriter>>>>,
 }
 
-/// Takes what was encoded, in the order of the jobs.
+/// Takes encoded columns, in the order of the jobs.
 pub struct Writer<W: Write + Send> {
     file: SerializedFileWriter<Held<W>>,
     columns: usize,
@@ -112,7 +112,7 @@ pub fn encoder<W: Write + Send>(table: &EpisodeTable, out: W) -> Result<(Encoder
 }
 
 impl Encoder<'_> {
-    /// All jobs, in the order in which a writer takes them.
+    /// All jobs, in the order that a writer expects.
     pub fn jobs(&self) -> impl Iterator<Item = Job> + use<> {
         let columns = self.schema.fields().len();
         (0..self.groups.len()).flat_map(move |group| (0..columns).map(move |column| Job { group, column }))
@@ -134,7 +134,7 @@ impl Encoder<'_> {
         Ok(writer.close()?)
     }
 
-    /// Writers come a row group at a time, and each is costly.
+    /// Writers are created for a whole row group at once, and each is costly.
     fn writer(&self, job: Job) -> Result<ArrowColumnWriter, ParquetError> {
         let mut writers = self.groups[job.group].lock().unwrap_or_else(PoisonError::into_inner);
         if writers.is_empty() {
@@ -177,9 +177,9 @@ fn properties(header: &Header, declared: &Declared) -> Result<WriterProperties, 
     let mut properties = WriterProperties::builder()
         .set_created_by(CREATED_BY.to_owned())
         .set_compression(Compression::ZSTD(ZstdLevel::default()))
-        // Who reads scores reads all of them.
+        // Readers of scores read all rows.
         .set_statistics_enabled(EnabledStatistics::None)
-        // No two episodes have the same id, names are in order, and small numbers take few bits anyway.
+        // Episode ids are unique, names are sorted, and small numbers take few bits anyway.
         .set_dictionary_enabled(false)
         .set_write_batch_size(GATHERED_ROWS)
         .set_max_row_group_row_count(Some(ROW_GROUP_ROWS))
@@ -212,12 +212,12 @@ fn decode(input: TableFile, partition: &Partition<'_>) -> Result<EpisodeTable, F
         (None, Some(named)) => named.clone(),
         (None, None) => return Err(FormatError::Definitions(format!("there is no `{DEFINITIONS_KEY}`"))),
     };
-    // Scores of other programs declare nothing.
+    // Scores of other programs have no declarations.
     let declared = footer::value(about.metadata().file_metadata(), DECLARED_KEY);
     let declared = declared.map(|text| DeclaredText::parse(&text)).transpose()?.unwrap_or_default().declared;
     let names: Vec<&str> = about.schema().fields().iter().map(|field| field.name().as_str()).collect();
     check_unique(&names)?;
-    // A part without rows has its columns all the same.
+    // A part without rows has all columns nevertheless.
     let none = partition.complete(&RecordBatch::new_empty(about.schema().clone()), &catalog)?;
     let mut table = TableBuilder::new(header_of(&none, catalog));
     append(&mut table, &none)?;
@@ -275,7 +275,7 @@ fn column(batch: &RecordBatch, name: &str, ty: &DataType, expected: &'static str
     let fault = |found: String| FormatError::Column { column: name.to_owned(), expected, found };
     let column = batch.column_by_name(name).ok_or_else(|| fault("no such column".to_owned()))?;
     let fits = match ty {
-        // Some engines widen a sum of integers until Parquet has no integer for it.
+        // Some engines widen an integer sum to a type that Parquet cannot store as an integer.
         DataType::Int64 => column.data_type().is_integer() || is_whole(column),
         _ => column.data_type().is_string(),
     };

@@ -1,5 +1,5 @@
-//! What a file of scores does not hold itself: columns in the names of its folders (Hive partitions), and definitions
-//! that the reader names.
+//! Parts of a score file that are stored elsewhere: columns in its folder names (Hive partitions), and definitions
+//! named by the reader.
 
 use std::sync::Arc;
 
@@ -11,18 +11,19 @@ use super::csv::KEYS;
 use metric::catalog::Catalog;
 use metric::sql::Dialect;
 
-/// The parts of a file of scores that are stored elsewhere.
+/// The parts of a score file that are stored elsewhere.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Partition<'a> {
-    /// Columns that are in the names of its folders, as Spark divides a table; `None` for null. The file's own win.
+    /// Columns in its folder names, as Spark partitions a table; `None` for null. The file's own columns take
+    /// precedence.
     pub folders: &'a [(String, Option<String>)],
     /// The definitions of scores that carry none.
     pub definitions: Option<&'a Catalog>,
 }
 
 impl Partition<'_> {
-    /// The batch with the keys and metrics that its folders name, and with the names of the catalog for metrics that the
-    /// portable SQL had to spell otherwise, or whose case an engine has folded.
+    /// Adds the keys and metrics of its folder names to a batch. Restores the catalog's names of metrics that the
+    /// portable SQL had to spell differently, or whose case an engine has folded.
     pub(super) fn complete(&self, batch: &RecordBatch, catalog: &Catalog) -> Result<RecordBatch, FormatError> {
         let mut fields: Vec<Arc<Field>> = batch.schema().fields().iter().map(|field| renamed(field, catalog)).collect();
         let mut columns = batch.columns().to_vec();

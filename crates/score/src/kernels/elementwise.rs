@@ -1,4 +1,4 @@
-//! Kernels that compute each value from the values at its place. They know no episode.
+//! Kernels that compute each value from the values at the same position. They do not know episodes.
 
 use arrow::array::{
     Array, ArrayRef, ArrowPrimitiveType, AsArray as _, BooleanArray, Datum, Int64Array, PrimitiveArray,
@@ -57,7 +57,7 @@ pub(crate) fn numbers(array: ArrayRef, ty: Type) -> Vector {
     }
 }
 
-/// The value after the first condition that is true; a null condition is not.
+/// The value of the first branch whose condition is true; a null condition is not true.
 pub(crate) fn case(branches: &[(&Vector, &Vector)], otherwise: &Vector, ty: Type) -> Vector {
     branches.iter().rev().fold(otherwise.clone(), |result, (when, then)| {
         let mask = when.bools();
@@ -75,7 +75,7 @@ pub(crate) fn coalesce(values: &[&Vector], ty: Type) -> Result<Vector, ArrowErro
     })
 }
 
-/// The values of `then` where the mask, which has no null, is set, and those of `otherwise` elsewhere.
+/// The values of `then` where the mask is set, and of `otherwise` elsewhere. The mask has no nulls.
 fn choose(mask: &BooleanArray, then: &Vector, otherwise: &Vector, ty: Type) -> Vector {
     match ty {
         Type::Bool => choose_bools(mask.values(), then.bools(), otherwise.bools()).into(),
@@ -85,7 +85,7 @@ fn choose(mask: &BooleanArray, then: &Vector, otherwise: &Vector, ty: Type) -> V
     }
 }
 
-/// As `zip`, on whole words of bits. One value of `then` represents all.
+/// Like `zip`, on whole words of bits. One value of `then` represents all.
 fn choose_bools(mask: &BooleanBuffer, then: &BooleanArray, otherwise: &BooleanArray) -> BooleanArray {
     let then = if then.len() == 1 { repeat_bool(then, mask.len()) } else { then.clone() };
     let others = !mask;
@@ -100,7 +100,7 @@ fn choose_bools(mask: &BooleanBuffer, then: &BooleanArray, otherwise: &BooleanAr
     BooleanArray::new(chosen(then.values(), otherwise.values()), nulls)
 }
 
-/// As `zip`, which copies run by run; here the mask changes from row to row. One value of `then` represents all.
+/// Like `zip`, which copies run by run; here the mask changes from row to row. One value of `then` represents all.
 fn choose_numbers<T: ArrowPrimitiveType>(
     mask: &BooleanArray,
     then: &PrimitiveArray<T>,

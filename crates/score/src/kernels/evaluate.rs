@@ -1,6 +1,6 @@
-//! Runs a physical plan over one batch of whole episodes: every step becomes one vector.
+//! Runs a physical plan over one batch of whole episodes: every step gives one vector.
 //!
-//! It deliberately does not know where batches come from, in which order, or on which thread.
+//! It deliberately does not know the source, order or thread of batches.
 
 use arrow::array::{Array, ArrayRef, AsArray as _, BooleanArray, Datum, RecordBatch, UInt32Array};
 use arrow::compute::kernels::window::shift;
@@ -19,16 +19,16 @@ use metric::columns::Type;
 use metric::plan::{Aggregate, Comparison};
 use trace::scan::Texts;
 
-/// Whole episodes in columns: one batch with a row per timestep, one with a row per episode.
+/// Whole episodes as columns: one batch with a row per timestep, one with a row per episode.
 #[derive(Clone, Copy, Debug)]
 pub struct Batch<'a> {
-    /// The boundaries of the episodes among the timesteps.
+    /// The boundaries of the episodes in the timesteps.
     pub segments: Segments<'a>,
     /// Columns per timestep, by name: booleans, 64-bit integers, doubles, dictionaries of text with 32-bit keys.
     pub steps: &'a RecordBatch,
-    /// Columns of text per timestep that are not among those.
+    /// Text columns per timestep that are not in `steps`.
     pub texts: &'a [Texts],
-    /// Columns per episode; the same types.
+    /// Columns per episode, of the same types.
     pub episodes: &'a RecordBatch,
 }
 
@@ -37,8 +37,8 @@ pub struct Batch<'a> {
 pub struct BatchScores {
     /// The episodes that the filter keeps; all if absent.
     pub kept: Option<BooleanArray>,
-    /// A column per metric, truth values or 64-bit integers, with a value for each episode kept; null where the metric
-    /// is undefined.
+    /// One column per metric, of truth values or 64-bit integers, with a value for each episode kept; null if
+    /// undefined.
     pub metrics: Vec<ArrayRef>,
 }
 
@@ -104,7 +104,7 @@ impl Evaluated {
     }
 }
 
-/// A plan and a batch under way.
+/// A plan and a batch during evaluation.
 struct Evaluation<'e> {
     plan: &'e PhysicalPlan,
     batch: &'e Batch<'e>,
@@ -112,7 +112,7 @@ struct Evaluation<'e> {
     vectors: Vec<Vector>,
 }
 
-/// An operand of a kernel of Arrow.
+/// An operand of an Arrow kernel.
 struct Operand<'a> {
     array: &'a dyn Array,
     is_one: bool,

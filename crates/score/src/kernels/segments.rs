@@ -1,7 +1,7 @@
-//! Kernels that know where episodes begin and end: spreading, windows, aggregates, lookups.
+//! Kernels that know episode boundaries: spreading, windows, aggregates, lookups.
 //!
-//! A batch holds whole episodes one after the other. Episode i has the rows `offsets[i]..offsets[i + 1]`,
-//! and its timestep t is the row `offsets[i] + t - 1`. No kernel allocates per episode.
+//! A batch holds whole episodes one after another. Episode i has the rows `offsets[i]..offsets[i + 1]`, and its
+//! timestep t is the row `offsets[i] + t - 1`. No kernel allocates per episode.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -14,14 +14,14 @@ use arrow::error::ArrowError;
 use metric::plan::{Aggregate, Comparison};
 use parquet_pages::bits::{self, Bits};
 
-/// The boundaries of the episodes among the rows of a batch.
+/// The boundaries of the episodes in the rows of a batch.
 #[derive(Clone, Copy, Debug)]
 pub struct Segments<'a> {
     offsets: &'a [usize],
 }
 
 impl<'a> Segments<'a> {
-    /// The episodes bounded by `offsets`: ascending, one more than there are episodes, each episode with a row at least.
+    /// The episodes bounded by `offsets`: ascending, one more than there are episodes, each with at least one row.
     pub fn new(offsets: &'a [usize]) -> Self {
         Self { offsets }
     }
@@ -30,7 +30,7 @@ impl<'a> Segments<'a> {
         self.offsets.len().saturating_sub(1)
     }
 
-    /// Returns true if there is no episode.
+    /// Returns true if there are no episodes.
     pub fn is_empty(self) -> bool {
         self.len() == 0
     }
@@ -93,9 +93,9 @@ impl<'a> Segments<'a> {
         nulls.map(|nulls| NullBuffer::new(self.spread_bits(nulls.inner())))
     }
 
-    /// The timesteps that compare with an episode's moment as asked: one window per episode. Null where the moment is null.
+    /// The timesteps that satisfy the comparison with a moment: one window per episode. Null if the moment is null.
     ///
-    /// The timesteps are never written out: a window is a run of set bits.
+    /// Timesteps are not materialised: a window is a run of set bits.
     pub(crate) fn window(self, comparison: Comparison, moments: &Int64Array) -> BooleanArray {
         let mut rows = Bits::with_capacity(self.rows());
         for ((_, length), &moment) in self.each().zip(moments.values()) {
@@ -112,8 +112,8 @@ impl<'a> Segments<'a> {
         self.each().map(|(start, length)| (start, 0..length))
     }
 
-    /// The rows of each episode that are in all these windows, which compare the timestep with a moment of the
-    /// episode by anything but `NotEqual`; none if a moment is null.
+    /// The rows of each episode that are in all these windows, empty if a moment is null. Windows compare the timestep
+    /// with a moment of the episode by any operator but `NotEqual`.
     pub(crate) fn within(self, windows: &[(Comparison, &Int64Array)]) -> Vec<Stretch> {
         let mut stretches: Vec<Stretch> = self.whole().collect();
         for (comparison, moments) in windows {
@@ -131,8 +131,8 @@ impl<'a> Segments<'a> {
 
     /// An aggregate of a predicate over some rows of each episode.
     ///
-    /// First, last and count give a number of steps or a timestep, anything else whether the predicate holds at some
-    /// row.
+    /// First, last and count return a timestep or a number of steps; other aggregates return true if the predicate
+    /// holds at some row.
     pub(crate) fn search(
         aggregate: Aggregate,
         predicate: &BooleanArray,
@@ -171,7 +171,7 @@ impl<'a> Segments<'a> {
         self.rows_at(moments).map(|row| row.is_some()).collect()
     }
 
-    /// The values of each episode that are not null, folded; null without one.
+    /// A fold of each episode's non-null values; null without any.
     pub(crate) fn fold<T: ArrowPrimitiveType>(
         self,
         values: &PrimitiveArray<T>,
@@ -185,8 +185,8 @@ impl<'a> Segments<'a> {
         folded.collect()
     }
 
-    /// The sums of each episode's values that are not null; null without one. What counts is the sum as a
-    /// whole: on the way to it no order of the steps can overflow.
+    /// The sum of each episode's non-null values; null without any. Only the whole sum must fit: intermediate sums
+    /// cannot overflow in any order of the steps.
     pub(crate) fn sums(self, values: &Int64Array) -> Result<Int64Array, ArrowError> {
         let sum = |(start, length)| {
             let valid = (start..start + length).filter(|&row| values.is_valid(row));
@@ -199,7 +199,7 @@ impl<'a> Segments<'a> {
         self.each().map(sum).collect()
     }
 
-    /// The rows of the timesteps asked for; `None` where there is no such step.
+    /// The rows of the requested timesteps; `None` if there is no such step.
     fn rows_at(self, moments: &Int64Array) -> impl Iterator<Item = Option<usize>> {
         self.each().zip(moments.iter()).map(|((start, length), moment)| {
             let moment = usize::try_from(moment?).ok()?;
@@ -249,7 +249,7 @@ pub(crate) fn repeat_bool(value: &BooleanArray, length: usize) -> BooleanArray {
     BooleanArray::new(bits, None)
 }
 
-/// The symbols whose text fulfils `test`, null where the text is null.
+/// True where the symbol's text satisfies `test`, null where the text is null.
 pub(crate) fn test_symbols(symbols: &UInt32Array, mut test: impl FnMut(u32) -> bool) -> BooleanArray {
     let mut known: Vec<Option<bool>> = Vec::new();
     let valid: Vec<bool> = (0..symbols.len()).map(|row| symbols.is_valid(row)).collect();
@@ -274,10 +274,10 @@ fn as_t(rows: usize) -> i64 {
     i64::try_from(rows).expect("a batch has fewer than 2^63 rows")
 }
 
-/// Rows of an episode: the row at which the episode starts, and the rows among its own.
+/// Rows of an episode: the episode's first row, and a range relative to it.
 pub(crate) type Stretch = (usize, Range<usize>);
 
-/// The rows of an episode of `length` whose timestep compares with a moment as asked, for all but `NotEqual`.
+/// The rows of an episode of `length` whose timestep satisfies the comparison with a moment, for all but `NotEqual`.
 fn inside(comparison: Comparison, moment: i64, length: usize) -> Range<usize> {
     // Rows strictly before the moment, and rows up to it.
     let before = clamp(moment.saturating_sub(1), length);
@@ -291,7 +291,7 @@ fn inside(comparison: Comparison, moment: i64, length: usize) -> Range<usize> {
     }
 }
 
-/// The set bits where a truth value is true, null counting as not.
+/// The bits of true values; null counts as not true.
 pub(crate) fn truths(values: &BooleanArray) -> BooleanBuffer {
     match values.nulls() {
         None => values.values().clone(),

@@ -1,4 +1,4 @@
-//! Vectors: what a step of the physical plan gives for one batch, and the texts of a batch as small integers.
+//! Vectors: the result of a physical step for one batch, and a batch's texts as small integers.
 
 use std::collections::HashMap;
 use std::rc::Rc;
@@ -17,13 +17,13 @@ use metric::plan::Constant;
 use parquet_pages::bits;
 use trace::scan::Texts;
 
-/// The result of one step. The physical plan knows its form.
+/// The result of one step. The physical plan determines its form.
 #[derive(Clone, Debug)]
 pub(crate) enum Vector {
-    /// Truth values, integers, floats, or the symbols of texts ([`Symbols`]): one per timestep, per episode, or one
-    /// that represents all.
+    /// Truth values, integers, floats, or text symbols ([`Symbols`]): one per timestep, one per episode, or one that
+    /// represents all.
     Array(ArrayRef),
-    /// A column of texts as the trace holds it.
+    /// A column of texts as stored in the trace.
     Keyed(Arc<Keyed>),
     /// Some rows of each episode.
     Rows(Rc<Vec<Stretch>>),
@@ -102,7 +102,7 @@ pub(crate) struct Keyed {
     symbols: Vec<u32>,
 }
 
-/// The keys of rows: bytes, where that is enough.
+/// The keys of rows, as bytes if they fit.
 #[derive(Debug)]
 enum Keys {
     Narrow(UInt8Array),
@@ -134,12 +134,12 @@ impl Keyed {
     }
 
     fn symbols_of<K: ArrowPrimitiveType>(&self, keys: &PrimitiveArray<K>) -> UInt32Array {
-        // A null's key may be anything; it is masked by the null buffer.
+        // The key of a null is arbitrary; the null buffer masks it.
         let symbol = |key: &K::Native| self.symbols.get(key.as_usize()).copied().unwrap_or(0);
         UInt32Array::new(keys.values().iter().map(symbol).collect(), keys.nulls().cloned())
     }
 
-    /// True where the texts equal their episode's text, or where they differ; null where one of them is null.
+    /// True where a text equals its episode's text (or differs from it, unless `equal`); null where either is null.
     pub(crate) fn compare(&self, segments: Segments<'_>, texts: &UInt32Array, equal: bool) -> BooleanArray {
         let mut keys_of = vec![None; self.symbols.iter().max().map_or(0, |last| *last as usize + 1)];
         self.symbols.iter().enumerate().for_each(|(key, symbol)| keys_of[*symbol as usize] = Some(key));
@@ -156,7 +156,7 @@ impl Keyed {
         )
     }
 
-    /// True where the texts equal one text, or where they differ; null where the text is null.
+    /// True where a text equals one given text (or differs from it, unless `equal`); null where the text is null.
     pub(crate) fn compare_with(&self, text: &UInt32Array, equal: bool) -> BooleanArray {
         if text.is_null(0) {
             return BooleanArray::new_null(self.keys.array().len());
@@ -164,7 +164,7 @@ impl Keyed {
         self.test(|symbol| (symbol == text.value(0)) == equal)
     }
 
-    /// The rows whose symbol fulfils `test`, null where the text is null.
+    /// True where the row's symbol satisfies `test`, null where the text is null.
     pub(crate) fn test(&self, test: impl FnMut(u32) -> bool) -> BooleanArray {
         let fulfilled: Vec<bool> = self.symbols.iter().copied().map(test).collect();
         let truths = match &self.keys {
@@ -208,12 +208,12 @@ fn packed(truths: &[bool]) -> BooleanBuffer {
     BooleanBuffer::new(bits::pack(truths).into(), 0, truths.len())
 }
 
-/// One NaN, and one zero: comparisons are by total order, in which these have several forms.
+/// Makes NaN and zero unique: comparisons use the total order, which distinguishes several forms of them.
 pub(crate) fn canonical(value: f64) -> f64 {
     if value.is_nan() { f64::NAN } else { value + 0.0 }
 }
 
-/// The distinct texts of a batch, numbered in the order of their coming.
+/// The distinct texts of a batch, numbered in order of first appearance.
 #[derive(Debug, Default)]
 pub(crate) struct Symbols {
     texts: Vec<Arc<str>>,
@@ -236,7 +236,7 @@ impl Symbols {
         &self.texts[number as usize]
     }
 
-    /// For each symbol its place in the order of UTF-8 bytes.
+    /// The rank of each symbol in the order of UTF-8 bytes.
     pub(crate) fn ranks(&self) -> Vec<u32> {
         let mut order: Vec<u32> = (0..).take(self.texts.len()).collect();
         order.sort_unstable_by_key(|&number| self.text(number));

@@ -30,8 +30,8 @@ impl<'a> Lowering<'a> {
         self.plain(id, None)
     }
 
-    /// A node: with a value per timestep or per episode as it has one, or, `at` the moments of a step, with its value
-    /// there, per episode.
+    /// Lowers a node at its own level, per timestep or per episode. With `at`, gives its value at the moments of that
+    /// step, per episode.
     fn node(&mut self, id: NodeId, at: Option<StepId>) -> StepId {
         if let Some(known) = self.known.get(&(id, at)) {
             return *known;
@@ -221,7 +221,7 @@ impl<'a> Lowering<'a> {
             .collect();
         let condition = self.full(rest, Shape::Timesteps, None);
         let within = (!windows.is_empty()).then(|| {
-            // Rows, not values: the type says nothing.
+            // Rows, not values: the type is irrelevant.
             self.physical.push(Kernel::Within(windows), Type::Int, Shape::Episodes)
         });
         Kernel::Search { aggregate, condition, within }
@@ -234,7 +234,7 @@ impl<'a> Lowering<'a> {
             return self.at(values, moments);
         }
         let values = self.full(x, Shape::Episodes, Some(moments));
-        // There is no value where there is no such timestep, whatever the expression makes of nulls.
+        // A missing timestep gives null, even if the expression replaces nulls.
         let ty = self.physical.step(values).ty;
         self.physical.push(Kernel::NullWhereAbsent { values, moments }, ty, Shape::Episodes)
     }

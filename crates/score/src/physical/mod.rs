@@ -1,9 +1,9 @@
-//! The physical plan: which kernel computes what, in which order.
+//! The physical plan: the kernels, their operands and their order.
 //!
-//! The logical plan ([`metric::plan::Plan`]) says what the definitions mean. This one fixes every choice before
-//! the first batch: which conditions are windows of timesteps, which lookups compute from the values that they look up,
-//! where a constant is written out, and which texts are compared as keys. Equal steps are one step, also across several
-//! logical plans. Evaluation ([`super::evaluate`]) runs the steps from the first to the last and decides nothing.
+//! The logical plan ([`metric::plan::Plan`]) gives the meaning of the definitions. This plan fixes every choice before
+//! the first batch: which conditions are windows of timesteps, which lookups compute from the looked-up values, where a
+//! constant is materialised, and which texts are compared as keys. Equal steps are one step, also across logical plans.
+//! Evaluation ([`super::evaluate`]) runs the steps in order and decides nothing.
 
 mod lower;
 mod print;
@@ -47,11 +47,11 @@ pub struct Step {
     pub shape: Shape,
 }
 
-/// The kernels. Unless said otherwise a null operand gives null, and operands have the shape of the result or
-/// [`Shape::One`]. Texts are symbols (integers that represent texts), except where a kernel takes keys.
+/// The kernels. By default a null operand gives null, and operands have the shape of the result or [`Shape::One`].
+/// Texts are symbols (integers that represent texts), except where a kernel takes keys.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Kernel {
-    /// A column of the batch; a column of text gives keys into its dictionary.
+    /// A column of the batch; a text column gives keys into its dictionary.
     Column(String),
     Constant(Constant),
     /// The timestep of each row.
@@ -59,7 +59,7 @@ pub enum Kernel {
     /// The length of each episode.
     Lengths,
     Repeat(StepId),
-    /// A value per episode, repeated for each of its timesteps.
+    /// A value per episode, repeated for each timestep.
     Spread(StepId),
     Symbols(StepId),
     Not(StepId),
@@ -67,7 +67,7 @@ pub enum Kernel {
     And(StepId, StepId),
     /// Kleene's disjunction; no operand is a constant.
     Or(StepId, StepId),
-    /// A comparison by value, of symbols for equality alone.
+    /// A comparison by value; of symbols, for equality only.
     Compare(Comparison, StepId, StepId),
     /// A comparison of symbols by the order of their texts.
     CompareTexts(Comparison, StepId, StepId),
@@ -83,7 +83,7 @@ pub enum Kernel {
         texts: StepId,
         equal: bool,
     },
-    /// True where the timestep compares with a moment of its episode; timesteps are not written out.
+    /// True where the timestep satisfies the comparison with a moment of its episode; timesteps are not materialised.
     Window(Comparison, StepId),
     /// True where two values differ, with null as an ordinary value; never null.
     Distinct(StepId, StepId),
@@ -97,9 +97,9 @@ pub enum Kernel {
     Arithmetic(Arithmetic, StepId, StepId),
     /// Quotient or remainder of two integers, null where the divisor is 0; no operand is a constant.
     Divide(Arithmetic, StepId, StepId),
-    /// The value with the other sign.
+    /// The negated value.
     Negate(StepId),
-    /// The value after the first condition that is true, else the last one. Values of branches may be constants.
+    /// The value of the first branch whose condition is true, else the last value. Values of branches may be constants.
     Case {
         /// Conditions and values, in order.
         branches: Vec<(StepId, StepId)>,
@@ -115,10 +115,10 @@ pub enum Kernel {
     IntFromBool(StepId),
     /// The same number as a float.
     FloatFromInt(StepId),
-    /// The rows of each episode that are in all these windows, comparisons of the timestep with moments; none if a
-    /// moment is null. Gives ranges of rows, no values.
+    /// The rows of each episode that are in all these windows, which compare the timestep with moments; empty if a
+    /// moment is null. Gives ranges of rows, not values.
     Within(Vec<(Comparison, StepId)>),
-    /// `first`, `last`, `any` or `count` of a condition, over all rows or over those of a `Within`.
+    /// `first`, `last`, `any` or `count` of a condition, over all rows or over the rows of a `Within`.
     Search {
         aggregate: Aggregate,
         condition: StepId,
@@ -132,7 +132,7 @@ pub enum Kernel {
         values: StepId,
         moments: StepId,
     },
-    /// The value at the timestep before, null at the first one; not a constant. Takes values.
+    /// The value at the previous timestep, null at the first one; not a constant. Takes values.
     Lag(StepId),
     /// Values per episode, null where the episode has no such timestep.
     NullWhereAbsent {
@@ -142,7 +142,7 @@ pub enum Kernel {
 }
 
 impl Kernel {
-    /// The steps that this one reads.
+    /// The operands of this step.
     pub fn operands(&self) -> Vec<StepId> {
         match self {
             Self::Column(_) | Self::Constant(_) | Self::Times | Self::Lengths => vec![],
@@ -197,11 +197,11 @@ pub struct Metric {
 pub struct Scores {
     /// The metrics, in the order of the definitions.
     pub metrics: Vec<Metric>,
-    /// The filter, a truth value per episode; all episodes count if absent.
+    /// The filter, one truth value per episode; all episodes count if absent.
     pub filter: Option<StepId>,
 }
 
-/// The steps that compute everything that was asked for, operands before their users.
+/// The steps that compute all requested outputs, operands before their users.
 #[derive(Clone, Debug, Default)]
 pub struct PhysicalPlan {
     steps: Vec<Step>,
@@ -212,7 +212,7 @@ pub struct PhysicalPlan {
 }
 
 impl PhysicalPlan {
-    /// The metrics and filters of some definitions, in their order, in one plan.
+    /// The metrics and filters of some definitions, in order, in one plan.
     pub fn of(plans: &[&Plan]) -> Self {
         let mut physical = Self::default();
         for plan in plans {
@@ -234,7 +234,7 @@ impl PhysicalPlan {
         self.scores.push(Scores { metrics, filter });
     }
 
-    /// Adds nodes of some definitions, each in its own shape; the step of each.
+    /// Adds nodes of some definitions, each in its own shape; returns their steps.
     pub(crate) fn add_nodes(&mut self, plan: &Plan, nodes: impl IntoIterator<Item = NodeId>) -> Vec<StepId> {
         let mut lowering = lower::Lowering::new(self, plan);
         nodes.into_iter().map(|node| lowering.values(node)).collect()
@@ -311,7 +311,7 @@ mod tests {
         let filtered = paper.clone().filtered("--where", "seed = 1", &schema_columns()).unwrap();
         let alone = PhysicalPlan::of(&[&paper.plan]);
         let both = PhysicalPlan::of(&[&paper.plan, &filtered.plan]);
-        // The column and the comparison; the paper's definitions have the constant 1 already.
+        // The column and the comparison; the paper's definitions already have the constant 1.
         assert_eq!(both.steps().len(), alone.steps().len() + 2);
         assert_eq!(both.scores()[0], alone.scores()[0]);
         assert_eq!(both.scores()[1].metrics, alone.scores()[0].metrics);

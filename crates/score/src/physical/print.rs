@@ -1,4 +1,4 @@
-//! The plan as text: a line per step, then the outputs.
+//! The plan as text: one line per step, then the outputs.
 
 use std::fmt;
 

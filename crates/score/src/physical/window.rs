@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use metric::columns::{Level, Type};
 use metric::plan::{Comparison, NodeId, Op, Plan};
 
-/// A comparison of `t` with a moment of the episode, which needs no timestep written out.
+/// A comparison of `t` with a moment of the episode, which needs no materialised timesteps.
 pub(super) fn window(plan: &Plan, op: &Op) -> Option<(Comparison, NodeId)> {
     match op {
         Op::Compare(comparison, left, right) if plan.node(*left).op == Op::Time => match &plan.node(*right).op {
@@ -26,10 +26,10 @@ pub(super) fn beside_its_episode(plan: &Plan, op: &Op) -> Option<(NodeId, NodeId
     pair(*x, *y).or_else(|| pair(*y, *x))
 }
 
-/// A condition of which parts are windows: what is left of it, and the windows.
+/// Splits the windows from a condition; returns the rest of the condition and the windows.
 ///
-/// `first`, `last`, `any` and `count` search what is left between the ends of the windows. A window with a null end
-/// holds nowhere, which is what these aggregates make of null.
+/// `first`, `last`, `any` and `count` search for the rest between the ends of the windows. A window with a null end is
+/// empty, which agrees with how these aggregates treat null.
 pub(super) fn split(plan: &Plan, condition: NodeId) -> (NodeId, Vec<(Comparison, NodeId)>) {
     let part =
         |id: NodeId| window(plan, &plan.node(id).op).filter(|(comparison, _)| *comparison != Comparison::NotEqual);
@@ -50,8 +50,8 @@ pub(super) fn split(plan: &Plan, condition: NodeId) -> (NodeId, Vec<(Comparison,
     (rest, windows)
 }
 
-/// Returns true if a lookup of this value should look up its columns and compute from what they hold there: once per episode
-/// instead of once per timestep. Not where a timestep that is not looked at could leave 64 bits.
+/// Returns true if a lookup of this value should look up its columns and compute from them, once per episode instead of
+/// once per timestep. False if a skipped timestep could leave 64 bits.
 pub(super) fn computes_after_lookup(plan: &Plan, value: NodeId) -> bool {
     let node = plan.node(value);
     let alone = matches!(node.op, Op::Column(_) | Op::Lag(_)) || node.level == Level::Episode;

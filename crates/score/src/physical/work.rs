@@ -1,16 +1,16 @@
-//! How much a plan computes for each row, so that a small file and a small definition file cannot ask for hours together.
+//! Limits the work of a plan per row, so that small files with a small definition file cannot cause hours of work.
 
 use super::{Kernel, PhysicalPlan, Shape, Step};
 use exact::budget::{Exceeded, Limit};
 use metric::columns::Type;
 
-/// The bytes that the values of all steps take for one batch: they are held until the batch is scored.
+/// The bytes that the values of all steps take for one batch, which are kept until the batch is scored.
 const LARGEST_BATCH: Limit = Limit::new("bytes of values of the definitions for an episode", 128 << 20);
 
-/// Files beyond this size may ask for more.
+/// Larger files may cause more work.
 const SMALL: u64 = 1 << 20;
 
-/// The bytes that the definitions read and write over all rows of some files.
+/// The most bytes that the definitions may read and write over all rows of files of this size.
 const fn most_work(bytes: u64) -> Limit {
     Limit::new("bytes computed, rows times values of the definitions, in files of their size", 8 << 30).and_beyond(
         SMALL,
@@ -20,7 +20,7 @@ const fn most_work(bytes: u64) -> Limit {
 }
 
 impl PhysicalPlan {
-    /// Returns true if the vectors of all steps may be held for so many rows and episodes at once.
+    /// Checks that the vectors of all steps fit into memory for this number of rows and episodes.
     pub(crate) fn check_batch(&self, rows: usize, episodes: usize) -> Result<(), Exceeded> {
         let bits = self.steps().iter().fold(0_u64, |sum, step| {
             let values = if step.shape == Shape::Timesteps { rows } else { episodes };
@@ -29,11 +29,11 @@ impl PhysicalPlan {
         LARGEST_BATCH.check(bits / 8)
     }
 
-    /// Returns true if all steps may be computed for so many rows, of files of so many bytes.
+    /// Checks the work of all steps over this number of rows, of files of this size.
     pub(crate) fn check_work(&self, rows: u64, bytes: u64) -> Result<(), Exceeded> {
         let bits = |step: &Step| if step.shape == Shape::Timesteps { bits_of(step) } else { 0 };
         let per_row = self.steps().iter().fold(0_u64, |sum, step| {
-            // A branch of `case` is looked at value by value, whatever its values are.
+            // `case` reads a branch value by value, whatever its type.
             let least = if matches!(step.kernel, Kernel::Case { .. } | Kernel::Coalesce(_)) {
                 bits(step).min(64) * 8
             } else {
@@ -51,7 +51,7 @@ impl PhysicalPlan {
 fn bits_of(step: &Step) -> u64 {
     match (&step.kernel, step.shape, step.ty) {
         (_, Shape::One, _) => 0,
-        // A range of rows.
+        // A row range.
         (Kernel::Within(_), ..) => 256,
         (_, _, Type::Bool) => 2,
         (_, _, Type::Int | Type::Float) => 65,

@@ -1,7 +1,7 @@
-//! Builds an episode table: rows come in any order, columns go out in the order of their keys.
+//! Builds an episode table: rows come in any order, columns leave in key order.
 //!
-//! Rule: values stay in columns. Texts are interned, so that only small integers are sorted; ids are kept once, in the
-//! order in which they come, and the sorted column points at them.
+//! Rule: values stay in columns. Texts are interned, so that only small integers are sorted; ids are stored once, in
+//! order of arrival, and the sorted column points at them.
 
 use std::collections::HashMap;
 
@@ -20,7 +20,7 @@ use trace::declared::Declared;
 use trace::scan::EPISODE_COLUMNS;
 use trace::schema::{self, Column};
 
-/// A table under way.
+/// A table under construction.
 #[derive(Debug)]
 pub struct TableBuilder {
     header: Header,
@@ -30,7 +30,7 @@ pub struct TableBuilder {
 }
 
 impl TableBuilder {
-    /// A table without a row.
+    /// A table without rows.
     pub fn new(header: Header) -> Self {
         let labels = header.labels.iter().map(|_| TextBuilder::default()).collect();
         let metrics = header.metrics.iter().map(|_| MetricBuilder::default()).collect();
@@ -54,7 +54,7 @@ impl TableBuilder {
         self.metrics.iter_mut().zip(metrics).for_each(|(column, value)| column.push(value));
     }
 
-    /// Adds scored episodes: their columns as a scan gives them, and a column for each metric of the header.
+    /// Adds scored episodes: their columns from a scan, and a column for each metric of the header.
     pub fn extend(&mut self, episodes: &RecordBatch, metrics: &[ArrayRef]) {
         self.keys.extend(episodes);
         for (name, label) in self.header.labels.iter().zip(&mut self.labels) {
@@ -66,7 +66,7 @@ impl TableBuilder {
         self.metrics.iter_mut().zip(metrics).for_each(|(builder, column)| builder.extend(column));
     }
 
-    /// All rows, in the order of their keys.
+    /// All rows, in key order.
     pub fn finish(self) -> EpisodeTable {
         let Header { catalog, labels, metrics } = self.header;
         let keys = self.keys.finish();
@@ -109,7 +109,7 @@ impl KeyBuilder {
         let [ids, models, experiments, seeds, runs] = EPISODE_COLUMNS.map(|name| column(episodes, name));
         self.experiment.extend(experiments, None);
         self.model.extend(models, None);
-        // The scan has checked that they fit.
+        // The scan has checked the range.
         let int = |value: &i64| i32::try_from(*value).unwrap_or_default();
         self.seed.extend(seeds.as_primitive::<Int64Type>().values().iter().map(int));
         self.run.extend(runs.as_primitive::<Int64Type>().values().iter().map(int));
@@ -131,7 +131,7 @@ impl KeyBuilder {
 }
 
 impl EpisodeKeys {
-    /// The keys of the episodes of a batch, in its order.
+    /// The keys of the episodes of a batch, in order.
     pub(crate) fn of_batch(episodes: &RecordBatch) -> Self {
         let mut keys = KeyBuilder::default();
         keys.extend(episodes);
@@ -139,7 +139,7 @@ impl EpisodeKeys {
     }
 }
 
-/// A column of text under way: texts are kept once.
+/// A text column under construction; each text is stored once.
 #[derive(Debug, Default)]
 pub(crate) struct TextBuilder {
     codes: UInt32Builder,
@@ -153,7 +153,7 @@ impl TextBuilder {
         self.codes.append_option(code);
     }
 
-    /// Adds the values of a column of any type, as text, and `null` without one.
+    /// Adds the values of a column of any type as text; a null value becomes `null`.
     fn extend(&mut self, column: &ArrayRef, null: Option<&str>) {
         match column.as_dictionary_opt::<Int32Type>() {
             Some(texts) => self.extend_coded(texts, null),
@@ -200,7 +200,7 @@ pub(crate) fn default_text(name: &str) -> Option<&'static str> {
     schema::column(name).and_then(Column::default_text)
 }
 
-/// A value that is no text as text; `None` for null.
+/// A non-text value as text; `None` for null.
 fn shown(column: &ArrayRef, row: usize) -> Option<String> {
     if column.is_null(row) {
         return None;
@@ -214,7 +214,7 @@ fn shown(column: &ArrayRef, row: usize) -> Option<String> {
 }
 
 impl FromIterator<EpisodeKey> for EpisodeKeys {
-    /// Keys in the order in which they come.
+    /// Keys in order of arrival.
     fn from_iter<I: IntoIterator<Item = EpisodeKey>>(keys: I) -> Self {
         let mut columns = KeyBuilder::default();
         keys.into_iter().for_each(|key| columns.push(key.as_ref()));
@@ -230,7 +230,7 @@ impl<T: AsRef<str>> FromIterator<Option<T>> for TextColumn {
     }
 }
 
-/// A column of scores under way: bits as long as all values are truth values.
+/// A score column under construction: bits as long as all values are truth values.
 #[derive(Debug)]
 pub(crate) struct MetricBuilder {
     values: Values,
@@ -368,7 +368,7 @@ mod tests {
             let table = builder.finish();
             let found = rows_of(&table);
             prop_assert!(found.is_sorted_by_key(|row| &row.0));
-            // Rows with equal keys stay in the order in which they came.
+            // Rows with equal keys stay in order of arrival.
             rows.sort_by(|a, b| a.0.cmp(&b.0));
             prop_assert_eq!(&found, &rows);
             let taken: Vec<usize> = (0..rows.len()).rev().step_by(2).collect();
@@ -399,7 +399,7 @@ mod tests {
             text += episode_id.len();
             builder.keys.push(KeyRef { experiment: &experiment, model: &model, seed, run, episode_id: &episode_id });
         }
-        // Those of the paper: eight rates and two numbers of steps.
+        // The paper's metrics: eight rates and two numbers of steps.
         for (at, metric) in builder.metrics.iter_mut().enumerate() {
             metric.extend(&if at < 8 {
                 Arc::new((0..EPISODES).map(|row| (row % 9 > 0).then_some(row % 2 == 0)).collect::<BooleanArray>())

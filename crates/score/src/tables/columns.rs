@@ -1,4 +1,4 @@
-//! The episode table as Arrow columns, for programs that go on with it.
+//! The episode table as Arrow columns, for other programs.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -10,11 +10,11 @@ use arrow::error::ArrowError;
 
 use crate::table::{EpisodeTable, Header, TextColumn};
 
-/// The key columns, in their order.
+/// The key columns, in order.
 pub const KEYS: [&str; 5] = ["episode_id", "model", "experiment", "seed", "run"];
 
-/// One row per episode, as `score` writes it: `episode_id`, `model`, `experiment` (text), `seed`, `run` (int32), further
-/// key columns (text, nullable), then one column per metric (int64; null where it is undefined, a rate is 0 or 1).
+/// One row per episode, as `score` writes it: `episode_id`, `model`, `experiment` (text), `seed`, `run` (int32),
+/// further key columns (text, nullable), then one column per metric (int64; null if undefined, a rate is 0 or 1).
 pub fn record_batch(table: &EpisodeTable) -> Result<RecordBatch, ArrowError> {
     let schema = Arc::new(schema(&table.header()));
     let columns = (0..schema.fields().len()).map(|column| values(table, column, 0..table.len()));
@@ -30,7 +30,7 @@ pub(crate) fn schema(header: &Header) -> Schema {
     Schema::new(keys.chain(labels).chain(metrics).collect::<Vec<_>>())
 }
 
-/// The texts of a column of the schema; `None` for one of numbers.
+/// The texts of a column of the schema; `None` for a numeric column.
 pub(crate) fn texts(table: &EpisodeTable, column: usize) -> Option<&TextColumn> {
     let EpisodeTable { keys, labels, .. } = table;
     match column {
@@ -57,7 +57,7 @@ pub(crate) fn values(table: &EpisodeTable, column: usize, rows: Range<usize>) ->
     })
 }
 
-/// The same as the Parquet library takes them: texts as codes, without a copy of a text per row.
+/// The same for the Parquet library: texts as codes, without a copy of the text per row.
 pub(crate) fn coded_values(table: &EpisodeTable, column: usize, rows: Range<usize>) -> Result<ArrayRef, ArrowError> {
     let Some(texts) = texts(table, column) else { return values(table, column, rows) };
     let codes = texts.codes.slice(rows.start, rows.len());

@@ -1,7 +1,7 @@
-//! Experiments that traces declare and the definitions do not know: with them a catalog covers the episodes of the traces.
+//! Experiments that traces declare and the definitions lack: they extend a catalog to cover all episodes of the traces.
 //!
-//! Rule: what the definitions say of an experiment counts; what several files declare, they declare alike. The order of the
-//! files changes nothing but which of them an error names first.
+//! Rule: the definitions take precedence; files that declare the same experiment must agree. The order of the files
+//! only affects which of them an error names first.
 
 use std::fmt::Debug;
 
@@ -13,7 +13,7 @@ use metric::catalog::{Catalog, Experiment, Kind};
 use trace::declared_experiment::DeclaredExperiment;
 use trace::open::TraceSet;
 
-/// An experiment that a file declares otherwise than another one, or with a level that no rate has.
+/// An experiment that two files declare differently, or with a level that no rate can have.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{file}: expected {expected}, found {found}\n  help: {help}")]
 pub struct DeclarationError {
@@ -25,12 +25,12 @@ pub struct DeclarationError {
     pub help: &'static str,
 }
 
-/// Experiments and the file that declares each, the first one.
+/// Experiments, each with the first file that declares it.
 #[derive(Clone, Debug, Default)]
 pub struct Declarations(IndexMap<String, (String, Experiment)>);
 
 impl Declarations {
-    /// Adds what a file declares.
+    /// Adds a file's declaration.
     pub fn add(&mut self, file: &str, name: &str, experiment: Experiment) -> Result<(), DeclarationError> {
         let Some((first_file, known)) = self.0.get(name) else {
             self.0.insert(name.to_owned(), (file.to_owned(), experiment));
@@ -49,7 +49,7 @@ impl Declarations {
     }
 }
 
-/// Adds to a catalog the experiments that some traces declare and it does not have.
+/// Adds to a catalog the experiments that the traces declare and it lacks.
 pub fn declare(catalog: &mut Catalog, traces: &TraceSet) -> Result<(), DeclarationError> {
     let (declarations, errors) = declarations(catalog, traces);
     if let Some(error) = errors.into_iter().next() {
@@ -59,7 +59,7 @@ pub fn declare(catalog: &mut Catalog, traces: &TraceSet) -> Result<(), Declarati
     Ok(())
 }
 
-/// Everything that keeps [`declare`] from it, in the order of the files.
+/// All errors that [`declare`] can return, in the order of the files.
 pub fn faults(catalog: &Catalog, traces: &TraceSet) -> Vec<DeclarationError> {
     declarations(catalog, traces).1
 }
@@ -76,10 +76,10 @@ fn declarations(catalog: &Catalog, traces: &TraceSet) -> (Declarations, Vec<Decl
     (found, errors)
 }
 
-/// The order of an experiment that is declared without one: behind all others, whichever there are.
+/// The order of an experiment that is declared without one: after all others.
 const LAST: i64 = i64::MAX;
 
-/// A declaration as the catalog has it: last where it names no order, without levels of metrics that there are not.
+/// A declaration for the catalog: last if it gives no order, without levels of unknown metrics.
 fn resolved(declared: &DeclaredExperiment, catalog: &Catalog) -> Experiment {
     let has = |metric: &String| catalog.metric.contains_key(metric);
     let mut experiment = Experiment {
@@ -143,12 +143,12 @@ fn differing_level<T: PartialEq + Debug>(
     Some((format!("{kind} level of {}", visible(metric)), of(one), of(other)))
 }
 
-/// A chance level as a definition file spells it.
+/// A chance level in the spelling of a definition file.
 pub fn spelled(level: Option<Ratio>) -> String {
     level.map_or_else(|| "none".to_owned(), |level| level.to_string())
 }
 
-/// Reference levels with commas between them.
+/// Reference levels, separated by commas.
 pub fn listed(levels: &[Ratio]) -> String {
     levels.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
 }

@@ -1,4 +1,4 @@
-//! Tables made of others: two put together, and one with a label in the names of its models.
+//! Tables made from others: two tables joined, and one with a label in its model names.
 
 use std::collections::HashSet;
 
@@ -8,7 +8,7 @@ use crate::table::{EpisodeKeys, EpisodeTable, Header, JoinError, LOST, TextColum
 use trace::schema;
 
 impl EpisodeTable {
-    /// The rows of two tables, in the order of their keys, with the experiments that the traces of either declare.
+    /// The rows of two tables, in key order, with the experiments that the traces of either declare.
     pub fn joined(self, other: &Self) -> Result<Self, JoinError> {
         if self.catalog.hash != other.catalog.hash {
             return Err(JoinError::Definitions(self.catalog.name, other.catalog.name.clone()));
@@ -49,8 +49,8 @@ impl EpisodeTable {
 }
 
 impl EpisodeTable {
-    /// The same episodes with a label, unless it is the default one, as part of the model's name: `model [label]`; and for
-    /// each row where it was before.
+    /// The same episodes with a non-default label in the model's name: `model [label]`; and the previous position of
+    /// each row.
     pub fn with_labelled_models(&self, label: &str) -> (Self, Vec<usize>) {
         let labels = self.label(label);
         let name = |row: usize| {

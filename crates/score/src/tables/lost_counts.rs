@@ -9,12 +9,12 @@ use crate::quality::CellKey;
 pub struct LostCounts(BTreeMap<CellKey, u64>);
 
 impl LostCounts {
-    /// One more of a cell.
+    /// Adds one lost episode of a cell.
     pub fn add(&mut self, key: CellKey) {
         *self.0.entry(key).or_default() += 1;
     }
 
-    /// The cells that lost some, and how many.
+    /// The cells with lost episodes, and their counts.
     pub fn iter(&self) -> impl Iterator<Item = (&CellKey, &u64)> {
         self.0.iter()
     }
@@ -27,7 +27,7 @@ impl LostCounts {
         self.0.values().sum()
     }
 
-    /// Those of an experiment and model, under one condition or under any.
+    /// The lost episodes of an experiment and model, under one condition or under any.
     pub fn of(&self, experiment: &str, model: &str, condition: Option<&str>) -> u64 {
         let is_wanted = |key: &CellKey| {
             key.experiment == experiment

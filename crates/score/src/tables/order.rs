@@ -7,7 +7,7 @@ use arrow::array::Array as _;
 
 use crate::table::{EpisodeKeys, TextColumn, narrow};
 
-/// The rows in the order of their keys; `None` where they are in order already.
+/// The rows in key order; `None` if they are already sorted.
 pub(crate) fn order(keys: &EpisodeKeys) -> Option<Vec<u32>> {
     let rows = Rows::of(keys);
     let order = match rows.bits {
@@ -36,7 +36,7 @@ impl Number for u128 {}
 
 fn sorted<N: Number>(rows: &Rows<'_>) -> Vec<u32> {
     let mut numbers: Vec<N> = (0..narrow(rows.keys.len())).map(|row| rows.number(row)).collect();
-    // With the row in the lowest bits, no two numbers are equal, and rows that differ in their ids alone are together.
+    // The row is in the lowest bits, so no two numbers are equal, and rows that differ only in their ids are adjacent.
     numbers.sort_unstable();
     let key = |number: N| number >> rows.row_bits;
     let row = |number: &N| (*number ^ (key(*number) << rows.row_bits)).try_into().ok();
@@ -51,7 +51,7 @@ fn compared(keys: &EpisodeKeys) -> Vec<u32> {
     order
 }
 
-/// Puts rows with equal experiment, model, seed and run into the order of their ids.
+/// Sorts rows with equal experiment, model, seed and run by their ids.
 fn sort_equal<N: Eq>(keys: &EpisodeKeys, order: &mut [u32], key: impl Fn(usize) -> N) {
     let mut start = 0;
     for end in 1..=order.len() {
@@ -69,7 +69,7 @@ fn by_id(keys: &EpisodeKeys, a: u32, b: u32) -> Ordering {
 /// The packing of rows' keys into numbers: experiment, model, seed, run, row, each in as few bits as it needs.
 struct Rows<'a> {
     keys: &'a EpisodeKeys,
-    /// The place of each text in the order of all, by code.
+    /// The rank of each text, by code.
     experiments: Vec<u32>,
     models: Vec<u32>,
     seed: Span,
@@ -100,7 +100,7 @@ impl<'a> Rows<'a> {
     }
 }
 
-/// Integers from the smallest to the largest.
+/// The range of some integers.
 struct Span {
     smallest: i32,
     bits: u32,
@@ -119,7 +119,7 @@ impl Span {
     }
 }
 
-/// For each code of a column the place of its text in the order of all, by UTF-8 bytes.
+/// The rank of each code's text in a column, by UTF-8 bytes.
 fn ranks(column: &TextColumn) -> Vec<u32> {
     let mut codes: Vec<u32> = (0..narrow(column.texts.len())).collect();
     codes.sort_unstable_by_key(|code| column.texts.value(*code as usize));

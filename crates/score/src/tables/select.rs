@@ -1,7 +1,7 @@
 //! Part of an episode table: some metrics, some episodes.
 //!
-//! A table of scores has no steps, so a condition can name its keys, its labels and its metrics, and
-//! no aggregate. It is evaluated by the same engine, each episode standing as one step.
+//! A table of scores has no steps, so a condition can name keys, labels and metrics, but no aggregates. The same engine
+//! evaluates it, with each episode as one step.
 
 use std::sync::Arc;
 
@@ -21,7 +21,7 @@ use metric::file::FileError;
 use toml_spec::Faults;
 use trace::labels;
 
-/// An error of selecting a part of a table.
+/// An error of selecting part of a table.
 #[derive(Debug, thiserror::Error)]
 pub enum SelectError {
     #[error(transparent)]
@@ -90,17 +90,17 @@ fn columns(table: &EpisodeTable) -> Columns {
     columns.with_help("scores have their keys and metrics alone; a condition on steps needs the traces")
 }
 
-/// Returns true if a column holds what coders say, as true and false.
+/// Returns true if a column holds coders' labels, as true and false.
 pub fn is_of_coders(label: &LabelColumn) -> bool {
     label.name.starts_with(labels::PREFIX) && label.values.iter().flatten().all(|text| matches!(text, "true" | "false"))
 }
 
-/// The values of a column of coders.
+/// The values of a label column.
 pub fn truths_of(label: &LabelColumn) -> impl Iterator<Item = Option<bool>> + '_ {
     label.values.iter().map(|text| text.map(|text| text == "true"))
 }
 
-/// The table as columns that the engine takes.
+/// The table as columns for the engine.
 fn rows(table: &EpisodeTable) -> Result<RecordBatch, ArrowError> {
     let text =
         |values: Vec<Option<&str>>| Arc::new(values.into_iter().collect::<DictionaryArray<Int32Type>>()) as ArrayRef;

@@ -19,9 +19,9 @@ pub struct EpisodeTable {
     pub catalog: Catalog,
     /// The keys, one row per episode.
     pub keys: EpisodeKeys,
-    /// Further columns that are constant in an episode (`body_color`, ...), where they were asked for.
+    /// Further columns that are constant in an episode (`body_color`, ...), if requested.
     pub labels: Vec<LabelColumn>,
-    /// The metrics in the order of the catalog, or of the selection made.
+    /// The metrics in the order of the catalog, or of the selection.
     pub metrics: Vec<MetricColumn>,
     /// The declarations of the traces about their recording.
     pub declared: Declared,
@@ -37,13 +37,13 @@ pub struct EpisodeKeys {
     pub(crate) episode_id: TextColumn,
 }
 
-/// The label of what a study varies besides the model.
+/// The label of the factor that a study varies besides the model.
 pub const CONDITION: &str = "condition";
 
-/// The label of episodes that were lost for want of an answer.
+/// The label of episodes that were lost because no answer came.
 pub const LOST: &str = "lost";
 
-/// The label of an episode's replies: those that gave no decision, of all, such as `3/20`.
+/// The label of an episode's unusable replies: the number without a decision, of all replies, such as `3/20`.
 pub const UNUSABLE_REPLIES: &str = "unusable_replies";
 
 /// The key of an episode. The derived order is the order of the table.
@@ -71,14 +71,14 @@ pub struct KeyRef<'a> {
     pub episode_id: &'a str,
 }
 
-/// A column of text: a code per row, null where there is no text, and the text of each code.
+/// A text column: a code per row, null without text, and the text of each code.
 #[derive(Clone, Debug)]
 pub struct TextColumn {
     pub(crate) codes: UInt32Array,
     pub(crate) texts: LargeStringArray,
 }
 
-/// A further key column: text, null where the trace has null.
+/// A further key column: text, null if the trace has null.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LabelColumn {
     /// The column's name in the trace.
@@ -86,7 +86,7 @@ pub struct LabelColumn {
     pub values: TextColumn,
 }
 
-/// The values of one metric, null where it is undefined.
+/// The values of one metric, null if undefined.
 #[derive(Clone, Debug)]
 pub struct MetricColumn {
     /// The metric's name in the catalog.
@@ -133,7 +133,7 @@ impl EpisodeTable {
         }
     }
 
-    /// Returns true if some episode was recorded under another condition than the default one.
+    /// Returns true if any episode was recorded under a condition other than the default.
     pub fn has_conditions(&self) -> bool {
         let default = schema::column(CONDITION).and_then(Column::default_text);
         self.label(CONDITION).is_some_and(|column| column.iter().flatten().any(|condition| Some(condition) != default))
@@ -153,7 +153,7 @@ impl EpisodeTable {
         self.keys.len()
     }
 
-    /// Returns true if there is no episode.
+    /// Returns true if there are no episodes.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -182,7 +182,7 @@ impl EpisodeKeys {
         self.seed.len()
     }
 
-    /// Returns true if there is no episode.
+    /// Returns true if there are no episodes.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -190,7 +190,7 @@ impl EpisodeKeys {
     /// The key of a row.
     ///
     /// # Panics
-    /// For a row that is not there.
+    /// If the row does not exist.
     pub fn get(&self, row: usize) -> KeyRef<'_> {
         KeyRef {
             experiment: self.experiment.get(row).unwrap_or_default(),
@@ -201,7 +201,7 @@ impl EpisodeKeys {
         }
     }
 
-    /// Returns true if other columns have the same key in each row; says no where equal keys are held in two ways.
+    /// Returns true if other columns have the same key in each row. May return false if keys are encoded differently.
     pub fn has_keys_of(&self, other: &Self) -> bool {
         let is_same = |of: fn(&Self) -> &TextColumn| {
             let (a, b) = (of(self), of(other));
@@ -232,7 +232,7 @@ impl EpisodeKeys {
     /// The seed of a row.
     ///
     /// # Panics
-    /// For a row that is not there.
+    /// If the row does not exist.
     pub fn seed(&self, row: usize) -> i32 {
         self.seed.value(row)
     }
@@ -240,7 +240,7 @@ impl EpisodeKeys {
     /// The run of a row.
     ///
     /// # Panics
-    /// For a row that is not there.
+    /// If the row does not exist.
     pub fn run(&self, row: usize) -> i32 {
         self.run.value(row)
     }
@@ -272,7 +272,7 @@ impl PartialEq for EpisodeKeys {
 }
 
 impl KeyRef<'_> {
-    /// The same key on its own.
+    /// The same key as an owned value.
     pub fn to_owned(&self) -> EpisodeKey {
         EpisodeKey {
             experiment: self.experiment.to_owned(),
@@ -296,7 +296,7 @@ impl TextColumn {
         self.codes.len()
     }
 
-    /// Returns true if there is no row.
+    /// Returns true if there are no rows.
     pub fn is_empty(&self) -> bool {
         self.codes.is_empty()
     }
@@ -304,16 +304,16 @@ impl TextColumn {
     /// The text of a row; `None` for null.
     ///
     /// # Panics
-    /// For a row that is not there.
+    /// If the row does not exist.
     pub fn get(&self, row: usize) -> Option<&str> {
         self.codes.is_valid(row).then(|| self.texts.value(self.codes.value(row) as usize))
     }
 
-    /// A number that represents the text of a row; `None` for null. Equal texts have one number, but for episode ids, of
-    /// which each row has its own.
+    /// A number that represents the text of a row; `None` for null. Equal texts have equal numbers, except episode ids:
+    /// each row has its own.
     ///
     /// # Panics
-    /// For a row that is not there.
+    /// If the row does not exist.
     pub fn code(&self, row: usize) -> Option<usize> {
         self.codes.is_valid(row).then(|| self.codes.value(row) as usize)
     }
@@ -347,10 +347,10 @@ impl MetricColumn {
         Self { name: name.into(), values: MetricValues::Ints(values.into_iter().collect()) }
     }
 
-    /// The value of a row; `None` where the metric is undefined.
+    /// The value of a row; `None` if the metric is undefined.
     ///
     /// # Panics
-    /// For a row that is not there.
+    /// If the row does not exist.
     pub fn get(&self, row: usize) -> Option<i64> {
         match &self.values {
             MetricValues::Bools(bools) => bools.is_valid(row).then(|| bools.value(row).into()),
@@ -363,7 +363,7 @@ impl MetricColumn {
         (0..self.array().len()).map(|row| self.get(row))
     }
 
-    /// Returns true if another column has the same value in each row; says no where equal values are held in two ways.
+    /// Returns true if another column has the same values. May return false if they are encoded differently.
     pub fn has_values_of(&self, other: &Self) -> bool {
         match (&self.values, &other.values) {
             (MetricValues::Bools(a), MetricValues::Bools(b)) => a == b,
@@ -372,17 +372,17 @@ impl MetricColumn {
         }
     }
 
-    /// The numbers of zeros and ones in these rows; `None` unless every value is one of them.
+    /// The numbers of zeros and ones in these rows; `None` if there is any other value.
     ///
     /// # Panics
-    /// For rows that are not there.
+    /// If a row does not exist.
     pub(crate) fn count_truths(&self, rows: Range<usize>) -> Option<(usize, usize)> {
         let MetricValues::Bools(bools) = &self.values else { return None };
         let some = bools.slice(rows.start, rows.len());
         Some((some.false_count(), some.true_count()))
     }
 
-    /// The defined values of some rows, added to `moments`.
+    /// Adds the defined values of some rows to `moments`.
     ///
     /// # Errors
     /// A sum beyond 128 bits.
@@ -390,7 +390,7 @@ impl MetricColumn {
     /// # Panics
     /// If a row is out of range.
     pub fn add_moments(&self, moments: Moments, rows: Range<usize>) -> Result<Moments, MomentOverflow> {
-        // A few rows are faster one by one than as a slice of bits.
+        // For a few rows, single values are faster than a slice of bits.
         let counts = if rows.len() < 16 { None } else { self.count_truths(rows.clone()) };
         match counts {
             Some((zeros, ones)) => moments.with_truths(zeros, ones),

@@ -6,7 +6,7 @@ use exact::moments::{Moments, StandardError};
 /// The interval of a difference of two independent rates, the first minus the second: square and add
 /// (Newcombe 1998, Statistics in Medicine 17:873, method 10).
 ///
-/// `None` where either rate has no interval.
+/// `None` if either rate has no interval.
 #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
 pub fn newcombe(first: (u64, u64), second: (u64, u64), confidence: f64) -> Option<Interval> {
     let (a, b) = (wilson(first.0, first.1, confidence)?, wilson(second.0, second.1, confidence)?);
@@ -21,7 +21,7 @@ pub fn newcombe(first: (u64, u64), second: (u64, u64), confidence: f64) -> Optio
 /// The interval of a difference of two independent means, variances unequal (Welch 1938; degrees of
 /// freedom by Satterthwaite 1946).
 ///
-/// Always from sample standard errors. `None` where either has fewer than two values or neither has a spread.
+/// Always from sample standard errors. `None` if either side has fewer than two values, or if neither has a spread.
 #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
 pub fn welch(first: &Moments, second: &Moments, confidence: f64) -> Option<Interval> {
     let difference = first.mean()? - second.mean()?;
@@ -30,7 +30,7 @@ pub fn welch(first: &Moments, second: &Moments, confidence: f64) -> Option<Inter
     student_t_of(difference, variance.sqrt(), freedom, confidence)
 }
 
-/// The variance of a difference and its degrees of freedom, from those of both sides (Satterthwaite 1946).
+/// The variance of a difference and its degrees of freedom, from the values of both sides (Satterthwaite 1946).
 pub(crate) fn satterthwaite(sides: [(f64, f64); 2]) -> (f64, f64) {
     let variance: f64 = sides.iter().map(|(variance, _)| variance).sum();
     let parts: f64 = sides.iter().map(|(variance, freedom)| variance * variance / freedom).sum();

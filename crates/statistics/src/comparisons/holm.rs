@@ -1,16 +1,16 @@
-//! Many tests at once: p values that keep their promise for the whole family.
+//! Many tests at once: p values that keep the level for the whole family.
 
 use crate::quantile;
 
-/// The level that a test of this confidence is held to: 0.05 for 0.95; `None` outside (0, 1).
+/// The level of a test at this confidence: 0.05 for 0.95; `None` outside (0, 1).
 pub fn level(confidence: f64) -> Option<f64> {
     quantile::tail(confidence).map(|tail| 2.0 * tail)
 }
 
-/// Holm's step-down adjustment (Holm 1979): valid whatever the dependence between the tests.
+/// Holm's step-down adjustment (Holm 1979): valid under any dependence between the tests.
 ///
-/// An adjusted value is to be compared with the level of the whole family. The order is that of the input;
-/// no value falls below its own p value or exceeds 1.
+/// Compare an adjusted value with the level of the whole family. Values are in input order; each is at least its own p
+/// value and at most 1.
 #[expect(clippy::cast_precision_loss, reason = "a family has few tests")]
 pub fn holm(p_values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..p_values.len()).collect();

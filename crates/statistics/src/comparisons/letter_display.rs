@@ -1,13 +1,12 @@
-//! Tied sets: which members of a family no test tells apart, in place of ranks.
+//! Tied sets: members of a family that no test separates, in place of ranks.
 //!
-//! Rule: a set is tied when no two of its members are separated, and it is given whole: every maximal such
-//! set, as in a compact letter display (Piepho 2004). Sets overlap where separation is not transitive,
-//! which is the rule rather than the exception at n = 21.
+//! Rule: a set is tied if no two of its members are separated. All maximal tied sets are returned, as in a compact
+//! letter display (Piepho 2004). Sets overlap if separation is not transitive, which is usual at n = 21.
 
-/// All maximal tied sets among `count` members; `separated` is asked with the smaller index first.
+/// All maximal tied sets of `count` members; `separated` is called with the smaller index first.
 ///
-/// Members ascend within a set, sets ascend by their members; each member is in at least one.
-/// The search is Bron and Kerbosch's with a pivot (1973), exponential only where ties are contrived.
+/// Members ascend within a set, sets ascend by their members, and each member is in at least one set. The search is the
+/// Bron-Kerbosch algorithm with a pivot (1973), exponential only for contrived ties.
 pub fn tied_sets(count: usize, separated: impl Fn(usize, usize) -> bool) -> Vec<Vec<usize>> {
     let tied = Ties {
         rows: (0..count).map(|a| (0..count).map(|b| a != b && !separated(a.min(b), a.max(b))).collect()).collect(),
@@ -25,7 +24,7 @@ struct Ties {
 }
 
 impl Ties {
-    /// Extends `set` by each candidate in turn; a set that neither a candidate nor an excluded member extends is whole.
+    /// Extends `set` by each candidate in turn. A set without candidates and excluded members is maximal.
     fn grow(
         &self,
         set: &mut Vec<usize>,

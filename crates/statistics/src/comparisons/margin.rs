@@ -1,22 +1,22 @@
 //! Non-inferiority of a rate within a margin: score tests of pairs and of independent units.
 //!
-//! Rule: a unit counts once, as the mean of its episodes. Part of a verdict varies at most as much as a verdict, so that the
-//! variance under the null hypothesis is never too small. Up to `MOST_ENUMERATED` outcomes the p value is exact: the largest
-//! probability over the rate that the null hypothesis leaves open (Chan 1998); beyond, the normal approximation.
+//! Rule: a unit counts once, as the mean of its episodes. A mean varies at most as much as a single verdict, so the
+//! variance under the null hypothesis is never too small. Up to `MOST_ENUMERATED` outcomes the p value is exact: the
+//! maximum over the rate that the null hypothesis leaves open (Chan 1998). Beyond, it is the normal approximation.
 
 use crate::interval::Interval;
 use crate::quantile::{normal, normal_below};
 
-/// More outcomes than this are not enumerated.
+/// The most outcomes that are enumerated.
 const MOST_ENUMERATED: usize = 6000;
-/// The number of values tried of the rate that is left open.
+/// The number of values tried for the rate that the null hypothesis leaves open.
 const NUISANCE: u32 = 100;
-/// The power that a number of units is planned for.
+/// The power for which a number of units is planned.
 const POWER: f64 = 0.8;
 /// The tolerance for equal statistics.
 const TIE: f64 = 1e-9;
 
-/// The units of two sides: those of both, with the means of both, and those of one alone.
+/// The units of two sides: shared units with the means of both, and units of one side alone.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Units {
     /// The means of the first and of the second side.
@@ -25,7 +25,7 @@ pub struct Units {
     pub second: Vec<f64>,
 }
 
-/// Gains, losses and the number of pairs; parts of a verdict are parts of one.
+/// Gains, losses and the number of pairs; partial verdicts count as fractions.
 #[derive(Clone, Copy)]
 struct Pairs {
     gains: f64,
@@ -57,20 +57,20 @@ impl Units {
         })
     }
 
-    /// The units on the smaller side, pairs among them.
+    /// The units on the smaller side, including pairs.
     pub fn len(&self) -> u64 {
         (self.shared.len() + self.first.len().min(self.second.len())) as u64
     }
 
-    /// Returns true if there is no unit to compare.
+    /// Returns true if there are no units to compare.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
     /// The one-sided p value of the hypothesis that the first rate is below the second by `margin` or more.
     ///
-    /// Pairs and other units are independent samples: their p values are combined with the square roots of their sizes as
-    /// weights (Stouffer). `None` without a unit to compare, and for a margin outside (0, 1).
+    /// Pairs and other units are independent samples: their p values are combined with the square roots of their sizes
+    /// as weights (Stouffer). `None` without units to compare, and for a margin outside (0, 1).
     pub fn non_inferior(&self, margin: f64) -> Option<f64> {
         if !(margin > 0.0 && margin < 1.0) {
             return None;
@@ -88,7 +88,7 @@ impl Units {
         }
     }
 
-    /// The spread of the difference; a half of a success and a half of a failure are added.
+    /// The spread of the difference, after adding half a success and half a failure.
     pub fn spread(&self) -> Option<Spread> {
         let share = |successes: f64, n: f64| (successes + 0.5) / (n + 1.0);
         let pairs = self.pairs().map(|Pairs { gains, losses, n }| {
@@ -110,26 +110,26 @@ impl Units {
 /// The variance of a difference, from which a number of units is planned.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spread {
-    /// The difference; better is up.
+    /// The difference; positive is better.
     pub gain: f64,
-    /// The variance of one unit's part in it.
+    /// The variance that one unit contributes.
     pub variance: f64,
     /// The units on the smaller side.
     pub units: u64,
 }
 
 impl Spread {
-    /// The spread that an interval of a mean difference shows.
+    /// The spread implied by the interval of a mean difference.
     #[expect(clippy::cast_precision_loss, reason = "counts of units are far below 2^53")]
     pub fn of_interval(gain: f64, interval: Interval, confidence: f64, units: u64) -> Self {
         let se = (interval.high - interval.low) / (2.0 * normal(f64::midpoint(1.0, confidence)));
         Self { gain, variance: units as f64 * se * se, units }
     }
 
-    /// The number of units on each side with which one verdict would be likely, if the difference stays unchanged.
+    /// The number of units per side that makes one verdict likely, if the difference stays unchanged.
     ///
-    /// `level` is two-sided for a difference and one-sided for the margin; the power is 0.8. `None` where no verdict comes
-    /// nearer with more units.
+    /// `level` is two-sided for a difference and one-sided for the margin; the power is 0.8. `None` if more units bring
+    /// no verdict closer.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a positive number, bounded above")]
     pub fn settling(self, margin: f64, level: f64) -> Option<u64> {
         let needed = |distance: f64, tail: f64| {
@@ -143,7 +143,7 @@ impl Spread {
 }
 
 impl Pairs {
-    /// The score of Tango (1998) for a difference of at most `-margin`.
+    /// The score statistic of Tango (1998) for a difference of at most `-margin`.
     fn score(self, margin: f64) -> f64 {
         let Self { gains, losses, n } = self;
         let least = -margin;
@@ -178,7 +178,7 @@ impl Pairs {
 }
 
 impl Sides {
-    /// The score of Farrington and Manning (1990) for a difference of at most `-margin`.
+    /// The score statistic of Farrington and Manning (1990) for a difference of at most `-margin`.
     fn score(self, margin: f64) -> f64 {
         let Self { successes: [a, b], n: [m, n] } = self;
         let second = restricted([a, b], [m, n], margin);
@@ -208,7 +208,7 @@ impl Sides {
     }
 }
 
-/// The second rate of the largest likelihood where the first is lower by `margin`: the likelihood rises, then falls.
+/// The maximum-likelihood second rate if the first is lower by `margin`; the likelihood rises, then falls.
 fn restricted([a, b]: [f64; 2], [m, n]: [f64; 2], margin: f64) -> f64 {
     let slope = |second: f64| {
         let first = second - margin;
@@ -299,12 +299,12 @@ mod tests {
         for margin in [0.0, 1.0, -0.1, f64::NAN] {
             assert_eq!(pairs(0, 0, 9).non_inferior(margin), None);
         }
-        // Pairs and others together say more than either.
+        // Pairs and other units together have more power than either alone.
         let both = Units { first: vec![1.0; 21], second: vec![1.0; 21], ..pairs(0, 0, 21) };
         assert!(both.non_inferior(0.1).unwrap() < pairs(0, 0, 21).non_inferior(0.1).unwrap());
     }
 
-    // (norm.isf(0.05) + norm.isf(0.2)) ** 2 is 6.182557232; one half of a pair of 21 in each direction: 1/22 of variance.
+    // (norm.isf(0.05) + norm.isf(0.2)) ** 2 is 6.182557232; half of one of 21 pairs in each direction: variance 1/22.
     #[test]
     fn the_number_that_settles_is_that_of_the_normal_approximation() {
         assert_eq!(pairs(0, 0, 21).spread().unwrap().settling(0.1, 0.05), Some(29));

@@ -1,4 +1,4 @@
-//! Tests between two groups, their families, and sets of ties.
+//! Tests between two groups, their families, and tied sets.
 
 pub mod contrast;
 pub mod holm;

@@ -1,7 +1,7 @@
-//! Two rates over the same episodes: who solved what the other did not.
+//! Two rates over the same episodes: which side solved episodes that the other did not.
 //!
-//! Rule: only pairs in which both values are defined count. Agreement says nothing about a difference;
-//! the test sees the discordant pairs alone, the interval sees all.
+//! Rule: only pairs with two defined values count. Agreement carries no information about a difference; the test uses
+//! only discordant pairs, the interval uses all pairs.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -25,7 +25,7 @@ pub struct Pairs {
 }
 
 impl Pairs {
-    /// The table of these pairs of values, of which 1 is a success and everything else a failure.
+    /// The table of these pairs of values; 1 is a success, any other value a failure.
     pub fn of(values: impl IntoIterator<Item = (i64, i64)>) -> Self {
         let mut pairs = Self::default();
         for value in values {
@@ -43,7 +43,7 @@ impl Pairs {
         self.both + self.first_only + self.second_only + self.neither
     }
 
-    /// The first rate minus the second; `None` without a pair.
+    /// The first rate minus the second; `None` without pairs.
     #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
     pub fn difference(self) -> Option<f64> {
         (self.n() > 0).then(|| (self.first_only as f64 - self.second_only as f64) / self.n() as f64)
@@ -51,8 +51,8 @@ impl Pairs {
 
     /// The exact two-sided test of no difference (`McNemar` 1947; as a sign test: Dixon and Mood 1946).
     ///
-    /// Under no difference a discordant pair falls either way with probability 1/2. 1 where no pair is
-    /// discordant; `None` without a pair.
+    /// Without a difference, a discordant pair favours either side with probability 1/2. 1 if no pair is discordant;
+    /// `None` without pairs.
     pub fn mcnemar(self) -> Option<f64> {
         match (self.n(), self.discordant()) {
             (0, _) => None,
@@ -61,10 +61,10 @@ impl Pairs {
         }
     }
 
-    /// The mid-p value of [`Pairs::mcnemar`] (Fagerland, Lydersen and Laake 2013, BMC Medical Research Methodology 13:91).
+    /// The mid-p value of [`Pairs::mcnemar`] (Fagerland, Lydersen and Laake 2013, BMC Med. Res. Methodol. 13:91).
     ///
-    /// Less conservative than the exact test and **not guaranteed to keep the level**. 1 where no pair is discordant;
-    /// `None` without a pair.
+    /// Less conservative than the exact test and **not guaranteed to keep the level**. 1 if no pair is discordant;
+    /// `None` without pairs.
     pub fn mcnemar_mid_p(self) -> Option<f64> {
         match (self.n(), self.discordant()) {
             (0, _) => None,
@@ -78,9 +78,9 @@ impl Pairs {
         Some(ExactTest { p: self.mcnemar()?, mid_p: self.mcnemar_mid_p()? })
     }
 
-    /// The least p value that [`Pairs::mcnemar`] could have given with as many discordant pairs: 2^(1 - d).
+    /// The least p value that [`Pairs::mcnemar`] can give with this number of discordant pairs: 2^(1 - d).
     ///
-    /// 1 where no pair is discordant; `None` without a pair.
+    /// 1 if no pair is discordant; `None` without pairs.
     pub fn mcnemar_least_p(self) -> Option<f64> {
         let halvings = i32::try_from(self.discordant().saturating_sub(1)).unwrap_or(i32::MAX);
         (self.n() > 0).then(|| 0.5f64.powi(halvings))
@@ -93,7 +93,7 @@ impl Pairs {
     /// The interval of [`Pairs::difference`]: square and add, with the correlation of the pairs
     /// (Newcombe 1998, Statistics in Medicine 17:2635, method 10).
     ///
-    /// `None` without a pair and for a confidence outside (0, 1).
+    /// `None` without pairs and for a confidence outside (0, 1).
     pub fn interval(self, confidence: f64) -> Option<Interval> {
         let (n, difference) = (self.n(), self.difference()?);
         let first = Arms::of(self.both + self.first_only, n, confidence)?;
@@ -106,7 +106,7 @@ impl Pairs {
         })
     }
 
-    /// Newcombe's phi: continuity-corrected towards 0 where positive, 0 where a margin is empty.
+    /// Newcombe's phi: continuity-corrected towards 0 if positive, 0 if a margin is empty.
     #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
     fn correlation(self) -> f64 {
         let [a, b, c, d] = [self.both, self.first_only, self.second_only, self.neither].map(|count| count as f64);
@@ -152,8 +152,8 @@ mod tests {
         }
     }
 
-    // Python fractions over comb(n, j) / 2**n; Fagerland et al. 2013: p minus the probability of the counts seen, 1 minus
-    // half of it where both counts are equal.
+    // Python fractions over comb(n, j) / 2**n; Fagerland et al. 2013: p minus the probability of the observed counts, 1
+    // minus half of it if both counts are equal.
     #[test]
     fn the_mid_p_value_and_the_least_p_value_are_the_known_ones() {
         for (b, c, mid_p, least) in [
@@ -172,7 +172,7 @@ mod tests {
         assert_eq!(pairs([0, 5000, 0, 0]).mcnemar_least_p(), Some(0.0));
     }
 
-    // Python: method 10 written out over the Wilson limits of statsmodels 0.15.0, proportion_confint(k, n, 0.05, "wilson")
+    // Python: method 10 over the Wilson limits of statsmodels 0.15.0, proportion_confint(k, n, 0.05, "wilson")
     #[test]
     fn the_interval_is_the_known_one() {
         for (table, low, high) in [

@@ -1,8 +1,7 @@
-//! Two independent rates in several strata (experiments): one common difference, one test of none.
+//! Two independent rates in several strata (experiments): their common difference, and a test of no difference.
 //!
-//! Rule: sides are compared within a stratum alone, so that strata of unequal difficulty and unequal size do not
-//! confound them. A stratum without an episode of one side says nothing and is left out. Episodes that are paired
-//! belong to [`pooled`].
+//! Rule: sides are compared only within a stratum, so unequal difficulty and size of strata do not confound them. A
+//! stratum without episodes of one side is left out. Paired episodes belong to [`pooled`].
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -13,7 +12,7 @@ use crate::paired::Pairs;
 use crate::quantile;
 use crate::unpaired::tables;
 
-/// The most multiplications that the exact test takes: a fraction of a second.
+/// The most multiplications of the exact test: a fraction of a second.
 const MOST_PRODUCTS: usize = 1 << 24;
 
 /// One stratum: the successes and the episodes of each side.
@@ -50,8 +49,8 @@ pub struct CochranMantelHaenszel {
 /// The common difference of the rates (Greenland and Robins 1985) and its score interval
 /// (Klingenberg 2014, Statistics in Medicine 33:2968), which inverts the test with Sato's variance (Sato 1989).
 ///
-/// `None` where no stratum has episodes of both sides, where a stratum has more successes than episodes, and for a
-/// confidence outside (0, 1).
+/// `None` if no stratum has episodes of both sides, if a stratum has more successes than episodes, and for a confidence
+/// outside (0, 1).
 pub fn common_difference(strata: &[Stratum], confidence: f64) -> Option<CommonDifference> {
     let z = quantile::normal(quantile::tail(confidence)?);
     let sums = terms(strata)?.iter().fold(Sums::default(), Sums::with);
@@ -65,7 +64,7 @@ pub fn common_difference(strata: &[Stratum], confidence: f64) -> Option<CommonDi
 
 /// The test without and with continuity correction (Cochran 1954; Mantel and Haenszel 1959).
 ///
-/// `None` as in [`common_difference`], and where no stratum has both a success and a failure.
+/// `None` as in [`common_difference`], and if no stratum has both a success and a failure.
 pub fn cochran_mantel_haenszel(strata: &[Stratum]) -> Option<CochranMantelHaenszel> {
     let terms = terms(strata)?;
     let variance: f64 = terms.iter().map(Term::variance).sum();
@@ -83,11 +82,11 @@ pub fn cochran_mantel_haenszel(strata: &[Stratum]) -> Option<CochranMantelHaensz
     })
 }
 
-/// The exact conditional test of no difference in any stratum: given the margins of each, the successes of the first
+/// The exact conditional test of no difference in any stratum. Given each stratum's margins, the successes of the first
 /// side are a sum of hypergeometric counts (Mehta, Patel and Gray 1985). Two-sided by minimum likelihood.
 ///
-/// `mid_p` is less conservative and not guaranteed to keep the level. `None` as in [`common_difference`], and where the
-/// sum has so many values that the asymptotic test serves better.
+/// `mid_p` is less conservative and not guaranteed to keep the level. `None` as in [`common_difference`], and if the
+/// sum has too many values: the asymptotic test then serves better.
 pub fn exact(strata: &[Stratum]) -> Option<ExactTest> {
     let terms = terms(strata)?;
     let seen = terms.iter().map(|term| term.seen).sum();
@@ -105,10 +104,10 @@ pub fn exact(strata: &[Stratum]) -> Option<ExactTest> {
     Some(sum.test(seen))
 }
 
-/// The pairs of all strata in one table: for matched pairs, [`Pairs::mcnemar`] of it is the exact conditional test.
+/// The pairs of all strata in one table: for matched pairs, its [`Pairs::mcnemar`] is the exact conditional test.
 ///
-/// Each pair is a stratum of its own, within whatever larger stratum; given its margins a concordant pair cannot fall
-/// otherwise, and a discordant one falls either way with probability 1/2. So nothing is lost by pooling.
+/// Each pair is a stratum of its own within any larger stratum. Given the margins, a concordant pair is fixed and a
+/// discordant one favours either side with probability 1/2. So pooling loses nothing.
 pub fn pooled(strata: &[Pairs]) -> Pairs {
     strata.iter().fold(Pairs::default(), |sum, pairs| Pairs {
         both: sum.both + pairs.both,
@@ -118,7 +117,7 @@ pub fn pooled(strata: &[Pairs]) -> Pairs {
     })
 }
 
-/// The strata with episodes of both sides; `None` without one, or one has more successes than episodes.
+/// The strata with episodes of both sides; `None` without any, or if one has more successes than episodes.
 fn terms(strata: &[Stratum]) -> Option<Vec<Term>> {
     if strata.iter().any(|stratum| stratum.first.0 > stratum.first.1 || stratum.second.0 > stratum.second.1) {
         return None;
@@ -128,7 +127,7 @@ fn terms(strata: &[Stratum]) -> Option<Vec<Term>> {
     (!terms.is_empty()).then_some(terms)
 }
 
-/// One stratum as numbers: `x` of `m` succeed on the first side, `y` of `n` on the second.
+/// One stratum in numbers: `x` of `m` succeed on the first side, `y` of `n` on the second.
 struct Term {
     seen: u64,
     stratum: Stratum,
@@ -197,7 +196,7 @@ mod tests {
     const THREE: [Counts; 3] = [((15, 21), (9, 21)), ((12, 21), (8, 20)), ((18, 21), (14, 19))];
     const SPARSE: [Counts; 4] = [((1, 2), (0, 3)), ((2, 2), (1, 4)), ((0, 1), (0, 2)), ((3, 4), (1, 3))];
     const OPPOSITE: [Counts; 2] = [((21, 21), (0, 21)), ((7, 7), (0, 9))];
-    /// Admissions of men and women at Berkeley in 1973 by department, as `UCBAdmissions` of R.
+    /// Admissions of men and women at Berkeley in 1973 by department, from R's `UCBAdmissions`.
     const BERKELEY: [Counts; 6] = [
         ((512, 825), (89, 108)),
         ((353, 560), (17, 25)),
@@ -215,8 +214,8 @@ mod tests {
         assert!((found / expected - 1.0).abs() < 1e-9, "found {found}, expected {expected}");
     }
 
-    // statsmodels 0.15.0: StratifiedTable(tables).test_null_odds(correction); it takes p from 1 - cdf, which leaves the
-    // least ones few digits: those are scipy 1.17.1 chi2.sf(statistic, 1).
+    // statsmodels 0.15.0: StratifiedTable(tables).test_null_odds(correction). It computes p as 1 - cdf, so small p
+    // values have few digits: those are scipy 1.17.1 chi2.sf(statistic, 1).
     #[test]
     fn the_test_is_the_known_one() {
         for (counts, statistic, p, statistic_corrected, p_corrected) in [
@@ -251,7 +250,7 @@ mod tests {
         }
     }
 
-    // Python: fractions, the hypergeometric probabilities of the strata convolved.
+    // Python: fractions, convolution of the strata's hypergeometric probabilities.
     #[test]
     fn the_exact_test_is_the_known_one() {
         for (counts, p, mid_p) in [
@@ -298,7 +297,7 @@ mod tests {
         assert!(cochran_mantel_haenszel(&many).is_some());
     }
 
-    // Each pair as a stratum of its own: the exact conditional test is McNemar's over the discordant pairs.
+    // With each pair as its own stratum, the exact conditional test is McNemar's over the discordant pairs.
     #[test]
     fn pairs_as_strata_are_mcnemars_test() {
         let experiments = [

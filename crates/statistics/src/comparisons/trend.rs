@@ -1,7 +1,7 @@
 //! A rate against a dose: does it rise or fall?
 //!
-//! Rule: episodes are compared within a stratum alone. Where the same scene is played at several doses it is a stratum, so that
-//! scenes of unequal difficulty do not confound them; independent episodes are one stratum.
+//! Rule: episodes are compared only within a stratum. A scene that is played at several doses is a stratum, so unequal
+//! difficulty of scenes does not confound doses; independent episodes are one stratum.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -21,7 +21,7 @@ pub struct Trend {
 
 /// The test over strata of (dose, success), with the variance of permutations within each stratum (Mantel 1963).
 ///
-/// `None` where no stratum has two doses and both outcomes, and for a dose that is not finite.
+/// `None` if no stratum has two doses and both outcomes, and for a dose that is not finite.
 pub fn cochran_armitage<S: AsRef<[(f64, bool)]>>(strata: &[S]) -> Option<Trend> {
     let (mut excess, mut variance, mut informative) = (0.0, 0.0, 0);
     for stratum in strata.iter().map(AsRef::as_ref) {

@@ -1,7 +1,7 @@
 //! Rates over units of analysis, such as scenes, with several episodes each.
 //!
-//! Rule: the unit counts, not the episode. A unit enters as the mean of its episodes, as an integer over a common
-//! denominator. With one episode per unit the tests are the binomial test and the test of `McNemar`.
+//! Rule: the unit counts, not the episode. A unit enters as the mean of its episodes, an integer over a common
+//! denominator. With one episode per unit, the tests are the binomial test and the test of `McNemar`.
 
 use std::collections::BTreeMap;
 
@@ -10,35 +10,35 @@ use crate::outcomes::ExactTest;
 use exact::moments::Moments;
 use exact::ratio::Ratio;
 
-/// More outcomes than this are not enumerated.
+/// The most outcomes that are enumerated.
 const MOST_OUTCOMES: usize = 1 << 21;
-/// No common denominator may be larger.
+/// The largest common denominator.
 const MOST_DENOMINATOR: i128 = 1 << 40;
 
-/// A test over units: its p value, and the least one that any outcome could have had.
+/// A test over units: its p value, and the least p value of any outcome.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UnitTest {
     /// The two-sided p value.
     pub p: f64,
-    /// The least p value of the same number of units.
+    /// The least p value for the same number of units.
     pub least: f64,
 }
 
-/// The units of two sides, each as the sum of its episodes.
+/// The units of two sides, each with the sums of its episodes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sides {
-    /// Those that both sides have.
+    /// The units of both sides.
     pub shared: Vec<(Moments, Moments)>,
-    /// Those of the first side alone.
+    /// The units of the first side alone.
     pub first: Vec<Moments>,
-    /// Those of the second side alone.
+    /// The units of the second side alone.
     pub second: Vec<Moments>,
 }
 
-/// The binomial test of a rate over units: the sum of their means, rounded towards the level, is the count.
+/// The binomial test of a rate over units. The count is the sum of their means, rounded towards the level.
 ///
-/// The sum varies at most as much as one verdict per unit would; part of a verdict counts for the level.
-/// `None` without a unit and for a level outside [0, 1].
+/// The sum varies at most as much as one verdict per unit would; a fraction counts in favour of the level. `None`
+/// without units and for a level outside [0, 1].
 pub fn rate_test(units: &[Moments], level: Ratio) -> Option<(ExactTest, f64)> {
     let (values, denominator) = means(units)?;
     let n = u64::try_from(units.len()).ok()?;
@@ -46,7 +46,7 @@ pub fn rate_test(units: &[Moments], level: Ratio) -> Option<(ExactTest, f64)> {
     Some((rate_test_of_sum(sum, denominator, n, level)?, least_p(n, level)?))
 }
 
-/// The same test of `n` units from the sum of their means, which is `sum / denominator`.
+/// The same test of `n` units from the sum of their means, `sum / denominator`.
 pub(crate) fn rate_test_of_sum(sum: i128, denominator: i128, n: u64, level: Ratio) -> Option<ExactTest> {
     let (numerator, whole) = (i128::from(level.numerator()), i128::from(level.denominator()));
     let expected = numerator * i128::from(n);
@@ -57,10 +57,10 @@ pub(crate) fn rate_test_of_sum(sum: i128, denominator: i128, n: u64, level: Rati
     Some(if crossed { ExactTest { p: 1.0, mid_p: 1.0 } } else { test })
 }
 
-/// The exact permutation test of two rates: within each unit that both sides have, and among the units of one side.
+/// The exact permutation test of two rates: within each shared unit, and among the unshared units.
 ///
-/// The statistic is the score, the first side's sum minus its expectation given the margins. `None` without a unit of
-/// both sides or one of each, and with too many outcomes to enumerate.
+/// The statistic is the score: the first side's sum minus its expectation given the margins. `None` unless there is a
+/// shared unit or an unshared unit on each side, and with too many outcomes to enumerate.
 pub fn difference_test(Sides { shared, first, second }: &Sides) -> Option<UnitTest> {
     let all: Vec<Moments> =
         shared.iter().flat_map(|&(a, b)| [a, b]).chain(first.iter().chain(second).copied()).collect();
@@ -73,7 +73,7 @@ pub fn difference_test(Sides { shared, first, second }: &Sides) -> Option<UnitTe
     if differences.is_empty() && pool.is_empty() {
         return None;
     }
-    // Everything times twice the size of the pool, so that the expectation is an integer.
+    // Everything is scaled by twice the size of the pool, so that the expectation is an integer.
     let scale = pool.len().max(1) as i128;
     let expected = 2 * drawn as i128 * pool.iter().sum::<i128>();
     let score = |difference: i128, sum: i128| scale * difference + 2 * scale * sum - expected;
@@ -126,7 +126,7 @@ fn flips(differences: &[i128]) -> Option<Vec<(i128, f64)>> {
     Some(sums)
 }
 
-/// The number of ways to each sum of `drawn` values.
+/// The number of ways to get each sum of `drawn` values.
 fn draws(pool: &[i128], drawn: usize) -> Option<BTreeMap<i128, f64>> {
     let mut by_count = vec![BTreeMap::new(); drawn + 1];
     by_count[0].insert(0, 1.0);

@@ -1,29 +1,29 @@
 //! Two rates over different episodes: Fisher's exact test.
 //!
-//! Rule: the number of successes of both together is taken as given; the test asks how they fall to the two sides.
+//! Rule: the total number of successes is fixed; the test asks how they are divided between the two sides.
 
 use crate::outcomes::{ExactTest, Outcomes};
 
 /// Fisher's exact test of no difference between two independent rates, two-sided by minimum likelihood
 /// (Fisher 1935; Gibbons and Pratt 1975), each as successes of episodes.
 ///
-/// `mid_p` is less conservative and not guaranteed to keep the level. Both are 1 where all or none of the episodes
-/// succeed. `None` where a side has no episode or more successes than episodes. The cost grows with the
-/// square root of the counts: some ten thousand steps for a million episodes.
+/// `mid_p` is less conservative and not guaranteed to keep the level. Both are 1 if all episodes or no episodes
+/// succeed. `None` if a side has no episodes, or more successes than episodes. The cost grows with the square root of
+/// the counts: about ten thousand steps for a million episodes.
 pub fn fisher(first: (u64, u64), second: (u64, u64)) -> Option<ExactTest> {
     Some(tables(first, second)?.test(first.0))
 }
 
-/// The least p value that [`fisher`] could have given with as many episodes and successes in all as these.
+/// The least p value that [`fisher`] can give with these numbers of episodes and this total of successes.
 ///
-/// `None` as there.
+/// `None` as in [`fisher`].
 pub fn fisher_least_p(first: (u64, u64), second: (u64, u64)) -> Option<f64> {
     Some(tables(first, second)?.least_p())
 }
 
-/// The successes that may fall to the first, the margins being given: the hypergeometric distribution.
+/// The possible successes of the first side given the margins: the hypergeometric distribution.
 ///
-/// `None` where a side has no episode or more successes than episodes.
+/// `None` if a side has no episodes, or more successes than episodes.
 #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
 pub(crate) fn tables((k, m): (u64, u64), (l, n): (u64, u64)) -> Option<Outcomes> {
     if m == 0 || n == 0 || k > m || l > n {

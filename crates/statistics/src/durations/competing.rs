@@ -1,7 +1,7 @@
-//! Time to a correct decision: a wrong decision ends the wait for good, so it competes and does not censor.
+//! Time to a correct decision. A wrong decision ends the wait for good, so it is a competing event and not censoring.
 //!
-//! Rule: an episode without a decision says only that it takes longer than its length. A decision in step t comes
-//! before censoring in step t. With every decision taken as correct, all this is the Kaplan-Meier curve.
+//! Rule: an episode without a decision is censored at its length. A decision in step t comes before censoring in step
+//! t. If every decision counts as correct, this is the Kaplan-Meier curve.
 
 use std::collections::BTreeMap;
 
@@ -32,10 +32,10 @@ struct Point {
     is_wrong: f64,
 }
 
-/// The contribution of each kind of episode to a restricted mean: its derivative by the episode's weight.
+/// The contribution of each kind of episode to a restricted mean: the derivative by the episode's weight.
 ///
 /// The sum of squares over the episodes is the variance by the infinitesimal jackknife (Jaeckel 1972; Efron 1982,
-/// chapter 6), which for one cause is Greenwood's.
+/// chapter 6); for a single cause it is Greenwood's.
 #[derive(Clone, Debug)]
 pub(crate) struct Influence {
     points: BTreeMap<i64, [f64; 3]>,
@@ -57,27 +57,27 @@ impl Incidence {
         (!points.is_empty()).then_some(Self { points })
     }
 
-    /// The shares decided correctly and wrongly by the end of a step; the rest is undecided.
+    /// The shares decided correctly and wrongly by the end of a step; the remainder is undecided.
     pub fn shares(&self, steps: i64) -> [f64; 2] {
         let last = self.points.iter().rev().find(|point| point.steps <= steps);
         last.map_or([0.0; 2], |point| [point.is_correct, point.is_wrong])
     }
 
-    /// The first step by which at least half of all episodes are decided correctly; `None` where that is never seen.
+    /// The first step by which at least half of all episodes are decided correctly; `None` if that never happens.
     pub fn median(&self) -> Option<i64> {
         self.points.iter().find(|point| point.is_correct >= HALF).map(|point| point.steps)
     }
 
-    /// The last step that the curve is known to, and `None` where it is known for ever: all decided.
+    /// The last step at which the curve is known; `None` if all are decided, so that it is known forever.
     pub(crate) fn known_until(&self) -> Option<i64> {
         self.points.last().filter(|last| last.at_risk > last.correct + last.wrong).map(|last| last.steps)
     }
 
-    /// The mean of the steps to a correct decision, where later than `horizon` and never both count as `horizon`:
-    /// the horizon minus the area under the curve (Andersen 2013).
+    /// The mean number of steps to a correct decision; later than `horizon` and never both count as `horizon`. It
+    /// equals the horizon minus the area under the curve (Andersen 2013).
     ///
-    /// `None` for a horizon that is not positive or lies beyond what the curve is known to, and for a confidence
-    /// outside (0, 1). Its standard error is the infinitesimal jackknife's times sqrt(n / (n - 1)).
+    /// `None` for a horizon that is not positive or beyond the known part of the curve, and for a confidence outside
+    /// (0, 1). Its standard error is the infinitesimal jackknife's times sqrt(n / (n - 1)).
     pub fn restricted_mean(&self, horizon: i64, confidence: f64) -> Option<RestrictedMean> {
         if horizon <= 0 || self.known_until().is_some_and(|known| known < horizon) {
             return None;
@@ -108,9 +108,9 @@ impl Incidence {
         self.points.iter().map(of_point).sum()
     }
 
-    /// The contributions of this curve's episodes to the restricted mean.
+    /// The contributions of the curve's episodes to the restricted mean.
     pub(crate) fn influence(&self, horizon: i64) -> Influence {
-        // What a larger share of decisions at a step takes away from the gains of all later steps.
+        // The reduction of all later gains by a larger share of decisions at a step.
         let mut later = 0.0;
         let mut slopes = Vec::with_capacity(self.points.len());
         for point in self.points.iter().rev() {
@@ -146,7 +146,7 @@ impl Influence {
     /// The contribution of one episode.
     ///
     /// # Panics
-    /// For an episode that is not of the curve.
+    /// For an episode that is not part of the curve.
     pub(crate) fn of(&self, ending: Ending) -> f64 {
         let [taken, correct, wrong] = self.points[&ending.steps];
         match ending.outcome {

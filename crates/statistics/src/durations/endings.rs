@@ -1,8 +1,8 @@
-//! Episodes as they end, and the walk over their risk sets that every curve is made of.
+//! The endings of episodes, and the walk over their risk sets that every curve is built from.
 
 use std::collections::BTreeMap;
 
-/// One episode: the steps until it ended, and how.
+/// One episode: the number of steps until it ended, and its outcome.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ending {
     /// The steps until the decision, or until the recording stopped.
@@ -13,29 +13,29 @@ pub struct Ending {
 /// The outcome of an episode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// With the decision that is waited for.
+    /// A correct decision, the awaited event.
     Correct,
-    /// With another one, after which that decision cannot come any more.
+    /// A wrong decision, after which a correct one can no longer come.
     Wrong,
-    /// Without a decision: censored.
+    /// No decision: censored.
     Unfinished,
 }
 
-/// The episodes at one step at which some ended.
+/// The episodes at one step in which some ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct RiskSet {
     pub steps: i64,
-    /// The episodes that lasted until here.
+    /// The episodes that lasted until this step.
     pub at_risk: u64,
-    /// Those that ended here, by [`Outcome`].
+    /// The episodes that ended in this step, by [`Outcome`].
     pub ended: [u64; 3],
     /// The share undecided before this step.
     pub before: f64,
-    /// The share undecided after it.
+    /// The share undecided after this step.
     pub after: f64,
 }
 
-/// The steps at which an episode ended, ascending. A decision in a step comes before censoring in that step.
+/// The steps in which an episode ended, ascending. A decision in a step comes before censoring in that step.
 #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
 pub(crate) fn risk_sets(endings: &[Ending]) -> Vec<RiskSet> {
     let mut ends: BTreeMap<i64, [u64; 3]> = BTreeMap::new();

@@ -1,4 +1,4 @@
-//! Times to an event: survival, competing endings, restricted means.
+//! Times to an event: survival, competing events, restricted means.
 
 pub mod competing;
 pub(crate) mod endings;

@@ -1,9 +1,9 @@
 //! The difference of two restricted means, of independent or paired episodes.
 //!
-//! Rule: both sides up to the same horizon. The variance of a side is that of the infinitesimal jackknife; a pair's
-//! two episodes vary together, so of pairs it is the differences that are squared. Variances divide by n - 1.
-//! Interval and p value are by Student's t: over the pairs, else with the degrees of freedom of Satterthwaite (1946). With the
-//! normal law, 8 equal models in 12 pairs or on 12 episodes each gave a false claim after Holm in up to 0.2 of studies.
+//! Rule: both sides have the same horizon. A side's variance is the infinitesimal jackknife's; a pair's two episodes
+//! vary together, so pairs use squared differences. Variances divide by n - 1. Interval and p value use Student's t,
+//! over the pairs, else with degrees of freedom by Satterthwaite (1946). With the normal distribution, 8 equal models
+//! in 12 pairs or on 12 episodes each gave a false claim after Holm in up to 0.2 of studies.
 
 use crate::clustered::fewest_clusters;
 use crate::competing::{Ending, Incidence, Influence};
@@ -25,20 +25,20 @@ pub fn fewest(level: f64) -> usize {
 /// One restricted mean minus another.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Difference {
-    /// The horizon of both, in steps.
+    /// The horizon of both sides, in steps.
     pub horizon: i64,
     /// The first minus the second, in steps.
     pub difference: f64,
     pub se: f64,
-    /// Plus and minus deviates of Student's t, within the horizon; `None` where the standard error is zero.
+    /// Plus and minus deviates of Student's t, within the horizon; `None` if the standard error is zero.
     pub interval: Option<Interval>,
-    /// Two-sided, by the same distribution; `None` where the standard error is zero.
+    /// Two-sided, by the same distribution; `None` if the standard error is zero.
     pub p: Option<f64>,
 }
 
 /// The difference between two independent sets of episodes (Royston and Parmar 2013; degrees of freedom by Satterthwaite 1946).
 ///
-/// `None` where either curve is not known up to the horizon, and for a confidence outside (0, 1).
+/// `None` if either curve is not known up to the horizon, and for a confidence outside (0, 1).
 #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
 pub fn independent(first: &[Ending], second: &[Ending], horizon: i64, confidence: f64) -> Option<Difference> {
     let means = Means::of(first.iter().copied(), second.iter().copied(), horizon, confidence)?;
@@ -50,7 +50,7 @@ pub fn independent(first: &[Ending], second: &[Ending], horizon: i64, confidence
     tested(horizon, means.difference, satterthwaite([side(0, first), side(1, second)]), confidence)
 }
 
-/// The difference between the two sides of pairs.
+/// The difference between the two sides of paired episodes.
 ///
 /// With complete durations this is the mean of the differences and its sample standard error.
 /// `None` as in [`independent`].
@@ -64,10 +64,10 @@ pub fn paired(pairs: &[(Ending, Ending)], horizon: i64, confidence: f64) -> Opti
     tested(horizon, means.difference, (variance, pairs.len() as f64 - 1.0), confidence)
 }
 
-/// The difference over units of analysis, such as scenes with several episodes, whose times up to the horizon are all known.
+/// The difference over units of analysis, such as scenes of several episodes, if all times up to the horizon are known.
 ///
-/// A unit counts once, as the mean of its times. Student's t over the units that both sides have, if these are at least
-/// half of each side's; Welch's t if the sides share no unit. `None` in between, and as in [`independent`].
+/// A unit counts once, as the mean of its times. Uses Student's t over the shared units, if these are at least half of
+/// each side's; Welch's t if the sides share no unit. `None` in between, and as in [`independent`].
 pub fn by_units(units: &Sides, horizon: i64, confidence: f64) -> Option<Difference> {
     let Sides { shared, first, second } = units;
     let mean = |unit: &Moments| unit.mean();
@@ -81,7 +81,7 @@ pub fn by_units(units: &Sides, horizon: i64, confidence: f64) -> Option<Differen
     if shared.is_empty() { tested(horizon, a - b, satterthwaite([of_first, of_second]), confidence) } else { None }
 }
 
-/// A mean, its squared standard error, and the degrees of freedom of that.
+/// A mean, its squared standard error, and the degrees of freedom of the latter.
 #[expect(clippy::cast_precision_loss, reason = "few units")]
 fn mean_of(values: &[f64]) -> (f64, (f64, f64)) {
     let n = values.len() as f64;
@@ -90,7 +90,7 @@ fn mean_of(values: &[f64]) -> (f64, (f64, f64)) {
     (mean, (squares / (n * (n - 1.0)), n - 1.0))
 }
 
-/// The last step that both sides are known to; the longest episode where both are known for ever.
+/// The last step at which both curves are known; the longest episode if both are known forever.
 pub fn shared_horizon(first: &[Ending], second: &[Ending]) -> Option<i64> {
     let known = [first, second].into_iter().filter_map(|side| Incidence::of(side)?.known_until()).min();
     known.or_else(|| first.iter().chain(second).map(|ending| ending.steps).max())
@@ -193,7 +193,7 @@ mod tests {
         close(found.interval.unwrap().low, -23.16304453031697);
     }
 
-    /// 8 models of equal durations, of which some exceed the budget of 100 steps: how often a claim survives Holm.
+    /// 8 models of equal durations, some of which exceed the budget of 100 steps: how often a claim survives Holm.
     #[test]
     fn families_of_equal_durations_keep_the_level_and_intervals_agree_with_p_values() {
         const STUDIES: usize = 600;
@@ -221,12 +221,12 @@ mod tests {
                 let p_values: Vec<f64> = found.iter().filter_map(|it| it.p).collect();
                 claims += usize::from(holm(&p_values).iter().any(|p| *p <= 0.05));
             }
-            // 0.05 and three standard errors of a share of 600.
+            // 0.05 plus three standard errors of a share of 600.
             assert!(claims <= 46, "{claims} of {STUDIES} studies of {n}, paired: {is_paired}, rate {at_each}");
         }
     }
 
-    // scipy 1.17.1: ttest_rel and ttest_ind(equal_var=False) of the means by unit, with their confidence_interval(0.95).
+    // scipy 1.17.1: ttest_rel and ttest_ind(equal_var=False) of the means by unit, with confidence_interval(0.95).
     #[test]
     fn units_count_once_as_their_means() {
         let of = |times: &[i64]| times.iter().fold(Moments::default(), |sum, &time| sum.with(time).unwrap());

@@ -1,7 +1,7 @@
-//! Durations of which some are only known to be longer: unfinished episodes are censored, not slow.
+//! Durations, including some with only a lower bound: unfinished episodes are censored, not slow.
 //!
-//! Rule: an episode that ends without a decision says that the decision takes more than its length.
-//! A decision in step t comes before censoring in step t.
+//! Rule: an episode that ends without a decision is censored at its length. A decision in step t comes before censoring
+//! in step t.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -16,7 +16,7 @@ const HALF: f64 = 0.5 + 1e-12;
 /// A Kaplan-Meier curve (Kaplan and Meier 1958): the share of episodes undecided after each step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Survival {
-    /// The steps at which an episode ended, ascending.
+    /// The steps in which an episode ended, ascending.
     pub points: Vec<Point>,
 }
 
@@ -24,7 +24,7 @@ pub struct Survival {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
     pub steps: i64,
-    /// The episodes that lasted until here.
+    /// The episodes that lasted until this step.
     pub at_risk: u64,
     pub decided: u64,
     /// The share undecided after this step.
@@ -56,7 +56,8 @@ pub struct MedianInterval {
 }
 
 impl RestrictedMean {
-    /// The estimate from `n` episodes, with its interval; `variance` divides by n. `None` for a confidence outside (0, 1).
+    /// The estimate from `n` episodes, with its interval; `variance` divides by n. `None` for confidence outside (0,
+    /// 1).
     #[expect(clippy::cast_precision_loss, reason = "steps and counts are far below 2^53")]
     pub(crate) fn of(horizon: i64, mean: f64, variance: f64, n: u64, confidence: f64) -> Option<Self> {
         quantile::tail(confidence)?;
@@ -76,16 +77,16 @@ pub(crate) fn small_sample(n: u64) -> f64 {
     if n > 1 { n as f64 / (n - 1) as f64 } else { 1.0 }
 }
 
-/// Returns true if a standard error is more than the rounding of steps up to `horizon`.
+/// Returns true if a standard error exceeds the rounding of steps up to `horizon`.
 #[expect(clippy::cast_precision_loss, reason = "steps are far below 2^53")]
 pub(crate) fn has_spread(se: f64, horizon: i64) -> bool {
     se > 1e-12 * horizon as f64
 }
 
 impl Survival {
-    /// The curve of these episodes, any decision being the one that is waited for; `None` without any.
+    /// The curve of these episodes, with any decision as the event; `None` without any.
     ///
-    /// It is what the Aalen-Johansen curves of both decisions leave undecided.
+    /// It is the share that the Aalen-Johansen curves of both decisions leave undecided.
     pub fn of(endings: &[Ending]) -> Option<Self> {
         let point = |RiskSet { steps, at_risk, ended, after, .. }: RiskSet| {
             let decided = ended[Outcome::Correct as usize] + ended[Outcome::Wrong as usize];
@@ -95,17 +96,17 @@ impl Survival {
         (!points.is_empty()).then_some(Self { points })
     }
 
-    /// The first step by which at least half are decided; `None` where the curve stays above one half.
+    /// The first step by which at least half are decided; `None` if the curve stays above one half.
     pub fn median(&self) -> Option<i64> {
         self.points.iter().find(|point| point.undecided <= HALF).map(|point| point.steps)
     }
 
-    /// The last step that the curve is known to, and `None` where it is known for ever: all decided.
+    /// The last step at which the curve is known; `None` if all are decided, so that it is known forever.
     pub(crate) fn known_until(&self) -> Option<i64> {
         self.points.last().filter(|point| point.undecided > 0.0).map(|point| point.steps)
     }
 
-    /// The longest duration seen, decided or not.
+    /// The longest observed duration, decided or not.
     pub fn longest(&self) -> Option<i64> {
         self.points.last().map(|point| point.steps)
     }
@@ -113,8 +114,8 @@ impl Survival {
     /// The mean duration up to `horizon` (Irwin 1949; Royston and Parmar 2013), its variance by Greenwood's
     /// formula (Klein and Moeschberger 2003, equation 4.5.2).
     ///
-    /// `None` for a horizon that is not positive or lies beyond what the curve is known to, and for a confidence
-    /// outside (0, 1).
+    /// `None` for a horizon that is not positive or beyond the known part of the curve, and for a confidence outside
+    /// (0, 1).
     #[expect(clippy::cast_precision_loss, reason = "steps and counts are far below 2^53")]
     pub fn restricted_mean(&self, horizon: i64, confidence: f64) -> Option<RestrictedMean> {
         if horizon <= 0 || self.known_until().is_some_and(|known| known < horizon) {
@@ -133,10 +134,10 @@ impl Survival {
         RestrictedMean::of(horizon, area + later as f64, variance, n, confidence)
     }
 
-    /// The steps that the median may be (Brookmeyer and Crowley 1982): those at which one half lies within the pointwise
-    /// interval of the curve, which is Greenwood's after the transformation log(-log) (Borgan and Liestol 1990).
+    /// The possible steps of the median (Brookmeyer and Crowley 1982): one half is in the pointwise interval of the
+    /// curve there, Greenwood's after the transformation log(-log) (Borgan and Liestol 1990).
     ///
-    /// `None` where not even the lower bound is seen, and for a confidence outside (0, 1).
+    /// `None` if not even the lower bound is observed, and for a confidence outside (0, 1).
     #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
     pub fn median_interval(&self, confidence: f64) -> Option<MedianInterval> {
         let z = quantile::normal(quantile::tail(confidence)?);
@@ -144,7 +145,7 @@ impl Survival {
         for point in &self.points {
             let (at_risk, decided) = (point.at_risk as f64, point.decided as f64);
             sum += decided / (at_risk * (at_risk - decided));
-            // Once all are decided the curve is 0, and its interval is not defined: half is passed, by how much is open.
+            // Once all are decided the curve is 0, below one half by an unknown amount: its interval is undefined.
             let bounds =
                 if point.undecided > 0.0 { log_log(point.undecided, sum, z) } else { Interval { low: 0.0, high: 1.0 } };
             low = low.or((bounds.low <= HALF).then_some(point.steps));
@@ -156,7 +157,7 @@ impl Survival {
     }
 }
 
-/// The interval of a share that is above 0, from Greenwood's sum; a share of 1 has none but itself.
+/// The interval of a share above 0, from Greenwood's sum; the interval of a share of 1 is a point.
 fn log_log(share: f64, sum: f64, z: f64) -> Interval {
     if share >= 1.0 {
         return Interval { low: 1.0, high: 1.0 };
@@ -165,9 +166,9 @@ fn log_log(share: f64, sum: f64, z: f64) -> Interval {
     Interval { low: share.powf(reach.exp()), high: share.powf((-reach).exp()) }
 }
 
-/// The largest horizon that every curve is known to: restricted means up to it compare like with like.
+/// The last step at which every curve is known: restricted means up to it are comparable.
 ///
-/// The longest duration of all where every curve is known for ever. `None` without a curve.
+/// The longest duration of all if every curve is known forever. `None` without curves.
 pub fn common_horizon<'a>(curves: impl IntoIterator<Item = &'a Survival> + Clone) -> Option<i64> {
     let known = curves.clone().into_iter().filter_map(Survival::known_until).min();
     known.or_else(|| curves.into_iter().filter_map(Survival::longest).max())
@@ -206,7 +207,7 @@ mod tests {
     }
 
     // lifelines 0.30.3: restricted_mean_survival_time(km, t=tau); standard errors by exact fractions in Python:
-    // sqrt(sum(area(t, tau)**2 * F(d, n * (n - d)))), to which the factor sqrt(n / (n - 1)) comes
+    // sqrt(sum(area(t, tau)**2 * F(d, n * (n - d)))), times sqrt(n / (n - 1))
     #[test]
     fn the_restricted_mean_is_the_known_one() {
         for (durations, horizon, mean, se) in [
@@ -244,8 +245,8 @@ mod tests {
         assert_eq!(curve(&[-100; 21]).restricted_mean(100, 0.95).unwrap().interval, None);
     }
 
-    // lifelines 0.30.3: median_survival_times(KaplanMeierFitter().fit(T, E).confidence_interval_); where all are decided
-    // it bounds the median by the longest duration, which the method does not support: none here, as in R's survfit
+    // lifelines 0.30.3: median_survival_times(KaplanMeierFitter().fit(T, E).confidence_interval_). If all are decided
+    // it bounds the median by the longest duration, which the method does not support: no bound here, as in R's survfit
     #[test]
     fn the_interval_of_the_median_is_the_known_one() {
         let written = [5, 12, -100, 30, -100, 44, 61, -100, 8, 77, -100, 15, -100, 90, 33];

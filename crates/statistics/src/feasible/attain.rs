@@ -1,11 +1,11 @@
 //! Possible sums of squares of integers with a given count, range and sum.
 //!
-//! Rule: exact, by search. For n integers from 0 to h with the sum t, the sum of squares has the parity of t, is
-//! smallest where the integers differ by at most one, and largest where all but one are 0 or h. Between the two not
-//! every value of that parity is attained (n = 4, t = 4: 4, 6, 8, 10, 16), so the search removes the largest integer
-//! and asks the same of the others. Both ends are attained and bound every branch; a large remainder succeeds at
-//! the first try, and what failed is remembered. A search of more than `MOST_STEPS`, which only few values over a huge
-//! range take, gives up and calls the value attained: nothing is called impossible that was not shown to be.
+//! Rule: exact, by search. Take n integers from 0 to h with the sum t. Their sum of squares has the parity of t. It is
+//! smallest if the integers differ by at most one, and largest if all but one are 0 or h. Not every value of that
+//! parity in between is attained (n = 4, t = 4: 4, 6, 8, 10, 16). So the search removes the largest integer and repeats
+//! the question for the others. Both ends are attained and bound every branch; a large remainder succeeds at the first
+//! try, and failures are remembered. A search of more than `MOST_STEPS`, which only few values over a huge range take,
+//! gives up and reports the value as attained: only proven cases are called impossible.
 
 use std::collections::HashSet;
 
@@ -21,7 +21,7 @@ struct Question {
 /// The most values that one search tries.
 const MOST_STEPS: u32 = 1_000_000;
 
-/// Searches that may share what they found out.
+/// Searches that may share their results.
 #[derive(Debug, Default)]
 pub struct Search {
     failed: HashSet<Question>,
@@ -86,7 +86,7 @@ impl Search {
 
 /// The smallest and the largest sum of squares of `count` integers from `low` to `high` with this sum.
 ///
-/// `None` where no such integers have the sum.
+/// `None` if no such integers have the sum.
 pub(crate) fn ends(count: i128, (low, high): (i128, i128), sum: i128) -> Option<(i128, i128)> {
     let shifted = sum - count * low;
     if count < 0 || low > high || shifted < 0 || shifted > count * (high - low) {
@@ -96,8 +96,8 @@ pub(crate) fn ends(count: i128, (low, high): (i128, i128), sum: i128) -> Option<
     Some((back(least_squares(count, shifted)), back(greatest_squares(high - low, shifted))))
 }
 
-/// The largest integer up to `most` that leaves the others enough of the squares; by bisection, as the least that it
-/// and the others have grows with it from the mean on.
+/// The largest integer up to `most` that leaves enough of the squares for the others. Found by bisection: from the mean
+/// on, the smallest sum of squares of it and the others grows with it.
 fn largest_that_leaves(count: i128, most: i128, sum: i128, squares: i128) -> i128 {
     let leaves = |largest: i128| largest * largest + least_squares(count - 1, sum - largest) <= squares;
     let (mut low, mut high) = ((sum + count - 1) / count, most);
@@ -120,7 +120,7 @@ fn least_squares(count: i128, sum: i128) -> i128 {
     count * each * each + more * (2 * each + 1)
 }
 
-/// As many at `most` as the sum allows, and one with the rest.
+/// As many values at `most` as the sum allows, and one with the remainder.
 fn greatest_squares(most: i128, sum: i128) -> i128 {
     if most == 0 {
         return 0;
@@ -185,7 +185,7 @@ mod tests {
     fn huge_ranges_come_to_an_end() {
         let range = (-3_000_000_000_000, 3_000_000_000_000);
         let mut search = Search::default();
-        // 3 integers with the sum 0: their squares add up to 2 (a² + ab + b²), which is never 2 modulo 3 twice over.
+        // 3 integers with the sum 0: their squares add up to 2 (a² + ab + b²), and a² + ab + b² is never 2 modulo 3.
         assert!(!search.is_attained(3, range, 0, 2 * 2));
         assert!(search.is_attained(3, range, 0, 2 * 7_000_000_000_000_003));
         assert!(search.is_attained(5, range, 1, 10_000_000_000_001));

@@ -1,9 +1,9 @@
-//! The question whether some integers have a printed mean and standard error.
+//! Decides whether any integers have a printed mean and standard error.
 //!
-//! Rule: exact. A mean of n integers is a sum over n (GRIM: Brown and Heathers 2017), and with the sum the standard
-//! error fixes the sum of squares up to its rounding (SPRITE: Heathers et al. 2018). Both prints are monotone in what
-//! they print, so each leaves an interval, and [`attain`] decides whether an integer of it is the sum of squares of
-//! any data. Nothing is sampled: what is called infeasible no data can give.
+//! Rule: exact. A mean of n integers is a sum over n (GRIM: Brown and Heathers 2017). With the sum, the standard error
+//! fixes the sum of squares up to its rounding (SPRITE: Heathers et al. 2018). Both prints are monotone, so each leaves
+//! an interval, and [`attain`] decides whether an integer in it is the sum of squares of any data. There is no
+//! sampling: no data can give what is called infeasible.
 
 pub mod attain;
 
@@ -14,22 +14,22 @@ use exact::moments::{Moments, StandardError};
 use exact::number::Decimal;
 use exact::rounding::Rounding;
 
-/// The known facts about a cell's values, apart from its printed numbers.
+/// The known facts about a cell's values, besides its printed numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sample {
     /// The number of values; at least one.
     pub n: u64,
-    /// The smallest and the largest value possible.
+    /// The smallest and the largest possible value.
     pub range: (i64, i64),
     /// The printed standard error.
     pub form: StandardError,
 }
 
-/// The numbers of a cell, and how they are taken to have been rounded.
+/// The numbers of a cell, and their assumed rounding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Print {
     pub mean: Decimal,
-    /// The standard error; `None` where none is printed, which constrains nothing.
+    /// The standard error; `None` if none is printed, which constrains nothing.
     pub se: Option<Decimal>,
     pub rounding: Rounding,
 }
@@ -38,19 +38,19 @@ pub struct Print {
 type Span = (i128, i128);
 
 impl Sample {
-    /// The sums that print as all these means.
+    /// The sums that print as all of these means.
     pub fn sums(&self, prints: &[Print]) -> Span {
         let mean = |sum, print: &Print| self.mean(sum, print);
         prints.iter().fold(self.all_sums(), |span, print| printing_as(span, print.mean, |sum| mean(sum, print)))
     }
 
-    /// The sums that so many values of the range can have.
+    /// The possible sums of this number of values in the range.
     pub fn all_sums(&self) -> Span {
         let n = i128::from(self.n);
         (n * i128::from(self.range.0), n * i128::from(self.range.1))
     }
 
-    /// Returns true if the printed means lie between those of the ends of a span: two divisions, where [`Sample::sums`]
+    /// Returns true if the printed means are between those of the ends of a span: two divisions, where [`Sample::sums`]
     /// bisects.
     pub fn reaches(&self, (least, most): Span, prints: &[Print]) -> bool {
         prints.iter().all(|print| {
@@ -63,7 +63,7 @@ impl Sample {
         print.rounding.ratio(sum, self.n.into(), print.mean.places())
     }
 
-    /// Moments of values with this sum that print as all these standard errors; `None` where no values do.
+    /// Moments of values with this sum that print as all these standard errors; `None` if no values do.
     pub fn with_sum(&self, sum: i128, prints: &[Print], search: &mut Search) -> Option<Moments> {
         if self.n == 1 {
             let prints_alike = prints.iter().filter_map(|print| print.se).all(|se| se.units() == 0);
@@ -81,7 +81,7 @@ impl Sample {
         None
     }
 
-    /// The sums whose means print nearest below and above a mean, where the range has such.
+    /// The sums whose means print nearest below and above a mean, if the range has any.
     pub fn sums_beside(&self, print: &Print) -> [Option<i128>; 2] {
         let (least, most) = self.all_sums();
         let is_below = |sum| compare(self.mean(sum, print), print.mean) == Ordering::Less;
@@ -130,7 +130,7 @@ fn compare(printed: Option<Decimal>, target: Decimal) -> Ordering {
     printed.map_or(Ordering::Greater, |printed| printed.cmp_value(target))
 }
 
-/// The first integer of a span for which `holds` does not; one beyond its end where it always does.
+/// The first integer of a span for which `holds` is false; one past its end if there is none.
 fn first_not((mut low, high): Span, holds: impl Fn(i128) -> bool) -> i128 {
     let mut beyond = (high + 1).max(low);
     while low < beyond {

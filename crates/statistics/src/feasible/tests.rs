@@ -13,7 +13,7 @@ fn print(mean: &str, se: &str, rounding: Rounding) -> Print {
 }
 
 impl Sample {
-    /// Moments of some values that print as all of these; `None` where no values do.
+    /// Moments of values that print as all of these; `None` if no values do.
     fn witness(&self, prints: &[Print], search: &mut Search) -> Option<Moments> {
         let (low, high) = self.sums(prints);
         (low..=high).find_map(|sum| self.with_sum(sum, prints, search))
@@ -65,7 +65,7 @@ fn means_out_of_range_have_no_sum() {
     assert_eq!(sample.sums_beside(&print("57.93", "", Rounding::HalfUp)), [Some(1216), Some(1217)]);
 }
 
-/// Every multiset of 4 integers from 0 to 6, printed by every rule: the witness is there exactly for what they print.
+/// Every multiset of 4 integers from 0 to 6, printed by every rule: a witness exists exactly for these prints.
 #[test]
 fn small_samples_agree_with_enumeration() {
     let moments = |values: [i64; 4]| values.into_iter().fold(Moments::default(), |m, v| m.with(v).unwrap());
@@ -89,7 +89,7 @@ fn small_samples_agree_with_enumeration() {
     }
 }
 
-/// Digits of a generator that needs no seed of its own (Knuth's MMIX constants).
+/// Digits of a generator with constants from Knuth's MMIX.
 fn draws(seed: u64) -> impl FnMut(u64) -> u64 {
     let mut state = seed;
     move |below| {
@@ -119,6 +119,6 @@ fn data_is_feasible_and_most_forgeries_are_not() {
             caught += usize::from(sample.witness(&[forgery], &mut search).is_none());
         }
     }
-    // A mean of n values has n of 100 possible pairs of digits: of 5 to 34, four in five forgeries are caught.
+    // A mean of n values has n of 100 possible pairs of digits: for n from 5 to 34, four in five forgeries are caught.
     assert!(caught * 100 > forged * 75, "{caught} of {forged}");
 }

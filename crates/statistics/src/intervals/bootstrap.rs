@@ -1,17 +1,17 @@
-//! A seeded bootstrap of a mean: an interval that leans where the values are skewed.
+//! A seeded bootstrap of a mean: an interval that is asymmetric for skewed values.
 //!
-//! Rule: the same values give the same interval, whatever else a report holds. Every call starts the
-//! generator from the same seed and resamples the sorted values; resampled sums are integers.
+//! Rule: the same values give the same interval, whatever else a report contains. Every call starts the generator from
+//! the same seed and resamples the sorted values; resampled sums are integers.
 
 use crate::interval::Interval;
 use crate::quantile;
 use crate::random::SplitMix64;
 
-/// Resamples drawn. One less than a round number, so that the usual tails fall on whole ranks
-/// (Davison and Hinkley 1997).
+/// The number of resamples. One less than a round number, so that the usual tails are whole ranks (Davison and Hinkley
+/// 1997).
 pub const RESAMPLES: usize = 9_999;
 
-/// The most values that are resampled: with more, Student's interval says the same at no cost.
+/// The most values that are resampled: for more values, Student's interval is equivalent and costs nothing.
 pub const MOST_VALUES: usize = 2_000;
 
 /// The seed of every bootstrap.
@@ -20,8 +20,8 @@ pub const SEED: u64 = 0x6d69_7272_6f72;
 /// The bias-corrected and accelerated interval of the mean (Efron 1987), from [`RESAMPLES`] resamples:
 /// Efron and Tibshirani 1993, equations 14.9, 14.10, 14.14 and 14.15.
 ///
-/// `None` for fewer than two values, for more than [`MOST_VALUES`], and for a confidence outside (0, 1). The bounds coincide where all
-/// values are equal: resampling knows no more.
+/// `None` for fewer than two values, for more than [`MOST_VALUES`], and for a confidence outside (0, 1). The bounds
+/// coincide if all values are equal: resampling has no more information.
 #[expect(clippy::cast_precision_loss, reason = "exact sums become one quotient here")]
 pub fn mean(values: &[i64], confidence: f64) -> Option<Interval> {
     let tail = quantile::tail(confidence)?;
@@ -64,7 +64,7 @@ impl Correction {
 fn bias(sums: &[i128], total: i128) -> f64 {
     let below = sums.partition_point(|&sum| sum < total);
     let not_above = sums.partition_point(|&sum| sum <= total);
-    // One resample is always granted to each side: an infinite correction helps nobody.
+    // Each side keeps at least one resample: an infinite correction is useless.
     let twice = (below + not_above).clamp(1, 2 * RESAMPLES - 1) as f64;
     let share = twice / (2 * RESAMPLES) as f64;
     if share <= 0.5 { -quantile::normal(share) } else { quantile::normal(1.0 - share) }

@@ -1,7 +1,7 @@
-//! The unit of replication: where episodes of one cluster share something, clusters, not episodes, are independent.
+//! The unit of replication: if episodes of one cluster share something, clusters are independent and episodes are not.
 //!
-//! Rule: what a cluster is, is declared by the design; nothing here guesses it. A statement about new clusters rests on the
-//! number of clusters. Sums stay integers up to one division.
+//! Rule: the design declares clusters; nothing here guesses them. A statement about new clusters rests on the number of
+//! clusters. Sums stay integers up to one division.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -10,14 +10,14 @@ use crate::interval::{Interval, student_t_of};
 use crate::quantile;
 use exact::moments::Moments;
 
-/// The fewest clusters over which a test can reach a level at all.
+/// The fewest clusters with which a test can reach a level.
 ///
 /// Reversing the signs of C cluster means gives 2^C equally likely outcomes under no effect, hence no
 /// two-sided p below 2^(1-C): 0.0625 for five clusters, 0.031 for six. Cluster-robust inference is known to
 /// fail well above that number too (Cameron and Miller 2015, section VI).
 pub fn fewest_clusters(level: f64) -> usize {
     let reach = |clusters: &usize| 0.5f64.powi(i32::try_from(*clusters).unwrap_or(i32::MAX) - 1) <= level;
-    // Beyond it the power underflows, and no level is reached.
+    // For smaller levels the power underflows, and no number of clusters reaches them.
     (1..1100).find(reach).unwrap_or(usize::MAX)
 }
 
@@ -44,7 +44,7 @@ pub struct Clustered {
 
 /// The clustered statistics of one cell from the moments of its clusters.
 ///
-/// Clusters without a value do not count. `None` for fewer than two, for a confidence outside (0, 1), and where
+/// Clusters without values do not count. `None` for fewer than two clusters, for a confidence outside (0, 1), and if
 /// 128 bits do not suffice.
 #[expect(clippy::cast_precision_loss, reason = "counts are small; exact sums become one quotient here")]
 pub fn clustered(clusters: &[Moments], confidence: f64) -> Option<Clustered> {
@@ -65,7 +65,7 @@ pub fn clustered(clusters: &[Moments], confidence: f64) -> Option<Clustered> {
     })
 }
 
-/// The same of clusters whose values are 0 and 1: the bounds lie inside (0, 1).
+/// The same for clusters of values 0 and 1: the bounds are inside (0, 1).
 #[expect(clippy::cast_precision_loss, reason = "counts are small; exact sums become one quotient here")]
 pub fn clustered_rate(clusters: &[Moments], confidence: f64) -> Option<Clustered> {
     let found = clustered(clusters, confidence)?;
@@ -81,9 +81,9 @@ pub fn clustered_rate(clusters: &[Moments], confidence: f64) -> Option<Clustered
     Some(Clustered { interval, ..found })
 }
 
-/// The variance between clusters, which is not below 0, and within them, by analysis of variance (Donner 1986).
+/// The variance between clusters, at least 0, and the variance within them, by analysis of variance (Donner 1986).
 ///
-/// `None` for fewer than two clusters and where each has one value.
+/// `None` for fewer than two clusters, and if each has one value.
 #[expect(clippy::cast_precision_loss, reason = "few clusters")]
 pub fn variance_components(clusters: &[Moments]) -> Option<(f64, f64)> {
     let parts: Vec<Moments> = clusters.iter().copied().filter(|part| part.n > 0).collect();
@@ -92,7 +92,7 @@ pub fn variance_components(clusters: &[Moments]) -> Option<(f64, f64)> {
     Some((((between - within) / typical_size).max(0.0), within))
 }
 
-/// A design effect up to this is zero but for rounding.
+/// Design effects up to this are zero up to rounding.
 const ROUNDING: f64 = 1e-12;
 
 struct Whole {
@@ -215,8 +215,8 @@ mod tests {
         assert_eq!((alike.se, alike.icc, alike.interval), (0.0, None, None));
     }
 
-    // Python, the analysis of variance written out in fractions: icc = -1/2, and 1 + (6 - 1) * icc = -3/2, which no ratio
-    // of variances is.
+    // Python, the analysis of variance written out in fractions: icc = -1/2, and 1 + (6 - 1) * icc = -3/2, which is
+    // impossible for a ratio of variances.
     #[test]
     fn a_design_effect_is_never_negative() {
         let clusters = [of(&[1, 1, 0, 0, 1, 0, 1, 0]), of(&[1, 0]), of(&[1, 0])];

@@ -1,9 +1,9 @@
-//! From how many episodes on an interval may be shown as one of 95 %.
+//! The fewest episodes for an interval to be shown as a 95 % interval.
 //!
-//! Rule: an interval is given where it held the truth in at least nine of ten simulated studies, from that number of
-//! episodes on, in every scenario of `benches/COVERAGE-INTERVALS.md`; elsewhere the reason is in its place.
-//! No number of episodes protects against an outcome that none of them had: with none among n, three of n may (the rule
-//! of three, Hanley and Lippman-Hand 1983).
+//! Rule: an interval is given if, from that number of episodes on, it contained the truth in at least nine of ten
+//! simulated studies, in every scenario of `benches/COVERAGE-INTERVALS.md`; otherwise the reason is given instead. No
+//! number of episodes protects against an outcome that never occurred: without one in n episodes, its rate may still be
+//! 3/n (the rule of three, Hanley and Lippman-Hand 1983).
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -12,13 +12,13 @@ use crate::interval::Interval;
 
 /// Student's t of a mean of steps.
 pub const STUDENT: u64 = 12;
-/// The bootstrap (bias-corrected and accelerated) of a mean of steps; below it, resamples repeat too few values.
+/// The bootstrap (bias-corrected and accelerated) of a mean of steps; with fewer values, resamples repeat too few.
 pub const BOOTSTRAP: u64 = 15;
 /// A restricted mean, to any decision or to a correct one.
 pub const RESTRICTED_MEAN: u64 = 6;
 /// A median by Brookmeyer and Crowley.
 pub const MEDIAN: u64 = 4;
-/// A difference of restricted means, episodes on each side; of pairs too, though there fewer would do.
+/// A difference of restricted means, episodes on each side; for pairs too, though fewer would suffice.
 pub const DIFFERENCE: u64 = 12;
 /// A difference of means by Welch's t, episodes on each side.
 pub const WELCH: u64 = 8;
@@ -44,7 +44,7 @@ pub enum Withheld {
     Incomparable,
 }
 
-/// The interval of `n` values where it may be given, and otherwise why not.
+/// The interval of `n` values if it may be shown, otherwise the reason why not.
 pub fn given(
     interval: Option<Interval>,
     n: u64,

@@ -1,7 +1,7 @@
 //! Confidence intervals of one cell: a rate from its counts, a mean from its moments.
 //!
-//! Rule: an interval that is not defined is `None`. Bounds of a rate stay inside [0, 1], and a rate of 0 or 1
-//! still has an interval with a width: that is what tells `0/21` from `0/2100`.
+//! Rule: an undefined interval is `None`. Bounds of a rate stay inside [0, 1], and the interval of a rate of 0 or 1
+//! still has a width, which distinguishes `0/21` from `0/2100`.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -22,13 +22,13 @@ impl Interval {
     /// No bounds.
     pub const UNBOUNDED: Self = Self { low: f64::NEG_INFINITY, high: f64::INFINITY };
 
-    /// The part between `least` and `most`, where bounds beyond them mean nothing.
+    /// The part between `least` and `most`; bounds beyond them are meaningless.
     #[must_use]
     pub fn within(self, least: f64, most: f64) -> Self {
         Self { low: self.low.clamp(least, most), high: self.high.clamp(least, most) }
     }
 
-    /// Returns true if `value` lies between the bounds, bounds included.
+    /// Returns true if `value` is between the bounds, inclusive.
     pub fn contains(self, value: f64) -> bool {
         self.low <= value && value <= self.high
     }
@@ -36,9 +36,9 @@ impl Interval {
 
 /// The score interval of a rate (Wilson 1927; Brown et al. 2001, equation 4).
 ///
-/// The default here: its coverage stays near the nominal one at n = 21, also close to 0 and 1.
-/// Exactly 0 is the lower bound of no success, exactly 1 the upper bound of no failure.
-/// `None` for n = 0, for more successes than n, and for a confidence outside (0, 1).
+/// The default: its coverage stays near the nominal one at n = 21, also close to 0 and 1. The lower bound without
+/// successes is exactly 0, the upper bound without failures exactly 1. `None` for n = 0, for more successes than n, and
+/// for a confidence outside (0, 1).
 #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
 pub fn wilson(successes: u64, n: u64, confidence: f64) -> Option<Interval> {
     let failures = counted(successes, n)?;
@@ -51,7 +51,7 @@ pub fn wilson(successes: u64, n: u64, confidence: f64) -> Option<Interval> {
     Some(Interval { low, high })
 }
 
-/// The exact interval of a rate (Clopper and Pearson 1934): never covers less than promised, often more.
+/// The exact interval of a rate (Clopper and Pearson 1934): covers at least the nominal share, often more.
 ///
 /// Bounds are quantiles of beta distributions (Brown et al. 2001, section 4.2.1). Ends and `None` as in [`wilson`].
 pub fn clopper_pearson(successes: u64, n: u64, confidence: f64) -> Option<Interval> {
@@ -84,9 +84,9 @@ fn equal_tails(successes: u64, n: u64, confidence: f64, prior: [(f64, f64); 2]) 
 
 /// Student's interval of a mean: mean plus and minus t(n - 1) standard errors (Student 1908).
 ///
-/// `form` is the standard error that the metric's definition asks for. `None` for n < 2, where no
-/// spread can be estimated in either form, and for a confidence outside (0, 1). The bounds coincide where all
-/// values are equal: the method knows no more.
+/// `form` is the standard error that the metric's definition asks for. `None` for n < 2, where neither form can
+/// estimate a spread, and for a confidence outside (0, 1). The bounds coincide if all values are equal: the method has
+/// no more information.
 #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
 pub fn student_t(moments: &Moments, form: StandardError, confidence: f64) -> Option<Interval> {
     let freedom = moments.n.checked_sub(1)?;
@@ -100,7 +100,7 @@ pub(crate) fn student_t_of(estimate: f64, se: f64, freedom: f64, confidence: f64
     Some(Interval { low: estimate - reach, high: estimate + reach })
 }
 
-/// The failures among `n`, where there is an episode at all and no more successes than episodes.
+/// The number of failures in `n`; `None` without episodes, or for more successes than episodes.
 fn counted(successes: u64, n: u64) -> Option<u64> {
     n.checked_sub(successes).filter(|_| n > 0)
 }
@@ -163,8 +163,8 @@ mod tests {
         check(student_t(&m, Population, 0.95), 5.075883023855853, 30.92411697614415);
     }
 
-    // statsmodels 0.15.0: proportion_confint(k, n, 0.05, "beta"), likewise "jeffreys" where 0 < k < n;
-    // at the ends Jeffreys is one-sided there, and its inner bound is the same.
+    // statsmodels 0.15.0: proportion_confint(k, n, 0.05, "beta"), likewise "jeffreys" if 0 < k < n; at the ends
+    // statsmodels' Jeffreys is one-sided, and its inner bound is the same.
     #[test]
     fn the_beta_intervals_are_the_known_ones() {
         for (k, n, [cp_low, cp_high], [j_low, j_high]) in [

@@ -1,4 +1,4 @@
-//! Intervals of rates and means, and the withholding of intervals from few values.
+//! Intervals of rates and means, withheld for too few values.
 
 pub mod bootstrap;
 pub mod clustered;

@@ -1,22 +1,22 @@
-//! Quantiles behind intervals: normal, Student's t and beta, and the confidence they are asked for at.
+//! Quantiles for intervals: normal, Student's t and beta, and the tail for a confidence.
 //!
-//! Rule: a quantile is given to twelve significant digits and no more. Logarithms and exponentials of
-//! a machine's mathematics library may differ in the last bit from another's; the digits kept do not,
-//! and everything later is plain arithmetic, so an interval has the same bits everywhere.
+//! Rule: quantiles have twelve significant digits. The last bit of logarithms and exponentials may differ between
+//! mathematics libraries; these digits do not, and all later steps are plain arithmetic. So an interval has the same
+//! bits everywhere.
 
 use statrs::distribution::{Beta, ChiSquared, Continuous, ContinuousCDF, Normal, StudentsT};
 
-/// Above this many degrees of freedom the expansion around the normal is exact to the digits kept.
+/// Above this many degrees of freedom the expansion around the normal is exact to these digits.
 const EXPANSION_FROM: f64 = 1000.0;
 
-/// The half of what a two-sided interval leaves out: 0.025 for 0.95. `None` outside (0, 1).
+/// Half of the probability outside a two-sided interval: 0.025 for 0.95. `None` outside (0, 1).
 pub fn tail(confidence: f64) -> Option<f64> {
     (confidence > 0.0 && confidence < 1.0).then(|| settled((1.0 - confidence) / 2.0))
 }
 
-/// The normal deviate that leaves `tail` above it: 1.96 for 0.025.
+/// The normal deviate with `tail` above it: 1.96 for 0.025.
 ///
-/// Takes 0 < `tail` <= 1/2, as [`tail`] gives.
+/// Expects 0 < `tail` <= 1/2, as [`tail`] gives.
 pub fn normal(tail: f64) -> f64 {
     settled(-Normal::standard().inverse_cdf(tail))
 }
@@ -28,16 +28,16 @@ pub(crate) fn normal_below(deviate: f64) -> f64 {
 
 /// The share of the chi-squared distribution with 1 degree of freedom above `statistic`, which is not negative.
 ///
-/// By the incomplete gamma function: the library's error function has ten digits.
+/// By the incomplete gamma function: the library's error function is accurate to only ten digits.
 pub(crate) fn chi_squared_above(statistic: f64) -> f64 {
     settled(ChiSquared::new(1.0).expect("one degree of freedom is positive").sf(statistic))
 }
 
-/// Student's t that leaves `tail` above it, for `freedom` > 0 degrees of freedom.
+/// The deviate of Student's t with `tail` above it, for `freedom` > 0 degrees of freedom.
 ///
-/// The library's inverse is improved by Newton steps on its distribution function; for large `freedom`
-/// the Cornish-Fisher expansion takes over (Abramowitz and Stegun 1964, 26.7.5), where the incomplete
-/// beta function loses digits. Fractional degrees of freedom, as Welch's, are fine.
+/// The library's inverse is improved by Newton steps on its distribution function. For large `freedom` the incomplete
+/// beta function loses digits, so the Cornish-Fisher expansion is used (Abramowitz and Stegun 1964, 26.7.5). Degrees of
+/// freedom may be fractional, as Welch's are.
 pub(crate) fn student(tail: f64, freedom: f64) -> f64 {
     if freedom >= EXPANSION_FROM {
         return settled(student_expansion(-Normal::standard().inverse_cdf(tail), freedom));
@@ -65,10 +65,9 @@ fn student_expansion(z: f64, freedom: f64) -> f64 {
     z + terms.iter().rev().fold(0.0, |sum, term| (sum + term) / freedom)
 }
 
-/// The point of the beta distribution with shapes `a` and `b` that leaves `tail` below it.
+/// The point of the beta distribution with shapes `a` and `b` that has `tail` below it.
 ///
-/// The library's inverse is improved by Newton steps on its distribution function; a step that would
-/// leave (0, 1) is not taken.
+/// The library's inverse is improved by Newton steps on its distribution function; a step outside (0, 1) is not taken.
 pub(crate) fn beta(tail: f64, a: f64, b: f64) -> f64 {
     let distribution = Beta::new(a, b).expect("shapes are positive");
     let start = distribution.inverse_cdf(tail);

@@ -1,4 +1,4 @@
-//! The generator behind every resampling: seeded, with a stable stream on every machine.
+//! The generator for all resampling: seeded, with the same stream on every machine.
 
 /// A small generator of known quality (Steele, Lea and Flood 2014).
 #[derive(Clone, Debug)]
@@ -18,7 +18,7 @@ impl SplitMix64 {
         z ^ (z >> 31)
     }
 
-    /// An index below `bound`, uniform but for 2^-64 of `bound`.
+    /// An index below `bound`, uniform up to a bias of 2^-64 times `bound`.
     pub fn below(&mut self, bound: usize) -> usize {
         let scaled = u128::from(self.next_bits()) * bound as u128;
         usize::try_from(scaled >> 64).expect("less than the bound")

@@ -1,4 +1,4 @@
-//! A study that is looked at while it runs: the e-values of `sequential`, at looks planned beforehand.
+//! A study with interim looks: the e-values of `sequential`, at planned looks.
 
 use super::Power;
 use crate::sequential::against_level;
@@ -7,9 +7,9 @@ use exact::ratio::Ratio;
 /// The most episodes of a plan with looks; the outcomes grow with the third power.
 pub const MOST_AT_LOOKS: u64 = 600;
 
-/// An anytime-valid test with a look after every this many episodes.
+/// An anytime-valid test with a look after each `every` episodes.
 ///
-/// An outcome is a loss, nothing, or a win: of pairs, which model alone succeeds; of one model, failure and success.
+/// An outcome is a loss, a tie or a win: for pairs, which model alone succeeds; for one model, failure or success.
 #[derive(Clone, Debug)]
 pub struct Anytime {
     level: f64,
@@ -22,7 +22,7 @@ pub struct Anytime {
 }
 
 impl Anytime {
-    /// Pairs of which `discordance` are discordant, so that the rates are `difference` apart.
+    /// Pairs with the discordant share `discordance`, so that the rates are `difference` apart.
     pub fn pairs(level: f64, every: u64, difference: f64, discordance: f64) -> Option<Self> {
         let [better, worse] = [difference, -difference].map(|sign| f64::midpoint(discordance, sign).max(0.0));
         Some(Self::new(level, every, [worse, 1.0 - discordance, better], Ratio::new(1, 2)?))
@@ -43,7 +43,7 @@ impl Anytime {
         self.level.recip()
     }
 
-    /// The expected number of episodes of a study that stops at its first rejection, and after `n` at the latest.
+    /// The expected number of episodes of a study that stops at its first rejection, or after `n`.
     #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
     pub fn expected(&mut self, n: u64) -> f64 {
         self.run(n);
@@ -54,7 +54,7 @@ impl Anytime {
         sum + (1.0 - stopped) * n as f64
     }
 
-    /// Plays on until `n` episodes.
+    /// Continues to `n` episodes.
     fn run(&mut self, n: u64) {
         while (self.stopped.len() as u64 + 1) * self.every <= n {
             (0..self.every).for_each(|_| self.step());
@@ -63,7 +63,7 @@ impl Anytime {
         }
     }
 
-    /// One more episode; `running[d][w]` has the probability of w wins among d wins and losses.
+    /// Adds one episode; `running[d][w]` is the probability of w wins among d wins and losses.
     fn step(&mut self) {
         let [lost, none, won] = self.shares;
         let mut next: Vec<Vec<f64>> = (0..=self.running.len()).map(|decided| vec![0.0; decided + 1]).collect();

@@ -1,6 +1,6 @@
-//! The probabilities of all counts at once, by ratios of neighbours from the most probable one.
+//! The probabilities of all counts, by ratios of neighbours starting from the most probable count.
 //!
-//! Rule: additions, products and quotients only, so that all machines get the same bits. What underflows is 0.
+//! Rule: only additions, products and quotients, so all machines get the same bits. Underflow gives 0.
 
 /// The probability of each number of successes in `n` trials with this rate.
 #[expect(
@@ -13,11 +13,11 @@ pub(crate) fn probabilities(n: u64, rate: f64) -> Vec<f64> {
     let rate = rate.clamp(0.0, 1.0);
     let mode = (((n + 1) as f64 * rate) as u64).min(n);
     let odds = rate / (1.0 - rate);
-    // P(k + 1) / P(k) = (n - k) / (k + 1) * odds; a certain success leaves n alone.
+    // P(k + 1) / P(k) = (n - k) / (k + 1) * odds; if success is certain, only n is possible.
     from_mode(n, mode, |k| if rate < 1.0 { (n - k) as f64 / (k + 1) as f64 * odds } else { 0.0 })
 }
 
-/// The counts whose probabilities add up to 1 for all that is printed.
+/// The counts whose probabilities add up to 1 at printed precision.
 pub(super) fn likely(probabilities: &[f64]) -> std::ops::RangeInclusive<u64> {
     const NEGLIGIBLE: f64 = 1e-18;
     let is_likely = |probability: &f64| *probability > NEGLIGIBLE;
@@ -26,7 +26,7 @@ pub(super) fn likely(probabilities: &[f64]) -> std::ops::RangeInclusive<u64> {
     first as u64..=last as u64
 }
 
-/// The probabilities of 0 to `last` that have this ratio of each to the one before, `ratio(k)` = P(k + 1) / P(k).
+/// The probabilities of 0 to `last`, from the ratio of each to the previous: `ratio(k)` = P(k + 1) / P(k).
 pub(super) fn from_mode(last: u64, mode: u64, ratio: impl Fn(u64) -> f64) -> Vec<f64> {
     let length = usize::try_from(last + 1).expect("counts of episodes are far below the address space");
     let at = usize::try_from(mode).expect("no more than the last");

@@ -1,10 +1,10 @@
-//! Episodes of two models that are no pairs: Fisher's exact test.
+//! Unpaired episodes of two models: Fisher's exact test.
 
 use super::binomial::{from_mode, likely, probabilities};
 use super::{Power, Rates, TIE};
 
-/// The exact two-sided test of no difference between two rates over as many episodes each, by probability: a table
-/// counts as extreme where it is at most as probable as the one seen, with the same totals.
+/// The exact two-sided test of no difference between two rates with equal numbers of episodes, by probability: a table
+/// is extreme if it is at most as probable as the observed one, given the totals.
 #[derive(Clone, Copy, Debug)]
 pub struct Fisher {
     /// The level that p must not exceed.
@@ -43,7 +43,7 @@ fn rejections(n: u64, total: u64, level: f64) -> Vec<bool> {
         ((n - x) as f64 * (total - x) as f64) / ((x + 1) as f64 * (n + x + 1 - total) as f64)
     };
     let probabilities = from_mode(last - first, (total / 2).clamp(first, last) - first, ratio);
-    // The least probable ones first; both tails fall away from the mode, so that the smaller of the ends is next.
+    // The least probable first: both tails fall away from the mode, so the next is the smaller of the two ends.
     let mut rejects = vec![false; probabilities.len()];
     let (mut low, mut beyond, mut sum) = (0, probabilities.len(), 0.0);
     while low < beyond {

@@ -1,4 +1,4 @@
-//! Pairs of episodes: the exact test of `McNemar`, whose power depends on the discordant pairs alone.
+//! Pairs of episodes: the exact test of `McNemar`, whose power depends only on the discordant pairs.
 
 use super::binomial::probabilities;
 use super::{Power, TIE};
@@ -13,7 +13,7 @@ pub struct McNemar {
 }
 
 impl McNemar {
-    /// Pairs of which `discordance` are discordant, so that the rates are `difference` apart.
+    /// Pairs with the discordant share `discordance`, so that the rates are `difference` apart.
     ///
     /// The discordance is at least the difference.
     pub fn new(level: f64, difference: f64, discordance: f64) -> Self {
@@ -21,8 +21,8 @@ impl McNemar {
         Self { level, discordance, favours: f64::midpoint(1.0, share).min(1.0), rejects: Vec::new() }
     }
 
-    /// The probability that so many discordant pairs lead to a rejection: both tails of the binomial as far as twice
-    /// the tail under 1/2 is at most the level.
+    /// The probability of a rejection with this number of discordant pairs: both tails of the binomial, up to the count
+    /// at which twice the tail under 1/2 is at most the level.
     fn rejects(&self, discordant: u64) -> f64 {
         let even = probabilities(discordant, 0.5);
         let mut tail = 0.0;

@@ -1,7 +1,7 @@
 //! Sample sizes of comparisons, and their exact power by enumeration.
 //!
-//! Rule: the tests are those of a report, at a fixed level, and their power is a sum over every outcome; that of pairs
-//! by seed is simulated, seeded. Power of an exact test rises in a sawtooth, so a size is tried one by one from below.
+//! Rule: the tests are a report's, at a fixed level. Power is a sum over all outcomes, or a seeded simulation for pairs
+//! by seed. The power of an exact test rises in a sawtooth, so sizes are tried one by one from below.
 
 mod anytime;
 pub mod binomial;
@@ -20,13 +20,13 @@ pub use self::one_rate::OneRate;
 pub use self::seeds::{BySeed, SEED, STUDIES, Seeds};
 pub use super::quantile::settled;
 
-/// The tolerance between a p value and the level, for rounding of sums only.
+/// The tolerance between a p value and the level, only for rounding of sums.
 const TIE: f64 = 1e-12;
 
-/// The most episodes per arm that a search goes to.
+/// The most episodes per arm in a search.
 pub const MOST_EPISODES: u64 = 2_000;
 
-/// A test whose power is known for each number of episodes.
+/// A test with known power for each number of episodes.
 pub trait Power {
     /// The probability that the test rejects with `n` episodes per model.
     fn power(&mut self, n: u64) -> f64;
@@ -46,27 +46,27 @@ pub struct Rates {
 }
 
 impl Rates {
-    /// Rates that are `difference` apart, from `baseline` up, or around 1/2 where none is given: there a difference is
-    /// hardest to show.
+    /// Rates that are `difference` apart: from `baseline` up, or by default around 1/2, where a difference is hardest
+    /// to show.
     ///
-    /// `None` where they are not within 0 and 1.
+    /// `None` if they are outside [0, 1].
     pub fn apart(difference: f64, baseline: Option<f64>) -> Option<Self> {
         let lower = baseline.unwrap_or((1.0 - difference) / 2.0);
         let rates = Self { lower, higher: lower + difference };
         (difference >= 0.0 && lower >= 0.0 && rates.higher <= 1.0 + TIE).then_some(rates)
     }
 
-    /// The higher minus the lower.
+    /// The higher rate minus the lower.
     pub fn difference(self) -> f64 {
         self.higher - self.lower
     }
 
-    /// The share of pairs of which one succeeds and the other does not, where success is independent within a pair.
+    /// The share of pairs in which exactly one episode succeeds, if successes are independent within a pair.
     pub fn independent_discordance(self) -> f64 {
         self.lower * (1.0 - self.higher) + self.higher * (1.0 - self.lower)
     }
 
-    /// The shares of discordant pairs that there can be with these rates: from the difference up.
+    /// The possible shares of discordant pairs with these rates: from the difference up.
     pub fn possible_discordance(self) -> (f64, f64) {
         let sum = self.lower + self.higher;
         (self.difference(), sum.min(2.0 - sum))
@@ -96,15 +96,15 @@ impl Clusters {
         if self.are_units() { self.seeds } else { self.seeds * runs }
     }
 
-    /// The power of a test with so many runs per seed.
+    /// The power of a test with `runs` runs per seed.
     pub fn power(self, test: &mut dyn Power, runs: u64) -> f64 {
         test.power(if self.are_units() { runs } else { self.seeds * runs })
     }
 
-    /// The fewest runs per seed with which the power is at least `wanted`; `None` where no number of episodes up to
-    /// [`Power::most`] has it.
+    /// The fewest runs per seed with power of at least `wanted`; `None` if no number of episodes up to [`Power::most`]
+    /// suffices.
     ///
-    /// Doubling and bisection find about where; then runs are tried one by one from a fifth, and from twenty, below.
+    /// Doubling and bisection find a candidate; then runs are tried one by one from 20, or a fifth, below it.
     pub fn runs_for(self, wanted: f64, test: &mut dyn Power) -> Option<u64> {
         const NEAR: u64 = 20;
         let most = test.most() / self.seeds.max(1);
@@ -125,7 +125,8 @@ impl Clusters {
     }
 }
 
-/// The smallest argument in [0, `most`] at which `power` reaches `wanted`, by bisection; `None` where even `most` does not.
+/// The smallest argument in [0, `most`] with `power` of at least `wanted`, by bisection; `None` if even `most` has
+/// less.
 ///
 /// `power` must rise with its argument. Forty halvings leave an error below 10^-12.
 pub fn smallest(wanted: f64, most: f64, mut power: impl FnMut(f64) -> f64) -> Option<f64> {

@@ -1,4 +1,4 @@
-//! One model against a level fixed beforehand, such as chance: the exact binomial test.
+//! One model against a fixed level, such as chance: the exact binomial test.
 
 use super::Power;
 use super::binomial::{likely, probabilities};
@@ -10,7 +10,7 @@ use exact::ratio::Ratio;
 pub struct OneRate {
     /// The level that p must not exceed.
     pub level: f64,
-    /// The rate under the hypothesis.
+    /// The rate under the null hypothesis.
     pub chance: Ratio,
     /// The true rate.
     pub rate: f64,

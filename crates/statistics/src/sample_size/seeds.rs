@@ -1,4 +1,4 @@
-//! Seeds whose episodes resemble each other: the tests of `units`, which count each seed once.
+//! Seeds with similar episodes: the tests of `units`, which count each seed once.
 
 use super::{McNemar, Power};
 use crate::random::SplitMix64;
@@ -6,23 +6,23 @@ use crate::units::{Sides, difference_test, rate_test_of_sum};
 use exact::moments::Moments;
 use exact::ratio::Ratio;
 
-/// The studies that a power over pairs is simulated by; its standard error is at most 0.012.
+/// The number of simulated studies for a power over pairs; its standard error is at most 0.012.
 pub const STUDIES: u32 = 2_000;
-/// The first state of their random numbers.
+/// The initial state of their random numbers.
 pub const SEED: u64 = 20_260_203;
 
 /// The tested quantity of each seed.
 #[derive(Clone, Copy, Debug)]
 pub enum BySeed {
-    /// The difference of two models, which share their seeds; and the share of discordant pairs.
+    /// The difference of two models that share their seeds, and the share of discordant pairs.
     Pairs { difference: f64, discordance: f64 },
     /// One rate against a level of chance.
     Rate { chance: Ratio, rate: f64 },
 }
 
-/// A test over seeds, each with as many runs.
+/// A test over seeds with equal numbers of runs.
 ///
-/// An episode has the outcome of its seed with the square root of the intraclass correlation, and one of its own otherwise.
+/// An episode takes its seed's outcome with probability sqrt(intraclass correlation), otherwise its own.
 #[derive(Clone, Copy, Debug)]
 pub struct Seeds {
     pub test: BySeed,
@@ -33,7 +33,7 @@ pub struct Seeds {
 }
 
 impl Power for Seeds {
-    /// The power with `n` runs for each seed.
+    /// The power with `n` runs per seed.
     fn power(&mut self, n: u64) -> f64 {
         match self.test {
             BySeed::Pairs { difference, discordance } if n == 1 => {
@@ -49,7 +49,7 @@ impl Power for Seeds {
 }
 
 impl Seeds {
-    /// The probability of each sum of `runs` outcomes of a seed, from `-runs` to `runs`; an outcome is -1, 0 or 1.
+    /// The probability of each sum of a seed's `runs` outcomes, from `-runs` to `runs`; an outcome is -1, 0 or 1.
     fn sums(&self, shares: [f64; 3], runs: u64) -> Vec<f64> {
         let copied = self.icc.sqrt();
         let mut all = vec![0.0; 2 * size(runs) + 1];
@@ -101,7 +101,7 @@ fn drawn(probabilities: &[f64], at: f64) -> usize {
     probabilities.iter().position(is_reached).unwrap_or(probabilities.len() - 1)
 }
 
-/// The episodes of both models in a seed whose sums differ by `at` minus the runs.
+/// The episodes of both models in a seed with sums that differ by `at` minus the runs.
 fn pair(at: usize, runs: u64) -> (Moments, Moments) {
     let runs = size(runs);
     let of = |successes: usize| Moments::default().with_truths(runs - successes, successes).unwrap_or_default();

@@ -1,5 +1,5 @@
-//! Reference values: scipy 1.17.1, every outcome weighed by `binom.pmf`, the tests being `2 * binom.cdf` at 1/2,
-//! `fisher_exact` and `binomtest`; sizes by trying each, smallest differences by `brentq`.
+//! Reference values from scipy 1.17.1: every outcome weighted by `binom.pmf`; the tests are `2 * binom.cdf` at 1/2,
+//! `fisher_exact` and `binomtest`. Sizes are found by trying each, smallest differences by `brentq`.
 #![expect(clippy::unreadable_literal, reason = "reference values as their source prints them")]
 
 use super::{Anytime, BySeed, Clusters, Fisher, McNemar, OneRate, Power, Rates, Seeds, binomial, smallest};
@@ -69,7 +69,7 @@ fn sizes_are_the_first_that_have_the_power() {
     assert_eq!(seeds(3).runs_for(0.8, &mut Fisher { level: 0.05, rates: around(0.5) }), Some(6));
     let chance = Ratio::new(1, 3).unwrap();
     assert_eq!(seeds(3).runs_for(0.8, &mut OneRate { level: 0.05, chance, rate: 1.0 / 3.0 + 0.3 }), Some(8));
-    // No difference is never found with more than the level.
+    // A zero difference is never found with more than the level.
     assert_eq!(seeds(200).runs_for(0.8, &mut pairs(0.05, around(0.0))), None);
 }
 
@@ -84,7 +84,7 @@ fn smallest_differences_are_the_known_ones() {
     assert_eq!(smallest(0.8, 1.0, |difference| pairs(0.05, around(difference)).power(5)), None);
 }
 
-/// The p values of `stats` for each outcome decide, weighed by its probability.
+/// The p values of `stats` decide each outcome, weighted by its probability.
 #[test]
 fn power_is_that_of_the_tests_that_statistics_run() {
     let (level, difference, discordance) = (0.05, 0.4, 0.5);
@@ -110,8 +110,8 @@ fn power_is_that_of_the_tests_that_statistics_run() {
     }
 }
 
-// Python, by enumeration: 12 pairs with discordant shares 0.45 and 0.05, e = beta(a + 1/2, b + 1/2) / (pi * 2^-(a + b)),
-// looks after 3, 6, 9 and 12 pairs, rejection where 1 / e <= 0.05.
+// Python, by enumeration: 12 pairs with discordant shares 0.45 and 0.05, e = beta(a + 1/2, b + 1/2) / (pi * 2^-(a +
+// b)), looks after 3, 6, 9 and 12 pairs, rejection if 1 / e <= 0.05.
 #[test]
 fn looks_stop_at_the_boundary_of_sequential_statistics() {
     let mut test = Anytime::pairs(0.05, 3, 0.4, 0.5).unwrap();
@@ -121,7 +121,7 @@ fn looks_stop_at_the_boundary_of_sequential_statistics() {
     let mut test = Anytime::rate(0.05, 3, Ratio::new(1, 3).unwrap(), 0.8);
     close(test.power(12), 0.6052045168640005);
     close(test.expected(12), 9.823156223999998);
-    // A true hypothesis is ever rejected with at most the level, however many looks.
+    // A true hypothesis is ever rejected with a probability of at most the level, however many looks there are.
     assert!(Anytime::pairs(0.05, 1, 0.0, 0.5).unwrap().power(200) < 0.05);
 }
 
@@ -133,9 +133,9 @@ fn seeds_count_once_in_a_plan_too() {
     close(of(BySeed::Rate { chance, rate: 0.8 }).power(3), 0.5159454035323163);
     let simulated = of(BySeed::Pairs { difference: 0.5, discordance: 0.6 }).power(3);
     assert!((simulated - 0.24331089963269045).abs() < 0.035, "{simulated}");
-    // One run for each seed: the test of McNemar over the seeds.
+    // With one run per seed: the test of McNemar over the seeds.
     close(of(BySeed::Pairs { difference: 0.5, discordance: 0.6 }).power(1), McNemar::new(0.05, 0.5, 0.6).power(6));
-    // However many runs, 3 seeds show nothing.
+    // With any number of runs, 3 seeds show nothing.
     let three = Clusters { seeds: 3, icc: 0.1, people: false };
     let test = BySeed::Pairs { difference: 0.9, discordance: 0.9 };
     close(three.power(&mut Seeds { test, level: 0.05, seeds: 3, icc: 0.1 }, 50), 0.0);
@@ -151,7 +151,7 @@ fn rates_stay_within_zero_and_one() {
     close(most, 1.0);
 }
 
-/// The search skips no size that the power has before the one it gives.
+/// The search skips no smaller size that has the power.
 #[test]
 fn no_smaller_size_has_the_power() {
     for difference in [0.2, 0.25, 0.35, 0.45, 0.6] {

@@ -12,12 +12,12 @@ use report::style::Style;
 use score::table::EpisodeTable;
 
 impl Study {
-    /// What changes from this study to another one: cells, and episodes by their ids. Two studies of the same traces under one
-    /// filter are scored in one scan, which tells the timesteps that decided each difference; what differs between others has
-    /// none, and a note says so.
+    /// The changes from this study to another: cells, and episodes by their ids. Two studies of the same traces under
+    /// one filter are scored in one scan, which gives the timesteps that decided each difference. Other studies lack
+    /// these timesteps, and a note says so.
     ///
     /// # Errors
-    /// As [`Study::score`] for either; sums of squares beyond 128 bits.
+    /// As [`Study::score`] for either study; sums of squares beyond 128 bits.
     pub fn diff(&self, other: &Self) -> Result<Diff, StudyError> {
         let by = self.question.by.clone().unwrap_or_else(|| DEFAULT_BY.map(str::to_owned).to_vec());
         if self.differs_in_definitions_alone(other) {
@@ -46,7 +46,7 @@ impl Study {
         are_traces && self.stamps == other.stamps && question(self) == question(other)
     }
 
-    /// The definitions that are asked for: a name or a path.
+    /// The requested definitions: a name or a path.
     pub fn definitions_name(&self) -> &Path {
         self.question.definitions_name()
     }

@@ -1,4 +1,4 @@
-//! The declared design, in the form that statistics use.
+//! The declared design, in the form used by statistics.
 
 use statistics::design::{Cluster, Design, DesignKind};
 use trace::declared::{self, Declared, Origin};

@@ -1,7 +1,7 @@
-//! Two sides of a comparison: definitions, scores or a report's folder, to cells and episodes that differ, and to the
-//! timesteps that decided where they do.
+//! Compares two sides: definitions, scores or a report's folder. Gives the cells and episodes that differ, and the
+//! timesteps that decided each difference.
 //!
-//! Rule: only metrics that both sides have are scored, so that a side may have others that these traces do not bear.
+//! Rule: only metrics of both sides are scored, so a side may have others that these traces do not support.
 
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
@@ -31,7 +31,7 @@ use trace::open::TraceSet;
 pub enum Side {
     /// Definitions by name or path.
     Definitions(PathBuf),
-    /// Files of scores, the parts of one table.
+    /// Files of scores, as parts of one table.
     Scores(Vec<ScoreFile>),
 }
 
@@ -40,7 +40,7 @@ pub enum Side {
 pub struct DiffRequest {
     /// The metrics; all if absent.
     pub metrics: Option<Vec<String>>,
-    /// The episodes, by a condition that holds on both sides; all if absent.
+    /// A condition on episodes that applies to both sides; all episodes if absent.
     pub filter: Option<String>,
     /// The columns that cells are grouped by.
     pub by: Vec<String>,
@@ -64,9 +64,9 @@ impl Default for DiffRequest {
 /// The differences between two sides.
 #[derive(Clone, Debug)]
 pub struct Diff {
-    /// Cells and episodes that changed, in the order of tables.
+    /// Changed cells and episodes, in table order.
     pub changes: Changes,
-    /// Notes about flips without known timesteps, one sentence each.
+    /// One sentence for each reason why deciding timesteps are unknown.
     pub notes: Vec<String>,
 }
 
@@ -82,15 +82,15 @@ pub(crate) struct Pair {
 /// One side, scored.
 #[derive(Debug)]
 pub(crate) struct Scored {
-    /// Its episodes, under the metrics that both sides have.
+    /// Its episodes, with the metrics of both sides.
     pub table: EpisodeTable,
-    /// All its metrics among those asked for.
+    /// All its requested metrics.
     pub metrics: Vec<String>,
-    /// The definitions; `None` for scores that were read, which carry their definitions as text.
+    /// The definitions; `None` for scores from a file, which carry their definitions as text.
     pub definitions: Option<Definitions>,
 }
 
-/// Compares two sides; `traces` score definitions, and tell which timesteps decided where both sides are scores.
+/// Compares two sides. `traces` are scored by definitions; if both sides are scores, they give the deciding timesteps.
 ///
 /// # Errors
 /// Faults in definitions, scores or traces; a metric that neither side has; definitions without traces.
@@ -121,14 +121,14 @@ impl Side {
     /// The side that an argument names.
     ///
     /// # Errors
-    /// A folder or a Parquet file that holds no scores.
+    /// A folder or a Parquet file without scores.
     pub fn of(argument: impl AsRef<Path>) -> Result<Self, StudyError> {
         let path = argument.as_ref();
         let inside = path.join("episodes.parquet");
         let inputs = if inside.is_file() {
             vec![Input::new(inside)]
         } else if path.is_dir() {
-            // A folder of parts, as a cluster writes them, is one table.
+            // A folder of parts, as a cluster writes it, is one table.
             inputs::resolve(&[path.as_os_str().to_owned()], io::empty())?
         } else {
             vec![Input::new(path)]
@@ -235,7 +235,7 @@ impl Pair {
         Ok(changes)
     }
 
-    /// Adds the timesteps that decided each flip; returns what there is to say about those that are not known.
+    /// Adds the timesteps that decided each flip; returns a note for each reason why some are unknown.
     pub(crate) fn explain(
         &self,
         changes: &mut Changes,
@@ -294,7 +294,7 @@ impl Scored {
     }
 }
 
-/// The tables of both sides, and what decided where they differ.
+/// The tables of both sides, and the evidence for their differences.
 type ScoredSides = ([EpisodeTable; 2], Option<[BTreeMap<String, Evidence>; 2]>);
 
 fn score_sides(

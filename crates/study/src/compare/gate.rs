@@ -1,4 +1,4 @@
-//! Later episodes compared with earlier ones: one verdict per cell, with the deciding steps and the frames of each flip.
+//! Compares later episodes with earlier ones: one verdict per cell, with the deciding steps and frames of each flip.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -20,15 +20,15 @@ use score::table::EpisodeTable;
 use trace::inputs::{self, Input};
 use trace::open::TraceSet;
 
-/// The file that tells a page which `view --export` wrote, and the one that names its episodes.
+/// The file that identifies a page of `view --export`, and the file that lists its episodes.
 const PAGE: [&str; 2] = ["assets/view.js", "data/list.js"];
 
 impl Study {
-    /// The verdicts on this study, the later one, against an earlier one: improved, held, regressed, or why neither is said.
+    /// The verdicts on this (later) study against an earlier one: improved, held, regressed, or why there is none.
     ///
     /// # Errors
-    /// As [`Study::score`] for either; a metric that a side does not have, or that has no better direction; a cell that mixes
-    /// episodes which were recorded differently; sums of squares beyond 128 bits.
+    /// As [`Study::score`] for either study; a metric that a side lacks, or without a better direction; a cell that
+    /// mixes episodes recorded differently; sums of squares beyond 128 bits.
     pub fn gate(&self, base: &Self, options: &GateOptions) -> Result<Gate, StudyError> {
         let (old, new) = (base.gated(options)?, self.gated(options)?);
         let design = design_of(&old.declared.clone().joined(new.declared.clone()));
@@ -62,7 +62,7 @@ impl Study {
         Ok(gate)
     }
 
-    /// The first metric that has a better direction.
+    /// The first metric with a better direction.
     ///
     /// # Errors
     /// As [`Study::score`]; definitions without such a metric.
@@ -93,7 +93,7 @@ impl Study {
         match &self.source {
             _ if ids.is_empty() => Ok(Shown::default()),
             Source::Traces(traces) => self.shown_by(traces, ids, metric),
-            // What is beside scores may be of other episodes, and is no fault of theirs.
+            // Files beside scores may belong to other episodes, which is no fault of the scores.
             Source::Scores(_) => {
                 Ok(self.traces_beside().and_then(|traces| self.shown_by(&traces, ids, metric).ok()).unwrap_or_default())
             }
@@ -139,14 +139,14 @@ pub(crate) fn check_metric<'t>(table: &'t EpisodeTable, name: &str) -> Result<&'
     })
 }
 
-/// The deciding steps of some episodes with the value that they gave, and pages with frames.
+/// The deciding steps and values of some episodes, and pages with frames.
 #[derive(Default)]
 struct Shown {
     evidence: BTreeMap<String, (Option<i64>, Vec<i64>)>,
     pages: Vec<PageBeside>,
 }
 
-/// A page that `view --export` wrote, and the value that it has of each episode.
+/// A page written by `view --export`, and its value for each episode.
 struct PageBeside {
     folder: PathBuf,
     values: BTreeMap<String, i64>,

@@ -1,7 +1,7 @@
-//! The check for cells that mix recordings: other worlds, other prompts, other agents.
+//! The check for cells that mix recordings: different worlds, prompts or agents.
 //!
-//! Rule: within a cell, the episodes of one experiment and model have one fingerprint. A mean over two is refused, with
-//! what differs. Where no episode of a cell declares one, nothing can be compared, and nothing is refused.
+//! Rule: within a cell, the episodes of one experiment and model have one fingerprint. A mean over two fingerprints is
+//! refused, and the error says what differs. Cells without fingerprints cannot be checked and are accepted.
 
 use std::collections::BTreeMap;
 
@@ -26,7 +26,7 @@ fn mixed(table: &EpisodeTable, groups: &[usize]) -> Vec<[usize; 2]> {
     found
 }
 
-/// Refuses cells, grouped by these columns, that mix fingerprints, or of which only some episodes have one.
+/// Refuses cells, grouped by these columns, that mix fingerprints, or in which only some episodes have one.
 pub(crate) fn check(table: &EpisodeTable, by: &[String]) -> Result<(), StudyError> {
     let groups = membership(table, by)?;
     match mixed(table, &groups).first() {
@@ -35,7 +35,7 @@ pub(crate) fn check(table: &EpisodeTable, by: &[String]) -> Result<(), StudyErro
     }
 }
 
-/// The mixtures that pooled cells contain, a sentence each; empty without any.
+/// The mixtures in pooled cells, one sentence each; empty without any.
 pub(crate) fn told(table: &EpisodeTable, by: &[String]) -> Result<Vec<String>, StudyError> {
     let groups = membership(table, by)?;
     let told = |rows: &[usize; 2]| {

@@ -1,8 +1,8 @@
-//! The study again under other thresholds of mirror evidence: how every cell moves, and where a conclusion changes.
+//! The study under other thresholds of mirror evidence: how each cell moves, and which conclusions change.
 //!
-//! Rule: all thresholds and the definitions as they are come from one scan and one plan. A threshold replaces the `let`
-//! `visible` of the definitions by `mirror_self_px >= K`, as an edited definition file would; a filter is read under each of
-//! them too.
+//! Rule: all thresholds and the unchanged definitions share one scan and one plan. A threshold replaces the `let`
+//! `visible` of the definitions by `mirror_self_px >= K`, as an edited definition file would; it applies to a filter
+//! too.
 
 use std::collections::BTreeSet;
 use std::str::FromStr;
@@ -31,21 +31,21 @@ use trace::schema::domain::Domain;
 
 /// The column that a threshold applies to.
 const PIXELS: &str = "mirror_self_px";
-/// The `let` that says at which steps there is evidence.
+/// The `let` that is true at steps with evidence.
 const EVIDENCE: &str = "visible";
-/// The evidence that recordings have as ground truth.
+/// The column that records evidence as ground truth.
 const GROUND_TRUTH: &str = "mirror_visible";
-/// The key of the threshold in a footer's recording.
+/// The key of the threshold in a footer's recording metadata.
 const THRESHOLD_KEY: &str = "visibility_threshold_px";
 
-/// The thresholds that are tried unless others are asked for, px.
+/// The default thresholds, px.
 pub const DEFAULT_THRESHOLDS: &str = "1,10,30,60,120,240";
 
-/// Thresholds, ascending and each once, px.
+/// Thresholds, ascending and distinct, px.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Thresholds(Vec<u32>);
 
-/// A list of thresholds that is not one.
+/// An invalid list of thresholds.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "expected whole numbers of pixels from 1 on, separated by commas, such as {DEFAULT_THRESHOLDS}, found `{found}`"
@@ -58,14 +58,14 @@ impl FromStr for Thresholds {
     type Err = ThresholdsError;
 
     fn from_str(text: &str) -> Result<Self, ThresholdsError> {
-        // No pixel is no evidence; what does not fit the column's 32 bits with a sign would be met by nothing.
+        // Zero pixels are no evidence; no value of the column, a signed 32-bit integer, reaches a larger threshold.
         let one = |text: &str| text.trim().parse::<u32>().ok().filter(|px| (1..=i32::MAX as u32).contains(px));
         let all: Option<BTreeSet<u32>> = text.split(',').map(one).collect();
         all.map(|all| Self(all.into_iter().collect())).ok_or_else(|| ThresholdsError { found: text.to_owned() })
     }
 }
 
-/// The answer: what moves, as data, and as a figure.
+/// The answer: the changes, as data and as a figure.
 #[derive(Debug)]
 pub struct SensitivityReport {
     /// Cells and conclusions under each threshold.
@@ -76,11 +76,11 @@ pub struct SensitivityReport {
 }
 
 impl Study {
-    /// The study under each threshold of mirror evidence and under the definitions as they are, in one scan.
+    /// Scores the study under each threshold of mirror evidence and under the unchanged definitions, in one scan.
     ///
     /// # Errors
-    /// As [`Study::statistics`]; scores, or traces that do not record `mirror_self_px` at every step; definitions without a
-    /// `let` named `visible` that is true or false at each step; metrics none of which depends on it.
+    /// As [`Study::statistics`]; scores, or traces that do not record `mirror_self_px` at every step; definitions
+    /// without a `let` named `visible` that is true or false at each step; metrics that do not depend on it.
     pub fn sensitivity(&self, thresholds: &Thresholds) -> Result<SensitivityReport, StudyError> {
         let traces = self.source.traces()?;
         check_pixels(traces)?;
@@ -138,7 +138,7 @@ impl Study {
 
     fn stage(&self, px: Option<u32>, counted: &Counted) -> Result<Scored, StudyError> {
         let cells = self.cells_of(&counted.results.episodes)?;
-        // Conclusions need no intervals of cells, whose bootstraps would be most of the time.
+        // Conclusions need no intervals of cells; their bootstraps would take most of the time.
         let none = |group: &Group| Group { moments: Vec::new(), ..group.clone() };
         let bare = Cells { metrics: Vec::new(), groups: cells.groups.iter().map(none).collect(), ..cells.clone() };
         let statistics = self.statistics_of(counted, &bare, &Options::default())?;
@@ -159,7 +159,7 @@ struct Scored {
 struct Trial {
     thresholds: Vec<u32>,
     definitions: Vec<Definitions>,
-    /// At how many steps of each episode no pixels are recorded.
+    /// Counts the steps of each episode without recorded pixels.
     pixels: Definitions,
     lost: Option<Definitions>,
     reference: Reference,
@@ -217,7 +217,7 @@ fn metrics(definitions: &Definitions) -> impl Iterator<Item = String> + '_ {
     definitions.plan.outputs.iter().map(|output| output.name.clone())
 }
 
-/// The definitions asked for, with evidence from this many pixels on.
+/// The requested definitions, with evidence from this number of pixels on.
 fn under(question: &Question, px: u32, columns: &Columns) -> Result<Definitions, StudyError> {
     let as_is = question.load(columns)?;
     let shown = format!("the threshold of {px} px");
@@ -235,7 +235,7 @@ fn under(question: &Question, px: u32, columns: &Columns) -> Result<Definitions,
     Ok(definitions)
 }
 
-/// The metrics and columns that depend on the evidence, between two definitions that differ in it alone.
+/// The metrics and columns that depend on the evidence, found from two definitions that differ only in it.
 struct Dependent {
     metrics: BTreeSet<String>,
     filter: bool,
@@ -273,7 +273,7 @@ fn check_pixels(traces: &TraceSet) -> Result<(), StudyError> {
     Err(StudyError::NoPixels { column: PIXELS, problem })
 }
 
-/// That every step of the episodes that count has a value; `pixels` counts the steps without one.
+/// Checks that every step of the counted episodes has a value; `pixels` counts the steps without one.
 fn check_values<'t>(pixels: &EpisodeTable, counted: impl Iterator<Item = &'t EpisodeTable>) -> Result<(), StudyError> {
     let ids: BTreeSet<&str> = counted.flat_map(|table| table.keys.iter().map(|key| key.episode_id)).collect();
     let missing = pixels.metrics.iter().flat_map(|metric| pixels.keys.iter().zip(metric.iter()));

@@ -1,7 +1,7 @@
-//! A filter that keeps no episode: how many there are, and what the columns that it names hold.
+//! A filter that keeps no episode: the number of episodes, and the values of the columns that it names.
 //!
-//! Rule: what cannot bear a conclusion is refused. Reports, statistics, figures and comparisons of no episode are errors;
-//! tables for programs (`score`, `query`) stay tables without rows, and a note says so.
+//! Rule: an empty selection supports no conclusion. Reports, statistics, figures and comparisons without episodes are
+//! errors; tables for programs (`score`, `query`) are empty tables, with a note.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -16,11 +16,11 @@ use report::cells::group::{KEY_COLUMNS, column_values};
 use score::table::EpisodeTable;
 use score::{score_traces, vocabulary};
 
-/// Values of a column that are listed.
+/// The most values of a column that are listed.
 const LISTED: usize = 8;
 
 impl Study {
-    /// Refuses an answer about no episode where the filter is why there is none.
+    /// Returns an error if the filter keeps no episode.
     pub(crate) fn check_filter(&self, episodes: usize) -> Result<(), StudyError> {
         match self.empty_filter(episodes)? {
             None => Ok(()),
@@ -28,7 +28,7 @@ impl Study {
         }
     }
 
-    /// The explanation of a filter that keeps no episode; `None` if it keeps some, or without a filter.
+    /// The explanation of a filter that keeps no episode; `None` if there are episodes or there is no filter.
     ///
     /// # Errors
     /// Faults of the inputs without the filter.

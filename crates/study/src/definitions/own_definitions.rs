@@ -1,7 +1,7 @@
 //! The definitions of each experiment: named by the footer, or those of the built-in experiment with its name.
 //!
-//! Rule: without definitions asked for, each experiment is scored by its own. Definitions that include all others score a
-//! mixture; any other mixture is refused, with the questions that would do. Definitions asked for must score what they keep.
+//! Rule: by default, each experiment is scored by its own definitions. Definitions that include all others score a
+//! mixture; other mixtures are refused, with questions that work. Requested definitions must score all that they keep.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -25,7 +25,7 @@ fn own(declared: &DeclaredExperiment) -> Option<(String, Option<String>)> {
     if let Some(name) = &declared.definitions {
         return Some((name.clone(), declared.definitions_hash.clone()));
     }
-    // Traces from before footers named them: built-in definitions list the experiment, or the task has no colours.
+    // Older traces name no definitions: built-in definitions list the experiment, or the task has no colours.
     let lists = |name: &&str| file::read(name).is_ok_and(|document| document.experiments.contains_key(&declared.name));
     let listed = file::built_in_names().into_iter().find(lists);
     let name = listed.or_else(|| (!declared.absent.is_empty()).then_some(WITHOUT_COLORS))?;
@@ -73,7 +73,7 @@ fn groups(traces: &TraceSet) -> Vec<ScoredAlike> {
     by_name.iter().map(group).collect()
 }
 
-/// The definitions that score all experiments of some traces, each as its own do; `None` for the default ones.
+/// The definitions that score all experiments of some traces as their own definitions do; `None` for the default ones.
 fn chosen(traces: &TraceSet) -> Result<Option<PathBuf>, StudyError> {
     let groups = groups(traces);
     match &groups[..] {
@@ -87,7 +87,7 @@ fn chosen(traces: &TraceSet) -> Result<Option<PathBuf>, StudyError> {
 }
 
 impl Question {
-    /// The question with the definitions that the experiments of these traces name, where it asks for none.
+    /// Fills in the definitions that the experiments of these traces name, unless the question requests others.
     pub fn resolved(mut self, traces: &TraceSet) -> Result<Self, StudyError> {
         if traces.domain() == Domain::Own {
             check_domain(self.definitions_name(), traces)?;
@@ -116,7 +116,7 @@ impl Question {
     }
 }
 
-/// Refuses definitions of the mirror for traces of another domain. What cannot be read is reported where it is loaded.
+/// Refuses definitions of the mirror for traces of another domain. Unreadable definitions are reported when loaded.
 fn check_domain(definitions: &Path, traces: &TraceSet) -> Result<(), StudyError> {
     let is_mirror = file::read(definitions).is_ok_and(|document| document.domain.is_none());
     let first = traces.files().first().filter(|_| is_mirror);
@@ -125,7 +125,7 @@ fn check_domain(definitions: &Path, traces: &TraceSet) -> Result<(), StudyError>
     })
 }
 
-/// Each experiment under its own definitions, in one; `None` where two of these give one name another meaning.
+/// All experiments in one, each under its own definitions; `None` if two of them define one name differently.
 fn side_by_side(groups: &[ScoredAlike], columns: &Columns) -> Result<Option<Definitions>, StudyError> {
     let part = |group: &ScoredAlike| {
         let definitions = Definitions::load(&group.definitions, columns)?;
@@ -138,7 +138,7 @@ fn side_by_side(groups: &[ScoredAlike], columns: &Columns) -> Result<Option<Defi
     Ok(Definitions::side_by_side(&parts, columns).transpose()?)
 }
 
-/// Refuses episodes of an experiment that some definitions do not score, where its own would: a false zero is no score.
+/// Refuses definitions that do not score an experiment whose own definitions would: a false zero is no score.
 pub(crate) fn check(definitions: &Definitions, traces: &TraceSet, episodes: &EpisodeTable) -> Result<(), StudyError> {
     unscored(definitions, traces, |name| episodes.keys.iter().any(|key| key.experiment == name)).map_or(Ok(()), Err)
 }
@@ -159,16 +159,16 @@ pub(crate) fn unscored(
 }
 
 impl Study {
-    /// The experiments by their definitions, where each is scored by its own beside others; else none.
+    /// The experiments by their definitions, if each is scored by its own; else empty.
     pub fn parts(&self) -> &[ScoredAlike] {
         &self.question.parts
     }
 
-    /// The definitions that score all experiments of the traces, as their footers name them; `None` for the default ones.
+    /// The definitions that score all experiments of the traces, named by their footers; `None` for the default ones.
     ///
     /// # Errors
-    /// Scores in the place of traces; experiments that need different definitions; definitions that are a file of the one
-    /// who recorded.
+    /// Scores in the place of traces; experiments that need different definitions; definitions in a file of the
+    /// recorder's.
     pub fn own_definitions(&self) -> Result<Option<PathBuf>, StudyError> {
         chosen(self.traces()?)
     }

@@ -1,4 +1,4 @@
-//! The question to the inputs: definitions, a filter, metrics, groups.
+//! A question to the inputs: definitions, a filter, metrics, groups.
 
 use std::path::{Path, PathBuf};
 
@@ -17,26 +17,26 @@ use crate::scored_alike::ScoredAlike;
 /// Labels of each episode's recording that scores carry if the traces have them.
 pub(crate) const STANDING_LABELS: [&str; 4] = [CONDITION, "scene", "fingerprint", "participant"];
 
-/// The definitions that are used where none are named.
+/// The default definitions.
 pub(crate) const DEFAULT_DEFINITIONS: &str = "paper";
 
-/// The question to the inputs.
+/// A question to the inputs.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Question {
-    /// Definitions by name or path; those that scores carry, or that the experiments of the traces name, if absent.
+    /// Definitions by name or path. If absent: those that scores carry, or that the experiments of the traces name.
     pub definitions: Option<PathBuf>,
-    /// True if experiments that need different definitions are each scored by their own, beside each other; else refused.
+    /// True to score experiments that need different definitions each by their own; false to refuse them.
     pub each: bool,
-    /// These definitions, found in the traces.
+    /// The experiments by their own definitions, found in the traces.
     pub parts: Vec<ScoredAlike>,
     /// A condition on episodes in the language of definitions; all episodes if absent.
     pub filter: Option<String>,
     /// The metrics wanted, by name; all if absent.
     pub metrics: Option<Vec<String>>,
-    /// The columns that cells are grouped by; experiment and model if absent, and the condition where there is more than the
-    /// default one.
+    /// The columns that cells are grouped by. If absent: experiment and model, and the condition if there is any other
+    /// than the default.
     pub by: Option<Vec<String>>,
-    /// True if a cell may hold episodes that were recorded differently.
+    /// True if a cell may mix episodes that were recorded differently.
     pub pool: bool,
     /// The treatment of lost episodes.
     pub lost: LostAs,
@@ -47,7 +47,7 @@ impl Question {
         self.definitions.as_deref().unwrap_or(Path::new(DEFAULT_DEFINITIONS))
     }
 
-    /// The columns among those to group by that a score lacks on its own.
+    /// The columns to group by that scores lack by default.
     pub(crate) fn labels(&self) -> Vec<String> {
         self.by.iter().flatten().filter(|name| !KEY_COLUMNS.contains(&name.as_str())).cloned().collect()
     }
@@ -79,7 +79,7 @@ impl Question {
         Ok(definitions)
     }
 
-    /// The definitions asked for over some columns.
+    /// The requested definitions over some columns.
     pub fn bind_to(&self, columns: &Columns) -> Result<Definitions, StudyError> {
         let mut definitions = self.load(columns)?;
         if let Some(filter) = &self.filter {

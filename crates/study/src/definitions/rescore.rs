@@ -1,7 +1,7 @@
-//! A report again from its own traces, under other definitions.
+//! Remakes a report from its own traces under other definitions.
 //!
-//! Rule: the new report keeps the filter, the grouping, the style and the choice of metrics of the old one, which stays
-//! as it is. Traces are found by their hashes.
+//! Rule: the new report keeps the old one's filter, grouping, style and choice of metrics. The old report is not
+//! changed. Traces are found by their hashes.
 
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
@@ -18,29 +18,29 @@ use score::format::{self, Partition};
 use score::table::EpisodeTable;
 use trace::inputs::Input;
 
-/// The report to make again, and the changes.
+/// The report to remake, and the changes.
 #[derive(Clone, Debug)]
 pub struct RescoreRequest {
     /// The folder of the report.
     pub report: PathBuf,
     /// The definitions to score under, by name or path; those that the traces name if absent.
     pub definitions: Option<PathBuf>,
-    /// The traces: those of [`traces_of`], or others in their place.
+    /// The traces: those of [`traces_of`], or replacements.
     pub traces: Vec<Input>,
-    /// The folder that the new report is for.
+    /// The folder of the new report.
     pub out: PathBuf,
-    /// Another style than the report's.
+    /// A style to replace the report's.
     pub style: Option<PathBuf>,
-    /// Other metrics than the report's.
+    /// Metrics to replace the report's.
     pub metrics: Option<Vec<String>>,
     pub threads: NonZeroUsize,
 }
 
-/// The traces of a report, found by their hashes in folders or files, or in the current folder, the report's folder and those
-/// above it if `places` is empty.
+/// The traces of a report, found by their hashes in folders or files. If `places` is empty, searches the current
+/// folder, the report's folder and its parents.
 ///
 /// # Errors
-/// A folder that is no report, traces that are not what they were.
+/// A folder that is no report; traces that have changed.
 pub fn traces_of(report: &Path, places: &[PathBuf]) -> Result<Vec<Input>, StudyError> {
     Ok(provenance::traces(&provenance::manifest(report)?, &provenance::places(report, places))?)
 }
@@ -53,10 +53,10 @@ pub struct Rescored {
 }
 
 impl RescoreRequest {
-    /// Makes the report again.
+    /// Remakes the report.
     ///
     /// # Errors
-    /// A folder that is no report, whatever is wrong with the definitions.
+    /// A folder that is no report; faults in the definitions.
     pub fn run(&self) -> Result<Rescored, StudyError> {
         let manifest = provenance::manifest(&self.report)?;
         let options = ReportOptions { style: self.style(&manifest)?, figures: has_figures(&self.report) };
@@ -86,7 +86,7 @@ impl RescoreRequest {
         }
     }
 
-    /// The name or path of the style, which must be the report's own unless another is asked for.
+    /// The name or path of the style: the report's own unless another is requested.
     fn style(&self, manifest: &Manifest) -> Result<PathBuf, StudyError> {
         if let Some(style) = &self.style {
             return Ok(style.clone());
@@ -99,7 +99,7 @@ impl RescoreRequest {
         }
     }
 
-    /// The scores of the old report, or why they cannot be had.
+    /// The scores of the old report, or why they are unavailable.
     fn scores_before(&self, manifest: &Manifest) -> Result<EpisodeTable, String> {
         let path = self.report.join("episodes.parquet");
         let file = input::open(&path).map_err(|error| format!("{}: {error}", path.display()))?;
@@ -112,10 +112,10 @@ impl RescoreRequest {
     }
 }
 
-/// The folder that a report is made again into: `out`, or `REPORT-rescored`; never the report itself.
+/// The folder of the new report: `out`, or `REPORT-rescored`; never the report itself.
 ///
 /// # Errors
-/// A folder that is the report; a path that cannot be resolved.
+/// An `out` that is the report itself; a path that cannot be resolved.
 pub fn folder_of_rescored(report: &Path, out: Option<&Path>) -> Result<PathBuf, StudyError> {
     let place = |path: &Path| std::path::absolute(path).and_then(|path| path.canonicalize().or(Ok(path)));
     let out = match out {

@@ -1,4 +1,4 @@
-//! The agreement of coders: Cohen's kappa of each label and each pair of coders.
+//! The agreement of coders: Cohen's kappa for each label and each pair of coders.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -12,7 +12,7 @@ use report::published;
 use report::style::Style;
 use score::vocabulary::{has_value, schema_columns};
 
-/// The assumptions of an audit about published tables.
+/// The assumptions of an audit of published tables.
 #[derive(Clone, Debug)]
 pub struct AuditRequest {
     /// Episodes per row.
@@ -23,11 +23,11 @@ pub struct AuditRequest {
     pub steps: u32,
     /// Roundings to consider; all if empty.
     pub roundings: Vec<Rounding>,
-    /// The style whose tables say what emphasis means, and where undefined prints as zero.
+    /// The style, whose tables give the meaning of emphasis, and where undefined prints as zero.
     pub style: PathBuf,
 }
 
-/// The cells of published tables that no data can give.
+/// The cells of published tables that no data can produce.
 pub fn audit_tables(tables: &[PathBuf], request: &AuditRequest) -> Result<Audit, StudyError> {
     let tables = tables.iter().map(|path| named(path)).collect::<Result<Vec<_>, _>>()?;
     let definitions = Definitions::load(&request.definitions, &schema_columns())?;

@@ -18,13 +18,13 @@ use report::style::Style;
 pub struct FigureOptions {
     /// `default`, `paper`, or the path of a style file, for the order of models, metrics and captions.
     pub style: PathBuf,
-    /// The metrics shown, in the order of their roles; those of the style if None.
+    /// The metrics shown, in the order of their roles; the style's metrics if None.
     pub metrics: Option<Vec<String>>,
-    /// A heading of its own.
+    /// A custom heading.
     pub title: Option<String>,
-    /// The width on paper; as wide as it is drawn if None.
+    /// The printed width; the drawn width if None.
     pub width: Option<FigureWidth>,
-    /// Only so many models, the best by their means of the first metric over all experiments; all if None.
+    /// The number of models to show, the best by their means of the first metric over all experiments; all if None.
     pub top: Option<usize>,
 }
 
@@ -43,33 +43,33 @@ pub(crate) struct FigureInputs<'a> {
     remark: Option<String>,
 }
 
-/// More models than a figure shows well.
+/// The most models that a figure shows well.
 pub const MANY_MODELS: usize = 20;
 
-/// How many of many models the figures of a report show.
+/// The number of models in a report's figures if there are more than [`MANY_MODELS`].
 const SHOWN_OF_MANY: usize = 12;
 
 /// The figures of a report.
 #[derive(Debug, Default)]
 pub(crate) struct Drawings {
-    /// Those that can be drawn.
+    /// The figures that can be drawn.
     pub drawn: Vec<(FigureName, Figure)>,
-    /// The reason why each other one cannot.
+    /// The other figures, with the reason for each.
     pub left_out: Vec<(FigureName, FigureError)>,
 }
 
 impl<'a> FigureInputs<'a> {
-    /// Groups the episodes as figures show them: by experiment and model, a model under another condition as one of its own.
+    /// Groups the episodes for figures: by experiment and model, with another condition as a model of its own.
     ///
     /// # Errors
-    /// Sums of squares that leave 128 bits.
+    /// Sums of squares beyond 128 bits.
     pub(crate) fn of(results: &'a Results, style: &'a Style) -> Result<Self, StudyError> {
         let results = results.with_conditions_as_models();
         let cells = group(&results.episodes, &DEFAULT_BY.map(str::to_owned))?;
         Ok(Self { cells, style, options: FigureOptions::default(), results, remark: None })
     }
 
-    /// The same for a page or a folder of all figures: of many models the best, which the captions say.
+    /// The same for a page or a folder of all figures: of many models only the best, as the captions say.
     pub(crate) fn of_a_report(results: &'a Results, style: &'a Style) -> Result<Self, StudyError> {
         let all = Self::of(results, style)?;
         let metric = results.episodes.catalog.metric.iter().find(|(_, metric)| metric.better != Better::Neither);
@@ -85,7 +85,7 @@ impl<'a> FigureInputs<'a> {
         Self { options, ..self }
     }
 
-    /// One figure.
+    /// Draws one figure.
     ///
     /// # Errors
     /// Inputs that lack what the figure needs.
@@ -93,13 +93,13 @@ impl<'a> FigureInputs<'a> {
         figures::draw(name, &self.input())
     }
 
-    /// Every figure that can be drawn, and why each other one cannot.
+    /// Draws every figure that can be drawn, and collects the reasons for the others.
     pub(crate) fn draw_all(&self) -> Drawings {
         let mut drawings = Drawings::default();
         for name in FigureName::ALL {
             match self.draw(name) {
                 Ok(figure) => drawings.drawn.push((name, figure.remarked(self.remark.as_deref()))),
-                // Most definitions declare no factor, or the traces have none of it.
+                // Most definitions declare no factor, or the traces lack it.
                 Err(FigureError::NoFactor { .. }) => {}
                 Err(error) => drawings.left_out.push((name, error)),
             }

@@ -1,5 +1,4 @@
-//! The sections of a report for some episodes that are scored already: what a page shows that is put together while it is
-//! looked at.
+//! Sections of a report for episodes that are already scored, for pages that are assembled on request.
 
 use crate::Study;
 use crate::error::StudyError;
@@ -28,20 +27,20 @@ pub enum Part {
 /// Some sections of a report.
 #[derive(Clone, Debug)]
 pub struct Overview {
-    /// Each as its element, in the order of the page.
+    /// The HTML element of each section, in page order.
     pub sections: Vec<String>,
     pub episodes: usize,
     /// The columns that cells are grouped by.
     pub by: Vec<String>,
-    /// The values of these columns for each group, as the rows of the tables number them; `None` for null.
+    /// The values of these columns for each group, in the numbering of the table rows; `None` for null.
     pub groups: Vec<Vec<Option<String>>>,
 }
 
 impl Study {
-    /// Makes sections of the report of these results, which a scan of this study gave, or some of its episodes.
+    /// Makes report sections from these results, which come from a scan of this study, or from a part of them.
     ///
     /// # Errors
-    /// Whatever is wrong with the style; a cell that mixes episodes which were recorded differently.
+    /// Faults of the style; a cell that mixes episodes recorded differently.
     pub fn overview(&self, results: Results, style: &str, part: Part) -> Result<Overview, StudyError> {
         let style = Style::load(style)?;
         let counted = self.counted(results);

@@ -1,7 +1,7 @@
-//! The traces that a report was made of, found again by its manifest.
+//! Finds the traces of a report by its manifest.
 //!
-//! Rule: a file is the trace that the manifest names if it has its hash, whatever the folder it is in; every trace
-//! that changed or is missing is reported at once, and no report is made without them.
+//! Rule: a file is the trace in the manifest if it has its hash, in whatever folder. All changed or missing traces are
+//! reported together, and no report is made without them.
 
 use std::ffi::OsStr;
 use std::fmt;
@@ -15,7 +15,7 @@ use report::bundle::{self, Manifest};
 use trace::inputs::Input;
 use trace::schema::SCHEMA_VERSION;
 
-/// An error of making a report again.
+/// An error of remaking a report.
 #[derive(Debug, thiserror::Error)]
 pub enum ProvenanceError {
     #[error("{}: expected a report's folder with its manifest.json; name the folder that `mirrorstats report` wrote", path.display())]
@@ -29,23 +29,23 @@ pub enum ProvenanceError {
 /// The remedy for traces that are not found.
 const REMEDY: &str = "  help: restore them, say where they are with --traces, or make a new report of what there is with `mirrorstats report`";
 
-/// A trace of the manifest that is not there as it was.
+/// A trace of the manifest that is missing or has changed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TraceFault {
     /// Its path in the manifest.
     pub path: String,
     /// Its hash in the manifest.
     pub expected: String,
-    /// The file in its place, with its path; `None` if there is no such file.
+    /// The file found instead, with its path; `None` if there is no such file.
     pub found: Option<(Found, PathBuf)>,
 }
 
-/// The file in the place of a trace.
+/// The file found instead of a trace.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Found {
-    /// A file of this hash.
+    /// A file with this hash.
     Other(String),
-    /// A file that cannot be read, for this reason.
+    /// A file that cannot be read, and the reason.
     Unreadable(String),
 }
 
@@ -64,7 +64,7 @@ impl fmt::Display for TraceFault {
     }
 }
 
-/// The most traces that a message tells one by one: what to do about them must stay in view.
+/// The most traces that a message lists, so that the remedy stays visible.
 const TOLD: usize = 5;
 
 fn lines(faults: &[TraceFault]) -> String {
@@ -75,13 +75,13 @@ fn lines(faults: &[TraceFault]) -> String {
     lines.join("\n")
 }
 
-/// A trace takes some 200 bytes of it.
+/// A trace takes about 200 bytes of a manifest.
 const LARGEST: Limit = Limit::new("bytes of a manifest", 64 << 20);
 
 /// The manifest of a report's folder.
 ///
 /// # Errors
-/// A folder without one, one that is not readable, one of a later program.
+/// A folder without a manifest; an unreadable manifest, or one of a later version.
 pub(crate) fn manifest(report: &Path) -> Result<Manifest, ProvenanceError> {
     let path = report.join("manifest.json");
     let text = match input::text(&path, LARGEST) {
@@ -107,7 +107,7 @@ fn is_plain(path: &str) -> bool {
     !path.is_empty() && Path::new(path).components().all(|part| matches!(part, Component::Normal(_)))
 }
 
-/// The traces of a manifest under their names in it: below one of `places`, in this order.
+/// The traces of a manifest, by their names in it, searched in `places` in order.
 ///
 /// # Errors
 /// Every trace that changed or is missing.
@@ -163,8 +163,8 @@ fn shown_as(folder: &Path, path: &Path) -> Vec<PathBuf> {
     })
 }
 
-/// Where the traces of a report are looked for: where one is given, else the current folder, the report's folder and
-/// the folders above it.
+/// The places where a report's traces are searched: the given ones, else the current folder, the report's folder and
+/// its parents.
 pub(crate) fn places(report: &Path, told: &[PathBuf]) -> Vec<PathBuf> {
     if !told.is_empty() {
         return told.to_vec();

@@ -1,4 +1,4 @@
-//! Limits on the quality of replies: which of them the traces exceed, and which cannot be checked.
+//! Limits on reply quality: which of them the traces exceed, and which cannot be checked.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -18,7 +18,7 @@ pub struct QualityLimits {
     pub max_repaired: Option<f64>,
     /// Lost episodes, over all cells.
     pub max_lost: Option<u64>,
-    /// Milliseconds within which 95 % of a cell's replies came.
+    /// Milliseconds within which 95 % of a cell's replies arrived.
     pub max_latency: Option<i64>,
 }
 
@@ -95,7 +95,7 @@ impl CellAnswer {
 type Compared = (&'static str, Option<f64>, Option<f64>);
 
 impl Study {
-    /// Checks the replies of the traces against limits; also gives the quality that it is about.
+    /// Checks the replies of the traces against limits; also returns the reply quality.
     pub fn check_quality(&self, limits: &QualityLimits) -> Result<(QualityCheckAnswer, QualityByCell), StudyError> {
         let cells = self.quality()?;
         let (violations, not_recorded) = (limits.violations(&cells), limits.not_recorded(&cells));
@@ -139,7 +139,7 @@ impl QualityLimits {
 
     fn missing(&self, quality: &Quality) -> [(&'static str, bool, u64); 6] {
         let replies = quality.steps.saturating_sub(quality.replies());
-        // What the infrastructure ended came with no reply, which would have taken some time.
+        // Replies lost to the infrastructure never arrived, so they have no latency.
         let ended: u64 = INFRASTRUCTURE.iter().map(|status| quality.of_status(status)).sum();
         let timed = quality.latencies.values().sum::<u64>() + ended;
         [

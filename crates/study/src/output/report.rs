@@ -1,4 +1,4 @@
-//! The report of a study: tables, figures, a page, and the folder that holds them.
+//! The report of a study: tables, figures, a page, and the folder that contains them.
 
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
@@ -34,7 +34,7 @@ pub(crate) const MOST_LISTED: usize = 20_000;
 pub struct ReportOptions {
     /// `default`, `paper`, or the path of a style file.
     pub style: PathBuf,
-    /// True if figures and `report.html` are in it.
+    /// True to include figures and `report.html`.
     pub figures: bool,
 }
 
@@ -47,18 +47,18 @@ impl Default for ReportOptions {
 /// A report, in memory.
 #[derive(Debug)]
 pub struct Report {
-    /// The results of the scan: one row per episode, and more.
+    /// The results of the scan.
     pub results: Results,
-    /// All episodes, where some were lost: those in `results` are the ones that count.
+    /// All episodes, if some were lost; `results` has the counted ones.
     all: Option<EpisodeTable>,
-    /// The cells, grouped as the study says.
+    /// The cells, grouped as requested.
     pub cells: Cells,
     /// The tables, as the style lays them out.
     pub tables: Vec<MetricTable>,
-    /// Ranks, if the style marks ties, and what became of the replies, if the inputs are traces.
+    /// Ranks, if the style marks ties; reply quality, if the inputs are traces.
     pub lists: Vec<ListTable>,
     pub manifest: Manifest,
-    /// The number of replies without a decision; `None` without any, and if it is not recorded.
+    /// The number of replies without a decision; `None` without any, or if not recorded.
     pub replies: Option<String>,
     /// The missing parts of the folder with their reasons, one sentence each.
     pub notes: Vec<String>,
@@ -70,7 +70,7 @@ pub struct Report {
     inputs: usize,
 }
 
-/// A report that was written.
+/// A written report.
 #[derive(Clone, Debug)]
 pub struct WrittenReport {
     /// The paths of its files inside the folder, in order.
@@ -80,7 +80,7 @@ pub struct WrittenReport {
 }
 
 impl Study {
-    /// Refuses a folder whose report has a file that this study reads, before anything is read.
+    /// Refuses a folder whose report contains a file that this study reads, before anything is read.
     ///
     /// # Errors
     /// An input in the folder.
@@ -91,7 +91,7 @@ impl Study {
 
     /// Makes the report of the study.
     pub fn report(&self, options: &ReportOptions) -> Result<Report, StudyError> {
-        // Small files first: a slip in the style should not cost a pass over the traces.
+        // Small files first: a mistake in the style should not cost a scan of the traces.
         let style = Style::load(&options.style)?;
         let figures: &[FigureName] = if options.figures { &FigureName::ALL } else { &[] };
         let outputs = Outputs { losses: true, quality: true, hashes: true, ..Outputs::of_figures(figures) };
@@ -139,7 +139,7 @@ impl Study {
 
     fn recordings(&self, manifest: &Manifest) -> Option<Recordings> {
         let Source::Traces(_) = &self.source else { return None };
-        // As a manifest names files: by no absolute path.
+        // As in manifests: without absolute paths.
         let named = |path: &PathBuf| bundle::Input::new(path, String::new(), 0).path;
         Some(Recordings {
             paths: manifest.inputs.iter().map(|input| input.path.clone()).collect(),
@@ -171,7 +171,7 @@ impl Study {
     }
 }
 
-/// Returns true if what is analysed is what was registered before the recording; `None` where no plan was.
+/// Says whether the analysis matches the plan registered before the recording; `None` without a plan.
 fn registered(episodes: &EpisodeTable) -> Option<String> {
     let plan = episodes.declared.registration.as_ref()?;
     let short = |hash: &str| hash.chars().take(12).collect::<String>();
@@ -196,12 +196,12 @@ fn undeclared(episodes: &EpisodeTable) -> Option<String> {
 }
 
 impl Report {
-    /// The table that is shown first.
+    /// The first table.
     pub fn main_table(&self) -> Option<&MetricTable> {
         self.tables.iter().find(|table| table.name == MAIN_TABLE).or(self.tables.first())
     }
 
-    /// The metrics that the style names nowhere, where there are too many of them for the main table.
+    /// The metrics that the style does not name, if there are too many for the main table.
     pub fn other_table(&self) -> Option<&MetricTable> {
         self.tables.iter().find(|table| table.name == OTHER_TABLE)
     }
@@ -209,7 +209,7 @@ impl Report {
     /// The table of this name.
     ///
     /// # Errors
-    /// A table that the style lacks; the error lists its tables.
+    /// A name that the style lacks; the error lists its tables.
     pub fn table(&self, name: &str) -> Result<&MetricTable, StudyError> {
         self.tables.iter().find(|table| table.name == name).ok_or_else(|| {
             let known = || self.tables.iter().map(|table| table.name.as_str());
@@ -219,16 +219,16 @@ impl Report {
         })
     }
 
-    /// A table as Markdown; `None` where the style has no table of this name.
+    /// A table as Markdown; `None` if the style has no table of this name.
     pub fn markdown(&self, name: &str) -> Option<String> {
         self.tables.iter().find(|table| table.name == name).map(|table| table.printed().markdown())
     }
 
-    /// Writes the folder of the report, in place of the report that is there.
+    /// Writes the folder of the report and replaces an existing report.
     ///
     /// # Errors
-    /// Where `out` is no folder or cannot be written; the folder is then as it was, or has no manifest. A file of the old
-    /// report that this one is made from.
+    /// `out` is not a folder or cannot be written: the folder is then unchanged, or has no manifest. The old report
+    /// contains a file that this one is made from.
     pub fn write(&self, out: &Path) -> Result<WrittenReport, StudyError> {
         bundle::check_old(out, &self.read)?;
         replace::check_folder(out, &self.read[..self.inputs]).map_err(BundleError::from)?;

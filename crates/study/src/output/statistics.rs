@@ -1,4 +1,4 @@
-//! Statistics of a study: what was left out and declared goes to each verdict.
+//! Statistics of a study: each verdict gets the exclusions and declarations.
 
 use ::report::cells::Cells;
 use ::report::plan::departures::Looks;
@@ -15,10 +15,10 @@ use crate::results::Outputs;
 use crate::{LostAs, Study, StudyError, pooled, size};
 
 impl Study {
-    /// The filter; it is by results where it asks for more than what is recorded of an episode before it begins.
+    /// The filter. It depends on results if it uses more than the values recorded before an episode begins.
     pub(crate) fn selection(&self, episodes: &EpisodeTable) -> Option<Selection> {
         let condition = self.question.filter.clone()?;
-        // A coder has seen the result.
+        // A coder has seen the outcome.
         let is_recorded = |name: &str| episodes.label(name).is_some() && !name.starts_with(labels::PREFIX);
         let is_key = |name: &str| is_recorded(name) || vocabulary::is_constant(name);
         let by_results = !is_about(&condition, &is_key);

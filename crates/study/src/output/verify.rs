@@ -1,6 +1,6 @@
-//! The check of a report's files against its manifest.
+//! Checks a report's files against its manifest.
 //!
-//! Rule: nothing outside of the folder is looked at, whatever the manifest says, and no link is followed.
+//! Rule: it never looks outside the folder, whatever the manifest says, and follows no links.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -15,15 +15,15 @@ use crate::input_hashes::of_file;
 use exact::escape::visible;
 use report::bundle::{MANIFEST, Output};
 
-/// The longest manifest that is read; that of the paper has 20 KB.
+/// The largest manifest that is read, in bytes; the paper's has 20 KB.
 const LONGEST: u64 = 64 << 20;
 
-/// As much of a manifest as is needed; that of other versions may have more.
+/// The needed part of a manifest; other versions may have more fields.
 #[derive(Deserialize)]
 struct Listed {
     #[serde(default)]
     outputs: Vec<Output>,
-    /// Only to tell the manifest of a report from another file of that name.
+    /// Only distinguishes a report's manifest from other files of that name.
     #[serde(rename = "schema_version")]
     _schema_version: u32,
 }
@@ -76,7 +76,7 @@ pub enum VerifyError {
 /// Compares the files of a folder with its manifest.
 ///
 /// # Errors
-/// A folder without a manifest, one that lists nothing, or paths that are not inside of the folder; what cannot be read.
+/// A folder without a manifest, a manifest without files, or paths outside the folder; unreadable files.
 pub fn verify(folder: &Path) -> Result<Verification, VerifyError> {
     let listed = listed(folder)?;
     let mut there = BTreeMap::new();
@@ -139,7 +139,7 @@ fn fault(output: &Output) -> Option<String> {
     (!is_hash).then(|| format!("the output `{shown}` with `{}` in place of a SHA-256", visible(&output.sha256)))
 }
 
-/// All that is in a folder and is no folder, by path inside of it.
+/// Collects everything in a folder except folders, by relative path.
 fn find(folder: &Path, inside: &str, there: &mut BTreeMap<String, Metadata>) -> Result<(), VerifyError> {
     let unreadable = |path: &Path| {
         let path = path.to_owned();
@@ -189,7 +189,7 @@ fn kind_of(about: &Metadata) -> &'static str {
 }
 
 impl Verification {
-    /// Returns true if all files are as the manifest says, and there are no others.
+    /// Returns true if all files match the manifest and there are no others.
     pub fn holds(&self) -> bool {
         self.differences.is_empty()
     }

@@ -1,4 +1,4 @@
-//! Expectations of definitions about the traces that they score.
+//! Requirements of definitions on the traces that they score.
 
 use std::path::Path;
 
@@ -8,10 +8,10 @@ use score::vocabulary::{declared_columns, schema_columns};
 use trace::schema::{DeclaredColumn, Domain};
 use trace::validate::Expected;
 
-/// Expectations of definitions about traces.
+/// Requirements of definitions on traces.
 #[derive(Clone, Debug)]
 pub(crate) struct ExpectedTraces {
-    /// The experiments that they know; any if `None`.
+    /// The known experiments; any if `None`.
     pub(crate) experiments: Option<Vec<String>>,
     /// The name of their domain; `None` for the mirror's.
     pub(crate) domain: Option<String>,

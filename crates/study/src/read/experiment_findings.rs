@@ -1,5 +1,5 @@
-//! What traces declare of their experiments beside what the definitions say: the definitions count, and the difference is
-//! told. What the definitions do not know must be declared alike.
+//! Compares experiments in traces with those in the definitions. The definitions take precedence, and differences are
+//! reported. Files must agree on experiments that the definitions do not know.
 
 use std::path::Path;
 
@@ -14,8 +14,8 @@ use trace::diagnostic::{Code, Finding};
 use trace::inputs::Input;
 use trace::open::{TraceFile, TraceSet};
 
-/// A note for each title, order and level in a footer that the definitions give otherwise, or whose metric they do not have;
-/// an error for each experiment that only footers know, and not alike. Files that cannot be opened say nothing here.
+/// A note for each title, order or level in a footer that differs from the definitions, or whose metric they lack. An
+/// error for each experiment that only footers know, if they disagree. Skips files that cannot be opened.
 pub(crate) fn experiment_findings(definitions: &Path, inputs: &[Input]) -> Result<Vec<Finding>, StudyError> {
     let catalog = Definitions::load(definitions, &schema_columns())?.catalog;
     let traces = TraceSet::of(inputs.iter().filter_map(|input| TraceFile::open(input).ok()).collect());

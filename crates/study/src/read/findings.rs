@@ -1,4 +1,4 @@
-//! All findings of traces, under the experiments that definitions know.
+//! All findings of traces, given the experiments that definitions know.
 
 use std::fmt::{self, Write as _};
 use std::num::NonZeroUsize;
@@ -14,10 +14,10 @@ use trace::diagnostic::Severity;
 use trace::inputs::Input;
 use trace::validate::{Validation, validate_as};
 
-/// Findings that are printed for each file and rule.
+/// The most findings printed for each file and rule.
 const SHOWN: usize = 10;
 
-/// All findings of traces, under the experiments of these definitions.
+/// All findings of traces, given the experiments of these definitions.
 pub fn findings(definitions: &Path, inputs: &[Input], threads: NonZeroUsize) -> Result<Validation, StudyError> {
     let expected = ExpectedTraces::of(definitions)?;
     let mut found = validate_as(inputs, expected.as_expected(), threads)?;
@@ -25,10 +25,10 @@ pub fn findings(definitions: &Path, inputs: &[Input], threads: NonZeroUsize) -> 
     Ok(found)
 }
 
-/// The findings for people, some of each kind, and how many there are.
+/// The findings as text: some of each kind, and their number.
 pub fn findings_text(report: &Validation) -> String {
     let mut text = String::new();
-    // Writing to a text does not fail.
+    // Writing to a string does not fail.
     let _ = write(&mut text, report);
     text
 }

@@ -1,4 +1,4 @@
-//! Traces out of JSON lines, under the experiments that definitions know.
+//! Makes traces from JSON lines, given the experiments that definitions know.
 
 use std::borrow::Cow;
 use std::fmt;
@@ -18,16 +18,16 @@ use trace::import::{self, Limits, Text};
 use trace::inputs::Input;
 use trace::schema::Kind;
 
-/// A colour takes some bytes.
+/// A colour takes only a few bytes.
 const LARGEST: Limit = Limit::new("bytes of a palette", 1 << 20);
 
 /// The options of an import.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ImportRequest {
     pub out: PathBuf,
-    /// The definitions whose experiments are known, by name or path.
+    /// The definitions that give the known experiments, by name or path.
     pub definitions: PathBuf,
-    /// Names of colours with commas between them, a file of names, or `default`.
+    /// Names of colours separated by commas, a file of names, or `default`.
     pub palette: Option<PathBuf>,
     /// True if the episodes of one seed are more alike than chance.
     pub clusters_by_seed: bool,
@@ -60,7 +60,7 @@ pub struct OwnColumn {
     pub kind: Option<Kind>,
 }
 
-/// Makes a trace of the steps in these texts, or writes nothing.
+/// Makes a trace from the steps in these texts; writes nothing if that fails.
 pub fn import(mut texts: Vec<Text>, request: &ImportRequest) -> Result<ImportAnswer, StudyError> {
     let expected = ExpectedTraces::of(&request.definitions)?;
     let palette = request.palette.as_deref().map(palette).transpose()?;
@@ -82,7 +82,7 @@ pub fn import(mut texts: Vec<Text>, request: &ImportRequest) -> Result<ImportAns
     })
 }
 
-/// The palette that is typed, or in the file that is named. A text with a comma is no name of a file.
+/// The palette in an argument or in the file that it names. A text with a comma is never a file name.
 fn palette(path: &Path) -> Result<Palette, StudyError> {
     let typed = path.to_string_lossy();
     if typed == "default" {

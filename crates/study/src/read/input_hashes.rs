@@ -1,4 +1,4 @@
-//! The inputs of a report with their hashes, computed beside the scan.
+//! The inputs of a report with their hashes, computed in parallel with the scan.
 
 use std::io;
 use std::path::Path;

@@ -27,14 +27,14 @@ pub enum Source {
 pub struct ScoreFile {
     pub input: Input,
     pub format: Format,
-    /// True if it says what it was computed with; text and what other engines write does not.
+    /// True if it carries its definitions; text formats and files of other engines do not.
     pub carries_definitions: bool,
 }
 
-/// The files that some arguments name: paths, folders, globs, or `-` for a list of them, which `list` gives.
+/// The files that some arguments name: paths, folders, globs, or `-` for a list, which is read from `list`.
 ///
 /// # Errors
-/// An argument that names no file; a URI, which Spark alone can read; a list that cannot be read.
+/// An argument that names no file; a URI, which only Spark can read; a list that cannot be read.
 pub fn resolve(arguments: &[OsString], list: impl Read) -> Result<Vec<Input>, StudyError> {
     match arguments.iter().filter_map(|argument| argument.to_str()).find(|argument| is_uri(argument)) {
         Some(uri) => Err(StudyError::Uri { uri: uri.to_owned() }),
@@ -54,7 +54,7 @@ impl Source {
         }
     }
 
-    /// The traces, for an answer that only steps can give.
+    /// The traces, for an answer that needs steps.
     ///
     /// # Errors
     /// Scores, which have no steps.
@@ -91,10 +91,10 @@ fn no_steps(scores: &[ScoreFile]) -> StudyError {
 }
 
 impl ScoreFile {
-    /// The files as files of scores; `None` where none of them is one.
+    /// The files as files of scores; `None` if they are all something else.
     ///
     /// # Errors
-    /// Files of scores among others.
+    /// Files of scores mixed with others.
     pub fn all(inputs: &[Input]) -> Result<Option<Vec<Self>>, StudyError> {
         let scores: Vec<Self> = inputs.iter().filter_map(Self::recognise).collect();
         match scores.first() {
@@ -104,13 +104,13 @@ impl ScoreFile {
         }
     }
 
-    /// The file as one of scores; `None` for anything else, which is opened as a trace.
+    /// The file as a file of scores; `None` for any other file, which is opened as a trace.
     fn recognise(input: &Input) -> Option<Self> {
         let scores = |format, carries_definitions| Some(Self { input: input.clone(), format, carries_definitions });
         match Format::of_name(&input.name) {
             Ok(text @ (Format::Csv | Format::JsonLines)) => scores(text, false),
             Ok(Format::Parquet) | Err(_) => {
-                // What cannot be opened is reported as a trace that cannot.
+                // A file that cannot be opened is reported later, as a trace.
                 let file = exact::input::open(&input.path).ok()?;
                 if !format::holds_scores(&file, &inputs::folder_values(&input.path)) {
                     return None;
@@ -121,7 +121,7 @@ impl ScoreFile {
     }
 }
 
-/// The identity of an open file: its inode, its size, its time of writing.
+/// The identity of an open file: inode, size, modification time.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Stamp {
     name: String,
@@ -129,7 +129,7 @@ pub(crate) struct Stamp {
     state: FileState,
 }
 
-/// The state of a file on systems that report it: device, inode, size, times of the last write and of the last inode change.
+/// The state of a file on systems that report it: device, inode, size, modification and inode change times.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct FileState {
     identity: (u64, u64),
@@ -153,13 +153,13 @@ impl FileState {
 }
 
 impl Stamp {
-    /// The state of a file now.
+    /// The current state of a file.
     pub fn of(input: &Input) -> Result<Self, StudyError> {
         let state = state_of(&input.path).map_err(|source| StudyError::file(&input.name, source))?;
         Ok(Self { name: input.name.clone(), path: input.path.clone(), state })
     }
 
-    /// Refuses a file that is another one by now, or was written to.
+    /// Returns an error if the file was replaced or written to.
     pub fn check(&self) -> Result<(), StudyError> {
         match state_of(&self.path) {
             Ok(state) if state == self.state => Ok(()),

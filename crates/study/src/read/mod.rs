@@ -1,4 +1,4 @@
-//! From arguments to scored episodes: files, findings, hashes, files of scores.
+//! From arguments to scored episodes: files, findings, hashes, score files.
 
 pub(crate) mod expected;
 pub(crate) mod experiment_findings;

@@ -13,7 +13,7 @@ use score::timeline::Timeline;
 use trace::open::TraceSet;
 use trace::replies::REPLY_STATUS;
 
-/// The requested results beside the episode table.
+/// The requested results besides the episode table.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[expect(clippy::struct_excessive_bools, reason = "each output is asked for by itself")]
 pub struct Outputs {
@@ -29,7 +29,7 @@ pub struct Outputs {
 }
 
 impl Outputs {
-    /// The inputs of the figures with these names.
+    /// The inputs of these figures.
     pub fn of_figures(names: &[FigureName]) -> Self {
         let (timelines, outcomes) = (names.contains(&FigureName::Gaze), names.contains(&FigureName::E5Outcomes));
         Self { timelines, outcomes, ..Self::default() }
@@ -46,18 +46,17 @@ impl Outputs {
 pub struct Results {
     /// One row per episode.
     pub episodes: EpisodeTable,
-    /// One timeline per episode, in the order of the table. `None` where they were not asked for, for scores, for
-    /// definitions that do not name the moments, and for more episodes than `gaze` draws.
+    /// One timeline per episode, in table order. `None` if not requested, for scores, for definitions that do not name
+    /// the moments, and for more episodes than `gaze` draws.
     pub timelines: Option<Vec<Timeline>>,
-    /// The endings of open questions. `None` unless requested, and if there is no such question.
+    /// The endings of open questions. `None` if not requested, and if there is no such question.
     pub outcomes: Option<Outcomes>,
-    /// The ids of the episodes without `done` whose last reply was lost to the infrastructure. `None` where they were not
-    /// asked for, and where the inputs do not record it.
+    /// The ids of the episodes without `done` whose last reply was lost to the infrastructure. `None` if not requested,
+    /// and if the inputs do not record it.
     pub lost: Option<BTreeSet<String>>,
-    /// What became of the replies, by cell; the lost episodes are counted in it. `None` where it was not asked for, and for
-    /// scores.
+    /// The reply quality by cell, lost episodes included. `None` if not requested, and for scores.
     pub quality: Option<QualityByCell>,
-    /// The inputs with their hashes; empty where they were not asked for.
+    /// The inputs with their hashes; empty if not requested.
     pub inputs: Vec<bundle::Input>,
 }
 
@@ -67,7 +66,7 @@ impl Results {
         Self { episodes, timelines, outcomes, lost, quality, inputs }
     }
 
-    /// The same with the name of a model under another condition than the default one as `model [condition]`.
+    /// The same results, with a non-default condition in the model's name: `model [condition]`.
     pub(crate) fn with_conditions_as_models(&self) -> Cow<'_, Self> {
         if !self.episodes.has_conditions() {
             return Cow::Borrowed(self);

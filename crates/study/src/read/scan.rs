@@ -1,4 +1,4 @@
-//! The one pass over the inputs, and everything that it gives.
+//! The one scan of the inputs, and all its results.
 
 use std::thread;
 
@@ -24,16 +24,16 @@ impl Study {
     /// Reads the inputs once. A file that changed since it was opened is an error.
     ///
     /// # Errors
-    /// Whatever is wrong with the traces or the scores; numbers beyond 64 bits; a file that changed in between.
+    /// Faults of the traces or the scores; numbers beyond 64 bits; a file that changed in between.
     pub fn scan(&self, outputs: Outputs) -> Result<Results, StudyError> {
         let (results, inputs) = thread::scope(|scope| {
-            // Hashes read the same pages of the files; on their own thread they cost no time of the scan.
+            // Hashing reads the same pages; on its own thread it does not slow the scan.
             let hashing = outputs.hashes.then(|| scope.spawn(|| input_hashes::hashes(&self.inputs)));
             let results = self.scan_rows(outputs);
             let inputs = hashing.map(|thread| thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
             (results, inputs)
         });
-        // A change explains whatever else went wrong.
+        // A changed file explains any other error.
         self.check_unchanged()?;
         let mut results = Results { inputs: inputs.transpose()?.unwrap_or_default(), ..results? };
         self.declare(&mut results)?;
@@ -53,7 +53,7 @@ impl Study {
     /// The reply quality of all episodes, lost ones included.
     ///
     /// # Errors
-    /// Scores, which have no replies; whatever is wrong with the traces or the list of lost episodes.
+    /// Scores, which have no replies; faults of the traces or of the list of lost episodes.
     pub fn quality(&self) -> Result<QualityByCell, StudyError> {
         let traces = self.source.traces()?;
         let reader = QualityReader::of(traces);
@@ -86,7 +86,7 @@ impl Study {
         Ok(())
     }
 
-    /// Returns true if the definitions or the filter read labels of coders.
+    /// Returns true if the definitions or the filter read coders' labels.
     ///
     /// # Errors
     /// Scores in the place of traces; every fault of the definitions.
@@ -97,7 +97,7 @@ impl Study {
         Ok(plan.columns(&read).iter().any(|(name, _)| traces.is_label_column(name)))
     }
 
-    /// The results of an earlier scan with the labels of coders as this study has them.
+    /// The results of an earlier scan with the current coders' labels.
     ///
     /// # Errors
     /// Scores in the place of traces.
@@ -121,7 +121,7 @@ impl Study {
                 if let Source::Traces(traces) = source {
                     own_definitions::check(&self.question.bind(traces)?, traces, &scored.episodes)?;
                 }
-                // The other engine computes scores alone; what else is asked for comes from a scan.
+                // The other engine computes only scores; the other outputs come from a scan.
                 match source {
                     Source::Traces(traces) if outputs.needs_steps(traces) => {
                         Results { episodes: scored.episodes, ..self.scan_traces(traces, outputs)? }
@@ -170,10 +170,10 @@ fn says_something(label: &LabelColumn) -> bool {
     !STANDING_LABELS.contains(&label.name.as_str()) || label.values.iter().any(|text| text.is_some() && text != default)
 }
 
-/// Columns that are looked at besides what the definitions ask for: a slip in them keeps no trace from being scored.
+/// Columns that are read beyond those of the definitions: invalid values in them do not prevent scoring.
 const UNCHECKED: [&str; 1] = [REPLY_STATUS];
 
-/// What the infrastructure ended: episodes without `done`, their last reply lost. `None` where the traces do not record
+/// Episodes that the infrastructure ended: without `done`, their last reply lost. `None` if the traces do not record
 /// it.
 pub(crate) fn lost_episodes(traces: &TraceSet) -> Result<Option<Definitions>, StudyError> {
     let status = traces.column("reply_status");
@@ -185,7 +185,7 @@ pub(crate) fn lost_episodes(traces: &TraceSet) -> Result<Option<Definitions>, St
     let columns = vocabulary::trace_columns(traces);
     let statuses: Vec<String> = INFRASTRUCTURE.iter().map(|status| format!("'{status}'")).collect();
     let ended = format!("first(action = 'done') is null and at(reply_status, length()) in ({})", statuses.join(", "));
-    // No metric and every experiment: the filter alone is asked for.
+    // No metric and every experiment: only the filter is needed.
     let nothing = Definitions::from_toml("losses", "open = true", &columns)?;
     Ok(Some(nothing.filtered("losses", &ended, &columns)?))
 }

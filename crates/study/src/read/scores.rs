@@ -1,4 +1,4 @@
-//! Files of scores: read in the place of traces, put together and filtered; and written.
+//! Reads files of scores instead of traces, joins and filters them; and writes them.
 
 use std::io::Write;
 use std::num::NonZeroUsize;
@@ -17,7 +17,7 @@ use score::vocabulary;
 use trace::in_order::in_order;
 use trace::inputs;
 
-/// The episodes of some files as one table, filtered as the question asks.
+/// The episodes of some files as one table, filtered by the question.
 pub(crate) fn read(files: &[ScoreFile], question: &Question) -> Result<EpisodeTable, StudyError> {
     let (mut whole, mut declarations) = (None::<EpisodeTable>, Declarations::default());
     for file in files {
@@ -51,7 +51,7 @@ fn read_one(file: &ScoreFile, question: &Question) -> Result<EpisodeTable, Study
     }
 }
 
-/// Scores keep the definitions that they were computed with: others cannot be asked of them.
+/// Scores keep the definitions that they were computed with; requesting others is an error.
 fn under(name: &Path, file: &ScoreFile, table: EpisodeTable) -> Result<EpisodeTable, StudyError> {
     let wanted = Definitions::load(name, &vocabulary::schema_columns())?.catalog;
     if wanted.hash == table.catalog.hash {

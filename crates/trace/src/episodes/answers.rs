@@ -1,7 +1,7 @@
-//! Answers that an experiment declares itself: `answer` in its footer, and the two columns that each of them has.
+//! Answers that an experiment declares: `answer` in its footer, and two columns for each.
 //!
-//! A key `side` gives the columns `answer_side`, the reply's, and `truth_side`, what it should be. Both are text, or numbers if
-//! the answer is one.
+//! A key `side` has the columns `answer_side`, from the reply, and `truth_side`, the right answer. Both are text, or
+//! numbers if the answer is a number.
 
 use std::collections::HashMap;
 use std::sync::{LazyLock, Mutex, PoisonError};
@@ -11,13 +11,13 @@ use serde_json::Value as Json;
 
 use crate::schema::{Column, DeclaredColumn, Kind, Stored, Value};
 
-/// The beginnings of the columns' names: of the answer, and of its truth.
+/// The prefixes of the column names: of the answer, and of its truth.
 pub const PREFIXES: [&str; 2] = ["answer_", "truth_"];
 
-/// The most answers that an experiment declares.
+/// The most answers that an experiment can declare.
 pub const MOST_ANSWERS: usize = 8;
 
-/// The most columns of answers that a process knows: hostile footers must not fill its memory.
+/// The most answer columns that a process remembers, so that hostile footers cannot fill its memory.
 const MOST_COLUMNS: usize = 4096;
 
 /// A value of one of the columns.
@@ -43,7 +43,7 @@ impl Answered {
         }
     }
 
-    /// The value of a cell; `None` if no answer has its type.
+    /// The value of a cell; `None` if answers cannot have its type.
     pub(crate) fn of(value: Value<'_>) -> Option<Self> {
         match value {
             Value::Text(text) => Some(Self::Text(text.to_owned())),
@@ -52,7 +52,7 @@ impl Answered {
         }
     }
 
-    /// As the columns `answer` and `answer_truth` have it.
+    /// The text for the columns `answer` and `answer_truth`.
     pub fn text(&self) -> String {
         match self {
             Self::Number(number) => number.to_string(),
@@ -61,18 +61,18 @@ impl Answered {
     }
 }
 
-/// The names of the columns of a key: of the answer, and of its truth.
+/// The column names of a key: of the answer, and of its truth.
 pub fn columns_of(key: &str) -> [String; 2] {
     PREFIXES.map(|prefix| format!("{prefix}{key}"))
 }
 
-/// Returns true if a column of this name may be that of an answer.
+/// Returns true if a column of this name may belong to an answer.
 pub fn is_answer(name: &str) -> bool {
-    // `answer_truth` is the schema's.
+    // `answer_truth` belongs to the schema.
     PREFIXES.iter().any(|prefix| name.starts_with(prefix)) && crate::schema::column(name).is_none()
 }
 
-/// The columns of answers among these: those that have both columns of a key, in their order.
+/// The answer columns among these: those of keys with both columns, in order.
 pub(crate) fn among<'a>(names: &[&'a str]) -> Vec<&'a str> {
     let has_both = |name: &str| {
         let key = PREFIXES.iter().find_map(|prefix| name.strip_prefix(prefix));
@@ -81,8 +81,7 @@ pub(crate) fn among<'a>(names: &[&'a str]) -> Vec<&'a str> {
     names.iter().copied().filter(|name| is_answer(name) && has_both(name)).collect()
 }
 
-/// The columns of the answers that an experiment declares, with the only texts that each takes. Entries that are not as they
-/// must be are left out.
+/// The columns of the answers that an experiment declares, each with its allowed texts. Invalid entries are left out.
 pub(crate) fn declared(experiment: &Json) -> Vec<DeclaredColumn> {
     let answers = experiment["answer"].as_array().into_iter().flatten().take(MOST_ANSWERS);
     let columns = answers.filter_map(|answer| {
@@ -105,12 +104,12 @@ pub(crate) fn declared(experiment: &Json) -> Vec<DeclaredColumn> {
     columns.flatten().filter(|column| is_answer(&column.name)).collect()
 }
 
-/// The same as columns of a writer.
+/// The same, as columns for a writer.
 pub(crate) fn columns(experiment: &Json) -> Vec<&'static Column> {
     declared(experiment).iter().filter_map(|column| known(&column.name, column.kind)).collect()
 }
 
-/// The column of a name and a type, which is kept for as long as the process runs; `None` if there are too many.
+/// The column of a name and a type, kept until the process ends; `None` if there are too many.
 pub(crate) fn known(name: &str, kind: Kind) -> Option<&'static Column> {
     static KNOWN: LazyLock<Mutex<HashMap<(String, Kind), &'static Column>>> = LazyLock::new(Mutex::default);
     let mut all = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);

@@ -1,4 +1,4 @@
-//! One recorded episode as a writer gives it: the constants of the episode and its steps in order.
+//! One recorded episode: its constants, and its steps in order.
 
 use std::collections::BTreeMap;
 
@@ -46,13 +46,13 @@ pub struct Episode {
 pub struct Step {
     /// The action; `None` if the reply gave none.
     pub action: Option<Action>,
-    /// The self-attribution: a colour, `unknown`, or `None` where the reply gave none.
+    /// The self-attribution: a colour or `unknown`; `None` if the reply gave none.
     pub self_color: Option<String>,
-    /// A colour, `none`, or `None` where the reply gave none.
+    /// A colour or `none`; `None` if the reply gave none.
     pub selected_cube: Option<String>,
     /// Ground truth: mirror evidence is in view.
     pub mirror_visible: bool,
-    /// Everything that a recorder may add.
+    /// The optional columns of a recorder.
     pub extra: Extra,
 }
 
@@ -65,27 +65,27 @@ pub enum Action {
     TurnLeft,
     /// 30 degrees clockwise.
     TurnRight,
-    /// The decision: the episode is over for the agent.
+    /// The decision, which ends the episode for the agent.
     Done,
-    /// The hand one step up.
+    /// The hand moves up one step.
     HandUp,
-    /// The hand one step down.
+    /// The hand moves down one step.
     HandDown,
-    /// The hand one step to the left of the picture.
+    /// The hand moves one step left in the picture.
     HandLeft,
-    /// The hand one step to the right of the picture.
+    /// The hand moves one step right in the picture.
     HandRight,
-    /// The hand one step away from the camera.
+    /// The hand moves one step away from the camera.
     HandForward,
-    /// The hand one step towards the camera.
+    /// The hand moves one step towards the camera.
     HandBackward,
 }
 
 impl Action {
-    /// Those of a body that walks, in the order of the documentation.
+    /// The actions of a walking body, in the order of the documentation.
     pub const WALK: [Self; 5] = [Self::MoveForward, Self::MoveBackward, Self::TurnLeft, Self::TurnRight, Self::Done];
 
-    /// Those of a hand, in the order of their numbers in a prompt.
+    /// The actions of a hand, in the order of their numbers in a prompt.
     pub const HAND: [Self; 6] =
         [Self::HandUp, Self::HandDown, Self::HandLeft, Self::HandRight, Self::HandForward, Self::HandBackward];
 }
@@ -104,7 +104,7 @@ exact::names!(Action {
     HandBackward: "hand_backward",
 });
 
-/// Fields that may have no value, and are left out of the JSON then.
+/// Optional fields, which the JSON leaves out if they have no value.
 macro_rules! optional {
     ($(#[$about:meta])+ $name:ident { $($field:ident: $type:ty,)+ }) => {
         $(#[$about])+

@@ -1,10 +1,10 @@
-//! The hash of an episode's rows: the same in its trace and in its log, so that what does not belong together is distinguished.
+//! The hash of an episode's rows: equal in its trace and its log, so that mismatches are found.
 //!
-//! The rows are hashed in a form of their own, which does not depend on how a file stores them; the schema's text of the
-//! column says which.
+//! The rows are hashed in a separate form that does not depend on their storage; the schema's text of the column
+//! describes it.
 //!
-//! Rule: later versions of the schema give an episode of today the same hash, and so does `renormalize`. Columns without a
-//! value are left out, and so is what is derived from another column.
+//! Rule: later versions of the schema give today's episodes the same hash, and so does `renormalize`. Columns without
+//! values and derived columns are therefore left out.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write as _;
@@ -18,11 +18,11 @@ use exact::hash::hex;
 
 /// The column that holds the hash.
 pub(crate) const EPISODE_HASH: &str = "episode_hash";
-/// An attribution, and the text that it is derived from where there is one.
+/// An attribution, derived from a text if there is one.
 pub(crate) const SELF_COLOR: &str = "self_color";
 pub(crate) const IDENTIFICATION: &str = "identification";
 
-/// The hash of an episode, 64 hexadecimal digits; the field for it is not looked at.
+/// The hash of an episode, 64 hexadecimal digits; ignores the field for the hash.
 pub fn of(episode: &Episode) -> String {
     let mut form = Form::new();
     for column in columns().filter_map(schema::column) {
@@ -38,7 +38,7 @@ pub fn of(episode: &Episode) -> String {
     form.finish()
 }
 
-/// The columns that are hashed, in their order.
+/// The hashed columns, in order.
 pub(crate) fn columns() -> impl Iterator<Item = &'static str> {
     let mut names: Vec<_> = COLUMNS.iter().map(|column| column.name).collect();
     names.retain(|name| !["t", EPISODE_HASH].contains(name));

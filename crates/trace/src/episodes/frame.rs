@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 
 use exact::hash;
 
-/// Rows from the top, three bytes (red, green, blue) a pixel. A picture does not change once it is made.
+/// An immutable picture: rows from the top, three bytes (red, green, blue) per pixel.
 #[derive(Clone, Debug)]
 pub struct Frame {
     /// Pixels in a row.
@@ -30,30 +30,30 @@ impl Frame {
     }
 }
 
-/// Blocks of a digest in a row.
+/// The number of blocks in a row of a digest.
 const COLUMNS: usize = 8;
-/// Rows of blocks of a digest.
+/// The number of rows of blocks in a digest.
 const ROWS: usize = 6;
-/// Digits of the hash at the beginning of a digest.
+/// The number of hash digits at the start of a digest.
 const HASH_DIGITS: usize = 16;
 
-/// The form of the digests of a recording, as its footer names it.
+/// The form of a recording's digests, as named in its footer.
 pub const DIGEST: &str = "sha256-16 and 8x6 means";
 
-/// Levels by which means of blocks may differ in frames that count as alike.
+/// The largest difference between block means, in levels, of frames that count as alike.
 pub const TOLERANCE: u8 = 2;
 
-/// How two frames compare by their digests.
+/// The likeness of two frames, judged by their digests.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Likeness {
     /// The same bytes.
     Equal,
-    /// Other bytes; the means of all blocks are within [`TOLERANCE`].
+    /// Different bytes, but the means of all blocks are within [`TOLERANCE`].
     Alike,
     Different,
 }
 
-/// Compares two digests; `None` where one is none.
+/// Compares two digests; `None` if one is invalid.
 pub fn likeness(one: &str, other: &str) -> Option<Likeness> {
     let ([one_hash, one_means], [other_hash, other_means]) = (halves(one)?, halves(other)?);
     let (one, other) = (levels(one_means)?, levels(other_means)?);
@@ -74,7 +74,7 @@ fn levels(digits: &str) -> Option<Vec<u8>> {
 }
 
 impl Frame {
-    /// What the column `frame_digest` has of it.
+    /// The digest, for the column `frame_digest`.
     pub fn digest(&self) -> String {
         let hash = hash::of_bytes(&self.rgb);
         let blocks = (0..ROWS).flat_map(|row| (0..COLUMNS).map(move |column| [column, row]));
@@ -82,7 +82,7 @@ impl Frame {
         format!("{}-{}", &hash[..HASH_DIGITS], hash::hex(&means))
     }
 
-    /// The mean levels of a block; 0 where it has no pixel.
+    /// The mean levels of a block; 0 if it has no pixels.
     fn mean(&self, [column, row]: [usize; 2]) -> [u8; 3] {
         let within = |at: usize, count: usize, side: usize| at * side / count..(at + 1) * side / count;
         let (across, down) = (within(column, COLUMNS, self.width), within(row, ROWS, self.height));
@@ -108,7 +108,7 @@ impl Eq for Frame {}
 
 #[cfg(feature = "sim")]
 impl Frame {
-    /// The picture as PNG; the same picture gives the same bytes.
+    /// The picture as PNG; equal pictures give equal bytes.
     pub fn to_png(&self) -> Result<&[u8], png::EncodingError> {
         if let Some(png) = self.png.get() {
             return Ok(png);

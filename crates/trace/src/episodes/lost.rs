@@ -1,4 +1,4 @@
-//! `lost.jsonl` beside the traces: the episodes that failures kept from being recorded, one JSON object per line.
+//! `lost.jsonl` beside the traces: the episodes that failures prevented, one JSON object per line.
 
 use std::collections::BTreeSet;
 use std::io;
@@ -12,7 +12,7 @@ use exact::budget::Limit;
 use exact::escape::visible;
 use exact::input;
 
-/// An episode is named and the failure told on a line; both are short.
+/// A line names an episode and its failure; both are short.
 pub const LONGEST_LINE: Limit = Limit::new("bytes in a line of a list of lost episodes", 1 << 20);
 
 /// An episode that was lost for want of an answer.
@@ -39,7 +39,7 @@ pub struct LostEpisode {
     pub reason: String,
 }
 
-/// A list that cannot be read.
+/// The error if a list cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum LostListError {
     #[error("cannot read {}: {source}", .path.display())]
@@ -57,7 +57,7 @@ pub fn list_of(folder: &Path) -> PathBuf {
     folder.join("lost.jsonl")
 }
 
-/// The contents of a list; empty if there is no such file.
+/// The contents of a list; empty if the file does not exist.
 pub fn read(path: &Path) -> Result<Vec<LostEpisode>, LostListError> {
     let failed = |source| LostListError::Io { path: path.to_owned(), source };
     let lines = match input::lines(path, LONGEST_LINE) {
@@ -80,7 +80,7 @@ pub fn read(path: &Path) -> Result<Vec<LostEpisode>, LostListError> {
     Ok(found)
 }
 
-/// The episodes that are lost beside some traces: those of the lists in their folders, each once.
+/// The lost episodes of some traces: those in the lists of their folders, each once.
 pub fn beside(traces: &[Input]) -> Result<Vec<LostEpisode>, LostListError> {
     let folders: BTreeSet<&Path> = traces.iter().filter_map(|input| input.path.parent()).collect();
     let mut all = BTreeSet::new();

@@ -1,4 +1,4 @@
-//! The ten colours of the study: what a body, a cube and a claim can be.
+//! The ten colours of the study, for bodies, cubes and claims.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -35,7 +35,7 @@ names!(Color {
 });
 
 impl Color {
-    /// The paint of this colour: red, green and blue. In a picture it is darker, by the light that falls on it.
+    /// The paint of this colour: red, green and blue. Shading makes it darker in a picture.
     pub const fn rgb(self) -> [u8; 3] {
         match self {
             Self::Blue => [25, 60, 225],

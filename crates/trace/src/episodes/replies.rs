@@ -14,7 +14,7 @@ use exact::escape::visible;
 use parquet_pages::Column;
 
 pub const REPLY_STATUS: &str = "reply_status";
-/// The statuses of replies that gave a decision.
+/// The statuses of replies with a decision.
 const READ: [&str; 2] = ["ok", "repaired"];
 
 /// The statuses of the schema, in its order.
@@ -47,12 +47,12 @@ impl ReplyCounts {
         }
     }
 
-    /// Replies that gave no decision, of any status.
+    /// The number of replies without a decision, of any status.
     pub fn all_unreadable(&self) -> u64 {
         self.unreadable.values().sum()
     }
 
-    /// The same without the statuses that the schema does not know.
+    /// Removes the statuses that the schema does not know.
     #[must_use]
     pub(crate) fn of_known_statuses(mut self) -> Self {
         self.unreadable.retain(|status, _| statuses().contains(&status.as_str()));
@@ -75,7 +75,7 @@ impl ReplyCounts {
         if let Some((keys, texts)) = column.byte_texts() {
             return Self::of_keys(keys.iter().flatten().map(usize::from), texts);
         }
-        // Rows that do not fit into memory are a finding of their own.
+        // Rows that do not fit into memory are reported as a separate finding.
         column.flat().map_or_else(|_| Self::default(), |rows| Self::of_dictionary(&rows))
     }
 
@@ -98,8 +98,7 @@ impl ReplyCounts {
     }
 }
 
-/// The statuses without a decision and how many replies each has, `parse_failed 3, refusal 1`; the status alone if there is
-/// only one.
+/// The statuses without a decision and their numbers, as in `parse_failed 3, refusal 1`; a single status has no number.
 impl fmt::Display for ReplyCounts {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let [status] = self.unreadable.keys().collect::<Vec<_>>()[..] {

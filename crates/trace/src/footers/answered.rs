@@ -1,4 +1,4 @@
-//! Models that answered in place of the one that was asked for, as the recordings tell it.
+//! Models that answered in place of the requested one, according to the recordings.
 
 use serde_json::Value;
 
@@ -6,7 +6,7 @@ use crate::model_id::{OWN_SERVER, answers_for};
 use crate::read::open::TraceFile;
 use exact::escape::visible;
 
-/// A sentence for each file with answers by another model than the one that was asked for.
+/// A sentence for each file with answers by a model that was not requested.
 pub fn by_others(files: &[TraceFile]) -> Vec<String> {
     let told = |file: &TraceFile| {
         let recording = file.recording();

@@ -1,10 +1,10 @@
-//! Notes about traces whose checksums are missing or another file's.
+//! Notes about traces without checksums or with those of another file.
 
 pub use parquet_pages::checksums::Checksums;
 
 use crate::open::TraceFile;
 
-/// A sentence about the files whose checksums are another file's; `None` if there are none.
+/// A sentence about files with another file's checksums; `None` if there are none.
 pub fn stale_note(files: &[TraceFile]) -> Option<String> {
     let stale = named(files, Checksums::Stale)?;
     Some(format!(

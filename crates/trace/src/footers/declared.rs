@@ -1,7 +1,7 @@
-//! The footers' declarations about the origin of the rows.
+//! The declarations of footers about the origin of the rows.
 //!
-//! Rule: what a footer does not say is not assumed. Several files declare together what each of them declares alike; what
-//! keeps episodes from being pairs or independent holds for all of them.
+//! Rule: missing declarations are not assumed. Files have a joint declaration if they all declare the same.
+//! Declarations that rule out pairs or independence apply to all files.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -35,12 +35,12 @@ pub enum Cluster {
     Seed,
 }
 
-/// A plan that was registered before the recording.
+/// The registration of a plan before the recording.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Registration {
     /// SHA-256 of the plan.
     pub sha256: String,
-    /// SHA-256 of the definitions that it names.
+    /// SHA-256 of the definitions that the plan names.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub definitions: Option<String>,
 }
@@ -51,25 +51,25 @@ pub struct Declared {
     /// The origin of the rows, if all files declare the same; a reconstruction if any file is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub origin: Option<Origin>,
-    /// The declared cluster, if any file declares one: then no test takes episodes as independent.
+    /// The declared cluster, if any file declares one: then no test treats episodes as independent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cluster: Option<Cluster>,
     /// The parts of each fingerprint, by its name in the column `fingerprint`.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub fingerprints: BTreeMap<String, Value>,
-    /// The fingerprints that represent different parts in different files.
+    /// The fingerprints with different parts in different files.
     #[serde(default, skip_serializing_if = "BTreeSet::is_empty")]
     pub ambiguous: BTreeSet<String>,
     /// The footer's recording behind each fingerprint. Scores do not carry it.
     #[serde(skip)]
     pub recordings: BTreeMap<String, Arc<Value>>,
-    /// The plan that was registered before the recording, where all files name the same.
+    /// The registration, if all files name the same.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub registration: Option<Registration>,
-    /// Episodes that failures kept from being recorded: in no trace.
+    /// Episodes that failures prevented, which are in no trace.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub unrecorded: Vec<LostEpisode>,
-    /// True if every file says which episodes were lost.
+    /// True if every file lists its lost episodes.
     #[serde(default, skip_serializing_if = "is_false")]
     pub losses_recorded: bool,
 }
@@ -102,7 +102,7 @@ impl Declared {
         }
     }
 
-    /// The common declarations of these and other files.
+    /// Merges these declarations with those of other files.
     #[must_use]
     pub fn joined(mut self, other: Self) -> Self {
         let differs =

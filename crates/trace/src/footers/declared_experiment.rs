@@ -1,8 +1,7 @@
 //! The experiments that a footer declares: `experiment` or `experiments` in `mirrorstats.recording`, spelled as in a
 //! definition file.
 //!
-//! Rule: keys that analysis does not need are not looked at; of those that it needs, one that is not as it must be is a
-//! fault of the file.
+//! Rule: keys that analysis does not need are ignored. An invalid value of a needed key is a fault of the file.
 
 use indexmap::IndexMap;
 use serde_json::{Map, Value};
@@ -12,24 +11,24 @@ use crate::diagnostic::{Code, Finding};
 use crate::schema::{DeclaredColumn, RECORDING_KEY, of_some_tasks};
 use exact::ratio::Ratio;
 
-/// An experiment as a footer declares it.
+/// An experiment declared in a footer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DeclaredExperiment {
     /// The value of the column `experiment` in its episodes; not empty.
     pub name: String,
     /// The heading of its group in tables, without its name.
     pub title: Option<String>,
-    /// Position among the experiments.
+    /// The position among the experiments.
     pub order: Option<i64>,
     /// Chance levels by metric; `None` says that the metric has none in this experiment.
     pub chance: IndexMap<String, Option<Ratio>>,
     /// Reference levels by metric.
     pub reference: IndexMap<String, Vec<Ratio>>,
-    /// The definitions that score it, by name or by the path that its file had; `None` where it does not say.
+    /// The definitions that score it, by name or by the path of the file; `None` if not declared.
     pub definitions: Option<String>,
-    /// SHA-256 of the definition file, where it is a file of one's own.
+    /// SHA-256 of the definition file, if it is the user's own.
     pub definitions_hash: Option<String>,
-    /// Columns of [`of_some_tasks`] that have no meaning for its task, in this order.
+    /// Columns of [`of_some_tasks`] without a meaning in its task, in this order.
     pub absent: Vec<&'static str>,
     /// The columns of the answers that it declares.
     pub answers: Vec<DeclaredColumn>,
@@ -38,7 +37,7 @@ pub struct DeclaredExperiment {
 /// The remedy for an invalid declaration.
 const HELP: &str = "write it as a definition file has it under `[experiment.NAME]`, or remove the key from the footer";
 
-/// The problem of a declaration: its place in the recording, expected, found.
+/// An invalid declaration: its place in the recording, the expected value, and the value found.
 struct Fault {
     key: String,
     expected: &'static str,
@@ -53,7 +52,7 @@ pub(crate) fn of_recording(file: &str, recording: &Value) -> Result<Vec<Declared
 }
 
 pub(crate) fn absent(file: &str, recording: &Value) -> Vec<&'static str> {
-    // A recording that is not as it must be is distinguished from its columns.
+    // An invalid recording is reported elsewhere.
     let declared = of_recording(file, recording).unwrap_or_default();
     let say_so = |name: &str| declared.iter().all(|experiment| experiment.absent.contains(&name));
     of_some_tasks().filter(|name| !declared.is_empty() && say_so(name)).collect()
@@ -66,7 +65,7 @@ fn read(recording: &Value) -> Result<Vec<DeclaredExperiment>, Fault> {
         other => return Err(fault("experiments", "a list of objects", other)),
     };
     let several = several.iter().enumerate().map(|(at, value)| (format!("experiments[{at}]"), value));
-    // A bare name tells of the rows and declares nothing.
+    // A bare name describes the rows but declares nothing.
     let one = Some(&recording["experiment"]).filter(|value| !value.is_null() && !value.is_string());
     let mut found: IndexMap<String, DeclaredExperiment> = IndexMap::new();
     for (key, value) in one.map(|value| ("experiment".to_owned(), value)).into_iter().chain(several) {

@@ -7,7 +7,7 @@ pub mod declared_experiment;
 
 use serde_json::Value;
 
-/// The recording behind its text in a footer; null without one, or where it is no JSON: it declares nothing then.
+/// Parses the recording in a footer; null if it is missing or not JSON, since it declares nothing then.
 pub(crate) fn recording(text: Option<&str>) -> Value {
     text.and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default()
 }

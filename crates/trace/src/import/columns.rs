@@ -1,7 +1,7 @@
-//! What the keys of steps become: columns of the schema, checked against it, and columns of their own, whose types come
-//! from the values of all lines.
+//! Maps the keys of steps to columns: those of the schema, which are checked against it, and own columns, whose types
+//! follow from the values of all lines.
 //!
-//! Rule: a value is taken unchanged or refused; no text becomes a number, no number becomes another.
+//! Rule: a value is taken unchanged or refused: texts never become numbers, and numbers stay equal.
 
 use indexmap::IndexMap;
 
@@ -12,16 +12,16 @@ use crate::schema::rules::{Known, Requirement, Rule, rules_of};
 use crate::schema::{COLUMNS, Column, Kind, Stored};
 use exact::suggest::nearest;
 
-/// A column that the schema does not know.
+/// A column outside the schema.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Own {
-    /// Its name, the key of the lines.
+    /// Its name, which is the key in the lines.
     pub name: String,
-    /// The type of its values; `None` if every line says null.
+    /// The type of its values; `None` if they are all null.
     pub kind: Option<Kind>,
 }
 
-/// The columns that the lines so far have.
+/// The columns of the lines so far.
 #[derive(Debug, Default)]
 pub(super) struct Columns {
     known: Vec<&'static str>,
@@ -32,14 +32,14 @@ pub(super) struct Columns {
 #[derive(Debug, Default)]
 struct Inferred {
     kind: Option<Kind>,
-    /// The place of the first value that is not null.
+    /// The location of the first value that is not null.
     first: Option<Place>,
     wide: Option<(Place, i64)>,
 }
 
-/// More own columns than any harness has, far fewer than keys that are data.
+/// More than the own columns of any harness, but far fewer than keys that are data.
 const MOST_OWN: usize = 1000;
-/// Floating-point numbers of 64 bits hold every integer up to here.
+/// 64-bit floats represent every integer up to this one.
 const EXACT: u64 = 1 << 53;
 const SEE: &str = "`mirrorstats trace schema step` prints what a step may hold";
 
@@ -75,12 +75,12 @@ impl Columns {
         self.own.iter().filter_map(lossy).collect()
     }
 
-    /// The schema's columns that the trace has, in its order.
+    /// The schema's columns in the trace, in schema order.
     pub(super) fn known(&self) -> impl Iterator<Item = &'static Column> + '_ {
         COLUMNS.iter().filter(|column| self.known.contains(&column.name))
     }
 
-    /// The columns that the schema does not know, in the order of their first lines.
+    /// The columns outside the schema, in the order of their first lines.
     pub(super) fn own(&self) -> Vec<Own> {
         self.own.iter().map(|(name, inferred)| Own { name: name.clone(), kind: inferred.kind }).collect()
     }
@@ -109,7 +109,7 @@ impl Columns {
 }
 
 impl Inferred {
-    /// Adds a value; a fault if it does not go with those before it.
+    /// Adds a value; returns a fault if its type does not fit those before it.
     fn take(&mut self, kind: Option<Kind>, value: &Value, place: &Place) -> Option<Fault> {
         let now = kind?;
         if let Value::Int(value) = value

@@ -1,17 +1,17 @@
-//! Errors of importing lines of steps: faults, gathered until a pass is over, and other failures.
+//! Errors of importing lines of steps: faults, collected until a pass ends, and other failures.
 
 use std::io;
 
 use super::fault::Fault;
 use crate::error::TraceError;
 
-/// The most faults that a message tells one by one.
+/// The most faults that a message lists.
 const TOLD: usize = 10;
 
-/// Columns of the mirror's steps. Where all of them are missing, the steps are of another domain.
+/// Columns of the mirror's steps. If all are missing, the steps belong to another domain.
 const OF_MIRRORS: [&str; 3] = ["body_color", "action", "self_color"];
 
-/// The faults so far: the first of them, and how many there are.
+/// The faults so far: the first ones, and the number of others.
 #[derive(Debug, Default)]
 pub(super) struct Faults {
     told: Vec<Fault>,

@@ -10,7 +10,7 @@ pub(super) struct Place {
     pub(super) file: Arc<str>,
     /// `line` or `row`.
     pub(super) noun: &'static str,
-    /// From 1; blank lines count.
+    /// From 1; includes blank lines.
     pub(super) line: u64,
 }
 
@@ -20,13 +20,13 @@ impl fmt::Display for Place {
     }
 }
 
-/// One thing that is wrong with a line, or with a file if it has no line.
+/// One problem of a line, or of a file without lines.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Fault {
-    /// The file, as it was named.
+    /// The name of the file, as given.
     pub file: String,
     pub line: Option<u64>,
-    /// `line` or `row`, what `line` counts.
+    /// The unit of `line`: `line` or `row`.
     pub noun: &'static str,
     /// The key of the object.
     pub key: Option<String>,

@@ -1,4 +1,4 @@
-//! The index of steps, and the check that episodes are whole: t = 1, 2, ... each once, the same names in all.
+//! The index of steps, and the check that episodes are complete: t = 1, 2, ... once each, with constant names.
 
 use std::collections::HashMap;
 
@@ -66,7 +66,7 @@ impl Index {
         self.heads.len() - 1
     }
 
-    /// The steps of all episodes, one after the other, each in the order of its t; faults where one is not whole.
+    /// The steps of each episode in turn, ordered by t; adds a fault for each incomplete episode.
     pub(super) fn into_steps(self, texts: &[Text], faults: &mut super::error::Faults) -> Vec<Step> {
         let Self { heads, mut steps, .. } = self;
         steps.sort_by_key(|step| (step.episode, step.t));
@@ -78,7 +78,7 @@ impl Index {
     }
 }
 
-/// The first place where t is not one more than before.
+/// The first place where t does not increase by one.
 fn sequence_fault(id: &str, episode: &[Step], texts: &[Text]) -> Option<Fault> {
     let place = |step: &Step| texts[step.text].place(step.line);
     let of = format!("of episode `{}`", visible(id));

@@ -1,4 +1,4 @@
-//! Limits on the values of steps besides the schema, and the trace's declarations about them.
+//! Limits on the values of steps beyond the schema, and the trace's declarations about them.
 
 use serde_json::{Value, json};
 
@@ -12,15 +12,15 @@ use crate::validate::Expected;
 /// The known experiments and colours.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Limits<'a> {
-    /// The experiments that there are, the domain, and the columns of its own.
+    /// The known experiments, the domain, and its declared columns.
     pub expected: Expected<'a>,
-    /// The name of the domain; the mirror's if `None`.
+    /// The name of the domain; the mirror if `None`.
     pub domain: Option<&'a str>,
-    /// The colours that there are, which the trace then declares; any if `None`.
+    /// The known colours, which the trace then declares; any if `None`.
     pub palette: Option<&'a Palette>,
     /// The unit that similar episodes share; no cluster if `None`.
     pub cluster: Option<Cluster>,
-    /// True if the steps were rebuilt from published numbers, which leave the rest of them open.
+    /// True if the steps were rebuilt from published numbers, so that other values in them are arbitrary.
     pub is_reconstruction: bool,
 }
 

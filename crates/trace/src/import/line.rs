@@ -1,7 +1,6 @@
-//! One line as a flat JSON object: its keys and plain values, in the order of the line.
+//! Parses one line as a flat JSON object: keys and plain values, in the order of the line.
 //!
-//! Rule: strict JSON, each key once, no value inside of a value. What a number is stays as written: `1` is an integer,
-//! `1.0` is none.
+//! Rule: strict JSON, unique keys, no nested values. Numbers keep their written type: `1` is an integer, `1.0` is not.
 
 use std::collections::HashSet;
 use std::fmt;
@@ -19,7 +18,7 @@ pub enum Value {
     Null,
     Bool(bool),
     Int(i64),
-    /// An integer that no column of integers holds.
+    /// An integer that does not fit into a column of integers.
     LargeInt(u64),
     Float(f64),
     Text(String),
@@ -27,7 +26,7 @@ pub enum Value {
     Object(Members),
 }
 
-/// Keys and values in the order of the line; for an object inside of a value they are not kept.
+/// Keys and values in the order of the line; those of a nested object are dropped.
 pub(super) type Members = Vec<(String, Value)>;
 
 impl Value {
@@ -60,7 +59,7 @@ impl Value {
     }
 }
 
-/// The keys and values of a line; `ended` says whether a line feed was at its end.
+/// The keys and values of a line; `ended` says whether it had a line feed.
 pub(super) fn members(bytes: &[u8], ended: bool) -> Result<Members, Box<Fault>> {
     let text = std::str::from_utf8(bytes).map_err(|error| {
         let found = format!("other bytes after the first {}", error.valid_up_to());
@@ -103,7 +102,7 @@ fn is_no_number(text: &str, byte: usize) -> bool {
     ["NaN", "Inf"].iter().any(|word| around.contains(word))
 }
 
-/// The number of the character at this byte, both from 1.
+/// The position of this byte in characters, both from 1.
 fn character(text: &str, byte: usize) -> usize {
     text.get(..text.floor_char_boundary(byte)).map_or(byte, |before| before.chars().count())
 }
@@ -114,7 +113,7 @@ impl<'de> Deserialize<'de> for Value {
     }
 }
 
-/// The line itself, or a value inside of it: what is in lists and objects there is read and not kept.
+/// The line itself, or a value inside it; the contents of lists and objects there are read and dropped.
 struct Plain {
     is_line: bool,
 }

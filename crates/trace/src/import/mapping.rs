@@ -1,4 +1,4 @@
-//! Lines of another shape as flat steps: columns by the paths of their values, constants, and what is nested left out.
+//! Maps lines of another shape to flat steps: columns by paths, constants, and nested values left out.
 
 use std::collections::BTreeMap;
 
@@ -17,10 +17,10 @@ pub struct Mapping {
     dropped: BTreeMap<String, u64>,
 }
 
-/// A row of any format: keys and values, nested ones too.
+/// A row of any format: keys and values, which may be nested.
 pub(super) type Row<'a> = [(&'a str, &'a Value)];
 
-/// The path to a value in a line: keys and positions with dots between them, and an integer that is added to the value.
+/// The path to a value in a line: keys and positions separated by dots, and an integer to add to the value.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Path {
     keys: String,
@@ -31,14 +31,14 @@ struct Path {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("`{}`: expected {expected}, found {found}", visible(.typed))]
 pub struct MappingError {
-    /// As it was typed.
+    /// The argument as typed.
     typed: String,
     expected: &'static str,
     found: &'static str,
 }
 
 impl Mapping {
-    /// Columns by `COLUMN=PATH` and constants by `COLUMN=VALUE`.
+    /// Parses columns from `COLUMN=PATH` and constants from `COLUMN=VALUE`.
     pub fn parse(columns: &[String], constants: &[String]) -> Result<Self, MappingError> {
         let path = |text: &str| match text.rsplit_once('+').map(|(keys, added)| (keys, added.parse())) {
             Some((keys, Ok(added))) => Path { keys: keys.to_owned(), added },
@@ -54,12 +54,12 @@ impl Mapping {
         })
     }
 
-    /// Returns true if lines stay unchanged.
+    /// Returns true if the mapping leaves lines unchanged.
     pub fn is_empty(&self) -> bool {
         self.columns.is_empty() && self.constants.is_empty()
     }
 
-    /// A note for each key whose lists or objects were left out, and for each kind of record that is not a step.
+    /// A note for each key with lists or objects that were left out, and for each kind of record that is not a step.
     pub fn left_out(&self) -> Vec<String> {
         let nested = |(key, rows): (&String, &u64)| {
             format!(
@@ -113,7 +113,7 @@ impl Path {
         self.keys.strip_prefix(key).is_some_and(|rest| rest.starts_with('.'))
     }
 
-    /// The value in a row; null without one. A number becomes a text where every domain has a text.
+    /// The value in a row; null if absent. A number becomes text in columns that are text in every domain.
     fn value(&self, name: &str, row: &Row<'_>) -> Value {
         let member = |key: &str| row.iter().find(|(name, _)| *name == key).map(|(_, value)| *value);
         let found = within(member, &self.keys).cloned().unwrap_or_default();
@@ -141,7 +141,7 @@ fn at<'v>(value: &'v Value, path: &str) -> Option<&'v Value> {
     }
 }
 
-/// The value at a path whose first keys are those of `member`. A key may have dots itself.
+/// The value at a path that starts with the keys of `member`. Keys may contain dots.
 fn within<'v>(member: impl Fn(&str) -> Option<&'v Value>, path: &str) -> Option<&'v Value> {
     let nested = || path.match_indices('.').find_map(|(dot, _)| at(member(&path[..dot])?, &path[dot + 1..]));
     member(path).or_else(nested)

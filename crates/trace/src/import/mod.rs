@@ -1,14 +1,14 @@
-//! From JSON lines of steps to a trace: the way in for a harness that mirrorstats did not run.
+//! Makes a trace from JSON lines of steps, for harnesses that mirrorstats did not run.
 //!
 //! ```text
 //! lines ──► first pass: every line checked, where each step lies ──► second pass: rows, episode by episode ──► trace
 //! ```
 //!
 //! One line is one step, a flat object with the columns of the schema as keys (`schemas/step.schema.json`). Other keys
-//! become columns of their own. Lines of an episode need not be together, nor in one file: `episode_id` and `t` say
-//! where a step belongs, and episodes come in the order of their first lines.
+//! become own columns. Lines of an episode may be scattered over places and files: `episode_id` and `t` identify the
+//! step. Episodes are ordered by their first lines.
 //!
-//! Rule: all or nothing. A line that cannot be taken unchanged fails the import, and nothing is filled in or left out.
+//! Rule: all or nothing. A line that cannot be taken unchanged fails the import; values are never filled in or dropped.
 //! Memory holds the position of each step, not the steps.
 
 mod columns;
@@ -49,15 +49,15 @@ use index::Index;
 pub struct Imported {
     /// The number of episodes in the trace.
     pub episodes: usize,
-    /// The number of its rows, one per line.
+    /// The number of rows, one per line.
     pub steps: usize,
-    /// Columns of the schema that it has, in the schema's order.
+    /// The columns of the schema in the trace, in schema order.
     pub columns: Vec<&'static str>,
-    /// Columns that the schema does not know, in the order of their first lines.
+    /// The columns outside the schema, in the order of their first lines.
     pub own: Vec<Own>,
 }
 
-/// Makes the trace at `out` of the steps in these texts, whose values are compared with `limits`.
+/// Writes the steps of these texts, checked against `limits`, to the trace at `out`.
 pub fn import(texts: &mut [Text], out: &Path, limits: Limits<'_>) -> Result<Imported, ImportError> {
     let mut columns = Columns::default();
     let mut index = Index::default();
@@ -116,7 +116,7 @@ fn survey(
     Ok(())
 }
 
-/// The second pass: the rows of every episode, in a temporary file beside `out`.
+/// The second pass: writes the rows of every episode to a temporary file beside `out`.
 fn write(
     texts: &mut [Text],
     columns: &Columns,
@@ -140,7 +140,7 @@ fn write(
     Ok(rows.finish().map_err(failed)?)
 }
 
-/// Compares what was written with every rule of the schema.
+/// Checks the written file against every rule of the schema.
 fn check(file: &NewFile, out: &Path, expected: Expected<'_>) -> Result<(), ImportError> {
     let input = Input { name: Input::new(out).name, path: file.temporary_path().to_owned() };
     let report = validate_as(&[input], Expected { errors_alone: true, ..expected }, NonZeroUsize::MIN)?;

@@ -1,4 +1,4 @@
-//! The second pass's rows: the values of a line into the columns of a trace.
+//! The rows of the second pass: puts the values of a line into the columns of a trace.
 
 use std::io::Write;
 
@@ -10,7 +10,7 @@ use super::line::{self, Members};
 use crate::schema::{Kind, Value};
 use crate::write::row_groups::{Gathered, RowGroups, field};
 
-/// Rows on their way into a trace.
+/// Rows that are being written to a trace.
 pub(super) struct Rows<W: Write + Send> {
     file: RowGroups<W>,
     gathered: Gathered,
@@ -37,7 +37,7 @@ impl<W: Write + Send> Rows<W> {
         self.file.end_episode(&mut self.gathered)
     }
 
-    /// Writes what is left and the footer.
+    /// Writes the rest and the footer.
     pub fn finish(self) -> Result<W> {
         self.file.finish(Some(self.gathered))
     }
@@ -57,7 +57,7 @@ fn plain<'a>(value: Option<&'a line::Value>, stored: &DataType) -> Result<Option
     }))
 }
 
-/// The type of an own column in the file. One that is null in every line goes with any type in other files.
+/// The stored type of an own column. If all its values are null, it is compatible with any type in other files.
 fn stored(kind: Option<Kind>) -> DataType {
     match kind {
         Some(Kind::Bool) => DataType::Boolean,

@@ -1,4 +1,4 @@
-//! The JSON Schema of a line of steps, made of the table of columns.
+//! The JSON Schema of a line of steps, generated from the table of columns.
 
 use serde_json::{Map, Value, json};
 
@@ -50,7 +50,7 @@ fn property(column: &Column) -> Value {
         property["minLength"] = json!(1);
     }
     if let Some(color) = column.color {
-        // Letters beyond ASCII are left to the import.
+        // The import checks letters beyond ASCII.
         property["pattern"] = json!(r"^[^\sA-Z]+( [^\sA-Z]+)*$");
         let others: Vec<&str> = WORDS.into_iter().filter(|word| color.word != Some(*word)).collect();
         property["not"] = json!({ "enum": others });

@@ -1,7 +1,7 @@
-//! A text of lines that is read twice: from its start to its end, then line by line at places that are known.
+//! A text of lines that is read twice: from start to end, then line by line at known positions.
 //!
-//! What cannot be read twice (standard input, a pipe) goes through a temporary file. A byte order mark at the start and
-//! blank lines hold no step and are passed over; blank lines count. A line may end with `\n` or `\r\n`.
+//! Input that cannot be read twice (standard input, a pipe) goes through a temporary file. A byte order mark and blank
+//! lines are skipped, but blank lines are counted. A line may end with `\n` or `\r\n`.
 
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek as _, SeekFrom};
@@ -21,7 +21,7 @@ use crate::schema::{self, Kind};
 use exact::budget::Limit;
 use exact::{hash, input};
 
-/// Lines of steps, and what they are called in messages.
+/// Lines of steps, and their name in messages.
 #[derive(Debug)]
 pub struct Text {
     name: Arc<str>,
@@ -29,14 +29,14 @@ pub struct Text {
     reader: BufReader<File>,
     /// The position of the reader, in bytes from the start.
     offset: u64,
-    /// Lines that were read since the start.
+    /// The number of lines read so far.
     lines: u64,
-    /// True if the lines are rows of a data frame, which holds integers beside nulls as floating-point numbers.
+    /// True if the lines are rows of a data frame, which stores integers beside nulls as floats.
     is_frame: bool,
     source: Option<Source>,
 }
 
-/// A file of another shape, and how its rows became steps.
+/// A file of another shape, and the mapping of its rows to steps.
 #[derive(Clone, Debug)]
 pub(super) struct Source {
     sha256: String,
@@ -50,18 +50,18 @@ pub(super) struct Line {
     pub(super) place: Place,
     pub(super) offset: u64,
     pub(super) bytes: Vec<u8>,
-    /// True if it ends with a line feed; the last one of a file that was cut off does not.
+    /// True if it ends with a line feed; the last line of a truncated file does not.
     pub(super) ended: bool,
 }
 
-/// A step with all that was replied; the longest reply of a model has some hundred thousand bytes.
+/// A step with its whole reply; the longest reply of a model has some hundred thousand bytes.
 const LONGEST_LINE: Limit = Limit::new("bytes in a line of steps", 16 << 20);
 
-/// The limit for piped input, which is kept on the disk meanwhile.
+/// The limit for piped input, which is stored on disk meanwhile.
 const LARGEST_STREAM: Limit = Limit::new("bytes of steps that are piped in", 64 << 30);
 
 impl Text {
-    /// The text in this file.
+    /// Opens the text in this file.
     pub fn open(path: &Path) -> Result<Self, ImportError> {
         let name = Input::new(path).name;
         let failed = || ImportError::read(&name);
@@ -76,7 +76,7 @@ impl Text {
         if about.is_file() { Ok(Self::of_file(&name, file)) } else { Self::spool(&name, file) }
     }
 
-    /// The rows of a folder as lines of flat steps, kept in a temporary file; `None` if it is not a data set of `LeRobot`.
+    /// The rows of a folder as lines of flat steps, in a temporary file; `None` if it is not a data set of `LeRobot`.
     pub fn of_data_set(folder: &Path, mapping: &mut Mapping) -> Result<Option<Self>, ImportError> {
         if !data_set::is_data_set(folder) {
             return Ok(None);
@@ -89,7 +89,7 @@ impl Text {
         Ok(Some(Self { noun: format.noun(), source: Some(source), ..lines }))
     }
 
-    /// The text that a stream still gives, kept in a temporary file.
+    /// The rest of a stream, stored in a temporary file.
     pub fn spool(name: &str, stream: impl Read) -> Result<Self, ImportError> {
         let mut file = tempfile::tempfile().map_err(ImportError::read(name))?;
         let copied = io::copy(&mut stream.take(LARGEST_STREAM.most().saturating_add(1)), &mut file);
@@ -98,12 +98,12 @@ impl Text {
         Ok(Self::of_file(name, file))
     }
 
-    /// The rows of a data frame as lines: a whole number is an integer where the schema asks for one.
+    /// The rows of a data frame as lines; whole numbers become integers in the schema's integer columns.
     pub fn of_frame(name: &str, rows: &[u8]) -> Result<Self, ImportError> {
         Ok(Self { is_frame: true, ..Self::spool(name, rows)? })
     }
 
-    /// The rows of a file of this format as lines of flat steps, kept in a temporary file.
+    /// The rows of a file of this format as lines of flat steps, in a temporary file.
     pub fn mapped(mut self, format: Format, mapping: &mut Mapping) -> Result<Self, ImportError> {
         if format == Format::JsonLines && mapping.is_empty() {
             return Ok(self);
@@ -160,7 +160,7 @@ impl Text {
         Ok(hash)
     }
 
-    /// The next line that is not blank; `None` at the end.
+    /// The next line that is not blank; `None` at the end of the text.
     pub(super) fn next_line(&mut self) -> Result<Option<Line>, ImportError> {
         loop {
             let offset = self.offset;
@@ -183,7 +183,7 @@ impl Text {
     pub(super) fn line_at(&mut self, offset: u64) -> Result<Vec<u8>, ImportError> {
         let failed = || ImportError::read(&self.name);
         if offset != self.offset {
-            // Within what is buffered this costs nothing.
+            // Seeking within the buffer costs nothing.
             match i64::try_from(i128::from(offset) - i128::from(self.offset)) {
                 Ok(distance) => self.reader.seek_relative(distance).map_err(failed())?,
                 Err(_) => drop(self.reader.seek(SeekFrom::Start(offset)).map_err(failed())?),

@@ -1,4 +1,4 @@
-//! One log out of several: episodes in the order of the trace, each in chunks of its own.
+//! Merges several logs into one: episodes in the order of the trace, each in its own chunks.
 
 use std::collections::BTreeMap;
 #[cfg(feature = "view")]
@@ -32,7 +32,7 @@ pub(super) fn writer<W: Write + Seek>(out: W) -> mcap::McapResult<Writer<W>> {
         .library(concat!("mirrorstats ", env!("CARGO_PKG_VERSION")))
         .compression(Some(Compression::Zstd))
         .compression_threads(0)
-        // Chunks end where an episode does, never at a number of bytes.
+        // Chunks end with an episode, never at a number of bytes.
         .chunk_size(None)
         .create(out)
 }
@@ -42,15 +42,15 @@ pub(super) fn write_recording<W: Write + Seek>(out: &mut Writer<W>, recording: &
     out.write_metadata(&Metadata { name: METADATA.to_owned(), metadata })
 }
 
-/// Writes one log of these logs of one episode each, which replaces the one at `out` in one step.
+/// Merges these logs of one episode each into the log at `out`, which is replaced in one step.
 pub fn write(out: &Path, parts: &[(Place, PathBuf)], recording: &Value) -> Result<(), LogError> {
     let file = NewFile::create(out).map_err(LogError::io("write", out))?;
     join(file, None, out, parts, recording)
 }
 
-/// Puts the episodes of the log `before`, if there is one, and of these logs of one episode each into one log, which
-/// replaces whatever is at `out` in one step; it is written in `scratch`, a folder of the same disk. Of an episode that is
-/// there twice the one in the log `before` counts. That `before` was recorded as `recording` says is for the caller to know.
+/// Merges the log `before`, if any, with these logs of one episode each. The result replaces `out` in one step; it is
+/// written in `scratch`, a folder of the same disk. For an episode in both, `before` counts. The caller must check that
+/// `before` belongs to `recording`.
 pub fn assemble(
     out: &Path,
     before: Option<&Path>,
@@ -62,7 +62,7 @@ pub fn assemble(
     join(file, before.map(Source::open).transpose()?, out, parts, recording)
 }
 
-/// Writes the log at `path` anew without the episodes of these ids.
+/// Rewrites the log at `path` without the episodes of these ids.
 #[cfg(feature = "view")]
 pub fn without(path: &Path, ids: &BTreeSet<String>, recording: &Value) -> Result<(), LogError> {
     let mut source = Source::open(path)?;
@@ -71,7 +71,7 @@ pub fn without(path: &Path, ids: &BTreeSet<String>, recording: &Value) -> Result
     write_recording(&mut log, recording).map_err(LogError::writing(path))?;
     while let Some((head, _)) = &source.begin {
         if ids.contains(&head.episode_id) {
-            // Up to the next begin.
+            // Skip to the next begin.
             source.begin = None;
             source.advance()?;
         } else {
@@ -160,7 +160,7 @@ impl Source {
         Ok(())
     }
 
-    /// Copies the next episode, from its `begin` to its `end`, and ends the chunk behind it.
+    /// Copies the next episode, from its `begin` to its `end`, and ends the chunk after it.
     fn copy_episode<W: Write + Seek>(&mut self, log: &mut Writer<W>, out: &Path) -> Result<(), LogError> {
         let Some((head, begin)) = self.begin.take() else { return Ok(()) };
         log.write(&begin).map_err(LogError::writing(out))?;

@@ -1,7 +1,7 @@
-//! The contents of a chunk, unpacked within a budget.
+//! Unpacks the contents of a chunk within a budget.
 //!
-//! Rule: a chunk says how large it is when unpacked, and is never unpacked beyond that; what it says is compared with its
-//! own bytes and counted for the whole log before anything is unpacked.
+//! Rule: a chunk states its unpacked size and is never unpacked beyond that. Before unpacking, the stated size is
+//! compared with the chunk's own bytes and counted against the whole log's budget.
 
 use std::sync::Arc;
 
@@ -11,10 +11,10 @@ use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use super::parse::{FRAME, LONGEST, parsed};
 use exact::budget::{Budget, Exceeded, Limit};
 
-/// The budgets for unpacking a log and for searching it for chunks behind damage.
+/// The budgets for unpacking a log, and for searching it for chunks after damage.
 ///
-/// Frames are compressed already, and rows as text take some twenty times less in a chunk: a log is far below the limit,
-/// which a chunk of zeros is not.
+/// Frames are compressed already, and rows of text shrink about twenty times in a chunk. So a log is far below the
+/// limit, but a chunk of zeros is not.
 #[derive(Clone, Debug)]
 pub(super) struct Budgets {
     unpacked: Arc<Budget>,
@@ -30,7 +30,7 @@ impl Budgets {
 
     fn unpack(&self, chunk: &[u8]) -> Result<(), Exceeded> {
         let size = size_unpacked(chunk) as u64;
-        // A length that is damaged must not use up what the chunks behind it need.
+        // A damaged length must not use up the budget of the chunks after it.
         Limit::in_proportion("bytes unpacked from a chunk of its size", 32 << 20, 64, chunk.len() as u64)
             .check(size)?;
         self.unpacked.spend(size)
@@ -41,7 +41,7 @@ impl Budgets {
     }
 }
 
-/// The records of a chunk, unpacked; each is parsed when it is asked for.
+/// The unpacked records of a chunk, each parsed on demand.
 #[derive(Debug, Default)]
 pub(super) struct Unpacked {
     bytes: Vec<u8>,
@@ -66,7 +66,7 @@ impl Iterator for Unpacked {
     }
 }
 
-/// The records in a chunk, all of them or none: none is given before the chunk's checksum holds.
+/// The records in a chunk: all, or an error if the chunk's checksum is wrong.
 pub(super) fn inside(chunk: &[u8], budgets: &Budgets) -> Result<Unpacked, String> {
     let mut found = Unpacked::default();
     let options = LinearReaderOptions::default().with_validate_chunk_crcs(true);
@@ -74,20 +74,20 @@ pub(super) fn inside(chunk: &[u8], budgets: &Budgets) -> Result<Unpacked, String
     Ok(found)
 }
 
-/// The records in front of a chunk that is cut off or damaged, as far as they can be read: enough to name what is lost,
-/// never enough to be saved.
+/// The readable records at the start of a truncated or damaged chunk: enough to name the losses, never enough to save
+/// an episode.
 pub(super) fn glimpse(chunk: &[u8], budgets: &Budgets) -> Unpacked {
     let mut found = Unpacked::default();
-    // That it ends in a fault is known.
+    // It is known to end in a fault.
     let _ = unpacked(chunk, LinearReaderOptions::default(), budgets, |opcode, data| found.push(opcode, data));
     found
 }
 
-/// Gives the schemas, channels and messages of a chunk one after the other.
+/// Passes on the schemas, channels and messages of a chunk, one by one.
 ///
-/// The library makes room for what a length says, and only then finds that the data ends before it. So a record may be as
-/// long as the chunk says it is when unpacked, and the size of the chunk itself is not asked for at once: of lengths that
-/// contradict each other the smaller one counts.
+/// The library allocates the stated length before it finds that the data ends earlier. So the limit for a record is the
+/// stated unpacked size, and the chunk's own size is not requested at once. Of contradicting lengths the smaller one
+/// counts.
 fn unpacked(
     chunk: &[u8],
     options: LinearReaderOptions,
@@ -126,12 +126,12 @@ fn unpacked(
     Ok(())
 }
 
-/// The whole records of a chunk that is not compressed, if the one behind them says that it is longer than what is left.
+/// The complete records of an uncompressed chunk, if the next record claims more bytes than are left.
 ///
-/// The library subtracts such a length from what is left and does not compare them before, which panics in builds that
-/// check for overflow. A chunk that is cut off is left to the library.
+/// The library subtracts such a length from the rest without comparing them, which panics in builds with overflow
+/// checks. Truncated chunks are left to the library.
 fn before_overrun(chunk: &[u8]) -> Option<&[u8]> {
-    // Behind the frame stand two times, a size and a checksum; then the name of the compression, empty without one.
+    // Two times, a size and a checksum follow the frame; then the name of the compression, empty without one.
     let (length, records) = chunk.get(FRAME + 28..)?.strip_prefix(&[0; 4])?.split_first_chunk::<8>()?;
     let (mut left, mut at) = (u64::from_le_bytes(*length), 0_usize);
     while left > 0 {
@@ -150,9 +150,9 @@ fn first_record(records: &[u8]) -> Option<(u8, &[u8], &[u8])> {
 }
 
 fn size_unpacked(chunk: &[u8]) -> usize {
-    // Behind the frame stand two times of 8 bytes each.
+    // Two times of 8 bytes each follow the frame.
     let size = chunk.get(FRAME + 16..FRAME + 24).and_then(|bytes| bytes.try_into().ok()).map(u64::from_le_bytes);
-    // The library holds the header of the chunk against the same limit.
+    // The library compares the header of the chunk with the same limit.
     size.and_then(|size| usize::try_from(size).ok()).map_or(LONGEST, |size| size.clamp(1 << 16, LONGEST))
 }
 

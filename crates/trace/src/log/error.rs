@@ -30,7 +30,7 @@ impl LogError {
         move |error| {
             let source = match error {
                 mcap::McapError::Io(source) => source,
-                // The library says of an error of the disk that a record cannot be parsed; its cause has the words.
+                // The library reports a disk error as a record that cannot be parsed; the cause has the message.
                 mcap::McapError::Parse(cause) => io::Error::other(cause.root_cause().to_string()),
                 other => io::Error::other(other),
             };

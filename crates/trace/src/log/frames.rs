@@ -1,7 +1,7 @@
-//! One step out of a log: its frame and its shapes, found by the log's index.
+//! Reads one step of a log: its frame and its shapes, found through the log's index.
 //!
-//! Rule: of a log that has ended no more is read than its index and the chunk that holds the step. One that is still being
-//! written has no index: it is read as far as it is there, and what is behind that is no fault.
+//! Rule: of a finished log, only the index and the chunk of the step are read. A log that is still being written has no
+//! index: it is read up to its current end, and an incomplete end is not a fault.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
@@ -36,10 +36,10 @@ struct Chunk {
     last: u64,
 }
 
-/// A log's record of a step.
+/// The contents of a log for one step.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Moment {
-    /// The frame, PNG; `None` where none was drawn.
+    /// The frame, PNG; `None` if none was drawn.
     pub frame: Option<Vec<u8>>,
     /// Everything in the room, as shapes.
     pub shapes: Vec<Shape>,
@@ -50,9 +50,9 @@ pub struct Moment {
 pub struct Shape {
     /// Its name, such as `pane0`, `cube0` or `agent0_head`.
     pub name: String,
-    /// Its outline on the floor: corners one after the other, m.
+    /// Its outline on the floor: the corners in order, m.
     pub outline: Vec<[f64; 2]>,
-    /// The radius of a round one, m; its place is the only corner then.
+    /// The radius of a round shape, m; its position is then the only corner.
     pub radius: Option<f64>,
     /// Red, green, blue and opacity, from 0 to 1.
     pub rgba: [f64; 4],
@@ -60,15 +60,15 @@ pub struct Shape {
     pub height: f64,
 }
 
-/// A log that is still being written, as far as it is there.
+/// The readable part of a log that is still being written.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Unfinished {
-    /// The episode with the rows that are there.
+    /// The episode with its rows so far.
     pub episode: Episode,
 }
 
 impl LogIndex {
-    /// Reads the index of a log; `None` where the log has not ended, and has none.
+    /// Reads the index of a log; `None` for an unfinished log, which has none.
     pub fn open(path: &Path) -> Result<Option<Self>, LogError> {
         let mut records = records(path)?;
         let (mut topics, mut chunks) = (BTreeMap::new(), Vec::new());
@@ -88,7 +88,7 @@ impl LogIndex {
         Ok((!chunks.is_empty()).then(|| Self { path: path.to_owned(), topics, chunks }))
     }
 
-    /// The log's record of an episode's step at this time, ns; `None` without one.
+    /// The log's record of an episode's step at this time, ns; `None` if it has none.
     pub fn step(&self, episode_id: &str, time: u64) -> Result<Option<Moment>, LogError> {
         let mut records = records(&self.path)?;
         for chunk in self.chunks.iter().filter(|chunk| (chunk.first..=chunk.last).contains(&time)) {
@@ -100,8 +100,8 @@ impl LogIndex {
         Ok(None)
     }
 
-    /// Gives the shapes of the steps of an episode at these times, ns, one step after the other; a step that the log does not
-    /// have is left out.
+    /// Passes on the shapes of an episode's steps at these times, ns, in order; steps that the log does not have are
+    /// left out.
     pub fn each_shapes(
         &self,
         episode_id: &str,
@@ -122,7 +122,7 @@ impl LogIndex {
         Ok(())
     }
 
-    /// Gives what the log has of the steps of an episode at these times, ns, one after the other, in one reading.
+    /// Passes on the log's records of an episode's steps at these times, ns, in order, in one reading.
     pub fn each_moment(
         &self,
         episode_id: &str,
@@ -149,7 +149,7 @@ impl LogIndex {
         Ok(())
     }
 
-    /// The messages of a chunk that are wanted: most of its bytes are frames, which are not kept.
+    /// The wanted messages of a chunk; frames, which are most of its bytes, are not kept unless wanted.
     fn messages(
         &self,
         records: &mut Records<BufReader<File>>,
@@ -168,11 +168,11 @@ impl LogIndex {
                 kept.push(record);
             }
         }
-        // Where all episodes that begin in a chunk are others, it is of them. Where none begins the time tells.
+        // If only other episodes begin in a chunk, it belongs to them. If none begins, the time decides.
         Ok(if !begun.is_empty() && !begun.contains(&true) { Vec::new() } else { kept })
     }
 
-    /// The id of the episode that a message begins.
+    /// The id of the episode that a message starts.
     fn begins(&self, header: &MessageHeader, data: &[u8]) -> Option<String> {
         if !self.is_of(header.channel_id, topic::EPISODE) {
             return None;
@@ -192,7 +192,7 @@ impl LogIndex {
     }
 }
 
-/// The episode of a log that is still being written; `None` where not even its begin is there.
+/// The episode of a log that is still being written; `None` if not even its start is readable.
 pub fn unfinished(path: &Path) -> Result<Option<Unfinished>, LogError> {
     let (mut head, mut steps): (Option<Episode>, Vec<Step>) = (None, Vec::new());
     each_message(path, |topic, _, data| match event(topic, data) {
@@ -214,7 +214,7 @@ pub fn unfinished_step(path: &Path, time: u64) -> Result<Option<Moment>, LogErro
     Ok(found)
 }
 
-/// Gives the shapes of the steps of a log that is still being written, by their times, ns.
+/// Passes on the shapes of the steps of a log that is still being written, by time, ns.
 pub fn each_unfinished_shapes(path: &Path, give: &mut dyn FnMut(u64, Vec<Shape>)) -> Result<(), LogError> {
     each_message(path, |topic, at, data| {
         if topic == topic::SCENE {
@@ -223,7 +223,7 @@ pub fn each_unfinished_shapes(path: &Path, give: &mut dyn FnMut(u64, Vec<Shape>)
     })
 }
 
-/// Returns true if a file begins as a log does.
+/// Returns true if a file starts like a log.
 pub fn is_log(path: &Path) -> bool {
     records(path).is_ok()
 }
@@ -286,7 +286,7 @@ fn add(moment: &mut Moment, topic: &str, data: &[u8]) {
     }
 }
 
-/// As much of `foxglove.SceneUpdate` as a map needs.
+/// The part of `foxglove.SceneUpdate` that a map needs.
 #[derive(Clone, PartialEq, prost::Message)]
 struct SceneUpdate {
     #[prost(message, repeated, tag = "2")]
@@ -403,7 +403,7 @@ fn rgba(color: Rgba) -> [f64; 4] {
     [color.r, color.g, color.b, color.a]
 }
 
-/// A vector turned by a unit quaternion.
+/// A vector rotated by a unit quaternion.
 fn turned(turn: Quaternion, vector: [f64; 3]) -> [f64; 3] {
     let cross =
         |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
@@ -413,7 +413,7 @@ fn turned(turn: Quaternion, vector: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|at| vector[at] + turn.w * once[at] + twice[at])
 }
 
-/// The corners of the convex hull of points; one point where all are the same.
+/// The corners of the convex hull of points; one point if all are the same.
 pub fn hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     points.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
     points.dedup();

@@ -49,7 +49,7 @@ pub struct Decision {
     others: Map<String, Value>,
 }
 
-/// Says in the schema of a row that it has no other keys but answers, which a type with keys of another one cannot.
+/// Restricts other keys of a row to answers in the schema, which the type cannot express.
 fn with_answers_alone(schema: &mut Schema) {
     let required = schema.remove("required");
     let answers = PREFIXES.map(|prefix| (format!("^{prefix}"), json!({ "type": ["string", "number"] })));
@@ -58,7 +58,7 @@ fn with_answers_alone(schema: &mut Schema) {
     schema.insert("required".to_owned(), required.unwrap_or_default());
 }
 
-/// An action that is invalid.
+/// The error for an invalid action.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("step {t}: expected an action such as `move_forward`, found `{found}`")]
 pub struct NoAction {
@@ -86,7 +86,7 @@ impl Decision {
         Ok(row)
     }
 
-    /// The step of a row.
+    /// Converts the row to a step.
     pub fn into_step(self) -> Result<Step, NoAction> {
         let Self { t, action, self_color, selected_cube, mirror_visible, extra, .. } = self;
         let named = |name: String| Action::named(&name).ok_or(NoAction { t, found: name });

@@ -1,7 +1,7 @@
-//! The messages of a log that must be whole, one after the other, in memory that does not grow with it.
+//! Reads the messages of a log that must be complete, one by one, in constant memory.
 //!
-//! Rule: the first damage ends it, as an error that names its place. Every length was compared with what is left of the
-//! file before anything was made of that size.
+//! Rule: the first damage ends reading with an error that gives its place. Every length is compared with the rest of
+//! the file before memory of that size is allocated.
 
 use std::fs::File;
 use std::io::{BufReader, Read, Seek};
@@ -38,13 +38,13 @@ impl Messages<BufReader<File>> {
 }
 
 impl<R: Read + Seek> Messages<R> {
-    /// The log is damaged: a message of the chunk that was read last says what it must not.
+    /// The error for a message with invalid contents in the last chunk.
     pub(super) fn damaged(&self, fault: &str) -> LogError {
         let fault = format!("in the chunk at byte {}, {fault}", self.at);
         LogError::Damaged { file: self.path.display().to_string(), fault }
     }
 
-    /// The next record that is not in the index; `None` behind the end record.
+    /// The next record that is not part of the index; `None` after the end record.
     fn record(&mut self) -> Result<Option<Record<'static>>, LogError> {
         loop {
             if let Some(record) = self.chunk.next() {

@@ -1,23 +1,23 @@
-//! MCAP logs of recordings: in, out, and what can be saved of a cut one.
+//! MCAP logs of recordings: writing, reading, and recovery of truncated ones.
 //!
-//! A log holds the episodes of a model and an experiment, one after the other in the order of the trace. Any viewer of
-//! MCAP plays it; the JSON topics alone hold all that the trace has, so that a trace can be made of a log.
+//! A log holds the episodes of a model and an experiment, in the order of the trace. Any MCAP viewer plays it. The JSON
+//! topics alone hold everything in the trace, so a trace can be made from a log.
 //!
-//! | topic | schema | what |
+//! | topic | schema | contents |
 //! |---|---|---|
 //! | `/episode` | `mirrorstats.Episode` (JSON) | `begin` with the constants of an episode; `end` with its number of steps |
 //! | `/camera` | `foxglove.CompressedImage` | the frame of a step, PNG |
-//! | `/tf` | `foxglove.FrameTransforms` | where the moving bodies and the eye are |
+//! | `/tf` | `foxglove.FrameTransforms` | poses of the moving bodies and the eye |
 //! | `/scene` | `foxglove.SceneUpdate` | everything as shapes |
-//! | `/census` | `mirrorstats.Census` (JSON) | what the eye could see, counted in pixels |
+//! | `/census` | `mirrorstats.Census` (JSON) | visibility, counted in pixels |
 //! | `/decision` | `mirrorstats.Decision` (JSON) | the row of the trace |
 //!
-//! Every message of step t has the time of the row's `frame_time`, which is no clock's but the step's own place on the
-//! time line; the metadata record `mirrorstats.recording` holds what the trace's footer does.
+//! Every message of step t has the time of the row's `frame_time`: the step's place on the time line, not a clock time.
+//! The metadata record `mirrorstats.recording` holds the same as the trace's footer.
 //!
-//! Rule: an episode fills chunks of its own, one for each step while it is recorded, so that it can be read before it ends, and
-//! the chunk with its `end` is on disk before the next one begins: of a log
-//! that was cut off, every episode whose `end` is there is whole.
+//! Rule: each episode has its own chunks, one per step during recording, so that it can be read before it ends. The
+//! chunk with its `end` is on disk before the next episode begins. So in a truncated log, every episode with an `end`
+//! is complete.
 
 pub mod assemble;
 mod chunk;

@@ -1,14 +1,14 @@
-//! A record out of its bytes.
+//! Parses a record from its bytes.
 //!
-//! Rule: every length is compared with what is left of the record first. The library makes room for a text before it knows
-//! that the text is there.
+//! Rule: every length is first compared with the rest of the record, since the library allocates memory for a text
+//! before it knows that the text is there.
 
 use mcap::records::{Record, op};
 
-/// No record of a log is longer, chunks included; a longer one is damage.
+/// The longest record of a log, chunks included; longer ones are damage.
 pub(super) const LONGEST: usize = 1 << 30;
 
-/// Of an opcode and a length.
+/// The size of an opcode and a length.
 pub(super) const FRAME: usize = 9;
 
 pub(super) fn parsed(opcode: u8, body: &[u8]) -> Result<Record<'_>, String> {
@@ -16,9 +16,9 @@ pub(super) fn parsed(opcode: u8, body: &[u8]) -> Result<Record<'_>, String> {
     mcap::parse_record(opcode, body).map_err(|fault| fault.to_string())
 }
 
-/// Goes along the texts of a record; `None` if one of them is longer than what is left.
+/// Checks the lengths of the texts of a record; `None` if one of them exceeds the rest.
 fn check_texts(opcode: u8, body: &[u8]) -> Option<()> {
-    // The bytes in front of each text. The map of a chunk's index has its length in front as a text has.
+    // The number of bytes before each text. The map in a chunk index starts with its length, like a text.
     let gaps: &[usize] = match opcode {
         op::HEADER => &[0, 0],
         op::SCHEMA => &[2, 0],
@@ -35,7 +35,7 @@ fn check_texts(opcode: u8, body: &[u8]) -> Option<()> {
         (_, rest) = text(rest.get(*gap..)?)?;
     }
     if matches!(opcode, op::CHANNEL | op::METADATA) {
-        // A map of texts, which are one behind the other.
+        // A map of consecutive texts.
         let (mut texts, _) = text(rest)?;
         while !texts.is_empty() {
             (_, texts) = text(texts)?;

@@ -1,4 +1,4 @@
-//! A log as its messages, one after the other, in memory that does not grow with it.
+//! Reads a log as messages, one by one, in constant memory.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -15,7 +15,7 @@ use super::topic;
 /// The content of a message.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
-    /// An episode begins or has ended.
+    /// The start or end of an episode.
     Episode(EpisodeMessage),
     /// The frame of a step: the bytes of a `foxglove.CompressedImage`.
     Frame(Vec<u8>),
@@ -43,7 +43,7 @@ impl LogReader {
     }
 }
 
-/// An episode of a log that is not the one of this id; `None` without one.
+/// The id of an episode in a log that is not this one; `None` if there is no other.
 pub fn other_episode(path: &Path, id: &str) -> Result<Option<String>, LogError> {
     for message in LogReader::open(path)? {
         if let Event::Episode(EpisodeMessage::Begin(head)) = message?.event
@@ -55,7 +55,7 @@ pub fn other_episode(path: &Path, id: &str) -> Result<Option<String>, LogError> 
     Ok(None)
 }
 
-/// The hashes of a log's episodes by their ids, as their ends tell them; logs of earlier versions tell none.
+/// The hashes of a log's episodes by id, from their ends; logs of earlier versions have none.
 pub fn episode_hashes(path: &Path) -> Result<BTreeMap<String, String>, LogError> {
     let mut hashes = BTreeMap::new();
     for message in LogReader::open(path)? {
@@ -93,7 +93,7 @@ pub(super) fn event(name: &str, data: &[u8]) -> serde_json::Result<Event> {
 
 /// The PNG in a `foxglove.CompressedImage`; `None` without one.
 pub fn png(image: &[u8]) -> Option<Vec<u8>> {
-    /// As much of the message as is needed.
+    /// The part of the message that is needed.
     #[derive(Clone, PartialEq, prost::Message)]
     struct Image {
         #[prost(bytes = "vec", tag = "2")]

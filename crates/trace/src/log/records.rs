@@ -1,7 +1,7 @@
-//! The records of a log as they are in the file, past damage.
+//! Reads the raw records of a log, past damage.
 //!
-//! Rule: a length that cannot be right ends nothing: the next chunk behind it, or the end of the data, is looked for and
-//! read on from. Checksums are taken along the way, so that damage which still reads as records is known too.
+//! Rule: an impossible length does not end reading: it continues at the next chunk or at the end of the data. Checksums
+//! are computed along the way, so that damage is noticed even if it still reads as records.
 
 use std::io::{self, Read, Seek, SeekFrom};
 
@@ -19,11 +19,11 @@ const CHUNK_HEADER: usize = 8 + 8 + 8 + 4 + 4 + 8;
 pub(super) enum Piece {
     /// A record other than a chunk.
     Record(Record<'static>),
-    /// A chunk: where it begins, and its opcode, its length and its bytes.
+    /// A chunk: its position, and its opcode, length and bytes.
     Chunk(u64, Vec<u8>),
-    /// Bytes that are no record; the next piece follows them.
+    /// Bytes that are not a record; the next piece follows them.
     Damage(String),
-    /// Nothing can be read from here on: why, and the bytes of the chunk that is cut off, if it is one.
+    /// The end of the readable data: the reason, and the bytes of a truncated chunk, if it is one.
     Cut(String, Vec<u8>),
 }
 
@@ -31,15 +31,15 @@ pub(super) struct Records<R> {
     bytes: R,
     at: u64,
     end: u64,
-    /// Of the record before, to be reported next.
+    /// The damage in the record before, to be reported next.
     damage: Option<String>,
     running: crc32fast::Hasher,
-    /// Of the section that has ended.
+    /// The checksum of the section that has ended.
     checksum: u32,
     budgets: Budgets,
 }
 
-/// An opcode, and the length of what follows.
+/// An opcode, and the length of the contents.
 #[derive(Clone, Copy)]
 struct Frame {
     opcode: u8,
@@ -60,7 +60,7 @@ impl Frame {
 }
 
 impl<R: Read + Seek> Records<R> {
-    /// The records behind the first magic bytes; `None` if it does not begin with them.
+    /// The records after the first magic bytes; `None` if the file does not start with them.
     pub(super) fn new(mut bytes: R) -> io::Result<Option<Self>> {
         let end = bytes.seek(SeekFrom::End(0))?;
         let mut records = Self {
@@ -91,7 +91,7 @@ impl<R: Read + Seek> Records<R> {
         };
         let whole = self.whole(self.at, frame)?;
         let behind = self.at + whole.len() as u64;
-        // Its length is right if a record follows it.
+        // Its length is right if another record follows it.
         let is_followed = frame.opcode == op::FOOTER || behind == self.end || self.frame(behind)?.is_some();
         let from = self.at;
         match decode(from, frame.opcode, &whole) {
@@ -132,7 +132,7 @@ impl<R: Read + Seek> Records<R> {
     }
 
     pub(super) fn summary(&mut self) -> io::Result<Vec<Record<'static>>> {
-        /// Two places and a checksum.
+        /// Two positions and a checksum.
         const FOOTER: usize = FRAME + 20;
         let last = self.end.saturating_sub((FOOTER + MAGIC.len()) as u64);
         let footer = self.read(last, FOOTER)?;
@@ -152,7 +152,7 @@ impl<R: Read + Seek> Records<R> {
         Ok(found)
     }
 
-    /// The chunk that begins at a place, with its frame; `None` where no chunk does.
+    /// The chunk at a position, with its frame; `None` if there is no chunk.
     #[cfg(feature = "view")]
     pub(super) fn chunk_at(&mut self, at: u64) -> io::Result<Option<Vec<u8>>> {
         match self.frame(at)?.filter(|frame| frame.opcode == op::CHUNK) {
@@ -161,7 +161,7 @@ impl<R: Read + Seek> Records<R> {
         }
     }
 
-    /// The data's checksum is that of all before its end record, the index's that of all behind it up to the checksum.
+    /// The data's checksum covers everything before its end record, the index's the bytes from there up to itself.
     fn sum(&mut self, opcode: u8, whole: &[u8]) {
         let (counted, is_last) = match opcode {
             op::DATA_END => (&[][..], true),
@@ -233,7 +233,7 @@ impl<R: Read + Seek> Records<R> {
         }
         Ok(match frame.opcode {
             op::CHUNK => {
-                // Beyond the budget nothing is looked for any more: the log is cut there.
+                // Beyond the budget the search stops, and the log is cut there.
                 if self.budgets.search(usize::try_from(frame.length).unwrap_or(LONGEST)).is_err() {
                     return Ok(false);
                 }
@@ -258,9 +258,9 @@ fn decode(at: u64, opcode: u8, whole: &[u8]) -> Result<Piece, String> {
             Ok(_) => Err("a chunk of another length than it says".to_owned()),
             Err(fault) => Err(fault),
         },
-        // An end is believed at its exact length alone: nothing behind it is looked at for episodes.
+        // An end record counts only with its exact length, since no episodes are read after it.
         op::DATA_END if body.len() != 4 => Err("an end record of another length".to_owned()),
-        // No log of ours has any, and the library expects that they are sound.
+        // Our logs have no attachments, and the library expects valid ones.
         op::ATTACHMENT => Ok(Piece::Record(Record::Unknown { opcode, data: Vec::new().into() })),
         _ => Ok(Piece::Record(parsed(opcode, body)?.into_owned())),
     }

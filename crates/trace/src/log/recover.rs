@@ -1,8 +1,8 @@
-//! Recovery of a log that was cut off or damaged.
+//! Recovers a truncated or damaged log.
 //!
-//! Rule: an episode is saved if its `begin`, its `end` and every row between are there, and their hash is that of the `end`;
-//! anything else that was begun is lost, and named. What is behind damage is still looked at. What is saved is what was written: of a chunk whose
-//! checksum does not hold nothing is.
+//! Rule: an episode is saved if its `begin`, its `end` and all rows between are there, and the hash in `end` matches
+//! them. Other episodes are lost, and named. Data after damage is still read. Chunks with a bad checksum are discarded,
+//! so that saved data is what was written.
 
 use std::collections::BTreeMap;
 use std::io::{self, BufReader, Read, Seek};
@@ -67,7 +67,7 @@ impl Losses {
         *self != Self::default()
     }
 
-    /// One of them in words; `None` without one.
+    /// One of the losses in words; `None` if there are none.
     pub fn first(&self) -> Option<String> {
         let episode = self.episodes.first().map(|lost| format!("the episode `{}`: {}", lost.episode_id, lost.reason));
         let told = self.damage.first().or(self.cut.as_ref()).or(self.recording.as_ref()).cloned();
@@ -76,13 +76,13 @@ impl Losses {
     }
 }
 
-/// Saves what can be saved of the log at `path`.
+/// Recovers the readable part of the log at `path`.
 pub fn recover(path: &Path) -> Result<Recovered, LogError> {
     let file = input::open(path).map_err(LogError::io("open", path))?;
     recover_from(path, BufReader::new(file))
 }
 
-/// Saves what can be saved of the log in these bytes; `path` is for messages of errors.
+/// Recovers the readable part of a log in these bytes; `path` is for error messages.
 pub fn recover_from(path: &Path, bytes: impl Read + Seek) -> Result<Recovered, LogError> {
     let records = Records::new(bytes).map_err(LogError::io("read", path))?;
     let mut records = records.ok_or_else(|| LogError::no_log(path))?;
@@ -95,8 +95,8 @@ pub fn recover_from(path: &Path, bytes: impl Read + Seek) -> Result<Recovered, L
     Ok(salvage.finished())
 }
 
-/// How many rows may be held: what is saved is held whole, and a row in memory is far larger than one of few words in a
-/// chunk. A log in use has some hundred bytes for a row without its frame.
+/// The limit of rows in memory, where saved rows are kept. A row takes far more memory than a row of few words in a
+/// chunk. Logs in use have some hundred bytes per row, without its frame.
 #[derive(Debug)]
 struct Rows(Budget, Limit);
 
@@ -121,7 +121,7 @@ impl Rows {
     }
 }
 
-/// The episode that is being put together.
+/// The episode that is being recovered.
 #[derive(Default)]
 struct Salvage {
     channels: BTreeMap<u16, String>,
@@ -133,7 +133,7 @@ struct Salvage {
 impl Salvage {
     fn of(records: &mut Records<impl Read + Seek>) -> io::Result<Self> {
         let mut salvage = Self { rows: Rows::of(records.bytes()), ..Self::default() };
-        // A chunk does not repeat the channels of earlier ones, which may be damaged; the summary does.
+        // A chunk does not repeat the channels of earlier chunks, which may be damaged; the summary does.
         let channels = records.of_summary()?;
         salvage.channels.extend(channels.into_iter().map(|channel| (channel.id, channel.topic)));
         let mut is_open = true;
@@ -180,7 +180,7 @@ impl Salvage {
         Ok(())
     }
 
-    /// Compares a checksum with the one that was written; 0 represents none.
+    /// Compares a checksum with the written one; 0 means none.
     fn compare(&mut self, what: &str, written: u32, found: u32) {
         let losses = &mut self.result.losses;
         if written != 0 && written != found && losses.damaged_chunks == 0 && losses.damage.is_empty() {
@@ -216,7 +216,7 @@ impl Salvage {
         }
     }
 
-    /// Names the episodes that begin in a chunk which cannot be read to its end, as far as it can.
+    /// Names the episodes that begin in a damaged chunk, as far as it is readable.
     fn lose_all(&mut self, chunk: &[u8], budgets: &Budgets, reason: &str) {
         for record in glimpse(chunk, budgets) {
             match record {
@@ -310,7 +310,7 @@ impl Salvage {
     }
 }
 
-/// The episode of a begin, its rows, and what its end tells of them.
+/// The episode with its rows and the contents of its end message.
 pub fn ended(
     head: Episode,
     steps: Vec<Step>,

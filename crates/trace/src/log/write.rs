@@ -1,4 +1,4 @@
-//! The log of one episode, written while it is played.
+//! Writes the log of one episode while it is played.
 
 use std::collections::BTreeMap;
 use std::io::BufWriter;
@@ -22,12 +22,12 @@ use crate::episode::Episode;
 use crate::episode_hash;
 use exact::replace::NewFile;
 
-/// Something that moves, in the frame of the room.
+/// A moving object, in the frame of the room.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Placed {
-    /// The name of its frame.
+    /// The name of its frame of reference.
     pub name: String,
-    /// m.
+    /// In m.
     pub position: [f64; 3],
     /// A unit quaternion: w, x, y, z.
     pub rotation: [f64; 4],
@@ -38,7 +38,7 @@ pub struct Placed {
 pub struct Solid {
     pub name: String,
     pub form: Form,
-    /// Of its centre, m.
+    /// The position of its centre, m.
     pub position: [f64; 3],
     /// A unit quaternion: w, x, y, z.
     pub rotation: [f64; 4],
@@ -49,10 +49,10 @@ pub struct Solid {
 /// A form and its sizes, m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Form {
-    /// Of these edges; an edge of 0 makes it a plane.
+    /// A box with these edges; an edge of 0 makes it a plane.
     Box([f64; 3]),
     Sphere(f64),
-    /// Along z: the radius, and the length of the cylinder between its round ends.
+    /// A capsule along z: the radius, and the length of the cylinder between its round ends.
     Capsule {
         radius: f64,
         length: f64,
@@ -62,7 +62,7 @@ pub enum Form {
 /// The perception before a step.
 #[derive(Clone, Debug)]
 pub struct View<'a, C> {
-    /// The frame, PNG; `None` where none was drawn.
+    /// The frame, PNG; `None` if none was drawn.
     pub png: Option<&'a [u8]>,
     pub placed: &'a [Placed],
     /// Everything, as shapes.
@@ -71,10 +71,10 @@ pub struct View<'a, C> {
     pub census: &'a C,
 }
 
-/// The frame of reference that everything is in.
+/// The frame of reference of everything.
 const ROOM: &str = "room";
 
-/// The log of an episode under way. It is a temporary file until the episode has ended, and is removed if it does not.
+/// The log of a running episode. It is a temporary file until the episode ends, and is removed if it does not.
 pub struct EpisodeLog {
     path: PathBuf,
     out: Writer<Out>,
@@ -95,21 +95,21 @@ struct Channels {
 }
 
 impl EpisodeLog {
-    /// Begins the log that will be at `path`; `census` is the JSON Schema of censuses.
+    /// Starts the log for `path`; `census` is the JSON Schema of a census.
     pub fn create(path: &Path, head: &Episode, census: &serde_json::Value, time: u64) -> Result<Self, LogError> {
         let file = NewFile::create(path).map_err(LogError::io("write", path))?;
         let mut out = writer(BufWriter::new(file)).map_err(LogError::writing(path))?;
         let channels = channels(&mut out, census).map_err(LogError::writing(path))?;
         let mut log = Self { path: path.to_owned(), out, channels, sequence: 0, is_read_meanwhile: true };
         let channel = log.channels.episode;
-        // What its rows hash to is not known before its end, and is there.
+        // The hash of its rows is not known before its end, which holds it.
         let head = Episode { episode_hash: None, ..head.clone() };
         log.json(channel, time, &EpisodeMessage::Begin(Box::new(head)))?;
         log.flush()?;
         Ok(log)
     }
 
-    /// Adds what is seen before a step.
+    /// Adds the perception before a step.
     pub fn seen<C: Serialize>(&mut self, time: u64, view: &View<'_, C>) -> Result<(), LogError> {
         let stamp = Timestamp::new_checked(u32::try_from(time / 1_000_000_000).unwrap_or(u32::MAX), 0);
         if let Some(png) = view.png {
@@ -135,18 +135,18 @@ impl EpisodeLog {
         if self.is_read_meanwhile { self.flush() } else { Ok(()) }
     }
 
-    /// The same in chunks of many steps, which take less room, for a log that nobody reads before it has ended.
+    /// Uses chunks of many steps, which are smaller, for a log that is only read after it has ended.
     #[must_use]
     pub fn in_large_chunks(self) -> Self {
         Self { is_read_meanwhile: false, ..self }
     }
 
-    /// Ends the chunk of a step, so that others can read it while the episode goes on.
+    /// Ends the chunk of a step, so that others can read it during the episode.
     fn flush(&mut self) -> Result<(), LogError> {
         self.out.flush().map_err(LogError::writing(&self.path))
     }
 
-    /// Ends the log of an episode of these rows, tells their hash, and gives the log its name.
+    /// Ends the log of an episode with the hash of its rows, and gives the log its name.
     pub fn end(mut self, time: u64, episode: &Episode) -> Result<(), LogError> {
         let Episode { episode_id, steps, fingerprint, .. } = episode;
         let end = EpisodeMessage::End {
@@ -224,7 +224,7 @@ fn transform(placed: &Placed, timestamp: Option<Timestamp>) -> FrameTransform {
     }
 }
 
-/// One entity for each shape, by its name, so that the next step's replaces it.
+/// One entity per shape with its name, so that the next step's entity replaces it.
 fn entity(solid: &Solid, timestamp: Option<Timestamp>) -> SceneEntity {
     let [r, g, b, a] = solid.rgba.map(f64::from);
     let color = Some(Color { r, g, b, a });

@@ -1,4 +1,4 @@
-//! Columns that no file has: the labels of coders beside the traces, one value per episode.
+//! Columns that are not in files: the labels of coders beside the traces, one value per episode.
 
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ pub(crate) struct Beside {
 }
 
 impl TraceSet {
-    /// The same traces with the labels beside them as columns.
+    /// Adds the labels beside these traces as columns.
     pub fn with_labels(self, labels: Labels) -> Result<Self, TraceError> {
         let columns = labels.columns();
         if let Some(column) = columns.iter().find(|name| self.column(name).is_some()) {
@@ -33,7 +33,7 @@ impl TraceSet {
         &self.labelled().labels
     }
 
-    /// The columns of the labels, true, false or null in each episode.
+    /// The columns of the labels: true, false or null in each episode.
     pub fn label_columns(&self) -> &[String] {
         &self.labelled().columns
     }
@@ -42,7 +42,7 @@ impl TraceSet {
         self.label_columns().iter().any(|column| column == name)
     }
 
-    /// Episodes with these columns of labels after their own.
+    /// Appends these label columns to episodes.
     pub(crate) fn with_label_columns(
         &self,
         episodes: RecordBatch,

@@ -1,5 +1,5 @@
-//! How much may come out of a trace: rows, columns, episodes, the length of names and of an episode. What pages may
-//! inflate to is counted in `parquet_pages`.
+//! Limits on the contents of a trace: rows, columns, episodes, the length of names and episodes. `parquet_pages` limits
+//! the inflated size of pages.
 
 use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
@@ -9,49 +9,49 @@ use arrow::array::{Array as _, AsArray as _};
 use exact::budget::{Budget, Exceeded, Limit};
 use parquet_pages::Column;
 
-/// The longest name of an episode, a model, a condition, a colour: they are in every row of what is made of a trace.
+/// The longest name of an episode, model, condition or colour: names are in every row of the outputs.
 pub(crate) const LONGEST_NAME: Limit = Limit::new("bytes in a name", 1024);
 
-/// The steps of an episode, which is held in memory whole.
+/// The most steps of an episode, which is held in memory as a whole.
 pub(crate) const LONGEST_EPISODE: Limit = Limit::new("steps in an episode", 1 << 22);
 
-/// The columns of a file.
+/// The most columns of a file.
 pub(crate) const MOST_COLUMNS: Limit = Limit::new("columns in a file", 10_000);
 
 pub(crate) fn most_rows(bytes: u64) -> Limit {
     Limit::in_proportion("rows in a file of its size", 8_000_000, 16, bytes)
 }
 
-/// A row takes a byte in the densest traces, and an episode has some rows.
+/// The most episodes. A row takes a byte in the densest traces, and an episode has several rows.
 pub(crate) const fn most_episodes(bytes: u64) -> Limit {
     Limit::new("episodes in files of their size", 300_000).and_beyond(1 << 20, 1, bytes)
 }
 
-/// The episodes of a list: each takes a kilobyte as it is printed.
+/// The most episodes of a list: each takes a kilobyte when printed.
 pub(crate) const fn most_listed(bytes: u64) -> Limit {
     Limit::in_proportion("episodes in a list of files of their size", 100_000, 1, bytes / 8)
 }
 
-/// The values of an episode that is held row by row, its steps times the columns of its file.
+/// The most values of an episode held row by row: its steps times the columns of its file.
 pub(crate) const fn most_values(bytes: u64) -> Limit {
     Limit::new("steps times columns of an episode that is shown", 2_000_000).and_beyond(1 << 20, 4, bytes)
 }
 
-/// The memory that such an episode takes before it is shown.
+/// The most memory of such an episode before it is shown.
 pub(crate) const fn most_shown(bytes: u64) -> Limit {
     Limit::new("bytes of an episode that is shown", 48 << 20).and_beyond(1 << 20, 64, bytes)
 }
 
-/// What a list of changed attributions takes, a kilobyte for each beside its text.
+/// The largest list of changed attributions, each with a kilobyte besides its text.
 pub(crate) const fn most_changed(bytes: u64) -> Limit {
     Limit::in_proportion("bytes of changed attributions in traces of their size", 64 << 20, 64, bytes)
 }
 
-/// The episodes that were read of a file so far. What is read again is counted once.
+/// The number of episodes read from a file so far. Repeated reads count once.
 #[derive(Debug)]
 pub(crate) struct EpisodeBudget {
     episodes: Budget,
-    /// The row before which the last of each row group ends.
+    /// By row group, the end of the rows read so far.
     read: Mutex<HashMap<usize, u64>>,
 }
 
@@ -60,7 +60,7 @@ impl EpisodeBudget {
         Self { episodes: Budget::new(most_episodes(bytes)), read: Mutex::default() }
     }
 
-    /// Whole episodes of a row group, of which the last row is before `end`.
+    /// Counts complete episodes of a row group, whose last row is before `end`.
     pub(crate) fn spend(&self, row_group: usize, end: u64, count: usize) -> Result<(), Exceeded> {
         let mut read = self.read.lock().unwrap_or_else(PoisonError::into_inner);
         let last = read.entry(row_group).or_default();

@@ -1,6 +1,6 @@
-//! Decodes a row group into rows of few types: bool, integer (64 bits), float (64 bits), text (a dictionary).
+//! Decodes a row group into rows of a few types: bool, integer (64 bits), float (64 bits), text (a dictionary).
 //!
-//! Rule: whatever bytes a file holds, decoding gives rows or a finding, never a panic.
+//! Rule: decoding any bytes gives rows or a finding, never a panic.
 
 use std::sync::Arc;
 
@@ -26,14 +26,14 @@ use parquet_pages::{
     rows_of, text_type,
 };
 
-/// Rows that are decoded at a time: the columns of so many stay in a core's cache.
+/// Rows decoded at a time: columns of this length stay in a core's cache.
 const BATCH_ROWS: usize = 32 * 1024;
 
-/// Bytes of one column's texts that are decoded at a time, about: the decoder makes room for them several
-/// times, and texts are not all as long.
+/// The approximate bytes of one column's texts decoded at a time. The decoder allocates several times that, and lengths
+/// of texts differ.
 const BATCH_TEXT: u64 = 64 << 20;
 
-/// Some rows of one row group: a column for each of the layout, in its order.
+/// Some rows of one row group, with the columns of the layout in order.
 #[derive(Clone, Debug)]
 pub(crate) struct Rows {
     pub(crate) columns: Vec<Column>,
@@ -47,7 +47,7 @@ impl Rows {
         self.columns[T].len()
     }
 
-    /// `length` rows from row `start`; nothing is copied.
+    /// `length` rows from row `start`, without copying.
     pub(crate) fn slice(&self, start: usize, length: usize) -> Self {
         let columns = self.columns.iter().map(|column| column.slice(start, length)).collect();
         let whole = self.whole && start + length == self.len();
@@ -77,7 +77,7 @@ pub(crate) struct RowGroup<'a> {
     first: usize,
     at_a_time: usize,
     over: bool,
-    /// What was read of each column whose values the footer describes.
+    /// The values read of each column whose statistics the footer has.
     seen: Vec<Option<Seen>>,
 }
 
@@ -85,7 +85,7 @@ pub(crate) struct RowGroup<'a> {
 enum Source {
     /// The file does not have the column.
     Absent,
-    /// The ids of the episodes, which are known already.
+    /// The ids of the episodes, which are decoded already.
     Ahead,
     Pages {
         root: usize,
@@ -94,7 +94,7 @@ enum Source {
     Library(Box<Library>),
 }
 
-/// A column as the Parquet library decodes it, this many rows at a time.
+/// A column decoded by the Parquet library, this many rows at a time.
 struct Library {
     reader: ParquetRecordBatchReader,
     held: Vec<ArrayRef>,
@@ -168,7 +168,7 @@ impl<'a> RowGroup<'a> {
         }
     }
 
-    /// A column that the library cannot decode, or that it is not given because of a page.
+    /// The finding for a column that the library cannot decode, or whose pages are refused.
     fn damaged(&self, at: usize, slot: &FaultSlot, error: &str) -> Box<Finding> {
         let finding = damaged(self.file.name(), slot, error).in_row_group(self.index);
         Box::new(finding.in_column(&self.layout.columns[at].name))
@@ -176,7 +176,7 @@ impl<'a> RowGroup<'a> {
 
     fn decode(&mut self) -> Result<Option<Rows>, Box<Finding>> {
         let left = self.file.row_group_rows(self.index) - self.first;
-        // Whole episodes where it is known where they end.
+        // Whole episodes if their ends are known.
         let most = self.at_a_time.min(left);
         let count = self.ids.as_ref().filter(|_| left > 0).map_or(most, |ids| ids.runs.until(self.first, most));
         let columns =
@@ -199,7 +199,7 @@ impl<'a> RowGroup<'a> {
         Ok(Some(rows))
     }
 
-    /// What the footer says of the values of a column, in a file without checksums.
+    /// The footer's statistics of a column, in a file without checksums.
     fn described(&self, at: usize) -> Option<&Chunk> {
         let leaf = leaf(&self.readable.footer, root(self.file, self.layout, at)?)?;
         self.file.statistics().chunk(self.index, leaf)
@@ -229,7 +229,7 @@ impl<'a> RowGroup<'a> {
         checked.map(|()| column).map_err(|exceeded| Box::new(over(exceeded)))
     }
 
-    /// The next `count` rows of a column. At the end, where that is invalid, there must be none.
+    /// The next `count` rows of a column. At the end `count` is 0 and no rows may remain.
     fn column(&mut self, at: usize, count: usize) -> Result<Column, Box<Finding>> {
         let kind = self.layout.columns[at].kind;
         if let Source::Pages { root, cursor } = &mut self.sources[at] {
@@ -287,7 +287,7 @@ impl<'a> RowGroup<'a> {
         Box::new(finding.in_row_group(self.index))
     }
 
-    /// The reason why a column is refused whose rows from `first` on were decoded.
+    /// The reason for refusing a column, found while decoding its rows from `first` on.
     fn refusal(&self, refused: Refused, column: usize, first: usize) -> Box<Finding> {
         let at_column = |finding: Finding| Box::new(finding.in_column(&self.layout.columns[column].name));
         match refused {
@@ -353,7 +353,7 @@ pub(crate) fn ids(file: &TraceFile, layout: &Layout, row_group: usize) -> Option
     let root = root(file, layout, EPISODE_ID)?;
     let (store, readable) = (store(file).ok()?, file.footer().ok()?);
     let read = || cursor(&readable, &store, root, row_group, Form::Runs)?.read(file.row_group_rows(row_group));
-    // Who reads them with the other columns says what is wrong with them.
+    // The reader of the other columns reports what is wrong with them.
     contained(read).ok()?.ok().filter(|ids| check_names(ids).is_ok())
 }
 
@@ -389,12 +389,12 @@ fn leaf(footer: &ArrowReaderMetadata, root: usize) -> Option<usize> {
     (0..schema.num_columns()).find(|leaf| schema.get_column_root_idx(*leaf) == root)
 }
 
-/// The bytes of a column's texts in a row group, written out if the file says so; `None` for other columns.
+/// The bytes of a column's texts in a row group, written out if the file gives that; `None` for other columns.
 fn text_bytes(footer: &ArrowReaderMetadata, root: usize, row_group: usize) -> Option<u64> {
     let column = footer.metadata().row_group(row_group).columns().get(leaf(footer, root)?)?;
     let written_out = column.unencoded_byte_array_data_bytes().unwrap_or_default();
-    // What the file says may be too little. Of the first MiB no more than this is inflated, and memory is promised for small
-    // files alone.
+    // The file may state too little. This is the most that the first MiB may inflate to; only small files get memory by
+    // it.
     let most = column.compressed_size().saturating_mul(INFLATED_PER_BYTE.cast_signed());
     let bytes = u64::try_from(column.uncompressed_size().max(written_out).max(most)).unwrap_or_default();
     (column.column_type() == Physical::BYTE_ARRAY).then_some(bytes)

@@ -1,8 +1,8 @@
 //! The episode ids of row groups, decoded ahead of their other columns.
 //!
-//! They tell where a row group can be cut so that each episode stays whole, and whether the episodes at its ends go on
-//! in its neighbours. Rule: each row group's ids are decoded once, by whichever thread asks first, and what is said of
-//! them depends on the files alone. Ids that are not held as runs are not decoded ahead; nothing is known of them then.
+//! They show where a row group can be cut without splitting an episode, and whether the episodes at its ends continue
+//! in its neighbours. Rule: each row group's ids are decoded once, by the first thread that asks, and the results
+//! depend only on the files. Ids that are not held as runs are not decoded ahead, and stay unknown.
 
 use std::sync::{Mutex, OnceLock, PoisonError};
 
@@ -11,7 +11,7 @@ use super::open::TraceFile;
 use super::projection::Layout;
 use parquet_pages::{Column, Runs};
 
-/// Row groups with more rows than that are not looked at ahead, for the sake of memory.
+/// Row groups with more rows are not decoded ahead, to save memory.
 const MOST_ROWS: usize = 4 << 20;
 
 /// The ids of the row groups of some files.
@@ -34,7 +34,7 @@ impl<'a> Ahead<'a> {
         Self { files, layout, groups }
     }
 
-    /// The ids of a row group, the first time that they are asked for; `None` if they are not held as runs.
+    /// The ids of a row group, for the first caller; `None` if they are not held as runs.
     pub(crate) fn take(&self, file: usize, row_group: usize) -> Option<Ids> {
         let group = self.group(file, row_group)?;
         let runs = group.runs.lock().unwrap_or_else(PoisonError::into_inner).take()?;

@@ -1,4 +1,4 @@
-//! Rows of a flat Parquet file that is no trace, verified and within the budgets as the pages of traces are.
+//! Rows of a flat Parquet file that is not a trace, verified and within the budgets like pages of traces.
 
 use std::fs::File;
 use std::sync::Arc;
@@ -16,13 +16,13 @@ use crate::diagnostic::{Code, Finding};
 use parquet_pages::checksums::ChunkChecksums;
 use parquet_pages::{Expansion, FaultSlot, Library, Store};
 
-/// Rows that are decoded at a time.
+/// The number of rows decoded at a time.
 const BATCH_ROWS: usize = 1024;
 
 /// An open file that may be a table.
 pub type TableFile = File;
 
-/// All rows of a file, some at a time.
+/// All rows of a file, in batches.
 pub struct FlatRows {
     reader: ParquetRecordBatchReader,
     slot: FaultSlot,
@@ -43,7 +43,7 @@ impl FlatRows {
         }
         let (row_groups, slot) = ((0..metadata.num_row_groups()).collect(), FaultSlot::default());
         let store = Store::new(file, Arc::new(Expansion::new(bytes)));
-        // A caller that reads such a file verifies its checksums before, all of them.
+        // The caller has verified all checksums of such a file before.
         let checksums = ChunkChecksums::default();
         let library = Library { store, metadata, checksums, row_groups, slot: Arc::clone(&slot), writes_out: true };
         let reader = library.reader(ProjectionMask::all(), None, BATCH_ROWS, None);

@@ -1,4 +1,4 @@
-//! Work on several threads, its results in order.
+//! Runs work on several threads, with results in order.
 
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
@@ -6,8 +6,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;
 use std::thread;
 
-/// Does all jobs, `threads` at a time, and gives `sink` the results in the order of the jobs. Where no thread is to be
-/// had, the calling one does the work.
+/// Runs all jobs, `threads` at a time, and passes the results to `sink` in the order of the jobs. If no thread can be
+/// started, the calling thread does the work.
 pub fn in_order<J: Sync, T: Send, E>(
     threads: NonZeroUsize,
     jobs: &[J],
@@ -22,7 +22,7 @@ pub fn in_order<J: Sync, T: Send, E>(
     let work = &work;
     let (give, take) = mpsc::channel();
     thread::scope(|scope| {
-        // The calling thread works, too: results wait in the channel meanwhile.
+        // The calling thread works too; results wait in the channel meanwhile.
         for _ in 1..threads {
             let give = give.clone();
             let worker = move || {

@@ -1,4 +1,4 @@
-//! From the bytes of traces to whole episodes, in the order of the files.
+//! Reads traces from bytes to complete episodes, in the order of the files.
 
 mod beside;
 pub(crate) mod budget;

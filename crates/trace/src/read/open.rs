@@ -1,4 +1,4 @@
-//! Traces opened together: every footer is read, and it is known what each column is over all files.
+//! Opens traces together: reads every footer and determines the use of each column over all files.
 
 use super::beside::Beside;
 pub use super::footer::trace_file::{FileColumn, TraceFile};
@@ -7,7 +7,7 @@ use crate::error::TraceError;
 use crate::inputs::Input;
 use crate::schema::{self, COLUMNS, Column, Domain, Kind};
 
-/// Traces that are open: every footer is read and good, no row is read yet.
+/// Open traces: every footer is read and valid, no rows are read yet.
 #[derive(Debug)]
 pub struct TraceSet {
     files: Vec<TraceFile>,
@@ -17,16 +17,16 @@ pub struct TraceSet {
 /// The type and presence of a column over all files of a set.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ColumnUse {
-    /// The logical type, the same in all files that have the column; [`Kind::Unsupported`] where they differ.
+    /// The logical type, the same in all files that have the column; [`Kind::Unsupported`] if they differ.
     pub kind: Kind,
-    /// The name of a file that does not have the column, if there is one; its rows read as null.
+    /// The name of a file without the column, if any; its rows read as null.
     pub missing_from: Option<String>,
-    /// Two files that disagree on the type, and the types they have.
+    /// Two files that disagree on the type, with their types.
     pub conflict: Option<[(String, Kind); 2]>,
 }
 
 impl TraceSet {
-    /// Opens these files, ordered as they are given ([`resolve`](crate::inputs::resolve) orders them by name).
+    /// Opens these files in the given order ([`resolve`](crate::inputs::resolve) orders them by name).
     pub fn open(inputs: &[Input]) -> Result<Self, TraceError> {
         let mut files = Vec::with_capacity(inputs.len());
         let mut faults = Vec::new();
@@ -46,7 +46,7 @@ impl TraceSet {
         }
     }
 
-    /// The domain of all files: the mirror's, unless every file is of another one.
+    /// The domain of all files: the mirror's, unless every file has another one.
     pub fn domain(&self) -> Domain {
         let is_own = |file: &TraceFile| file.domain() == Domain::Own;
         if !self.files.is_empty() && self.files.iter().all(is_own) { Domain::Own } else { Domain::Mirror }
@@ -57,7 +57,7 @@ impl TraceSet {
         self.files.iter().flat_map(TraceFile::strangeness).collect()
     }
 
-    /// The schema's column of this name in these files; `None` for a column of their own.
+    /// The schema's column of this name in these files; `None` for an own column.
     pub fn schema_column(&self, name: &str) -> Option<&'static Column> {
         let is_known = |known: &&'static Column| match self.domain() {
             Domain::Mirror => known.since == 1 || self.declares(name),
@@ -72,7 +72,7 @@ impl TraceSet {
         self.domain().has(known) && (is_free || self.column(known.name).is_none() || self.declares(known.name))
     }
 
-    /// Files that were opened one by one.
+    /// A set of files opened one by one.
     pub fn of(files: Vec<TraceFile>) -> Self {
         Self { files, beside: Beside::default() }
     }
@@ -90,7 +90,7 @@ impl TraceSet {
         &self.files
     }
 
-    /// The column of this name over all files; `None` if no file has it, and it is no label's.
+    /// The use of a column over all files; `None` if no file and no label has it.
     pub fn column(&self, name: &str) -> Option<ColumnUse> {
         if self.is_label_column(name) {
             return Some(ColumnUse { kind: Kind::Bool, missing_from: None, conflict: None });
@@ -108,19 +108,18 @@ impl TraceSet {
                 (Some(Some(_)), Some(_)) => {}
             }
         }
-        // A column that is null in every file has the schema's type, or text where the schema does not know it.
+        // A column that is null in every file has the schema's type, or text if it is not in the schema.
         let unseen = || self.domain().column(name).map_or(Kind::String, |column| column.stored.kind());
         let kind = if conflict.is_some() { Kind::Unsupported } else { seen.map_or_else(unseen, |(_, kind)| kind) };
         (present || seen.is_some()).then_some(ColumnUse { kind, missing_from, conflict })
     }
 
-    /// Returns true if some file has the schema's column of this name.
+    /// Returns true if a file has the schema's column of this name.
     pub fn declares(&self, name: &str) -> bool {
         self.files.iter().any(|file| file.declares(name))
     }
 
-    /// The names of all columns of all files: those of the schema in its order, then the others in the order of the
-    /// files.
+    /// The names of all columns of all files: those of the schema in its order, then the others in file order.
     pub fn column_names(&self) -> Vec<&str> {
         let known = COLUMNS.iter().filter(|column| self.domain().has(column)).map(|column| column.name);
         let mut names: Vec<&str> =

@@ -1,9 +1,9 @@
-//! One pass over traces: row groups decoded in parallel, whole episodes handed on in the order of the files.
+//! One pass over traces: decodes row groups in parallel and hands on complete episodes in the order of the files.
 //!
-//! Each row group is one job. A worker decodes it and works on the episodes that lie wholly inside. Where the episodes at
-//! its two ends go on in the neighbouring row groups, or may do so, their rows travel to the receiving thread, which
-//! joins them. What the receiver sees, and in which order, depends on the files alone, never on threads. A few row groups are
-//! under way at a time, so memory does not grow with the data.
+//! Each row group is one job. A worker decodes it and processes the episodes that are wholly inside. The episodes at
+//! its ends may continue in the neighbouring row groups: their rows go to the receiving thread, which joins them. The
+//! receiver's input and its order depend only on the files, never on threads. Only a few row groups are in progress at
+//! a time, so memory does not grow with the data.
 
 use std::collections::VecDeque;
 use std::num::NonZeroUsize;
@@ -23,7 +23,7 @@ use crate::diagnostic::{Code, Finding};
 use crate::error::TraceError;
 use parquet_pages::Column;
 
-/// Whole episodes of one file, one after the other.
+/// Complete consecutive episodes of one file.
 #[derive(Clone, Debug)]
 pub(crate) struct Episodes {
     pub(crate) file: usize,
@@ -32,7 +32,7 @@ pub(crate) struct Episodes {
     pub(crate) pieces: Vec<Piece>,
 }
 
-/// Rows that lie together in a row group.
+/// Consecutive rows of a row group.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Piece {
     pub(crate) at: usize,
@@ -59,7 +59,7 @@ impl Episodes {
         self.columns[EPISODE_ID].text(row)
     }
 
-    /// The ids of the episodes of some rows, which ascend; `None` for null.
+    /// The ids of the episodes of some rows, which must ascend; `None` for null.
     pub(crate) fn ids<'a>(&'a self, rows: &'a [usize]) -> impl Iterator<Item = Option<&'a str>> {
         self.columns[EPISODE_ID].texts(rows)
     }
@@ -68,21 +68,21 @@ impl Episodes {
 pub(crate) enum Event<T> {
     /// The result of the work on some whole episodes.
     Whole(T),
-    /// The file cannot be decoded any further; nothing more comes of it.
+    /// The file cannot be decoded further; this is its last event.
     Fault(Box<Finding>),
 }
 
 /// The parts of a row group, in this order: at most one head, wholes, a tail or a fault.
 enum Part<T> {
-    /// The first episode's rows, which the row group before may have begun.
+    /// The first episode's rows, which may continue the row group before.
     Head(Vec<Rows>),
     Whole(T),
-    /// The last episode's rows, which the next row group may go on with.
+    /// The last episode's rows, which may continue in the next row group.
     Tail(Vec<Rows>),
     Fault(Box<Finding>),
 }
 
-/// A row group to decode, and where its parts go.
+/// A row group to decode, and the destination of its parts.
 type Order<T> = (Job, SyncSender<Part<T>>);
 
 #[derive(Clone, Copy)]
@@ -91,10 +91,10 @@ struct Job {
     row_group: usize,
 }
 
-/// Results that wait in a row group's queue before its worker does.
+/// The number of results that may wait in a row group's queue before its worker must.
 const QUEUED_PARTS: usize = 16;
 
-/// Runs `work` on all whole episodes and gives `receive` the results with their file, in order.
+/// Runs `work` on all complete episodes and passes the results to `receive` with their file, in order.
 pub(crate) fn pass<T: Send, E: From<TraceError>>(
     files: &[TraceFile],
     layout: &Layout,
@@ -109,11 +109,11 @@ pub(crate) fn pass<T: Send, E: From<TraceError>>(
     });
     let jobs: VecDeque<Job> = jobs.collect();
     let (give, take) = mpsc::channel::<Order<T>>();
-    // Only workers hold on to it, so that nobody waits for orders when all of them have panicked.
+    // Only workers hold it, so that sending fails once all of them have panicked.
     let take = Arc::new(Mutex::new(take));
     let ahead = &Ahead::new(files, layout);
     thread::scope(|scope| {
-        // Dropped when this closure returns, early or not: workers then find no job and end.
+        // Dropped when this closure returns, even early: workers then find no job and end.
         let (give, take) = (give, take);
         let wanted = threads.get().min(jobs.len());
         for started in 0..wanted {
@@ -175,7 +175,7 @@ impl<T, W: Fn(Episodes) -> T> Splitter<'_, T, W> {
             Ok(rows) => self.split(rows),
             Err(finding) => self.send(Part::Fault(finding)),
         };
-        // Nothing is left to do for a receiver that has gone.
+        // The receiver has gone, so the result is not needed.
         drop(result);
     }
 
@@ -214,7 +214,7 @@ impl<T, W: Fn(Episodes) -> T> Splitter<'_, T, W> {
             self.open.push(rows.clone());
             return Ok(());
         };
-        // Without an episode that goes on, the first one here is whole, unless it may have begun before this row group.
+        // If no episode continues, the first one here is complete, unless it may have begun before this row group.
         let from = if self.open.is_empty() && self.headed { 0 } else { starts.get(1).copied().unwrap_or(last) };
         if from > 0 {
             self.open.push(rows.slice(0, from));
@@ -265,18 +265,18 @@ impl<T, W: Fn(Episodes) -> T> Splitter<'_, T, W> {
 struct Started<T> {
     job: Job,
     parts: Receiver<Part<T>>,
-    /// Held, so that a file's footer is read once for all its row groups.
+    /// Held so that a file's footer is read once for all its row groups.
     _footer: Option<Arc<Readable>>,
 }
 
-/// Puts the parts of the row groups together again, on the receiving thread.
+/// Joins the parts of the row groups, on the receiving thread.
 struct Joiner<'a, W, R> {
     files: &'a [TraceFile],
     work: &'a W,
     receive: R,
     open: Vec<Rows>,
     file: usize,
-    /// True if the file had a fault, after which nothing of it counts.
+    /// True after a fault of the file; the rest of it is ignored.
     failed: bool,
 }
 
@@ -396,7 +396,7 @@ fn starts(rows: &Rows) -> Vec<usize> {
     match &rows.columns[EPISODE_ID] {
         Column::Runs(ids) => starts.extend(ids.text_changes()),
         Column::Flat(ids) if ids.null_count() == 0 => {
-            // Equal keys are equal ids; a dictionary may still hold one id under two keys.
+            // Equal keys are equal ids; but a dictionary may hold one id under two keys.
             let keys = ids.as_dictionary::<Int32Type>().keys().values();
             starts.extend((1..keys.len()).filter(|row| keys[*row] != keys[row - 1]).filter(differ));
         }

@@ -1,4 +1,4 @@
-//! The columns of one pass: which are read, as what, and what is known about them.
+//! The columns of one pass: which to read, as which type, and their known properties.
 
 use super::open::TraceSet;
 use crate::error::TraceError;
@@ -6,12 +6,12 @@ use crate::schema::{Column, DeclaredColumn, Domain, Kind};
 
 /// Columns that every pass reads, at these positions.
 pub(crate) const KEYS: [&str; 6] = ["episode_id", "model", "experiment", "seed", "run", "t"];
-/// A column that is read besides in every pass over traces of the mirror's domain.
+/// A column that every pass over traces of the mirror's domain reads as well.
 pub(crate) const BODY_COLOR: &str = "body_color";
 pub(crate) const EPISODE_ID: usize = 0;
 pub(crate) const T: usize = 5;
 
-/// The columns that a pass reads: [`KEYS`], then those asked for.
+/// The columns of a pass: [`KEYS`], then the requested ones.
 #[derive(Clone, Debug)]
 pub(crate) struct Layout {
     pub(crate) columns: Vec<LayoutColumn>,
@@ -22,7 +22,7 @@ pub(crate) struct LayoutColumn {
     pub(crate) name: String,
     pub(crate) kind: Kind,
     pub(crate) known: Option<&'static Column>,
-    /// True if it must be the same in all rows of an episode.
+    /// True if it must be constant in an episode.
     pub(crate) constant: bool,
     pub(crate) values: Vec<String>,
 }
@@ -56,7 +56,7 @@ impl Layout {
         Ok(())
     }
 
-    /// Takes the rules that definitions declare for columns which the schema does not know.
+    /// Adds the rules that definitions declare for columns outside the schema.
     pub(crate) fn with_declared(&mut self, declared: &[DeclaredColumn]) {
         for declared in declared {
             let own = self.columns.iter_mut().find(|column| column.name == declared.name && column.known.is_none());

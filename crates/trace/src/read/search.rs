@@ -1,4 +1,4 @@
-//! Words in what was said: replies, reasoning, notes, errors.
+//! Searches for words in replies, reasoning, notes and errors.
 
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
@@ -12,27 +12,27 @@ use super::steps::Steps;
 use crate::error::TraceError;
 use crate::schema::{Domain, Kind};
 
-/// The columns of the mirror's domain that are searched.
+/// The searched columns of the mirror's domain.
 pub const SAID: [&str; 7] =
     ["reasoning", "reply", "view_description", "identification", "summary", "reply_fault", "reply_status"];
 
-/// The characters of an excerpt on either side of the words.
+/// The characters of an excerpt on either side of a match.
 const AROUND: usize = 40;
 
-/// Where words were found in an episode.
+/// A match in an episode.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Found {
-    /// The first step that has them.
+    /// The first step with a match.
     pub t: i64,
-    /// The column that has them there.
+    /// The column of that match.
     pub column: String,
     /// Some text around them.
     pub excerpt: String,
-    /// How many steps have them.
+    /// The number of steps with a match.
     pub steps: usize,
 }
 
-/// The episodes whose steps have these words in a text, by their ids; small and capital letters are the same.
+/// The episodes with these words in a text of a step, by id; ignores case.
 pub fn search(set: &TraceSet, words: &str, threads: NonZeroUsize) -> Result<BTreeMap<String, Found>, TraceError> {
     let words = words.to_lowercase();
     let known = set.column_names();
@@ -72,11 +72,11 @@ fn is_text(set: &TraceSet, name: &str) -> bool {
     name != "episode_id" && set.column(name).is_some_and(|column| column.kind == Kind::String)
 }
 
-/// Some text around words in small letters, if the text has them.
+/// Some text around words, which are in lower case; `None` if the text does not contain them.
 fn excerpt(text: &str, words: &str) -> Option<String> {
     let small = text.to_lowercase();
     let at = small.find(words)?;
-    // Small letters may take other bytes: places are counted in characters.
+    // Lower case may change the number of bytes, so positions are counted in characters.
     let from = small[..at].chars().count();
     let length = words.chars().count();
     let start = from.saturating_sub(AROUND);

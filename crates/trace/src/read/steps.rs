@@ -1,5 +1,5 @@
-//! The steps of traces as Arrow batches, for programs that go on with them: the same columns of the same types from every
-//! file, null where a file has none.
+//! The steps of traces as Arrow batches for other programs: every file gives the same columns and types, with nulls for
+//! columns that it does not have.
 
 use std::collections::{BTreeSet, VecDeque};
 use std::io;
@@ -29,15 +29,15 @@ use exact::input;
 use parquet_pages::{Expansion, FaultSlot, Library, Store};
 
 const BATCH_ROWS: usize = 8 * 1024;
-/// The column by which episodes are distinguished.
+/// The column that identifies episodes.
 const EPISODE_ID: &str = "episode_id";
 
-/// The batches that a thread is ahead of the reader, at most.
+/// The most batches that a thread decodes ahead of the reader.
 const AHEAD: usize = 4;
 
-/// The rows of all files in their order, some at a time. No rule of traces is checked, checksums are.
+/// The rows of all files in order, in batches. Checksums are checked, but not the rules of traces.
 ///
-/// Nothing follows an error. A thread per row group decodes ahead.
+/// An error ends the iteration. One thread per row group decodes ahead.
 pub struct Steps {
     shape: Shape,
     parts: vec::IntoIter<Part>,
@@ -52,7 +52,7 @@ struct Shape {
     episodes: Option<Arc<BTreeSet<String>>>,
 }
 
-/// A row group whose rows are still to come.
+/// A row group that is not read yet.
 struct Part {
     name: String,
     path: PathBuf,
@@ -76,7 +76,7 @@ struct Reader {
 }
 
 impl Steps {
-    /// The steps of these episodes, of all if absent, with these columns in this order, all if absent.
+    /// The steps of these episodes, with these columns in this order; all episodes or columns if absent.
     pub fn new(
         set: &TraceSet,
         columns: Option<&[String]>,
@@ -98,7 +98,7 @@ impl Steps {
         Ok(Self { shape, parts, ahead: VecDeque::new(), threads })
     }
 
-    /// The columns: those of the schema as it has them, others as text, int64, float64 or bool; all may be null.
+    /// The columns: those of the schema with its types, others as text, int64, float64 or bool; all may be null.
     pub fn schema(&self) -> SchemaRef {
         Arc::clone(&self.shape.schema)
     }
@@ -128,7 +128,7 @@ impl Shape {
             }
         };
         let columns = self.schema.fields().iter().map(column).collect::<Result<Vec<_>, _>>();
-        // With no column at all there is nothing else to tell how many rows there are.
+        // Without columns, only this gives the number of rows.
         let options = RecordBatchOptions::new().with_row_count(Some(rows.num_rows()));
         let batch =
             columns.and_then(|columns| RecordBatch::try_new_with_options(Arc::clone(&self.schema), columns, &options));
@@ -159,7 +159,7 @@ fn is_readable(set: &TraceSet, name: &str) -> bool {
     set.column(name).is_some_and(|column| column.kind != Kind::Unsupported || column.conflict.is_some())
 }
 
-/// The type of a column: as the schema has it, as wide as can be where the schema does not know it.
+/// The type of a column: the schema's, or the widest of its kind for columns outside the schema.
 fn data_type(set: &TraceSet, name: &str, kind: Kind) -> DataType {
     let known = set.domain().column(name).filter(|column| column.stored.kind() == kind).map(|column| column.stored);
     match (known, kind) {
@@ -191,7 +191,7 @@ impl Part {
         let name = self.name.clone();
         thread::spawn(move || {
             let end = self.send(&shape, &sender).map(|()| None);
-            // Nobody reads any more where this fails.
+            // If this fails, the reader is gone.
             let _ = sender.send(end);
         });
         Ahead { name, rows }

@@ -17,34 +17,33 @@ use crate::episode::Episode;
 pub struct Column {
     /// The column's name in the file.
     pub name: &'static str,
-    /// The type that the writer stores; readers take any of the same [`Kind`].
+    /// The stored type; readers accept any type of the same [`Kind`].
     #[serde(rename = "type")]
     pub stored: Stored,
     /// True if every trace has the column.
     pub required: bool,
-    /// True if a row may have none.
+    /// True if a row may have no value.
     pub nullable: bool,
     /// True if the value is the same in all rows of an episode.
     pub constant: bool,
     /// The unit of a number.
     pub unit: Option<&'static str>,
     pub doc: &'static str,
-    /// The only values that the column takes, where they are fixed.
+    /// The only values of the column, if they are fixed.
     pub values: &'static [&'static str],
-    /// The first version of the schema that has the column. An older trace may have a column of this name that means
-    /// something else.
+    /// The first schema version with the column. In an older trace, a column of this name may mean something else.
     pub since: u32,
-    /// What a trace without the column, and a row without a value, mean: an expression in the language of definitions.
-    /// `null` where a trace without the column is one without a value in any row, so that definitions may read it.
+    /// The value if a trace has no such column or a row has no value: an expression in the language of definitions.
+    /// `null` means that a missing column equals a column without values, so that definitions may read it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub default: Option<&'static str>,
-    /// The code of a finding about a text beside `values`.
+    /// The code of a finding about a text outside `values`.
     #[serde(skip)]
     pub rule: Option<Code>,
-    /// The colours that it holds, if it holds any.
+    /// The colours in it, if any.
     #[serde(skip)]
     pub color: Option<ColorColumn>,
-    /// True if it counts something, so that a negative number is a fault.
+    /// True if it counts something, so that negative numbers are faults.
     #[serde(skip)]
     pub counts: bool,
     #[serde(skip)]
@@ -57,7 +56,7 @@ pub struct Column {
     pub(super) access: Access,
 }
 
-/// The type of a column as the writer stores it.
+/// The stored type of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Stored {
@@ -115,7 +114,7 @@ impl Stored {
         }
     }
 
-    /// The smallest and largest integer of the type, where it is one.
+    /// The smallest and largest integer of the type, if it is an integer type.
     pub const fn range(self) -> Option<(i64, i64)> {
         match self {
             Self::Int8 => Some((i8::MIN as i64, i8::MAX as i64)),
@@ -135,14 +134,14 @@ impl PartialEq for Column {
 impl Eq for Column {}
 
 impl Column {
-    /// What no value means, where that is a text or a number and not an expression over other columns.
+    /// The meaning of a missing value, if it is a text or a number and not an expression over other columns.
     pub fn default_text(&self) -> Option<&'static str> {
         let text = self.default?;
         let quoted = text.strip_prefix('\'').and_then(|text| text.strip_suffix('\''));
         quoted.or_else(|| text.bytes().all(|byte| byte.is_ascii_digit()).then_some(text))
     }
 
-    /// A column of an answer that an experiment declares.
+    /// The column of an answer that an experiment declares.
     pub(crate) fn of_answer(name: &'static str, stored: Stored) -> Self {
         Self {
             name,
@@ -174,7 +173,7 @@ impl Column {
         })
     }
 
-    /// Puts the value at the step of an index; says no, and changes nothing, where the field cannot hold it.
+    /// Sets the value at a step index; returns false and changes nothing if the field cannot hold it.
     pub(crate) fn put(&self, episode: &mut Episode, at: usize, value: Option<Value<'_>>) -> bool {
         (self.access.set)(episode, at, value)
     }

@@ -1,11 +1,11 @@
-//! The schema as a document: what `mirrorstats trace schema` prints and `schemas/trace.schema.json` holds.
+//! The schema as a document, printed by `mirrorstats trace schema` and stored in `schemas/trace.schema.json`.
 
 use serde::Serialize;
 
 use crate::diagnostic::{Code, Severity};
 use crate::schema::{COLUMNS, Column, METADATA, MetadataKey, SCHEMA_VERSION};
 
-/// All that a writer or reader of traces must know.
+/// Everything that writers and readers of traces must know.
 #[derive(Clone, Debug, Serialize)]
 pub struct SchemaDocument {
     pub title: &'static str,
@@ -21,7 +21,7 @@ pub struct SchemaDocument {
     pub rules: Vec<Rule>,
 }
 
-/// One rule and the code that its findings have.
+/// One rule and the code of its findings.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Rule {
     pub code: Code,

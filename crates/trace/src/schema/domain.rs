@@ -1,6 +1,6 @@
-//! Domains: which columns of the schema mean something in a trace.
+//! Domains: the columns of the schema with a meaning in a trace.
 //!
-//! Every domain has identity and time. The columns of the mirror's world are names like any other elsewhere.
+//! Every domain has identity and time. In other domains, the names of the mirror's columns have no special meaning.
 
 use std::sync::LazyLock;
 
@@ -17,17 +17,17 @@ use crate::read::open::FileColumn;
 /// The subject of a trace's episodes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Domain {
-    /// Embodied agents before a mirror: the whole schema holds.
+    /// Embodied agents before a mirror: the whole schema applies.
     #[default]
     Mirror,
-    /// Anything else: identity and time, and the columns of the file's own.
+    /// Anything else: identity and time, and the file's own columns.
     Own,
 }
 
 /// The name of the mirror's domain.
 pub(crate) const MIRROR: &str = "mirror";
 
-/// The columns of the schema, in the order in which the writer stores them: required ones first.
+/// The columns of the schema, in storage order: required ones first.
 pub static COLUMNS: LazyLock<Vec<Column>> = LazyLock::new(|| {
     let text = include_str!("../../../../assets/domains/mirror.toml");
     let file: DomainFile = toml::from_str(text).expect("the built-in domain is well-formed: a test reads it");
@@ -35,13 +35,13 @@ pub static COLUMNS: LazyLock<Vec<Column>> = LazyLock::new(|| {
     column.into_iter().map(|(name, declared)| declared.named(name.leak(), &counted)).collect()
 });
 
-/// Which traces mean a column as the schema does.
+/// The traces in which a column has the meaning of the schema.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Scope {
-    /// Every trace has it.
+    /// Every trace, which must have it.
     Every,
-    /// Traces of any domain, where it has the schema's type.
+    /// Traces of any domain, if it has the schema's type.
     Any,
     /// Those of the mirror's domain.
     #[default]
@@ -55,7 +55,7 @@ struct DomainFile {
     column: IndexMap<String, DomainColumn>,
 }
 
-/// A column as the file declares it; the file says what each key means.
+/// A column as declared in the file, which documents each key.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a key of the file")]
@@ -96,7 +96,7 @@ const fn first_version() -> u32 {
 }
 
 impl DomainColumn {
-    /// The column, whose texts are kept for as long as the process runs: there is one table.
+    /// The column. Its texts are kept until the process ends, since there is only one table.
     fn named(self, name: &'static str, counted: &[String]) -> Column {
         let kept = |text: String| &*text.leak();
         let color = |color: DomainColor| ColorColumn { name, word: color.word.map(kept), advice: kept(color.advice) };
@@ -123,8 +123,8 @@ impl DomainColumn {
 }
 
 impl Domain {
-    /// The domain of a file with these columns: its recording names it. Where it does not, a file with an identity and without
-    /// any column of the mirror is of its own domain, and all others are traces of the mirror, damaged ones too.
+    /// The domain of a file: the recording names it. Otherwise a file with an identity and no column of the mirror has
+    /// its own domain; all others, damaged ones included, are traces of the mirror.
     pub(crate) fn of_file(columns: &[FileColumn], recording: &Value) -> Self {
         if let Some(name) = recording["domain"].as_str() {
             return Self::named(name);
@@ -140,7 +140,7 @@ impl Domain {
         if name == MIRROR { Self::Mirror } else { Self::Own }
     }
 
-    /// Returns true if the schema's column means something here.
+    /// Returns true if the schema's column has a meaning here.
     pub fn has(self, column: &Column) -> bool {
         self == Self::Mirror || column.scope != Scope::Mirror
     }
@@ -151,14 +151,14 @@ impl Domain {
     }
 }
 
-/// A column that definitions of their own domain declare.
+/// A column that definitions of another domain declare.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DeclaredColumn {
     pub name: String,
     pub kind: Kind,
-    /// The only texts that it holds, null apart; any if empty.
+    /// The only texts in it, except null; any if empty.
     pub values: Vec<String>,
-    /// True if it is the same in all rows of an episode.
+    /// True if it is constant in an episode.
     pub constant: bool,
 }
 
@@ -167,7 +167,7 @@ pub fn is_identity(name: &str) -> bool {
     column(name).is_some_and(|column| column.scope == Scope::Every)
 }
 
-/// Returns true if a column of the schema is that of every domain.
+/// Returns true if a column of the schema belongs to every domain.
 pub fn is_general(name: &str) -> bool {
     column(name).is_some_and(|column| column.scope != Scope::Mirror)
 }

@@ -11,16 +11,16 @@ pub enum Value<'a> {
     Text(&'a str),
 }
 
-/// The field behind a column, at the step of an index (0-based); a field of the episode is the same at all of them.
+/// The field behind a column at a step index (0-based); a field of the episode is the same at all steps.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Access {
     /// The value; `None` for null.
     pub(crate) get: fn(&Episode, usize) -> Option<Value<'_>>,
-    /// Puts a value there. Says no, and changes nothing, where the field cannot hold it.
+    /// Sets the value. Returns false and changes nothing if the field cannot hold it.
     pub(crate) set: fn(&mut Episode, usize, Option<Value<'_>>) -> bool,
 }
 
-/// The field behind the column of this name. The timestep is the place of its row; of a name without a field nothing is kept.
+/// The field behind the column of this name. The timestep follows from the row; values of unknown names are not kept.
 pub(super) fn access(name: &str) -> Access {
     const T: Access = Access { get: |_, at| i64::try_from(at).ok().map(|at| Value::Int(at + 1)), set: |_, _, _| true };
     const NONE: Access = Access { get: |_, _| None, set: |_, _, _| false };
@@ -54,14 +54,14 @@ const FIELDS: &[(&str, Access)] = fields! {
     ];
 };
 
-/// A field that a column is made of.
+/// A type of field behind columns.
 trait Field {
     fn value(&self) -> Option<Value<'_>>;
 
     fn put(&mut self, value: Option<Value<'_>>) -> bool;
 }
 
-/// Fields of a type, where a null is none of their values, and fields that may have one.
+/// Non-nullable and nullable fields.
 macro_rules! field {
     ($type:ty, $held:pat => $made:expr, $own:ident => $value:expr) => {
         impl Field for $type {
@@ -102,7 +102,7 @@ field!(f64, Value::Float(value) => Some(value), own => Value::Float(*own));
 field!(String, Value::Text(value) => Some(value.to_owned()), own => Value::Text(own));
 field!(Action, Value::Text(value) => Action::named(value), own => Value::Text(own.name()));
 
-/// A number that a field of 32 bits had, or a reader's column of them.
+/// A number from a 32-bit field, or from a reader's column of them.
 #[expect(clippy::cast_possible_truncation, reason = "the column holds 32 bits")]
 fn narrowed(value: f64) -> f32 {
     value as f32

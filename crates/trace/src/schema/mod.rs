@@ -1,8 +1,8 @@
-//! The table of columns: what a trace holds, as `assets/domains/mirror.toml` declares it.
+//! The table of a trace's columns, declared in `assets/domains/mirror.toml`.
 //!
-//! Writer, reader, `validate`, `import`, the messages of logs, `mirrorstats trace schema` and `schemas/trace.schema.json` all
-//! follow `COLUMNS`: a new column is an entry of that file, and a field of `Episode` or `Extra`. Columns that it does not name
-//! are a trace's own: they are kept, and definitions may use them.
+//! Writer, reader, `validate`, `import`, the messages of logs, `mirrorstats trace schema` and
+//! `schemas/trace.schema.json` all follow `COLUMNS`. A new column needs an entry in that file, and a field of `Episode`
+//! or `Extra`. Other columns are a trace's own: they are kept, and definitions may use them.
 
 pub mod colors;
 mod column;
@@ -17,11 +17,11 @@ pub use column::{Column, Kind, Stored};
 pub use domain::{COLUMNS, DeclaredColumn, Domain};
 pub use field_access::Value;
 
-/// The newest version of the schema. A trace is written as the oldest one that has its columns.
+/// The newest schema version. A trace is written with the oldest version that has its columns.
 pub const SCHEMA_VERSION: u32 = 2;
 
-/// The required columns that have no meaning for some tasks: a trace may lack one if every experiment that its footer declares
-/// says so (`absent`). Its rows have no value then.
+/// The required columns without a meaning in some tasks. A trace may lack one if every experiment in its footer
+/// declares so (`absent`); its rows then have no value.
 pub fn of_some_tasks() -> impl Iterator<Item = &'static str> {
     COLUMNS.iter().filter(|column| column.is_of_some_tasks).map(|column| column.name)
 }
@@ -43,7 +43,7 @@ pub struct MetadataKey {
 pub const VERSION_KEY: &str = "mirrorstats.schema_version";
 /// Footer key: the program that wrote the file.
 pub(crate) const WRITER_KEY: &str = "mirrorstats.writer";
-/// Footer key: how the recording was made, JSON.
+/// Footer key: the circumstances of the recording, JSON.
 pub const RECORDING_KEY: &str = "mirrorstats.recording";
 /// Footer key: checksums of the columns and of the footer, JSON.
 pub(crate) const CHECKSUMS_KEY: &str = parquet_pages::checksums::KEY;
@@ -165,7 +165,7 @@ mod tests {
                 assert!(!column.put(&mut episode, 1, Some(other)), "{}", column.name);
                 assert_eq!(column.put(&mut episode, 1, None), column.nullable, "{}", column.name);
             }
-            // The type that is stored is the field's: it holds all of that range, and nothing beyond.
+            // The stored type is the field's: it holds exactly that range.
             if let Some((lowest, highest)) = column.stored.range().filter(|_| column.name != "t") {
                 assert!([lowest, highest].map(Value::Int).iter().all(|v| column.put(&mut episode, 0, Some(*v))));
                 let beyond = highest.checked_add(1).map(Value::Int);

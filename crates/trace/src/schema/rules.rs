@@ -1,7 +1,7 @@
-//! The rules about the values of columns, once: which ones a column has, in which order, and what each asks for.
+//! The rules about column values, defined once: the rules of a column, their order and their requirements.
 //!
-//! `validate::rules` checks them on the columns of whole episodes, the check on Spark as aggregates over rows; both take
-//! code, order and words from here.
+//! `validate::rules` checks them on columns of complete episodes, the check on Spark as aggregates over rows. Both take
+//! codes, order and messages from here.
 
 use super::colors::ColorColumn;
 use super::colors::palette::Palette;
@@ -24,26 +24,26 @@ pub enum Requirement<'a> {
     Name,
     /// One of these texts.
     OneOf(&'static [&'static str]),
-    /// One of the texts that definitions declare.
+    /// One of the texts that the definitions declare.
     Among(&'a [String]),
-    /// A colour that the column may hold.
+    /// A colour that the column allows.
     Color(ColorColumn, Option<&'a Palette>),
     /// An integer within these bounds of a type.
     Within(i64, i64, &'static str),
-    /// A number that is not below zero.
+    /// A non-negative number.
     Count,
-    /// The same in all rows of an episode.
+    /// Constant in an episode.
     Constant,
-    /// A known experiment; that it has a name is another rule.
+    /// A known experiment; another rule requires a name.
     Experiment(&'a [String]),
-    /// 1 in an episode's first row.
+    /// 1 in the first row of an episode.
     FromOne,
     Once,
-    /// No number left out.
+    /// No gaps in the numbers.
     WithoutGap,
 }
 
-/// The limits on values besides the schema.
+/// The limits on values beyond the schema.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Known<'a> {
     /// The palette of the footer.
@@ -53,13 +53,13 @@ pub struct Known<'a> {
 }
 
 impl Column {
-    /// Returns true if the column's text names something, so that an empty one is a fault.
+    /// Returns true if the column's text is a name, so that an empty one is a fault.
     pub fn names(&self) -> bool {
         self.stored == Stored::String && (self.required || self.constant || self.color.is_some())
     }
 }
 
-/// The rules of a column of the schema, in the order in which they are reported.
+/// The rules of a column of the schema, in reporting order.
 pub fn rules_of<'a>(column: &Column, known: Known<'a>) -> Vec<Rule<'a>> {
     let mut rules = Vec::new();
     let mut rule = |code, asks| rules.push(Rule { code, asks });
@@ -74,7 +74,7 @@ pub fn rules_of<'a>(column: &Column, known: Known<'a>) -> Vec<Rule<'a>> {
     if let Some(color) = column.color {
         rule(Code::InvalidColor, Requirement::Color(color, known.palette));
     }
-    // That t counts from 1 says more than any range, and every integer is within the widest one.
+    // The rule that t counts from 1 is stricter than any range, and every integer fits the widest one.
     if let Some((lowest, highest)) = column.stored.range().filter(|(lowest, _)| *lowest > i64::MIN)
         && column.name != "t"
     {
@@ -101,7 +101,7 @@ pub fn rules_of<'a>(column: &Column, known: Known<'a>) -> Vec<Rule<'a>> {
 }
 
 impl Rule<'_> {
-    /// The expected values, for a message. Callers that see single rows may say more of a constant, and of the steps.
+    /// The expected values, for a message. Callers that see single rows may add details about constants and steps.
     pub fn expected(&self) -> String {
         match self.asks {
             Requirement::Present => "a value".to_owned(),

@@ -1,27 +1,27 @@
-//! From the free text of `identification` to an attribution: a colour of the palette, `unknown`, or nothing.
+//! Converts the free text of `identification` to an attribution: a colour of the palette, `unknown`, or none.
 //!
-//! Rule, in this order, over the text in lower case and cut into words:
+//! Rules, in this order, on the text in lower case, split into words:
 //!
-//! 1. Nothing but blanks is no attribution.
-//! 2. A clause that speaks in the first person ("I am red", "my body is red", "self: red") and names one colour that it
-//!    does not deny, nor has from hearsay, decides; clauses end at `. ; ! ? ,` and at "but", "while", "whereas", "although", "though".
-//! 3. Words of not knowing ("unknown", "not sure", "cannot tell", ...) are `unknown`, whatever colours are beside.
-//! 4. One colour that is not denied is that colour, "probably" or not; two or more are `unknown`: nothing is chosen.
-//! 5. Colours that are all denied ("not red") are `unknown`.
-//! 6. No word about a colour, or about one outside of the palette alone, is no attribution.
+//! 1. Blank text is no attribution.
+//! 2. A clause in the first person ("I am red", "my body is red", "self: red") decides if it names one colour that is
+//!    neither denied nor hearsay; clauses end at `. ; ! ? ,` and at "but", "while", "whereas", "although", "though".
+//! 3. Words of uncertainty ("unknown", "not sure", "cannot tell", ...) give `unknown`, whatever the colours beside.
+//! 4. A single colour that is not denied is the attribution, "probably" or not; two or more give `unknown`.
+//! 5. Colours that are all denied ("not red") give `unknown`.
+//! 6. Text without colours, or only with colours outside the palette, is no attribution.
 //!
-//! Other languages than English are not read. [`VERSION`] changes with every change of meaning; it goes into
-//! recordings, and the column can be made anew from the texts at any time.
+//! Only English is read. [`VERSION`] changes with every change of meaning. Recordings contain it, and the column can be
+//! derived from the texts again at any time.
 
 use crate::palette::Color;
 
 /// The version of the rule.
 pub const VERSION: &str = "1";
 
-/// The attribution where the agent says that it does not know.
+/// The attribution if the agent says that it does not know.
 pub const UNKNOWN: &str = "unknown";
 
-/// The normal form of an identification; `None` where it holds no attribution.
+/// The normal form of an identification; `None` if it has no attribution.
 ///
 /// ```
 /// use mirrorstats_trace::identification::normal_form;
@@ -65,7 +65,7 @@ fn clauses(text: &str) -> Vec<Vec<String>> {
     clauses
 }
 
-/// Words after which another thought begins.
+/// Words that begin another thought.
 const TURNS: [&str; 6] = ["but", "while", "whereas", "although", "though", "however"];
 
 fn affirmed<'a>(clauses: impl Iterator<Item = &'a Vec<String>>) -> Vec<Color> {
@@ -101,10 +101,10 @@ fn is_about_oneself(clause: &[String]) -> bool {
     clause.iter().any(|word| matches!(word.as_str(), "i" | "im" | "my" | "me" | "self" | "myself" | "ego" | "own"))
 }
 
-/// Words of what somebody else says.
+/// Words that introduce statements of others.
 const HEARSAY: [&str; 9] = ["told", "say", "says", "said", "stated", "states", "claimed", "claims", "prompt"];
 
-/// The words say that the speaker does not know.
+/// Returns true if the words say that the speaker does not know.
 fn is_ignorance(words: &[impl AsRef<str>]) -> bool {
     let has = |phrase: &[&str]| {
         words.windows(phrase.len()).any(|window| window.iter().zip(phrase).all(|(a, b)| a.as_ref() == *b))
@@ -165,7 +165,7 @@ fn color(word: &str) -> Option<Color> {
     in_full(stem).or_else(|| in_full(word.strip_suffix("colored").or_else(|| word.strip_suffix("coloured"))?))
 }
 
-/// Names of shades, by the colour of the palette that a person would file them under.
+/// Names of shades, with the palette colour that people would assign them to.
 const SYNONYMS: &[(&str, Color)] = &[
     ("amber", Color::Orange),
     ("amethyst", Color::Purple),

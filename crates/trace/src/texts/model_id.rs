@@ -1,16 +1,16 @@
-//! Comparison of the answering model with the requested one, by their ids.
+//! Compares the answering model with the requested one, by their ids.
 //!
-//! The same model has several ids. OpenAI answers for an alias with its dated snapshot (`gpt-5.1-2025-11-13`), Anthropic
-//! likewise (`claude-sonnet-4-6-20260101`), Google puts `models/` in front and numbers versions (`gemini-2.5-flash-001`,
-//! `gemini-2.5-pro-preview-06-05`), OpenRouter puts the vendor in front, a variant behind (`:nitro`), and may order words
-//! otherwise (`anthropic/claude-4.6-sonnet-20260217`). A version (`gpt-5.1` for `gpt-5`) or a size is another model.
+//! The same model has several ids. OpenAI answers for an alias with its dated snapshot (`gpt-5.1-2025-11-13`), and so
+//! does Anthropic (`claude-sonnet-4-6-20260101`). Google adds `models/` and numbers versions (`gemini-2.5-flash-001`,
+//! `gemini-2.5-pro-preview-06-05`). OpenRouter adds a vendor and a variant (`:nitro`), and may reorder words
+//! (`anthropic/claude-4.6-sonnet-20260217`). Another version (`gpt-5.1` for `gpt-5`) or size is another model.
 
 use glob::{MatchOptions, Pattern};
 
-/// The backend of servers of one's own.
+/// The backend for the user's own servers.
 pub const OWN_SERVER: &str = "compatible";
 
-/// Returns true if `returned` is `asked`, a snapshot of it or its alias, or fits one of these patterns, where `*` is any text.
+/// Returns true if `returned` is `asked`, its snapshot or its alias, or matches one of these patterns; `*` is any text.
 pub fn answers_for(asked: &str, returned: &str, patterns: &[String]) -> bool {
     let options = MatchOptions { case_sensitive: false, ..MatchOptions::new() };
     let fits = |text: &String| Pattern::new(text).is_ok_and(|pattern| pattern.matches_with(returned, options));
@@ -24,7 +24,7 @@ pub fn answers_for(asked: &str, returned: &str, patterns: &[String]) -> bool {
             None => extra.push(word),
         }
     }
-    // Of two dates one is the wrong one.
+    // With two dates, one of them is wrong.
     is_snapshot(&extra) && is_snapshot(&asked) && (extra.is_empty() || asked.is_empty())
 }
 

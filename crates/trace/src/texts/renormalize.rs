@@ -1,6 +1,6 @@
-//! Attributions of old traces made anew: `self_color` from the text of `identification`, by the rule of this program.
+//! Derives `self_color` of old traces again from the text of `identification`, by the rule of this program.
 //!
-//! Rule: a step without a text keeps what it has; every step whose attribution changes is a flip, and told.
+//! Rule: a step without a text keeps its attribution. Every step whose attribution changes is reported as a flip.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -25,12 +25,12 @@ use crate::write::rewrite::{Before, rewrite};
 use exact::budget::Budget;
 use exact::replace::{Content, FolderFiles, TemporaryFolder, folder_of, is_same_file, make_folder, replace_folder};
 
-/// The free text, as replied.
+/// The free text of the reply.
 const SOURCE: &str = "identification";
 const TARGET: &str = "self_color";
-/// What a flip takes as it is printed, beside its text.
+/// The printed size of a flip, without its text.
 const PRINTED: usize = 1 << 10;
-/// The key of a recording that tells the version of the rule.
+/// The key of a recording for the version of the rule.
 const VERSION_KEY: &str = "identification_version";
 
 /// The changes.
@@ -91,7 +91,7 @@ pub enum RenormalizeError {
     Unwritable { path: PathBuf, source: io::Error },
 }
 
-/// Makes the attributions of traces anew: finds what changes, and writes the traces into `folder` if there is one, all or none.
+/// Derives attributions again: finds the changes and, if `folder` is given, writes the traces there, all or none.
 ///
 /// Each trace must keep every rule of the schema.
 pub fn renormalize(
@@ -129,7 +129,7 @@ pub fn renormalize(
     Ok(answer)
 }
 
-/// The new trace of each; refused where two have one name, or a trace would replace itself.
+/// The path of each new trace; refused if two have the same name, or a trace would replace itself.
 fn targets(inputs: &[Input], folder: &Path) -> Result<Vec<PathBuf>, RenormalizeError> {
     let refused = |input: &Input, expected: String, found: &str| RenormalizeError::Location {
         file: input.name.clone(),
@@ -163,7 +163,7 @@ fn unwritable(path: &Path, source: io::Error) -> RenormalizeError {
     RenormalizeError::Unwritable { path: path.to_owned(), source }
 }
 
-/// A trace whose attributions can be made anew.
+/// A trace whose attributions can be derived again.
 #[derive(Debug)]
 struct Old {
     set: TraceSet,
@@ -214,10 +214,10 @@ impl Old {
     }
 }
 
-/// The texts of a trace, as far as they are read.
+/// Reads and converts the texts of a trace.
 struct Normalizer<'a> {
     name: &'a str,
-    /// What the flips of all traces may take.
+    /// The budget for the flips of all traces.
     changed: &'a Budget,
     version_before: Option<String>,
     steps: u64,
@@ -232,7 +232,7 @@ impl Normalizer<'_> {
         (RenormalizedFile { name, out: None, version_before, steps, texts, flips: flips.len() }, flips)
     }
 
-    /// The attribution of a step, noted if it is another one than before.
+    /// The new attribution of a step; records a change.
     fn attribution(&mut self, (episode_id, t, source, target): Before<'_>) -> Result<Option<String>, TraceError> {
         self.steps += 1;
         let before = target.map(str::to_owned);
@@ -250,7 +250,7 @@ impl Normalizer<'_> {
     }
 }
 
-/// Writes the version of the rule to where a recording tells it, else beside its other keys; what stood there before.
+/// Sets the version of the rule where a recording has it, else beside its other keys; returns the previous version.
 pub fn put_version(recording: &mut Value) -> Option<String> {
     let text = |value: Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
     if let Some(place) = find(recording) {

@@ -1,7 +1,6 @@
-//! The colours of all inputs together: one spelling for each, and claims of a colour that nothing has.
+//! Checks the colours of all inputs together: one spelling for each, and claims of a colour that nothing has.
 //!
-//! Rule: what is found depends on the rows and on the order of the files, never on threads or on dictionary entries that
-//! no row has.
+//! Rule: findings depend only on the rows and the order of the files, never on threads or unused dictionary entries.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::num::NonZeroUsize;
@@ -32,18 +31,18 @@ pub(crate) struct Sighting {
     t: Option<i64>,
 }
 
-/// All colours of some inputs that pass the check of single values.
+/// All colours of some inputs that pass the checks of single values.
 #[derive(Default)]
 pub(crate) struct Tally {
     declared: BTreeSet<String>,
-    /// Colours of a body or a cube, in the order of their first rows.
+    /// Colours of bodies and cubes, in the order of their first rows.
     seen: IndexSet<String>,
-    /// Colours that their file does not declare, by column, in the order of their first rows.
+    /// Undeclared colours by column, in the order of their first rows.
     met: Vec<(usize, Sighting)>,
     places: HashMap<(&'static str, String), usize>,
 }
 
-/// The colours of some episodes by column, those with a first row before others first.
+/// The colours of some episodes by column, in the order of their first rows.
 pub(crate) fn sightings(file: &TraceFile, layout: &Layout, episodes: &Episodes) -> Vec<Sighting> {
     let mut found = Vec::new();
     for (held, column) in color_columns(layout, episodes) {
@@ -119,7 +118,7 @@ impl Tally {
         Self { declared, ..Self::default() }
     }
 
-    /// Adds what some episodes of a file have; files and rows come in their order.
+    /// Adds the colours in some episodes of a file; files and rows must come in order.
     pub(crate) fn add(&mut self, files: &[TraceFile], file: usize, sightings: Vec<Sighting>) {
         for sighting in sightings {
             let is_seen = matches!(sighting.column.name, "body_color" | "selected_cube");
@@ -139,8 +138,8 @@ impl Tally {
         }
     }
 
-    /// What the colours break together: errors for other spellings of a colour, notes for claims of one that nothing has.
-    /// Each with the position of its file.
+    /// The findings about colours together: errors for other spellings of a colour, notes for claims of one that
+    /// nothing has. Each has the position of its file.
     pub(crate) fn findings(&self, files: &[TraceFile]) -> Vec<(usize, Finding)> {
         let mut spelled: HashMap<String, &str> = HashMap::new();
         for name in self.declared.iter().chain(&self.seen) {
@@ -189,15 +188,15 @@ impl Sighting {
     }
 }
 
-/// The colours that some episodes may have beyond those of the study: entries of dictionaries, whether a row has them or
-/// not. Costs as much as the entries are many, whatever the number of rows.
+/// The possible colours of some episodes beyond those of the study: all dictionary entries, used or not. The cost
+/// depends on the number of entries, not of rows.
 pub(crate) fn other_names(layout: &Layout, episodes: &Episodes) -> Vec<String> {
     let entries = color_columns(layout, episodes).flat_map(|(held, _)| held.entries().as_string::<i32>());
     let is_other = |name: &&str| Color::named(name).is_none() && !WORDS.contains(name);
     entries.flatten().filter(is_other).map(str::to_owned).collect()
 }
 
-/// Names that are no colours of the study; they do not have to be in a row.
+/// Names that are not colours of the study, whether or not a row has them.
 pub(crate) struct Spellings(BTreeSet<String>);
 
 impl Spellings {
@@ -209,8 +208,8 @@ impl Spellings {
         self.0.extend(names);
     }
 
-    /// The first row, by file, with another spelling of a colour of the set. The rows are read again, and only where two
-    /// of the names are spellings of one.
+    /// The first row, by file, with another spelling of a colour in the set. The rows are read again only if two of the
+    /// names are spellings of one colour.
     pub(crate) fn first_conflict(
         &self,
         files: &[TraceFile],

@@ -1,7 +1,7 @@
-//! The check that episode ids are unique.
+//! Checks that episode ids are unique.
 //!
-//! Rule: exact. Eight bytes are kept per episode: the hash of its id. Where two hashes are equal, the traces are read
-//! again and the ids themselves compared.
+//! Rule: the check is exact. It keeps eight bytes per episode: the hash of its id. If two hashes are equal, the traces
+//! are read again to compare the ids themselves.
 
 use std::collections::{HashMap, HashSet};
 use std::hash::{DefaultHasher, Hasher};
@@ -14,21 +14,21 @@ use crate::read::open::TraceFile;
 use crate::read::parallel_scan::{Episodes, Event, pass};
 use crate::read::projection::Layout;
 
-/// The hashes of the ids of the episodes that begin at a row up to `last`; an episode without an id has none.
+/// The id hashes of the episodes that begin at a row up to `last`, except episodes without an id.
 pub(crate) fn hashes(episodes: &Episodes, last: usize) -> Vec<u64> {
     let firsts = &episodes.offsets[..episodes.len()];
     let begins = &firsts[..firsts.partition_point(|row| *row <= last)];
     episodes.ids(begins).flatten().map(hash).collect()
 }
 
-/// A number that two ids nearly never share, the same one at every run.
+/// A hash that is the same in every run and rarely the same for two ids.
 fn hash(id: &str) -> u64 {
     let mut hasher = DefaultHasher::new();
     hasher.write(id.as_bytes());
     hasher.finish()
 }
 
-/// The ids of the episodes met so far, as their hashes.
+/// The hashes of the episode ids so far.
 #[derive(Default)]
 pub(crate) struct Prints(Vec<u64>);
 
@@ -46,21 +46,21 @@ impl Prints {
         self.0.extend_from_slice(hashes);
     }
 
-    /// The first episode by file and row whose id an episode before it has, if there is one among those met.
+    /// The first episode, by file and row, that repeats the id of an earlier one, if any.
     pub(crate) fn first_repeated(
         self,
         files: &[TraceFile],
         layout: &Layout,
     ) -> Result<Option<Box<Finding>>, TraceError> {
         let alike = repeated_numbers(&self.0);
-        // Equal hashes nearly always are equal ids.
+        // Equal hashes nearly always mean equal ids.
         if alike.is_empty() { Ok(None) } else { first_equal(files, layout, &alike, self.0.len()) }
     }
 }
 
 fn repeated_numbers(numbers: &[u64]) -> HashSet<u64> {
-    // A bit represents all numbers with the same beginning. With 32 times as many bits as numbers, few share theirs with
-    // another one, and only those need to be sorted.
+    // A bit stands for all numbers with the same beginning. With 32 times as many bits as numbers, few numbers share a
+    // bit, and only those must be sorted.
     let bits = (numbers.len() * 32).next_power_of_two().max(64);
     let place = |number: u64| {
         let bit = usize::try_from(number >> (u64::BITS - bits.ilog2())).expect("there are as many bits as this says");
@@ -81,7 +81,7 @@ fn repeated_numbers(numbers: &[u64]) -> HashSet<u64> {
     shared.windows(2).filter(|pair| pair[0] == pair[1]).map(|pair| pair[0]).collect()
 }
 
-/// Reads the first `count` episodes again, in the order of the files, and compares the ids whose hash is one of these.
+/// Reads the first `count` episodes again, in file order, and compares the ids with one of these hashes.
 fn first_equal(
     files: &[TraceFile],
     layout: &Layout,
@@ -111,7 +111,7 @@ fn first_equal(
     search.map_or_else(|Stop(end)| end, |()| Ok(None))
 }
 
-/// That an id was there before: in another file if `other` names it; `groups` are the row groups, before and again.
+/// The finding for a repeated id: in another file if `other` names it; `groups` are the first and second row group.
 fn repeated(file: &str, id: &str, other: Option<&str>, groups: (usize, usize)) -> Finding {
     let finding = match other {
         None => {
@@ -126,7 +126,7 @@ fn repeated(file: &str, id: &str, other: Option<&str>, groups: (usize, usize)) -
     finding.in_row_group(groups.1).in_episode(id).in_column("episode_id")
 }
 
-/// The ids met so far, in the order of the files: for those who want each repeated one, at the price of memory.
+/// The ids so far, in file order: finds every repetition, but takes more memory.
 #[derive(Default)]
 pub(crate) struct Ids {
     seen: HashMap<String, (usize, usize)>,
@@ -139,7 +139,7 @@ pub(crate) struct Start {
 }
 
 impl Ids {
-    /// Takes note of an episode; a finding if its id was met before. `names` are the names of the files.
+    /// Adds an episode; returns a finding if its id is known. `name` gives the names of files.
     pub(crate) fn admit(&mut self, start: Start, file: usize, name: impl Fn(usize) -> String) -> Option<Located> {
         let Start { id, row, row_group } = start;
         let Some(&(before, group)) = self.seen.get(&id) else {
@@ -204,12 +204,12 @@ mod tests {
         )
         .unwrap();
         assert_eq!(all.len(), 840);
-        // As if they were alike: the ids themselves are compared, those of the first file twice.
+        // As if all hashes were equal: the ids themselves are compared, those of the first file twice.
         assert!(first_equal(set.files(), &layout, &all, 840).unwrap().is_none());
         let twice = TraceSet::open(&[&inputs[..1], &inputs].concat()).unwrap();
         let found = first_equal(twice.files(), &layout, &all, 861).unwrap().unwrap();
         assert_eq!(found.code, Code::EpisodeInTwoFiles);
-        // Only episodes that were met the first time count.
+        // Only the first 21 episodes count, before the repetitions.
         assert!(first_equal(twice.files(), &layout, &all, 21).unwrap().is_none());
     }
 }

@@ -1,4 +1,4 @@
-//! The check of each episode's hash against its rows.
+//! Checks each episode's hash against its rows.
 
 use arrow::array::{Array as _, ArrayRef, AsArray as _};
 use arrow::datatypes::{DataType, Float64Type, Int32Type, Int64Type};

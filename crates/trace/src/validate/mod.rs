@@ -1,7 +1,7 @@
-//! Checks traces against every rule of the schema and reports all that is wrong, not only the first fault.
+//! Checks traces against every rule of the schema and reports all faults, not only the first.
 //!
-//! A damaged file does not keep the others from being checked. Columns that the schema does not know are not decoded; their
-//! pages and checksums are checked like all others.
+//! The other files are checked even if one is damaged. Columns outside the schema are not decoded, but their pages and
+//! checksums are checked like all others.
 
 pub(crate) mod color_set;
 pub(crate) mod duplicate_ids;
@@ -56,7 +56,7 @@ pub struct CheckedFile {
     pub checksums: Checksums,
 }
 
-/// Findings that an abridged report leaves out.
+/// Findings left out of an abridged report.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rest<'a> {
     pub file: &'a str,
@@ -70,7 +70,7 @@ impl Validation {
         self.findings.iter().filter(|finding| finding.severity == severity).count()
     }
 
-    /// The first `limit` findings of each file and rule, and how many more each has.
+    /// The first `limit` findings of each file and rule, and the number of others.
     pub fn abridged(&self, limit: usize) -> (Vec<&Finding>, Vec<Rest<'_>>) {
         let (mut shown, mut rest) = (Vec::new(), Vec::<Rest>::new());
         let mut counts = indexmap::IndexMap::<_, usize>::new();
@@ -90,21 +90,21 @@ impl Validation {
     }
 }
 
-/// Expectations of definitions about traces.
+/// The requirements of definitions for traces.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Expected<'a> {
-    /// The experiments that there are, besides those that the files declare; any if `None`.
+    /// The known experiments, besides those that the files declare; any if `None`.
     pub experiments: Option<&'a [String]>,
-    /// The domain: traces of any other are refused by the mirror's definitions.
+    /// The domain; the mirror's definitions refuse traces of others.
     pub domain: Domain,
-    /// The columns of their own.
+    /// The columns that the definitions declare.
     pub declared: &'a [DeclaredColumn],
-    /// True if no copies of episodes are looked for.
+    /// True to skip the search for copied episodes.
     pub errors_alone: bool,
 }
 
-/// Checks these files as traces of the mirror. Experiments are checked against `experiments` if it is given, and what the
-/// files declare.
+/// Checks these files as traces of the mirror. Experiments are checked against `experiments`, if given, and against
+/// those that the files declare.
 pub fn validate(
     inputs: &[Input],
     experiments: Option<&[String]>,
@@ -113,7 +113,7 @@ pub fn validate(
     validate_as(inputs, Expected { experiments, ..Expected::default() }, threads)
 }
 
-/// Checks these files as definitions expect them.
+/// Checks these files against the requirements of definitions.
 pub fn validate_as(inputs: &[Input], expected: Expected<'_>, threads: NonZeroUsize) -> Result<Validation, TraceError> {
     let mut report = Validation::default();
     let mut found: Vec<Vec<Finding>> = Vec::new();
@@ -161,7 +161,7 @@ pub fn validate_as(inputs: &[Input], expected: Expected<'_>, threads: NonZeroUsi
         found[*place].extend(stale(file));
     }
     for ((found, input), replies) in found.iter_mut().zip(inputs).zip(replies) {
-        // A status that the schema does not know is a finding already.
+        // A status outside the schema has a finding already.
         found.extend(unreadable(&input.name, &replies.of_known_statuses()));
     }
     report.findings = found.into_iter().flatten().collect();
@@ -278,7 +278,7 @@ fn check_rows(
     Ok(())
 }
 
-/// The ids of episodes, each with a hash of its model, experiment, seed, run and length: those of a copy are the same.
+/// The ids of episodes, each with a hash of its model, experiment, seed, run and length, which copies share.
 fn alike(episodes: &Episodes) -> Vec<(u64, String)> {
     let key = |ends: &[usize]| {
         let (at, mut hasher) = (ends[0], DefaultHasher::new());
@@ -290,7 +290,7 @@ fn alike(episodes: &Episodes) -> Vec<(u64, String)> {
     episodes.offsets.windows(2).filter_map(key).collect()
 }
 
-/// The copies, each with its file. Files that cannot be read have other findings.
+/// The copies, each with its file. Unreadable files have other findings.
 fn copied(set: &TraceSet, alike: HashMap<u64, Vec<(String, usize)>>, threads: NonZeroUsize) -> Vec<(usize, Finding)> {
     let several = alike.into_values().filter(|episodes| episodes.len() > 1);
     let files: BTreeMap<String, usize> = several.flatten().collect();
@@ -312,7 +312,7 @@ fn with_repeated(
     name: impl Fn(usize) -> String,
 ) -> Vec<Finding> {
     let repeated: Vec<_> = starts.into_iter().filter_map(|start| ids.admit(start, file, &name)).collect();
-    // Rows of one episode that lie apart: that they do not start at t = 1 is no fault of its own.
+    // Separated rows of one episode: not starting at t = 1 is not another fault.
     let apart = |row| repeated.iter().any(|again| again.row == row && again.finding.code == Code::EpisodeTwice);
     found.retain(|located| located.finding.code != Code::TStart || !apart(located.row));
     let mut all = repeated;

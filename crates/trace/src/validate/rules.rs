@@ -1,7 +1,7 @@
-//! The rules that whole episodes must keep, checked on columns: a fast look at what is held, which most traces pass, and
-//! a search for the row where it is not enough.
+//! Checks the rules for complete episodes on columns: a fast look, which is enough for most traces, then a search for
+//! the row if it is not.
 //!
-//! Rule: a rule gives one finding per episode and column, at the first row that breaks it, and says how many more do.
+//! Rule: a rule gives one finding per episode and column, at the first row that breaks it, with the number of others.
 
 use arrow::array::{Array as _, ArrayRef, AsArray as _, BooleanArray, Float64Array, Int64Array};
 use arrow::datatypes::{Float64Type, Int32Type, Int64Type};
@@ -16,7 +16,7 @@ use exact::escape::exact;
 use exact::suggest::nearest;
 use parquet_pages::{Column as Held, text_at};
 
-/// A finding and its row among the episodes'.
+/// A finding and its row in the episodes.
 pub(crate) struct Located {
     pub(crate) row: usize,
     pub(crate) finding: Finding,
@@ -32,7 +32,7 @@ impl Rules<'_> {
     pub(crate) fn check(&self, file: &TraceFile, episodes: &Episodes) -> Vec<Located> {
         let mut found = Vec::new();
         let mut columns: Vec<(usize, &LayoutColumn)> = self.layout.columns.iter().enumerate().collect();
-        // The schema has the body's colour before t.
+        // In the schema the body's colour comes before t.
         if columns.get(T + 1).is_some_and(|(_, column)| column.name == BODY_COLOR) {
             columns.swap(T, T + 1);
         }
@@ -67,7 +67,7 @@ impl Rules<'_> {
         if !column.values.is_empty() && column.kind == Kind::String {
             rules.push(Rule { code: Code::UnknownValue, asks: Requirement::Among(&column.values) });
         }
-        // A definition may ask for any column to be constant.
+        // A definition may require any column to be constant.
         let constant = Rule { code: Code::InconsistentConstant, asks: Requirement::Constant };
         if column.constant && at != EPISODE_ID && !rules.contains(&constant) {
             rules.push(constant);
@@ -76,7 +76,7 @@ impl Rules<'_> {
     }
 }
 
-/// The fast look: whether some row may break a rule. May say so where none does.
+/// The fast look: returns false only if no row breaks the rule.
 fn may_break(rule: &Rule<'_>, held: &Held, offsets: &[usize]) -> bool {
     match (rule.asks, held) {
         (Requirement::Present, Held::Flat(values)) => values.null_count() > 0,
@@ -85,15 +85,15 @@ fn may_break(rule: &Rule<'_>, held: &Held, offsets: &[usize]) -> bool {
         (Requirement::Constant, Held::Flat(values)) => !is_constant(values, offsets),
         (Requirement::Constant, Held::Runs(runs)) => !runs.start_only_at(offsets),
         (Requirement::Constant, Held::Keys(_)) => true,
-        // One search finds all that is wrong with the order of the steps.
+        // One search finds all faults in the order of the steps.
         (Requirement::FromOne, held) => !counts_from_one(held, offsets),
         (Requirement::Once | Requirement::WithoutGap, _) => false,
         (_, held) => has_odd(rule, held.entries()),
     }
 }
 
-/// Returns true if one of some values, what is in the place of nulls included, is none that the rule allows. Counted
-/// without an early end, which the compiler turns into few instructions.
+/// Returns true if the rule forbids one of the values, including those behind nulls. Counts without an early exit,
+/// which compiles to few instructions.
 fn has_odd(rule: &Rule<'_>, values: &ArrayRef) -> bool {
     if let Some(texts) = values.as_string_opt::<i32>() {
         return texts.iter().flatten().any(|text| !rule.allows(text));
@@ -105,7 +105,7 @@ fn has_odd(rule: &Rule<'_>, values: &ArrayRef) -> bool {
     floats.is_some_and(|floats| floats.values().iter().any(|value| !rule.allows_float(*value)))
 }
 
-/// Returns true if the same bits are in all rows of each episode; null values may be the same and are not looked at.
+/// Returns true if all rows of each episode have the same bits; ignores nulls.
 fn is_constant(values: &ArrayRef, offsets: &[usize]) -> bool {
     fn uniform<V: Copy + PartialEq>(values: &[V]) -> bool {
         let Some(first) = values.first() else { return true };
@@ -135,7 +135,7 @@ fn counts_from_one(t: &Held, offsets: &[usize]) -> bool {
     }
 }
 
-/// One column of some episodes, in which a rule is checked.
+/// One column of some episodes, for checking a rule.
 struct Look<'a> {
     file: &'a str,
     episodes: &'a Episodes,
@@ -165,7 +165,7 @@ impl Look<'_> {
         }
     }
 
-    /// One finding for each episode with a row that is `bad`.
+    /// Adds one finding for each episode with a row that is `bad`.
     fn each_episode(&mut self, rule: &Rule<'_>, bad: impl Fn(usize) -> bool) {
         for ends in self.episodes.offsets.windows(2) {
             let mut rows = (ends[0]..ends[1]).filter(|row| bad(*row));

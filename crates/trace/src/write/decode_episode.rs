@@ -1,6 +1,6 @@
-//! From the rows of an episode back to the episode that a writer gave: the inverse of writing.
+//! Decodes the rows of an episode to the episode that was written: the inverse of writing.
 //!
-//! Columns of the schema that a file does not have are absent; columns that the schema does not know are not read.
+//! Columns of the schema that the file does not have are absent; columns outside the schema are not read.
 
 use arrow::array::{Array as _, ArrayRef, AsArray as _, RecordBatch};
 use arrow::compute::cast;
@@ -12,7 +12,7 @@ use crate::schema::domain::is_identity;
 use crate::schema::{COLUMNS, Column, Kind, Value};
 use crate::write::row_groups::data_type;
 
-/// Rows that are no episode of the schema.
+/// The error for rows that are not an episode of the schema.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("column `{column}`: expected {expected}, found {found}")]
 pub struct NotAnEpisode {
@@ -21,7 +21,7 @@ pub struct NotAnEpisode {
     found: String,
 }
 
-/// The episode of these rows, which are one's.
+/// The episode in these rows, which must belong to one episode.
 pub(crate) fn episode(rows: &RecordBatch) -> Result<Episode, NotAnEpisode> {
     let mut episode = Episode { steps: vec![Step::default(); rows.num_rows()], ..Episode::default() };
     for column in COLUMNS.iter() {
@@ -45,7 +45,7 @@ pub(crate) fn episode(rows: &RecordBatch) -> Result<Episode, NotAnEpisode> {
     Ok(episode)
 }
 
-/// A column as one of the four types that are shown; `None` if it is none of them.
+/// A column as one of the four displayed types; `None` if it cannot be converted.
 fn held(values: &ArrayRef) -> Option<ArrayRef> {
     let held = match values.data_type() {
         DataType::Boolean => DataType::Boolean,
@@ -79,7 +79,7 @@ pub(crate) fn identity(rows: &RecordBatch) -> Result<Episode, NotAnEpisode> {
     Ok(episode)
 }
 
-/// The columns besides identity and time, in the order of the file; without those of no type that is shown.
+/// The columns besides identity and time, in file order, except those that cannot be displayed.
 pub(crate) fn own_columns(rows: &RecordBatch) -> Vec<OwnColumn> {
     let schema = rows.schema();
     let named = schema.fields().iter().zip(rows.columns()).filter(|(field, _)| !is_identity(field.name()));

@@ -1,6 +1,6 @@
-//! Traces put together from others, episode by episode, as they are: no value is read or changed.
+//! Merges traces episode by episode, without reading or changing values.
 //!
-//! Rule: the same episodes in the same order give the same bytes, whatever files they came from.
+//! Rule: the same episodes in the same order give the same bytes, whatever their files.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -33,10 +33,10 @@ use exact::input;
 use exact::replace::{self, NewFile};
 use parquet_pages::{Expansion, FaultSlot, Library, Store, rows_of};
 
-/// Rows that are decoded at a time.
+/// The number of rows decoded at a time.
 const BATCH_ROWS: usize = 8 << 10;
 
-/// The rows of one episode, with what it is ordered and found by.
+/// The rows of one episode, with its id and its order.
 #[derive(Clone, Debug)]
 pub struct EpisodeRows {
     pub episode_id: String,
@@ -58,17 +58,17 @@ impl EpisodeRows {
         decode_episode::episode(&self.rows)
     }
 
-    /// The identity of an episode of any domain; its steps have no value.
+    /// The identity of an episode of any domain; its steps have no values.
     pub fn identity(&self) -> Result<Episode, NotAnEpisode> {
         decode_episode::identity(&self.rows)
     }
 
-    /// The columns besides identity and time, in the order of the file.
+    /// The columns besides identity and time, in file order.
     pub fn own_columns(&self) -> Vec<OwnColumn> {
         decode_episode::own_columns(&self.rows)
     }
 
-    /// The same rows with some columns of integers or truths replaced; a column that is not there is left out.
+    /// Replaces some integer or truth columns; columns that do not exist are left out.
     pub fn with_columns(&self, columns: &[(&str, ArrayRef)]) -> Result<Self, TraceError> {
         let schema = self.rows.schema();
         let mut arrays = self.rows.columns().to_vec();
@@ -83,7 +83,7 @@ impl EpisodeRows {
         if self.rows.column_by_name(EPISODE_HASH).is_some() { changed.hashed() } else { Ok(changed) }
     }
 
-    /// The hash that the rows carry; `None` where they carry none.
+    /// The hash in the rows, if any.
     pub fn stated_hash(&self) -> Option<String> {
         let hashes = cast(self.rows.column_by_name(EPISODE_HASH)?, &DataType::Utf8).ok()?;
         let first = hashes.as_string::<i32>().iter().next().flatten();
@@ -107,7 +107,7 @@ impl EpisodeRows {
         Ok(Self { rows: rows.map_err(|error| unreadable(&self.episode_id, error.into()))?, ..self.clone() })
     }
 
-    /// Returns true if there is no step, which no episode of a file has.
+    /// Returns true if there are no steps, which never happens for an episode from a file.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -120,14 +120,14 @@ pub fn read(path: &Path) -> Result<Vec<EpisodeRows>, TraceError> {
     let file = input::open(path).map_err(|error| unreadable(&name, error.into()))?;
     let footer = footer(&Input::new(path), Extent::Pages).map_err(|finding| damaged(*finding))?;
     match bounds::fault(&name, footer.bytes, &footer.metadata) {
-        // A caller that puts traces together takes one without rows as it is.
+        // Callers that merge traces accept one without rows.
         Some(fault) if fault.code != Code::NoEpisodes => Err(damaged(fault)),
         _ => decode(&name, Store::new(file, Arc::new(Expansion::new(footer.bytes))), footer),
     }
 }
 
-/// The episodes in some rows of a trace file, counted from its first; only the row groups that hold them are read. They are
-/// held row by row, which their values must be few enough for.
+/// The episodes in some rows of a trace file, counted from its first row. Only the row groups of these rows are read.
+/// Values are held row by row, so their number is limited.
 pub fn read_rows(of: &Input, rows: Range<usize>) -> Result<Vec<EpisodeRows>, TraceError> {
     let name = &of.name;
     let damaged = |finding: Finding| unreadable(name, finding.to_string().into());
@@ -143,7 +143,7 @@ pub fn read_rows(of: &Input, rows: Range<usize>) -> Result<Vec<EpisodeRows>, Tra
     for group in 0..footer.metadata.num_row_groups() {
         let behind = before + rows_of(footer.metadata.row_group(group));
         if behind > rows.start && before < rows.end {
-            // Of an episode over several groups, the first alone has rows before it.
+            // If an episode spans several groups, only the first group has rows before it.
             skipped.get_or_insert_with(|| rows.start - before);
             groups.push(group);
         }
@@ -230,7 +230,7 @@ fn episodes(rows: &RecordBatch) -> Result<Vec<EpisodeRows>, String> {
     Ok(found)
 }
 
-/// The rows of an episode as a trace with these optional columns holds them.
+/// The rows of an episode, for a trace with these optional columns.
 pub fn rows(episode: &Episode, columns: &OptionalColumns) -> Result<EpisodeRows, TraceError> {
     let (columns, undeclared) = columns.split();
     write::check(episode, &columns, &undeclared, None)?;
@@ -241,12 +241,12 @@ pub fn rows(episode: &Episode, columns: &OptionalColumns) -> Result<EpisodeRows,
     Ok(EpisodeRows { episode_id: episode.episode_id.clone(), seed, run, repetition, rows })
 }
 
-/// Replaces the trace at `path` by one of these episodes, in this order.
+/// Replaces the trace at `path` by one with these episodes, in this order.
 pub fn write(path: &Path, recording: Option<&serde_json::Value>, episodes: &[EpisodeRows]) -> Result<(), TraceError> {
     write_in(replace::folder_of(path), path, recording, episodes)
 }
 
-/// As [`write()`], with the temporary file in `scratch`, a folder of the same file system.
+/// Like [`write()`], with the temporary file in `scratch`, a folder of the same file system.
 pub fn write_in(
     scratch: &Path,
     path: &Path,

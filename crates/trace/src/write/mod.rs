@@ -1,10 +1,9 @@
-//! Writes traces: whole episodes into row groups, and a file that appears whole or not at all.
+//! Writes traces: complete episodes into row groups, in a file that appears whole or not at all.
 //!
-//! Rule: what this writer makes passes `validate` without a note, and the same episodes give the same bytes. A palette that
-//! the recording declares holds for what is written, too. An `episode_hash` is made here, whatever an episode
-//! that has one says.
-//! The optional columns of a file are declared when it is created, so that memory stays flat; a value for a
-//! column that was not declared is refused, never dropped.
+//! Rule: the writer's output passes `validate` without a note, and the same episodes give the same bytes. Values must
+//! also fit the palette that the recording declares. An `episode_hash` is always computed here, even if the episode has
+//! one. The optional columns of a file are declared when it is created, so that memory stays flat. Values for
+//! undeclared columns are refused, never dropped.
 
 pub mod decode_episode;
 pub mod merge;
@@ -34,18 +33,18 @@ use exact::replace::NewFile;
 pub struct TraceMetadata {
     /// The recording as a JSON object (scene and prompt hashes, view size, ...); left out if `None`.
     pub recording: Option<serde_json::Value>,
-    /// The optional columns that the file has.
+    /// The optional columns of the file.
     pub columns: OptionalColumns,
 }
 
-/// Columns that a trace may have besides the required ones, in the order of the schema.
+/// Optional columns of a trace, in schema order.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct OptionalColumns {
     given: Vec<&'static Column>,
     absent: Vec<&'static str>,
 }
 
-/// Columns that no recording of the five experiments gives.
+/// Columns that recordings of the five experiments do not have.
 const OF_OTHER_TASKS: [&str; 12] = [
     "frame_digest",
     "participant",
@@ -72,8 +71,8 @@ impl OptionalColumns {
         Self { given: given.collect(), absent: Vec::new() }
     }
 
-    /// Those of a recording: all of the schema but what its task and its agent never give. Of the required columns those are
-    /// left out that the experiment says to be absent.
+    /// The columns of a recording: the schema's, except those that its task and its agent never give, and the required
+    /// columns that the experiment declares absent.
     pub fn recorded(recording: &serde_json::Value) -> Self {
         let agent = &recording["agent"];
         let reads_replies = agent.is_object() && agent.get("scripted").is_none();
@@ -105,13 +104,13 @@ impl OptionalColumns {
         Self { absent: absent.collect(), ..Self::of(given.chain(answers::columns(experiment))) }
     }
 
-    /// Those of these names; `None` if one is no optional column of the schema.
+    /// The columns of these names; `None` if one is not an optional column of the schema.
     pub fn named(names: &[&str]) -> Option<Self> {
         let columns = Self::of(Self::all().given.into_iter().filter(|column| names.contains(&column.name)));
         names.iter().all(|name| columns.given.iter().any(|column| column.name == *name)).then_some(columns)
     }
 
-    /// Those that have a value in one of these episodes.
+    /// The columns with a value in one of these episodes.
     pub fn used_by<'a>(episodes: impl IntoIterator<Item = &'a Episode>) -> Self {
         let mut used = Vec::new();
         let mut unused: Vec<_> = COLUMNS.iter().filter(|column| !column.required).collect();
@@ -136,10 +135,10 @@ impl OptionalColumns {
     }
 }
 
-/// A constructor for the start of a trace file.
+/// A constructor for a new trace file.
 type Make<W> = fn(W, &SchemaRef, Option<&serde_json::Value>) -> parquet::errors::Result<RowGroups<W>>;
 
-/// Encodes episodes as a trace into anything that bytes can be written to.
+/// Encodes episodes as a trace into any output.
 pub struct TraceEncoder<W: Write + Send> {
     file: RowGroups<W>,
     columns: Vec<&'static Column>,
@@ -154,7 +153,7 @@ impl<W: Write + Send> TraceEncoder<W> {
         Self::with(RowGroups::new, out, metadata)
     }
 
-    /// Starts a trace without checksums: the bytes that versions before them gave.
+    /// Starts a trace without checksums, with the same bytes as versions before checksums.
     pub fn without_checksums(out: W, metadata: &TraceMetadata) -> Result<Self, TraceError> {
         Self::with(RowGroups::without_checksums, out, metadata)
     }
@@ -178,7 +177,7 @@ impl<W: Write + Send> TraceEncoder<W> {
         self.file.end_episode(&mut self.gathered).map_err(failed)
     }
 
-    /// Writes what is left and the footer.
+    /// Writes the rest and the footer.
     pub fn finish(self) -> Result<W, TraceError> {
         self.file.finish(Some(self.gathered)).map_err(failed)
     }
@@ -189,14 +188,13 @@ fn numbered(column: &str, prefix: &str) -> Option<usize> {
     column.strip_prefix(prefix)?.split('_').next()?.parse().ok()
 }
 
-/// Whether one of the mirrors and windows of an experiment may show a body in another colour than the own body's: one of
-/// them says a colour that is not the own one.
+/// Returns true if a mirror or window of an experiment may show a body in another colour than the own body's.
 fn shows_another_color(panes: &serde_json::Value) -> bool {
     let colors = panes.as_array().into_iter().flatten().filter_map(|pane| pane["color"].as_str());
     colors.into_iter().any(|color| color != "own")
 }
 
-/// Whether one of them shows a body that nothing else shows: a window's stranger, or one in place of the own body.
+/// Returns true if one of them shows another body: a window's stranger, or a body in place of the own one.
 fn shows_another_body(panes: &serde_json::Value) -> bool {
     panes.as_array().into_iter().flatten().any(|pane| pane["kind"] == "window" || pane["body"] == "independent")
 }
@@ -290,7 +288,7 @@ pub struct TraceWriter {
 }
 
 impl TraceWriter {
-    /// Starts the trace that will be at `path`, replacing what is there; its folder must exist.
+    /// Starts the trace for `path`, replacing an existing one; its folder must exist.
     pub fn create(path: &Path, metadata: &TraceMetadata) -> Result<Self, TraceError> {
         let file = NewFile::create(path).map_err(|source| unwritable(path, source))?;
         let encoder = TraceEncoder::new(file, metadata).map_err(|error| error.writing(path))?;
@@ -302,7 +300,7 @@ impl TraceWriter {
         self.encoder.write(episode).map_err(|error| error.writing(&self.path))
     }
 
-    /// Completes the file, synchronises it with the disk and gives it its name.
+    /// Completes the file, synchronises it with the disk and gives it its final name.
     pub fn finish(self) -> Result<(), TraceError> {
         let Self { encoder, path } = self;
         let file = encoder.finish().map_err(|error| error.writing(&path))?;

@@ -1,8 +1,7 @@
-//! A trace again with one column of text made anew, or with checksums alone; everything else is as it was.
+//! Copies a trace with one new text column, or only with checksums; everything else stays unchanged.
 //!
-//! Rule: other columns are copied as the bytes they are, so whatever type, encoding or codec a writer chose stays; so do
-//! the row groups and the footer's own keys, but for the recording. What only speeds up reading (page indexes, bloom
-//! filters) is left behind.
+//! Rule: other columns are copied as bytes, so their types, encodings and codecs stay. So do the row groups and the
+//! footer's own keys, except the recording. Data that only speeds up reading (page indexes, bloom filters) is dropped.
 
 use std::fs::File;
 use std::io::Write;
@@ -27,11 +26,11 @@ use crate::read::verify::verify_pages;
 use crate::schema::RECORDING_KEY;
 use parquet_pages::checksums::{self, CREATED_BY, Held};
 
-/// The sources of a new text: the episode's id, the timestep, the text to look at, and the present text.
+/// The sources of a new text: the episode's id, the timestep, the source text, and the present text.
 pub(crate) type Before<'a> = (&'a str, i64, Option<&'a str>, Option<&'a str>);
 
-/// Writes the trace of a set's only file to `out`, with the column `target`, which it has, as `change` makes it from the
-/// column `source`, and with this recording.
+/// Writes the trace of a set's only file to `out` with this recording; `change` gives the new values of the existing
+/// column `target` from the column `source`.
 pub(crate) fn rewrite<W: Write + Send>(
     set: &TraceSet,
     [source, target]: [&str; 2],
@@ -45,12 +44,12 @@ pub(crate) fn rewrite<W: Write + Send>(
     })
 }
 
-/// Writes the trace of a set's only file to `out` with checksums; every column is copied as it is.
+/// Writes the trace of a set's only file to `out` with checksums; all columns are copied unchanged.
 pub(crate) fn with_checksums<W: Write + Send>(set: &TraceSet, out: W) -> Result<W, TraceError> {
     copied(set, out, None, |_, _, _| Ok(()))
 }
 
-/// Copies the columns of a set's only file; `write` gives the one that is made anew, beside the new recording.
+/// Copies the columns of a set's only file; `write` writes the new column, which comes with a new recording.
 fn copied<W: Write + Send>(
     set: &TraceSet,
     out: W,
@@ -58,7 +57,7 @@ fn copied<W: Write + Send>(
     mut write: impl FnMut(&mut SerializedRowGroupWriter<'_, Held<W>>, &TraceFile, usize) -> Result<(), TraceError>,
 ) -> Result<W, TraceError> {
     let [file] = set.files() else { return Err(unwritable("the trace", "there is not exactly one".into())) };
-    // What is copied gets new checksums, which must not represent damaged bytes.
+    // Copied columns get new checksums, which must not hide damaged bytes.
     verify_pages(set)?;
     let failed = |error: ParquetError| unwritable(file.name(), error.into());
     let metadata = file.footer_again(Extent::Whole)?.metadata;
@@ -101,11 +100,11 @@ fn copy<W: Write + Send>(
     contained(|| group.append_column(input, close)).map_err(ParquetError::General)?
 }
 
-/// Rows that are written together: a multiple of those that the library takes at a time, so that the bytes do not depend on
-/// how many are decoded together.
+/// The number of rows written together: a multiple of the library's batch, so that the bytes do not depend on how many
+/// are decoded together.
 const WRITTEN_ROWS: usize = 8 << 10;
 
-/// The column made anew, some rows at a time: a row group of a small file may have millions.
+/// Writes the new column, some rows at a time: a row group of a small file may have millions.
 fn write_texts<W: Write + Send>(
     group: &mut SerializedRowGroupWriter<'_, W>,
     (file, row_group): (&TraceFile, usize),
@@ -142,7 +141,7 @@ fn write_texts<W: Write + Send>(
     column.close().map_err(failed)
 }
 
-/// The file's schema with the target as text that may be null.
+/// The file's schema with the target as nullable text.
 fn with_text(schema: &SchemaDescriptor, target: &str) -> parquet::errors::Result<TypePtr> {
     let root = schema.root_schema();
     let fields = root.get_fields().iter().map(|field| {
@@ -174,7 +173,7 @@ fn properties(pairs: Vec<KeyValue>) -> WriterPropertiesPtr {
         .set_key_value_metadata(Some(pairs))
         .set_created_by(CREATED_BY.to_owned())
         .set_compression(Compression::ZSTD(ZstdLevel::default()))
-        // Chunks that are copied have no page index here, and a file has one for all columns or for none.
+        // Copied chunks have no page index here, and a file has one for all columns or for none.
         .set_statistics_enabled(EnabledStatistics::Chunk)
         .set_offset_index_disabled(true);
     Arc::new(properties.build())

@@ -1,6 +1,6 @@
-//! Rows on their way into the row groups of a file: gathered column by column, an episode never in two row groups.
+//! Gathers rows by column for the row groups of a file; an episode is never in two row groups.
 //!
-//! Rule: every trace gets its checksums here or in `rewrite`, but for those that are to be the bytes of an earlier version.
+//! Rule: every trace gets its checksums here or in `rewrite`, unless it must equal the bytes of an earlier version.
 
 use std::io::Write;
 use std::sync::Arc;
@@ -19,7 +19,7 @@ use parquet::file::properties::{WriterProperties, WriterPropertiesBuilder};
 use crate::schema::{self, Column, Kind, Stored, Value};
 use parquet_pages::checksums::{self, CREATED_BY, Held};
 
-/// Rows after which a row group is closed, at the next end of an episode.
+/// The number of rows after which a row group is closed, at the next end of an episode.
 const ROW_GROUP_ROWS: usize = 128 * 1024;
 /// Rows that are gathered before they are encoded.
 const GATHERED_ROWS: usize = 8 * 1024;
@@ -31,7 +31,7 @@ pub(crate) struct RowGroups<W: Write + Send> {
     rows: usize,
 }
 
-/// Rows that are not in a file yet.
+/// Rows that are not written yet.
 pub(crate) struct Gathered {
     pub(crate) layout: SchemaRef,
     pub(crate) columns: Vec<Values>,
@@ -44,7 +44,7 @@ pub(crate) enum Values {
     Int(Int64Builder),
     Float(Float64Builder),
     Text(StringBuilder),
-    /// Nothing but nulls.
+    /// Only nulls.
     Null(usize),
 }
 
@@ -59,7 +59,7 @@ impl<W: Write + Send> RowGroups<W> {
     }
 
     fn with(properties: WriterProperties, out: W, layout: &SchemaRef, has_checksums: bool) -> Result<Self> {
-        // Parquet's own logical types say all of it; an embedded Arrow schema would only pin one library's view.
+        // Parquet's logical types are complete; an embedded Arrow schema would only pin one library's view.
         let options = ArrowWriterOptions::new().with_properties(properties).with_skip_arrow_metadata(true);
         let parquet = ArrowWriter::try_new_with_options(Held::new(out), Arc::clone(layout), options)?;
         Ok(Self { parquet, has_checksums, rows: 0 })
@@ -83,7 +83,7 @@ impl<W: Write + Send> RowGroups<W> {
         Ok(())
     }
 
-    /// Writes what is left and the footer.
+    /// Writes the rest and the footer.
     pub fn finish(mut self, gathered: Option<Gathered>) -> Result<W> {
         if let Some(mut gathered) = gathered.filter(|gathered| gathered.rows > 0) {
             self.parquet.write(&gathered.take()?)?;
@@ -111,7 +111,7 @@ fn properties(layout: &Schema, recording: Option<&serde_json::Value>) -> WriterP
     WriterProperties::builder()
         .set_key_value_metadata(Some(pairs))
         .set_compression(Compression::ZSTD(ZstdLevel::default()))
-        // Row groups end where an episode does, never at a number of rows.
+        // Row groups end with an episode, never at a number of rows.
         .set_max_row_group_row_count(None)
 }
 

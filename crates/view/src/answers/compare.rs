@@ -1,4 +1,4 @@
-//! Two episodes beside each other, and the steps where they part.
+//! Two episodes side by side, and the steps where they differ.
 
 use serde_json::{Value, json};
 
@@ -13,10 +13,10 @@ use trace::schema::domain::is_identity;
 use trace::schema::{COLUMNS, Column, Value as Cell};
 use world::replay::moments::{Moment, moments};
 
-/// The most episodes of a scene on one page.
+/// The maximum number of episodes of a scene on one page.
 const MOST_OF_A_SCENE: usize = 60;
 
-/// Columns that differ between any two recordings, and say nothing of what was done.
+/// Columns that differ between any two recordings and do not describe behaviour.
 const BY_CHANCE: [&str; 12] = [
     "latency_ms",
     "prompt_tokens",
@@ -32,13 +32,13 @@ const BY_CHANCE: [&str; 12] = [
     "reply_fault",
 ];
 
-/// The columns of the place of a step and of its frame, which are not part of the step.
+/// The columns that locate a step and its frame; they are not compared.
 const ADDRESSES: [&str; 2] = ["t", "frame_time"];
 
-/// The moments that two episodes can be laid on each other by, as a request and the page call them.
+/// The moments by which two episodes can be aligned, as named in requests and on the page.
 const MOMENTS: [(&str, Moment); 2] = [("sight", Moment::FirstSight), ("decision", Moment::Decision)];
 
-/// How many steps each of two episodes begins later, so that a moment of both stands at one place; `None` where one has none.
+/// The number of steps by which each episode is shifted to align a moment; `None` if either has no such moment.
 fn leads(query: &Query, a: &Episode, b: &Episode) -> Option<(usize, usize)> {
     let wanted = value(query, "align")?;
     let (_, wanted) = MOMENTS.iter().find(|(name, _)| *name == wanted)?;
@@ -50,8 +50,8 @@ fn leads(query: &Query, a: &Episode, b: &Episode) -> Option<(usize, usize)> {
     Some((of_b.saturating_sub(of_a), of_a.saturating_sub(of_b)))
 }
 
-/// Both episodes, and where they differ: at steps of both in `columns` of what was seen and done, and `also` in others. Each `t` is
-/// a place in both, which is a timestep of an episode plus its lead.
+/// Both episodes and their differences: `columns` for what was seen and done, `also` for the rest. Each `t` is a shared
+/// position: an episode's timestep plus its lead.
 pub(crate) fn answer(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewError> {
     let (a, b) = (snapshot.episode(required(query, "a")?)?, snapshot.episode(required(query, "b")?)?);
     let found = leads(query, &a.episode, &b.episode);
@@ -64,7 +64,7 @@ pub(crate) fn answer(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewEr
         columns.map(|column| (column.name, of_both(column))).collect()
     };
     let constants = parted(|column| column.constant && column.name != "episode_hash", 0, 0);
-    // The steps of one before the other begins are skipped: both are from there on.
+    // Starts where both episodes have begun.
     let mut of_steps = parted(|column| !column.constant && !ADDRESSES.contains(&column.name), lead_b, lead_a);
     for column in a.own.iter().flatten() {
         if let Some(other) = b.own.iter().flatten().find(|other| other.name == column.name) {
@@ -88,7 +88,7 @@ pub(crate) fn answer(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewEr
         }
     }
     let behind = (both < last).then(|| json!({"t": both.max(begin) + 1, "columns": ["length"]}));
-    // Where one is over before the other begins, each step is one of a single episode.
+    // If one episode ends before the other begins, every step belongs to a single episode.
     let alone = begin.min(last) + last - both.max(begin).min(last);
     Ok(json!({
         "aligned": found.and(value(query, "align")),
@@ -103,7 +103,7 @@ pub(crate) fn answer(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewEr
     }))
 }
 
-/// The episodes of one scene, each with how it ended and where its moments are.
+/// The episodes of one scene, each with its outcome and its moments.
 pub(crate) fn scene(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewError> {
     let id = required(query, "id")?;
     let others = list::siblings(snapshot, id);
@@ -128,7 +128,7 @@ pub(crate) fn scene(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewErr
     Ok(json!({"episodes": told, "others": (others.len() + 1).saturating_sub(MOST_OF_A_SCENE)}))
 }
 
-/// Returns true if both have the same frame at a step; null where one has none.
+/// Returns true if both have the same frame at a step; null if either has no frame.
 pub(crate) fn same_frame(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewError> {
     let t = number(query, "t")?.unwrap_or(1);
     let of_b = number(query, "t_b")?.unwrap_or(t);

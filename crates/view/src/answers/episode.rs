@@ -1,4 +1,4 @@
-//! One episode: its rows, what they say, and the timesteps that decided each metric.
+//! One episode: its rows, their content, and the timesteps that decided each metric.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -20,7 +20,7 @@ use trace::schema::domain::is_identity;
 use trace::schema::{COLUMNS, Column, Value as Cell};
 use world::replay::moments::moments;
 
-/// The most characters of a text in an answer; the rest is a request of its own.
+/// The maximum number of characters of a text in an answer; the page requests the whole text separately.
 pub(crate) const LONGEST: usize = 4_000;
 
 pub(crate) fn answer(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewError> {
@@ -32,8 +32,8 @@ pub(crate) fn answer(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewEr
     Ok(told)
 }
 
-/// An episode without its place in a list, its texts cut to so many characters. A log that cannot be read keeps nothing else
-/// from being shown.
+/// An episode without its position in a list, its texts cut to `longest` characters. An unreadable log hides nothing
+/// else.
 pub(crate) fn about(snapshot: &Snapshot, opened: &Opened, longest: usize) -> Result<Value, ViewError> {
     let (first, fault) = match snapshot.moment(opened, 1) {
         Ok(first) => (first, None),
@@ -49,7 +49,7 @@ pub(crate) fn about(snapshot: &Snapshot, opened: &Opened, longest: usize) -> Res
     Ok(told)
 }
 
-/// An episode without its place in a list; `first` is what its log has of its first step.
+/// An episode without its position in a list; `first` is the log's record of its first step.
 pub(crate) fn described(
     snapshot: &Snapshot,
     opened: &Opened,
@@ -164,7 +164,7 @@ fn lines(text: &str) -> String {
     text.replace('\t', "    ").lines().map(visible).collect::<Vec<_>>().join("\n")
 }
 
-/// Every metric with its value and what decided it, under the definitions and under those they are compared with.
+/// Every metric with its value and deciding steps, under the definitions and under those they are compared with.
 pub(crate) fn scores(snapshot: &Snapshot, opened: &Opened) -> Result<(Value, Value), ViewError> {
     let (Some(scored), Some(input)) = (&snapshot.scored, &opened.input) else { return Ok((json!([]), Value::Null)) };
     let id = &opened.episode.episode_id;
@@ -173,7 +173,7 @@ pub(crate) fn scores(snapshot: &Snapshot, opened: &Opened) -> Result<(Value, Val
     Ok((own, told(&study.explain_in(input, id)?)))
 }
 
-/// The same for some episodes of a trace, by their ids.
+/// The same for some episodes of a trace, by id.
 pub(crate) fn scores_of(
     snapshot: &Snapshot,
     input: &Input,
@@ -188,7 +188,7 @@ pub(crate) fn scores_of(
     Ok(own.iter().map(|(id, evidence)| (id.clone(), (told(evidence), against(id)))).collect())
 }
 
-/// A trace under the other definitions, if there are some.
+/// The trace under the other definitions, if any.
 fn other_study(snapshot: &Snapshot, input: &Input) -> Result<Option<Study>, ViewError> {
     let options = &snapshot.options;
     let Some(against) = &options.against else { return Ok(None) };

@@ -1,4 +1,4 @@
-//! Labels and notes: what coders say of an episode, and the one line that a page may add.
+//! Labels and notes: coders' judgements of an episode, and the lines that a page may add.
 
 use std::path::PathBuf;
 
@@ -13,7 +13,7 @@ use score::table::EpisodeTable;
 use trace::labels::{LabelLine, Mark, PREFIX, append, list_beside};
 use trace::open::TraceSet;
 
-/// A label as a page sends it; the coder's name is the server's.
+/// A label as sent by a page; the server knows the coder's name.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Asked {
@@ -25,7 +25,7 @@ struct Asked {
     removed: bool,
 }
 
-/// The marks of an episode, its own before those of its steps.
+/// The marks of an episode, followed by those of its steps.
 pub(crate) fn of_episode(snapshot: &Snapshot, id: &str) -> Value {
     let labels = snapshot.scored.as_ref().and_then(|scored| scored.study.traces().ok()).map(TraceSet::labels);
     let told = |Mark { coder, step, label, note }: Mark<'_>| json!({"coder": visible(coder), "step": step, "label": label, "note": note.map(visible_lines)});
@@ -38,7 +38,7 @@ pub(crate) fn of_row(table: &EpisodeTable, row: usize) -> Vec<&str> {
     put.filter_map(|label| label.name.strip_prefix(PREFIX)).collect()
 }
 
-/// Adds the line that a page sends to the list beside the episode's trace; gives the episode's marks.
+/// Appends a line from a page to the list beside the episode's trace; returns the episode's marks.
 pub(crate) fn put(view: &View, body: &[u8]) -> Result<Value, ViewError> {
     let Some(coder) = view.options.coder.clone() else {
         let words = "this page only shows; `mirrorstats view --label NAME` lets you label as NAME";
@@ -55,7 +55,7 @@ pub(crate) fn put(view: &View, body: &[u8]) -> Result<Value, ViewError> {
     Ok(of_episode(&view.newest(), &line.episode_id))
 }
 
-/// The list for a line, which must be about an episode and a step that are there.
+/// The list for a line; the line's episode and step must exist.
 fn list_of(snapshot: &Snapshot, line: &LabelLine) -> Result<PathBuf, ViewError> {
     let id = &line.episode_id;
     let (input, steps) = snapshot

@@ -12,10 +12,10 @@ use exact::escape::visible;
 use score::select::is_of_coders;
 use score::table::{EpisodeTable, MetricColumn};
 
-/// The most episodes in an answer.
+/// The maximum number of episodes in an answer.
 const MOST: usize = 500;
 
-/// Some episodes of the list: by `offset` and `limit`, in the order of `sort` and `order`.
+/// Some episodes of the list, by `offset`, `limit`, `sort` and `order`.
 pub(crate) fn answer(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewError> {
     let table = &snapshot.table()?.results.episodes;
     let rows = sorted(snapshot, query)?;
@@ -43,7 +43,7 @@ pub(crate) fn answer(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewEr
     }))
 }
 
-/// The whole list, for a copy. Rows whose names are spelled have what filters ask for beside it, under `keys`.
+/// The whole list, for a copy. Rows whose names are shown escaped also have `keys`, the raw values for filters.
 pub(crate) fn everything(snapshot: &Snapshot) -> Result<Value, ViewError> {
     let table = &snapshot.table()?.results.episodes;
     Ok(json!({
@@ -67,7 +67,7 @@ fn with_keys(table: &EpisodeTable, row: usize) -> Value {
     told
 }
 
-/// The ids before and behind an episode in the same list.
+/// The ids before and after an episode in the same list.
 pub(crate) fn neighbours(snapshot: &Snapshot, query: &Query, id: &str) -> Result<Value, ViewError> {
     let Some(scored) = &snapshot.scored else { return Ok(json!({})) };
     let rows = sorted(snapshot, query)?;
@@ -97,7 +97,7 @@ pub(crate) fn siblings(snapshot: &Snapshot, id: &str) -> Vec<Value> {
     (0..table.len()).filter(is_sibling).take(MOST).map(named).collect()
 }
 
-/// The rows that are wanted in the order that is wanted; what is undefined comes last either way.
+/// The filtered rows in the requested order; undefined values come last in both directions.
 fn sorted(snapshot: &Snapshot, query: &Query) -> Result<Vec<usize>, ViewError> {
     let table = &snapshot.table()?.results.episodes;
     let mut rows = Filter::of(query).rows(snapshot)?;

@@ -1,4 +1,4 @@
-//! Recordings that go on: whether there is something new, and how far the episodes under way are.
+//! Recordings in progress: whether there is new data, and the progress of the episodes under way.
 
 use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};
@@ -13,23 +13,23 @@ use exact::escape::visible;
 use exact::format::fixed;
 use trace::replies::ReplyCounts;
 
-/// The least time between two looks at the files.
+/// The minimum time between two scans of the files.
 const PAUSE: Duration = Duration::from_millis(400);
-/// The time over which steps are counted for a rate.
+/// The time over which the rate of steps is measured.
 const SPAN: Duration = Duration::from_secs(10);
 
-/// The time of the last look at the files, and its findings.
+/// The time and the findings of the last scan of the files.
 #[derive(Debug, Default)]
 pub(crate) struct Watch {
     last: Option<Instant>,
     counted: Vec<(Instant, u64)>,
-    /// The reason why the newest state cannot be shown; the one before it is.
+    /// The reason why the newest state cannot be shown; the previous one is shown instead.
     fault: Option<String>,
 }
 
 impl View {
     pub(crate) fn live(&self) -> Value {
-        // A caller that comes while another one looks gets what was found before.
+        // Concurrent callers get the previous findings.
         if let Ok(mut watch) = self.watch.try_lock()
             && watch.last.is_none_or(|last| last.elapsed() >= PAUSE)
         {
@@ -51,7 +51,7 @@ impl View {
         })
     }
 
-    /// Looks at the files now.
+    /// Scans the files now.
     pub(crate) fn refresh(&self) -> Result<(), ViewError> {
         let mut watch = self.watch.lock().unwrap_or_else(PoisonError::into_inner);
         self.look(&mut watch);
@@ -84,7 +84,7 @@ impl View {
                 *self.newest.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(newer);
                 watch.fault = None;
             }
-            // A recording that is just replacing a trace is looked at again in a moment.
+            // A recording may be replacing a trace; the next scan follows soon.
             Err(error) => watch.fault = Some(error.words()),
         }
     }
@@ -96,7 +96,7 @@ impl Watch {
         self.counted.push((Instant::now(), steps));
     }
 
-    /// Steps a second, over the last seconds.
+    /// Steps per second over the last seconds.
     fn rate(&self) -> Option<f64> {
         let ((from, before), (to, after)) = (self.counted.first()?, self.counted.last()?);
         let seconds = to.duration_since(*from).as_secs_f64();

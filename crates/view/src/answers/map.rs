@@ -1,7 +1,7 @@
-//! The room from above, step by step, as a picture of some hundred pixels needs it.
+//! The room from above, step by step, for a picture of a few hundred pixels.
 //!
-//! Rule: an episode may have any number of steps and a log any number of shapes; the answer has neither. Places are whole
-//! centimetres, a shape that stays is told once, and of too many that move some steps are left out.
+//! Rule: the size of the answer is bounded for any number of steps and shapes. Coordinates are whole centimetres, a
+//! shape that does not move is sent once, and steps are skipped if too many shapes move.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -13,12 +13,12 @@ use super::super::snapshot::Snapshot;
 use exact::escape::visible;
 use trace::log::frames::{Shape, hull};
 
-/// The most different shapes in an answer, some 600 kB.
+/// The maximum number of distinct shapes in an answer, about 600 kB.
 const MOST: usize = 12_000;
 
 pub(crate) fn answer(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewError> {
     let opened = snapshot.episode(required(query, "id")?)?;
-    // The page of the episode tells of a log that cannot be read.
+    // The episode's page reports an unreadable log.
     let mut map = Map::default();
     Ok(match snapshot.each_shapes(&opened, &mut |t, shapes| map.add(t, &shapes)) {
         Ok(()) => map.told(opened.episode.steps.len()),
@@ -26,12 +26,12 @@ pub(crate) fn answer(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewEr
     })
 }
 
-/// Name, paint, height, radius, then the corners: all that a shape is drawn from, in centimetres.
+/// All that is drawn of a shape, in centimetres: name, paint, height, radius, then the corners.
 type Drawn = Vec<i64>;
 
 #[derive(Debug)]
 pub(crate) struct Map {
-    /// Only each so many-th step has shapes.
+    /// The interval of steps with shapes.
     every: usize,
     names: Vec<String>,
     paints: Vec<[i64; 4]>,
@@ -68,7 +68,7 @@ impl Map {
         *self.shapes.entry(drawn).or_insert(next)
     }
 
-    /// Leaves out the steps that are no longer wanted, and the shapes that they alone had.
+    /// Removes the steps that are no longer needed, and the shapes that only they used.
     fn thin(&mut self) {
         let every = self.every;
         self.steps.retain(|t, _| (t - 1).is_multiple_of(every));
@@ -94,7 +94,7 @@ impl Map {
     }
 }
 
-/// The shapes with each body as its outline and its head: its fifty parts are some pixels large.
+/// The shapes with each body reduced to its outline and head: its fifty parts are a few pixels in size.
 fn from_above(shapes: &[Shape]) -> Vec<Shape> {
     let mut parts: BTreeMap<&str, Vec<&Shape>> = BTreeMap::new();
     let mut all = Vec::new();
@@ -115,14 +115,14 @@ fn from_above(shapes: &[Shape]) -> Vec<Shape> {
     all
 }
 
-/// How far a part reaches from its own middle.
+/// The largest distance from a part's centre to its outline.
 fn spread(part: &Shape) -> f64 {
     let [first, ..] = part.outline[..] else { return 0.0 };
     let far = |at: &[f64; 2]| (at[0] - first[0]).hypot(at[1] - first[1]);
     part.radius.unwrap_or_default().max(part.outline.iter().map(far).fold(0.0, f64::max) / 2.0)
 }
 
-/// The corners of a part; eight on the edge of a round one.
+/// The corners of a part; a round part gets eight.
 fn corners(part: &Shape) -> Vec<[f64; 2]> {
     let Some(radius) = part.radius else { return part.outline.clone() };
     let around = |at: &[f64; 2]| {

@@ -1,4 +1,4 @@
-//! The report, live: what the page begins with, and the sections of the report.
+//! The report, live: the start of the page, and the sections of the report.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -39,7 +39,7 @@ fn named(definitions: &Path) -> String {
     visible(&definitions.file_stem().unwrap_or(definitions.as_os_str()).to_string_lossy())
 }
 
-/// The columns whose values can be chosen, and the values.
+/// The columns to filter by, and their values.
 fn choices(scored: &Scored) -> Vec<Value> {
     let table = &scored.results.episodes;
     let metrics = table.metrics.iter().map(|metric| metric.name.as_str());
@@ -48,7 +48,7 @@ fn choices(scored: &Scored) -> Vec<Value> {
     columns.filter_map(|column| choice(table, column)).chain(statuses(scored)).collect()
 }
 
-/// The most values that a metric or a seed may have to be chosen by.
+/// The maximum number of values of a metric or a seed to choose from.
 const MOST_VALUES: usize = 200;
 
 fn choice(table: &EpisodeTable, column: &str) -> Option<Value> {
@@ -57,7 +57,7 @@ fn choice(table: &EpisodeTable, column: &str) -> Option<Value> {
     let mut counts: BTreeMap<Option<String>, usize> = BTreeMap::new();
     for row in 0..table.len() {
         *counts.entry(value(row)).or_default() += 1;
-        // A duration is chosen by a condition.
+        // Durations are filtered by conditions.
         if is_metric && counts.keys().flatten().any(|value| value != "0" && value != "1") {
             return None;
         }
@@ -72,7 +72,7 @@ fn choice(table: &EpisodeTable, column: &str) -> Option<Value> {
     is_wanted.then(|| json!({"column": column, "is_metric": is_metric, "values": values.collect::<Vec<_>>()}))
 }
 
-/// The outcomes of replies, where not all of them are `ok`.
+/// The outcomes of replies, unless all are `ok`.
 fn statuses(scored: &Scored) -> Option<Value> {
     let quality = scored.results.quality.as_ref()?.whole();
     let told =
@@ -81,8 +81,8 @@ fn statuses(scored: &Scored) -> Option<Value> {
     (!values.is_empty()).then(|| json!({"column": STATUS, "is_metric": false, "values": values}))
 }
 
-/// The models by their mean over experiments of the first metric that is a rate, each experiment counting once. Null where there
-/// is nothing to put in an order.
+/// The models ordered by the first metric that is a rate, as the mean over experiments with equal weights. Null without
+/// such a metric, or with fewer than two models or experiments.
 fn ranking(episodes: &EpisodeTable) -> Value {
     let is_rate = |metric: &&MetricColumn| metric.iter().flatten().all(|value| value == 0 || value == 1);
     let Some(metric) = episodes.metrics.iter().find(is_rate) else { return Value::Null };
@@ -105,7 +105,7 @@ fn ranking(episodes: &EpisodeTable) -> Value {
     })
 }
 
-/// Sections of the report of the episodes that are wanted.
+/// Sections of the report on the filtered episodes.
 pub(crate) fn sections(snapshot: &Snapshot, query: &Query, part: Part) -> Result<Value, ViewError> {
     let scored = snapshot.table()?;
     let filter = Filter::of(query);
@@ -119,7 +119,7 @@ pub(crate) fn sections(snapshot: &Snapshot, query: &Query, part: Part) -> Result
             order = ranking(&results.episodes);
             scored.study.overview(results, &snapshot.options.style, part)?
         }
-        // Figures ask for timelines, which only a scan gives.
+        // Figures need timelines, which require a scan.
         Part::Figures | Part::Statistics => scanned(snapshot, scored, &filter, part)?,
     };
     Ok(json!({

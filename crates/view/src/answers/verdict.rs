@@ -1,4 +1,4 @@
-//! One sentence that says how an episode ended, and the step where it did.
+//! One sentence on how an episode ended, and the step of its end.
 
 use serde_json::{Value, json};
 
@@ -8,11 +8,11 @@ use trace::episode::{Action, Episode, Step};
 use world::experiment::Experiment;
 use world::experiment::spec::Decision;
 
-/// What a decision is called, and what was decided at a step.
+/// The name of a kind of decision, and the decision at a step.
 type Choice = (&'static str, fn(&Step) -> Option<&str>);
 
-/// The sentence, whether the decision names the true colour, and the step to open the episode at. Null where the trace is not
-/// the mirror's.
+/// The sentence, whether the decision names the true colour, and the step to open first. Null if the trace is from
+/// another domain.
 pub(crate) fn answer(opened: &Opened) -> Value {
     let episode = &opened.episode;
     if opened.own.is_some() || episode.steps.is_empty() {
@@ -57,7 +57,7 @@ fn is_color(name: &str) -> bool {
     !matches!(name, "none" | "unknown")
 }
 
-/// Of a hand that is to reach a mark: how near it came.
+/// The outcome of reaching for a mark: the smallest distance.
 fn reached(episode: &Episode) -> (&'static str, String, usize) {
     let distances =
         episode.steps.iter().enumerate().filter_map(|(at, step)| Some((step.extra.target_distance?, at + 1)));

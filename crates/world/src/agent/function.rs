@@ -1,9 +1,9 @@
 //! Agents that are functions of this process, such as those of a program that uses the library.
 //!
-//! A function gets the messages that a program gets ([`exec::message`](super::exec::message)), in the same order, and its
-//! replies are read as those of a program are. A function that fails loses its episode, as a program that ends does. Each
-//! episode has a thread for its function, so that several functions may take their time at once, and a recording that is
-//! stopped waits for none of them.
+//! A function gets the messages that a program gets ([`exec::message`](super::exec::message)), in the same order, and
+//! its replies are read the same way. A function that fails loses its episode, as a program that ends does. Each
+//! episode's function has its own thread, so several slow functions run at once, and a stopped recording waits for
+//! none.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -24,26 +24,26 @@ use super::vlm::secrets::{Secret, from_every_key_variable};
 use super::{Agent, Decision, Ended, Farewell, Lost, Observation, Player, Reply, Status, Task, Usage};
 use exact::hash;
 
-/// One episode's function: gets a message and gives its reply. What it gives for a task or for the end is not looked at.
+/// One episode's function: gets a message and returns its reply. Return values for a task or an end are ignored.
 pub type Listener = Box<dyn FnMut(&Message) -> Result<String, String> + Send>;
 
-/// The time between two looks at whether the recording is stopped.
+/// The interval of checks whether the recording is stopped.
 const GLANCE: Duration = Duration::from_millis(20);
 
-/// Makes the function of each episode; an error is why there is none.
+/// Makes the function of each episode, or returns the reason why it cannot.
 pub type Listeners = dyn Fn() -> Result<Listener, String> + Send + Sync;
 
-/// The player, and its settings.
+/// A function agent's settings.
 pub struct Function {
     pub model: String,
-    /// The text of the function, if it has one: recordings carry its hash.
+    /// The function's source text, if known: recordings carry its hash.
     pub source: Option<String>,
     pub images: Images,
-    /// The folder in which each episode gets one for its frames.
+    /// The parent folder of the episodes' temporary frame folders.
     pub scratch: PathBuf,
     /// Makes the function of each episode.
     pub listeners: Arc<Listeners>,
-    /// Set when the recording is to stop: episodes under way then end without their functions.
+    /// Set to stop the recording: episodes under way then end without their functions.
     pub stop: Arc<AtomicBool>,
 }
 
@@ -95,7 +95,7 @@ impl Player for FunctionPlayer {
     }
 }
 
-/// A message, and where its reply goes.
+/// A message and the channel for its reply.
 type Question = (Message, oneshot::Sender<Result<String, String>>);
 
 fn questions(listeners: Arc<Listeners>) -> Result<Sender<Question>, Lost> {
@@ -104,7 +104,7 @@ fn questions(listeners: Arc<Listeners>) -> Result<Sender<Question>, Lost> {
         let mut listener = listeners();
         for (message, reply) in asked {
             let said = listener.as_mut().map_err(|fault| fault.clone()).and_then(|listener| listener(&message));
-            // Nobody waits for it where the recording is stopped.
+            // If the recording is stopped, no receiver is left.
             let _ = reply.send(said);
         }
     };
@@ -130,7 +130,7 @@ impl Agent for FunctionAgent {
     fn end(&mut self, reason: Ended) -> Farewell<'_> {
         let end = Message::End(EndMessage { reason, steps: self.steps });
         Box::pin(async move {
-            // The episode is committed: what a function makes of its end changes nothing.
+            // The episode is committed: the function's response to its end changes nothing.
             let _ = self.tell(end).await;
         })
     }
@@ -150,10 +150,10 @@ impl FunctionAgent {
         Ok(self.conversation.read(text, Usage { latency_ms, ..Usage::default() }))
     }
 
-    /// The reply to a message; the episode is not lost where the recording stops before it comes.
+    /// The reply to a message; a stopped recording ends the wait without losing the episode.
     async fn tell(&mut self, message: Message) -> Result<String, Lost> {
         let (reply, mut said) = oneshot::channel();
-        // A thread that is gone drops the question, which is an answer too.
+        // If the thread has ended, the question is dropped, which the receiver notices.
         let _ = self.questions.send((message, reply));
         loop {
             match timeout(GLANCE, &mut said).await {

@@ -1,9 +1,9 @@
 //! Agents: they decide the next action.
 //!
-//! An agent gets what a vision-language model gets, the frame and the words around it, and nothing else: no pose of
-//! another body, no label, no ground truth. It answers with a [`Reply`], which the recorder writes down as it is.
+//! An agent gets only what a vision-language model gets: the frame and the words around it. It gets no pose of another
+//! body, no label and no ground truth. It answers with a [`Reply`], which the recorder stores unchanged.
 //!
-//! Rule: an agent is a function of its task and its observations (and, for a model behind a network, of what that said).
+//! Rule: an agent is a function of its task and its observations (and, for a model behind a network, of its answers).
 
 #[cfg(feature = "sim")]
 pub mod exec;
@@ -41,7 +41,7 @@ pub struct Task {
     pub stated_color: Option<String>,
     /// Steps after which the episode ends automatically (100 in the paper).
     pub step_budget: i32,
-    /// The only source of chance for an agent; differs from episode to episode, equal from recording to recording.
+    /// The only source of randomness for an agent; differs between episodes, equal between recordings.
     pub seed: u64,
 }
 
@@ -60,13 +60,13 @@ pub struct Observation {
     pub yaw: f32,
     /// The last move was blocked.
     pub bumped: bool,
-    /// The step before: what was done, and the summary of the last reply that gave a decision; `None` at t = 1.
+    /// The previous step: its action, and the summary of the last reply with a decision; `None` at t = 1.
     pub history: Option<(Option<Action>, Option<String>)>,
-    /// All steps before, the first one first; a prompt may tell them all.
+    /// All previous steps in order; a prompt may include them.
     pub past: Arc<Vec<Past>>,
     pub frame: Arc<Frame>,
-    /// The vertical field of view of the frame, degrees: 110 in the study. For scripted agents alone: models and programs
-    /// are not told.
+    /// The vertical field of view of the frame, degrees: 110 in the study. Only scripted agents use it; models and
+    /// programs do not get it.
     pub fov_y: f64,
 }
 
@@ -85,44 +85,44 @@ pub struct Past {
 pub struct Reply {
     /// The outcome of getting and reading it.
     pub status: Status,
-    /// The repairs that were needed to read it, in order.
+    /// The repairs that were needed, in order.
     pub repairs: Vec<Repair>,
-    /// The reason why it gave no decision, for people; `None` where it gave one, or the status says all.
+    /// The reason for a missing decision, for people; `None` with a decision, or if the status says all.
     pub fault: Option<String>,
-    /// The action; `None` where the reply gave none: the body stands still.
+    /// The action; `None` if the reply gave none, so that the body stands still.
     pub action: Option<Action>,
-    /// The self-attribution: a colour of the palette, `unknown`, or `None` where the reply gave none.
+    /// The self-attribution: a colour of the palette, `unknown`, or `None` if the reply gave none.
     pub self_color: Option<String>,
-    /// The cube: a colour, `none`, or `None` where the reply gave none.
+    /// The cube: a colour, `none`, or `None` if the reply gave none.
     pub selected_cube: Option<String>,
-    /// The mark on the own body: a colour, `none`, or `None` where the reply gave none.
+    /// The mark on the own body: a colour, `none`, or `None` if the reply gave none.
     pub mark_report: Option<String>,
-    /// The answers that the experiment declares, by key; without those that the reply gave none to.
+    /// The answers that the experiment declares, by key; missing answers are absent.
     pub answers: Answers,
     /// The words around the decision, as given.
     pub words: Words,
-    /// The whole reply, as it came.
+    /// The whole reply as received.
     pub raw: Option<String>,
     pub usage: Usage,
-    /// The id of the model as the provider returned it; `None` where no provider answers.
+    /// The model's id as the provider returned it; `None` without a provider.
     pub model: Option<String>,
 }
 
 /// Answers by key.
 pub type Answers = BTreeMap<String, Answered>;
 
-/// The free text of a reply; the keys of the reply's JSON object in the paper.
+/// The free text of a reply; in the paper, keys of the reply's JSON object.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Words {
     pub view_description: Option<String>,
     pub reasoning: Option<String>,
-    /// `summary`; comes back as the history of the next step.
+    /// `summary`; returned as the history of the next step.
     pub summary: Option<String>,
-    /// `identification`, of which the self-attribution is the normal form.
+    /// `identification`, the source of the self-attribution.
     pub identification: Option<String>,
 }
 
-/// Time, tokens and money of one reply; `None` where nobody counted.
+/// Time, tokens and money of one reply; `None` if not measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Usage {
     /// From sending the request to the whole reply, ms.
@@ -142,20 +142,20 @@ pub enum Status {
     Ok,
     /// Valid after a named repair.
     Repaired,
-    /// No JSON object in it.
+    /// Without a JSON object.
     ParseFailed,
-    /// A JSON object, but not the one asked for.
+    /// A JSON object other than the requested one.
     SchemaInvalid,
     Refusal,
-    /// Cut off by the limit of tokens.
+    /// Cut off by the token limit.
     Truncated,
-    /// Nothing in it.
+    /// An empty reply.
     Empty,
-    /// The provider's limit of requests, to the last attempt.
+    /// The provider's rate limit, up to the last attempt.
     RateLimited,
-    /// The provider failed, to the last attempt.
+    /// A provider failure, up to the last attempt.
     ServerError,
-    /// No whole reply in time, to the last attempt.
+    /// No complete reply in time, up to the last attempt.
     Timeout,
 }
 
@@ -172,8 +172,8 @@ names!(Status {
     Timeout: "timeout",
 });
 
-/// The episode cannot go on, and that is not the agent's doing: the infrastructure failed. Such an episode is counted
-/// apart and recorded again by the next run of the command; it is never scored.
+/// An episode that cannot continue for reasons outside the agent, such as failed infrastructure. It is counted
+/// separately and recorded again by the next run of the command; it is never scored.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{cause}")]
 pub struct Lost {
@@ -181,21 +181,21 @@ pub struct Lost {
     pub status: Option<Status>,
     /// The failure, without any key.
     pub cause: String,
-    /// The step that went wrong, where it is an earlier one than that at which it was noticed.
+    /// The step that went wrong, if it precedes the one where the failure was noticed.
     pub step: Option<i32>,
     pub kind: LostKind,
 }
 
-/// Why an episode cannot go on.
+/// The reason why an episode cannot continue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LostKind {
-    /// Something failed.
+    /// A failure.
     Failure,
-    /// A limit of what may be spent is reached; the episode waits for a higher one.
+    /// A spending limit is reached; the episode waits for a higher one.
     Limit,
     /// The recording is being stopped.
     Stop,
-    /// The person who played it has left the study.
+    /// The participant has left the study.
     Leaving,
 }
 
@@ -210,7 +210,7 @@ impl Lost {
         Self { status: Some(status), ..Self::because(cause) }
     }
 
-    /// Stopped by a limit that a caller that records has set.
+    /// Stopped by a limit that the recording's caller has set.
     pub fn by_limit(cause: impl Into<String>) -> Self {
         Self { kind: LostKind::Limit, ..Self::because(cause) }
     }
@@ -226,7 +226,7 @@ impl Lost {
     }
 }
 
-/// A decision that may take its time: scripted agents are ready at once, others wait for a network or a program.
+/// A decision that may take time: scripted agents are ready at once, others wait for a network or a program.
 pub type Decision<'a> = Pin<Box<dyn Future<Output = Result<Reply, Lost>> + 'a>>;
 
 /// The agent's work after its episode.
@@ -236,7 +236,7 @@ pub type Farewell<'a> = Pin<Box<dyn Future<Output = ()> + 'a>>;
 pub trait Agent {
     fn decide<'a>(&'a mut self, observation: &'a Observation) -> Decision<'a>;
 
-    /// The code of the person who plays; `None` where no person does.
+    /// The participant's code; `None` for other agents.
     fn participant(&self) -> Option<&str> {
         None
     }
@@ -264,42 +264,42 @@ pub enum Ended {
     Stopped,
 }
 
-/// An episode that a recording is to have.
+/// An episode of a planned recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Planned {
     pub episode_id: String,
     pub experiment: String,
     pub seed: i32,
     pub repetition: i32,
-    /// True if it is recorded already.
+    /// True if it is already recorded.
     pub is_recorded: bool,
 }
 
-/// When an episode can be played.
+/// The availability of an episode's player.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Turn {
     Now,
     Later,
-    /// Nobody is left who could play it.
+    /// No player is left for it.
     Never,
 }
 
-/// Who plays: makes the agent of each episode.
+/// The player: makes the agent of each episode.
 pub trait Player: Send + Sync {
     fn model(&self) -> &str;
 
-    /// What goes into recordings: everything that shapes the agent's decisions, and nothing that differs from one start of
-    /// the same recording to the next.
+    /// The description for recordings: everything that shapes the agent's decisions, and nothing that differs between
+    /// starts of the same recording.
     fn description(&self) -> serde_json::Value;
 
     fn agent(&self, task: Task, episode_id: &str) -> Result<Box<dyn Agent>, Lost>;
 
-    /// Returns true if the agent looks at frames; one that does not may be given empty ones.
+    /// Returns true if the agent looks at frames; others may get empty ones.
     fn looks(&self) -> bool {
         true
     }
 
-    /// Returns true if its agents wait for something outside of this process, so that a recording takes its time.
+    /// Returns true if its agents wait for something outside this process.
     fn waits(&self) -> bool {
         false
     }
@@ -312,17 +312,17 @@ pub trait Player: Send + Sync {
         usize::MAX
     }
 
-    /// Hears which episodes there are, before the first one is begun.
+    /// Receives the planned episodes before the first one begins.
     fn plans(&self, _planned: &[Planned]) {}
 
     fn turn(&self, _episode_id: &str) -> Turn {
         Turn::Now
     }
 
-    /// The recording is to stop: nothing is waited for that a person has to do.
+    /// Stops all waiting for people, since the recording is to stop.
     fn interrupt(&self) {}
 
-    /// The ids of episodes that their participants wanted deleted, and that are deleted now.
+    /// The ids of episodes that were deleted at their participants' request.
     fn deleted(&self) -> Result<BTreeSet<String>, String> {
         Ok(BTreeSet::new())
     }
@@ -336,7 +336,7 @@ pub trait Player: Send + Sync {
         None
     }
 
-    /// Looks, before the first episode is begun, whether what the agents need is there; asks nobody anything.
+    /// Checks, before the first episode, that the agents' requirements are met; sends no questions.
     fn check(&self) -> Result<(), String> {
         Ok(())
     }

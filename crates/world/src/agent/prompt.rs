@@ -1,6 +1,6 @@
-//! The words that go with a frame, from the templates of an experiment's prompt.
+//! The words around a frame, from the templates of an experiment's prompt.
 //!
-//! Rule: the same task and observation give the same words, and [`Prompt::hash`] changes with any word of them.
+//! Rule: equal tasks and observations give equal words, and [`Prompt::hash`] changes with every edit of the templates.
 
 use minijinja::{Environment, Error, UndefinedBehavior, Value, context};
 
@@ -17,7 +17,7 @@ pub struct Prompt {
     hash: String,
 }
 
-/// The messages to a model beside the frame.
+/// The messages to a model besides the frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Rendered {
     pub system: String,
@@ -100,7 +100,7 @@ pub fn hashes() -> serde_json::Value {
     })
 }
 
-/// The letter or number by which the prompt names an action.
+/// The prompt's letter or number for an action.
 pub const fn letter(action: Action) -> &'static str {
     match action {
         Action::MoveForward => "w",
@@ -117,7 +117,7 @@ pub const fn letter(action: Action) -> &'static str {
     }
 }
 
-/// The action of a letter, exactly as the prompt spells it.
+/// The action of a letter, spelled exactly as in the prompt.
 pub fn action(letter_of_action: &str) -> Option<Action> {
     Action::ALL.into_iter().find(|action| letter(*action) == letter_of_action)
 }
@@ -143,7 +143,7 @@ fn step(past: &Past) -> Value {
     }
 }
 
-/// A thought keeps to its line, so that it cannot pass for another part of the prompt.
+/// Keeps a thought on one line, so that it cannot pass for another part of the prompt.
 fn one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }

@@ -1,11 +1,11 @@
-//! Colours that come equally often, however many seeds and runs a study has.
+//! Colours with equal frequencies, for any number of seeds and runs of a study.
 //!
-//! A square of `n` by `n` numbers, in which each row and each column has each number once, and in which every rectangle at
-//! its first corner has each number equally often, or one more. Seeds are its rows and runs its columns, again and again,
-//! so that the colours of a study are balanced without knowing how large it is, and stay unchanged when it grows.
-//! The squares were found by a search that fills row after row and turns back where a rectangle would be out of balance.
+//! A square of `n` by `n` numbers: each row and each column has each number once. Every rectangle at its first corner
+//! has each number equally often, or once more. Seeds are its rows and runs its columns, periodically, so colours are
+//! balanced for any size of study and stay unchanged when it grows. A backtracking search, row after row, found the
+//! squares.
 
-/// The squares of 2 to 10 colours, a row after the other, a digit per place.
+/// The squares of 2 to 10 colours, row after row, one digit per cell.
 const SQUARES: [&str; 9] = [
     "1001",
     "102210021",
@@ -18,7 +18,7 @@ const SQUARES: [&str; 9] = [
     "6872530941104396275892518743063706418529458902167321376590848964705132031528649756983472107420193865",
 ];
 
-/// The least colours that can be balanced; one is always itself.
+/// The minimum number of colours that can be balanced.
 const LEAST: usize = 2;
 
 /// The colour of an episode among `count` colours, by its seed and run: 0 to `count` - 1.
@@ -31,7 +31,7 @@ pub fn index(count: usize, seed: i32, run: i32) -> usize {
     }
     let square = SQUARES[count - LEAST].as_bytes();
     let side = i32::try_from(count).expect("a palette has at most ten colours");
-    // Seeds and runs begin at 1.
+    // Seeds and runs start at 1.
     let [row, column] = [seed, run].map(|from_one| (from_one.wrapping_sub(1)).rem_euclid(side));
     let at = usize::try_from(row * side + column).expect("both are at least 0");
     usize::from(square[at] - b'0')

@@ -1,4 +1,4 @@
-//! The experiments that come with the program, one file each.
+//! The built-in experiments, one file each.
 
 use super::Known;
 use super::file;
@@ -6,7 +6,7 @@ use toml_spec::Source;
 
 macro_rules! files {
     ($($name:literal),+ $(,)?) => {
-        /// By name, the paper's five first; a later one may have the scenes of an earlier one.
+        /// The experiments by name, the paper's five first; a later one may use the scenes of an earlier one.
         const FILES: [(&str, &str); [$($name),+].len()] =
             [$(($name, include_str!(concat!("../../../../assets/experiments/", $name, ".toml")))),+];
     };
@@ -48,7 +48,7 @@ files!(
     "contingency-swap",
 );
 
-/// The names of the built-in experiments, in their order.
+/// The names of the built-in experiments, in order.
 pub fn built_in_names() -> Vec<&'static str> {
     FILES.iter().map(|(name, _)| *name).collect()
 }
@@ -58,7 +58,7 @@ pub fn built_in(name: &str) -> Option<&'static str> {
     FILES.iter().find(|(known, _)| *known == name).map(|(_, text)| *text)
 }
 
-/// Every built-in experiment, read as one text, so that one may have the scenes of another.
+/// Every built-in experiment, parsed as one text, so that one may use the scenes of another.
 pub(super) fn all() -> Vec<Known> {
     let text: String = FILES.iter().map(|(_, text)| *text).collect::<Vec<_>>().join("\n");
     let source = Source { name: "built-in experiments".to_owned(), text };

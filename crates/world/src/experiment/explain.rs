@@ -9,7 +9,7 @@ use super::spec::{
 };
 use exact::escape::visible;
 
-/// The lines of `explain`: what an experiment shows, asks and decides.
+/// The output of `explain`: what an experiment shows, asks and decides.
 pub fn explained(experiment: Experiment) -> String {
     let mut text = format!("{}: {}\n", experiment.name(), visible(&experiment.title));
     let mut line = |name: &str, words: String| {
@@ -133,7 +133,7 @@ fn cubes(cubes: Cubes) -> String {
     }
 }
 
-/// The share of occlusion in scenes of the built-in world.
+/// The occlusion in scenes of the built-in world.
 #[cfg(feature = "sim")]
 fn occlusion(experiment: Experiment) -> Option<String> {
     use crate::sim::{config::WorldConfig, placement::Occlusion};
@@ -148,7 +148,7 @@ fn occlusion(experiment: Experiment) -> Option<String> {
     ))
 }
 
-/// A build without the world draws no scenes.
+/// A build without the world cannot draw scenes.
 #[cfg(not(feature = "sim"))]
 const fn occlusion(_: Experiment) -> Option<String> {
     None

@@ -1,4 +1,4 @@
-//! The text of a file of experiments: every key accounted for, every fault with its place.
+//! The parser of experiment files: every key is checked, and every error has its location.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -8,10 +8,10 @@ use super::spec::Spec;
 use super::table::{self, Beside, Entry};
 use toml_spec::{At, Fault, Faults, Shape, Source};
 
-/// The most experiments of a file.
+/// The maximum number of experiments in a file.
 const MOST_EXPERIMENTS: usize = 64;
 
-/// Reads the experiments of a text, which may have the scenes of those that are `known`. Prompts of its own are folders in
+/// Parses the experiments of a text, which may use the scenes of `known` ones. Their own prompts are folders in
 /// `folder`; a text without a folder is built in.
 pub fn read(source: Source, folder: Option<&Path>, known: &[&Spec]) -> Result<Vec<Entry>, Faults> {
     entries(source, folder, known).map_err(|faults| Faults(faults.0.into_iter().map(with_help).collect()))

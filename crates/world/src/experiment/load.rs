@@ -1,4 +1,4 @@
-//! Files of experiments, which become known to the process.
+//! Loads experiment files and registers their experiments.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -10,9 +10,9 @@ use exact::budget::Limit;
 use exact::input;
 use toml_spec::{Faults, Place, Source};
 
-/// The most bytes of a file.
+/// The maximum size of a file in bytes.
 const LARGEST: Limit = Limit::new("bytes of an experiment file", 1 << 20);
-/// A file of experiments that cannot be used.
+/// An experiment file that cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages say it")]
 pub enum FileError {
@@ -28,18 +28,18 @@ pub enum FileError {
     TooMany(#[from] TooMany),
 }
 
-/// An experiment that is known now, and where it is in its file.
+/// A registered experiment, and its locations in its file.
 #[derive(Clone, Debug)]
 pub struct Loaded {
     pub experiment: Experiment,
-    /// The places of its cubes, or its name if it says nothing of them.
+    /// The location of its cubes, or of its name if it does not mention cubes.
     pub cubes: Place,
-    /// Where each of its mirrors stands.
+    /// The location of each of its mirrors.
     pub mirrors: Vec<Place>,
     pub name: Place,
 }
 
-/// Reads the experiments of a file, and makes them known, in their order.
+/// Loads the experiments of a file and registers them, in order.
 pub fn load(path: &Path) -> Result<Vec<Loaded>, FileError> {
     let text = input::text(path, LARGEST).map_err(|source| FileError::Unreadable { path: path.to_owned(), source })?;
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));

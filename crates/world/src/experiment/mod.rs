@@ -1,15 +1,15 @@
-//! Experiments as data: what a world shows, what an agent is asked, and how the answer is decided.
+//! Experiments as data: the world, the prompt, and the decision.
 //!
 //! ```text
 //! assets/experiments/*.toml, a lab's own file ──► file (every fault underlined) ──► Spec ──► Experiment (a handle)
 //!                                                   └── prompt (a folder of templates, hashed)
 //! ```
 //!
-//! `table` reads one `[experiment.NAME]` key by key; [`schema`] is the same shape as types, for the JSON Schema; [`explain`] says
-//! a [`Spec`] in words; [`balance`] deals colours out equally.
+//! `table` reads one `[experiment.NAME]` key by key; [`schema`] has the same shape as types, for the JSON Schema;
+//! [`explain`] describes a [`Spec`] in words; [`balance`] distributes colours equally.
 //!
-//! The paper's five experiments are five such files. A trace carries the whole [`Spec`] in its footer, so that a replay
-//! and a report need no file.
+//! The paper's five experiments are such files. A trace has the whole [`Spec`] in its footer, so replays and reports
+//! need no file.
 //!
 //! Rule: an experiment draws nothing, renders nothing and knows no agent; `sim` and `agent` read it.
 
@@ -33,38 +33,38 @@ pub use built_in::{built_in, built_in_names};
 use prompt::Templates;
 pub use spec::Spec;
 
-/// The most experiments that a process holds at once: hostile files must not fill its memory.
+/// The maximum number of experiments in a process: hostile files must not fill its memory.
 const MOST: usize = 4096;
 
-/// A known experiment: a name for its [`Spec`] that is as cheap as a number.
+/// A registered experiment: a handle to its [`Spec`], as cheap as a number.
 ///
-/// Experiments are ordered as they became known: the paper's five first, then those of files.
+/// Experiments are ordered by registration: the paper's five first, then those of files.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Experiment(u16);
 
-/// A known experiment.
+/// A registered experiment.
 #[derive(Debug)]
 pub struct Known {
     pub spec: Spec,
-    /// Its prompt; empty where it comes from a trace's footer, which has the hash alone.
+    /// Its prompt; empty if it comes from a trace's footer, which has only the hash.
     pub templates: Templates,
 }
 
-/// Every experiment of this process. It only grows, by what differs: reading a file twice adds nothing.
+/// Every experiment of this process. The list only grows, by distinct experiments: reading a file twice adds nothing.
 static KNOWN: LazyLock<RwLock<Vec<&'static Known>>> = LazyLock::new(|| {
     let all = built_in::all().into_iter().map(|known| -> &'static Known { Box::leak(Box::new(known)) });
     RwLock::new(all.collect())
 });
 
-/// A name that is no experiment.
+/// An unknown experiment name.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("no experiment `{name}`: expected {}, or a file such as mine.toml", built_in_names().join(", "))]
 pub struct UnknownExperiment {
-    /// As it was written.
+    /// The name as written.
     pub name: String,
 }
 
-/// More experiments than a process holds.
+/// Too many experiments for a process.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("more than {MOST} experiments in one process: use fewer files at once")]
 pub struct TooMany;
@@ -89,7 +89,7 @@ impl Experiment {
         at.and_then(|at| u16::try_from(at).ok()).map(Self).ok_or_else(|| UnknownExperiment { name: name.to_owned() })
     }
 
-    /// Makes an experiment known; the same one again is the one that is known.
+    /// Registers an experiment; returns the existing one if it is equal.
     pub fn register(known: Known) -> Result<Self, TooMany> {
         let mut all = KNOWN.write().unwrap_or_else(PoisonError::into_inner);
         let same = |other: &&Known| other.spec == known.spec && other.templates == known.templates;
@@ -104,9 +104,9 @@ impl Experiment {
         u16::try_from(at).map(Self).map_err(|_| TooMany)
     }
 
-    /// The experiment that a trace's footer declares: the known one that is the same, or one without a prompt.
+    /// The experiment that a trace's footer declares: the equal registered one, or one without a prompt.
     pub fn of_footer(spec: Spec) -> Result<Self, TooMany> {
-        // Footers from before experiments named their definitions do not differ in anything else.
+        // Older footers, which lack the definitions, differ in nothing else.
         let unnamed = |known: &Spec| spec.definitions.is_none() && Spec { definitions: None, ..known.clone() } == spec;
         let same = {
             let all = KNOWN.read().unwrap_or_else(PoisonError::into_inner);
@@ -121,7 +121,7 @@ impl Experiment {
         KNOWN.read().unwrap_or_else(PoisonError::into_inner)[usize::from(self.0)]
     }
 
-    /// Its name, as in traces and files.
+    /// Its name in traces and files.
     pub fn name(self) -> &'static str {
         &self.known().spec.name
     }
@@ -130,7 +130,7 @@ impl Experiment {
         &self.known().templates
     }
 
-    /// A number for an agent's chances: differs from experiment to experiment.
+    /// A number for an agent's randomness: differs between experiments.
     pub fn number(self) -> u64 {
         match self {
             Self(at @ 0..5) => u64::from(at) + 1,
@@ -144,7 +144,7 @@ fn built_in_specs() -> Vec<&'static Spec> {
     names.filter_map(|name| Experiment::parse(name).ok()).map(|experiment| &experiment.known().spec).collect()
 }
 
-/// A number that a name represents: the beginning of its SHA-256.
+/// A number derived from a name: the beginning of its SHA-256.
 pub fn number_of(name: &str) -> u64 {
     let hash = exact::hash::of_bytes(name.as_bytes());
     u64::from_str_radix(&hash[..16], 16).unwrap_or_default()

@@ -8,14 +8,14 @@
 //! | `position.txt` | pose and budget | `x`, `y`, `yaw`, `remaining`, `budget` |
 //! | `warning.txt` | the last move was stopped | none |
 //!
-//! Each of `answers` has `key`, `words` and `expected`. Each of `steps`, the first one first, has `action`, `name`, `bumped` and `thought`.
+//! `answers` have `key`, `words` and `expected`; `steps`, in order, have `action`, `name`, `bumped` and `thought`.
 //!
-//! The first two are a prompt's own; the other three are shared by all, unless a folder has its own.
-//! The templates of the paper's two prompts are word for word (appendix, "Prompt Templates"). The three of the dynamic
-//! context are ours, since the paper says what they hold but not how they read.
+//! Every folder needs the first two; the other three have shared defaults. The templates of the paper's two prompts are
+//! verbatim (appendix, "Prompt Templates"). The three of the dynamic context are ours, since the paper states their
+//! content but not their wording.
 //!
-//! The paper's user prompt of E5 has no `<warning_if_bumped_wall>`, that of E1 to E4 has it. Ours has it in both: a body
-//! that was stopped is named so by one rule, and where nothing was hit the words of E5 are the paper's.
+//! In the paper, the user prompt of E1 to E4 has `<warning_if_bumped_wall>`, that of E5 does not. Ours has it in both,
+//! so that one rule names every blocked move; without a bump, the words of E5 are the paper's.
 
 use std::fs;
 use std::path::{Component, Path};
@@ -26,13 +26,13 @@ use exact::budget::Limit;
 use exact::hash;
 use exact::input;
 
-/// The most bytes of a template.
+/// The maximum size of a template in bytes.
 const LARGEST: Limit = Limit::new("bytes of a prompt", 256 * 1024);
 
 /// A template: the name of its file without the ending, and its text.
 pub type Template = (String, String);
 
-/// The names of the templates, and the values that each may use.
+/// The names of the templates, and their permitted values.
 const NAMES: [(&str, &[&str]); 5] = [
     ("system", &["stated_color", "reply_keys", "answers"]),
     ("user", &["history_text", "position_text", "bumped", "warning_if_bumped_wall", "remaining", "budget"]),
@@ -41,7 +41,7 @@ const NAMES: [(&str, &[&str]); 5] = [
     ("warning", &[]),
 ];
 
-/// The templates that every folder has; the others have a text where it has none.
+/// The templates that every folder must have; the others have defaults.
 const OWN: [&str; 2] = ["system", "user"];
 
 macro_rules! folder {
@@ -50,7 +50,7 @@ macro_rules! folder {
     };
 }
 
-/// The built-in folders, with the templates that are their own.
+/// The built-in folders, with their own templates.
 const BUILT_IN: [(&str, &[(&str, &str)]); 13] = [
     folder!("cube-selection": "system", "user"),
     folder!("exploration": "system", "user"),
@@ -67,7 +67,7 @@ const BUILT_IN: [(&str, &[(&str, &str)]); 13] = [
     folder!("answers": "system", "user"),
 ];
 
-/// The three that they share.
+/// The three shared defaults.
 const SHARED: [(&str, &str); 3] = [
     ("history", include_str!("../../../../assets/prompts/history.txt")),
     ("position", include_str!("../../../../assets/prompts/position.txt")),
@@ -77,7 +77,7 @@ const SHARED: [(&str, &str); 3] = [
 /// The templates of a prompt.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Templates {
-    /// `system`, `user`, `history`, `position`, `warning`, in this order; empty where only the hash is known.
+    /// `system`, `user`, `history`, `position`, `warning`, in this order; empty if only the hash is known.
     pub all: Vec<Template>,
 }
 

@@ -1,6 +1,6 @@
 //! The shape of an experiment file, for editors and other programs (`schemas/experiments.schema.json`).
 //!
-//! A key is declared here, once: the reader and the schema go by these types. `table` makes a [`Spec`](super::Spec) of them.
+//! Each key is declared once, here: parser and schema use these types. `table` makes a [`Spec`](super::Spec) of them.
 
 use indexmap::IndexMap;
 use schemars::JsonSchema;

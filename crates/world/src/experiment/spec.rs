@@ -1,4 +1,4 @@
-//! A checked experiment: every value is in its range and fits the others.
+//! A validated experiment: every value is in range and consistent with the others.
 
 mod answers;
 mod appearance;
@@ -18,10 +18,10 @@ pub use layout::{Behavior, Colors, Cubes, Layout, Occluders, Others, Start, Wall
 pub use marks::{Mark, MarkColor, Part, Wearer};
 pub use panes::{BodyShown, Paint, Pane, PaneKind};
 
-/// The most glass panes (mirrors and windows) in a room.
+/// The maximum number of glass panes (mirrors and windows) in a room.
 pub const MOST_PANES: usize = 4;
 
-/// The most marks in a world.
+/// The maximum number of marks in a world.
 pub const MOST_MARKS: usize = 4;
 
 /// An experiment: what its world shows, what its agent is asked, and how the answer is decided.
@@ -114,7 +114,7 @@ pub enum AbsentColumn {
 names!(AbsentColumn { SelfColor: "self_color", SelectedCube: "selected_cube" });
 
 impl AbsentColumn {
-    /// The key of a reply that would fill it.
+    /// The key of a reply that would fill the column.
     pub const fn key(self) -> ReplyKey {
         match self {
             Self::SelfColor => ReplyKey::Identification,
@@ -221,7 +221,7 @@ names!(Decision {
 });
 
 impl Decision {
-    /// The key of a reply that fills the column; `None` where it is one that the experiment declares.
+    /// The key of a reply that fills the column; `None` for a declared answer.
     pub const fn key(self) -> Option<ReplyKey> {
         match self {
             Self::SelectedCube => Some(ReplyKey::SelectedCube),
@@ -297,7 +297,7 @@ pub enum Camera {
 names!(Camera { Eye: "eye", Behind: "behind" });
 
 impl Spec {
-    /// Returns true if there are cubes of which one is to be selected.
+    /// Returns true if one of several cubes is to be selected.
     pub const fn has_candidates(&self) -> bool {
         matches!(self.layout.cubes, Cubes::Candidates { .. })
     }
@@ -313,7 +313,7 @@ impl Spec {
         self.reply.contains(&ReplyKey::SelectedCube)
     }
 
-    /// Returns true if a reply says how the agent knows itself.
+    /// Returns true if a reply states how the agent identifies itself.
     pub fn asks_for_identification(&self) -> bool {
         self.reply.contains(&ReplyKey::Identification)
     }

@@ -1,4 +1,4 @@
-//! One `[experiment.NAME]` table: what fits only together, and what is beside its file.
+//! One `[experiment.NAME]` table: constraints between keys, and references to other files.
 
 mod answers;
 mod checks;
@@ -22,17 +22,17 @@ use metric::file::{self as definitions, Document};
 use toml_spec::{At, Fault, Place};
 use trace::palette::Color;
 
-/// The most characters of a name.
+/// The maximum number of characters of a name.
 const LONGEST_NAME: usize = 40;
 
-/// An experiment as read, and where its parts stand, for faults that only a drawing shows.
+/// A parsed experiment and the locations of its parts, for errors that only drawing its scenes reveals.
 #[derive(Debug)]
 pub struct Entry {
     pub known: Known,
     pub name: Place,
-    /// The places of its cubes, or its name if it says nothing of them.
+    /// The location of its cubes, or of its name if it does not mention cubes.
     pub cubes: Place,
-    /// Where each of its mirrors stands.
+    /// The location of each of its mirrors.
     pub mirrors: Vec<Place>,
 }
 
@@ -40,11 +40,11 @@ pub struct Entry {
 pub(super) struct Beside<'a> {
     /// The folder of its file; `None` for a built-in one.
     pub folder: Option<&'a Path>,
-    /// The experiments before it, its own file's and the built-in ones, of which it may have the scenes.
+    /// The experiments whose scenes it may use: earlier ones of its file, and built-in ones.
     pub before: &'a [&'a Spec],
 }
 
-/// Reads one experiment; `None` where it has a fault.
+/// Parses one experiment; `None` if it has errors.
 pub(super) fn read(name: &str, at: &At<'_>, beside: &Beside<'_>, faults: &mut Vec<Fault>) -> Option<Entry> {
     let before = faults.len();
     check_name(name, at, beside, faults);
@@ -102,7 +102,7 @@ pub(super) fn read(name: &str, at: &At<'_>, beside: &Beside<'_>, faults: &mut Ve
         look: table.look.unwrap_or_default(),
         body: table.body,
     };
-    // What is wrong by itself may make relations wrong that are not: a key with a fault says nothing to them.
+    // An invalid key can break valid relations, so relations of keys with errors are not checked.
     let own = faults[before..].to_vec();
     let is_faulty = |key: &&str| at.get(key).is_some_and(|at| own.iter().any(|fault| holds(&at, fault)));
     if !["cubes", "others", "decision", "truth", "mark", "reply", "hand", "answer"].iter().any(is_faulty) {
@@ -158,7 +158,7 @@ fn millimetres(metres: f64) -> u32 {
     (metres * 1000.0).round() as u32
 }
 
-/// A name is part of the names of files, and of ids with `/` and `@` between their parts.
+/// Checks a name, which is part of file names, and of ids with `/` and `@` as separators.
 fn check_name(name: &str, at: &At<'_>, beside: &Beside<'_>, faults: &mut Vec<Fault>) {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
     if name.is_empty() || name.len() > LONGEST_NAME || !name.chars().all(is_plain) || name.starts_with('-') {
@@ -284,7 +284,7 @@ fn definitions(
     beside: &Beside<'_>,
     faults: &mut Vec<Fault>,
 ) -> (Option<String>, Option<String>, Option<Document>) {
-    // Those of the built-in experiments are tested to fit.
+    // Tests check that the definitions of built-in experiments fit.
     let built_in = |name: &str| beside.folder.and_then(|_| definitions::read(name).ok());
     let Some(name) = name else {
         let known = match decision {
@@ -329,7 +329,7 @@ fn absent(
 }
 
 fn prompt(name: String, at: &At<'_>, beside: &Beside<'_>, faults: &mut Vec<Fault>) -> (String, Templates) {
-    // A prompt that is absent or no text is a fault already.
+    // A missing or non-text prompt is already reported.
     let Some(at) = at.get("prompt").filter(|prompt| prompt.written() == name) else { return Default::default() };
     if let Some(templates) = Templates::built_in(&name) {
         return (name, templates);
@@ -351,7 +351,7 @@ fn prompt(name: String, at: &At<'_>, beside: &Beside<'_>, faults: &mut Vec<Fault
     }
 }
 
-/// Returns true if each mark shows before the last step.
+/// Checks that each mark appears before the last step.
 fn check_marks(marks: &[Mark], steps: Option<u32>, at: &At<'_>, faults: &mut Vec<Fault>) {
     for (n, mark) in marks.iter().enumerate() {
         if let Some(steps) = steps.filter(|steps| mark.from_t > *steps) {

@@ -1,4 +1,4 @@
-//! Errors of a recording's folder, and of episodes that did not come to their end.
+//! Errors of a recording's folder, and of episodes that did not finish.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -49,7 +49,7 @@ pub enum StoreError {
 }
 
 impl StoreError {
-    /// The file at `path` was recorded differently.
+    /// The file at `path` was recorded with other settings.
     pub(super) fn different(path: &Path, Difference { what, expected, found }: Difference) -> Self {
         let path = path.to_owned();
         match what.as_str() {
@@ -78,13 +78,13 @@ pub enum RecordError {
         /// The failure.
         lost: Lost,
     },
-    /// The world, the camera or the disk failed, as they would for any episode.
+    /// The world, the camera or the disk failed, which would affect every episode.
     #[error(transparent)]
     Fatal(Box<dyn std::error::Error + Send + Sync>),
 }
 
 impl RecordError {
-    /// A failure that every episode would meet.
+    /// A failure that affects every episode.
     pub fn fatal(error: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Self {
         Self::Fatal(error.into())
     }

@@ -1,4 +1,4 @@
-//! The eyes of a thread: one for each size of pictures, look of the room and shape of bodies that the experiments ask for.
+//! The cameras of a thread: one per picture size, look of the room and body shape in the experiments.
 
 use std::cell::RefCell;
 
@@ -7,8 +7,7 @@ use crate::experiment::spec::{Body, Look};
 use crate::sim::camera::{Camera, CameraError};
 use crate::sim::config::WorldConfig;
 
-/// Eyes by the width and the height of their pictures, and the look and the shape that they can draw: a renderer keeps its
-/// textures, and as many parts as it was made with.
+/// Cameras by picture size, look and body shape: a renderer keeps its textures, and its number of parts is fixed.
 pub(super) struct Eyes(Vec<(Kind, RefCell<Camera>)>);
 
 type Kind = ([u32; 2], Look, Body);

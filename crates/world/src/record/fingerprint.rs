@@ -1,32 +1,32 @@
-//! The fingerprint of an episode's recording, in a few hashes: episodes with different fingerprints are not of one sample.
+//! A fingerprint of how an episode was recorded, from a few hashes: a sample mixes no fingerprints.
 //!
-//! Rule: equal recordings have equal fingerprints, and whatever can change what an agent does is in one of the parts.
+//! Rule: equal recordings have equal fingerprints, and everything that can affect an agent is in one of the parts.
 
 use serde_json::{Map, Value, json};
 
 use exact::hash;
 use trace::renderer::Renderer;
 
-/// Digits of a fingerprint's name: enough for all recordings of a study, and short in a table.
+/// Digits of a fingerprint's id: enough for all recordings of a study, and short in a table.
 const DIGITS: usize = 16;
-/// The names, definitions and levels of an experiment, which change no episode.
+/// The keys of an experiment that do not affect episodes.
 const WORDS: [&str; 6] = ["title", "order", "chance", "reference", "definitions", "definitions_hash"];
-/// The keys of an agent's description that are parts of their own.
+/// The keys of an agent's description that are separate parts.
 const SAMPLING: [&str; 4] = ["temperature", "max_output_tokens", "reasoning_effort", "extra_body"];
 
-/// A name, and what it represents.
+/// A fingerprint: its id, and its parts.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fingerprint {
     /// The value of the column `fingerprint`: the beginning of the hash of the parts.
     pub id: String,
-    /// SHA-256 of `world`, `prompts`, `reply_schema`, `agent` and `sampling`, and the `model` that answered; null where
-    /// there is no such thing. The `renderer` of the frames in the clear, where the agent sees them.
+    /// SHA-256 of `world`, `prompts`, `reply_schema`, `agent` and `sampling`, and the answering `model`; null if not
+    /// applicable. In plain text, the `renderer` of the frames, if the agent sees them.
     pub parts: Value,
 }
 
 impl Fingerprint {
-    /// The fingerprint of an episode, from what its trace says of the recording, and the id of the model as the provider
-    /// returned it, and what drew the frames that the agent saw, if it saw any.
+    /// The fingerprint of an episode, from its trace's metadata and the model's id as the provider returned it.
+    /// `renderer` drew the frames that the agent saw, if any.
     pub fn of(recording: &Value, model: Option<&str>, renderer: Option<&Renderer>) -> Self {
         let mut agent = recording["agent"].as_object().cloned().unwrap_or_default();
         let mut experiment = recording["experiment"].clone();
@@ -49,7 +49,7 @@ impl Fingerprint {
             "sampling": (!sampling.is_empty()).then(|| hash_of(&Value::Object(sampling))),
             "model": model,
         });
-        // Absent, not null: the fingerprints of agents that see no frames, and those of before, have no such part.
+        // Absent, not null: agents without frames, and older recordings, have no such part in their fingerprints.
         if let Some(renderer) = renderer {
             parts["renderer"] = json!(renderer);
         }
@@ -59,12 +59,12 @@ impl Fingerprint {
     }
 }
 
-/// The hash of a value; keys of objects are in order.
+/// The hash of a value, with the keys of objects sorted.
 fn hash_of(value: &Value) -> String {
     hash::of_bytes(sorted(value).to_string().as_bytes())
 }
 
-/// The same value with the keys of its objects in the order of their bytes.
+/// The same value with its objects' keys sorted by bytes.
 fn sorted(value: &Value) -> Value {
     match value {
         Value::Object(members) => {
@@ -133,7 +133,7 @@ mod tests {
         assert!(unseen.id != one.id && one.id != other.id);
         assert_eq!(unseen.parts.get("renderer"), None);
         assert_eq!(other.parts["renderer"]["processor"], "x86_64 limited to sse2");
-        // As those of recordings from before: a part that is absent is not null.
+        // As in older recordings: a missing part is absent, not null.
         assert_eq!(unseen.parts.as_object().unwrap().len(), 6);
     }
 

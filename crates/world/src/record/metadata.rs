@@ -1,4 +1,4 @@
-//! A trace's metadata about its recording: all that replay needs, and nothing that differs between two equal recordings.
+//! A trace's metadata on its recording: all that a replay needs; equal for equal recordings.
 
 use std::collections::BTreeMap;
 
@@ -11,24 +11,24 @@ use crate::sim::scene::SCENE_VERSION;
 use trace::declared::Registration;
 use trace::palette::Color;
 
-/// A key that grows with the recording's episodes.
+/// A key that grows with the recorded episodes.
 pub(super) const SEEDS: &str = "seeds";
-/// A key that grows with the recording's episodes: what they were recorded with, by fingerprint.
+/// A key that grows with the recorded episodes: their settings, by fingerprint.
 pub(super) const FINGERPRINTS: &str = "fingerprints";
 
-/// The key of the version of this object's shape.
+/// The key of this object's version.
 pub(super) const VERSION_KEY: &str = "version";
 
-/// The version of this object's shape: 2 since it declares a palette, a design and fingerprints, 3 since it has the whole
-/// experiment. A recording of another version is not continued, since its episodes were not compared with the same rules.
+/// The version of this object's shape: 2 adds a palette, a design and fingerprints, 3 the whole experiment. A recording
+/// of another version is not continued, since its episodes were compared by other rules.
 const VERSION: u32 = 3;
 
-/// The metadata of several experiments' traces about their recordings.
+/// The metadata of several experiments' recordings.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Recordings(BTreeMap<Experiment, Value>);
 
 impl Recordings {
-    /// Those of some experiments; `condition` is absent for the default one.
+    /// The metadata of some experiments; `condition` is absent for the default one.
     pub fn new(
         experiments: &[Experiment],
         config: &WorldConfig,
@@ -40,7 +40,7 @@ impl Recordings {
         Self(experiments.iter().map(|experiment| (*experiment, of(experiment))).collect())
     }
 
-    /// That of an experiment; null for one that is not recorded.
+    /// The metadata of an experiment; null if it is not recorded.
     pub fn of(&self, experiment: Experiment) -> &Value {
         self.0.get(&experiment).unwrap_or(&Value::Null)
     }
@@ -48,7 +48,7 @@ impl Recordings {
 
 /// The value of `mirrorstats.recording`; the store adds the seeds and fingerprints.
 ///
-/// Episodes with equal scenes are pairs. A seed is no cluster: each of its runs has a room of its own.
+/// Episodes with equal scenes are pairs. A seed is no cluster: each of its runs has a separate room.
 fn recording(
     experiment: Experiment,
     config: &WorldConfig,
@@ -87,12 +87,12 @@ pub(super) struct Difference {
     /// The key of the metadata.
     pub what: String,
     pub expected: String,
-    /// The value of the other one.
+    /// The value in the other recording.
     pub found: String,
 }
 
 pub(super) fn difference(ours: &Value, theirs: &Value) -> Option<Difference> {
-    // Which definitions score an experiment changes no episode.
+    // The scoring definitions do not affect episodes.
     let recorded = |value: &Value| {
         let mut value = value.clone();
         if let Some(experiment) = value.get_mut("experiment").and_then(Value::as_object_mut) {

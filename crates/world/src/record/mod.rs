@@ -1,4 +1,4 @@
-//! Runs episodes: a world, an agent, and a trace and a log at the end.
+//! Runs episodes: a world, an agent, and the resulting trace and log.
 //!
 //! ```text
 //! Plan ──► episodes still to do ──► threads, each with one camera ──► rollout ──► part ──► assembled: trace, log
@@ -8,25 +8,25 @@
 //!
 //! | file | what it knows |
 //! |---|---|
-//! | [`plan`] | which episodes, their names, and which of them a shard has |
+//! | [`plan`] | the episodes, their names, and the share of a shard |
 //! | [`rollout`] | one episode, from the first frame to the last step |
-//! | [`fingerprint`] | what an episode was recorded with, in a few hashes |
-//! | [`metadata`] | what a trace says of how it was recorded |
-//! | [`index`] | what is recorded in a folder already |
+//! | [`fingerprint`] | the settings of an episode's recording, in a few hashes |
+//! | [`metadata`] | a trace's metadata on its recording |
+//! | [`index`] | the recorded episodes of a folder |
 //! | [`store`] | the folder: how an episode commits, how the final files are made |
-//! | [`folder_lock`] | who else records into the folder |
+//! | [`folder_lock`] | other processes that record into the folder |
 //! | [`lock`] | the locks of a folder and of an episode |
-//! | [`queue`] | the episodes still to take, and which of them other processes have |
-//! | `continued` | whether the log that is there belongs to the recording |
-//! | [`error`] | why a folder cannot be used, why an episode did not come to its end |
-//! | [`failures`] | the list of episodes that failures kept from being recorded |
-//! | [`replies`] | how many replies gave no decision |
-//! | [`unusable`] | when an agent that cannot answer ends its recording |
+//! | [`queue`] | the remaining episodes, and those that other processes have |
+//! | `continued` | the check that an existing log belongs to the recording |
+//! | [`error`] | errors of a folder, and of an unfinished episode |
+//! | [`failures`] | the list of episodes lost to failures |
+//! | [`replies`] | the number of replies without a decision |
+//! | [`unusable`] | the end of a recording whose agent cannot answer |
 //! | [`run`] | threads, episodes under way, stopping |
-//! | [`shares`] | what took the time |
+//! | [`shares`] | the time by activity |
 //!
 //! Rule: an episode is a function of the world's configuration, its experiment, seed and run, and its agent. Threads,
-//! shards, interruptions and their order change nothing in a trace. Nothing here knows a metric.
+//! shards, interruptions and their order do not affect a trace. Nothing here knows a metric.
 
 pub mod error;
 mod eyes;

@@ -7,25 +7,25 @@ use std::str::FromStr;
 
 use crate::experiment::{Experiment, built_in_names};
 
-/// Seeds and runs begin at 1, as in the paper.
+/// Seeds and runs start at 1, as in the paper.
 const FIRST: i32 = 1;
 
 /// Experiments, seeds and runs; every combination is an episode.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Plan {
-    /// The experiments, each once, in their order.
+    /// The experiments without duplicates, in order.
     pub experiments: Vec<Experiment>,
     /// Seeds 1 to this (3 in the paper).
     pub seeds: i32,
     /// Runs 1 to this for each seed (7 in the paper).
     pub runs: i32,
-    /// The number of times that each scene is played.
+    /// The number of repetitions of each scene.
     pub repeats: i32,
-    /// The share that this process records.
+    /// The shard of this process.
     pub shard: Shard,
 }
 
-/// The key of an episode among those of a model.
+/// The key of an episode within a model's recordings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Key {
     pub experiment: Experiment,
@@ -35,12 +35,12 @@ pub struct Key {
     pub repetition: i32,
 }
 
-/// Whose episodes they are: a model, under a condition where one is named.
+/// The subject of episodes: a model, under a named or the default condition.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Subject {
     /// The name shown in tables.
     pub model: String,
-    /// The condition that the study varies besides the model; the default one if absent.
+    /// The condition that the study varies besides the model; absent for the default one.
     pub condition: Option<String>,
 }
 
@@ -50,7 +50,7 @@ impl Subject {
         Self { model: model.to_owned(), condition: None }
     }
 
-    /// The subject as part of a file's name: `oracle`, `oracle@near`. No model's own name has an `@` in it there.
+    /// The subject as part of a file name: `oracle`, `oracle@near`. A model's slug contains no `@`.
     pub fn slug(&self) -> String {
         match &self.condition {
             None => slug(&self.model),
@@ -60,34 +60,34 @@ impl Subject {
 }
 
 impl Key {
-    /// The first time that a scene is played.
+    /// The first repetition of a scene.
     pub const fn first(experiment: Experiment, seed: i32, run: i32) -> Self {
         Self { experiment, seed, run, repetition: FIRST }
     }
 
-    /// The episode's id: `E1/oracle/s1/r3`, under a condition `E1/oracle@near/s1/r3`, the second time `E1/oracle/s1/r3/x2`.
+    /// The episode's id: `E1/oracle/s1/r3`, with a condition `E1/oracle@near/s1/r3`, repeated `E1/oracle/s1/r3/x2`.
     pub fn episode_id(self, subject: &Subject) -> String {
         let Self { experiment, seed, run, repetition } = self;
         let again = if repetition > FIRST { format!("/x{repetition}") } else { String::new() };
         format!("{}/{}/s{seed}/r{run}{again}", experiment.name(), subject.slug())
     }
 
-    /// The name of a file of the episode, without its ending: `E1-oracle-s1-r3`.
+    /// The stem of the episode's file names: `E1-oracle-s1-r3`.
     pub fn file_stem(self, subject: &Subject) -> String {
         self.episode_id(subject).replace('/', "-")
     }
 
-    /// A number for the agent's chances: differs between episodes, and from what the world is drawn by.
+    /// The seed of the agent's randomness: differs between episodes, and from the world's seeds.
     pub fn agent_seed(self) -> u64 {
         let part = |value: i32| u64::from(value.unsigned_abs());
-        // Turned, not shifted: the number of a lab's own experiment has all bits.
+        // Rotated, not shifted: the number of a user's own experiment has all bits.
         let experiment = self.experiment.number().rotate_left(56);
         let again = part(self.repetition - FIRST) << 10;
         experiment ^ (part(self.seed) << 24) ^ again ^ part(self.run) ^ 0x6d69_7272_6f72
     }
 }
 
-/// A model's name as part of a file's name: lower case, everything but letters and digits as `-`.
+/// A model's name as part of a file name: lower case, with `-` for everything but letters and digits.
 pub fn slug(model: &str) -> String {
     let mut slug = String::new();
     for c in model.chars().flat_map(char::to_lowercase) {
@@ -102,7 +102,7 @@ pub fn slug(model: &str) -> String {
 }
 
 impl Plan {
-    /// The episodes of this share, by experiment, seed, run and repetition.
+    /// The episodes of this shard, by experiment, seed, run and repetition.
     pub fn keys(&self) -> Vec<Key> {
         let (seeds, runs, repeats) = (self.seeds, self.runs, self.repeats);
         let all = self.experiments.iter().flat_map(move |experiment| {
@@ -130,7 +130,7 @@ impl Shard {
     }
 }
 
-/// A text that names no share, or no experiments.
+/// A text that names no shard or no experiments.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("expected {expected}, found `{found}`")]
 pub struct NotAPlan {
@@ -150,12 +150,12 @@ impl FromStr for Shard {
     }
 }
 
-/// Experiments as typed: `E1`, `E1..E5`, `E1,E3`, a file such as `mine.toml`, or several of these with commas; each once,
-/// in their order.
+/// Experiments as typed: `E1`, `E1..E5`, `E1,E3`, a file such as `mine.toml`, or several of these with commas; without
+/// duplicates, in order.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Experiments(pub Vec<Named>);
 
-/// One of several experiments as typed.
+/// A typed experiment, or a file of experiments.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Named {
     BuiltIn(Experiment),
@@ -163,7 +163,7 @@ pub enum Named {
 }
 
 impl Experiments {
-    /// As typed, where the name of a file may have any bytes.
+    /// Parses typed experiments, for file names with arbitrary bytes.
     #[cfg(unix)]
     pub fn of(typed: &OsStr) -> Result<Self, NotAPlan> {
         use std::os::unix::ffi::OsStrExt as _;

@@ -1,8 +1,8 @@
-//! The episodes that a recording has still to take.
+//! The remaining episodes of a recording.
 //!
-//! Rule: an episode is taken with its lock, so that processes that record the same episodes divide them. One that another
-//! process has is asked for again until it is recorded, or that process has given it back or has ended. An experiment is
-//! complete, and given once, when all of its episodes are recorded, by whomever, or lost.
+//! Rule: taking an episode locks it, so that processes recording the same episodes divide them. An episode held by
+//! another process is tried again until it is recorded or released, or that process has ended. An experiment is
+//! complete, and returned once, when all of its episodes are recorded, by any process, or lost.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -25,9 +25,9 @@ pub struct Queue<'a> {
 #[derive(Debug)]
 struct Waiting {
     keys: VecDeque<Key>,
-    /// Those that other processes have recorded since.
+    /// Episodes that other processes have recorded since.
     elsewhere: Vec<Key>,
-    /// Those that nobody is left to play.
+    /// The number of episodes without a player.
     left_out: usize,
     experiments: BTreeMap<Experiment, Outcomes>,
     complete: Vec<Complete>,
@@ -41,13 +41,13 @@ struct Outcomes {
     lost: Vec<(Key, LostEpisode)>,
 }
 
-/// An experiment of which no episode is left.
+/// An experiment without remaining episodes.
 #[derive(Debug)]
 pub struct Complete {
     pub experiment: Experiment,
-    /// Its episodes that are recorded now.
+    /// Its recorded episodes.
     pub recorded: Vec<Key>,
-    /// Its episodes that were lost.
+    /// Its lost episodes.
     pub lost: Vec<(Key, LostEpisode)>,
 }
 
@@ -75,26 +75,26 @@ impl Waiting {
 #[derive(Debug)]
 pub enum Next {
     Play(Key, EpisodeLock),
-    /// Ask again later: other processes have all that are left.
+    /// Ask again later: other processes have all remaining episodes.
     Held(Held),
-    /// Ask again later: who is to play those that are left plays others now.
+    /// Ask again later: the players of the remaining episodes are busy.
     Later,
-    /// Nothing: all are taken.
+    /// None: all are taken.
     Nothing,
 }
 
-/// Episodes that other processes have.
+/// Episodes held by other processes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Held {
     /// One of them.
     pub key: Key,
-    /// The id of the process that has it, as far as it is known.
+    /// The id of the process that has it, if known.
     pub process: Option<u32>,
     pub count: usize,
 }
 
 impl<'a> Queue<'a> {
-    /// These episodes, in this order.
+    /// A queue of these episodes, in this order.
     pub fn new(store: &'a Store, keys: &[Key]) -> Self {
         let mut experiments = BTreeMap::<Experiment, Outcomes>::new();
         for key in keys {
@@ -110,7 +110,7 @@ impl<'a> Queue<'a> {
         self.waiting().experiments.keys().copied().collect()
     }
 
-    /// The next episode whose turn it is, with its lock.
+    /// The next playable episode, with its lock.
     pub fn next(&self, turn: impl Fn(Key) -> Turn) -> Result<Next, StoreError> {
         let mut waiting = self.waiting();
         let (mut held, mut at, mut is_later) = (None, 0, false);
@@ -146,22 +146,22 @@ impl<'a> Queue<'a> {
         Ok(held.map_or(nothing, |(key, process)| Next::Held(Held { key, process, count })))
     }
 
-    /// Takes back an episode whose player has left.
+    /// Returns an episode whose player has left to the queue.
     pub fn again(&self, key: Key) {
         self.waiting().keys.push_back(key);
     }
 
-    /// The number of episodes that nobody is left to play.
+    /// The number of episodes without a player.
     pub fn left_out(&self) -> usize {
         self.waiting().left_out
     }
 
-    /// Notes that an episode which was taken is recorded, or lost.
+    /// Notes that a taken episode is recorded or lost.
     pub fn ended(&self, key: Key, lost: Option<LostEpisode>) {
         self.waiting().end(key, lost);
     }
 
-    /// The experiments that have become complete since this was last asked.
+    /// The experiments completed since the last call.
     pub fn complete(&self) -> Vec<Complete> {
         std::mem::take(&mut self.waiting().complete)
     }
@@ -170,7 +170,7 @@ impl<'a> Queue<'a> {
         !self.waiting().keys.is_empty()
     }
 
-    /// The episodes that other processes have recorded meanwhile.
+    /// The episodes that other processes have recorded in the meantime.
     pub fn elsewhere(&self) -> Vec<Key> {
         self.waiting().elsewhere.clone()
     }

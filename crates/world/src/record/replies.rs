@@ -1,4 +1,4 @@
-//! The replies of a recording under way: how many gave no decision, and what the first of those says.
+//! The replies of a recording under way: the number without a decision, and the first of these.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -10,10 +10,10 @@ use exact::escape::visible;
 use trace::episode::Step;
 use trace::replies::ReplyCounts;
 
-/// Characters of a reply that are shown.
+/// Characters of a reply to show.
 const SHOWN: usize = 200;
 
-/// Replies as they come, from any thread.
+/// Replies in order of arrival, from any thread.
 #[derive(Debug, Default)]
 pub struct Replies(Mutex<Found>);
 
@@ -49,7 +49,7 @@ pub struct UnreadableReply {
 }
 
 impl Replies {
-    /// Adds the reply of a step. Gives the reply back if it is the first one that came and gave no decision.
+    /// Adds the reply of a step. Returns it if it is the first to arrive without a decision.
     pub fn add(&self, subject: &Subject, key: Key, step: i32, row: &Step) -> Option<UnreadableReply> {
         let status = row.extra.reply_status.as_deref()?;
         let mut found = self.found();
@@ -69,7 +69,7 @@ impl Replies {
         self.found().counts.clone()
     }
 
-    /// The answer about them.
+    /// The counts and the first unreadable reply.
     pub fn answer(&self) -> RepliesAnswer {
         let found = self.found();
         RepliesAnswer {
@@ -90,7 +90,7 @@ impl UnreadableReply {
         Self { episode_id: key.episode_id(subject), step, status: status.to_owned(), text, fault }
     }
 
-    /// The reply, its place, and the reason why it gave no decision, in words.
+    /// The reply, its location, and the reason for the missing decision, in words.
     pub fn words(&self) -> String {
         let text = self.text.as_ref().map_or_else(|| "no text".to_owned(), |text| format!("`{text}`"));
         let fault = self.fault.as_ref().map_or_else(String::new, |fault| format!(": {fault}"));

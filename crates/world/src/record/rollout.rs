@@ -1,7 +1,7 @@
 //! One episode, from the first frame to the last step.
 //!
-//! Row t of the trace is what was in view before step t, and what was then decided; `bumped` says whether that decision
-//! was stopped, and the agent hears of it at t + 1.
+//! Row t of the trace has the view before step t and the decision made then. `bumped` says whether that action was
+//! blocked, which the agent learns at t + 1.
 
 use std::cell::RefCell;
 use std::sync::Arc;
@@ -32,7 +32,7 @@ pub trait Observer {
     fn done(&mut self, t: i32, row: &Step) -> Result<(), RecordError>;
 }
 
-/// Looks on where nothing is kept.
+/// An observer that does nothing.
 #[derive(Clone, Copy, Debug)]
 pub struct Nobody;
 
@@ -50,17 +50,17 @@ impl Observer for Nobody {
 #[derive(Debug)]
 pub struct Stage<'a> {
     pub config: &'a WorldConfig,
-    /// The thread's eye; `None` where nobody looks at pictures.
+    /// The thread's camera; `None` if no pictures are needed.
     pub eye: Option<&'a RefCell<Camera>>,
-    /// The agent sees what is drawn.
+    /// True if the agent sees the frames.
     pub looks: bool,
-    /// The recording is to stop.
+    /// Set when the recording is to stop.
     pub stop: &'a AtomicBool,
     pub shares: &'a Shares,
 }
 
 impl Stage<'_> {
-    /// The renderer of the frames that the agent sees; `None` for one that sees none.
+    /// The renderer of the frames that the agent sees; `None` if it sees none.
     pub fn renderer(&self) -> Option<Renderer> {
         self.eye.filter(|_| self.looks).map(|eye| eye.borrow().drawn_by().clone())
     }
@@ -76,7 +76,7 @@ pub fn task(config: &WorldConfig, scene: &Scene, key: Key) -> Task {
     }
 }
 
-/// The episode of a key as it begins: its constants, without steps.
+/// The episode of a key at its start: its constants, without steps.
 pub fn head(config: &WorldConfig, scene: &Scene, key: Key, subject: &Subject) -> Episode {
     Episode {
         episode_id: key.episode_id(subject),
@@ -97,19 +97,19 @@ pub fn head(config: &WorldConfig, scene: &Scene, key: Key, subject: &Subject) ->
     }
 }
 
-/// An episode that was played to its end.
+/// An episode played to its end.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Played {
     pub episode: Episode,
-    /// The id of the model as the provider returned it with the first answer; `None` where nothing is returned.
+    /// The model's id as the provider returned it with the first answer; `None` if no id was returned.
     pub model: Option<String>,
-    /// Another id that came later in the episode, and the step of its first answer.
+    /// A different id later in the episode, and the step of its first answer.
     pub other_model: Option<(i32, String)>,
     /// True if a hand has reached its mark, which ends an episode.
     pub is_reached: bool,
 }
 
-/// Plays an episode to its end: `done`, a mark that is reached, or the last step of the budget.
+/// Plays an episode to its end: `done`, a reached mark, or the last step of the budget.
 pub async fn play(
     stage: &Stage<'_>,
     world: &mut World,
@@ -151,7 +151,7 @@ pub async fn play(
                 other_model = Some((t, answering.clone()));
             }
         }
-        // A reply without a decision has no thought to take the place of the last one.
+        // A reply without a decision does not replace the last thought.
         if action.is_some() {
             thought.clone_from(&reply.words.summary);
         }
@@ -165,7 +165,7 @@ pub async fn play(
         let start = Instant::now();
         bumped = world.act(action).bumped;
         stage.shares.visibility(start);
-        // The observation is gone, so that nothing is copied.
+        // Dropping the observation first avoids a copy.
         drop(observation);
         Arc::make_mut(&mut past).push(Past { action, bumped, thought: own_thought });
         row.extra.bumped = Some(bumped);
@@ -191,7 +191,7 @@ fn nothing() -> Arc<Frame> {
     Arc::new(Frame::new(0, 0, Vec::new()))
 }
 
-/// The row of a step, `bumped` left open.
+/// The row of a step, without `bumped`.
 fn row(world: &World, key: Key, t: i32, visibility: &Visibility, reply: Reply) -> Step {
     let counts = columns::by_column(world, visibility);
     let px = |column: &str| counts.iter().find(|(name, _)| *name == column).map(|(_, px)| *px);

@@ -1,8 +1,8 @@
-//! Threads, and the episodes each has under way.
+//! Threads, and their episodes under way.
 //!
-//! A thread has one eye and one queue of its own; where agents wait for a network or a program, several of its episodes
-//! are under way, and the eye serves whichever is ready. A scripted agent never waits, so that its episode runs to its
-//! end in one go. An agent that cannot answer stops the recording, as Ctrl-C does.
+//! A thread has one camera and one queue. If agents wait for a network or a program, several of its episodes are under
+//! way, and the camera serves those that are ready. A scripted agent never waits, so its episode runs without
+//! interruption. An agent that cannot answer stops the recording, as Ctrl-C does.
 
 use std::cell::RefCell;
 use std::io;
@@ -34,22 +34,22 @@ use trace::episode_hash;
 
 /// Events of a running recording, reported by its threads.
 pub trait Progress: Sync {
-    /// A step of an episode was played: its number, from 1, and its row.
+    /// Receives a played step of an episode: its number, from 1, and its row.
     fn step(&self, episode: Key, t: i32, row: &Step);
     fn episode(&self, key: Key, id: &str, steps: usize);
     fn model_changed(&self, id: &str, t: i32, before: &str, after: &str);
     fn lost(&self, id: &str, reason: &str);
-    /// Nothing is left to do but episodes that other processes have; this one is among them. Told again and again.
+    /// Only episodes held by other processes remain; this is one of them. Called repeatedly.
     fn waiting(&self, id: &str, held: Held);
 }
 
-/// The seed of what is practised; those of recordings are smaller.
+/// The seed of practice episodes; those of recordings are smaller.
 const PRACTICE_SEED: i32 = 9_000;
 
-/// The time between two looks at episodes that other processes have.
+/// The interval of checks for episodes held by other processes.
 const AGAIN: Duration = Duration::from_millis(50);
 
-/// Whether a thread asks again for episodes that it could not take.
+/// The handling of episodes that a thread could not take: ask again, or not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Wait {
     No,
@@ -57,60 +57,60 @@ enum Wait {
     Held(Held),
 }
 
-/// How a recording is run.
+/// The settings of a recording.
 #[derive(Clone, Copy, Debug)]
 pub struct Settings {
-    /// Threads, each with an eye of its own.
+    /// Threads, each with a camera.
     pub threads: NonZeroUsize,
     /// Episodes under way at once, over all threads.
     pub in_flight: NonZeroUsize,
-    /// True if frames are drawn for agents that do not look, and are kept in the log.
+    /// True if frames are drawn and logged even for agents that do not look.
     pub frames: bool,
     /// True if a log is written.
     pub log: bool,
-    /// Replies in a row without a decision that end the recording; `None` for no number.
+    /// The number of consecutive replies without a decision that ends the recording; `None` for no limit.
     pub max_unusable: Option<NonZeroU32>,
 }
 
 /// The outcomes of the episodes.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
-    /// Episodes that were recorded now.
+    /// Episodes recorded by this start.
     pub recorded: Vec<Key>,
-    /// Their steps.
+    /// The number of their steps.
     pub steps: u64,
-    /// Episodes that were lost, and why.
+    /// Lost episodes, with reasons.
     pub lost: Vec<(Key, LostEpisode)>,
-    /// Episodes that were under way when the recording was stopped.
+    /// Episodes under way when the recording was stopped.
     pub under_way: Vec<Key>,
-    /// A limit of what may be spent stopped it.
+    /// True if a spending limit stopped it.
     pub by_limit: bool,
-    /// Episodes that are not played, since their participants have left.
+    /// The number of episodes not played because their participants have left.
     pub left_out: usize,
-    /// Episodes that other processes recorded meanwhile.
+    /// Episodes that other processes recorded in the meantime.
     pub elsewhere: Vec<Key>,
-    /// The recording was stopped before its end.
+    /// True if the recording was stopped before its end.
     pub stopped: bool,
-    /// The reason why it was, if the agent could not answer.
+    /// The reason for the stop, if the agent could not answer.
     pub given_up: Option<GivenUp>,
 }
 
-/// One recording under way: what its threads share.
+/// One recording under way: the shared state of its threads.
 pub struct Recording<'a> {
     pub config: &'a WorldConfig,
     pub player: &'a dyn Player,
     pub subject: &'a Subject,
     pub store: &'a Store,
-    /// Told of everything.
+    /// The receiver of all events.
     pub progress: &'a dyn Progress,
-    /// The recording is to stop.
+    /// Set when the recording is to stop.
     pub stop: &'a AtomicBool,
     pub shares: &'a Shares,
     pub settings: Settings,
 }
 
 fn check_descriptors(threads: usize, in_flight: usize) -> io::Result<()> {
-    /// Of libraries, and of each thread and episode under way, at least.
+    /// The minimum number of files that libraries open; threads and episodes under way add theirs.
     const LIBRARIES: usize = 16;
     let needed = LIBRARIES + 8 * threads + 2 * in_flight;
     match open_file_limit() {
@@ -121,7 +121,7 @@ fn check_descriptors(threads: usize, in_flight: usize) -> io::Result<()> {
     }
 }
 
-/// The limit of open files of this process; `None` where it is not known.
+/// The limit of open files of this process; `None` if unknown.
 fn open_file_limit() -> Option<u64> {
     #[cfg(unix)]
     return nix::sys::resource::getrlimit(nix::sys::resource::Resource::RLIMIT_NOFILE).ok().map(|(soft, _)| soft);
@@ -161,7 +161,7 @@ impl Recording<'_> {
         Ok(tally)
     }
 
-    /// One thread: its eye, and up to `each` episodes under way.
+    /// One thread: its camera, and up to `each` episodes under way.
     fn thread(&self, queue: &Queue<'_>, unusable: &Unusable, each: usize) -> Result<Tally, RecordError> {
         let start = Instant::now();
         let result = self.episodes(queue, unusable, each);
@@ -205,16 +205,16 @@ impl Recording<'_> {
         Ok(tally)
     }
 
-    /// Puts together the experiments that have become complete, so that they can be looked at while others are played.
+    /// Assembles the newly complete experiments, so that they can be viewed while others are played.
     fn assemble(&self, queue: &Queue<'_>) {
         for Complete { experiment, recorded, lost } in queue.complete() {
-            // What fails here is tried again at the end of the recording, and told there; no episode need be lost for it.
+            // Failures here are retried and reported at the end of the recording; no episode need be lost.
             let _ = self.store.note_lost(&recorded, lost);
             let _ = self.store.assemble(experiment);
         }
     }
 
-    /// Takes episodes until so many are under way; says whether those that are left are to be asked for again.
+    /// Takes episodes up to the limit under way; returns whether to ask again for the remaining ones.
     fn take_up<F>(
         &self,
         queue: &Queue<'_>,

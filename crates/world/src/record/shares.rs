@@ -1,9 +1,9 @@
-//! The time of a recording, by part.
+//! The time of a recording by activity.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-/// The time of a recording by part, over all threads.
+/// The time of a recording by activity, over all threads.
 #[derive(Debug, Default)]
 pub struct Shares {
     rendering: AtomicU64,
@@ -12,7 +12,7 @@ pub struct Shares {
     all: AtomicU64,
 }
 
-/// The form of a share of the time.
+/// The total times by activity.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Spent {
     /// Drawing frames.
@@ -21,7 +21,7 @@ pub struct Spent {
     pub visibility: Duration,
     /// Writing logs and parts.
     pub writing: Duration,
-    /// The rest of the threads' time: agents that decide, and waiting for those that decide elsewhere.
+    /// The rest of the threads' time: deciding agents, and waiting for external ones.
     pub agent: Duration,
 }
 
@@ -38,7 +38,7 @@ impl Shares {
         add(&self.writing, start);
     }
 
-    /// All that a thread has done since it began.
+    /// Adds a thread's total time since its start.
     pub(super) fn thread(&self, start: Instant) {
         add(&self.all, start);
     }

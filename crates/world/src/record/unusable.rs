@@ -1,8 +1,8 @@
-//! Ends the recording of an agent that cannot answer: a model that declines everything, a program that prints no JSON.
+//! Stops the recording of an agent that cannot answer: a model that refuses everything, a program that prints no JSON.
 //!
-//! Rule: a reply without a decision is unusable. So many of them in a row stop the recording: in a row within one episode,
-//! or in a row over the recording as they come. With one episode under way the second holds the first. With several,
-//! the first does not depend on what happens elsewhere, and which episodes are whole by the time of the second does.
+//! Rule: a reply without a decision is unusable. Consecutive ones stop the recording, counted per episode and in order
+//! of arrival. With one episode under way the second count includes the first. With several, the first is independent
+//! of other episodes; which ones are complete at the second is not.
 
 use std::fmt;
 use std::num::NonZeroU32;
@@ -39,7 +39,7 @@ impl fmt::Display for GivenUp {
     }
 }
 
-/// The unusable replies in a row over a recording.
+/// The consecutive unusable replies of a recording.
 #[derive(Debug)]
 pub(super) struct Unusable {
     most: Option<NonZeroU32>,
@@ -53,13 +53,13 @@ struct Found {
 }
 
 impl Unusable {
-    /// Nothing is counted yet; `most` in a row end the recording.
+    /// A count of zero; `most` consecutive replies end the recording.
     pub(super) fn new(most: Option<NonZeroU32>) -> Self {
         Self { most, found: Mutex::default() }
     }
 
-    /// Counts the reply of a step; `in_episode` are those in a row of its episode before it. Says whether the recording
-    /// is to stop for it.
+    /// Counts the reply of a step; `in_episode` is the number of consecutive ones of its episode before it. Returns
+    /// true if the recording is to stop.
     pub(super) fn add(&self, subject: &Subject, key: Key, t: i32, row: &Step, in_episode: &mut u32) -> bool {
         let Some(status) = row.extra.reply_status.as_deref() else { return false };
         let mut found = self.found.lock().unwrap_or_else(PoisonError::into_inner);
@@ -97,7 +97,7 @@ mod tests {
         Step { extra: Extra { reply_status: Some(status.to_owned()), reply, ..Extra::default() }, ..Step::default() }
     }
 
-    /// Gives replies of these episodes and statuses, and says after how many the recording stops.
+    /// Adds replies of these episodes and statuses; returns the number after which the recording stops.
     fn stops_after(most: u32, replies: &[(i32, &str)]) -> (Option<usize>, Unusable) {
         let unusable = Unusable::new(NonZeroU32::new(most));
         let mut in_episodes = [0; 4];
@@ -117,9 +117,9 @@ mod tests {
             (vec![bad(1), bad(1), bad(1), bad(1)], Some(3)),
             (vec![bad(1), bad(1), good(1), bad(1), bad(1)], None),
             (vec![bad(1), bad(1), (1, "repaired"), bad(1), (1, "refusal"), (1, "empty")], Some(6)),
-            // Over episodes one after the other.
+            // Over consecutive episodes.
             (vec![good(1), bad(1), bad(2), bad(3)], Some(4)),
-            // One episode among others that are well.
+            // One failing episode among healthy ones.
             (vec![bad(1), good(2), bad(1), good(2), bad(1)], Some(5)),
             (vec![bad(1), good(2), bad(2), good(1), bad(1), good(2), bad(2)], None),
         ] {

@@ -1,4 +1,4 @@
-//! A trace's worlds built anew, and its actions repeated in them.
+//! Rebuilds a trace's worlds and repeats its actions in them.
 
 use serde_json::Value as Json;
 
@@ -15,25 +15,25 @@ use trace::episode::{Episode, Extra, Step};
 use trace::palette::Color;
 use trace::schema::{self, Value};
 
-/// The most rays in a row and in a column of the grid that pixels are counted with.
+/// The maximum number of rays per row and per column of the visibility grid.
 pub const MOST_RAYS: u32 = 4096;
 
-/// A trace's metadata that a replay needs.
+/// The part of a trace's metadata that a replay needs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recipe {
-    /// The experiment, as the trace has it.
+    /// The experiment from the trace.
     pub experiment: Experiment,
     pub config: WorldConfig,
-    /// The same with the grid and the threshold that the trace's pixels were counted with: the recorded ones, unless they
-    /// were counted anew since.
+    /// The same configuration with the grid and threshold of the trace's pixel counts: the recorded ones, unless the
+    /// pixels were recounted.
     pub eye: WorldConfig,
 }
 
 impl Recipe {
-    /// Reads the value of `mirrorstats.recording`.
+    /// Parses the value of `mirrorstats.recording`.
     pub fn of(recording: Option<&Json>) -> Result<Self, ReplayError> {
         let recording = recording.ok_or(ReplayError::NoRecipe)?;
-        // First: a world of another version may lack what this one has.
+        // This check is first: a world of another version may lack values that this one has.
         let version = recording.get("scene_version").ok_or(ReplayError::NoRecipe)?;
         if *version != SCENE_VERSION {
             return Err(ReplayError::Scenes { found: version.to_string() });
@@ -53,7 +53,7 @@ impl Recipe {
         Ok(Self { experiment, config, eye })
     }
 
-    /// The world of an episode at its start, seen by an eye of this configuration.
+    /// The world of an episode at its start, with this configuration of the eye.
     pub fn world(&self, episode: &Episode, eye: &WorldConfig) -> Result<World, ReplayError> {
         let fault = |fault: String| ReplayError::World { episode: episode.episode_id.clone(), fault };
         let name = self.experiment.name();
@@ -83,7 +83,7 @@ fn counted_with(config: &WorldConfig, recording: &Json) -> WorldConfig {
     eye
 }
 
-/// Repeats an episode's actions; `look` is called before each step with the world and what can be seen.
+/// Repeats an episode's actions; calls `look` before each step with the world and its visibility.
 pub fn again<E: From<ReplayError>>(
     recipe: &Recipe,
     eye: &WorldConfig,
@@ -110,7 +110,7 @@ pub fn again<E: From<ReplayError>>(
     Ok(parted)
 }
 
-/// A column, what the trace has, and what the replay gives.
+/// A column, the trace's value, and the replay's value.
 type Compared<N = &'static str> = (N, String, String);
 
 fn differs<N: AsRef<str>>(episode: &Episode, t: i32, columns: &[Compared<N>]) -> Option<Divergence> {
@@ -161,7 +161,7 @@ fn poses(step: &Step, world: &World) -> Vec<Compared> {
     poses.chain(marks).collect()
 }
 
-/// The truths of the experiment's own answers; a trace of another program may have none.
+/// The true values of the experiment's own answers; other programs' traces may lack them.
 fn truths(episode: &Episode, step: &Step, world: &World, visibility: &Visibility) -> Vec<Compared<String>> {
     let condition = episode.condition.as_deref().unwrap_or("default");
     let mut again = Extra::default();

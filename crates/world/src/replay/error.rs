@@ -53,13 +53,13 @@ pub enum ReplayError {
     Apart { episode: String, trace: String, traced: String, log: PathBuf, logged: String },
     #[error("`{trace}`: {fault}")]
     InTrace { trace: String, fault: Box<Self> },
-    /// A trace, a log, the world or the disk refuses.
+    /// An error of a trace, a log, the world or the disk.
     #[error(transparent)]
     Other(#[from] Box<dyn std::error::Error + Send + Sync>),
 }
 
 impl ReplayError {
-    /// A trace and a log whose rows of an episode have other hashes.
+    /// A trace and a log with different hashes of an episode's rows.
     pub fn apart(episode: &str, (trace, traced): (&str, &str), (log, logged): (&Path, &str)) -> Self {
         let [episode, trace, traced, logged] = [episode, trace, traced, logged].map(str::to_owned);
         Self::Apart { episode, trace, traced, log: log.to_owned(), logged }

@@ -1,4 +1,4 @@
-//! One episode as a row of frames, out of a log or rendered again from a trace.
+//! One episode as a row of frames, from a log or rendered again from a trace.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -19,10 +19,10 @@ use trace::merge::{self, EpisodeRows};
 use trace::open::TraceSet;
 use trace::schema::RECORDING_KEY;
 
-/// The pixels of a frame: 2048 x 2048, each four bytes once it is drawn, from a file that may have few.
+/// The maximum pixels of a frame, 2048 x 2048: a small file may decode to many pixels of four bytes each.
 const LARGEST_FRAME: Limit = Limit::new("pixels in a frame", 1 << 22);
 
-/// The strip that is asked for.
+/// A requested strip.
 #[derive(Clone, Debug)]
 pub struct Strip {
     pub episode: String,
@@ -32,20 +32,20 @@ pub struct Strip {
 /// The steps of a strip.
 #[derive(Clone, Debug)]
 pub enum Steps {
-    /// So many, chosen to tell the story.
+    /// This number of steps, chosen to tell the story.
     Chosen(usize),
-    /// These.
+    /// These steps.
     Named(Vec<i32>),
 }
 
-/// An episode and the frames of some of its steps, PNG.
+/// An episode and the frames of some of its steps as PNG.
 struct Reel {
     episode: Episode,
     frames: BTreeMap<i32, Vec<u8>>,
 }
 
 impl Strip {
-    /// Draws the episode that one of these logs has, with its frames; `traces` are where it may be, too.
+    /// Draws the episode from the log that has it, with its frames; `traces` may have it too.
     pub fn from_logs(&self, logs: &[PathBuf], traces: &[Input]) -> Result<Option<Figure>, ReplayError> {
         for log in logs {
             if let Some(reel) = self.in_log(log)? {
@@ -56,7 +56,7 @@ impl Strip {
         Ok(None)
     }
 
-    /// Renders the episode that one of these traces has again, and draws it.
+    /// Renders the episode again from the trace that has it, and draws it.
     pub fn from_traces(&self, traces: &[Input]) -> Result<Option<Figure>, ReplayError> {
         self.in_traces(traces)?.map(|reel| self.draw(&reel)).transpose()
     }
@@ -104,7 +104,7 @@ impl Strip {
                 _ => {}
             }
         }
-        // A log without frames tells the story, but shows nothing: the trace renders it again.
+        // A log without frames has the moments but no pictures: the trace renders them again.
         let Some(head) = head.filter(|_| !frames.is_empty()) else { return Ok(None) };
         let (fingerprint, hash) = end.unwrap_or_default();
         match ended(*head, steps, fingerprint, hash) {
@@ -115,7 +115,7 @@ impl Strip {
         }
     }
 
-    /// Refuses a trace that has other rows of the episode than its log. A trace that cannot be read says nothing.
+    /// Rejects a trace whose rows of the episode differ from its log's. Unreadable traces are ignored.
     fn check_traces(&self, episode: &Episode, log: &Path, traces: &[Input]) -> Result<(), ReplayError> {
         let Some(logged) = &episode.episode_hash else { return Ok(()) };
         for trace in traces {
@@ -161,7 +161,7 @@ fn title(episode: &Episode) -> String {
 }
 
 fn still(t: i32, step: &Step, png: &[u8], moments: Vec<&'static str>) -> Result<Still, ReplayError> {
-    // Width and height stand at fixed places behind the signature.
+    // Width and height are at fixed offsets behind the signature.
     let pixels = |at: usize| png.get(at..at + 4).and_then(|bytes| Some(u32::from_be_bytes(bytes.try_into().ok()?)));
     let (Some(width), Some(height)) = (pixels(16), pixels(20)) else { return Err(ReplayError::NotPng(t)) };
     LARGEST_FRAME.check(u64::from(width) * u64::from(height)).map_err(|exceeded| ReplayError::Frame(t, exceeded))?;

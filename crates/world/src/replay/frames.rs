@@ -1,4 +1,4 @@
-//! Frames of an episode rendered again, where no log has them.
+//! Frames of an episode, rendered again if no log has them.
 
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
@@ -10,15 +10,14 @@ use super::error::ReplayError;
 use crate::sim::camera::Camera;
 use trace::episode::Episode;
 
-/// The rows of rays that visibility is counted with here, where nobody reads the counts: counting is what most of a replay's
-/// time goes to.
+/// The rows of rays for visibility here, where the counts are unused: counting takes most of a replay's time.
 const RAYS: u32 = 24;
 
 /// The end of a replay before its last step.
 enum Halt {
-    /// All wanted frames are there.
+    /// All requested frames are rendered.
     Done,
-    /// Something is wrong.
+    /// An error.
     Fault(ReplayError),
 }
 
@@ -28,7 +27,7 @@ impl From<ReplayError> for Halt {
     }
 }
 
-/// The frames of these steps, PNG, by t; `recording` is what the trace says of how it was recorded.
+/// The frames of these steps as PNG, by t; `recording` is the trace's metadata on its recording.
 pub fn frames(
     recording: Option<&Value>,
     episode: &Episode,
@@ -57,7 +56,7 @@ pub fn frames(
     }
 }
 
-/// Returns true if a trace says how its world was made, and this program can make it.
+/// Returns true if a trace describes its world, and this program can build it.
 pub fn is_recipe(recording: Option<&Value>) -> bool {
     Recipe::of(recording).is_ok()
 }

@@ -16,14 +16,14 @@ use trace::log::write::{EpisodeLog, Form, Placed, Solid, View};
 
 static CENSUS: LazyLock<Value> = LazyLock::new(|| schema_for!(Visibility).to_value());
 
-/// A step as a caller that looks on sees it.
+/// A step as seen by an observer.
 #[derive(Debug)]
 pub struct Seen<'a> {
     /// The timestep, from 1.
     pub t: i32,
     /// The world before the action.
     pub world: &'a World,
-    /// The picture, where one was drawn.
+    /// The picture, if one was drawn.
     pub frame: Option<&'a Arc<Frame>>,
     pub visibility: &'a Visibility,
 }
@@ -31,7 +31,7 @@ pub struct Seen<'a> {
 /// An error of writing a log.
 pub type LogFault = Box<dyn std::error::Error + Send + Sync>;
 
-/// The log of an episode under way.
+/// The log of an episode in progress.
 pub struct Log {
     seed: i32,
     run: i32,
@@ -40,20 +40,20 @@ pub struct Log {
 }
 
 impl Log {
-    /// Begins the log of an episode that will be at `path`.
+    /// Begins the log of an episode at `path`.
     pub fn begin(path: &Path, episode: &Episode) -> Result<Self, LogFault> {
         let (seed, run, repetition) = (episode.seed, episode.run, episode.repetition.unwrap_or(1));
         let file = EpisodeLog::create(path, episode, &CENSUS, time(seed, run, repetition, 0))?;
         Ok(Self { seed, run, repetition, file })
     }
 
-    /// The same for a log that nobody reads before it has ended: it takes less room.
+    /// Makes the log smaller, if it is not read before its end.
     #[must_use]
     pub fn in_large_chunks(self) -> Self {
         Self { file: self.file.in_large_chunks(), ..self }
     }
 
-    /// Adds what is seen before a step.
+    /// Adds the view before a step.
     pub fn seen(&mut self, seen: &Seen<'_>) -> Result<(), LogFault> {
         let png = seen.frame.map(|frame| frame.to_png()).transpose()?;
         let snapshot = seen.world.snapshot();
@@ -79,8 +79,8 @@ impl Log {
     }
 }
 
-/// When a step's frame was seen, ns: no clock, but a place of its own on the time line of the log. Another time of the same
-/// scene comes some thousandths of a second later.
+/// The time of a step's frame, ns: not a clock time, but a unique position on the log's time line. Repetitions of a
+/// scene follow some thousandths of a second later.
 pub fn frame_time(seed: i32, run: i32, repetition: i32, t: i32) -> i64 {
     const SECOND: i64 = 1_000_000_000;
     const MILLISECOND: i64 = 1_000_000;
@@ -88,7 +88,7 @@ pub fn frame_time(seed: i32, run: i32, repetition: i32, t: i32) -> i64 {
     (episode * 1_000 + i64::from(t)) * SECOND + i64::from(repetition - 1) * MILLISECOND
 }
 
-/// The time of a step in the log, which never lies before 0.
+/// The time of a step in the log, never below 0.
 fn time(seed: i32, run: i32, repetition: i32, t: i32) -> u64 {
     u64::try_from(frame_time(seed, run, repetition, t)).unwrap_or(0)
 }

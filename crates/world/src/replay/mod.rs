@@ -1,17 +1,17 @@
-//! A recorded episode again: re-simulated, as frames, as a film strip.
+//! Recorded episodes again: simulated, as frames, as a film strip.
 //!
 //! | file | what it knows |
 //! |---|---|
-//! | `verify` | traces compared with a replay; their frames, log and counts anew (feature `sim`, as the next five) |
+//! | `verify` | traces compared with a replay; new frames, logs and counts (feature `sim`, as the next five) |
 //! | `film_strip` | an episode as a row of frames |
 //! | `frames` | frames of an episode rendered again, some steps at a time |
-//! | `again` | a trace's worlds built anew, its actions repeated, every row compared with what comes of it |
-//! | `same_frames` | frames drawn again, compared with the digests of those that agents saw |
-//! | `log` | what an episode's log gets, step by step, by a recording or a replay |
-//! | [`reparse`] | recorded replies read again by the parser of this program |
-//! | [`moments`] | which steps of an episode tell its story |
+//! | `again` | a trace's worlds rebuilt, its actions repeated, every row compared |
+//! | `same_frames` | replayed frames compared with the digests of those that agents saw |
+//! | `log` | the content of an episode's log, step by step, from a recording or a replay |
+//! | [`reparse`] | recorded replies parsed again by this program |
+//! | [`moments`] | the key steps of an episode |
 //!
-//! Rule: a replay reads the trace alone; what it needs of the world is in the trace's footer.
+//! Rule: a replay reads only the trace, whose footer has all that it needs of the world.
 
 #[cfg(feature = "sim")]
 pub mod again;

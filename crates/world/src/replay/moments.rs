@@ -1,4 +1,4 @@
-//! The steps of an episode that tell its story.
+//! The key steps of an episode.
 
 use trace::episode::{Action, Episode};
 
@@ -22,7 +22,7 @@ impl Moment {
     }
 }
 
-/// The moments of an episode by their t, in the order of t; a moment that does not come is left out.
+/// The moments of an episode with their t, in order; moments that do not occur are left out.
 pub fn moments(episode: &Episode) -> Vec<(i32, Moment)> {
     let first = |holds: &dyn Fn(usize) -> bool| (0..episode.steps.len()).find(|at| holds(*at));
     let claims = |at: usize| episode.steps[at].self_color.as_deref().is_some_and(|color| color != "unknown");
@@ -37,7 +37,7 @@ pub fn moments(episode: &Episode) -> Vec<(i32, Moment)> {
     moments
 }
 
-/// Up to `count` steps that tell the story: the first, the last, the moments, and others evenly between.
+/// Up to `count` key steps: the first, the last, the moments, and others spread evenly between them.
 pub fn chosen(episode: &Episode, count: usize) -> Vec<i32> {
     let last = i32::try_from(episode.steps.len()).unwrap_or(i32::MAX);
     let mut chosen: Vec<i32> = moments(episode).into_iter().map(|(t, _)| t).collect();
@@ -49,7 +49,7 @@ pub fn chosen(episode: &Episode, count: usize) -> Vec<i32> {
         }
     }
     kept.sort_unstable();
-    // The middle of the widest gap, again and again.
+    // Splits the widest gap in the middle, repeatedly.
     while kept.len() < count {
         let gap = kept.windows(2).max_by_key(|pair| (pair[1] - pair[0], -pair[0]));
         match gap {

@@ -1,7 +1,7 @@
-//! Recorded replies read again by the parser of this program.
+//! Recorded replies parsed again by this program.
 //!
-//! Rule: recorded actions stay, since the world has answered them. An episode whose action would have been another one has
-//! diverged from the first such step on, and is named. A reply that the provider declined or cut off stays unchanged.
+//! Rule: recorded actions stay, since the world has reacted to them. An episode with a changed action diverges from the
+//! first such step on, and is listed. Replies that the provider refused or truncated stay unchanged.
 
 use std::path::Path;
 
@@ -64,7 +64,7 @@ pub struct Diverged {
     pub parsed: Option<&'static str>,
 }
 
-/// An error of parsing again.
+/// An error of reparsing.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages say it")]
 pub enum ReparseError {
@@ -80,7 +80,7 @@ pub enum ReparseError {
 }
 
 impl ReparseAnswer {
-    /// Reads the replies of traces again, and writes new traces into a folder that is there; their names must differ.
+    /// Reparses the replies of traces, and writes new traces into an existing folder; their names must differ.
     pub fn of(inputs: &[Input], folder: &Path) -> Result<(Self, Vec<Input>), ReparseError> {
         let mut answer = Self::default();
         let mut written = Vec::new();
@@ -147,7 +147,7 @@ fn recipe(input: &Input) -> Result<(Value, Experiment), ReparseError> {
 
 fn read_again(step: &Step, experiment: &Spec) -> Option<Reading> {
     let status = step.extra.reply_status.as_deref().and_then(Status::named)?;
-    // How the provider ended them is not in their text.
+    // Their text does not show how the provider ended them.
     if matches!(status, Status::Refusal | Status::Truncated) {
         return None;
     }
@@ -179,7 +179,7 @@ fn compared(step: &Step, experiment: &Spec) -> Vec<(String, Option<String>)> {
 fn put(step: &mut Step, reading: Reading, experiment: &Spec) {
     let extra = &mut step.extra;
     if step.selected_cube != reading.selected_cube {
-        // Its distance was to the recorded cube.
+        // The recorded distance was to the recorded cube.
         extra.cube_distance = None;
     }
     step.self_color = reading.self_color;

@@ -1,4 +1,4 @@
-//! Frames of a replay compared with those that the agent saw, by their digests.
+//! Frames of a replay, compared by digest with those that the agent saw.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -28,7 +28,7 @@ pub struct FramesAnswer {
 }
 
 impl FramesAnswer {
-    /// Adds a trace: what drew its frames, and what draws them now.
+    /// Adds a trace: the recorded and the current renderer of its frames.
     pub(super) fn add_trace(&mut self, recording: Option<&Value>, drawn_with: Option<&Renderer>) {
         self.tolerance = TOLERANCE;
         self.drawn_with = drawn_with.cloned();
@@ -39,7 +39,7 @@ impl FramesAnswer {
         }
     }
 
-    /// Compares a frame; gives the divergence if it is another picture.
+    /// Compares a frame; returns the divergence if the picture differs.
     pub(super) fn add(&mut self, (episode_id, t): (&str, i32), recorded: &str, frame: &Frame) -> Option<Divergence> {
         let drawn = frame.digest();
         match likeness(recorded, &drawn) {
@@ -60,7 +60,7 @@ impl FramesAnswer {
     }
 }
 
-/// Returns true if the trace has digests of the frames that its agents saw.
+/// Returns true if the trace has digests of its agents' frames.
 pub(super) fn has_digests(recording: Option<&Value>) -> bool {
     recording.is_some_and(|recording| recording["frame_digest"].is_string())
 }

@@ -1,4 +1,4 @@
-//! Traces replayed and compared with what was recorded; frames, logs and counts anew on the way.
+//! Replays traces and compares them with the recorded values; writes new frames, logs and counts on the way.
 
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
@@ -38,21 +38,21 @@ pub struct Recorded {
 pub struct Outputs {
     /// The folder for the frame of every step.
     pub frames: Option<PathBuf>,
-    /// The log.
+    /// The path of the log.
     pub log: Option<PathBuf>,
-    /// The trace with its visibility decided anew.
+    /// The trace with recomputed visibility.
     pub recount: Option<Recount>,
-    /// Frames are not compared with those that agents saw.
+    /// True if frames are not compared with those that agents saw.
     pub skip_frames: bool,
 }
 
-/// The new decision about visibility.
+/// The settings of recomputed visibility.
 #[derive(Clone, Debug)]
 pub struct Recount {
     pub out: PathBuf,
-    /// The threshold, pixels of the grid; the recorded one, scaled to the grid, where there is none.
+    /// The threshold, pixels of the grid; by default the recorded one, scaled to the grid.
     pub threshold: Option<u32>,
-    /// The grid of rays, width and height; the size of the view where there is none.
+    /// The grid of rays, width and height; by default the size of the view.
     pub grid: Option<(u32, u32)>,
 }
 
@@ -72,7 +72,7 @@ pub struct ReplayAnswer {
 }
 
 impl Recorded {
-    /// Reads traces, or one of their episodes.
+    /// Opens traces, or one of their episodes.
     pub fn open(files: &[Input], episode: Option<&str>) -> Result<Vec<Self>, ReplayError> {
         let set = TraceSet::open(files).map_err(ReplayError::other)?;
         let mut traces = Vec::new();
@@ -90,7 +90,7 @@ impl Recorded {
         Ok(traces)
     }
 
-    /// Replays the episodes and adds to `answer`; `save` writes a frame, PNG.
+    /// Replays the episodes and adds to `answer`; `save` writes a frame as PNG.
     pub fn replay<E: From<ReplayError>>(
         &self,
         outputs: &Outputs,
@@ -128,7 +128,7 @@ impl Recorded {
 }
 
 impl Recorded {
-    /// What draws the frames, if any are to be written or compared.
+    /// The camera, if frames are to be written or compared.
     fn camera(&self, outputs: &Outputs, answer: &mut ReplayAnswer) -> Result<Option<Camera>, ReplayError> {
         let is_written = outputs.frames.is_some() || outputs.log.is_some();
         let is_compared = has_digests(self.recording.as_ref()) && !outputs.skip_frames;
@@ -162,7 +162,7 @@ impl Recount {
     }
 }
 
-/// The player of a trace's episodes.
+/// The replay of a trace's episodes.
 struct Player<'a> {
     trace: &'a Recorded,
     outputs: &'a Outputs,
@@ -171,7 +171,7 @@ struct Player<'a> {
 }
 
 impl Player<'_> {
-    /// One episode, its log at `part`.
+    /// Replays one episode, with its log at `part`.
     fn episode<E: From<ReplayError>>(
         &mut self,
         episode: &Episode,
@@ -210,7 +210,7 @@ impl Player<'_> {
     }
 }
 
-/// The new counts, a value per step.
+/// The new counts, one value per step.
 #[derive(Default)]
 struct Counts {
     px: Vec<(&'static str, Vec<i32>)>,
@@ -219,7 +219,7 @@ struct Counts {
 
 impl Counts {
     fn add(&mut self, counts: Vec<(&'static str, i32)>, visible: bool) {
-        // The columns of a scene are the same at every step.
+        // A scene has the same columns at every step.
         self.px.resize_with(counts.len(), Default::default);
         for (values, (column, count)) in self.px.iter_mut().zip(counts) {
             values.0 = column;

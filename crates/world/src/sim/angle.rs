@@ -1,6 +1,6 @@
-//! Headings, sines and rotations that have the same last bit on every machine.
+//! Headings, sines and rotations that are bit-identical on every machine.
 //!
-//! Rule: multiplication, addition and square roots only, which IEEE 754 defines to the bit; no `sin` of a C library.
+//! Rule: only multiplication, addition and square roots, which IEEE 754 defines exactly; no `sin` of a C library.
 
 use serde::{Deserialize, Serialize};
 
@@ -34,7 +34,7 @@ fn sine_of_fifteens(fifteens: usize) -> f64 {
 }
 
 impl Heading {
-    /// The heading of this many steps of 30 degrees, full turns left out.
+    /// The heading of this many steps of 30 degrees, modulo full turns.
     pub const fn new(thirties: u8) -> Self {
         Self(thirties % HEADINGS)
     }
@@ -49,27 +49,27 @@ impl Heading {
         30.0 * f64::from(self.0)
     }
 
-    /// The heading after `thirties` steps to the left, or to the right where negative.
+    /// The heading after `thirties` steps to the left; negative to the right.
     #[must_use]
     pub fn turned(self, thirties: i8) -> Self {
         let turned = (i16::from(self.0) + i16::from(thirties)).rem_euclid(i16::from(HEADINGS));
         Self(u8::try_from(turned).expect("a remainder of 12 is less than 12"))
     }
 
-    /// The unit vector that faces so.
+    /// The unit vector of this heading.
     pub fn direction(self) -> [f64; 2] {
         let fifteens = 2 * usize::from(self.0);
         [sine_of_fifteens(fifteens + 6), sine_of_fifteens(fifteens)]
     }
 
-    /// The rotation about the vertical that turns +x to it.
+    /// The rotation about the vertical from +x to this heading.
     pub fn rotation(self) -> Quaternion {
         let half = usize::from(self.0);
         Quaternion([sine_of_fifteens(half + 6), 0.0, 0.0, sine_of_fifteens(half)])
     }
 }
 
-/// sin and cos of an angle between -90 and 90 degrees, by their series.
+/// sin and cos of an angle between -90 and 90 degrees, by series.
 pub fn sine_cosine(degrees: f64) -> (f64, f64) {
     let x = degrees * (std::f64::consts::PI / 180.0);
     let (mut sine, mut cosine) = (0.0, 0.0);
@@ -86,12 +86,12 @@ pub fn sine_cosine(degrees: f64) -> (f64, f64) {
     (sine, cosine)
 }
 
-/// A rotation as a unit quaternion (w, x, y, z), as MuJoCo writes them.
+/// A rotation as a unit quaternion (w, x, y, z), in MuJoCo's order.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quaternion(pub [f64; 4]);
 
 impl Quaternion {
-    /// The rotation about +y by an angle between -90 and 90 degrees: a limb that hangs down swings back where positive.
+    /// The rotation about +y by an angle between -90 and 90 degrees: a hanging limb swings back if positive.
     pub fn about_y(degrees: f64) -> Self {
         let (sine, cosine) = sine_cosine(degrees / 2.0);
         Self([cosine, 0.0, sine, 0.0])

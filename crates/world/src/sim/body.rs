@@ -1,7 +1,7 @@
-//! A humanoid in a room: where it stands, where it faces, and where its limbs are.
+//! A humanoid in a room: its position, direction and limbs.
 //!
 //! Rule: a body is upright and moves as a cylinder; its limbs have three positions, standing and the two halves of a
-//! stride, and none of them shows in one's own view.
+//! stride. None is visible in one's own view.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -28,7 +28,7 @@ impl Body {
         }
     }
 
-    /// The height by which legs rise in a stride, m: the toes of the humanoid would else go through the floor.
+    /// The height by which legs rise in a stride, m: otherwise the humanoid's toes would enter the floor.
     const fn lift(self) -> f64 {
         match self {
             Self::Mannequin => 0.0,
@@ -88,19 +88,19 @@ pub struct Figure {
 }
 
 impl Figure {
-    /// A body that has just been put there.
+    /// A body that has not moved yet.
     pub const fn standing(pose: Pose) -> Self {
         Self { pose, stride: Stride::Standing, steps: 0 }
     }
 
-    /// Goes there, with the next half of a stride.
+    /// Moves to a pose, with the next half of a stride.
     pub const fn step_to(&mut self, pose: Pose) {
         self.steps = self.steps.wrapping_add(1);
         self.stride = if self.steps % 2 == 1 { Stride::Left } else { Stride::Right };
         self.pose = pose;
     }
 
-    /// Turns on the spot, its limbs down.
+    /// Turns on the spot, with its limbs down.
     pub fn turn(&mut self, thirties: i8) {
         self.stride = Stride::Standing;
         self.pose.heading = self.pose.heading.turned(thirties);
@@ -111,7 +111,7 @@ impl Figure {
     }
 }
 
-/// A piece of the humanoid that moves as one.
+/// A rigid piece of the humanoid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[expect(missing_docs, reason = "each is the piece of its name")]
 pub enum Piece {
@@ -122,7 +122,7 @@ pub enum Piece {
     RightLeg,
 }
 
-// Every body has one of each; the names are those of `assets/world/mannequin.xml` and `humanoid.xml`.
+// Every body has one of each, named as in `assets/world/mannequin.xml` and `humanoid.xml`.
 names!(Piece {
     Trunk: "trunk",
     LeftArm: "left_arm",
@@ -147,7 +147,7 @@ impl Piece {
         }
     }
 
-    /// Its place in the room: its origin, which in the body's own frame is `joint`, and its rotation.
+    /// Its placement in the room: its rotation, and the position of its origin, which is `joint` in the body's frame.
     pub fn place(self, figure: &Figure, joint: [f64; 3], config: &BodyConfig) -> ([f64; 3], Quaternion) {
         let Pose { x, y, heading } = figure.pose;
         let [cosine, sine] = heading.direction();

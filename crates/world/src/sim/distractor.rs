@@ -1,6 +1,6 @@
 //! Another agent: walks about, turns away from walls and cubes, and lets bodies pass.
 //!
-//! Rule: what it does depends on its habit and on what is in its way, never on a clock; it never goes through anything.
+//! Rule: it reacts only to its habit and to obstacles, never to a clock; it never passes through anything.
 
 use super::body::Figure;
 use super::config::OthersConfig;
@@ -13,7 +13,7 @@ use super::scene::Other;
 pub struct Distractor {
     pub figure: Figure,
     chance: Rng,
-    /// Turns to make before it walks on; to the right where negative.
+    /// Turns to make before it walks on; negative to the right.
     turns: i8,
     /// Steps to walk before it turns.
     strides: u32,
@@ -21,7 +21,7 @@ pub struct Distractor {
 }
 
 impl Distractor {
-    /// One that is about to set out.
+    /// An agent about to start walking.
     pub fn new(other: &Other) -> Self {
         let mut chance = Rng::of_number(u64::from(other.habit));
         let strides = 2 + chance.below(6);

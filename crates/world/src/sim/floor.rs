@@ -1,6 +1,6 @@
-//! The room as a plan: where an upright cylinder may stand and pass.
+//! A floor plan: where an upright cylinder may stand and pass.
 //!
-//! Rule: a move is a straight line, and all of it must be clear, not its end alone.
+//! Rule: a move is a straight line, and the whole line must be clear, not only its end.
 
 /// An obstacle with its sides along the walls.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -12,13 +12,13 @@ pub struct Square {
 }
 
 impl Square {
-    /// From a point to the nearest of its sides; 0 inside, m.
+    /// The distance of a point from the nearest side; 0 inside, m.
     pub fn distance(&self, point: [f64; 2]) -> f64 {
         let [dx, dy] = [0, 1].map(|axis| ((point[axis] - self.center[axis]).abs() - self.half).max(0.0));
         (dx * dx + dy * dy).sqrt()
     }
 
-    /// From a line to the nearest of its sides; 0 where the line crosses it, m.
+    /// The distance of a line from the nearest side; 0 if they cross, m.
     fn distance_to_line(&self, from: [f64; 2], to: [f64; 2]) -> f64 {
         if self.is_crossed(from, to) {
             return 0.0;
@@ -49,7 +49,7 @@ impl Square {
     }
 }
 
-/// From a point to a line between two others, m.
+/// The distance of a point from a line between two others, m.
 pub fn distance_to_line(point: [f64; 2], from: [f64; 2], to: [f64; 2]) -> f64 {
     let along = [to[0] - from[0], to[1] - from[1]];
     let length = along[0] * along[0] + along[1] * along[1];
@@ -60,7 +60,7 @@ pub fn distance_to_line(point: [f64; 2], from: [f64; 2], to: [f64; 2]) -> f64 {
     (gap[0] * gap[0] + gap[1] * gap[1]).sqrt()
 }
 
-/// From a point to another, m.
+/// The distance between two points, m.
 pub fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
     let [dx, dy] = [a[0] - b[0], a[1] - b[1]];
     (dx * dx + dy * dy).sqrt()
@@ -78,7 +78,7 @@ pub struct FloorPlan {
 }
 
 impl FloorPlan {
-    /// Returns true if a body's axis may be at a point, `clearance` further from cubes than touching.
+    /// Returns true if a body's axis may be at a point, `clearance` more than touching away from cubes.
     pub fn admits(&self, spot: [f64; 2], clearance: f64) -> bool {
         spot.iter().all(|at| at.abs() <= self.reach)
             && self.squares.iter().all(|square| square.distance(spot) >= self.radius + clearance)
@@ -90,7 +90,7 @@ impl FloorPlan {
             && self.squares.iter().all(|square| square.distance_to_line(from, to) >= self.radius)
     }
 
-    /// Returns true if a body that goes straight from one point to another touches a body at `other`.
+    /// Returns true if a body moving straight from one point to another touches a body at `other`.
     pub fn is_blocked_by(&self, from: [f64; 2], to: [f64; 2], other: [f64; 2]) -> bool {
         distance_to_line(other, from, to) < 2.0 * self.radius
     }

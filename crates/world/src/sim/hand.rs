@@ -1,7 +1,7 @@
-//! The hand of a reaching task: where it is, and what stops it.
+//! The hand of a reaching task: its position and its obstacles.
 //!
-//! Rule: its place is whole steps from the mark along three directions (away from the camera, to the left of the picture,
-//! up), so that distances are exact integers. It never enters the body, the mirror's plane, the floor, the ceiling or a wall.
+//! Rule: its position is whole steps from the mark away from the camera, left in the picture and up, so distances are
+//! exact. It never enters the body, the mirror's plane, the floor, the ceiling or a wall.
 
 use super::body::Pose;
 use super::config::{WorldConfig, metres};
@@ -9,7 +9,7 @@ use super::scene::{BEFORE_MIRROR, HandStart, Patch, Scene, in_room};
 use crate::experiment::spec::{Hand, Part};
 use trace::episode::Action;
 
-/// Half of the body as a box, ahead and to the side, and its height, m.
+/// Half of the body's box ahead and to the side, and its height, m.
 const BODY: [f64; 3] = [0.12, 0.3, 1.62];
 
 /// The units and limits of a hand's steps.
@@ -23,7 +23,7 @@ pub(super) struct Place<'a> {
 }
 
 impl<'a> Place<'a> {
-    /// Of a scene; `None` where there is no hand.
+    /// The units and limits in a scene; `None` without a hand.
     pub fn of(scene: &Scene, config: &'a WorldConfig) -> Option<Self> {
         let patch = scene.marks.iter().find(|mark| mark.part == Part::Front)?.patch?;
         Some(Self { task: scene.experiment.hand?, patch, hand: scene.hand?, config, body: scene.start })
@@ -39,7 +39,7 @@ impl<'a> Place<'a> {
         in_room(self.body, self.local(from_mark))
     }
 
-    /// Returns true if it may be there.
+    /// Returns true if the hand may be there.
     pub fn is_free(&self, from_mark: [i32; 3]) -> bool {
         let half = self.hand.half();
         let [ahead, left, up] = self.local(from_mark);
@@ -55,13 +55,13 @@ impl<'a> Place<'a> {
         self.task.step_mm * from_mark.iter().map(|steps| steps.unsigned_abs()).sum::<u32>()
     }
 
-    /// Returns true if the mark counts as reached from there.
+    /// Returns true if the mark counts as reached from this position.
     pub fn is_reached(&self, from_mark: [i32; 3]) -> bool {
         self.distance_mm(from_mark) <= self.task.within * self.task.step_mm
     }
 }
 
-/// A step of a hand; `None` for what a body does.
+/// The step of a hand for an action; `None` for a body's actions.
 pub(super) fn step(action: Action) -> Option<[i32; 3]> {
     Some(match action {
         Action::HandForward => [1, 0, 0],

@@ -6,9 +6,9 @@
 //!                                                                Camera::frame ┘ (pixels; one renderer per thread)
 //! ```
 //!
-//! Rule: a world is a function of its configuration, experiment, seed, run and the actions taken in it. It draws whole
-//! numbers only, takes sines from its own tables, and reads no clock, so that it is the same on every machine.
-//! It knows no agent, no trace and no metric.
+//! Rule: a world is a function of its configuration, experiment, seed, run and the actions taken in it. It draws only
+//! whole numbers, takes sines from its own tables, and reads no clock, so it is the same on every machine. It knows no
+//! agent, no trace and no metric.
 
 pub mod angle;
 pub mod body;

@@ -1,13 +1,13 @@
-//! The world as MuJoCo has it: one model for all experiments, dressed for a scene and posed for a moment.
+//! The world in MuJoCo: one model for all experiments, adapted to a scene and posed for a moment.
 //!
 //! Every world has seven humanoids, twelve cubes, and for each of four panes a place and a humanoid that only it shows.
-//! Those that a scene lacks are hidden: in a group that neither picture nor rays include. So all models have one layout,
-//! and a renderer goes from world to world at no cost.
+//! Those that a scene lacks are in a hidden group, which pictures and rays exclude. So all models have one layout, and
+//! a renderer switches worlds at no cost.
 //!
-//! A scene has several stages: the room as the eye sees it directly, where panes are blank, and what is seen through each
-//! pane: the same room without the wall that the look comes through, with bodies where and how that pane shows them.
-//! MuJoCo itself draws one mirror at most; a stage per pane gives any number, late ones and false ones.
-//! Rule: the sizes of planes never change after compiling, because a renderer keeps them as they were; panes are boxes.
+//! A scene has several stages: the room as seen directly, with blank panes, and the view through each pane. The latter
+//! is the room without the pane's wall, with bodies where and how the pane shows them. MuJoCo draws at most one mirror;
+//! a stage per pane permits any number, including late and false ones.
+//! Rule: the sizes of planes never change after compiling, because a renderer caches them; panes are boxes.
 
 mod dress;
 mod shadow;
@@ -24,19 +24,19 @@ use super::config::{LightsConfig, WorldConfig};
 use super::scene::{MOST_CUBES, MOST_OTHERS, Scene};
 use crate::experiment::spec::{MOST_MARKS, MOST_PANES, Part};
 
-/// Humanoids of a room: the agent's own body, then the others.
+/// Humanoids in a room: the agent's own body, then the others.
 pub const AGENTS: usize = 1 + MOST_OTHERS;
 
 /// Humanoids in every model: those of the room, then one for each pane, which only that pane shows.
 pub const BODIES: usize = AGENTS + MOST_PANES;
 
-/// The camera that is the agent's eye.
+/// The agent's eye as a camera.
 pub const EYE_CAMERA: &str = "eye";
 
-/// The camera that sees through a pane: the eye's mirror image, or the eye in the second room.
+/// The camera for a pane: the eye's mirror image, or the eye in the second room.
 pub const BEYOND_CAMERA: &str = "beyond";
 
-/// The body that is the hand, and the beginning of the names of its shapes.
+/// The hand's body, and the prefix of its shapes' names.
 pub const HAND: &str = "hand";
 
 /// The square mark on the front of a body that stands still.
@@ -45,16 +45,16 @@ pub const PATCH: &str = "patch";
 /// The camera that sees the room from above.
 pub const TOP_CAMERA: &str = "top";
 
-/// Groups that MuJoCo's pictures and rays tell apart.
+/// Groups for MuJoCo's pictures and rays.
 pub mod group {
     /// Walls, floor and panes.
     pub const ROOM: i32 = 0;
     /// Cubes and other agents.
     pub const THINGS: i32 = 1;
     pub const EGO: i32 = 2;
-    /// The ceiling, through which the view from above looks.
+    /// The ceiling, which the view from above excludes.
     pub const CEILING: i32 = 3;
-    /// The geom group of things that a scene lacks; not drawn by MuJoCo's default.
+    /// The geom group of things that a scene lacks; MuJoCo does not draw it by default.
     pub const HIDDEN: i32 = 5;
 }
 
@@ -62,20 +62,20 @@ pub mod group {
 const LABELLED_PARTS: [u32; 3] = [40, 24, 2];
 
 const ROOM: &str = include_str!("../../../../assets/world/room.xml");
-/// The panels of textured walls, in place of what is matte.
+/// The panels of textured walls, instead of the matte material.
 const PANELS: &str = r#"<texture name="panels" type="2d" builtin="flat" mark="edge" rgb1="1 1 1" markrgb="0.72 0.72 0.74" width="64" height="64"/>
     <material name="panels" texture="panels" texuniform="true" texrepeat="0.9 0.9" specular="0" shininess="0" reflectance="0"/>
   </asset>"#;
 
-/// Bars of a frame: above, below, and at both sides.
+/// Bars of a frame: top, bottom and both sides.
 pub(super) const BARS: usize = 4;
 
 /// The paint of a model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Paint {
-    /// As the agent sees it: lit.
+    /// Lit, as the agent sees it.
     Lit,
-    /// Every pixel exactly the colour of what it shows: no light, no shade, no smoothing.
+    /// Every pixel has exactly the colour of its thing: no light, no shade, no smoothing.
     Labels,
 }
 
@@ -98,10 +98,10 @@ pub enum Item {
     Hand,
 }
 
-/// The viewer of a stage.
+/// The look of a stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Look {
-    /// By the eye: panes are blank.
+    /// Directly by the eye: panes are blank.
     Direct,
     /// Through the pane of this number.
     Through(usize),
@@ -110,9 +110,9 @@ pub enum Look {
 /// The moving things at one moment.
 #[derive(Clone, Copy, Debug)]
 pub struct Moment {
-    /// The step that comes next, from 1: which marks there are.
+    /// The next step, from 1, which determines the visible marks.
     pub t: u32,
-    /// The humanoids by their number; `None` for those that are not there.
+    /// The humanoids by number; `None` for absent ones.
     pub bodies: [Option<Figure>; BODIES],
     /// The pose of the camera behind a pane.
     pub beyond: Option<Pose>,
@@ -125,7 +125,7 @@ pub struct Moment {
 #[error("mujoco cannot build the world: {0}; the configuration or the library is at fault")]
 pub struct ModelError(#[from] MjEditError);
 
-/// A model dressed for a scene, and its state.
+/// A model adapted to a scene, and its state.
 pub struct Stage {
     pub(super) data: MjData<Arc<MjModel>>,
     model: Arc<MjModel>,
@@ -144,8 +144,8 @@ impl std::fmt::Debug for Stage {
 }
 
 impl Stage {
-    /// The stages of a scene, for pictures of the configured size: what the eye sees directly, then what it sees through
-    /// each pane.
+    /// The stages of a scene, for pictures of the configured size: the eye's direct view, then the view through each
+    /// pane.
     pub fn all(config: &WorldConfig, paint: Paint, scene: &Scene) -> Result<(Self, Vec<Self>), ModelError> {
         let model = compile(config, paint, [config.eye.width as usize, config.eye.height_px as usize])?;
         let stage = |look| Self::of(model.clone(), config, paint, scene, look);
@@ -187,7 +187,7 @@ impl Stage {
         self.marks_at = t;
     }
 
-    /// Its viewer.
+    /// The look of this stage.
     pub const fn look(&self) -> Look {
         self.look
     }
@@ -365,7 +365,7 @@ fn build_boxes(spec: &mut MjSpec, name: &str, count: usize, largest: f64, paint:
         geom.set_type(MjtGeomBase::mjGEOM_BOX);
         *geom.size_mut() = [largest / 2.0; 3];
         *geom.pos_mut() = [0.0, 0.0, -50.0];
-        // MuJoCo ignores what a scene says of a rotation that is invalid when compiled.
+        // MuJoCo ignores a scene's rotation if it was invalid when compiled.
         let quarter = std::f64::consts::FRAC_1_SQRT_2;
         *geom.quat_mut() = [quarter, 0.0, -quarter, 0.0];
         geom.set_contype(1);
@@ -384,7 +384,7 @@ fn add_eyes(spec: &mut MjSpec, config: &WorldConfig) {
         let camera = spec.body_mut(body).expect("every model has this body").add_camera();
         camera.set_name(name).expect("no other camera has this name");
         *camera.pos_mut() = place;
-        // Right is -y, up is z; then down by its pitch, about y.
+        // Right is -y and up is z; then the pitch about y.
         let level = Quaternion([0.5, 0.5, -0.5, -0.5]);
         *camera.quat_mut() = if eye.pitch > 0.0 { Quaternion::about_y(eye.pitch).after(level).0 } else { level.0 };
         camera.set_fovy(eye.fovy);
@@ -401,8 +401,8 @@ fn set_picture(spec: &mut MjSpec, config: &WorldConfig, paint: Paint, size: [usi
     (visual.global.offwidth, visual.global.offheight) = (width, height);
     let samples = if paint == Paint::Lit { config.eye.samples } else { 0 };
     visual.quality.offsamples = i32::try_from(samples).unwrap_or(0);
-    // Drawing takes its time by the triangles of round parts; a body is some hundred pixels high at most. Labels are what
-    // the rays are compared with, and are as round as it gets.
+    // Drawing time depends on the triangles of round parts, and a body is a few hundred pixels high at most. Labels are
+    // compared with rays, and are as round as possible.
     let parts = match paint {
         Paint::Lit => [config.eye.slices, config.eye.stacks, config.eye.quads],
         Paint::Labels => LABELLED_PARTS,
@@ -411,7 +411,7 @@ fn set_picture(spec: &mut MjSpec, config: &WorldConfig, paint: Paint, size: [usi
         parts.map(|count| i32::try_from(count).unwrap_or(i32::MAX));
 }
 
-/// Four equal lamps, one towards each wall, so that no wall is lit otherwise than another; one from below.
+/// Four equal lamps, one towards each wall, so that all walls are lit alike; one from below.
 fn light(spec: &mut MjSpec, config: &LightsConfig) {
     #[expect(clippy::cast_possible_truncation, reason = "a part of a colour")]
     let [ambient, diffuse, lamp, floor] =
@@ -421,7 +421,7 @@ fn light(spec: &mut MjSpec, config: &LightsConfig) {
     (head.ambient, head.diffuse, head.specular) = (ambient, diffuse, [0.0; 3]);
     let (down, ahead) = sine_cosine(config.lamp_slope);
     let lamps = (0..4).map(|wall| {
-        // A little off the walls' own directions, so that corners of cubes show.
+        // Slightly off the walls' own directions, so that corners of cubes are visible.
         let [x, y] = Heading::new(3 * wall + 1).direction();
         ([ahead * x, ahead * y, -down], lamp)
     });

@@ -1,7 +1,7 @@
-//! Drawing a scene: random places that never overlap and always leave the task solvable.
+//! Drawing a scene: random places without overlap, in which the task is always solvable.
 //!
-//! Rule: places are drawn on a grid of whole centimetres and kept or drawn again; where a drawing comes to no end, all
-//! of it starts anew from the same stream. What is kept depends on comparisons alone, never on the order of a sum.
+//! Rule: places are drawn on a grid of whole centimetres and accepted or drawn again. If a place cannot be found,
+//! everything restarts from the same stream. Acceptance depends only on comparisons, never on the order of a sum.
 
 mod panes;
 mod reach;
@@ -20,13 +20,13 @@ use crate::experiment::spec::{Colors, Cubes, Hand, Layout, Occluders, Paint, Sta
 use crate::experiment::{balance, number_of};
 use trace::palette::Color;
 
-/// Places that are drawn for one thing before all starts anew.
+/// The maximum number of draws for one thing before everything restarts.
 const ATTEMPTS: u32 = 400;
 
-/// Drawings of a whole scene before giving up.
+/// The maximum number of attempts at a whole scene.
 const DRAWINGS: u32 = 2000;
 
-/// The configuration leaves no room for all that must be placed.
+/// An error: the room is too small for all that must be placed.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "{} of seed {seed} and run {run} finds no place for all that stands in its room after {DRAWINGS} drawings: \
@@ -40,7 +40,7 @@ pub struct Crowded {
 }
 
 impl Scene {
-    /// Draws the scene of one episode. What the experiment says of lengths and counts lies over the configuration.
+    /// Draws the scene of one episode. The experiment's lengths and counts override the configuration.
     pub fn draw(config: &WorldConfig, experiment: Experiment, seed: i32, run: i32) -> Result<Self, Crowded> {
         let config = &config.of(experiment);
         let purpose = purpose(experiment);
@@ -70,11 +70,11 @@ impl Scene {
 pub struct DoesNotFit {
     pub what: String,
     pub help: String,
-    /// The mirror that is too wide, by its place in the file; `None` where something else has no room.
+    /// The mirror that is too wide, by its index in the file; `None` if something else has no room.
     pub mirror: Option<usize>,
 }
 
-/// The reason why an experiment does not fit into a room, found by drawing a study of it; `None` where it fits.
+/// The reason why an experiment does not fit into a room, found by drawing a study of it; `None` if it fits.
 pub fn crowded(config: &WorldConfig, experiment: Experiment) -> Option<DoesNotFit> {
     let world = config.of(experiment);
     let widest = world.room.size - 2.0 * world.placement.wall_margin;
@@ -108,18 +108,18 @@ pub fn crowded(config: &WorldConfig, experiment: Experiment) -> Option<DoesNotFi
     })
 }
 
-/// The seeds and runs of a study, the scenes by which an experiment is judged.
+/// The seeds and runs of a study, whose scenes serve to check an experiment.
 fn study() -> impl Iterator<Item = (i32, i32)> {
     (1..=3).flat_map(|seed| (1..=7).map(move |run| (seed, run)))
 }
 
-/// What cubes hide from the places before the mirror in a study's scenes.
+/// The occlusion by cubes, from the places before the mirror in a study's scenes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Occlusion {
     pub places: usize,
-    /// Those from which half of the body or more is hidden.
+    /// Places from which at least half of the body is hidden.
     pub hidden: usize,
-    /// The shares of the body that are hidden, over all places.
+    /// The sum of the hidden shares of the body over all places.
     pub shares: f64,
 }
 
@@ -132,7 +132,7 @@ impl Occlusion {
         }
     }
 
-    /// That of an experiment; `None` where its scenes do not fit into the room.
+    /// The occlusion of an experiment; `None` if its scenes do not fit into the room.
     pub fn of(config: &WorldConfig, experiment: Experiment) -> Option<Self> {
         study().try_fold(Self::default(), |sum, (seed, run)| {
             let scene = Scene::draw(config, experiment, seed, run).ok()?;
@@ -158,7 +158,7 @@ fn body_color(experiment: Experiment, purpose: u64, seed: i32, run: i32) -> Colo
     match experiment.layout.colors {
         Colors::Random => Rng::of(!purpose, seed, run).one_of(&palette),
         Colors::Balanced => {
-            // Another order of the colours for other scenes, the same for all of their seeds and runs.
+            // A different order of colours for other scenes, equal for all of their seeds and runs.
             shuffle(&mut palette, &mut Rng::of_number(purpose));
             palette[balance::index(palette.len(), seed, run)]
         }
@@ -178,7 +178,7 @@ struct Drawing<'a> {
 }
 
 impl Drawing<'_> {
-    /// A layout without seed and run; `None` where something found no place.
+    /// A layout without seed and run; `None` if a place was not found.
     fn scene(&mut self, experiment: Experiment, body_color: Color) -> Option<Scene> {
         let layout = &experiment.layout;
         let mirror = self.mirror(layout.wall);
@@ -359,10 +359,10 @@ impl Drawing<'_> {
     }
 }
 
-/// Returns true if any of the mirror is within the field of view, whatever stands before it.
+/// Returns true if any part of the mirror is within the field of view, ignoring occlusion.
 pub(super) fn is_in_view(config: &WorldConfig, mirror: MirrorPlace, pose: Pose) -> bool {
     const POINTS: i32 = 64;
-    // Towards the edge of the view, so that a mirror that almost shows counts.
+    // Widens the view at its edge, so that a mirror that is nearly visible counts.
     const MARGIN: f64 = 0.05;
     let (sine, cosine) = sine_cosine(config.eye.fovy / 2.0);
     let widest = sine / cosine * f64::from(config.eye.width) / f64::from(config.eye.height_px);

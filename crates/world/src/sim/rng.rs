@@ -1,6 +1,6 @@
 //! Draws: whole numbers from a permuted congruential generator, the same on every machine.
 //!
-//! Rule: no float is ever drawn, and every range is drawn without bias, by rejection.
+//! Rule: floats are never drawn, and every range is drawn without bias, by rejection.
 
 use rand::Rng as _;
 use rand_pcg::Pcg64;
@@ -10,7 +10,7 @@ use rand_pcg::Pcg64;
 pub struct Rng(Pcg64);
 
 impl Rng {
-    /// The stream of some whole numbers; other numbers, another stream.
+    /// The stream of these whole numbers; different numbers give different streams.
     pub fn of(purpose: u64, seed: i32, run: i32) -> Self {
         let episode = (u64::from(seed.cast_unsigned()) << 32) | u64::from(run.cast_unsigned());
         Self::of_number(mixed(episode) ^ purpose)
@@ -18,7 +18,7 @@ impl Rng {
 
     /// The stream of one number.
     pub fn of_number(number: u64) -> Self {
-        // Neighbouring numbers must not give neighbouring states, which the generator would show for a while.
+        // Neighbouring numbers must not give neighbouring states, which would be noticeable at first.
         let [low, high] = [mixed(number), mixed(mixed(number))];
         Self(Pcg64::new((u128::from(high) << 64) | u128::from(low), 0))
     }
@@ -27,7 +27,7 @@ impl Rng {
         self.0.next_u64()
     }
 
-    /// One of 0, 1, .. `below` - 1; 0 where `below` is 0.
+    /// One of 0, 1, .. `below` - 1; 0 if `below` is 0.
     pub fn below(&mut self, below: u32) -> u32 {
         if below == 0 {
             return 0;
@@ -47,7 +47,7 @@ impl Rng {
         least.saturating_add_unsigned(self.below(span))
     }
 
-    /// True in `percent` of a hundred draws.
+    /// True with a probability of `percent` in a hundred.
     pub fn happens(&mut self, percent: u32) -> bool {
         self.below(100) < percent
     }
@@ -61,7 +61,7 @@ impl Rng {
     }
 }
 
-/// A number whose every bit depends on every bit of the given one (the finalizer of `SplitMix64`).
+/// A mixed number in which every bit depends on every input bit (the finalizer of `SplitMix64`).
 const fn mixed(number: u64) -> u64 {
     let number = number.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let number = (number ^ (number >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

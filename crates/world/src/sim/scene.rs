@@ -1,8 +1,8 @@
 //! An episode's world at its start, as plain data.
 //!
-//! Rule: a scene is drawn from its configuration, experiment, seed and run alone. Experiments that share scenes draw the
-//! same layout from the same seed and run, as E1, E2 and E3 do: E2 leaves the mirror out, E3 adds a false statement, so
-//! that they compare in pairs.
+//! Rule: a scene is drawn only from its configuration, experiment, seed and run. Experiments with shared scenes draw
+//! the same layout from the same seed and run. E1, E2 and E3 do: E2 leaves the mirror out, E3 adds a false statement,
+//! so they compare in pairs.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -18,21 +18,21 @@ use exact::hash;
 use exact::names;
 use trace::palette::Color;
 
-/// Changes whenever the same configuration and seeds give other scenes or other motion than before.
+/// Increases whenever the same configuration and seeds give other scenes or other motion.
 ///
 /// 2: body colours are balanced, clutter hides more, faces are marked, lamps are fixed in the room.
 pub const SCENE_VERSION: u32 = 2;
 
-/// Digits of the fingerprint of a scene: enough for any study.
+/// Digits of a scene's fingerprint: enough for any study.
 const FINGERPRINT_DIGITS: usize = 16;
 
-/// The distance from the mirror of an agent that starts before it, m.
+/// The distance of an agent that starts before the mirror, m.
 pub(super) const BEFORE_MIRROR: f64 = 2.0;
 
-/// The most other agents that a world holds.
+/// The maximum number of other agents in a world.
 pub const MOST_OTHERS: usize = 6;
 
-/// The most cubes that a world holds.
+/// The maximum number of cubes in a world.
 pub const MOST_CUBES: usize = 12;
 
 /// An episode's world at its start.
@@ -178,7 +178,7 @@ pub struct Other {
 }
 
 impl MirrorPlace {
-    /// The heading of one who faces it squarely.
+    /// The heading of a viewer who faces it squarely.
     pub const fn heading(self) -> Heading {
         Heading::new(self.wall % 4 * 3)
     }
@@ -212,7 +212,7 @@ impl Patch {
         [FRONT_MM, self.aside_mm, self.height_mm].map(|length| f64::from(length) / 1000.0)
     }
 
-    /// Its middle in the room, on the front of a body that is there, m.
+    /// Its middle in the room, on the front of a body at this pose, m.
     pub fn center(self, body: Pose) -> [f64; 3] {
         in_room(body, self.place())
     }
@@ -231,7 +231,7 @@ impl HandStart {
 }
 
 impl Cube {
-    /// The square of the floor that it covers.
+    /// The square of floor that it covers.
     pub fn square(&self) -> Square {
         Square { center: [self.x, self.y], half: self.edge / 2.0 }
     }
@@ -242,7 +242,7 @@ impl Cube {
 }
 
 impl Scene {
-    /// The colour in which an agent is drawn, directly or through a pane; `None` if it is not there.
+    /// The colour of an agent, directly or through a pane; `None` if it is absent.
     pub(super) fn agent_color(&self, agent: usize, pane: Option<&HungPane>) -> Option<Color> {
         let is_window = pane.is_some_and(|pane| pane.kind == PaneKind::Window);
         match (agent.checked_sub(1), pane) {
@@ -254,7 +254,7 @@ impl Scene {
         }
     }
 
-    /// The marks that are there at a step, counted from 1.
+    /// The marks present at a step, counted from 1.
     pub fn marks_at(&self, t: u32) -> impl Iterator<Item = (usize, &WornMark)> {
         self.marks.iter().enumerate().filter(move |(_, mark)| mark.from_t <= t)
     }
@@ -264,20 +264,20 @@ impl Scene {
         self.marks_at(t).find(|(_, mark)| mark.wearer == 0).map(|(_, mark)| mark.color)
     }
 
-    /// The colour in which a mirror or window shows a body that is not the own body's: a decoy's paint, or that of a body
-    /// that it alone shows; of the first such pane. `None` without one.
+    /// The first colour other than the own body's in which a pane shows a body: a decoy's paint, or the colour of a
+    /// body that only this pane shows. `None` without one.
     pub fn shown_color(&self) -> Option<Color> {
         let shown = |pane: &HungPane| pane.paint.or_else(|| pane.double.map(|double| double.color));
         self.panes.iter().filter_map(shown).find(|color| *color != self.body_color)
     }
 
-    /// What two episodes share that are a pair: the room, the body, the cubes, the start and the others. What they are
-    /// compared in is not part of it: the mirror, and what is stated.
+    /// The shared features of paired episodes: the room, the body, the cubes, the start and the others. The compared
+    /// features are not part of it: the mirror, and the statement.
     pub fn fingerprint(&self, config: &WorldConfig) -> String {
         let Self { body_color, start, cubes, others, .. } = self;
         let mut parts = json!([SCENE_VERSION, config.room, body_color, start, cubes, others]);
         if let (Some(hand), Some(parts)) = (self.hand, parts.as_array_mut()) {
-            // The mark to be reached is what the hand's place is derived from.
+            // The hand's position is relative to the mark to be reached.
             parts.extend([json!(hand), json!(self.marks)]);
         }
         let mut hash = hash::of_bytes(parts.to_string().as_bytes());
@@ -285,15 +285,15 @@ impl Scene {
         hash
     }
 
-    /// The Manhattan distance from the hand to the mark at the start, mm; `None` where there is no hand.
+    /// The Manhattan distance from the hand to the mark at the start, mm; `None` without a hand.
     pub fn start_distance(&self) -> Option<i32> {
         let (task, hand) = (self.experiment.hand?, self.hand?);
         let steps: u32 = hand.from_mark.iter().map(|steps| steps.unsigned_abs()).sum();
         i32::try_from(steps * task.step_mm).ok()
     }
 
-    /// Steps after which an episode ends automatically: those of the way to the mark and some more, at most as many as the
-    /// experiment says, where there is a hand; else the configuration's.
+    /// Steps after which an episode ends automatically. With a hand: those of the way to the mark and some more,
+    /// limited by the experiment; otherwise the configuration's.
     pub fn budget(&self, config: &WorldConfig) -> u32 {
         match (self.experiment.hand, self.hand) {
             (Some(task), Some(hand)) => {
@@ -304,7 +304,7 @@ impl Scene {
         }
     }
 
-    /// The fixed things, as a plan.
+    /// The fixed things as a floor plan.
     pub fn floor_plan(&self, config: &WorldConfig) -> FloorPlan {
         floor_plan(config, &self.cubes)
     }

@@ -1,4 +1,4 @@
-//! Everything in a world as shapes with places and colours: what a log draws.
+//! Everything in a world as shapes with places and colours, for drawing by a log.
 
 use mujoco_rs::prelude::MjtGeomBase;
 
@@ -10,13 +10,13 @@ use super::world::World;
 /// One moment of a world.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Snapshot {
-    /// The bodies that move, each in the frame of the room: `agent0_trunk`, .. and `eye`.
+    /// The moving bodies, each in the frame of the room: `agent0_trunk`, .. and `eye`.
     pub frames: Vec<Placed>,
     /// Every visible shape, in the frame of the room.
     pub solids: Vec<Solid>,
 }
 
-/// Something with a place.
+/// A named placement.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Placed {
     /// Unique among the frames.
@@ -32,7 +32,7 @@ pub struct Placed {
 pub struct Solid {
     /// Unique among the shapes, such as `pane0`, `cube0` or `agent0_head`.
     pub name: String,
-    /// The item that it is part of.
+    /// The item that this shape is part of.
     pub item: Item,
     pub shape: Shape,
     /// Of its centre, m.
@@ -46,10 +46,10 @@ pub struct Solid {
 /// A form and its sizes, m, about its centre.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shape {
-    /// A rectangle of these whole sides along x and y, its front to +z.
+    /// A rectangle with these full sides along x and y, its front to +z.
     Plane([f64; 2]),
     Sphere(f64),
-    /// About z: the radius, and the whole length of the cylinder between its round ends.
+    /// About z: the radius, and the full length of the cylinder between its round ends.
     Capsule {
         radius: f64,
         length: f64,
@@ -58,7 +58,7 @@ pub enum Shape {
 }
 
 impl World {
-    /// Everything as it is now.
+    /// The current state of everything.
     pub fn snapshot(&self) -> Snapshot {
         Snapshot { frames: frames(self), solids: solids(self.stage()) }
     }
@@ -78,7 +78,7 @@ fn frames(world: &World) -> Vec<Placed> {
     let level = world.pose().heading.rotation();
     let rotation = if eye.pitch > 0.0 { level.after(Quaternion::about_y(eye.pitch)) } else { level };
     let eye = Placed { name: EYE_CAMERA.to_owned(), position: [ahead.x, ahead.y, eye.height], rotation: rotation.0 };
-    // Where those are that a pane alone shows: behind a window in the second room's own frame.
+    // The positions of bodies that only a pane shows: behind a window, in the second room's own frame.
     let doubles = (0..world.scene().panes.len()).filter_map(|pane| {
         let pose = world.double(pane)?.pose;
         let rotation = pose.heading.rotation().0;
@@ -90,7 +90,7 @@ fn frames(world: &World) -> Vec<Placed> {
 fn solids(stage: &Stage) -> Vec<Solid> {
     let model = stage.model();
     (0..stage.items().len())
-        // Only shadows let anything through.
+        // Only shadows are translucent.
         .filter(|geom| stage.is_shown(*geom) && model.geom_rgba()[*geom][3] >= 1.0)
         .map(|geom| Solid {
             name: stage.geom_name(geom).to_owned(),
@@ -105,7 +105,7 @@ fn solids(stage: &Stage) -> Vec<Solid> {
 
 fn shape(item: Item, kind: MjtGeomBase, size: [f64; 3]) -> Shape {
     match kind {
-        // Of a pane only the face is there.
+        // Only the face of a pane is shown.
         _ if matches!(item, Item::Pane(_)) => Shape::Plane([2.0 * size[0], 2.0 * size[1]]),
         MjtGeomBase::mjGEOM_PLANE => Shape::Plane([2.0 * size[0], 2.0 * size[1]]),
         MjtGeomBase::mjGEOM_SPHERE => Shape::Sphere(size[0]),
@@ -114,7 +114,7 @@ fn shape(item: Item, kind: MjtGeomBase, size: [f64; 3]) -> Shape {
     }
 }
 
-/// The unit quaternion of a rotation matrix, its largest part first found so that nothing small divides.
+/// The unit quaternion of a rotation matrix, starting with its largest component to avoid small divisors.
 fn quaternion(m: [f64; 9]) -> [f64; 4] {
     let squares =
         [1.0 + m[0] + m[4] + m[8], 1.0 + m[0] - m[4] - m[8], 1.0 - m[0] + m[4] - m[8], 1.0 - m[0] - m[4] + m[8]];

@@ -1,6 +1,6 @@
-//! One episode's world: what is where, what an action does, what the eye could see.
+//! One episode's world: positions, the effects of actions, and what the eye could see.
 //!
-//! Rule: the agent moves first, then each other in turn; whoever would touch something stays where it is.
+//! Rule: the agent moves first, then each of the others in turn; a move that would touch something does not happen.
 
 use std::cell::OnceCell;
 use std::collections::VecDeque;
@@ -21,7 +21,7 @@ use trace::palette::Color;
 /// The result of an action.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Moved {
-    /// A wall, a cube or a body was in the way: the agent stays where it was.
+    /// True if a wall, a cube or a body was in the way: the agent stays where it was.
     pub bumped: bool,
 }
 
@@ -34,10 +34,10 @@ pub struct World {
     ego: Figure,
     others: Vec<Distractor>,
     doubles: Vec<Option<Distractor>>,
-    /// The step that comes next, from 1.
+    /// The next step, from 1.
     t: u32,
     past: VecDeque<Vec<Figure>>,
-    /// The hand's steps from the mark, the latest last, beside `past`; empty where there is no hand.
+    /// The hand's steps from the mark, the latest last, parallel to `past`; empty without a hand.
     hand: VecDeque<[i32; 3]>,
     stage: Stage,
     beyond: Vec<Stage>,
@@ -45,7 +45,7 @@ pub struct World {
 }
 
 impl World {
-    /// The world of a scene, at its start. What the experiment says of lengths and counts lies over the configuration.
+    /// The world of a scene at its start. The experiment's lengths and counts override the configuration.
     pub fn new(config: &WorldConfig, scene: Scene) -> Result<Self, ModelError> {
         let config = config.of(scene.experiment);
         let (stage, beyond) = Stage::all(&config, Paint::Lit, &scene)?;
@@ -67,17 +67,17 @@ impl World {
         Ok(world)
     }
 
-    /// The scene that the world was made of.
+    /// The scene of this world.
     pub const fn scene(&self) -> &Scene {
         &self.scene
     }
 
-    /// The configuration that it was made with.
+    /// The configuration of this world.
     pub const fn config(&self) -> &WorldConfig {
         &self.config
     }
 
-    /// The fixed things, as a plan.
+    /// The fixed things as a floor plan.
     pub const fn floor_plan(&self) -> &FloorPlan {
         &self.plan
     }
@@ -87,19 +87,19 @@ impl World {
         self.ego.pose
     }
 
-    /// Everybody as they are: the agent first, then the others in the order of the scene.
+    /// The current state of all bodies: the agent first, then the others in the order of the scene.
     pub fn figures(&self) -> Vec<Figure> {
         std::iter::once(self.ego).chain(self.others.iter().map(|walker| walker.figure)).collect()
     }
 
-    /// Everybody as a pane shows them: late where it is late. Before there is such a past, the start.
+    /// All bodies as a pane shows them, with its delay. Before enough steps have passed, their state at the start.
     pub fn figures_in(&self, pane: usize) -> Vec<Figure> {
         let back = self.scene.panes[pane].delay as usize;
         let at = self.past.len().saturating_sub(1 + back);
         self.past.get(at).cloned().unwrap_or_default()
     }
 
-    /// The body that a pane alone shows.
+    /// The body that only this pane shows.
     pub fn double(&self, pane: usize) -> Option<Figure> {
         self.doubles[pane].as_ref().map(|double| double.figure)
     }
@@ -109,12 +109,12 @@ impl World {
         self.doubles.iter().any(Option::is_some)
     }
 
-    /// Returns true if the own body wears a mark at some step.
+    /// Returns true if the own body wears a mark at any step.
     pub fn has_own_mark(&self) -> bool {
         self.scene.marks.iter().any(|mark| mark.wearer == 0)
     }
 
-    /// The step that comes next, from 1.
+    /// The next step, from 1.
     pub const fn t(&self) -> u32 {
         self.t
     }
@@ -134,12 +134,12 @@ impl World {
         passage::eye(&self.config, &self.scene.panes[pane], self.ego.pose)
     }
 
-    /// The label of every pixel of the eye's view: kept until somebody moves, since counts and pictures both need it.
+    /// The label of every pixel of the eye's view, cached until something moves, for counts and pictures.
     pub(super) fn labels_or(&self, cast: impl FnOnce() -> LabelImage) -> &LabelImage {
         self.labels.get_or_init(cast)
     }
 
-    /// The Manhattan distance from the hand to the mark, mm; `None` where there is no hand.
+    /// The Manhattan distance from the hand to the mark, mm; `None` without a hand.
     pub fn target_distance(&self) -> Option<i32> {
         let place = Place::of(&self.scene, &self.config)?;
         i32::try_from(place.distance_mm(*self.hand.back()?)).ok()
@@ -170,8 +170,8 @@ impl World {
         Moved { bumped: !is_free }
     }
 
-    /// Does what the agent decided, then lets the others move. No action, `done`, and what the agent of this experiment
-    /// cannot do is standing still.
+    /// Carries out the agent's action, then lets the others move. The agent stands still without an action, for `done`,
+    /// and for actions of other experiments.
     pub fn act(&mut self, action: Option<Action>) -> Moved {
         let step = self.config.body.step_length;
         let moved = match action {
@@ -191,7 +191,7 @@ impl World {
         moved
     }
 
-    /// Puts everybody somewhere, whatever is in the way: for tests of what can be seen.
+    /// Places all bodies, ignoring obstacles: for tests of visibility.
     pub fn place(&mut self, figures: &[Figure]) {
         let mut figures = figures.iter().copied();
         if let Some(ego) = figures.next() {
@@ -203,7 +203,7 @@ impl World {
         self.settle();
     }
 
-    /// Puts the agent somewhere at a later step, as if nobody had moved before: for pictures of what that step shows.
+    /// Places the agent at a later step, as if nothing had moved before: for pictures of that step.
     pub fn place_at(&mut self, figure: Figure, t: u32) {
         self.t = t;
         self.past.clear();
@@ -231,7 +231,7 @@ impl World {
     }
 
     fn tick_others(&mut self) {
-        // Bodies that only a pane shows meet nobody.
+        // Bodies that only a pane shows collide with nobody.
         for (at, double) in self.doubles.iter_mut().enumerate() {
             if let Some(double) = double {
                 let is_window = self.scene.panes[at].kind == PaneKind::Window;
@@ -274,14 +274,14 @@ impl World {
         }
     }
 
-    /// Other stages of the same scene as it is now: with other paint, or for other rays.
+    /// Further stages of the same scene in its current state: with other paint, or for other rays.
     pub fn stages(&self, paint: Paint) -> Result<(Stage, Vec<Stage>), ModelError> {
         let mut stages = Stage::all(&self.config, paint, &self.scene)?;
         self.show_on(&mut stages);
         Ok(stages)
     }
 
-    /// Puts stages of the same scene as this world is.
+    /// Updates stages of the same scene to the state of this world.
     pub fn show_on(&self, (stage, beyond): &mut (Stage, Vec<Stage>)) {
         for stage in std::iter::once(stage).chain(beyond) {
             let moment = self.moment(stage.look());
@@ -305,8 +305,8 @@ impl World {
         Moment { t, bodies, beyond, hand: self.hand_back(late) }
     }
 
-    /// How far the agent's body could still walk before it touches the candidate of a colour, m; `None` where there is
-    /// no such candidate, as always in E5.
+    /// The distance that the agent's body could still walk before it touches the candidate of a colour, m; `None` if
+    /// there is no such candidate, as always in E5.
     pub fn distance_to_cube(&self, color: Color) -> Option<f64> {
         let cube = self.candidate(color)?;
         Some((cube.square().distance(self.ego.pose.spot()) - self.plan.radius).max(0.0))

@@ -1,4 +1,4 @@
-//! `sensitivity`: how every cell moves with the threshold of mirror evidence, and where a conclusion changes.
+//! `sensitivity`: how the cells depend on the threshold of mirror evidence, and where a conclusion changes.
 
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
@@ -41,9 +41,9 @@ pub struct SensitivityArgs {
 const TABLES: [&str; 3] = ["sensitivity.csv", "sensitivity.md", "sensitivity.tex"];
 
 impl SensitivityArgs {
-    /// Scores under every threshold, prints and writes.
+    /// Scores under every threshold, then prints and writes the results.
     pub fn run(self) -> Result<Outcome, Failure> {
-        // A name of no known format should not cost a pass over the traces.
+        // Refuse an unknown format before a pass over the traces.
         let format = self.figure.as_deref().map(FigureFormat::of).transpose().map_err(Failure::input)?;
         let study = self.traces.study(&self.scoring, &GroupingArgs { pool: self.pool, ..GroupingArgs::default() })?;
         let mut targets = self.out.iter().flat_map(|out| names().map(|name| out.join(name))).chain(self.figure.clone());

@@ -1,4 +1,4 @@
-//! `sql`: the statement that computes the episode table on another engine.
+//! `sql`: the statement for computing the episode table on another engine.
 
 use std::ffi::OsString;
 use std::io::{self, Write as _};

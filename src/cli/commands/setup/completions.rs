@@ -1,4 +1,4 @@
-//! `mirrorstats setup completions`: what a shell needs to complete command lines.
+//! `mirrorstats setup completions`: completions of command lines for shells.
 
 use std::io::{self, Write as _};
 

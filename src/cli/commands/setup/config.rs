@@ -1,4 +1,4 @@
-//! `mirrorstats setup config`: the defaults that hold here.
+//! `mirrorstats setup config`: the defaults in effect.
 
 use std::io::{self, Write as _};
 

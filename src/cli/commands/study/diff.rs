@@ -1,4 +1,4 @@
-//! `diff`: what another set of definitions changes, or another set of scores.
+//! `diff`: the changes under another set of definitions, or between sets of scores.
 
 use std::ffi::OsString;
 use std::io::{self, Write as _};

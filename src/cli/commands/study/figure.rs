@@ -1,4 +1,4 @@
-//! `mirrorstats figure NAME TRACES...`: one figure, to a file or to standard output.
+//! `mirrorstats figure NAME TRACES...`: one figure, to a file or standard output.
 
 use std::io::{self, Write as _};
 use std::path::PathBuf;
@@ -51,11 +51,11 @@ pub struct FigureArgs {
     pub pool: bool,
 }
 
-/// A file format, as clap lists it.
+/// A file format, for clap's list.
 #[derive(Clone, Copy, Debug)]
 pub struct Format(FigureFormat);
 
-/// Every format that this build has.
+/// The formats of this build.
 const FORMATS: &[Format] = &[
     Format(FigureFormat::Svg),
     #[cfg(feature = "raster")]
@@ -84,7 +84,7 @@ impl ValueEnum for Format {
 impl FigureArgs {
     /// Scores the traces and draws.
     pub fn run(self) -> Result<Outcome, Failure> {
-        // An ending of no known format should not cost a pass over the traces.
+        // Refuse an unknown extension before a pass over the traces.
         let format = self.format()?;
         let study = self.traces.study_on(
             &self.engine,

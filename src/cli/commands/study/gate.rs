@@ -1,4 +1,4 @@
-//! `mirrorstats gate`: compares later episodes with earlier ones; each verdict has an exit code.
+//! `mirrorstats gate`: compares new episodes with old ones; each verdict has an exit code.
 
 use std::ffi::OsString;
 use std::io::{self, Write as _};

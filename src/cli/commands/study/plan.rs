@@ -1,4 +1,4 @@
-//! `plan`: how many episodes a study needs, or what its episodes can show.
+//! `plan`: the number of episodes that a study needs, or the difference that its episodes can show.
 
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
@@ -91,7 +91,7 @@ pub struct PlanArgs {
     pub json: bool,
 }
 
-/// Options that do not go together.
+/// The error for options that exclude each other.
 #[derive(Debug, thiserror::Error)]
 enum UsageError {
     #[error(
@@ -105,7 +105,7 @@ enum UsageError {
 }
 
 impl PlanArgs {
-    /// Plans, prints, and registers where asked to.
+    /// Computes and prints the plan, and registers it if requested.
     pub fn run(self) -> Result<Outcome, Failure> {
         let plan = plan(self.request()?).map_err(Failure::input)?;
         if let Some(file) = &self.register {
@@ -176,7 +176,7 @@ impl PlanArgs {
         let mut new = output::create(file)?;
         let written = new.write_all(registered.to_json().as_bytes()).and_then(|()| new.commit_new());
         written.map_err(|error| match error.kind() {
-            // Another process has registered one meanwhile.
+            // Another process has registered a plan meanwhile.
             io::ErrorKind::AlreadyExists => Failure::input(UsageError::Registered { file: file.display().to_string() }),
             _ => output::unwritable(file, error),
         })
@@ -189,7 +189,7 @@ impl PlanArgs {
         Ok((vec![world], registration::prompts()))
     }
 
-    /// Nothing, in a program that cannot record.
+    /// Returns no hashes, in a program that cannot record.
     #[cfg(not(feature = "sim"))]
     #[expect(clippy::unnecessary_wraps, clippy::unused_self, reason = "a program that records reads a file")]
     fn recorded(&self) -> Result<(Vec<NamedHash>, Vec<NamedHash>), Failure> {

@@ -1,4 +1,4 @@
-//! `query`: any SELECT over steps, episodes and cells.
+//! `query`: a SELECT over steps, episodes and cells.
 
 use std::path::PathBuf;
 
@@ -49,7 +49,7 @@ impl QueryArgs {
     }
 }
 
-/// Refuses: the work needs Polars.
+/// Refuses the query, which needs Polars.
 #[cfg(not(feature = "polars"))]
 mod rows {
     use super::{Failure, Outcome, QueryArgs};
@@ -59,7 +59,7 @@ mod rows {
     }
 }
 
-/// From a query as typed to its rows on standard output or in a file.
+/// Runs a typed query and writes its rows to standard output or a file.
 #[cfg(feature = "polars")]
 mod rows {
     use std::io::{self, Write as _};
@@ -81,7 +81,7 @@ mod rows {
 
     pub(super) fn answer(args: &QueryArgs) -> Result<Outcome, Failure> {
         let format = format(args)?;
-        // A slip in the query should not cost a look at the traces.
+        // Refuse an invalid query before reading the traces.
         let query = statement::check(&args.query).map_err(|found| Failure::of_faults(&found))?;
         let study = args.traces.study(&args.scoring, &GroupingArgs::default())?;
         if let Some(path) = &args.output {
@@ -115,7 +115,7 @@ mod rows {
         StudyError::from(error).into()
     }
 
-    /// The format asked for; `None` for a table.
+    /// The requested format; `None` for a table.
     fn format(args: &QueryArgs) -> Result<Option<Format>, Failure> {
         let ending = args.output.as_deref().and_then(Path::extension).map(std::ffi::OsStr::to_ascii_lowercase);
         let ending = ending.as_deref().and_then(std::ffi::OsStr::to_str);

@@ -1,4 +1,4 @@
-//! `report`: every table of the study from traces, on the terminal and as a folder.
+//! `report`: all tables of the study from traces, on the terminal and in a folder.
 
 use std::io::{self, Write as _};
 use std::path::PathBuf;

@@ -42,7 +42,7 @@ impl ScoreArgs {
             let words = "error: --explain shows what the native engine decided by\n  help: leave --engine out";
             return Err(Failure::Rendered(words.to_owned()));
         }
-        // An output name of no known format should not cost a pass over the traces.
+        // Refuse an unknown output format before a pass over the traces.
         let format = self.output.as_deref().map(format_of).transpose()?;
         let study = self.traces.study_on(&self.engine, &self.scoring, &GroupingArgs::default())?;
         self.check_target(study.files_read(None))?;

@@ -1,4 +1,4 @@
-//! `mirrorstats stats`: what can be concluded at this n, and what cannot.
+//! `mirrorstats stats`: the conclusions that this n allows.
 
 use std::io::Write as _;
 use std::path::PathBuf;
@@ -11,7 +11,7 @@ use exact::suggest::hint;
 use report::statistics::text::Length;
 use report::statistics::{Options, Sequential, Statistics};
 
-/// The word that represents every metric.
+/// The word for all metrics.
 const ALL: &str = "all";
 
 /// Intervals, tests and comparisons that hold at small n
@@ -50,7 +50,7 @@ pub struct StatsArgs {
     pub json: bool,
 }
 
-/// A metric asked for that the definitions do not have.
+/// The error for a requested metric that the definitions lack.
 #[derive(Debug, thiserror::Error)]
 #[error("no {kind} is named `{name}`; the definitions have {known}{suggestion}")]
 struct UnknownMetric {
@@ -98,7 +98,7 @@ impl StatsArgs {
         Ok(sequential.render(&chosen, terminal::width()))
     }
 
-    /// The metrics to print: those asked for, if they are among `all`, else the headline ones.
+    /// The metrics to print: the requested ones if they are in `all`; the headline ones if none is requested.
     fn chosen<'a>(
         &self,
         kind: &'static str,

@@ -65,7 +65,7 @@ pub struct ViewArgs {
 }
 
 impl ViewArgs {
-    /// Shows recordings, until the process is ended.
+    /// Shows recordings until the process ends.
     pub fn run(self) -> Result<Outcome, Failure> {
         let options = Options {
             runs: self.runs.clone(),

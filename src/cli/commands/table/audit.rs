@@ -1,4 +1,4 @@
-//! `audit`: the cells of published tables that no data can give.
+//! `audit`: finds cells of published tables that no data can give.
 
 use std::io::Write as _;
 use std::path::PathBuf;
@@ -38,7 +38,7 @@ pub struct AuditArgs {
 }
 
 impl AuditArgs {
-    /// Audits; the check holds if some data can give every cell.
+    /// Audits; the check passes if every cell is possible.
     pub fn run(self) -> Result<Outcome, Failure> {
         let Self { episodes, definitions, steps, rounding: roundings, style, .. } = self;
         let found = audit_tables(&self.tables, &AuditRequest { episodes, definitions, steps, roundings, style })?;

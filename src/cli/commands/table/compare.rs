@@ -1,4 +1,4 @@
-//! `compare`: what the traces print beside what is published.
+//! `compare`: the tables of traces beside the published ones.
 
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
@@ -41,7 +41,7 @@ pub struct CompareArgs {
 }
 
 impl CompareArgs {
-    /// Scores the traces and compares; the check holds if every difference is excused.
+    /// Scores the traces and compares; the check passes if every difference is excused.
     pub fn run(self) -> Result<Outcome, Failure> {
         let errata = self.errata()?;
         let scoring = ScoringArgs { definitions: self.definitions.clone(), ..ScoringArgs::default() };

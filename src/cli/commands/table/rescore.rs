@@ -1,4 +1,4 @@
-//! `rescore`: a report again from its own traces, under other definitions or with replies read again.
+//! `rescore`: makes a report again from its traces, under other definitions or with replies read again.
 
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
@@ -131,7 +131,7 @@ impl RescoreArgs {
     }
 }
 
-/// Reads the replies of traces again; the new ones are in a folder beside `out`.
+/// Reads the replies of traces again; writes the new traces to a folder beside `out`.
 fn reparse(traces: &[Input], out: &Path) -> Result<(ReparseAnswer, Vec<Input>), Failure> {
     let mut folder = out.as_os_str().to_owned();
     folder.push("-traces");

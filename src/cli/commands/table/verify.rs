@@ -1,4 +1,4 @@
-//! `mirrorstats table verify`: whether a report's files are still those that were written.
+//! `mirrorstats table verify`: checks a report's files against its manifest.
 
 use std::path::PathBuf;
 

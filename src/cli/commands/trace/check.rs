@@ -1,4 +1,4 @@
-//! `mirrorstats trace check`: whether the replies in traces are good enough, for CI and before a report.
+//! `mirrorstats trace check`: checks the quality of replies in traces, for CI and before a report.
 
 use std::io::{self, Write as _};
 

@@ -1,4 +1,4 @@
-//! `mirrorstats import`: steps of any harness as a trace.
+//! `mirrorstats import`: makes a trace from steps of any harness.
 
 use std::io;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! `mirrorstats trace info`: what traces hold.
+//! `mirrorstats trace info`: the contents of traces.
 
 use std::fmt::Display;
 use std::io::{self, Write};
@@ -43,7 +43,7 @@ pub struct InfoAnswer {
 }
 
 impl InfoCommand {
-    /// Reads the traces and prints what they hold.
+    /// Reads the traces and prints their contents.
     pub fn run(&self) -> Result<Outcome, Failure> {
         let study = self.input.open()?;
         let listing = if self.episodes { Listing::Episodes } else { Listing::Nothing };
@@ -110,7 +110,7 @@ fn coverage(info: &Info) -> Table {
     let header = std::iter::once("model").chain(info.experiments.iter().map(String::as_str));
     let mut table = Table::of_texts(header).aligned_right(1..=info.experiments.len());
     for (row, model) in info.models.iter().enumerate() {
-        // Cells come experiment by experiment, each with all models.
+        // Cells are ordered by experiment, with all models for each.
         let counts = info.coverage.iter().skip(row).step_by(info.models.len()).map(|cell| match cell.episodes {
             0 => "none".to_owned(),
             episodes => episodes.to_string(),
@@ -120,7 +120,7 @@ fn coverage(info: &Info) -> Table {
     table
 }
 
-/// Seeds and runs that are listed for a cell.
+/// The number of seeds and runs listed per cell.
 const LISTED: usize = 8;
 
 fn gaps(out: &mut impl Write, info: &Info) -> io::Result<()> {

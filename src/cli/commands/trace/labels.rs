@@ -1,4 +1,4 @@
-//! `mirrorstats trace labels`: the labels of coders, and how far they agree.
+//! `mirrorstats trace labels`: the labels of coders, and their agreement.
 
 use std::io::{self, Write as _};
 

@@ -1,4 +1,4 @@
-//! `trace`: what traces hold, what coders say of them, whether they are valid, how they are written anew; `import` makes one.
+//! `trace`: inspects, checks and rewrites traces, and lists the labels of coders; `import` makes a trace.
 
 pub mod check;
 pub mod import;

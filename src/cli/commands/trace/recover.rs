@@ -1,4 +1,4 @@
-//! `mirrorstats trace recover`: a trace out of a log, also of a cut one.
+//! `mirrorstats trace recover`: makes a trace from a log, even a truncated one.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -73,10 +73,9 @@ impl RecoverArgs {
         Ok(if answer.losses.is_any() { Outcome::Lossy } else { Outcome::Done })
     }
 
-    /// Refuses to write over a trace of another recording, or one with an episode that the log does not have, or has with
-    /// other rows.
+    /// Refuses to replace a trace of another recording, or one with episodes that the log lacks or has with other rows.
     fn check_target(&self, rows: &[EpisodeRows], recording: Option<&Value>) -> Result<(), Failure> {
-        // A file that cannot be read as a trace is what a recovery is there to replace.
+        // A file that is not a readable trace may be replaced.
         let (Ok(file), Ok(there)) = (TraceFile::open(&self.target()), merge::read(&self.out)) else { return Ok(()) };
         let help = "name another file, or move that one away";
         let ids: BTreeSet<&str> = rows.iter().map(|episode| episode.episode_id.as_str()).collect();
@@ -110,7 +109,7 @@ impl RecoverArgs {
         Input { name: self.out.display().to_string(), path: self.out.clone() }
     }
 
-    /// Compares the trace that was written with every rule of the schema.
+    /// Checks the written trace against every rule of the schema.
     fn check(&self) -> Result<(), Failure> {
         let report = validate(&[self.target()], None, NonZeroUsize::MIN).map_err(Failure::input)?;
         match report.findings.iter().find(|finding| finding.severity == Severity::Error) {

@@ -1,4 +1,4 @@
-//! `mirrorstats trace renormalize`: the attributions of old traces by the rule of this program.
+//! `mirrorstats trace renormalize`: derives the attributions of old traces by the rule of this program.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -55,12 +55,12 @@ impl From<RenormalizeError> for Failure {
     }
 }
 
-/// The answer for people.
+/// The answer as text.
 #[derive(serde::Serialize)]
 #[serde(transparent)]
 struct Shown<'a>(&'a RenormalizeAnswer);
 
-/// The most characters of a text in the table; `--json` has all.
+/// The most characters of a text in the table; `--json` prints all.
 const LONGEST: usize = 80;
 
 impl fmt::Display for Shown<'_> {
@@ -91,7 +91,7 @@ impl fmt::Display for Shown<'_> {
     }
 }
 
-/// `0 -> ` where the traces tell other versions than this one.
+/// `0 -> ` with the traces' versions, if they differ from this one.
 fn versions_before(answer: &RenormalizeAnswer) -> String {
     let mut before: Vec<&str> = answer.files.iter().filter_map(|file| file.version_before.as_deref()).collect();
     before.retain(|version| *version != answer.identification_version);

@@ -1,4 +1,4 @@
-//! `mirrorstats trace schema`: what a trace is, and the JSON Schemas of what others write for this program.
+//! `mirrorstats trace schema`: the schema of traces, and the JSON Schemas of files that other programs write.
 
 use std::io::{self, Write};
 
@@ -46,7 +46,7 @@ pub enum Name {
 }
 
 impl Name {
-    /// The document, as the file of this name in `schemas/` has it.
+    /// The document, as in the file of this name in `schemas/`.
     pub fn document(self) -> Value {
         match self {
             Self::Trace => json!(SchemaDocument::current()),
@@ -59,7 +59,7 @@ impl Name {
     }
 }
 
-/// Columns that text is wrapped to wherever it goes, but for narrower terminals.
+/// The width to which text is wrapped, except on narrower terminals.
 const WIDTH: usize = 110;
 
 impl SchemaCommand {

@@ -45,7 +45,7 @@ impl From<SealError> for Failure {
     }
 }
 
-/// The answer for people.
+/// The answer as text.
 #[derive(serde::Serialize)]
 #[serde(transparent)]
 struct Shown<'a>(&'a SealAnswer);

@@ -1,4 +1,4 @@
-//! `mirrorstats trace validate`: every rule of the schema, all findings.
+//! `mirrorstats trace validate`: checks every rule of the schema and reports all findings.
 
 use std::io::{self, Write as _};
 use std::path::PathBuf;

@@ -1,4 +1,4 @@
-//! `mirrorstats world`: what the experiments are made of, without running any.
+//! `mirrorstats world`: the parts of the experiments, without running any.
 
 pub mod filmstrip;
 pub mod record;
@@ -73,7 +73,7 @@ struct SheetArgs {
     config: Option<PathBuf>,
 }
 
-/// The world of a file, or the built-in one.
+/// The world configuration in a file, or the built-in one.
 pub(super) fn configured(path: Option<&PathBuf>) -> Result<WorldConfig, Failure> {
     let Some(path) = path else { return Ok(WorldConfig::default()) };
     WorldConfig::load(path).map_err(|error| match error {

@@ -1,4 +1,4 @@
-//! `mirrorstats record`: agents in the mirror world, one trace and one log per model and experiment.
+//! `mirrorstats record`: records agents in the mirror world, one trace and one log per model and experiment.
 
 use std::io;
 use std::num::{NonZeroU32, NonZeroUsize};
@@ -37,7 +37,7 @@ use world::record::store::Store;
 use world::sim::Experiment;
 use world::sim::config::WorldConfig;
 
-/// The agent that is people.
+/// The name of the agent for people.
 const HUMAN: &str = "human";
 
 /// Record episodes of an agent in the mirror world: step traces for `report`, logs with the frames
@@ -145,7 +145,7 @@ impl RecordArgs {
         let mut all = Vec::new();
         for args in each.iter().take_while(|_| !stop.load(Ordering::Relaxed)) {
             let recorded = args.record_one(&playing, stop);
-            // A model that cannot go on keeps none of the others from it.
+            // A model that cannot continue does not stop the others.
             if let (Some(reason), true) = (several::stopped(&recorded), each.len() > 1) {
                 output::say(&format!("stopped: {reason}"));
             }
@@ -174,7 +174,7 @@ impl RecordArgs {
         self.study.is_some() || self.vlm.each().len() > 1
     }
 
-    /// One recording for each condition and model of a study file, or for each `--model`.
+    /// One recording per condition and model of a study file, or per `--model`.
     fn each(&self) -> Result<Vec<Self>, Failure> {
         let Some(file) = &self.study else {
             let one = |vlm| Self { vlm, ..self.clone() };
@@ -242,7 +242,7 @@ impl RecordArgs {
         self.player_who(true)
     }
 
-    /// The same; people are not asked to play where nothing is recorded.
+    /// The same, but people are not asked to play unless `plays` is set.
     #[cfg_attr(not(feature = "view"), expect(unused_variables, reason = "people play with the feature alone"))]
     fn player_who(&self, plays: bool) -> Result<Arc<dyn Player>, Failure> {
         if let Some(command) = self.agent.strip_prefix("exec:") {
@@ -309,7 +309,7 @@ impl RecordArgs {
         Ok(ForecastAnswer::of(&subject, episodes.planned.len(), &episodes.todo, config, requests))
     }
 
-    /// Records with this player, whatever `--agent` names, until all is done or `stop` is set. Only progress is reported.
+    /// Records with this player, whatever `--agent` names, until the end or until `stop` is set. Reports only progress.
     pub fn record(&self, player: &dyn Player, stop: &AtomicBool) -> Result<Recorded, Failure> {
         let config = &configured(self.config.as_ref())?;
         let plan = &self.planned(config)?;
@@ -331,7 +331,7 @@ impl RecordArgs {
         let (progress, settings) = (&bar, self.settings(player));
         let recording = Recording { config, player, subject, store, progress, stop, shares: &shares, settings };
         let outcome = recording.run(todo);
-        // What is whole is put together whatever ended the recording.
+        // Complete episodes are assembled, however the recording ended.
         let assembled = plan.experiments.iter().try_for_each(|experiment| store.assemble(*experiment));
         let deleted = player.deleted();
         bar.clear();
@@ -390,12 +390,12 @@ impl RecordArgs {
     }
 }
 
-/// A recording that ran to its end, or was stopped.
+/// The result of a recording that reached its end or was stopped.
 #[derive(Debug)]
 pub struct Recorded {
     /// The outcomes of the episodes.
     pub answer: RecordAnswer,
-    /// The reason why the agent could not go on, if it could not.
+    /// The reason why the agent could not continue, if so.
     pub gave_up: Option<String>,
     lost_list: PathBuf,
     elapsed: Duration,

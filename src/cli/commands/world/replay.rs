@@ -1,4 +1,4 @@
-//! `mirrorstats world replay`: a trace's episodes again, compared with what was recorded.
+//! `mirrorstats world replay`: repeats a trace's episodes and compares them with the recording.
 
 use std::ffi::OsString;
 use std::fmt;
@@ -112,7 +112,7 @@ impl ReplayArgs {
     }
 
     fn check_hashes(&self, traces: &[Recorded]) -> Result<(), Failure> {
-        // What cannot be read as a log is there to be replaced.
+        // A file that is not a readable log may be replaced.
         let Some((log, logged)) = self.mcap.as_ref().and_then(|log| Some((log, episode_hashes(log).ok()?))) else {
             return Ok(());
         };
@@ -174,7 +174,7 @@ fn tell_frames(f: &mut fmt::Formatter<'_>, frames: &FramesAnswer) -> fmt::Result
     Ok(())
 }
 
-/// The answer, with its words for people.
+/// The answer, with its text.
 #[derive(Serialize)]
 #[serde(transparent)]
 struct Shown<'a>(&'a ReplayAnswer);
@@ -182,7 +182,7 @@ struct Shown<'a>(&'a ReplayAnswer);
 impl fmt::Display for Shown<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for Divergence { episode_id, t, column, expected, found } in &self.0.divergences {
-            // The hashes are enough for people.
+            // Hashes are enough for people.
             let [expected, found] = [expected, found].map(|text| match column.as_str() {
                 "frame_digest" => text.split('-').next().unwrap_or_default(),
                 _ => text,

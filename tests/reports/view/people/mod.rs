@@ -1,4 +1,4 @@
-//! A person in the agent's place: what they get, what they give, and what becomes of it.
+//! A person in the agent's place: what they see, what they reply, and how it is recorded.
 
 mod study;
 
@@ -62,7 +62,7 @@ impl People {
     }
 }
 
-/// Somebody with a link, who remembers every byte.
+/// A person with a link, who remembers every received byte.
 struct Person {
     port: u16,
     token: String,
@@ -80,7 +80,7 @@ impl Person {
         answer
     }
 
-    /// The page's state once it is in one of these phases.
+    /// Waits for one of these phases and returns the page's state.
     fn state(&mut self, phases: &[&str]) -> Value {
         loop {
             let told = self.ask("GET", "state", &Value::Null).json();
@@ -91,7 +91,7 @@ impl Person {
         }
     }
 
-    /// Answers a question; begins the episode if it waits for that.
+    /// Answers a question; begins the episode if necessary.
     fn act(&mut self, action: &str, identification: &str, cube: &str) {
         if self.state(&["play", "practice", "ready"])["phase"] == "ready" {
             assert_eq!(self.ask("POST", "begin", &json!({})).status, 200);
@@ -104,7 +104,7 @@ impl Person {
         assert_eq!(taken["taken"], true);
     }
 
-    /// Has the practice behind and begins what counts.
+    /// Completes the practice and begins the first counted episode.
     fn practise(&mut self) {
         assert_eq!(self.state(&["practice", "play"])["phase"], "practice");
         self.act("done", "unknown", "red");
@@ -232,7 +232,7 @@ fn the_page_is_played_by_keys() {
     );
     browser.press("ArrowLeft");
     until(&mut browser, "document.querySelector('h1').textContent === 'Step 2'");
-    // Letters can be switched off, for those whose software uses them.
+    // Letters can be switched off for people whose software uses them.
     browser.click("#letters");
     browser.value("document.activeElement.blur()");
     browser.press("a");
@@ -281,14 +281,14 @@ fn every_page_of_the_player_is_accessible() {
     people.ends();
 }
 
-/// Ends an episode in a browser, and says again that this is meant.
+/// Ends an episode in a browser and confirms it.
 fn done(browser: &mut Browser) {
     browser.click("button[data-action=done]");
     until(browser, "document.querySelector('dialog[open] #sure-done')");
     browser.click("#sure-done");
 }
 
-/// Ends the practice in a browser, and begins what counts.
+/// Completes the practice in a browser and begins the first counted episode.
 fn practise(browser: &mut Browser) {
     until(browser, "document.querySelector('.practice')");
     done(browser);
@@ -302,7 +302,7 @@ fn practise(browser: &mut Browser) {
 /// The content of the claim's field.
 const CLAIM: &str = "document.querySelector('input[name=identification]').value";
 
-/// Types a claim in the place of what is there.
+/// Replaces the claim in the field.
 fn claim(browser: &mut Browser, words: &str) {
     browser.value("document.querySelector('input[name=identification]').select()");
     browser.send("Input.insertText", &json!({"text": words}));
@@ -332,7 +332,7 @@ fn a_claim_belongs_to_the_step_in_which_it_was_typed() {
         until(&mut browser, "document.querySelector('#begin')");
         let words = browser.text("document.querySelector('#content').textContent");
         assert!(words.contains("1 episode done") && words.contains("episode 2 of 2"), "{words}");
-        // A key that is pressed too often is no step of the next episode.
+        // An extra key press does not become a step of the next episode.
         browser.press("ArrowLeft");
         browser.click("#begin");
         until(&mut browser, "document.querySelector('h1').textContent === 'Step 1'");
@@ -340,7 +340,7 @@ fn a_claim_belongs_to_the_step_in_which_it_was_typed() {
         done(&mut browser);
         until(&mut browser, "document.querySelector('#over')");
         people.ends();
-        // The server has gone; the page says the same.
+        // The server has stopped; the page says the same.
         std::thread::sleep(std::time::Duration::from_secs(2));
         let words = browser.text("document.body.innerText");
         assert!(words.contains("The study is over") && words.contains("Thank you"), "{words}");
@@ -407,7 +407,7 @@ fn no_step_counts_before_the_person_has_begun() {
     person.ask("POST", "begin", &json!({}));
     let told = person.state(&["play"]);
     assert_eq!(told["t"], 1);
-    // Another window of the same person sends a reply during a break: nothing is taken, and nothing is lost.
+    // Another window of the same person sends a reply during a break: it is not taken and does no harm.
     person.ask("POST", "pause", &json!({}));
     let sent = json!({"number": told["number"], "reply": {"action": "done"}});
     assert_eq!(person.ask("POST", "reply", &sent).json()["taken"], false);
@@ -436,7 +436,7 @@ fn a_failed_reply_is_reported_and_sent_again() {
     browser.click("#again");
     until(&mut browser, "document.querySelector('h1').textContent === 'Step 2'");
     assert!(browser.holds("document.querySelector('#notice').hidden"));
-    // The whole server is out of reach for a while: the form and the words in it stay.
+    // The server is out of reach for a while: the form and its words stay.
     claim(&mut browser, "I am yellow");
     browser.send("Network.setBlockedURLs", &json!({"urls": ["*"]}));
     until(&mut browser, "document.querySelector('#notice').textContent.includes('does not answer')");

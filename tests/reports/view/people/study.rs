@@ -16,7 +16,7 @@ use crate::harness::program::{interrupt, program, run, wait_for};
 use crate::html::browser::Browser;
 use crate::view::pages::until;
 
-/// The files of a folder that hold some bytes.
+/// The files of a folder that contain these bytes.
 fn files_with(folder: &Path, bytes: &str) -> Vec<String> {
     let mut found = Vec::new();
     for entry in std::fs::read_dir(folder).unwrap().flatten().filter(|entry| entry.path().is_file()) {
@@ -28,7 +28,7 @@ fn files_with(folder: &Path, bytes: &str) -> Vec<String> {
     found
 }
 
-/// The phase of a person's page once it is one of these.
+/// The phase of a person's page, once it is one of these.
 fn phase(person: &mut Person, phases: &[&str]) -> String {
     person.state(phases)["phase"].as_str().unwrap().to_owned()
 }
@@ -38,7 +38,7 @@ impl Person {
         self.ask("POST", name, body).json()
     }
 
-    /// Waits until an episode is there, also over the end of one server and the start of the next.
+    /// Waits until there is an episode, even across a restart of the server.
     fn answers_again(&self) {
         wait_for("the next recording", || {
             let mut stream = TcpStream::connect(("127.0.0.1", self.port)).ok()?;
@@ -62,14 +62,14 @@ impl Person {
         self.practise();
     }
 
-    /// What the participant of this number does in the study of twenty.
+    /// The behaviour of participant `number` in the study of twenty.
     fn takes_part(&mut self, number: usize) {
         match number {
             1 | 2 => {
                 self.begins();
                 self.act("a", "", "none");
                 let before = self.state(&["play"]);
-                // The page is loaded again: the same question is asked.
+                // Loading the page again asks the same question.
                 assert_eq!(self.ask("GET", "", &Value::Null).status, 200);
                 let after = self.state(&["play"]);
                 assert_eq!((&after["t"], &after["number"], &after["t"]), (&before["t"], &before["number"], &json!(2)));
@@ -95,7 +95,7 @@ impl Person {
                 self.begins();
                 self.act("a", "", "none");
                 self.state(&["play"]);
-                // No page asks for a while: the clock stands still.
+                // No page sends requests for a while, so the clock stops.
                 thread::sleep(Duration::from_secs(12));
                 self.act("done", "I am red", "red");
                 self.play();
@@ -140,7 +140,7 @@ fn twenty_people_play_every_scene_but_for_one_who_declines_and_one_who_withdraws
     let counts = |answer: &Value| ["asked", "found", "recorded", "left_out"].map(|key| answer[key].as_u64().unwrap());
     assert_eq!((counts(&first), first["stopped"].as_bool()), ([40, 0, 36, 4], Some(false)), "{first}");
 
-    // Traces: everyone who stayed has played both scenes, once each.
+    // Traces: everyone who stayed has played both scenes once.
     run(folder.path(), &["trace", "validate", "runs"]).done();
     let of_each = "select participant, count(distinct episode_id) as n, count(distinct scene) as scenes from steps group by participant";
     let rows = run(folder.path(), &["query", of_each, "runs", "--format", "csv"]).done();
@@ -150,14 +150,14 @@ fn twenty_people_play_every_scene_but_for_one_who_declines_and_one_who_withdraws
     let most = run(folder.path(), &["query", times, "runs", "--format", "csv"]).done();
     assert!(most.lines().nth(1).unwrap().parse::<u64>().unwrap() < 10_000, "{most}");
 
-    // Statistics: a person counts once, and two people on one scene are no repetition.
+    // Statistics: a person counts once, and two people on one scene are not a repetition.
     let stats = run(folder.path(), &["stats", "runs", "--json"]).json();
     let chance = stats["chance"].as_array().unwrap();
     let units: Vec<&Value> = chance.iter().map(|row| &row["units"]).collect();
     assert!(!units.is_empty() && units.iter().all(|it| it["n"] == 18 && it["name"] == "participants"), "{units:?}");
     assert_eq!(stats["retests"], json!([]));
 
-    // Deletions: what says that somebody has left is all that is left of them.
+    // Deletions: the only thing left of people who withdrew is the entry that says so.
     for code in ["person-03", "person-04"] {
         assert_eq!(files_with(&folder.path().join("runs"), code), ["participants.jsonl"], "{code}");
     }
@@ -177,14 +177,14 @@ fn twenty_people_play_every_scene_but_for_one_who_declines_and_one_who_withdraws
         .into();
     assert_eq!(firsts, ["E1/people/s1/r1", "E1/people/s1/r2/x2"], "the order is counterbalanced");
 
-    // Again: nothing is left to do, the links are the same, and nobody who has left is asked.
+    // Again: nothing remains to record, the links are the same, and people who withdrew are not asked.
     let people = start("second.json");
     assert_eq!(people.links.iter().map(token).collect::<Vec<_>>(), links.iter().map(token).collect::<Vec<_>>());
     people.ends();
     assert_eq!(counts(&answer("second.json")), [40, 36, 0, 4]);
 }
 
-/// What cannot be guessed of a link.
+/// The secret part of a link.
 fn token(link: &String) -> &str {
     let token = link.split_once("?p=").unwrap().1;
     assert_eq!(token.len(), 32, "{link}");
@@ -312,7 +312,7 @@ fn a_person_declines_or_leaves_by_the_keyboard_alone() {
     second.press("Enter");
     until(&mut second, "document.querySelector('.practice')");
     assert!(second.holds("document.querySelector('#status').getAttribute('role') === 'status'"));
-    // A question before the end of an episode: Escape goes back to it.
+    // A confirmation before an episode ends: Escape goes back to the episode.
     second.value("document.querySelector('button[data-action=done]').focus()");
     second.press("Enter");
     until(&mut second, "document.activeElement.id === 'sure-stay'");
@@ -347,7 +347,7 @@ fn a_study_file_has_conditions_that_the_same_person_plays() {
     let mut person = people.person(0);
     person.practise();
     person.play();
-    // The same link goes on with the next condition; nobody practises twice.
+    // The same link continues with the next condition, without another practice.
     person.answers_again();
     person.play();
     people.ends();

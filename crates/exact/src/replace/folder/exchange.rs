@@ -1,8 +1,8 @@
-//! A folder replaced by exchanging its name with that of a complete new one.
+//! Replaces a folder by exchanging its name with that of a complete new one.
 //!
-//! Done in place instead: on systems that cannot exchange; where the folder is a link, a mount point, holds one, or holds
-//! the current folder, which would be gone from under the user; where something in it cannot be linked or would change
-//! its owner; where the folder is not writable, so that this refuses as any other writing does.
+//! This fails, and files are replaced in place, if the system cannot exchange names; if the folder is a link or a mount
+//! point, or contains one; if it contains the current folder, which would vanish; if something in it cannot be linked
+//! or would change its owner; or if it is not writable, so that the usual error appears.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File, Metadata};
@@ -13,7 +13,7 @@ use super::super::place::{folder_of, sync_folder};
 use super::platform;
 use super::stage::{FolderFiles, Stage, old_files, step};
 
-/// Replaces the files of the existing folder `out`. The result within tells whether their names are on the disk.
+/// Replaces the files of the existing folder `out`. The inner result says whether the new names are on the disk.
 pub(super) fn replace(out: &Path, files: &FolderFiles<'_>) -> io::Result<io::Result<()>> {
     check(out)?;
     let stage = Stage::beside(out)?;
@@ -21,19 +21,19 @@ pub(super) fn replace(out: &Path, files: &FolderFiles<'_>) -> io::Result<io::Res
     link_others(out, stage.path(), files)?;
     make_alike(&fs::symlink_metadata(out)?, stage.path())?;
     sync_folder(stage.path())?;
-    // The old folder is this process's to remove, also under its new name. Nobody waits for this lock.
+    // The old folder is this process's to remove, also under its new name. No process waits for this lock.
     let old = File::open(out)?;
     let _ = old.try_lock();
     step();
     platform::exchange(stage.path(), out)?;
-    // From here on the new files are there, and errors are no reason to replace them again.
+    // The new files are in place now, so errors are no reason to replace them again.
     let synced = sync_folder(folder_of(out));
     step();
-    // Whatever others put into the old folder in the meantime.
+    // Link what others put into the old folder in the meantime.
     let _ = link_others(stage.path(), out, files);
     step();
     if synced.is_err() {
-        // After a loss of power the old folder may have its name again, and must have its files then.
+        // After a loss of power the old folder may have its name back, so it must still have its files.
         stage.keep();
     }
     Ok(synced)
@@ -48,7 +48,7 @@ fn check(out: &Path) -> io::Result<()> {
     platform::check_writable(out)
 }
 
-/// Links everything below `from` that is no old file, and not in `to` yet, into `to`.
+/// Links everything below `from` into `to`, except old files and paths that `to` has already.
 fn link_others(from: &Path, to: &Path, files: &FolderFiles<'_>) -> io::Result<()> {
     link_below(from, to, Path::new(""), &old_files(from, files))
 }
@@ -61,7 +61,7 @@ fn link_below(from: &Path, to: &Path, inside: &Path, old: &BTreeSet<PathBuf>) ->
         if entry.file_type()?.is_dir() {
             link_folder(from, to, &inside, old)?;
         } else if target.is_dir() {
-            // A link to a folder that new files are in.
+            // `from` has a link here, and `to` a folder with new files.
             return Err(io::ErrorKind::Unsupported.into());
         } else if !old.contains(&inside) && fs::symlink_metadata(&target).is_err() {
             step();

@@ -1,4 +1,4 @@
-//! The files of a folder replaced one by one, with a note and without an index in between.
+//! Replaces the files of a folder one by one; meanwhile the folder has a note and no index.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File, TryLockError};
@@ -12,7 +12,7 @@ use super::stage::{FolderError, FolderFiles, NOTE, Stage, old_files, step, sync_
 /// Replaces the files of the existing folder `out`.
 pub(super) fn replace(out: &Path, files: &FolderFiles<'_>) -> Result<(), FolderError> {
     let _lock = lock(out).map_err(FolderError::at(out))?;
-    // Inside the folder, which may be a volume of its own.
+    // Inside the folder, which may be a separate volume.
     let stage = Stage::create(out, files.index.unwrap_or(out)).map_err(FolderError::at(out))?;
     stage.write(files, out)?;
     let old = old_files(out, files);
@@ -60,7 +60,7 @@ fn remove(out: &Path, inside: &Path) -> Result<(), FolderError> {
     }
 }
 
-/// Removes the folders above a file that was removed, up to `out`, for as long as they are empty.
+/// Removes the empty folders between a removed file and `out`.
 fn remove_empty(out: &Path, path: &Path) {
     let above = path.ancestors().skip(1).filter(|inside| !inside.as_os_str().is_empty());
     for inside in above {
@@ -70,8 +70,8 @@ fn remove_empty(out: &Path, path: &Path) {
     }
 }
 
-/// Refuses while another process replaces files in the folder: their files would mix. Where the file system has no
-/// locks, that is not seen.
+/// Fails while another process replaces files in the folder: their files would mix. Without file locks this goes
+/// unnoticed.
 fn lock(out: &Path) -> io::Result<Option<File>> {
     let Ok(folder) = File::open(out) else { return Ok(None) };
     match folder.try_lock() {

@@ -1,9 +1,9 @@
-//! Replaces the files of a folder together: after a crash all of them are the old ones, or all are the new ones.
+//! Replaces the files of a folder together: after a crash either all files are old or all are new.
 //!
-//! The new folder is completed beside the old one, with hard links to all that does not change, and the two exchange
-//! their names in one step of the file system. Where that is impossible (see [`exchange`]), files are replaced one by
-//! one: a note says so until all are replaced, and the index goes first and comes last, so that a folder without a note or
-//! with an index is complete.
+//! The new folder is completed beside the old one, with hard links to all unchanged files. Then the two exchange names
+//! in one step of the file system. If that is impossible (see [`exchange`]), files are replaced one by one. A note
+//! marks the folder until all are replaced. The index is removed first and written last. So a folder without a note, or
+//! with an index, is complete.
 
 mod exchange;
 mod in_place;
@@ -19,10 +19,10 @@ use super::place::{folder_of, make_folder, sync_folder};
 pub use stage::{Content, FolderError, FolderFiles, is_unfinished};
 use stage::{Stage, step};
 
-/// Replaces the files of the folder `out`, which is made if need be with the folders above it. What killed processes
-/// have left of earlier attempts at this folder is removed.
+/// Replaces the files of the folder `out`, creating it and its parents if needed. Leftovers of killed processes that
+/// worked on this folder are removed.
 pub fn replace_folder(out: &Path, files: &FolderFiles<'_>) -> Result<(), FolderError> {
-    // Without the slash at the end of `link/`, which would lead through the link.
+    // Without the final slash of `link/`, which would follow the link.
     let out: &Path = &out.components().collect::<PathBuf>();
     let parent = folder_of(out);
     make_folder(parent).map_err(FolderError::at(parent))?;
@@ -37,7 +37,7 @@ pub fn replace_folder(out: &Path, files: &FolderFiles<'_>) -> Result<(), FolderE
     leftover::sweep(out);
     match exchange::replace(out, files) {
         Ok(synced) => synced.map_err(FolderError::at(out)),
-        // Whatever was in the way, nothing has changed yet; if it is in the way of this too, its error is the one to tell.
+        // Nothing has changed yet. If the same obstacle stops the replacement in place, that error is reported.
         Err(_) => in_place::replace(out, files),
     }
 }

@@ -1,4 +1,4 @@
-//! Folder operations that only some systems have. On other systems they return an error.
+//! Folder operations that only some systems support; on others they return an error.
 
 use std::fs::Metadata;
 use std::io;
@@ -17,12 +17,12 @@ pub(super) fn exchange(_: &Path, _: &Path) -> io::Result<()> {
     Err(io::ErrorKind::Unsupported.into())
 }
 
-/// Returns true if another file system, or another part of one, begins at the folder. Names on the two sides of it cannot be
-/// linked, and what lies behind it must never be removed with the folder.
+/// Returns true if another file system, or another part of one, begins at the folder. Hard links across this border are
+/// impossible, and the contents behind it must never be removed with the folder.
 #[cfg(target_os = "linux")]
 pub(super) fn is_mount_point(folder: &Path) -> io::Result<bool> {
     let found = system::statx(CWD, folder, AtFlags::SYMLINK_NOFOLLOW, StatxFlags::BASIC_STATS)?;
-    // Linux before 5.8 does not tell.
+    // Linux before 5.8 does not report this.
     if !found.stx_attributes_mask.contains(StatxAttributes::MOUNT_ROOT) {
         return Err(io::ErrorKind::Unsupported.into());
     }

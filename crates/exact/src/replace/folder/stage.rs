@@ -8,7 +8,7 @@ use std::path::{Component, Path, PathBuf};
 use super::super::place::{folder_of, prefix_for, sync_folder};
 use super::super::temporary::TemporaryFolder;
 
-/// A file in a folder with old and new files that lists what the next attempt replaces or removes.
+/// A file that marks a folder with old and new files; it lists what the next attempt replaces or removes.
 pub(super) const NOTE: &str = ".mirrorstats-unfinished";
 
 /// The content of a new file.
@@ -16,7 +16,7 @@ pub(super) const NOTE: &str = ".mirrorstats-unfinished";
 pub enum Content<'a> {
     /// These bytes.
     Bytes(&'a [u8]),
-    /// Those of a file, which stays where it is.
+    /// The bytes of a file, which stays where it is.
     File(&'a Path),
 }
 
@@ -24,13 +24,13 @@ pub enum Content<'a> {
 pub struct FolderFiles<'a> {
     /// The new files and their content.
     pub new: &'a [(&'a Path, Content<'a>)],
-    /// One of the new files, if readers rely on the others where they find it.
+    /// One of the new files, if readers find the others through it.
     pub index: Option<&'a Path>,
     /// Returns the files of the folder that will be replaced or removed. Everything else stays.
     pub old: &'a dyn Fn(&Path) -> Vec<PathBuf>,
 }
 
-/// Returns true if a folder has files of both sides, because a replacement in place was broken off.
+/// Returns true if a folder has old and new files, because a replacement in place was interrupted.
 pub fn is_unfinished(folder: &Path) -> bool {
     folder.join(NOTE).is_file()
 }
@@ -50,16 +50,16 @@ impl FolderError {
     }
 }
 
-/// A temporary folder that new files are written into.
+/// A temporary folder for new files.
 pub(super) struct Stage(TemporaryFolder);
 
 impl Stage {
-    /// One that may take the place of `out`.
+    /// Creates a stage that can take the place of `out`.
     pub(super) fn beside(out: &Path) -> io::Result<Self> {
         Self::create(folder_of(out), out)
     }
 
-    /// One in `parent`, named after `target`.
+    /// Creates a stage in `parent`, named after `target`.
     pub(super) fn create(parent: &Path, target: &Path) -> io::Result<Self> {
         step();
         TemporaryFolder::with_mode(parent, &prefix_for(target), 0o777).map(Self)
@@ -73,7 +73,7 @@ impl Stage {
         self.0.keep();
     }
 
-    /// Writes the new files, on the disk when this returns; `out` is for errors.
+    /// Writes the new files, which are on the disk when this returns; `out` is for errors.
     pub(super) fn write(&self, files: &FolderFiles<'_>, out: &Path) -> Result<(), FolderError> {
         for (path, content) in files.new {
             write_synced(&self.path().join(path), *content).map_err(FolderError::at(&out.join(path)))?;
@@ -99,8 +99,8 @@ pub(super) fn sync_folders(root: &Path, files: &FolderFiles<'_>) -> io::Result<(
     folders.into_iter().try_for_each(|inside| sync_folder(&root.join(inside)))
 }
 
-/// What of the folder at `root` goes or is replaced; no path leads out of it. That is also what an attempt in place may
-/// have left, and its note.
+/// The files of the folder at `root` that are removed or replaced: the old ones, those in the note of an interrupted
+/// attempt, and the note. No path leaves the folder.
 pub(super) fn old_files(root: &Path, files: &FolderFiles<'_>) -> BTreeSet<PathBuf> {
     let is_inside = |path: &PathBuf| path.components().all(|part| matches!(part, Component::Normal(_)));
     let noted = fs::read_to_string(root.join(NOTE)).unwrap_or_default();

@@ -1,4 +1,4 @@
-//! The process is ended before every step of the file system; the steps are the same in a process of its own.
+//! Ends the process before every step of the file system; the steps are the same in a separate process.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -8,16 +8,16 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::{Content, FolderFiles, replace_folder};
 
-/// Names the step before which the process ends.
+/// Names the step at which the process ends.
 const LAST_STEP: &str = "MIRRORSTATS_TEST_LAST_STEP";
-/// Names the folder that the process replaces files in.
+/// Names the folder in which the process replaces files.
 const FOLDER: &str = "MIRRORSTATS_TEST_FOLDER";
-/// The exit code of a process that was ended.
+/// The exit code of an ended process.
 const ENDED: i32 = 42;
 
 static STEPS: AtomicUsize = AtomicUsize::new(0);
 
-/// Ends the process before the step that it was told, without running any destructor.
+/// Ends the process before the given step, without running destructors.
 pub(super) fn step() {
     let Ok(last) = std::env::var(LAST_STEP) else { return };
     if STEPS.fetch_add(1, Ordering::Relaxed).to_string() == last {
@@ -62,7 +62,7 @@ fn old_folder(out: &Path) {
     fs::create_dir(out.join("empty")).unwrap();
 }
 
-/// All files and empty folders below a folder; those of killed processes are left out.
+/// All files and empty folders below a folder, without those of killed processes.
 fn contents(root: &Path) -> Contents {
     fn walk(root: &Path, inside: &Path, found: &mut Contents) {
         let mut is_empty = true;
@@ -97,7 +97,7 @@ fn has_leftovers(folder: &Path) -> bool {
     names.into_iter().any(|name| name.to_string_lossy().starts_with(".mirrorstats-"))
 }
 
-/// Replaces the files of `out` in a process that ends before `step`; whether it came to its end before.
+/// Replaces the files of `out` in a process that ends before `step`; returns true if it completed before that.
 fn replaced_before(out: &Path, step: usize) -> bool {
     let mut child = Command::new(std::env::current_exe().unwrap());
     child.args(["--exact", concat!(module_path!(), "::replaces_in_a_process_of_its_own")].map(without_crate));
@@ -110,7 +110,7 @@ fn replaced_before(out: &Path, step: usize) -> bool {
     }
 }
 
-/// Names of tests begin behind that of the crate.
+/// Test names start after the crate's name.
 fn without_crate(name: &str) -> &str {
     name.split_once("::").filter(|_| name.contains("tests::")).map_or(name, |(_, name)| name)
 }
@@ -122,8 +122,8 @@ fn replaces_in_a_process_of_its_own() {
     replace(Path::new(&out), &NEW);
 }
 
-/// Ends a process before each step; `is_right` judges what is in the folder then. A run that comes to its end puts all
-/// in order. Returns the number of steps.
+/// Ends a process before each step, then checks the folder with `is_right`. A run to completion cleans up. Returns the
+/// number of steps.
 fn end_at_every_step(out_of: impl Fn(&Path) -> PathBuf, is_right: impl Fn(&Contents) -> bool) -> usize {
     for step in 0.. {
         let home = tempfile::tempdir().unwrap();

@@ -5,7 +5,7 @@ use std::cmp::Ordering;
 use super::{EpisodeName, Overlap, Pair};
 use score::table::{EpisodeKeys, EpisodeTable};
 
-/// The rows of two tables by their keys; both are in the order of them.
+/// The rows of two tables by their keys; both are in key order.
 #[derive(Default)]
 pub(super) struct Aligned {
     pub(super) both: Vec<Pair<usize>>,
@@ -17,7 +17,7 @@ impl Aligned {
     pub(super) fn of(before: &EpisodeKeys, after: &EpisodeKeys) -> Self {
         let mut aligned = Self::default();
         if before.has_keys_of(after) {
-            // One scan scored both: no key is read. Comparing them one by one takes a third of a diff.
+            // One scan scored both, so keys need not be read. Comparing them takes a third of a diff.
             aligned.both.extend((0..before.len()).map(|row| Pair { before: row, after: row }));
             return aligned;
         }

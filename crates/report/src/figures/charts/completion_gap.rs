@@ -43,7 +43,7 @@ pub fn draw(scene: Scene<'_>) -> Drawn {
     (sheet, height)
 }
 
-/// The gaps of all cells, the size of the largest, and whether any is below zero.
+/// The gaps of all cells, the largest absolute gap, and whether any is negative.
 struct Gaps<'a> {
     scene: Scene<'a>,
     ids: [MetricId<'a>; 2],

@@ -1,4 +1,4 @@
-//! `e5-outcomes`: how the episodes of an open question ended, a stacked bar per model.
+//! `e5-outcomes`: the endings of the episodes of an open question, as one stacked bar per model.
 
 use std::collections::BTreeMap;
 
@@ -35,11 +35,11 @@ pub struct OutcomeRow {
 }
 
 impl Outcomes {
-    /// The outcomes of the first experiment with episodes that has reference levels for a rate instead of a chance level: the
-    /// one whose question is open. `None` without one.
+    /// The outcomes of the first experiment with episodes that has reference levels for a rate instead of a chance
+    /// level, so that its question is open. `None` without one.
     ///
-    /// An episode is correct where the rate is 1, else wrong where its decision committed to a colour: where `answered`,
-    /// which has a value per episode of the table, is true.
+    /// An episode is correct if the rate is 1. Otherwise it is wrong if its decision committed to a colour: if
+    /// `answered`, which has one value per episode of the table, is true.
     pub fn of(episodes: &EpisodeTable, answered: &[bool]) -> Option<Self> {
         let (experiment, success) = open_question(episodes)?;
         let mut rows: BTreeMap<&str, OutcomeRow> = BTreeMap::new();
@@ -57,13 +57,13 @@ impl Outcomes {
         (!rows.is_empty()).then(|| Self { experiment: experiment.to_owned(), rows })
     }
 
-    /// Returns true if there is an episode that [`of`](Self::of) would count.
+    /// Returns true if there is any episode that [`of`](Self::of) would count.
     pub fn are_there(episodes: &EpisodeTable) -> bool {
         open_question(episodes).is_some()
     }
 }
 
-/// The first experiment with episodes that has reference levels instead of a chance level, and the rate that they are of.
+/// The first experiment with episodes and reference levels instead of a chance level, and the rate that they apply to.
 fn open_question(episodes: &EpisodeTable) -> Option<(&str, &MetricColumn)> {
     let has_episodes = |name: &str| episodes.keys.iter().any(|key| key.experiment == name);
     episodes.catalog.experiment.iter().find_map(|(name, experiment)| {

@@ -1,15 +1,15 @@
-//! The paper's qualitative figure: frames of one episode in a row, what was done and claimed at each, and its moments.
+//! The paper's qualitative figure: frames of one episode in a row, with the action and claim at each, and its moments.
 
 use crate::figures::Figure;
 use crate::figures::kit::{Fill, Frame, MARGIN, Mark, PALETTE, Rgb, Sheet, Stroke, label, lettering};
 
-/// One step as the strip shows it.
+/// One step in the strip.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Still {
     pub t: i32,
-    /// The frame, PNG, and its pixels in a row and in a column.
+    /// The frame as PNG.
     pub png: Vec<u8>,
-    /// See `png`.
+    /// The width and height of `png`, in pixels.
     pub size: (u32, u32),
     /// The action, in words.
     pub action: String,
@@ -17,16 +17,16 @@ pub struct Still {
     pub claim: String,
     /// True if mirror evidence was in view.
     pub visible: bool,
-    /// The moments of the story that it is.
+    /// The story's moments at this step.
     pub moments: Vec<&'static str>,
 }
 
-/// The colour of what was in view, and of the story's moments.
+/// The colour for evidence in view and for the story's moments.
 const SEEN: Rgb = Rgb(0, 119, 187);
 /// The width of a frame, px.
 const WIDTH: f64 = 160.0;
 const GAP: f64 = 6.0;
-/// From one line of text to the next, px.
+/// The line height of text, px.
 const LINE: f64 = 15.0;
 
 /// The strip of these steps.

@@ -1,4 +1,4 @@
-//! `gaze`: a raster of episodes by steps: the mirror in view, first sight of it, claim and decision.
+//! `gaze`: a raster of episodes by steps: the mirror in view, its first sight, claim and decision.
 
 use crate::figures::kit::{
     Arrangement, Fill, Frame, MARGIN, Mark, PALETTE, Panels, Plot, Sheet, Stroke, Swatch, leading, legend, lettering,
@@ -7,10 +7,10 @@ use crate::figures::kit::{
 use crate::figures::{Drawn, Scene};
 use score::timeline::Timeline;
 
-/// The most episodes of the raster: with more, the thinnest rows make a picture that no reader can take in.
+/// The most episodes of the raster: with more, rows become too thin to read.
 pub const MOST_EPISODES: usize = 2_000;
 
-/// The height of all rows of a column together that is aimed at, px.
+/// The target height of all rows of a column together, px.
 const AIM: f64 = 420.0;
 const THINNEST_ROW: f64 = 1.6;
 const THICKEST_ROW: f64 = 7.0;
@@ -44,7 +44,7 @@ pub(in crate::figures) fn draw(scene: Scene<'_>, timelines: &[Timeline]) -> Draw
     (sheet, height)
 }
 
-/// The rows of all panels: a block per model, as many rows as its fullest experiment has episodes.
+/// The rows of all panels: one block per model, with as many rows as its fullest experiment has episodes.
 struct Raster<'a> {
     scene: Scene<'a>,
     timelines: &'a [Timeline],
@@ -74,7 +74,7 @@ impl<'a> Raster<'a> {
         episodes
     }
 
-    /// The upper edge of a block and its height, px; never too low for the model's name.
+    /// The top of a block and its height, px; at least as high as the model's name.
     fn block(&self, block: usize) -> (f64, f64) {
         let height = |rows: usize| (self.row * many(rows)).max(leading(lettering::label()));
         let above: f64 = self.rows[..block].iter().map(|&rows| height(rows) + BLOCK_GAP).sum();

@@ -1,4 +1,4 @@
-//! `heatmap`: models by experiments and metrics; the colour says how good, the number is the mean.
+//! `heatmap`: models by experiments and metrics; the colour shows how good the mean is, the number is the mean.
 
 use crate::figures::kit::{
     Align, Arrangement, Frame, Lettering, MARGIN, PALETTE, Panels, Sheet, label, leading, legend, lettering, many,
@@ -52,7 +52,7 @@ fn draw_key(sheet: &mut Sheet, scene: Scene<'_>, metrics: &[MetricId<'_>], top: 
     legend::draw_signs(sheet, (scale + 24.0, top), missing::signs(readings)).max(top + 14.0) + MARGIN
 }
 
-/// The names of the metrics above their columns; upright where a column is too narrow for one of them.
+/// The names of the metrics above their columns; vertical if a column is too narrow for any of them.
 struct Head<'a> {
     metrics: &'a [MetricId<'a>],
     lettering: Lettering,
@@ -85,7 +85,7 @@ impl<'a> Head<'a> {
     }
 }
 
-/// One experiment's cells in `body`.
+/// Draws one experiment's cells in `body`.
 fn draw_block(sheet: &mut Sheet, scene: Scene<'_>, experiment: &str, metrics: &[MetricId<'_>], body: Frame) {
     let cell = body.width / many(metrics.len());
     for (column, metric) in metrics.iter().enumerate() {

@@ -10,11 +10,11 @@ use crate::figures::{Drawn, Scene};
 
 const MOST_COLUMNS: usize = 3;
 const LEAST_PANEL: f64 = 120.0;
-/// The radius of the slowest model's marker, px; area goes by relative duration.
+/// The radius of the slowest model's marker, px; the area is proportional to relative duration.
 const LARGEST: f64 = 5.6;
-/// The radius below which a shape cannot be seen, px.
+/// The smallest radius of a visible shape, px.
 const SMALLEST: f64 = 2.0;
-/// Room for the numbers and the title of the axis at the left, px.
+/// Room for the numbers and the title of the axis on the left, px.
 const AXIS_ROOM: f64 = 34.0;
 const AXIS_BELOW: f64 = 28.0;
 
@@ -82,7 +82,7 @@ fn points(sheet: &mut Sheet, scene: Scene<'_>, experiment: &str, ids: [MetricId<
     }
 }
 
-/// Area by duration relative to the slowest; the smallest size where there is none.
+/// The radius for an area proportional to the duration relative to the slowest; the smallest size without a duration.
 fn radius(duration: Option<f64>, slowest: Option<f64>) -> f64 {
     match (duration, slowest) {
         (Some(duration), Some(slowest)) if slowest > 0.0 => {

@@ -1,6 +1,6 @@
-//! `sensitivity`: how each metric moves with the threshold of mirror evidence, per experiment, one line per model.
+//! `sensitivity`: each metric as a function of the threshold of mirror evidence, per experiment, one line per model.
 //!
-//! No report draws it, so it is not among [`crate::figures::FigureName::ALL`].
+//! Reports do not draw it, so it is not in [`crate::figures::FigureName::ALL`].
 
 use crate::cells::Cells;
 use crate::figures::kit::{
@@ -16,25 +16,25 @@ const CAPTION: &str = "Each metric under rising thresholds of mirror evidence, o
                        definitions as they are. Models with the same value stand side by side. Where a metric is undefined \
                        there is no marker, and the line has a gap.";
 
-/// The most panels beside each other.
+/// The most panels side by side.
 const MOST_COLUMNS: usize = 5;
 const PLOT_HEIGHT: f64 = 92.0;
 const AXIS_ROOM: f64 = 24.0;
 const AXIS_BELOW: f64 = 28.0;
 const GAP: f64 = 12.0;
-/// From marker to marker of models with the same value, px.
+/// The distance between the markers of models with equal values, px.
 const APART: f64 = 4.5;
 /// The share of a column that markers side by side may take.
 const COLUMN_ROOM: f64 = 0.66;
 /// The overhang of the last number beyond its plot, px.
 const OVERHANG: f64 = 4.0;
-/// Between two numbers below a plot, px.
+/// The gap between two numbers below a plot, px.
 const NUMBER_GAP: f64 = 3.0;
 
 /// The results under one threshold.
 #[derive(Clone, Copy, Debug)]
 pub struct Stage<'a> {
-    /// The threshold, px; `None` for the definitions as they are.
+    /// The threshold, px; `None` for the unchanged definitions.
     pub px: Option<u32>,
     /// The cells by experiment and model.
     pub cells: &'a Cells,
@@ -43,10 +43,10 @@ pub struct Stage<'a> {
 /// The inputs of the figure.
 #[derive(Clone, Copy, Debug)]
 pub struct Input<'a> {
-    /// The definitions as they are, then the thresholds, ascending.
+    /// The unchanged definitions, then the thresholds, ascending.
     pub stages: &'a [Stage<'a>],
     pub metrics: &'a [String],
-    /// Models in the order to show them; those not named follow in the palette's order, then by name.
+    /// Models in display order; other models follow in the palette's order, then by name.
     pub order: &'a [String],
     /// The meaning of a null threshold: `recorded (60 px)`.
     pub reference: &'a str,
@@ -116,7 +116,7 @@ impl<'a> Field<'a> {
         self.experiments.iter().map(|experiment| Panel { field: self, experiment, metric, top }).collect()
     }
 
-    /// The greatest mean of a quantity in any panel; `None` for a rate.
+    /// The largest mean of a quantity in any panel; `None` for a rate.
     fn top(&self, metric: &str) -> Option<f64> {
         let ids = self.matrices.iter().flatten().filter_map(|matrix| Some((matrix, id(matrix, metric)?)));
         let mut top: Option<f64> = None;
@@ -131,7 +131,7 @@ impl<'a> Field<'a> {
         stage.px.map_or_else(|| short(self.input.reference), |px| px.to_string())
     }
 
-    /// From threshold to threshold in a plot of `width` px: half as much is left at both ends, or what the last number takes.
+    /// The distance between thresholds in a plot of `width` px; the ends keep half of it, or room for the last number.
     fn column(&self, width: f64) -> f64 {
         let last = self.input.stages.last().map_or(0.0, |stage| lettering::tick().width(&self.label(stage)));
         let count = self.input.stages.len();
@@ -147,7 +147,7 @@ impl<'a> Field<'a> {
     }
 }
 
-/// One panel per column where there are several experiments, so that a row is one metric.
+/// The number of columns: one per experiment if there are several, so that a row is one metric.
 fn columns(experiments: usize, metrics: usize) -> usize {
     match experiments {
         1 => panels::balanced(metrics, 3),

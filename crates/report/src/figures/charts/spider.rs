@@ -1,4 +1,4 @@
-//! `spider`: behavioural profiles, a radar per experiment and a line per model.
+//! `spider`: behavioural profiles, one radar per experiment and one line per model.
 
 use std::f64::consts::TAU;
 
@@ -19,7 +19,7 @@ const RADIUS: f64 = 70.0;
 const LABEL_ROOM: f64 = 18.0;
 
 pub fn draw(scene: Scene<'_>) -> Drawn {
-    // Clockwise from above.
+    // Clockwise from the top.
     let Scene { matrix, roster, metrics: axes, width: all } = scene;
     let (columns, width) = panels::most(MOST_COLUMNS, all - 2.0 * MARGIN, [LEAST_PANEL, GAP]);
     let strips: Vec<_> = matrix.experiments.iter().map(|e| Strip::new(matrix, roster, e, axes, width)).collect();

@@ -1,4 +1,4 @@
-//! SVG to PNG and to PDF, both from one parsed tree and with the embedded font alone (feature `raster`).
+//! SVG to PNG and PDF, both from one parsed tree and only with the embedded font (feature `raster`).
 
 use std::sync::{Arc, LazyLock};
 
@@ -12,12 +12,12 @@ use resvg::usvg::{Options, Tree};
 
 use super::font;
 
-/// Pixels of a PNG to a px of the figure: about 300 dots an inch where the figure is 7 inches wide.
+/// PNG pixels per px of the figure: about 300 dpi for a figure that is 7 inches wide.
 const PNG_SCALE: f32 = 3.0;
 
 const POINTS_PER_PX: f32 = 0.75;
 
-/// The embedded font and no other: an installed one cannot be found in there.
+/// Only the embedded font: installed fonts are never used.
 static FONTS: LazyLock<Arc<Database>> = LazyLock::new(|| {
     let mut fonts = Database::new();
     for data in font::FILES {
@@ -27,7 +27,7 @@ static FONTS: LazyLock<Arc<Database>> = LazyLock::new(|| {
     Arc::new(fonts)
 });
 
-/// A figure that could not be converted.
+/// An error of converting a figure.
 #[derive(Debug, thiserror::Error)]
 pub enum ConvertError {
     #[error("the figure's SVG cannot be read back; please report this with the model names of the data")]
@@ -40,13 +40,13 @@ pub enum ConvertError {
     Pdf(String),
 }
 
-/// The SVG as both converters see it.
+/// Parses the SVG for both converters.
 pub fn tree(svg: &str) -> Result<Tree, ConvertError> {
     let options = Options { fontdb: FONTS.clone(), font_family: font::FAMILY.to_owned(), ..Options::default() };
     Ok(Tree::from_str(svg, &options)?)
 }
 
-/// The picture as PNG bytes, three pixels to a px.
+/// The picture as PNG bytes, at three pixels per px.
 pub fn png(tree: &Tree) -> Result<Vec<u8>, ConvertError> {
     let (width, height) = (tree.size().width() * PNG_SCALE, tree.size().height() * PNG_SCALE);
     let mut pixels = Pixmap::new(whole(width), whole(height)).ok_or(ConvertError::Size { width, height })?;
@@ -54,7 +54,7 @@ pub fn png(tree: &Tree) -> Result<Vec<u8>, ConvertError> {
     pixels.encode_png().map_err(|error| ConvertError::Png(error.to_string()))
 }
 
-/// The picture as a PDF of one page, its text selectable; no date and no random identifier inside.
+/// The picture as a one-page PDF with selectable text, without a date or a random identifier.
 pub(crate) fn pdf(tree: &Tree) -> Result<Vec<u8>, ConvertError> {
     let (width, height) = (tree.size().width() * POINTS_PER_PX, tree.size().height() * POINTS_PER_PX);
     let fault = || ConvertError::Size { width, height };

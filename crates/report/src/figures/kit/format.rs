@@ -9,22 +9,22 @@ use super::picture::Figure;
 /// A file format of a figure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FigureFormat {
-    /// Vectors for the web, values on hover.
+    /// Vector graphics for the web, with values on hover.
     Svg,
     /// Pixels, about 300 per inch at a width of 7 inches.
     #[cfg(feature = "raster")]
     Png,
-    /// Vectors for LaTeX.
+    /// Vector graphics for LaTeX.
     #[cfg(feature = "raster")]
     Pdf,
 }
 
-/// A figure that cannot be encoded.
+/// An error of encoding a figure.
 #[derive(Debug, thiserror::Error)]
 #[error(transparent)]
 pub struct EncodeError(#[from] Box<dyn Error + Send + Sync>);
 
-/// A file whose ending is no format of a figure.
+/// A file extension that is no format of a figure.
 #[derive(Debug, thiserror::Error)]
 #[error("expected a file that ends in {}, found the ending `{ending}`", endings())]
 pub struct UnknownEnding {
@@ -32,7 +32,7 @@ pub struct UnknownEnding {
 }
 
 impl FigureFormat {
-    /// Every format that this build has.
+    /// All formats of this build.
     pub const ALL: &[Self] = &[
         Self::Svg,
         #[cfg(feature = "raster")]
@@ -41,7 +41,7 @@ impl FigureFormat {
         Self::Pdf,
     ];
 
-    /// The ending of a file of this format.
+    /// The file extension of this format.
     pub const fn ending(self) -> &'static str {
         match self {
             Self::Svg => "svg",
@@ -52,7 +52,7 @@ impl FigureFormat {
         }
     }
 
-    /// The format that the ending of `path` asks for, in any case; SVG where there is no ending.
+    /// The format for the extension of `path`, in any case; SVG without an extension.
     pub fn of(path: &Path) -> Result<Self, UnknownEnding> {
         let Some(ending) = path.extension().and_then(OsStr::to_str) else { return Ok(Self::Svg) };
         let named = Self::ALL.iter().copied().find(|format| format.ending().eq_ignore_ascii_case(ending));

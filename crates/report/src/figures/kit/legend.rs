@@ -1,4 +1,4 @@
-//! Legends: which model is which, and what signs mean; laid out by the measured widths of their texts.
+//! Legends: models and signs with their meanings, laid out by the measured widths of their texts.
 
 use super::frame::{Frame, Point, many};
 use super::lettering::{self, Lettering, MARGIN, NAME_ROOM};
@@ -20,7 +20,7 @@ pub(crate) enum Swatch {
     Line(&'static ModelStyle),
     Marker(&'static ModelStyle),
     Tile(Fill),
-    /// A cell with episodes and no value.
+    /// A cell with episodes but no value.
     Undefined,
     Empty,
     /// The mark of chance on an axis.
@@ -28,10 +28,10 @@ pub(crate) enum Swatch {
     /// A line across a plot.
     Rule(Stroke),
     Tick(Stroke),
-    /// A ring of that radius, px.
+    /// A ring with this radius, px.
     Ring(f64),
     Dot(Fill),
-    /// Nothing: a note.
+    /// No sign: a note.
     None,
 }
 
@@ -44,7 +44,7 @@ pub(crate) struct Legend {
 }
 
 impl Legend {
-    /// The models in columns, as many as `width` px takes; read downwards, then to the right.
+    /// The models in columns, as many as fit into `width` px, in column-major order.
     pub(crate) fn of_models(roster: &Roster<'_>, width: f64, swatch: fn(&'static ModelStyle) -> Swatch) -> Self {
         let lettering = lettering::label();
         let room = NAME_ROOM.min(width - SWATCH_WIDTH - SWATCH_GAP);
@@ -62,7 +62,7 @@ impl Legend {
         Self { entries: entries.collect(), lettering, height: leading * many(rows) }
     }
 
-    /// Signs one after the other, in as many lines as they need.
+    /// Signs one after another, in as many lines as needed.
     pub(crate) fn of_signs(signs: Vec<(Swatch, String)>, width: f64) -> Self {
         let lettering = lettering::tick();
         let leading = line_height(lettering);
@@ -88,7 +88,7 @@ impl Legend {
         self.height
     }
 
-    /// Draws it with its upper left corner at `corner`.
+    /// Draws it with its top left corner at `corner`.
     pub(crate) fn draw(&self, sheet: &mut Sheet, corner: Point) {
         let leading = line_height(self.lettering);
         for (swatch, text, (x, y)) in &self.entries {
@@ -99,14 +99,14 @@ impl Legend {
     }
 }
 
-/// Draws signs at `corner` and gives the edge below them, px.
+/// Draws signs at `corner`; returns the bottom edge, px.
 pub(crate) fn draw_signs(sheet: &mut Sheet, corner: Point, signs: Vec<(Swatch, String)>) -> f64 {
     let legend = Legend::of_signs(signs, sheet.width() - corner.0 - MARGIN);
     legend.draw(sheet, corner);
     corner.1 + legend.height
 }
 
-/// The models in the free place of `panels` where they fit, else below them; `signs` last. Gives the figure's height.
+/// The models in the free place of `panels` if they fit, else below them; `signs` last. Returns the figure's height.
 pub(crate) fn around(
     sheet: &mut Sheet,
     roster: &Roster<'_>,
@@ -172,7 +172,7 @@ fn ring() -> Fill {
     Fill::outlined(PALETTE.surface.paper, PALETTE.surface.axis, 1.0)
 }
 
-/// The red mark of chance: a diamond, unlike any model's by its colour and its dark rim.
+/// The red mark of chance: a diamond, whose colour and dark outline differ from any model's.
 pub fn chance(sheet: &mut Sheet, (x, y): Point) {
     let fill = Fill::outlined(PALETTE.surface.chance, PALETTE.surface.paper, 0.8);
     sheet.polygon(&[(x, y - 4.5), (x + 3.2, y), (x, y + 4.5), (x - 3.2, y)], fill);

@@ -1,9 +1,9 @@
-//! The drawing kit: everything that figures are made of, and nothing that knows what they show.
+//! The drawing kit: building blocks of figures, without knowledge of their content.
 //!
-//! From the ground up: `frame`, `look`, `font`, `palette` and `lettering` (places, looks, what is embedded), `ink` (SVG
-//! under plotters), `mark` and `sheet` (verbs to draw with), `marker`, `label`, `tiles`, `dodge` (parts), `roster`,
-//! `legend`, `panels` and `plot` (arrangements), `picture`, `format` and `convert` (a drawing as bytes of SVG, PNG, PDF;
-//! the last two with the feature `raster`).
+//! Bottom-up: `frame`, `look`, `font`, `palette` and `lettering` (positions, styles, embedded assets), `ink` (SVG under
+//! plotters), `mark` and `sheet` (drawing functions), `marker`, `label`, `tiles`, `dodge` (parts), `roster`, `legend`,
+//! `panels` and `plot` (arrangements), `picture`, `format` and `convert` (a drawing as bytes of SVG, PNG, PDF; the last
+//! two with the feature `raster`).
 
 #[cfg(feature = "raster")]
 pub mod convert;

@@ -11,9 +11,9 @@ pub(crate) struct Panels {
     /// The frame below each heading.
     pub bodies: Vec<Frame>,
     headings: Vec<(Point, String, Vec<String>)>,
-    /// The edge below the last row.
+    /// The bottom of the last row.
     pub bottom: f64,
-    /// The place after the last panel of a last row that is not full, heading included.
+    /// The place after the last panel if the last row is not full, including its heading.
     pub rest: Option<Frame>,
 }
 
@@ -22,16 +22,16 @@ pub(crate) struct Panels {
 pub(crate) struct Arrangement {
     /// The left edge of the first column, px.
     pub left: f64,
-    /// Panels beside each other.
+    /// The number of panels side by side.
     pub columns: usize,
     /// The height of a panel without its heading, px.
     pub height: f64,
-    /// Between two panels beside each other, px.
+    /// The gap between panels side by side, px.
     pub gap: f64,
 }
 
 impl Panels {
-    /// A panel for each of `names` on a sheet of `width` px, with its title in up to two lines where `titles` has one.
+    /// A panel for each of `names` on a sheet of `width` px, with a title of up to two lines if `titles` has one.
     pub(crate) fn new(names: &[&str], titles: &[&str], width: f64, arranged: Arrangement) -> Self {
         let Arrangement { left, columns, height, gap } = arranged;
         let room = width - left - MARGIN;
@@ -75,19 +75,19 @@ impl Panels {
     }
 }
 
-/// Columns for `count` panels of at least `least` px in `room` px, at most `most`, so that rows are about equally full.
+/// The columns for `count` panels of at least `least` px in `room` px, at most `most`, in about equally full rows.
 pub(crate) fn fitting(count: usize, most: usize, room: f64, [least, gap]: [f64; 2]) -> usize {
     balanced(count, self::most(most, room, [least, gap]).0)
 }
 
-/// As many columns as panels of at least `least` px fit in `room` px, at most `most`, and the width of a panel, px.
+/// The most columns of panels of at least `least` px in `room` px, up to `most`; and the width of a panel, px.
 pub(crate) fn most(most: usize, room: f64, [least, gap]: [f64; 2]) -> (usize, f64) {
     let fits = |&n: &usize| least * many(n) + gap * many(n - 1) <= room;
     let columns = (1..=most).rev().find(fits).unwrap_or(1);
     (columns, (room - gap * many(columns - 1)) / many(columns))
 }
 
-/// Columns for `count` panels, at most `most`, so that rows are about equally full.
+/// The columns for `count` panels, at most `most`, in about equally full rows.
 pub(crate) fn balanced(count: usize, most: usize) -> usize {
     let rows = count.div_ceil(most.max(1)).max(1);
     count.div_ceil(rows).max(1)

@@ -1,4 +1,4 @@
-//! A plot with two linear axes: from values to places, with grid lines and numbers beside them.
+//! A plot with two linear axes: maps values to positions, with grid lines and numbers beside them.
 
 use std::ops::Range;
 
@@ -15,17 +15,17 @@ use super::palette::PALETTE;
 use super::sheet::Sheet;
 use exact::number::Decimal;
 
-/// Two linear axes over a frame; y grows upwards.
+/// Two linear axes over a frame; y points up.
 pub(crate) struct Plot {
     pub frame: Frame,
     spec: Cartesian2d<RangedCoordf64, RangedCoordf64>,
 }
 
-/// A place on an axis.
+/// A position on an axis.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Tick {
     pub at: f64,
-    /// Its text; empty for a grid line alone.
+    /// Its text; empty for only a grid line.
     pub text: String,
 }
 
@@ -37,13 +37,13 @@ impl Plot {
         Self { frame, spec: Cartesian2d::new(x, y, (across, upwards)) }
     }
 
-    /// The place of a pair of values.
+    /// The position of a pair of values.
     pub(crate) fn at(&self, x: f64, y: f64) -> Point {
         let (x, y) = self.spec.translate(&(x, y));
         (f64::from(x) / UNITS_PER_PX, f64::from(y) / UNITS_PER_PX)
     }
 
-    /// Upright grid lines, with numbers below the plot.
+    /// Draws vertical grid lines, with numbers below the plot.
     pub(crate) fn x_axis(&self, sheet: &mut Sheet, ticks: &[Tick]) {
         let lettering = lettering::tick().aligned(Align::Middle);
         for tick in ticks {
@@ -55,7 +55,7 @@ impl Plot {
         }
     }
 
-    /// Level grid lines, with numbers to the left of the plot.
+    /// Draws horizontal grid lines, with numbers to the left of the plot.
     pub(crate) fn y_axis(&self, sheet: &mut Sheet, ticks: &[Tick]) {
         let lettering = lettering::tick().aligned(Align::End);
         for tick in ticks {
@@ -80,13 +80,13 @@ impl Plot {
     }
 }
 
-/// 0, 0.5 and 1 with numbers, the quarters as grid lines alone.
+/// 0, 0.5 and 1 with numbers, the quarters only as grid lines.
 pub(crate) fn rate_ticks() -> Vec<Tick> {
     let tick = |(at, text): (f64, &str)| Tick { at, text: text.to_owned() };
     [(0.0, "0"), (0.25, ""), (0.5, "0.5"), (0.75, ""), (1.0, "1")].map(tick).into()
 }
 
-/// At most `most` whole numbers from 0 to `last`, at even distances.
+/// At most `most` integers from 0 to `last`, at even distances.
 pub(crate) fn whole_ticks(last: u32, most: usize) -> Vec<Tick> {
     let axis = RangedCoordf64::from(0.0..f64::from(last));
     let whole = axis.key_points(BoldPoints(most)).into_iter().filter(|at| at.fract() == 0.0);

@@ -1,11 +1,11 @@
-//! The models of a report, in the order of every figure, each with the style it keeps in all of them.
+//! The models of a report, in the order of every figure, each with the same style in all figures.
 
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
 use super::palette::{ModelStyle, PALETTE};
 
-/// A model and how it is drawn.
+/// A model and its style.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Member<'a> {
     pub model: &'a str,
@@ -18,10 +18,10 @@ pub(crate) struct Member<'a> {
 pub(crate) struct Roster<'a>(pub Vec<Member<'a>>);
 
 impl<'a> Roster<'a> {
-    /// `models` with their styles: those of `order` first, as they come there, then pinned ones, then by name.
+    /// `models` with their styles: those of `order` first, in that order, then pinned ones, then by name.
     ///
-    /// The style of a pinned model never changes. The others take, by name, the styles after the pinned ones,
-    /// then what pinned models left free; from the 21st model on styles repeat.
+    /// The style of a pinned model never changes. The others get, by name, the styles after the pinned ones, then
+    /// unused pinned styles; styles repeat from the 21st model on.
     pub(crate) fn new(models: &[&'a str], order: &[String]) -> Self {
         let mut models = models.to_vec();
         models.sort_unstable();

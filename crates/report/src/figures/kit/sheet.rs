@@ -1,4 +1,4 @@
-//! The sheet a figure is drawn on: a few verbs in px over plotters' elements, and groups that carry values.
+//! The sheet for drawing a figure: a few functions in px over plotters' elements, and groups that carry values.
 
 use std::cell::RefCell;
 use std::fmt::Write as _;
@@ -22,7 +22,7 @@ use super::look::{Fill, Rgb, Stroke};
 use super::mark::Mark;
 use exact::format::fixed;
 
-/// A figure in the making. What lies further down than its final height must not be drawn.
+/// A figure in progress. Elements below its final height must not be drawn.
 #[derive(Debug)]
 pub struct Sheet {
     ink: Rc<RefCell<Ink>>,
@@ -39,7 +39,7 @@ impl Sheet {
         self.width
     }
 
-    /// A line through these points.
+    /// Draws a line through these points.
     pub fn line(&mut self, points: &[Point], stroke: Stroke) {
         let points: Vec<_> = points.iter().map(|&at| lattice(at)).collect();
         let style =
@@ -57,8 +57,8 @@ impl Sheet {
         self.put(&Rectangle::new(corners, shape(fill)), outline_attributes(fill));
     }
 
-    /// Filled rectangles side by side, from the same top and of the same height: pairs of left and right ends,
-    /// ascending. Many of them take little room in the file.
+    /// Draws filled rectangles side by side, with the same top and height: pairs of left and right ends, ascending.
+    /// Many of them take little space in the file.
     pub(crate) fn bars(&mut self, ends: &[(f64, f64)], top: f64, height: f64, color: Rgb) {
         let ends: Vec<_> =
             ends.iter().map(|&(left, right)| (lattice((left, top)).0, lattice((right, top)).0)).collect();
@@ -70,7 +70,7 @@ impl Sheet {
         self.put(&Circle::new(lattice(center), units(radius), shape(fill)), outline_attributes(fill));
     }
 
-    /// One line of text, the middle of its capitals at the height of `at`.
+    /// Draws one line of text, with the middle of its capitals at the height of `at`.
     pub fn text(&mut self, at: Point, text: &str, lettering: Lettering) {
         let drop = font::drop_to_baseline(lettering.size);
         let at = if lettering.upwards { (at.0 + drop, at.1) } else { (at.0, at.1 + drop) };
@@ -78,7 +78,7 @@ impl Sheet {
         self.put(&Text::new(font::drawable(text), lattice(at), style), String::new());
     }
 
-    /// A picture that fills a frame; it is carried along in the file.
+    /// Draws a picture that fills a frame; it is embedded in the file.
     pub(crate) fn picture(&mut self, frame: Frame, png: &[u8]) {
         let [left, top, width, height] =
             [frame.left, frame.top, frame.width, frame.height].map(|length| fixed(Some(length), 2));
@@ -90,14 +90,14 @@ impl Sheet {
         );
     }
 
-    /// Puts everything that `draw` draws into one group with the mark's title and values.
+    /// Groups everything that `draw` draws, with the mark's title and values.
     pub fn mark(&mut self, mark: &Mark, draw: impl FnOnce(&mut Self)) {
         self.ink.borrow_mut().body.push_str(&mark.opening());
         draw(self);
         self.ink.borrow_mut().body.push_str("</g>\n");
     }
 
-    /// Returns the content down to `height` px, under a heading, and the height of both, px.
+    /// The content down to `height` px under a heading, and the height of both, px.
     pub(crate) fn under(self, title: &str, height: f64) -> (Self, f64) {
         let heading = lettering::heading();
         let mut sheet = Self::new(self.width);
@@ -111,7 +111,7 @@ impl Sheet {
         (sheet, height + top)
     }
 
-    /// The SVG, cut at `height`; `title` and `description` are for those who do not see it.
+    /// The SVG, cut at `height`; `title` and `description` are for screen readers.
     pub fn finish(self, height: f64, title: &str, description: &str) -> Drawing {
         let body = std::mem::take(&mut self.ink.borrow_mut().body);
         Drawing {
@@ -135,7 +135,7 @@ impl Sheet {
     }
 }
 
-/// A finished drawing, not yet a document.
+/// A finished drawing that is not yet a document.
 #[derive(Clone, Debug)]
 pub struct Drawing {
     width: f64,
@@ -152,12 +152,12 @@ impl Drawing {
         Self { printed: Some(width), ..self }
     }
 
-    /// The SVG to set into another document, which brings the font along.
+    /// The SVG for embedding in another document, which must include the font.
     pub fn inline(&self) -> String {
         self.element("")
     }
 
-    /// The SVG as a document of its own, with a title and `style` as its style sheet.
+    /// The SVG as a standalone document, with a title and the style sheet `style`.
     pub fn document(&self, style: &str) -> String {
         self.element(&format!("<title>{}</title>\n<style>{style}</style>\n", escaped(&self.title)))
     }

@@ -1,4 +1,4 @@
-//! Cells of a heat map: a value on its colour, hatched where undefined, crossed where there is no episode.
+//! Cells of a heat map: a coloured value, hatched if undefined, crossed without episodes.
 
 use super::frame::{Frame, Point, many};
 use super::label;
@@ -7,7 +7,7 @@ use super::look::{Fill, Rgb, Stroke};
 use super::palette::{PALETTE, text_on};
 use super::sheet::Sheet;
 
-/// A value: its colour, and the first of `texts` that the cell has room for.
+/// A value: its colour, and the first of `texts` that fits into the cell.
 pub(crate) fn known(sheet: &mut Sheet, frame: Frame, color: Rgb, texts: &[String]) {
     let lettering = lettering::value().aligned(Align::Middle);
     sheet.rectangle(frame, Fill::plain(color));
@@ -16,7 +16,7 @@ pub(crate) fn known(sheet: &mut Sheet, frame: Frame, color: Rgb, texts: &[String
     }
 }
 
-/// Episodes, and no value: hatched, `--`.
+/// Episodes without a value: hatched, `--`.
 pub(crate) fn undefined(sheet: &mut Sheet, frame: Frame) {
     const BETWEEN: f64 = 4.0;
     let surface = &PALETTE.surface;
@@ -35,7 +35,7 @@ pub(crate) fn undefined(sheet: &mut Sheet, frame: Frame) {
     sheet.text((x, y), "--", text);
 }
 
-/// No episode at all: crossed.
+/// No episodes: crossed.
 pub(crate) fn empty(sheet: &mut Sheet, frame: Frame) {
     let stroke = Stroke::solid(PALETTE.surface.hatch, 0.8);
     sheet.rectangle(frame, framed());
@@ -43,9 +43,9 @@ pub(crate) fn empty(sheet: &mut Sheet, frame: Frame) {
     sheet.line(&[(frame.left, frame.bottom()), (frame.right(), frame.top)], stroke);
 }
 
-/// A colour scale with a word at each end, drawn at `corner`; gives its right edge, px.
+/// Draws a colour scale at `corner`, with a word at each end; returns its right edge, px.
 pub(crate) fn scale(sheet: &mut Sheet, corner: Point, colors: impl Fn(f64) -> Rgb, ends: [&str; 2]) -> f64 {
-    // Whole pixels of a PNG each, so that no seam shows.
+    // Each a whole number of PNG pixels, so that no seams show.
     const STEPS: usize = 60;
     const WIDTH: f64 = 120.0;
     let lettering = lettering::tick();
@@ -62,7 +62,7 @@ pub(crate) fn scale(sheet: &mut Sheet, corner: Point, colors: impl Fn(f64) -> Rg
     bar.right() + 6.0 + lettering.width(ends[1])
 }
 
-/// Names beside rows: their labels, and the width they take, px.
+/// Names beside rows: their labels and width, px.
 pub(crate) fn row_labels(names: &[&str], room: f64) -> (Vec<String>, f64) {
     let lettering = lettering::label();
     let labels = label::fitted(names, room, lettering);

@@ -1,4 +1,4 @@
-//! One block minus another under one metric: by their pairs where they have pairs, else as independent samples.
+//! One block minus another under one metric: paired if they have pairs, else as independent samples.
 
 use std::collections::BTreeSet;
 
@@ -101,7 +101,7 @@ pub(in crate::statistics) struct Compared<'s, 'a> {
 }
 
 impl Compared<'_, '_> {
-    /// The comparison under one metric, not adjusted yet.
+    /// The comparison under one metric, before adjustment.
     pub(crate) fn under(&self, column: &MetricColumn) -> Comparison {
         let rates = self.study.kind(&column.name) == Kind::Rate;
         let sides = Sides::of(self.study, column, &[(self.first, self.second)]);
@@ -117,8 +117,8 @@ impl Compared<'_, '_> {
         Comparison { repeat_se, losses, ..found }
     }
 
-    /// The test with the lost episodes of both sides: in a comparison by pairs or units, each is a pair against a known
-    /// outcome, which is the most that it can do.
+    /// The test including the lost episodes of both sides. In a comparison by pairs or units, each lost episode is a
+    /// pair against a known outcome, which is its largest possible effect.
     fn with_lost(&self, column: &MetricColumn, seen: &Comparison, sides: Option<&Sides>, toward: Toward) -> LossCase {
         let is_highest = toward == Toward::Highest;
         let lost = self.first.lost + self.second.lost;
@@ -155,7 +155,7 @@ impl Compared<'_, '_> {
         }
     }
 
-    /// The ends of both sides and of their lost episodes, which decide at once or never.
+    /// The endings of both sides, with each lost episode decided at once or never.
     fn lost_endings(&self, column: &MetricColumn, horizon: i64, toward: Toward) -> [Vec<Ending>; 2] {
         let fast = Ending { steps: 1, outcome: Outcome::Correct };
         let slow = Ending { steps: horizon, outcome: Outcome::Unfinished };
@@ -169,7 +169,7 @@ impl Compared<'_, '_> {
         sides
     }
 
-    /// The same of units: each lost episode is one of its own.
+    /// The same for units: each lost episode is its own unit.
     fn lost_units(&self, mut sides: units::Sides, horizon: i64, toward: Toward) -> units::Sides {
         let one = |steps: i64| Moments::default().with(steps).unwrap_or_default();
         let ends = if toward == Toward::Highest { [one(horizon), one(1)] } else { [one(1), one(horizon)] };
@@ -183,7 +183,7 @@ impl Compared<'_, '_> {
         sides
     }
 
-    /// Returns true if a unit enters the comparison of episodes more than once.
+    /// Returns true if a unit occurs more than once in the comparison of episodes.
     fn is_dependent(&self) -> bool {
         let Some(pairs) = &self.matched.pairs else {
             return self.first.repeats || self.second.repeats;
@@ -208,7 +208,7 @@ impl Compared<'_, '_> {
         }
     }
 
-    /// A duration by unit where its times up to the horizon are all known; another quantity has no test.
+    /// Compares a duration by unit if all its times up to the horizon are known; other quantities have no test.
     fn quantity_by_unit(&self, column: &MetricColumn) -> Comparison {
         let seen = self.of_episodes(column).withheld_as_dependent();
         if !is_duration(self.study, &column.name) {
@@ -236,7 +236,7 @@ impl Compared<'_, '_> {
         Comparison { n: seen.n, units: Some(units), ..tested }
     }
 
-    /// The times of both sides up to the horizon, by unit.
+    /// The times of both sides, limited to the horizon, by unit.
     fn times(&self, column: &MetricColumn, horizon: i64) -> Option<units::Sides> {
         let time = |row| decided(self.study, column, row).map(|end| end.steps.min(horizon));
         Sides::by(self.study, &[(self.first, self.second)], time).divided()
@@ -268,7 +268,7 @@ impl Compared<'_, '_> {
 
     fn paired_quantity(&self, column: &MetricColumn, rows: &[(usize, usize)]) -> Comparison {
         let mut differences = rows.iter().filter_map(|&(a, b)| column.get(a)?.checked_sub(column.get(b)?));
-        // No sum of squares that 128 bits cannot hold: then there is no interval.
+        // If a sum of squares exceeds 128 bits, there is no interval.
         let moments = differences.try_fold(Moments::default(), Moments::with).unwrap_or_default();
         let interval = student_t(&moments, StandardError::Sample, self.confidence);
         let spread = moments.se(StandardError::Sample).is_some_and(|se| se > 0.0);
@@ -312,7 +312,7 @@ impl Compared<'_, '_> {
         Comparison { undefined, ..Comparison::of_durations(method, n, found, self.confidence) }
     }
 
-    /// The ends of both sides' episodes; of pairs, those of which both have one, in the same order.
+    /// The endings of both sides' episodes. For pairs, only those with both endings, in the same order.
     fn endings(&self, column: &MetricColumn) -> [Vec<Ending>; 2] {
         let ending = |row: usize| decided(self.study, column, row);
         match &self.matched.pairs {
@@ -365,7 +365,7 @@ impl Comparison {
         Self { interval: None, withheld: Some(Withheld::Dependent), p: None, ..self }
     }
 
-    /// The test needs as many units as any other test, the interval as many as its coverage.
+    /// The test needs as many units as any other test, the interval as many as its coverage requires.
     fn of_durations(method: Method, n: [u64; 2], found: Option<Difference>, confidence: f64) -> Self {
         let least = fewest_of(confidence);
         let (interval, withheld) = coverage::given(
@@ -388,7 +388,7 @@ impl Comparison {
         Self { p: test.map(|test| test.p), mid_p: test.map(|test| test.mid_p), ..self }
     }
 
-    /// The units, pairs or episodes that are too few for any verdict, or the lost episodes that decide it; none elsewhere.
+    /// The units, pairs or episodes that are too few for a verdict, or the lost episodes that decide it; else `None`.
     #[expect(clippy::cast_precision_loss, reason = "few episodes: more of them are never too few")]
     pub(in crate::statistics) fn unsaid(&self, confidence: f64) -> Option<Units> {
         if let Some(units) = &self.units {
@@ -424,12 +424,12 @@ fn fewest_of(confidence: f64) -> u64 {
     level(confidence).map_or(u64::MAX, |level| fewest(level) as u64)
 }
 
-/// The position of the first of two models.
+/// The sign of a difference between two models.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sign {
-    /// Above the second.
+    /// The first is above the second.
     Higher,
-    /// Below it.
+    /// The first is below the second.
     Lower,
 }
 

@@ -1,4 +1,4 @@
-//! Contrasts of experiments, a model at a time: those that the definitions declare by `control`, else the first experiment
+//! Contrasts of experiments for each model: those that the definitions declare by `control`, else the first experiment
 //! minus each other one.
 
 use schemars::JsonSchema;
@@ -58,7 +58,7 @@ impl<'s, 'a> Pair<'s, 'a> {
         study.table.metrics.iter().filter(|column| self.on.is_empty() || self.on.contains(&column.name)).collect()
     }
 
-    /// The blocks of one model and condition in both.
+    /// The blocks of one model and condition in both experiments.
     pub(in crate::statistics) fn couples(&self) -> impl Iterator<Item = (&'s Block<'a>, &'s Block<'a>)> {
         let firsts = &self.baseline.blocks;
         let same = move |second: &'s Block<'a>| {
@@ -92,7 +92,7 @@ impl Contrast {
         contrasts
     }
 
-    /// The pairs of experiments with tasks that are alike.
+    /// The pairs of experiments with similar tasks.
     pub(in crate::statistics) fn pairs<'s, 'a>(study: &'s Study<'a>) -> Vec<Pair<'s, 'a>> {
         let catalog = &study.table.catalog;
         let is_like = |pair: &Pair| tasks_differ(catalog, pair.baseline.name, pair.against.name).is_none();

@@ -1,4 +1,4 @@
-//! Episodes that the infrastructure ended, and what they could have changed.
+//! Episodes that the infrastructure ended, and their possible effect.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -9,7 +9,7 @@ use exact::moments::Moments;
 use statistics::holm::{holm, level};
 use statistics::losses::{Fate, Lossy, bounds};
 
-/// The name of lost episodes that decide.
+/// The name of lost episodes that decide a verdict.
 pub(in crate::statistics) const LOST: &str = "lost episodes";
 
 /// Losses, or that nothing is known of them.
@@ -75,7 +75,7 @@ pub(in crate::statistics) enum Toward {
 }
 
 impl Toward {
-    /// The moments of a rate with the lost episodes of its side, which is the first or the second of a difference.
+    /// The moments of a rate including the lost episodes of its side, the first or the second of a difference.
     pub fn moments(self, known: Moments, lost: u64, is_first: bool) -> Moments {
         let lost = usize::try_from(lost).unwrap_or(usize::MAX);
         let (zeros, ones) = if (self == Self::Highest) == is_first { (0, lost) } else { (lost, 0) };
@@ -84,7 +84,7 @@ impl Toward {
 }
 
 impl LossCases {
-    /// Both cases; `None` without a lost episode.
+    /// Both cases; `None` without lost episodes.
     pub(in crate::statistics) fn of(lost: u64, case: impl Fn(Toward) -> LossCase) -> Option<Self> {
         let both = || Self { lost, lowest: case(Toward::Lowest), highest: case(Toward::Highest), agree: true };
         (lost > 0).then(both)

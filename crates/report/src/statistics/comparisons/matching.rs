@@ -1,7 +1,7 @@
 //! Pairs of episodes of two blocks: those with the same scene.
 //!
-//! Rule: a pair is one episode of each side with one scene, where each side has exactly one with it. Whether two blocks
-//! are compared by their pairs is decided by the scenes alone, before any outcome is looked at.
+//! Rule: a pair is one episode of each side with one scene, if each side has exactly one with it. Only the scenes
+//! decide whether two blocks are compared by pairs, before any outcome is read.
 
 use std::collections::BTreeMap;
 
@@ -37,11 +37,11 @@ pub(in crate::statistics) struct Scenes {
 /// Two blocks' pairs, as rows of the table, in the order of the scenes.
 pub(in crate::statistics) struct Matched {
     pub matching: Matching,
-    /// The pairs where they are what is compared; none otherwise.
+    /// The pairs if they are compared; otherwise `None`.
     pub pairs: Option<Vec<(usize, usize)>>,
 }
 
-/// The 2x2 table of a rate over pairs of rows; a pair counts if both values are defined.
+/// The 2x2 table of a rate over pairs of rows; pairs with an undefined value do not count.
 pub(in crate::statistics) fn outcomes(column: &MetricColumn, pairs: &[(usize, usize)]) -> Pairs {
     Pairs::of(pairs.iter().filter_map(|&(a, b)| Some((column.get(a)?, column.get(b)?))))
 }

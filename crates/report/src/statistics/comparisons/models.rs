@@ -1,4 +1,4 @@
-//! Models against each other in one experiment: by pairs or not, and sets of ties instead of ranks.
+//! Compares models in one experiment: paired or not, with tied sets instead of ranks.
 
 use std::cmp::Ordering;
 
@@ -78,7 +78,7 @@ pub struct Gap {
     pub episodes: usize,
 }
 
-/// Every pair of blocks of an experiment, matched once for all metrics.
+/// All pairs of blocks of an experiment, matched once for all metrics.
 pub(in crate::statistics) struct Field<'s, 'a> {
     study: &'s Study<'a>,
     blocks: &'s [Block<'a>],
@@ -143,14 +143,14 @@ impl<'s, 'a> Field<'s, 'a> {
     }
 }
 
-/// The options that all comparisons share.
+/// Options shared by all comparisons.
 #[derive(Clone, Copy)]
 struct Asked {
     horizon: Option<i64>,
     confidence: f64,
 }
 
-/// The place of a pair among the pairs of `count` members, listed row by row of the upper triangle.
+/// The index of a pair among the pairs of `count` members, listed row by row of the upper triangle.
 fn triangle(count: usize, a: usize, b: usize) -> usize {
     a * (2 * count - a - 1) / 2 + (b - a - 1)
 }
@@ -161,7 +161,7 @@ pub(in crate::statistics) fn compared(study: &Study, horizon: Option<i64>, confi
         let field = Field::of(study, experiment);
         for column in &study.table.metrics {
             if is_duration(study, &column.name) {
-                // Models are ordered and compared up to one horizon, that of the table of durations.
+                // Models are ordered and compared up to one horizon, the one in the table of durations.
                 let horizon = horizon.or_else(|| durations::horizon_of(study, experiment, column));
                 families.push(Family::of(experiment.name, column, &field, Asked { horizon, confidence }));
             } else if study.kind(&column.name) == Kind::Rate {
@@ -218,7 +218,7 @@ fn best_first(field: &Field, column: &MetricColumn, horizon: Option<i64>) -> Vec
     let means: Vec<Option<f64>> = field.blocks.iter().map(mean).collect();
     let better = field.study.better(&column.name);
     let mut order: Vec<usize> = (0..field.blocks.len()).collect();
-    // Blocks are ordered by name, and the sort keeps that order.
+    // Blocks are ordered by name, and the sort is stable.
     order.sort_by(|&a, &b| by_mean(means[a], means[b], better));
     order
 }

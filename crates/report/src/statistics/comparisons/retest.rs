@@ -1,7 +1,7 @@
-//! The same scene played again by the same model: how often a verdict comes out otherwise.
+//! The same scene played repeatedly by the same model: how often verdicts differ.
 //!
-//! Rule: what one scene gives from one time to the next is noise, and a difference has to exceed it. Every two times of a
-//! scene count once, each scene with the same weight. Two people who play one scene are no repetition.
+//! Rule: the variation between repetitions of one scene is noise, and a difference has to exceed it. Every two
+//! repetitions of a scene count once, and scenes have equal weight. One scene played by two people is no repetition.
 
 use std::collections::BTreeMap;
 
@@ -88,7 +88,7 @@ impl RetestRow {
     }
 }
 
-/// The rows of each scene, of each person apart.
+/// The rows of each scene, separately for each person.
 type Times = BTreeMap<(usize, Option<usize>), Vec<usize>>;
 
 fn times(study: &Study, block: &Block) -> Times {

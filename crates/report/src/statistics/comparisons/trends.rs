@@ -1,4 +1,4 @@
-//! Rates against the doses of a factor, a model at a time: do they rise or fall?
+//! Rates against the doses of a factor, for each model: do they rise or fall?
 
 use std::collections::BTreeMap;
 
@@ -55,18 +55,18 @@ pub struct Dose {
     pub n: u64,
 }
 
-/// The fewest scenes, other units or independent episodes for which the limit of many holds.
+/// The fewest scenes, other units or independent episodes for which the asymptotic test is valid.
 const LEAST_UNITS: u64 = 12;
 
 impl TrendRow {
-    /// The number of units that are compared, where it is too small for a verdict.
+    /// The number of compared units, if it is too small for a verdict.
     pub(in crate::statistics) fn too_few(&self) -> Option<u64> {
         let episodes = || self.doses.iter().map(|dose| dose.n).sum();
         let units = self.trend.map(|trend| if self.units == "episodes" { episodes() } else { trend.strata });
         units.filter(|units| *units < LEAST_UNITS)
     }
 
-    /// The headline rates under every factor that two experiments or more of the table have.
+    /// The headline rates under every factor with two or more experiments in the table.
     pub(in crate::statistics) fn all(study: &Study, headline: &[String], confidence: f64) -> Vec<Self> {
         let mut rows = Vec::new();
         for (name, factor) in &study.table.catalog.factor {
@@ -92,7 +92,7 @@ impl TrendRow {
             let experiment = block.experiment.to_owned();
             doses.push(Dose { dose: *dose, experiment, successes, n: values.len() as u64 });
             for (row, success) in values {
-                // Episodes that share nothing are one stratum.
+                // Episodes without a shared unit form one stratum.
                 let unit = Some(study.unit(row)).filter(|unit| !matches!(unit, Unit::Episode(_)));
                 strata.entry(unit).or_default().push((*dose, success));
             }
@@ -118,7 +118,7 @@ impl TrendRow {
 /// Blocks by model and condition, each with its dose.
 type Blocks<'s, 'a> = BTreeMap<(&'a str, Option<&'a str>), Vec<(f64, &'s Block<'a>)>>;
 
-/// The blocks of each model and condition by dose, the least first.
+/// The blocks of each model and condition, ascending by dose.
 fn blocks<'s, 'a>(study: &'s Study<'a>, factor: &Factor) -> Blocks<'s, 'a> {
     let mut found = Blocks::new();
     for (experiment, dose) in factor.doses() {

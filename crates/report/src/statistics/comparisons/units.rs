@@ -1,4 +1,4 @@
-//! Two models by unit of analysis: a scene, a declared cluster or a participant counts once.
+//! Compares two models by unit of analysis: a scene, a declared cluster or a participant counts once.
 
 use std::collections::BTreeMap;
 use std::mem::discriminant;
@@ -31,7 +31,7 @@ impl Units {
 }
 
 impl Units {
-    /// Those of two sides. Units of different kinds, such as participants and scenes, have no test between them.
+    /// The units of two sides. Units of different kinds, such as participants and scenes, cannot be tested.
     pub(super) fn between(study: &Study, blocks: [&Block; 2], sides: &Sides, least: f64, confidence: f64) -> Self {
         let ([first, second], names) = (sides.counts(), blocks.map(|block| study.unit_name(block)));
         if names[0] == names[1] {
@@ -41,7 +41,7 @@ impl Units {
     }
 }
 
-/// True if no symmetric test of so many units or episodes, or none with this least p value, can reach the level.
+/// True if no symmetric test with this number of units or episodes, or with this least p value, can reach the level.
 pub(in crate::statistics) fn too_few(n: usize, least: f64, confidence: f64) -> bool {
     level(confidence).is_none_or(|level| least > level || n < fewest_clusters(level))
 }
@@ -52,9 +52,9 @@ pub(in crate::statistics) struct Sides {
 }
 
 impl Sides {
-    /// The sides of all strata together, so that a unit of several strata counts once.
+    /// The sides of all strata together: a unit of several strata counts once.
     ///
-    /// `None` where each episode is a unit, or all units are pairs of one episode each.
+    /// `None` if each episode is its own unit, or all units are pairs of one episode each.
     pub fn of(study: &Study, column: &MetricColumn, strata: &[(&Block, &Block)]) -> Option<Self> {
         if !study.has_units() {
             return None;
@@ -66,7 +66,7 @@ impl Sides {
         (repeats || is_partly_shared).then_some(sides)
     }
 
-    /// The sides under any value of an episode.
+    /// The sides for any value of an episode.
     pub fn by(study: &Study, strata: &[(&Block, &Block)], value: impl Fn(usize) -> Option<i64>) -> Self {
         let mut units: BTreeMap<Unit, (Moments, Moments)> = BTreeMap::new();
         let add = |sum: &mut Moments, part: Moments| {
@@ -98,7 +98,7 @@ impl Sides {
         self.units.values().fold([0, 0], has)
     }
 
-    /// The units that both sides have and those of one; `None` where the units of the two sides are of different kinds.
+    /// The shared units, and those of one side; `None` if the units of the two sides are of different kinds.
     pub(crate) fn divided(&self) -> Option<units::Sides> {
         let mut sides = units::Sides::default();
         let mut kinds = [None; 2];
@@ -117,7 +117,7 @@ impl Sides {
         (kinds[0] == kinds[1]).then_some(sides)
     }
 
-    /// The exact test of a rate; `lost` are further units of both sides.
+    /// The exact test of a rate; `lost` are additional shared units.
     pub fn test(&self, lost: &[(Moments, Moments)]) -> Option<UnitTest> {
         let mut sides = self.divided()?;
         sides.shared.splice(..0, lost.iter().copied());

@@ -1,4 +1,4 @@
-//! The scenes in which the later value is another one, with the episodes of both sides.
+//! The scenes in which the later value differs, with the episodes of both sides.
 
 use std::collections::BTreeMap;
 
@@ -32,7 +32,8 @@ pub struct Played {
     pub frames: Option<String>,
 }
 
-/// The pairs of episodes whose values differ: of equal scenes in their order, or of equal ids where no scene is declared; none of reconstructions.
+/// The pairs of episodes whose values differ, matched by scene in order, or by id if no scenes are declared. Empty for
+/// reconstructions.
 pub(super) fn of(study: &Study, column: &MetricColumn, [base, new]: [&Block; 2]) -> Vec<FlippedPair> {
     let id = |row: usize| sides::id(study.table.keys.get(row).episode_id);
     let by_scene = |block: &Block| Scenes::of(study, block).rows;

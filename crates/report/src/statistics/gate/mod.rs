@@ -1,7 +1,7 @@
-//! Later episodes compared with earlier ones, cell by cell: improved, held, regressed, or why no verdict is given.
+//! Compares later episodes with earlier ones, cell by cell: improved, held, regressed, or why there is no verdict.
 //!
-//! Rule: a loss within the margin is accepted, so that `held` comes before `regressed`. Every verdict is adjusted by Holm over
-//! the cells, rests on the unit of analysis, and holds for every outcome of the lost episodes.
+//! Rule: a loss within the margin is accepted, so `held` comes before `regressed`. Every verdict is Holm-adjusted over
+//! the cells, based on the unit of analysis, and valid for every outcome of the lost episodes.
 
 mod flips;
 mod sides;
@@ -32,13 +32,13 @@ use statistics::margin;
 /// The options of the gate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GateOptions {
-    /// The metric, which both sides have and which has a better direction.
+    /// The metric, which both sides need, with a better direction.
     pub metric: String,
-    /// The largest loss that is accepted, in the unit of the metric.
+    /// The largest accepted loss, in the unit of the metric.
     pub margin: f64,
     /// One minus the level of every verdict.
     pub confidence: f64,
-    /// True if settings that differ do not matter.
+    /// True to ignore differing settings.
     pub pool: bool,
 }
 
@@ -134,7 +134,7 @@ struct Tried {
 }
 
 impl Gate {
-    /// The verdict on every cell that either side has.
+    /// The verdict on every cell of either side.
     pub fn of([base, new]: [&EpisodeTable; 2], design: Design, options: &GateOptions) -> Result<Self, MomentOverflow> {
         let sides = Sides::of(base, new);
         let barrier = sides.barrier().filter(|_| !options.pool);
@@ -228,7 +228,7 @@ impl Tried {
             let held = units.non_inferior(options.margin);
             return Self { comparison: at(options.confidence), spread: units.spread(), held };
         }
-        // Every verdict on a quantity is by its interval, at the level of Bonferroni.
+        // Verdicts on a quantity use its interval, at the Bonferroni level.
         #[expect(clippy::cast_precision_loss, reason = "few cells")]
         let share = (1.0 - options.confidence) / tests.max(1) as f64;
         let (told_apart, within) = (at(1.0 - share), at(1.0 - 2.0 * share));
@@ -247,7 +247,7 @@ impl Tried {
     }
 }
 
-/// The means of both sides by unit; the better direction is up.
+/// The means of both sides by unit; higher is better.
 fn units(study: &Study, column: &MetricColumn, [base, new]: [&Block; 2]) -> margin::Units {
     let is_lower = study.better(&column.name) == Better::Lower;
     let mean = |mean: f64| if is_lower { 1.0 - mean } else { mean };

@@ -1,4 +1,4 @@
-//! Both sides of a gate as one table: the condition says which side an episode is of.
+//! Both sides of a gate as one table: the condition identifies an episode's side.
 
 use super::super::study::Block;
 use super::{GateCell, GateOptions};
@@ -10,7 +10,7 @@ use score::table::{EpisodeTable, Header, KeyRef, LOST};
 
 /// The prefixes of the condition and the episode id of each side.
 const MARKS: [&str; 2] = ["0/", "1/"];
-/// The labels that say what episodes share, and what they were recorded with.
+/// The labels for units that episodes share, and for their recording settings.
 const LABELS: [&str; 4] = [CONDITION, "scene", FINGERPRINT, "participant"];
 /// The name of the default condition.
 const DEFAULT: &str = "default";
@@ -18,11 +18,11 @@ const DEFAULT: &str = "default";
 /// The assumed result of lost episodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Fill {
-    /// They do not count.
+    /// Not counted.
     Out,
-    /// Failures of the later side, successes of the earlier one.
+    /// Failures on the later side, successes on the earlier one.
     Against,
-    /// Successes of the later side, failures of the earlier one.
+    /// Successes on the later side, failures on the earlier one.
     For,
 }
 
@@ -43,7 +43,7 @@ impl<'a> Sides<'a> {
         Self { tables: [base, new], renamed }
     }
 
-    /// The obstacle to comparing any cell: other definitions, or episodes that were made in another way.
+    /// The reason why no cell can be compared: different definitions, or episodes of different origin.
     pub(crate) fn barrier(&self) -> Option<String> {
         let [base, new] = self.tables;
         let hash = |table: &EpisodeTable| table.catalog.hash.chars().take(8).collect::<String>();
@@ -54,7 +54,7 @@ impl<'a> Sides<'a> {
         (kind(base) != kind(new)).then(|| format!("kind is {} and {}", kind(base), kind(new)))
     }
 
-    /// The earlier name of a model.
+    /// The earlier name of a renamed model.
     pub(crate) fn base_model(&self, model: &str) -> Option<String> {
         self.renamed.filter(|[_, new]| *new == model).map(|[old, _]| old.to_owned())
     }

@@ -1,4 +1,4 @@
-//! The verdicts of a gate for people, for pages, and for the programs that run checks.
+//! The verdicts of a gate for people, for pages, and for CI programs.
 
 use std::fmt::Write as _;
 
@@ -14,9 +14,9 @@ pub enum GateFormat {
     /// A table for a terminal of this width, and the flipped episodes.
     Text(Option<usize>),
     Markdown,
-    /// Workflow commands of GitHub Actions, a line per cell.
+    /// Workflow commands of GitHub Actions, one line per cell.
     Github,
-    /// `JUnit` XML: a regression is a failure, a cell that is not comparable an error, a cell without a verdict skipped.
+    /// `JUnit` XML: a regression is a failure, an incomparable cell an error, a cell without a verdict skipped.
     Junit,
 }
 
@@ -31,7 +31,7 @@ pub(super) const fn name(verdict: GateVerdict) -> &'static str {
 }
 
 impl Gate {
-    /// The verdicts in a format; the last line of text sums up.
+    /// The verdicts in a format; the last line of text is a summary.
     pub fn render(&self, format: GateFormat) -> String {
         match format {
             GateFormat::Text(width) => self.text(width),
@@ -160,7 +160,7 @@ impl Gate {
 }
 
 impl GateCell {
-    /// The model and its condition, with the earlier name of the model where it is another one.
+    /// The model and its condition, with the model's earlier name if it differs.
     pub fn name(&self) -> String {
         let model = named(&self.model, self.condition.as_deref());
         self.base_model.as_ref().map_or_else(|| model.clone(), |base| format!("{model} (was {base})"))
@@ -177,7 +177,7 @@ fn side(side: GateSide) -> String {
     counted + &lost
 }
 
-/// `E1/ant/s1/r2 1 (step 4) -> E1/ant/s1/r2 0 (step 7)`, with where the frames are.
+/// `E1/ant/s1/r2 1 (step 4) -> E1/ant/s1/r2 0 (step 7)`, with the location of the frames.
 fn words(flip: &FlippedPair) -> String {
     let played = |played: &Played| {
         let steps = played.timesteps.as_ref().filter(|steps| !steps.is_empty()).map_or_else(String::new, |steps| {
@@ -190,7 +190,7 @@ fn words(flip: &FlippedPair) -> String {
     format!("{} -> {}", played(&flip.base), played(&flip.new))
 }
 
-/// Text as XML has it; a character that XML does not have is spelled.
+/// Text escaped for XML; characters that XML forbids are spelled out.
 fn xml(text: &str) -> String {
     let text = visible(text);
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")

@@ -1,4 +1,4 @@
-//! Every cell with its count and its intervals.
+//! Every cell with its count and intervals.
 
 use indexmap::IndexMap;
 use schemars::JsonSchema;
@@ -17,7 +17,7 @@ use statistics::bootstrap;
 use statistics::coverage::{self, Withheld};
 use statistics::interval::{Interval, clopper_pearson, jeffreys, wilson};
 
-/// Conditional metrics with fewer defined episodes than this are marked.
+/// Conditional metrics with fewer defined episodes are marked.
 pub(crate) const FEW: u64 = 5;
 
 /// One cell: the episodes of one group under one metric.
@@ -78,7 +78,7 @@ pub enum Intervals {
 }
 
 impl CellRow {
-    /// Notes what is not in the numbers of the cell, or not a decision.
+    /// Adds the counts of lost episodes and of replies without a decision.
     pub(in crate::statistics) fn note_left_out(&mut self, lost: Option<&LostCounts>, replies: Option<&Replies>) {
         let lost = lost.into_iter().flat_map(LostCounts::iter);
         let lost = lost.filter(|(key, _)| self.is_of(&key.experiment, &key.model, Some(&key.condition)));
@@ -89,7 +89,7 @@ impl CellRow {
         (self.lost, self.unusable_replies) = ((lost > 0).then_some(lost), (unusable > 0).then_some(unusable));
     }
 
-    /// Returns true if episodes of this experiment, model and condition are in the cell, and not divided further.
+    /// Returns true if the cell has episodes of this experiment, model and condition, without dividing them further.
     fn is_of(&self, experiment: &str, model: &str, condition: Option<&str>) -> bool {
         self.key.iter().all(|(name, value)| match (name.as_str(), value) {
             ("experiment", KeyValue::Text(text)) => text == experiment,
@@ -99,7 +99,7 @@ impl CellRow {
         })
     }
 
-    /// All cells, in the order of the groups and metrics.
+    /// All cells, by group and metric.
     pub(in crate::statistics) fn all(study: &Study, cells: &Cells, confidence: f64) -> Vec<Self> {
         let rows = rows_by_group(study.table, cells);
         let groups = cells.groups.iter().zip(&rows);
@@ -139,7 +139,7 @@ impl CellRow {
 }
 
 impl Intervals {
-    /// Of a metric that the catalog does not describe.
+    /// For a metric that the catalog does not describe.
     const NONE: Self = Self::Quantity {
         student_t: None,
         student_t_withheld: Some(Withheld::Undefined),
@@ -163,7 +163,7 @@ impl Intervals {
         confidence: f64,
     ) -> Self {
         let range = study.range(name);
-        // 10,000 resamples are drawn only where their interval may be given.
+        // 10,000 resamples are drawn only if their interval may be shown.
         let resampled = (moments.n >= coverage::BOOTSTRAP && moments.has_spread())
             .then(|| bootstrap::mean(&values(study, name, rows), confidence))
             .flatten();

@@ -1,7 +1,7 @@
 //! Rates against the levels of blind guessing, by the exact binomial test.
 //!
 //! Rule: a rate that counts unfinished episodes as failures is beside the same rate among finished episodes
-//! ([`Relations`](metric::relations::Relations)): who does not finish is below chance under the first and need not guess.
+//! ([`Relations`](metric::relations::Relations)): a model that never finishes is below chance, but need not guess.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -76,7 +76,7 @@ pub enum Verdict {
 }
 
 impl ChanceRow {
-    /// Every rate against every level that its experiment has.
+    /// Every rate against every level of its experiment.
     pub(in crate::statistics) fn all(study: &Study, confidence: f64) -> Vec<Self> {
         let mut rows = Vec::new();
         for experiment in &study.experiments {
@@ -132,7 +132,7 @@ impl ChanceRow {
         tested.into_iter().zip(adjusted).map(row).collect()
     }
 
-    /// The units or episodes that are too few for any verdict, or the lost ones that decide it; none elsewhere.
+    /// The units or episodes that are too few for a verdict, or the lost ones that decide it; otherwise `None`.
     pub(in crate::statistics) fn unsaid(&self, confidence: f64) -> Option<Units> {
         let episodes =
             || Units { n: self.n, name: "episodes".to_owned(), too_few: few_episodes(self.n, self.level, confidence) };
@@ -140,7 +140,7 @@ impl ChanceRow {
         units.too_few.then_some(units).or_else(|| LossCases::unsettled(self.losses.as_ref()))
     }
 
-    /// The largest number of units or episodes, if no outcome of any of these models could pass Holm's first step.
+    /// The largest number of units or episodes, if no outcome of these models could pass Holm's first step.
     pub(in crate::statistics) fn hopeless(family: &[&Self], confidence: f64) -> Option<Units> {
         #[expect(clippy::cast_precision_loss, reason = "a family has few tests")]
         let first_step = level(confidence)? / family.len() as f64;
@@ -151,7 +151,7 @@ impl ChanceRow {
         family.iter().all(is_hopeless).then_some(most)
     }
 
-    /// The model as it is compared.
+    /// The model's name in comparisons.
     pub fn name(&self) -> String {
         named(&self.model, self.condition.as_deref())
     }

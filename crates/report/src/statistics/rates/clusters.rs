@@ -1,4 +1,4 @@
-//! Cells by seed, where the design declares that episodes of one seed depend on each other.
+//! Cells by seed, if the design declares that episodes of one seed depend on each other.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -1,4 +1,4 @@
-//! Durations with their unfinished episodes taken as censored, and the time to a correct decision.
+//! Durations with unfinished episodes as censored, and the time to a correct decision.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -55,12 +55,12 @@ pub struct CorrectRow {
     pub withheld: Option<Withheld>,
 }
 
-/// Returns true if a metric is a duration whose end is known.
+/// Returns true if a metric is a duration with a known end.
 pub(in crate::statistics) fn is_duration(study: &Study, metric: &str) -> bool {
     study.relations.finished(metric).is_some_and(|finished| study.column(finished).is_some())
 }
 
-/// The end of an episode, any decision being the one waited for; `None` where the duration is undefined.
+/// The ending of an episode, with any decision as the event; `None` if the duration is undefined.
 pub(in crate::statistics) fn decided(study: &Study, column: &MetricColumn, row: usize) -> Option<Ending> {
     let ending = ending(study, column, row)?;
     let outcome = if ending.outcome == Outcome::Unfinished { Outcome::Unfinished } else { Outcome::Correct };
@@ -76,7 +76,7 @@ fn ending(study: &Study, column: &MetricColumn, row: usize) -> Option<Ending> {
     column.get(row).map(|steps| Ending { steps, outcome })
 }
 
-/// The horizon of an experiment: the last step that every model's curve is known to.
+/// The horizon of an experiment: the last step at which every model's curve is known.
 pub(in crate::statistics) fn horizon_of(study: &Study, experiment: &Experiment, column: &MetricColumn) -> Option<i64> {
     let curves: Vec<Survival> = experiment.blocks.iter().filter_map(|block| curve(study, block, column)).collect();
     common_horizon(&curves)
@@ -89,7 +89,7 @@ pub(in crate::statistics) fn restricted(
     column: &MetricColumn,
     horizon: i64,
 ) -> Option<f64> {
-    // Any confidence: the mean alone is wanted.
+    // Any confidence works: only the mean is used.
     Some(curve(study, block, column)?.restricted_mean(horizon, 0.5)?.mean)
 }
 
@@ -98,8 +98,8 @@ fn curve(study: &Study, block: &Block, column: &MetricColumn) -> Option<Survival
 }
 
 impl DurationRow {
-    /// Every censored duration that the table has, up to `horizon` or, without one, up to the last step
-    /// that every model's curve is known to.
+    /// Every censored duration of the table, up to `horizon`, by default the last step at which every model's curve is
+    /// known.
     pub(in crate::statistics) fn all(study: &Study, horizon: Option<i64>, confidence: f64) -> Vec<Self> {
         let durations = study.relations.durations.iter().filter(|(duration, _)| is_duration(study, duration));
         let columns: Vec<&MetricColumn> = durations.filter_map(|(duration, _)| study.column(duration)).collect();

@@ -1,7 +1,7 @@
-//! Models against each other over all experiments, each of which is a stratum.
+//! Compares models over all experiments, with each experiment as a stratum.
 //!
-//! Rule: only experiments that both models have, recorded alike. Where the two are paired in all of them, all pairs are pooled; else every
-//! stratum is a 2x2 table of independent episodes.
+//! Rule: only experiments that both models have, recorded alike. If the two are paired in all of them, all pairs are
+//! pooled; else every stratum is a 2x2 table of independent episodes.
 
 use std::collections::BTreeMap;
 
@@ -207,7 +207,7 @@ impl<'s, 'a> Couple<'s, 'a> {
     }
 
     fn improvement(&self, study: &Study, column: &MetricColumn, confidence: f64) -> Option<ImprovementRow> {
-        // Later is larger: a side that decides earlier is the second of the two that are compared.
+        // The statistic favours larger values, but earlier decisions are better: so the sides are swapped.
         let steps = |block: &Block| -> Vec<i64> {
             let endings = block.rows().filter_map(|row| decided(study, column, row));
             endings.map(|it| if it.outcome == Outcome::Unfinished { i64::MAX } else { it.steps }).collect()

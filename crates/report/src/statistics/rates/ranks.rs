@@ -1,7 +1,7 @@
-//! Ranks that the tests leave open, in place of an order of means.
+//! Ranks that the tests leave open, instead of an order of means.
 //!
-//! Rule: a model is below another where it is shown to be worse, and nowhere else. Those that are below none are tied for the
-//! best. A family with models that are not comparable has no ranks.
+//! Rule: a model ranks below another only if it is shown to be worse. Models that rank below no other are tied for the
+//! best. A family with incomparable models has no ranks.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -55,7 +55,7 @@ impl RankRow {
         rows
     }
 
-    /// `2`, or `1-3` where the tests leave several ranks open.
+    /// `2`, or `1-3` if the tests leave several ranks open.
     pub(in crate::statistics) fn interval(&self) -> String {
         if self.best == self.worst { self.best.to_string() } else { format!("{}-{}", self.best, self.worst) }
     }
@@ -82,7 +82,7 @@ fn ranks(experiment: Option<&str>, metric: &str, models: &[&str], shown: &[(&str
     models.iter().map(row).collect()
 }
 
-/// The ranks of a table at the usual confidence, in each experiment and over all of them.
+/// The ranks of a table at the default confidence, in each experiment and over all of them.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Ranks(Vec<RankRow>);
 
@@ -99,14 +99,14 @@ impl Ranks {
         Ok(Self(RankRow::all(&compared(&study, None, CONFIDENCE).0, &overall)))
     }
 
-    /// Returns true if a model is tied for the best, and another one is not.
+    /// Returns true if a model is tied for the best, and some other model is not.
     pub fn is_tied(&self, experiment: &str, model: &str, metric: &str) -> bool {
         let is_of = |row: &&RankRow| row.experiment.as_deref() == Some(experiment) && row.metric == metric;
         let mut family = self.0.iter().filter(is_of);
         family.clone().any(|row| row.model == model && row.best == 1) && family.any(|row| row.best > 1)
     }
 
-    /// A line per experiment and model with the ranks under each metric; `None` without a comparison.
+    /// One line per experiment and model with the ranks under each metric; `None` without comparisons.
     pub fn list(&self) -> Option<ListTable> {
         let mut metrics: Vec<&str> = Vec::new();
         let mut lines: BTreeMap<(bool, &str, &str), BTreeMap<&str, String>> = BTreeMap::new();

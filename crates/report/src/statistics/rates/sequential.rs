@@ -1,7 +1,7 @@
 //! Statistics for a study in progress: confidence sequences and e-values.
 //!
-//! Rule: nothing here is a fixed-n statistic, so that a reader may look after every episode and stop at any look.
-//! Families are those of the fixed-n page: models of an experiment against a level, pairs of models of an experiment.
+//! Rule: this module has no fixed-n statistics, so a reader may look after every episode and stop at any look. Families
+//! are those of the fixed-n page: models of an experiment against a level, pairs of models of an experiment.
 
 use std::collections::BTreeMap;
 
@@ -136,7 +136,7 @@ pub struct SequentialPair {
 impl Sequential {
     /// The statistics of `table`, the episodes so far.
     ///
-    /// With a confidence outside (0, 1) no sequence and no verdict is defined.
+    /// For a confidence outside (0, 1), sequences and verdicts are undefined.
     pub fn of(table: &EpisodeTable, options: &Options) -> Result<Self, MomentOverflow> {
         let mut study = Study::of(table, options.design, None)?;
         study.pool = options.pooled.is_some();
@@ -162,7 +162,7 @@ fn headline_rates(study: &Study) -> Vec<String> {
 }
 
 impl SequentialRate {
-    /// The model as it is compared.
+    /// The model's name in comparisons.
     pub fn name(&self) -> String {
         named(&self.model, self.condition.as_deref())
     }
@@ -172,7 +172,7 @@ impl SequentialRate {
     }
 }
 
-/// The rates of an experiment that are 0 or 1 in every episode, by metric, then by model.
+/// The rates of an experiment with values 0 or 1 in every episode, by metric, then by model.
 #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
 fn of_experiment(study: &Study, experiment: &Experiment, confidence: f64) -> Vec<SequentialRate> {
     let each = study.rates().flat_map(|column| experiment.blocks.iter().map(move |block| (column, block)));
@@ -194,12 +194,12 @@ fn of_experiment(study: &Study, experiment: &Experiment, confidence: f64) -> Vec
 }
 
 impl SequentialChance {
-    /// The model as it is compared.
+    /// The model's name in comparisons.
     pub fn name(&self) -> String {
         named(&self.model, self.condition.as_deref())
     }
 
-    /// Every rate against every level that its experiment has.
+    /// Every rate against every level of its experiment.
     fn all(study: &Study, confidence: f64) -> Vec<Self> {
         let mut rows = Vec::new();
         for experiment in &study.experiments {
@@ -277,7 +277,7 @@ impl SequentialPair {
     }
 }
 
-/// The pairs of equal units, then those of the rest in their order; and how many are of equal units.
+/// Pairs of equal units, then pairs of the others in order; and the number of pairs of equal units.
 fn matched(first: &[(Unit, i64)], second: &[(Unit, i64)]) -> (Pairs, u64) {
     let of_second: BTreeMap<Unit, i64> = second.iter().copied().collect();
     let shared: BTreeMap<Unit, (i64, i64)> =

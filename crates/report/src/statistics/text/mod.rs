@@ -1,4 +1,4 @@
-//! Statistics for people: the answers first, then the numbers that they rest on, each under the name of its method.
+//! Statistics for people: first the answers, then the numbers behind them, each under the name of its method.
 //!
 //! Rule: text from traces is shown, never obeyed ([`visible`]).
 
@@ -14,16 +14,16 @@ use exact::format::fixed;
 /// The amount of printed detail.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Length {
-    /// The answers, and the numbers that they rest on.
+    /// The answers and the numbers behind them.
     Short,
-    /// Everything: further intervals, plain means, clusters, what could have been shown.
+    /// Everything: further intervals, plain means, clusters, detectable differences.
     Full,
 }
 
 impl Statistics {
-    /// The text, its tables about these metrics alone, in lines of at most `width` columns.
+    /// The text, with tables for these metrics only, in lines of at most `width` columns.
     ///
-    /// A table that has nothing to show is left out. [`Statistics::headline`] has the metrics for a reader who did not choose.
+    /// Empty tables are omitted. [`Statistics::headline`] has the metrics for a reader who did not choose.
     pub fn render(&self, metrics: &[String], length: Length, width: Option<usize>) -> String {
         let statistics = self;
         let shown = |metric: &str| metrics.iter().any(|name| name == metric);

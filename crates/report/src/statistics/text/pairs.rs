@@ -1,6 +1,6 @@
-//! Every test of two models as texts, for a page that shows those of the two that a reader chooses.
+//! Every test of two models as text, for a page that shows two models of the reader's choice.
 //!
-//! Rule: what depends on which of the two comes first is there both ways, so that nobody computes again.
+//! Rule: texts that depend on the order of the two models are stored for both orders, so that nothing is recomputed.
 
 use super::super::{Comparison, OverallMethod, OverallRow, PairTest, Statistics};
 use super::tables::{held, method};
@@ -16,13 +16,13 @@ const RATE_PLACES: usize = 3;
 pub enum Verdict {
     /// The first is better, after adjustment.
     FirstIsBetter,
-    /// The two are not told apart.
+    /// The test does not separate the two.
     NotToldApart,
     /// There is no test.
     NoTest,
 }
 
-/// One model against another, as texts; two texts are seen from the first and from the second.
+/// One model against another, as texts; an array has the text from the first and from the second model's view.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct PairText<'a> {
     /// The model with the better mean.
@@ -30,30 +30,30 @@ pub(crate) struct PairText<'a> {
     pub second: &'a str,
     /// The name of the test.
     pub test: &'static str,
-    /// The counts of each side: `11/21`, or `n = 21` of a duration.
+    /// The counts of each side: `11/21`, or `n = 21` for a duration.
     pub counts: [String; 2],
-    /// The pairs that differ, `2 : 6 of 21`: in favour of this side, of the other one, all of them.
+    /// The discordant pairs, `2 : 6 of 21`: in favour of this side, in favour of the other, of all pairs.
     pub differing: [String; 2],
     /// One side minus the other.
     pub difference: [String; 2],
-    /// Its interval, or why there is none.
+    /// Its interval, or why it has none.
     pub interval: [String; 2],
     pub p: String,
-    /// The same, adjusted by Holm's method.
+    /// The p value, adjusted by Holm's method.
     pub p_adjusted: String,
     pub verdict: Verdict,
 }
 
-/// All tests under one metric in one experiment; without an experiment over all of them.
+/// All tests under one metric in one experiment; over all experiments if `experiment` is `None`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct FamilyText<'a> {
     pub experiment: Option<&'a str>,
     pub metric: &'a str,
-    /// Every two models.
+    /// All pairs of models.
     pub tests: Vec<PairText<'a>>,
 }
 
-/// Every family, experiment by experiment, then those over all experiments.
+/// All families: by experiment, then those over all experiments.
 pub(crate) fn families(statistics: &Statistics) -> Vec<FamilyText<'_>> {
     let single = statistics.models.iter().map(|family| FamilyText {
         experiment: Some(&family.experiment),

@@ -6,7 +6,7 @@ use crate::tables::{Table, push_wrapped};
 use exact::escape::visible;
 use exact::format::{bounds, e_value, fixed, p_value};
 
-/// The methods, in the lines that they have where there is room.
+/// The methods, with line breaks for a wide terminal.
 const METHODS: [&str; 5] = [
     "Methods: beta-binomial mixtures over Beta(1/2, 1/2) (Robbins; Krichevsky and Trofimov), which need no order; p is",
     "1 / e, and Holm's adjustment of it holds at every look. What they need: each next episode succeeds with the same",
@@ -16,9 +16,9 @@ const METHODS: [&str; 5] = [
 ];
 
 impl Sequential {
-    /// The whole text, about these metrics alone, in lines of at most `width` columns.
+    /// The whole text, for these metrics only, in lines of at most `width` columns.
     ///
-    /// Pairs of models that are not told apart are counted.
+    /// Pairs of models that are not separated are counted.
     pub fn render(&self, metrics: &[String], width: Option<usize>) -> String {
         let sequential = self;
         let shown = |metric: &String| metrics.contains(metric);

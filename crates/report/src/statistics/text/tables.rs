@@ -1,4 +1,4 @@
-//! The tables of `stats`, one function each: a line per row of the statistics whose metric is shown.
+//! The tables of `stats`, one function each: one line per row of the statistics whose metric is shown.
 
 use super::super::ranks::ALL;
 use super::super::study::named;
@@ -16,7 +16,7 @@ pub(super) type Shown<'a> = &'a dyn Fn(&str) -> bool;
 /// The mark of a conditional metric with few defined episodes.
 pub(super) const FEW_MARK: char = '†';
 
-/// The columns of what is not in the numbers of cells: none where nothing is left out.
+/// The columns of lost episodes and replies without a decision; empty if no cell has any.
 fn left_out(cells: &[CellRow]) -> impl Fn(&CellRow) -> Vec<String> + use<> {
     let names: Vec<&str> = names_of_left_out(cells).collect();
     move |cell| {
@@ -32,7 +32,7 @@ fn names_of_left_out(cells: &[CellRow]) -> impl Iterator<Item = &'static str> {
     lost.into_iter().chain(replies)
 }
 
-/// Rates with Wilson's interval; with the other two where `is_full`.
+/// Rates with Wilson's interval; also the other two if `is_full`.
 pub(super) fn rates(statistics: &Statistics, shown: Shown, is_full: bool) -> Table {
     let left_out = left_out(&statistics.cells);
     let lines = statistics.cells.iter().filter(|cell| shown(&cell.metric)).filter_map(|cell| {
@@ -81,7 +81,7 @@ fn mark(cell: &CellRow) -> String {
     if cell.few { FEW_MARK.to_string() } else { String::new() }
 }
 
-/// Rates against their levels; where a rate is shown, so is the same among finished episodes.
+/// Rates against their levels; a rate is shown with the same rate among finished episodes.
 pub(super) fn chance(statistics: &Statistics, shown: Shown, is_full: bool) -> Table {
     let is_shown = |metric: &str| shown(metric) || statistics.relations.whole(metric).is_some_and(shown);
     let has_losses = statistics.chance.iter().any(|row| row.losses.is_some());
@@ -109,10 +109,10 @@ pub(super) fn chance(statistics: &Statistics, shown: Shown, is_full: bool) -> Ta
     Table::plain(&["experiment", "model", "metric", "level"], &numbers).with(rows)
 }
 
-/// The verdict where no outcome of so few units or of the lost episodes would have been one.
+/// The verdict if no outcome of the few units, or of the lost episodes, could have given one.
 const CANNOT_SAY: &str = "cannot say";
 
-/// The heading of the p values with all lost episodes taken both ways.
+/// The heading of the p values under both assumptions about lost episodes.
 const WITH_LOST: &str = "p with lost episodes";
 
 /// The p values of a table.
@@ -245,7 +245,7 @@ pub(super) const fn method(method: Method) -> (&'static str, usize) {
     }
 }
 
-/// Two models over all experiments: all of them where `is_full`, else those that are distinguished.
+/// Pairs of models over all experiments: all pairs if `is_full`, else only separated ones.
 pub(super) fn overall(statistics: &Statistics, shown: Shown, is_full: bool) -> Table {
     let rows = statistics.overall.iter().filter(|row| shown(&row.metric) && (is_full || row.separated));
     let columns = Columns { is_full, has_losses: rows.clone().any(|row| row.losses.is_some()), has_repeats: false };

@@ -1,6 +1,6 @@
 //! Lists: a header, a line, the rows. As wide as their text; a terminal may be narrower.
 //!
-//! A table that is too wide is made narrower step by step: cells wrap at spaces, long names wrap anywhere, and at last the
+//! A table that is too wide is narrowed step by step: cells wrap at spaces, then long names wrap anywhere. At last the
 //! columns go into several tables below each other, each with the columns that name its rows.
 
 use comfy_table::{
@@ -12,16 +12,16 @@ use super::wrap::push_wrapped;
 use crate::tables::{Align, Look, Table};
 use exact::escape::visible;
 
-/// Spaces that a column has around its text.
+/// Spaces around a column's text.
 const PADDING: usize = 2;
 
-/// The columns that a column takes besides its text: spaces, and what stands between it and the next.
+/// The width of a column besides its text: spaces, and the separator.
 const AROUND: usize = PADDING + 1;
 
-/// The width that the columns of names keep before the others move into a table below.
+/// The least width of name columns before other columns move into a table below.
 const LEAST_NAME: usize = 16;
 
-/// A column of a table that is too wide: how wide its text is and has to be.
+/// A column of a table that is too wide: the natural and the least width of its text.
 #[derive(Clone, Copy)]
 struct Measured {
     at: usize,
@@ -42,12 +42,12 @@ pub fn render(table: &Table, width: Option<usize>) -> String {
     text
 }
 
-/// The lines, of any width if that is invalid.
+/// The lines; `None` sets no limit.
 pub fn lines(table: &Table, width: Option<usize>) -> String {
     fitted(&laid_out(table), table.names, width) + "\n"
 }
 
-/// The lines, all columns beside each other in `width` columns of the terminal.
+/// The lines, with all columns side by side in `width` columns of the terminal.
 pub fn wrapped(table: &Table, width: usize) -> String {
     let mut lines = laid_out(table);
     let width = u16::try_from(width).unwrap_or(u16::MAX);
@@ -77,8 +77,8 @@ fn style(look: Look) -> TableStyle {
     }
 }
 
-/// The text of a table, its lines at most `width` columns wide, of any width if that is invalid. The first `names` columns
-/// name the rows.
+/// The text of a table, in lines of at most `width` columns; `None` sets no limit. The first `names` columns name the
+/// rows.
 fn fitted(table: &Lines, names: usize, width: Option<usize>) -> String {
     let text = |table: &Lines| table.trim_fmt();
     let Some(width) = width.filter(|width| widest_line(table) > *width) else { return text(table) };
@@ -113,7 +113,7 @@ fn columns(table: &Lines, names: usize, width: usize) -> Vec<Measured> {
     let cells = table.header().into_iter().chain(table.row_iter()).flat_map(|row| row.cell_iter().enumerate());
     for (at, cell) in cells {
         let longest = cell.content().split_whitespace().map(UnicodeWidthStr::width).max().unwrap_or(0);
-        // A number that goes on in the next line reads as two; a name does not, nor does what fills half a line.
+        // A number that wraps reads as two; a name does not, nor does a text that fills half a line.
         let most = if at < names { LEAST_NAME } else { LEAST_NAME.max(width / 2) };
         columns[at].least = columns[at].least.max(longest.min(most));
     }

@@ -1,4 +1,4 @@
-//! Tables for a terminal, and for a pipe: sheets in a layout of our own, lists by `comfy_table`.
+//! Tables for a terminal or a pipe: sheets in our own layout, lists by `comfy_table`.
 
 pub(super) mod list;
 mod sheet;
@@ -6,10 +6,10 @@ pub(super) mod wrap;
 
 use super::{Look, Table};
 
-/// The terminal that a text is printed on.
+/// The terminal for a text.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Terminal {
-    /// Its columns; `None` where lines may be of any length.
+    /// Its number of columns; `None` for unlimited lines.
     pub width: Option<usize>,
     pub emphasis: Marks,
 }

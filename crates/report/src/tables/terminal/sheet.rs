@@ -1,9 +1,9 @@
 //! Sheets of metrics.
 //!
-//! On a terminal the best is bold and the second best underlined; elsewhere they stand as `*0.91*` and `_0.86_`.
-//! A table wider than the terminal puts each cell's interval under its estimate; where that is not enough, long names
-//! wrap and columns go on in further tables below. The layout is our own because headings span all columns and styled
-//! text must measure as what it shows.
+//! On a terminal the best is bold and the second best underlined; elsewhere they print as `*0.91*` and `_0.86_`. A
+//! table wider than the terminal puts each cell's interval under its estimate; if that is not enough, long names wrap
+//! and columns continue in further tables below. The layout is our own because headings span all columns, and styled
+//! text must be measured by its visible width.
 
 use unicode_width::UnicodeWidthStr;
 
@@ -14,7 +14,7 @@ use exact::escape::visible;
 
 const GAP: &str = "  ";
 
-/// The room for sentences on a terminal however narrow.
+/// The least room for sentences on a narrow terminal.
 const LEAST_ROOM: usize = 40;
 
 /// The whole table: title, rows, notes.
@@ -49,7 +49,7 @@ enum Shape {
     TwoLines,
 }
 
-/// Text and the columns that it takes on the screen.
+/// Text and its width on the screen, in columns.
 #[derive(Clone, Default)]
 struct Piece {
     text: String,
@@ -84,7 +84,7 @@ impl Piece {
     }
 }
 
-/// Every cell as its lines, and the widths of the columns; the names of the rows are column 0.
+/// Every cell as lines, and the widths of the columns; column 0 has the row names.
 struct Grid {
     header: Vec<Piece>,
     groups: Vec<Vec<Vec<Vec<Piece>>>>,
@@ -92,7 +92,7 @@ struct Grid {
 }
 
 impl Grid {
-    /// The table as one grid, or as several below each other where it must be.
+    /// The table as one grid, or as several below each other if necessary.
     fn within(table: &Table, terminal: Terminal) -> Vec<Self> {
         let one_line = Self::new(table, terminal.emphasis, Shape::OneLine);
         let Some(width) = terminal.width.filter(|width| one_line.width() > *width) else { return vec![one_line] };
@@ -100,7 +100,7 @@ impl Grid {
         if two_lines.width() <= width { vec![two_lines] } else { two_lines.split(width) }
     }
 
-    /// Grids of some columns each, none wider than `width` unless a single column is; each has the names of the rows.
+    /// Grids of some columns each, at most `width` wide unless a single column is wider; each has the row names.
     fn split(mut self, width: usize) -> Vec<Self> {
         self.break_names(width / 2);
         let mut parts: Vec<Vec<usize>> = Vec::new();
@@ -119,7 +119,7 @@ impl Grid {
         parts.into_iter().map(|part| self.only(&part)).collect()
     }
 
-    /// Breaks the names of rows that are wider than `room` into lines.
+    /// Breaks row names wider than `room` into lines.
     fn break_names(&mut self, room: usize) {
         for cell in self.groups.iter_mut().flatten().filter_map(|row| row.first_mut()) {
             let lines = cell.iter().flat_map(|piece| broken(&piece.text, room));

@@ -2,8 +2,7 @@
 
 use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
 
-/// Adds `text` in lines of at most `width` columns, of any width if that is invalid; lines after the first begin with `indent`
-/// spaces.
+/// Adds `text` in lines of at most `width` columns; `None` sets no limit. Later lines are indented by `indent` spaces.
 pub(crate) fn push_wrapped(text: &mut String, words: &str, width: Option<usize>, indent: usize) {
     for line in wrapped(words, width.unwrap_or(usize::MAX), indent) {
         text.push_str(&line);
@@ -11,11 +10,11 @@ pub(crate) fn push_wrapped(text: &mut String, words: &str, width: Option<usize>,
     }
 }
 
-/// `text` in lines of at most `width` columns where its words allow; lines after the first begin with `indent` spaces.
+/// `text` in lines of at most `width` columns, if its words allow; later lines are indented by `indent` spaces.
 pub fn wrapped(text: &str, width: usize, indent: usize) -> Vec<String> {
     let words = text.trim_start_matches(' ');
     let mut lines = vec![" ".repeat(text.len() - words.len())];
-    // The columns of the last line, and whether a word is in it.
+    // The width of the last line, and whether it has a word.
     let (mut taken, mut begun) = (text.len() - words.len(), false);
     for word in words.split(' ') {
         let columns = word.width();
@@ -40,7 +39,7 @@ pub fn wrapped(text: &str, width: usize, indent: usize) -> Vec<String> {
     lines
 }
 
-/// `text` in lines of at most `width` columns; words that are wider are broken anywhere.
+/// `text` in lines of at most `width` columns; wider words are broken anywhere.
 pub fn broken(text: &str, width: usize) -> Vec<String> {
     let mut lines = Vec::new();
     for line in wrapped(text, width, 0) {

@@ -1,4 +1,4 @@
-//! One line of a list of labels, and the errors of lists.
+//! One line of a list of labels, and the errors of such lists.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -39,7 +39,7 @@ pub struct LabelLine {
 }
 
 impl LabelLine {
-    /// Returns an error if a value is not as it must be.
+    /// Returns an error if a value is invalid.
     pub fn check(&self) -> Result<(), InvalidLabel> {
         check_coder(&self.coder)?;
         let is_empty = self.episode_id.is_empty().then(|| InvalidLabel::new("the id of an episode", "no text"));
@@ -55,7 +55,7 @@ impl LabelLine {
     }
 }
 
-/// Returns an error if a text is no name of a coder.
+/// Returns an error if a text cannot be the name of a coder.
 pub fn check_coder(name: &str) -> Result<(), InvalidLabel> {
     let length = name.chars().count();
     if length == 0 || length > LONGEST_CODER || name.trim() != name || name.chars().any(char::is_control) {
@@ -72,7 +72,7 @@ fn is_word(text: &str) -> bool {
         && text.bytes().all(|byte| is_letter(byte) || byte.is_ascii_digit() || byte == b'_')
 }
 
-/// A value of a line that is not as it must be.
+/// The error for an invalid value of a line.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("expected {expected}, found {found}")]
 pub struct InvalidLabel {
@@ -91,7 +91,7 @@ impl InvalidLabel {
 /// An error of reading or writing a list of labels.
 #[derive(Debug, thiserror::Error)]
 pub enum LabelsError {
-    /// The operating system refuses to read.
+    /// The list cannot be read.
     #[error("cannot read {}: {source}", .path.display())]
     Read {
         /// The list.
@@ -99,7 +99,7 @@ pub enum LabelsError {
         /// The error of the system.
         source: io::Error,
     },
-    /// The operating system refuses to write.
+    /// The list cannot be written.
     #[error("cannot write {}: {source}\n  help: is the folder writable, and the disk not full?", .path.display())]
     Write {
         /// The list.
@@ -107,17 +107,17 @@ pub enum LabelsError {
         /// The error of the system.
         source: io::Error,
     },
-    /// A line that is no label.
+    /// A line is not a label.
     #[error("{}, line {line}: {problem}\n  help: correct or remove the line; docs/how-to/view.md has examples", .path.display())]
     Line {
         /// The list.
         path: PathBuf,
-        /// From 1.
+        /// The line number, from 1.
         line: usize,
         /// The rule and the value found.
         problem: String,
     },
-    /// More than a list may hold.
+    /// The list exceeds a limit.
     #[error("{}: {source}", .path.display())]
     Budget {
         /// The list.

@@ -1,7 +1,7 @@
 //! `labels.jsonl` beside the traces: the labels and notes of coders, one JSON object per line.
 //!
-//! Rule: the list only grows. A later line replaces an earlier one of the same coder, episode, step and label, so that two lists
-//! put together are a list.
+//! Rule: the list only grows. A later line replaces an earlier one of the same coder, episode, step and label, so two
+//! lists can be concatenated.
 
 mod line;
 
@@ -21,7 +21,7 @@ use crate::inputs::Input;
 use line::LONGEST_LINE;
 pub use line::{InvalidLabel, LabelLine, LabelsError, check_coder};
 
-/// The beginning of the names of columns: the label `confabulates` is the column `label_confabulates`.
+/// The prefix of column names: the label `confabulates` is the column `label_confabulates`.
 pub const PREFIX: &str = "label_";
 
 const MOST_LINES: Limit = Limit::new("lines in a list of labels", 2_000_000);
@@ -29,10 +29,10 @@ const MOST_NOTES: Limit = Limit::new("bytes of notes in a list of labels", 32 <<
 const MOST_CODERS: Limit = Limit::new("coders in a list of labels", 1000);
 const MOST_WORDS: Limit = Limit::new("different labels in a list of labels", 200);
 
-/// The folder of a recording's whole episodes that are not in its trace yet.
+/// The folder of a recording's complete episodes that are not in its trace yet.
 const PARTS: &str = ".parts";
 
-/// The list beside a trace: in its folder, or in that of the recording.
+/// The list beside a trace: in the trace's folder, or in the recording's.
 pub fn list_beside(trace: &Path) -> PathBuf {
     let folder = trace.parent().unwrap_or(Path::new(""));
     let recording = folder.parent().filter(|_| folder.ends_with(PARTS));
@@ -44,13 +44,13 @@ pub fn lists_beside(traces: &[Input]) -> BTreeSet<PathBuf> {
     traces.iter().map(|input| list_beside(&input.path)).collect()
 }
 
-/// Adds a line to a list, which is made if it is absent.
+/// Adds a line to a list, which is created if needed.
 pub fn append(list: &Path, line: &LabelLine) -> Result<(), LabelsError> {
     let failed = |source| LabelsError::Write { path: list.to_owned(), source };
     let mut file = OpenOptions::new().create(true).append(true).read(true).open(list).map_err(failed)?;
     let mut text = serde_json::to_string(line).map_err(io::Error::from).map_err(failed)?;
     text.push('\n');
-    // A list that was edited by hand may end without a line feed.
+    // A list edited by hand may end without a line feed.
     if file.seek(SeekFrom::End(0)).map_err(failed)? > 0 {
         let mut end = [0];
         file.seek(SeekFrom::End(-1)).and_then(|_| file.read_exact(&mut end)).map_err(failed)?;
@@ -58,11 +58,11 @@ pub fn append(list: &Path, line: &LabelLine) -> Result<(), LabelsError> {
             text.insert(0, '\n');
         }
     }
-    // One write: lines of several programs do not mix.
+    // A single write, so that lines of several programs do not mix.
     file.write_all(text.as_bytes()).map_err(failed)
 }
 
-/// Removes all that a list says of some episodes; gives the number of lines. Nobody may add to it meanwhile.
+/// Removes all lines about some episodes and returns their number. No program may add lines meanwhile.
 pub fn remove(list: &Path, episodes: &BTreeSet<String>) -> Result<usize, LabelsError> {
     let reading = |source| LabelsError::Read { path: list.to_owned(), source };
     let writing = |source| LabelsError::Write { path: list.to_owned(), source };
@@ -90,13 +90,13 @@ pub fn remove(list: &Path, episodes: &BTreeSet<String>) -> Result<usize, LabelsE
     Ok(removed)
 }
 
-/// What a coder says of an episode or a step.
+/// A coder's mark on an episode or a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Mark<'l> {
     pub coder: &'l str,
     /// `None` for the whole episode.
     pub step: Option<u32>,
-    /// `None` if the coder looked and puts no label.
+    /// `None` if the coder looked and gave no label.
     pub label: Option<&'l str>,
     pub note: Option<&'l str>,
 }
@@ -107,7 +107,7 @@ pub struct Labels {
     episodes: Names,
     coders: Names,
     words: Names,
-    /// In order; of equal keys, one is left.
+    /// In order, one per key.
     marks: Vec<Entry>,
     notes: Vec<Box<str>>,
 }
@@ -119,7 +119,7 @@ struct Names {
     numbers: HashMap<Arc<str>, u32>,
 }
 
-/// The step is 0 for the whole episode, the word [`NONE`] for no label.
+/// The step is 0 for the whole episode; the word is [`NONE`] without a label.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Key {
     episode: u32,
@@ -167,7 +167,7 @@ fn narrow(number: u32) -> u16 {
 }
 
 impl Labels {
-    /// The labels of the lists beside some traces; empty without a list.
+    /// The labels in the lists beside some traces; empty without lists.
     pub fn beside(traces: &[Input]) -> Result<Self, LabelsError> {
         let mut labels = Self::default();
         for list in lists_beside(traces) {
@@ -224,7 +224,7 @@ impl Labels {
         self.marks.push(Entry { key, state });
     }
 
-    /// Keeps the last line of each key, and the notes that are left.
+    /// Keeps the last line of each key, and only the notes in use.
     fn in_order(mut self) -> Self {
         self.marks.sort_by_key(|entry| entry.key);
         let mut kept: Vec<Entry> = Vec::new();
@@ -245,12 +245,12 @@ impl Labels {
         Self { marks: kept, notes, ..self }
     }
 
-    /// Returns true if nobody has put a label or a note.
+    /// Returns true if there are no labels or notes.
     pub fn is_empty(&self) -> bool {
         self.marks.is_empty()
     }
 
-    /// The labels that are in use, in the order of their letters.
+    /// The labels in use, in alphabetical order.
     pub fn words(&self) -> BTreeSet<&str> {
         let used: BTreeSet<u16> = self.marks.iter().map(|entry| entry.key.word).filter(|word| *word != NONE).collect();
         used.into_iter().map(|word| self.words.get(word)).collect()
@@ -261,20 +261,20 @@ impl Labels {
         self.words().into_iter().map(|word| format!("{PREFIX}{word}")).collect()
     }
 
-    /// The ids of the episodes that somebody coded.
+    /// The ids of the coded episodes.
     pub fn episodes(&self) -> impl Iterator<Item = &str> {
         let mut last = None;
         let numbers = self.marks.iter().map(|entry| entry.key.episode);
         numbers.filter(move |number| last.replace(*number) != Some(*number)).map(|number| self.episodes.get(number))
     }
 
-    /// What is said of an episode: its own marks, then those of its steps.
+    /// The marks of an episode: its own, then those of its steps.
     pub fn of_episode(&self, id: &str) -> impl Iterator<Item = Mark<'_>> {
         self.marks[self.range(id)].iter().map(|entry| self.mark(entry))
     }
 
-    /// The value of a column: true if a coder puts the label on the episode or a step, false if only others put something, null if
-    /// nobody coded the episode.
+    /// The value of a column: true if a coder gave the label to the episode or a step, false if coders gave only
+    /// others, null if no coder saw the episode.
     pub fn value(&self, column: &str, id: &str) -> Option<bool> {
         let number = column.strip_prefix(PREFIX).and_then(|word| self.words.numbers.get(word));
         let word = number.map_or(NONE, |number| narrow(*number));
@@ -282,7 +282,7 @@ impl Labels {
         (!marks.is_empty()).then(|| word != NONE && marks.iter().any(|entry| entry.key.word == word))
     }
 
-    /// The labels of each coder by episode, an empty set where the coder puts none.
+    /// The labels of each coder by episode; an empty set if the coder gave none.
     pub fn by_coder(&self) -> BTreeMap<&str, BTreeMap<&str, BTreeSet<&str>>> {
         let mut coders: BTreeMap<&str, BTreeMap<&str, BTreeSet<&str>>> = BTreeMap::new();
         for entry in &self.marks {

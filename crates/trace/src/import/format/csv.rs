@@ -1,4 +1,4 @@
-//! CSV: columns by the header; a column's type is that of all its cells, and an empty cell is null.
+//! CSV: the header names the columns; a column's type must fit all its cells, and an empty cell is null.
 
 use std::fs::File;
 use std::io::{BufReader, Seek as _};
@@ -45,7 +45,7 @@ fn kind_of(cell: &str) -> Option<Kind> {
     }
 }
 
-/// Numbers, and no texts of digits such as `007`.
+/// Accepts numbers, but not texts of digits such as `007`.
 fn is_decimal(cell: &str) -> bool {
     let digits = cell.trim_start_matches('-');
     let leads_with_zero = digits.len() > 1 && digits.starts_with('0') && !digits.starts_with("0.");

@@ -1,5 +1,5 @@
-//! Members of a zip archive: stored, deflated, or method 93, zstd of any number of frames. Of members with one name the
-//! last one counts.
+//! Members of a zip archive: stored, deflated, or method 93 (zstd with any number of frames). The last of several
+//! members with one name counts.
 
 use std::collections::BTreeSet;
 use std::fs::File;
@@ -31,7 +31,7 @@ impl EvalArchive {
         &self.names
     }
 
-    /// The value of a member; what keeps it from being read otherwise.
+    /// Parses a member; the error says why it cannot be read.
     pub(super) fn json<T: DeserializeOwned>(&mut self, name: &str) -> Result<T, String> {
         let bytes = self.bytes(name).map_err(|error| error.to_string())?;
         json::from_slice(&bytes).map_err(|error| error.to_string())

@@ -1,7 +1,7 @@
-//! Logs of Inspect: one row per model or tool event, and one for a sample without either.
+//! Logs of Inspect: one row per model or tool event, or one row for a sample without such events.
 //!
-//! A `.eval` log is an archive with a member per sample, or a folder of chunks; a `.json` log is one object. Scalars of
-//! `eval`, `sample` and `event` that have no column are values for `--map`.
+//! A `.eval` log is an archive with one member per sample, or a folder of chunks; a `.json` log is one object. Scalars
+//! of `eval`, `sample` and `event` without a column are available to `--map`.
 
 use std::collections::HashMap;
 use std::fs::File;
@@ -67,14 +67,14 @@ fn chunked(archive: &mut EvalArchive, folder: &str) -> Result<Map<String, Value>
     Ok(sample)
 }
 
-/// Values that the samples of a log share.
+/// Values shared by the samples of a log.
 pub(super) struct Log {
     eval: Value,
     /// The number of each sample in the data set, from 1, by its id as JSON.
     numbers: HashMap<String, usize>,
 }
 
-/// An error of a sample without rows.
+/// The error for a sample that gives no rows.
 pub(super) enum SampleFault {
     Shape(&'static str),
     Import(ImportError),
@@ -141,7 +141,7 @@ impl Log {
     }
 }
 
-/// Events that are steps, in their order; those inside of a tool's event follow it.
+/// The events that are steps, in order; those inside a tool's event follow it.
 fn flatten(events: Value, rows: &mut Rows<'_>, steps: &mut Vec<Value>) {
     let Value::Array(events) = events else { return };
     for mut event in events {
@@ -240,7 +240,7 @@ fn resolve(value: &mut Value, attachments: &Value) {
     }
 }
 
-/// Puts the messages of the pools into an event whose messages are mapped.
+/// Replaces references to the message pools in an event whose messages are mapped.
 fn expand(event: &mut Value, pools: &Value, rows: &Rows<'_>) {
     let of = |refs: &Value, pool: &Value| -> Option<Value> {
         let range =
@@ -266,7 +266,7 @@ fn text(value: &Value) -> String {
     value.as_str().map_or_else(|| value.to_string(), str::to_owned)
 }
 
-/// Null for what is nested.
+/// The value itself; null if it is nested.
 fn scalar(value: &Value) -> Value {
     if value.is_array() || value.is_object() { Value::Null } else { value.clone() }
 }

@@ -8,7 +8,7 @@ use super::Rows;
 use super::json::WithoutNan;
 use crate::import::error::ImportError;
 
-/// Lists with an item for each trial of a scene, and the column of each.
+/// Lists with one item per trial of a scene, and the column of each.
 const PER_TRIAL: [(&str, &str); 5] = [
     ("operator_judgements", "judgement"),
     ("judgement_sources", "judgement_source"),

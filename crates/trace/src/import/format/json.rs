@@ -1,11 +1,11 @@
-//! JSON as Python writes it: `NaN` and infinities represent no number, and become null.
+//! JSON as Python writes it: `NaN` and infinities become null.
 
 use std::io::{self, BufReader, Read};
 
 use memchr::memmem;
 use serde::de::DeserializeOwned;
 
-/// The value of a text, with null for numbers that are none.
+/// Parses a text, with null for `NaN` and infinities.
 pub(super) fn from_slice<T: DeserializeOwned>(bytes: &[u8]) -> serde_json::Result<T> {
     match serde_json::from_slice(bytes) {
         Err(_) if [&b"NaN"[..], b"Infinity"].iter().any(|word| memmem::find(bytes, word).is_some()) => {
@@ -15,7 +15,7 @@ pub(super) fn from_slice<T: DeserializeOwned>(bytes: &[u8]) -> serde_json::Resul
     }
 }
 
-/// Gives `null` for `NaN`, `Infinity` and `-Infinity` outside of texts.
+/// Replaces `NaN`, `Infinity` and `-Infinity` outside of texts by `null`.
 pub(super) struct WithoutNan<R> {
     bytes: io::Bytes<BufReader<R>>,
     pending: Vec<u8>,
@@ -45,7 +45,7 @@ impl<R: Read> WithoutNan<R> {
         self.word(byte)
     }
 
-    /// The first byte of `null`, or of what is not one of the words.
+    /// The first byte of `null`, or of the text if it is not one of the words.
     fn word(&mut self, first: u8) -> io::Result<Option<u8>> {
         let mut word = vec![first];
         while ["NaN", "Infinity", "-Infinity"].iter().any(|whole| whole.as_bytes().starts_with(&word)) {

@@ -26,7 +26,7 @@ pub(super) fn read(json: impl Read, rows: &mut Rows<'_>) -> Result<(), ImportErr
     }
 }
 
-/// The object of the log, or the list of its samples once `eval` was read.
+/// Visits the object of the log, or the list of its samples once `eval` was read.
 struct JsonLog<'r, 'm> {
     log: Option<Log>,
     rows: &'r mut Rows<'m>,

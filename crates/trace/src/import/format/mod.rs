@@ -1,6 +1,6 @@
-//! Files of other harnesses as rows. Each format is one file; all rows go through one mapping and become lines of steps.
+//! Reads files of other harnesses as rows. Each format has one file; all rows become lines of steps by one mapping.
 //!
-//! Rule: a key that a format does not say is absent or null, and records that are not steps are counted and named.
+//! Rule: keys that a format does not give are absent or null. Records that are not steps are counted and named.
 
 mod csv;
 mod eval_archive;
@@ -31,7 +31,7 @@ pub enum Format {
     JsonLines,
     /// A header and one record per step.
     Csv,
-    /// One row per step, of any shape.
+    /// One row per step, in any shape.
     Parquet,
     /// A log of Inspect, `.eval` or `.json`.
     Inspect,
@@ -50,11 +50,11 @@ exact::names!(Format {
     LeRobot: "lerobot",
 });
 
-/// The number of bytes that tell the kind of a JSON file.
+/// The number of bytes that identify the kind of a JSON file.
 const HEAD: u64 = 64 << 10;
 
 impl Format {
-    /// The format that a file's name and first bytes show; JSON Lines if they show no other.
+    /// The format by a file's name and first bytes; JSON Lines if they show no other.
     pub fn of_file(path: &Path) -> Self {
         match path.extension().and_then(|ending| ending.to_str()) {
             Some("csv") => Self::Csv,
@@ -98,10 +98,10 @@ impl Format {
     }
 }
 
-/// The sink of rows: a mapping, then a temporary file of lines.
+/// The destination of rows: a mapping, then a temporary file of lines.
 pub(super) struct Rows<'m> {
     pub(super) file: String,
-    /// The first digits of its hash: of files that number their episodes from 0, they keep the ids apart.
+    /// The first digits of its hash, which keep ids distinct between files that number their episodes from 0.
     pub(super) digits: String,
     pub(super) mapping: &'m mut Mapping,
     out: BufWriter<File>,

@@ -1,4 +1,4 @@
-//! Parquet of any shape: one row per step, values as JSON has them.
+//! Parquet of any shape: one row per step, with values as in JSON.
 
 use std::fs::File;
 
@@ -27,7 +27,7 @@ pub(super) fn each_row(
     each_row_of(file, rows, &[], add)
 }
 
-/// The same with these columns alone, all if there is none.
+/// The same for these columns only; all columns if the list is empty.
 pub(super) fn each_row_of(
     file: File,
     rows: &mut Rows<'_>,

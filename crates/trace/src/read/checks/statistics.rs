@@ -1,8 +1,8 @@
-//! The values of a row group compared with the statistics of its footer, where no checksum says that they are as written.
+//! Compares the values of a row group with the statistics in its footer, if no checksum protects them.
 //!
-//! Rule: a file is refused only for what no sound writer does: a null count that is wrong, a value beyond the least or the
-//! greatest, and a least or greatest number, truth or short text that neither a row nor a dictionary has, and texts of other bytes
-//! together. Long texts may be cut.
+//! Rule: a file is refused only for errors that no sound writer makes. These are a wrong null count, values out of
+//! bounds, a wrong total size of texts, and a bound (number, truth or short text) that neither a row nor a dictionary
+//! has. Long texts may be cut.
 
 use std::cmp::Ordering;
 
@@ -15,18 +15,18 @@ use parquet::file::statistics::Statistics;
 use exact::escape::visible;
 use parquet_pages::{Column, Runs};
 
-/// Texts from this length on may be cut by their writer.
+/// Writers may cut texts from this length on.
 const CUT: usize = 60;
 
-/// The statistics of all columns of all row groups, as far as they are of use.
+/// The usable statistics of all columns of all row groups.
 #[derive(Debug, Default)]
 pub(crate) struct Declared(Vec<Vec<Option<Chunk>>>);
 
-/// What a footer says of the values of a chunk.
+/// A footer's statistics of the values of a chunk.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Chunk {
     nulls: Option<u64>,
-    /// The bytes of the texts of all rows.
+    /// The total bytes of the texts of all rows.
     bytes: Option<u64>,
     least: Option<Value>,
     greatest: Option<Value>,
@@ -80,7 +80,7 @@ impl Chunk {
                 [of.min_opt(), of.max_opt()].map(|value| value.map(|value| Value::Float((*value).into())))
             }
             Statistics::Double(of) => [of.min_opt(), of.max_opt()].map(|value| value.map(|value| Value::Float(*value))),
-            // The order of the older fields is that of signed bytes.
+            // The older fields are ordered as signed bytes.
             Statistics::ByteArray(of) if !statistics.is_min_max_deprecated() => {
                 [of.min_opt(), of.max_opt()].map(|value| value.map(|value| Value::Text(value.data().to_vec())))
             }
@@ -90,14 +90,14 @@ impl Chunk {
     }
 }
 
-/// What was read of a column of a row group so far.
+/// The values read so far of a column of a row group.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Seen {
     nulls: u64,
     bytes: u64,
     least: Option<Value>,
     greatest: Option<Value>,
-    /// The least and the greatest text of dictionaries. Some writers make statistics of these, whether a row has them or not.
+    /// The bounds of dictionary texts. Some writers use these for statistics, even if no row has them.
     entries: Option<[Vec<u8>; 2]>,
 }
 
@@ -110,7 +110,7 @@ impl Seen {
         }
     }
 
-    /// What does not fit: expected and found.
+    /// The first mismatch: expected and found.
     pub(crate) fn fault(&self, declared: &Chunk) -> Option<(String, String)> {
         let nulls = declared.nulls.filter(|nulls| *nulls != self.nulls);
         if let Some(nulls) = nulls {
@@ -199,7 +199,7 @@ impl Seen {
         self.used(values, &used);
     }
 
-    /// Values, and how many rows have each.
+    /// Adds values with the number of rows of each.
     fn used(&mut self, values: &ArrayRef, used: &[u64]) {
         if let Some(texts) = values.as_string_opt::<i32>() {
             let bytes =
@@ -213,7 +213,7 @@ impl Seen {
         self.ends(values, (0..values.len()).filter(|at| used.get(*at).is_some_and(|rows| *rows > 0)));
     }
 
-    /// Takes the least and the greatest of some values.
+    /// Updates the bounds with some values.
     fn ends(&mut self, values: &ArrayRef, rows: impl Iterator<Item = usize>) {
         let rows = rows.filter(|row| values.is_valid(*row));
         match values.data_type() {
@@ -262,14 +262,14 @@ impl Value {
         match (self, other) {
             (Self::Bool(a), Self::Bool(b)) => Some(a.cmp(b)),
             (Self::Int(a), Self::Int(b)) => Some(a.cmp(b)),
-            // Equal whatever the sign of zero; not a number says nothing.
+            // Equal regardless of the sign of zero; NaN does not compare.
             (Self::Float(a), Self::Float(b)) => a.partial_cmp(b),
             (Self::Text(a), Self::Text(b)) => Some(a.cmp(b)),
             _ => None,
         }
     }
 
-    /// Returns true if a bound must be a value that some row has.
+    /// Returns true if some row must have the value of a bound.
     fn is_whole(&self) -> bool {
         match self {
             Self::Text(text) => text.len() < CUT,

@@ -10,7 +10,7 @@ use crate::diagnostic::{Code, Finding};
 use crate::error::TraceError;
 use parquet_pages::{FaultSlot, Place, verify};
 
-/// Reads all pages of all files and checks their headers and, where they have any, their checksums. Nothing is decoded.
+/// Reads all pages of all files and checks their headers and, if present, their checksums, without decoding them.
 pub fn verify_pages(set: &TraceSet) -> Result<(), TraceError> {
     set.files().iter().try_for_each(|file| Ok(verify_columns(file, |_| true)?))
 }

@@ -1,5 +1,5 @@
-//! What a footer says about rows and bytes, checked before any page is read: counts add up, columns lie within the file
-//! and apart from each other, and rows are no more than their bytes can hold.
+//! Checks a footer's rows and bytes before any page is read: counts add up, columns lie within the file without
+//! overlap, and the bytes are enough for the rows.
 
 use parquet::file::metadata::{ParquetMetaData, RowGroupMetaData};
 
@@ -7,8 +7,8 @@ use crate::diagnostic::{Code, Finding};
 use crate::read::budget::most_rows;
 use parquet_pages::checksums::range;
 
-/// The most rows for which a byte of a row group, of all columns together, is enough. Each episode has an id of its own
-/// and each of its steps another `t`; the densest traces in use have about one row in a byte.
+/// The most rows per byte of a row group, all columns together. Each episode has its own id and each step its own `t`;
+/// the densest traces in use have about one row per byte.
 const ROWS_PER_BYTE: u64 = 4096;
 
 pub(crate) fn fault(file: &str, bytes: u64, metadata: &ParquetMetaData) -> Option<Finding> {

@@ -1,4 +1,4 @@
-//! Reads footers: where a file's columns lie, and what is in its key-value metadata.
+//! Reads footers: the positions of a file's columns, and its key-value metadata.
 
 pub(crate) mod bounds;
 pub(crate) mod trace_file;
@@ -24,11 +24,11 @@ const ENCRYPTED_MAGIC: [u8; 4] = *b"PARE";
 /// A magic number at each end, and the footer's length.
 const SMALLEST: u64 = 12;
 
-/// The decoded extent of a footer.
+/// The parts of a footer to decode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Extent {
     Pages,
-    /// Statistics too.
+    /// The statistics too.
     Whole,
 }
 
@@ -117,7 +117,7 @@ fn magic(file: &mut File, at: SeekFrom) -> io::Result<Option<[u8; 4]>> {
     let read = file.seek(at).and_then(|_| file.read_exact(&mut found));
     match read {
         Ok(()) => Ok(Some(found)),
-        // Shorter than four bytes.
+        // The file is shorter than four bytes.
         Err(error) if matches!(error.kind(), io::ErrorKind::UnexpectedEof | io::ErrorKind::InvalidInput) => Ok(None),
         Err(error) => Err(error),
     }

@@ -1,6 +1,6 @@
-//! One trace: its footer, read and checked against the schema.
+//! One trace file: its footer, read and checked against the schema.
 //!
-//! No row is read here. A file is held by its name and what it is made of, never by an open handle, so that any number of
+//! Rows are not read here. A file is identified by its name and contents, without an open handle, so any number of
 //! files can be open at once.
 
 use std::collections::HashMap;
@@ -33,7 +33,7 @@ use exact::suggest::nearest;
 use parquet_pages::checksums::{Checksums, ChunkChecksums};
 use parquet_pages::{Expansion, Store, rows_of, with_texts_as_keys};
 
-/// One trace whose footer is good.
+/// A trace file with a valid footer.
 #[derive(Debug)]
 pub struct TraceFile {
     input: Input,
@@ -46,7 +46,7 @@ pub struct TraceFile {
     colors: Declared,
     experiments: Vec<DeclaredExperiment>,
     checksums: Checksums,
-    /// What the footer says of the values, of a file without checksums.
+    /// The footer's statistics, in a file without checksums.
     statistics: Statistics,
     footer: Mutex<Weak<Readable>>,
     expansion: Arc<Expansion>,
@@ -64,7 +64,7 @@ pub(crate) struct Readable {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FileColumn {
     pub name: String,
-    /// Its logical type; `None` for a column that is declared to hold nothing but nulls, which goes with any type.
+    /// Its logical type; `None` for a column declared as all null, which is compatible with any type.
     pub kind: Option<Kind>,
 }
 
@@ -85,7 +85,7 @@ impl TraceFile {
             return Err(findings);
         }
         let rows = metadata.row_groups().iter().map(rows_of).collect();
-        // They are verified, long, and of no other file.
+        // They are verified, long, and apply only to this file.
         pairs.retain(|pair| pair.key != schema::CHECKSUMS_KEY);
         let colors = Declared::of(&input.name, &recording).map_err(|f| vec![*f])?;
         let experiments = declared_experiment::of_recording(&input.name, &recording).map_err(|f| vec![*f])?;
@@ -116,7 +116,7 @@ impl TraceFile {
         &self.input.name
     }
 
-    /// Opens the file itself for reading.
+    /// Opens the file for reading.
     pub fn reader(&self) -> io::Result<File> {
         input::open(&self.input.path)
     }
@@ -133,7 +133,7 @@ impl TraceFile {
         &self.episodes
     }
 
-    /// Its path, for an engine that reads files itself.
+    /// Its path, for engines that read files themselves.
     pub fn path(&self) -> &Path {
         &self.input.path
     }
@@ -173,8 +173,8 @@ impl TraceFile {
         self.columns.iter().find(|column| column.name == name)
     }
 
-    /// Whether the file has the schema's column of this name, and not one of its own that is called so: a trace of an older
-    /// version may have used a name that the schema knows by now.
+    /// Returns true if the file has the schema's column of this name. A trace of an older version may have an own
+    /// column of that name.
     pub fn declares(&self, name: &str) -> bool {
         let Some((column, known)) = self.column(name).zip(self.domain.column(name)) else { return false };
         let has_kind = || column.kind.is_none_or(|kind| kind == known.stored.kind());
@@ -210,7 +210,7 @@ impl TraceFile {
         &self.pairs
     }
 
-    /// The palette that the footer declares, if it declares one.
+    /// The palette in the footer, if any.
     pub fn palette(&self) -> Option<&Palette> {
         self.colors.palette.as_ref()
     }
@@ -219,12 +219,12 @@ impl TraceFile {
         &self.colors
     }
 
-    /// The experiments that the footer declares, each once.
+    /// The experiments in the footer, each once.
     pub fn experiments(&self) -> &[DeclaredExperiment] {
         &self.experiments
     }
 
-    /// The footer's recording; null without one, or where it is no JSON. Parsed anew: many files would hold much.
+    /// The footer's recording; null if missing or not JSON. Parsed on each call to save memory with many files.
     pub fn recording(&self) -> Value {
         footers::recording(self.metadata_value(schema::RECORDING_KEY))
     }
@@ -234,7 +234,7 @@ impl TraceFile {
         value(&self.pairs, key)
     }
 
-    /// The parts that a reader needs; strings are read as dictionaries. Read again unless somebody holds it.
+    /// The parts for a reader; strings are read as dictionaries. Cached while a caller holds them.
     pub(crate) fn footer(&self) -> Result<Arc<Readable>, Box<Finding>> {
         let mut held = self.footer.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(footer) = held.upgrade() {
@@ -265,7 +265,7 @@ fn value<'a>(pairs: &'a [KeyValue], key: &str) -> Option<&'a str> {
 }
 
 fn version_of(file: &str, metadata: &ParquetMetaData) -> Result<u32, Box<Finding>> {
-    // A file of another writer has none; its columns are checked all the same.
+    // Files of other writers have none; their columns are checked all the same.
     let pairs = metadata.file_metadata().key_value_metadata();
     let Some(text) = pairs.and_then(|pairs| value(pairs, schema::VERSION_KEY)) else {
         return Ok(schema::SCHEMA_VERSION);
@@ -301,8 +301,8 @@ pub(crate) fn columns_of(file: &str, descriptor: &SchemaDescriptor) -> Result<Ve
     Ok(columns.collect())
 }
 
-/// Lists, structs and maps are refused whether or not somebody reads them: their levels declare how many values there are,
-/// and no count of the file bounds those.
+/// Lists, structs and maps are refused even if they are not read: their levels declare the number of values, which no
+/// count in the file bounds.
 pub(crate) fn is_nested(file: &str, column: &str) -> Finding {
     let expected = "a column with one value per row; leave it out, or write its parts as columns of their own";
     Finding::new(Code::WrongType, file, expected, "a list, a struct or a map").in_column(column)
@@ -314,7 +314,7 @@ fn kind_of(stored: &DataType, text: bool) -> Option<Kind> {
         DataType::Boolean => Some(Kind::Bool),
         integer if integer.is_integer() => Some(Kind::Int),
         float if float.is_floating() => Some(Kind::Float),
-        // Text that is only annotated as JSON is not checked to be UTF-8 by the decoder.
+        // The decoder does not check that text with only a JSON annotation is UTF-8.
         DataType::Utf8 if text => Some(Kind::String),
         _ => Some(Kind::Unsupported),
     }

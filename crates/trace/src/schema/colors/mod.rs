@@ -1,15 +1,15 @@
-//! Colours are checked values: lower-case names, of the palette that a trace declares where it declares one.
+//! Colours are checked values: lower-case names, from the palette if a trace declares one.
 //!
-//! Metrics compare colours byte by byte, so that `Red` beside `red` would turn a right answer into a wrong one.
+//! Metrics compare colours byte by byte, so `Red` beside `red` would turn a right answer into a wrong one.
 //!
-//! | file | what it knows |
+//! | file | contents |
 //! |---|---|
-//! | `spelling` | how a colour is spelled |
+//! | `spelling` | the spelling of a colour |
 //! | `palette` | the palette in a footer |
-//! | `mod` | what a column may hold, one value alone |
-//! | `validate::color_set` | what the values of all inputs say together |
+//! | `mod` | the allowed values of a column, each by itself |
+//! | `validate::color_set` | checks of the values of all inputs together |
 //!
-//! Rule: the scan, `validate`, `import`, the writer and the check on Spark all ask this module.
+//! Rule: the scan, `validate`, `import`, the writer and the check on Spark all use this module.
 
 pub mod palette;
 pub mod spelling;
@@ -18,27 +18,27 @@ use self::palette::Palette;
 use self::spelling::{WORDS, did_you_mean, is_well_spelled, meant_by, normal, spelling_key, study_color};
 use crate::schema;
 
-/// A column that holds colours.
+/// A column of colours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ColorColumn {
     pub name: &'static str,
-    /// The one of [`WORDS`] that the column may hold.
+    /// The one of [`WORDS`] that the column allows.
     pub word: Option<&'static str>,
     pub(super) advice: &'static str,
 }
 
-/// The columns that hold colours, in the order of the schema.
+/// The columns of colours, in schema order.
 pub fn columns() -> impl Iterator<Item = ColorColumn> {
     schema::COLUMNS.iter().filter_map(|column| column.color)
 }
 
-/// The column of this name, if it holds colours.
+/// The column of this name, if it is one of colours.
 pub fn column(name: &str) -> Option<ColorColumn> {
     schema::column(name)?.color
 }
 
 impl ColorColumn {
-    /// Returns true if the column may hold this text. The empty text is left to the rule about names.
+    /// Returns true if the column allows this text. The rule about names covers empty text.
     pub fn may_hold(self, text: &str, palette: Option<&Palette>) -> bool {
         if text.is_empty() || self.word == Some(text) {
             return true;
@@ -59,7 +59,7 @@ impl ColorColumn {
         format!("{colors}{word}{null}")
     }
 
-    /// The remedy for a text that the column may not hold.
+    /// The remedy for a text that the column does not allow.
     pub fn help(self, text: &str, palette: Option<&Palette>) -> String {
         let likely = normal(text);
         if likely.is_empty() || WORDS.contains(&likely.as_str()) && self.word != Some(likely.as_str()) {
@@ -84,7 +84,7 @@ mod tests {
     use super::{WORDS, column, columns};
     use crate::schema;
 
-    /// Texts that no column may hold without a palette, and the colour meant.
+    /// Texts that no column allows without a palette, and the colour meant.
     const MISSPELLED: [(&str, &str); 12] = [
         ("Red", "red"),
         ("RED", "red"),

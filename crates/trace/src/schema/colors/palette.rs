@@ -1,5 +1,5 @@
-//! What the footer's `mirrorstats.recording` says of colours: `palette`, a list of names, or that the world is this
-//! program's, whose colours are those of the study.
+//! The colours in the footer's `mirrorstats.recording`: `palette`, a list of names, or the statement that the world is
+//! this program's, with the colours of the study.
 
 use serde_json::Value;
 
@@ -60,7 +60,7 @@ impl Palette {
         Self(Color::ALL.map(|color| color.name().to_owned()).to_vec())
     }
 
-    /// The palette of these names, in their order.
+    /// The palette of these names, in this order.
     pub fn of_names<'a>(names: impl IntoIterator<Item = &'a str>) -> Result<Self, NoPalette> {
         let mut palette: Vec<String> = Vec::new();
         for name in names {
@@ -87,7 +87,7 @@ impl Palette {
         }
     }
 
-    /// All names of these palettes, in their order; `None` if one is missing, or there are none.
+    /// The names of all these palettes, in order; `None` if a palette is missing, or there are none.
     pub fn of_all<'a>(palettes: impl Iterator<Item = Option<&'a Self>>) -> Option<Self> {
         let mut names: Vec<String> = Vec::new();
         for palette in palettes {
@@ -97,7 +97,7 @@ impl Palette {
         (!names.is_empty()).then_some(Self(names))
     }
 
-    /// The names, in the order of the footer.
+    /// The names, in footer order.
     pub fn names(&self) -> &[String] {
         &self.0
     }

@@ -1,4 +1,4 @@
-//! The spelling of colours: in lower case, with single spaces between words and no invisible character.
+//! The spelling of colours: lower case, single spaces between words, no invisible characters.
 
 use std::sync::LazyLock;
 
@@ -8,18 +8,18 @@ use unicode_security::skeleton;
 use crate::palette::Color;
 use exact::suggest::nearest;
 
-/// Words that some columns hold in place of a colour.
+/// Words that some columns allow in place of a colour.
 pub const WORDS: [&str; 2] = ["none", "unknown"];
 
-/// A pattern that matches no name in normal form, for engines that match patterns; letters in upper case apart.
+/// A pattern that finds violations of the normal form, except upper case, for engines that match patterns.
 pub const STRAY: &str = r"^ | $|  |[\s&&[^ ]]|[\p{Cc}\u{ad}\u{61c}\u{200b}-\u{200f}\u{2028}-\u{202e}\u{2060}-\u{206f}\u{feff}\u{e0000}-\u{e007f}]";
 
-/// A pattern for names that mix Latin letters with those of other scripts, many of which look alike.
+/// A pattern for names that mix Latin letters with those of other scripts, many of which look the same.
 pub const MIXED: &str =
     r"\p{Latin}.*[\p{L}&&[^\p{Latin}\p{Common}\p{Inherited}]]|[\p{L}&&[^\p{Latin}\p{Common}\p{Inherited}]].*\p{Latin}";
 
 pub(crate) fn is_well_spelled(name: &str) -> bool {
-    // Nearly every name: no need to make its normal form.
+    // True for nearly all names, which need no normal form.
     name.bytes().all(|byte| byte.is_ascii_lowercase())
         || normal(name) == name && !is_mixed(name) && study_color(name).is_none_or(|color| color == name)
 }
@@ -29,12 +29,12 @@ fn is_mixed(name: &str) -> bool {
     !name.is_ascii() && PATTERN.as_ref().is_some_and(|pattern| pattern.is_match(name))
 }
 
-/// A character as those of ASCII that it looks like, by Unicode's table of confusables; itself where it looks like none.
+/// The ASCII characters that a character looks like, by Unicode's table of confusables; itself if there are none.
 fn look_of(c: char) -> String {
     let look: String = skeleton(c.encode_utf8(&mut [0; 4])).collect();
     match look.as_str() {
         _ if c.is_ascii() => c.to_string(),
-        // In that table `m` is the same as `rn`.
+        // That table maps `m` to `rn`.
         "rn" => "m".to_owned(),
         _ => look.to_lowercase(),
     }
@@ -48,14 +48,14 @@ fn disguise(name: &str) -> Option<String> {
     Some(format!(" its `{c}` is U+{:04X}, which only looks like `{look}`", u32::from(c)))
 }
 
-/// A name in lower case, with single spaces between its words and no character that does not show.
+/// A name in lower case, with single spaces between words and without invisible characters.
 pub fn normal(name: &str) -> String {
     let shown: String = name.chars().filter(|c| c.is_whitespace() || !hides(*c)).collect();
     let words: Vec<&str> = shown.split_whitespace().collect();
     words.join(" ").to_lowercase()
 }
 
-/// Returns true if a character does not show, as [`STRAY`] lists them for engines that match patterns.
+/// Returns true for an invisible character, as [`STRAY`] lists them for engines that match patterns.
 fn hides(c: char) -> bool {
     let is_mark = matches!(c, '\u{ad}' | '\u{61c}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}');
     c.is_control() || is_mark || matches!(c, '\u{2060}'..='\u{206f}' | '\u{feff}' | '\u{e0000}'..='\u{e007f}')

@@ -16,7 +16,7 @@ use exact::replace::TemporaryFolder;
 /// The prefix of the temporary folder for an episode's frames.
 const FRAMES: &str = "frames";
 
-/// One episode's messages, and how its replies are read.
+/// One episode's messages, and the reading of its replies.
 #[derive(Debug)]
 pub(in crate::agent) struct Conversation {
     task: Task,
@@ -26,7 +26,7 @@ pub(in crate::agent) struct Conversation {
 }
 
 impl Conversation {
-    /// The conversation of an episode; frames that are files lie below `scratch`.
+    /// The conversation of an episode; frame files are below `scratch`.
     pub(in crate::agent) fn new(task: Task, episode_id: &str, images: Images, scratch: &Path) -> Result<Self, Lost> {
         let prompt = Prompt::of(task.experiment).map_err(unusable)?;
         let frames = match images {
@@ -36,7 +36,7 @@ impl Conversation {
         Ok(Self { task, episode_id: episode_id.to_owned(), prompt, frames })
     }
 
-    /// The task, before the first observation alone, and the observation.
+    /// The task, only before the first observation, and the observation.
     pub(in crate::agent) fn messages(&self, observation: &Observation) -> Result<(Option<Message>, Message), Lost> {
         let Rendered { system, user } = self.prompt.render(&self.task, observation).map_err(unusable)?;
         let task = (observation.t == 1).then(|| self.task_message(system));
@@ -83,7 +83,7 @@ impl Conversation {
     }
 }
 
-/// Something between the world and the agent cannot be made.
+/// An observation for the agent cannot be made.
 pub(super) fn unusable(fault: impl fmt::Display) -> Lost {
     Lost::because(format!("the observation cannot be made: {fault}"))
 }

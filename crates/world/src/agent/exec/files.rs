@@ -1,8 +1,8 @@
-//! The files that a command names: what they hold shapes the replies as much as the command does.
+//! The files that a command names: their contents shape the replies as much as the command does.
 //!
-//! Rule: a word of the command that names a regular file, from the folder that the recording is started in, is known by its
-//! place in the command and the hash of its contents, and by no path. Not looked at are the word that the shell looks up
-//! on `PATH`, what output is redirected to, and files named within a word (`--log=out.log`).
+//! Rule: a word that names a regular file, relative to the starting folder, counts by position and content hash, not by
+//! path. Exempt are the word that the shell looks up on `PATH`, redirection targets, and files named within a word
+//! (`--log=out.log`).
 
 use std::fs::File;
 use std::io;
@@ -21,15 +21,15 @@ pub struct Unreadable {
     source: io::Error,
 }
 
-/// The hash over the places and contents of the files that a command names; `None` if it names none, or is no command of
-/// the shell.
+/// The hash over the positions and contents of the files that a command names; `None` if it names none or the shell
+/// cannot parse it.
 pub(super) fn fingerprint(command: &str) -> Result<Option<String>, Unreadable> {
     let files = words(command).into_iter().filter(|(_, word)| Path::new(word).is_file());
     let lines: Vec<String> = files.map(|(place, word)| line(place, word)).collect::<Result<_, _>>()?;
     Ok((!lines.is_empty()).then(|| hash::of_bytes(lines.concat().as_bytes())))
 }
 
-/// The place of a word and the hash of the file that it names.
+/// The position of a word and the hash of the file that it names.
 fn line(place: usize, word: String) -> Result<String, Unreadable> {
     match File::open(&word).and_then(hash::of_reader) {
         Ok(contents) => Ok(format!("{place} {contents}\n")),
@@ -37,7 +37,7 @@ fn line(place: usize, word: String) -> Result<String, Unreadable> {
     }
 }
 
-/// The words of a command that may name files the program reads, each with its place from 1.
+/// The words of a command that may name files to read, each with its position from 1.
 fn words(command: &str) -> Vec<(usize, String)> {
     let mut kept = Vec::new();
     let (mut is_command, mut is_output) = (true, false);
@@ -53,8 +53,8 @@ fn words(command: &str) -> Vec<(usize, String)> {
     kept
 }
 
-/// A word without the operators that stand against it, and whether a command ends with it. A file whose name has one is
-/// itself.
+/// A word without the operators attached to it, and whether it ends a command. A file with an operator in its name is
+/// unchanged.
 fn without_operators(word: &str) -> (&str, bool) {
     if OPERATORS.contains(&word) {
         return ("", true);
@@ -66,7 +66,7 @@ fn without_operators(word: &str) -> (&str, bool) {
     (bare, word.ends_with([';', '&', '|']))
 }
 
-/// Returns true if the next word is what output goes to.
+/// Returns true if the next word is a redirection target.
 fn is_redirection(word: &str) -> bool {
     let operator = word.trim_start_matches(|c: char| c.is_ascii_digit() || c == '&');
     matches!(operator, ">" | ">>" | ">|")

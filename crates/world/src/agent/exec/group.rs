@@ -1,7 +1,7 @@
-//! Programs that run now, each with all that it started: they are killed when their episode lets go of them, and all at once
-//! when the process is about to end.
+//! Running programs, each with its descendants: they are killed when their episode ends, and all together when the
+//! process is about to end.
 //!
-//! A program has a process group. What leaves the group (`setsid`) is found by a variable in its environment, on Linux.
+//! A program has a process group. Processes that leave it (`setsid`) are found by an environment variable, on Linux.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -9,10 +9,10 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tokio::process::{Child, Command};
 
-/// The variable that a program and all that it starts have in their environment.
+/// The environment variable of a program and its descendants.
 const MARK: &str = "_MIRRORSTATS_EXEC";
 
-/// The groups of all programs that run now.
+/// The groups of all running programs.
 #[derive(Debug, Default)]
 pub struct Groups(Mutex<Running>);
 
@@ -24,7 +24,7 @@ struct Running {
 }
 
 impl Groups {
-    /// Kills all of them, and lets none be started any more.
+    /// Kills all of them, and prevents further starts.
     pub fn kill_all(&self) {
         let mut running = self.running();
         running.is_over = true;
@@ -46,7 +46,7 @@ pub struct Group {
 impl Group {
     /// Starts the first process of a group.
     pub fn start(shell: &mut Command, groups: &Arc<Groups>) -> io::Result<(Child, Self)> {
-        // Held until the process is known: one that was started and not known yet would outlive `kill_all`.
+        // The lock is held until the process is registered: an unregistered process would outlive `kill_all`.
         let mut running = groups.running();
         if running.is_over {
             return Err(io::Error::new(io::ErrorKind::Interrupted, "the recording is being ended"));
@@ -73,9 +73,9 @@ impl Drop for Group {
 fn kill(id: i32, mark: &str) {
     use nix::sys::signal::{Signal, kill, killpg};
     use nix::unistd::Pid;
-    // Fails where all of it has ended already, which is fine.
+    // Fails harmlessly if the whole group has already ended.
     let _ = killpg(Pid::from_raw(id), Signal::SIGKILL);
-    // What is killed may have started something in the meantime.
+    // Killed processes may have started others in the meantime.
     for _ in 0..10 {
         let left = marked(mark);
         for id in &left {

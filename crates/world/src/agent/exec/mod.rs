@@ -1,19 +1,19 @@
-//! Agents that are programs of one's own: any command that takes JSON lines and gives JSON lines.
+//! Agents that are external programs: any command that reads and writes JSON lines.
 //!
 //! | file | what it knows |
 //! |---|---|
-//! | [`message`] | the lines that a program is sent |
-//! | `conversation` | which lines an episode has, and how replies are read |
-//! | [`program`] | running it, and the names of what can go wrong |
-//! | [`said`] | what it says on standard error |
-//! | [`group`] | that nothing of it stays behind |
-//! | [`files`] | the files that the command names, by what they hold |
+//! | [`message`] | the lines to a program |
+//! | `conversation` | the lines of an episode, and the reading of replies |
+//! | [`program`] | running it, and its failures |
+//! | [`said`] | its standard error |
+//! | [`group`] | the cleanup of its processes |
+//! | [`files`] | the files that the command names, by content |
 //!
-//! One process plays one episode. A reply is read as that of a model is: what is not the object asked for is a step
-//! without a decision. A program that ends, hangs or talks out of turn loses its episode, as a broken network does.
+//! One process plays one episode. Its replies are read like a model's: any other text than the requested object is no
+//! decision. A program that ends, hangs or speaks out of turn loses its episode, like a broken network.
 //!
-//! Rule: a program sees the words and the frame that a model gets. It inherits the environment, keys included, but no
-//! value of a variable that holds a key is kept of what it says.
+//! Rule: a program gets the words and the frame that a model gets. It inherits the environment, including keys, but the
+//! values of variables that hold keys are removed from all recorded output.
 
 pub(super) mod conversation;
 pub mod files;
@@ -40,7 +40,7 @@ use exact::hash;
 /// The shell's exit codes for a missing command, and for one that cannot be run.
 const NO_COMMAND: [i32; 2] = [126, 127];
 
-/// The passing of frames to a program.
+/// The transfer of frames to a program.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Images {
     /// As files, which are there until the episode ends.
@@ -59,18 +59,18 @@ impl Images {
     }
 }
 
-/// A command, and how it is dealt with.
+/// A command and its settings.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Settings {
     pub model: String,
-    /// The command, for the shell.
+    /// The command, in shell syntax.
     pub command: String,
     pub images: Images,
-    /// The time for a reply; for the first one it includes the program's start.
+    /// The time limit of a reply; for the first reply it includes the program's start.
     pub timeout: Duration,
-    /// The folder in which each episode gets one for its frames.
+    /// The parent folder of the episodes' temporary frame folders.
     pub scratch: PathBuf,
-    /// The folder in which each episode gets a file with what its program said on standard error.
+    /// The folder with one file per episode for the program's standard error.
     pub standard_error: PathBuf,
 }
 
@@ -103,8 +103,8 @@ impl Player for Exec {
         &self.shared.settings.model
     }
 
-    /// The command by its hash, as typed it may hold paths of a machine, or a key; the files that it names by theirs, null
-    /// if it names none.
+    /// The command by its hash, since its text may hold local paths or keys; the files that it names by theirs, null if
+    /// it names none.
     fn description(&self) -> serde_json::Value {
         let Settings { model, command, images, .. } = &self.shared.settings;
         serde_json::json!({
@@ -144,7 +144,7 @@ impl Player for Exec {
 struct ExecAgent {
     shared: Arc<Shared>,
     conversation: Conversation,
-    /// `None` once it is of no use.
+    /// `None` once it is unusable.
     program: Option<Program>,
     kept: Kept,
     steps: i32,
@@ -178,7 +178,7 @@ impl ExecAgent {
         }
     }
 
-    /// The task, before the first observation alone, and the observation.
+    /// The task, only before the first observation, and the observation.
     fn lines(&self, observation: &Observation) -> Result<(Option<Vec<u8>>, Vec<u8>), Lost> {
         let (task, question) = self.conversation.messages(observation)?;
         let task = task.map(|task| task.line()).transpose();
@@ -193,20 +193,20 @@ impl ExecAgent {
                 let text = self.shared.without_secrets(text);
                 self.conversation.read(text, usage)
             }
-            // With its bytes replaced it might pass for something that the program did not say.
+            // With its bytes replaced, the line might pass for something else.
             Err(fault) => Reading::without_decision(Status::ParseFailed, Some(fault.to_string()))
                 .into_reply(self.shared.without_secrets(&String::from_utf8_lossy(line)), usage),
         }
     }
 
-    /// The program is of no use any more, nor is any other if the command cannot be run at all.
+    /// The program is unusable from now on; if the command cannot be run at all, so are all others.
     async fn give_up(&mut self, failure: &Failure) -> Lost {
         let Some(program) = self.program.take() else { return lost(failure) };
         let lost = lost(failure);
         program.close().await;
         let words = self.kept.said.last_words(&self.shared.secrets);
         let words = words.map_or_else(String::new, |words| format!("; its last words:\n{words}"));
-        // What came before the reply spoilt the step before, though it is noticed now.
+        // Output before the reply belongs to the previous step, though it is noticed now.
         let earlier = matches!(failure, Failure::Chatter { .. }).then(|| self.steps - 1);
         let step = earlier.unwrap_or(self.steps);
         let cause = self.shared.without_secrets(&format!("step {step}: {}{words}", lost.cause));

@@ -1,10 +1,10 @@
-//! A program that runs for one episode: lines in, lines out, and what can go wrong between.
+//! A program running for one episode: lines in, lines out, and failures.
 //!
-//! Rule: nothing of a program outlives its [`Program`]: it has a process group of its own, which is killed when the
-//! value is dropped, whatever the program has started meanwhile. What it says on standard error is read all the time.
+//! Rule: no process outlives its [`Program`]: dropping the value kills its process group, including processes started
+//! meanwhile. Standard error is read continuously.
 //!
-//! A line is a reply if the program had begun to read the question when it wrote it. Where the system says how much of a
-//! pipe is unread, one that came before is known for what it is; elsewhere only if it came before the question was sent.
+//! A line is a reply if the program had begun to read the question when it wrote the line. Where the system reports the
+//! unread bytes of a pipe, earlier lines are detected; elsewhere only those from before the question was sent.
 
 use std::io;
 use std::process::{ExitStatus, Stdio};
@@ -20,15 +20,15 @@ use tokio::time::timeout;
 use super::group::{Group, Groups};
 use super::said::Said;
 
-/// Bytes of one reply.
+/// The maximum size of a reply in bytes.
 pub const LONGEST_REPLY: u64 = 1 << 20;
-/// The time that a program has to leave after its standard input was closed.
+/// The time for a program to exit after its standard input was closed.
 const FAREWELL: Duration = Duration::from_secs(5);
 /// The time between the end of a process's output and its own end.
 const CLOSING: Duration = Duration::from_secs(1);
 /// The interval of checks that the program has read its task.
 const GLANCE: Duration = Duration::from_millis(2);
-/// Bytes of a line that are shown.
+/// The number of bytes of a line to show.
 const SHOWN: usize = 100;
 
 /// The reason for a missing reply.
@@ -87,8 +87,8 @@ impl Program {
         Ok(Self { child, group, input, output: BufReader::new(output), listener, last: String::new() })
     }
 
-    /// Sends a question and waits for a line, which is given without its end. The first question comes after the task, which
-    /// asks for no line.
+    /// Sends a question and waits for a line, returned without its end. The first question follows the task, which
+    /// requires no line.
     pub async fn ask(&mut self, task: Option<&[u8]>, question: &[u8], patience: Duration) -> Result<Vec<u8>, Failure> {
         let asked = async {
             match task {
@@ -108,16 +108,16 @@ impl Program {
         timeout(patience, asked).await.unwrap_or(Err(Failure::Slow(patience)))
     }
 
-    /// Sends the task, and waits until the program has read it: what it writes before is no reply.
+    /// Sends the task and waits until the program has read it; earlier output is not a reply.
     async fn tell(&mut self, task: &[u8]) -> Result<(), Failure> {
-        // A program that no longer listens has ended or is about to, which reading finds.
+        // A program that no longer reads has ended or is about to; reading detects this.
         let _ = self.input.write_all(task).await;
         loop {
-            // In this order: what was written before the task was read is there to be seen after it.
+            // The order matters: output from before the task was read is visible afterwards.
             let is_read = self.unread() == 0;
             match timeout(GLANCE, self.output.fill_buf()).await {
                 Ok(Ok(early)) if !early.is_empty() => return Err(Failure::Early(beginning(early))),
-                // Its output has ended, which the next reading finds.
+                // Its output has ended; the next read detects this.
                 Ok(_) => return Ok(()),
                 Err(_) if is_read => return Ok(()),
                 Err(_) => {}
@@ -143,9 +143,9 @@ impl Program {
         }
     }
 
-    /// Nothing waits to be read: a line from before the question would be taken for the answer.
+    /// Checks that no output is waiting: a line from before the question would be taken for the answer.
     async fn is_silent(&mut self) -> Result<(), Failure> {
-        // Lets what has arrived be noticed.
+        // Lets the runtime notice output that has arrived.
         tokio::task::yield_now().await;
         let early = match self.output.fill_buf().now_or_never() {
             Some(Ok(early)) if !early.is_empty() => beginning(early),
@@ -156,7 +156,7 @@ impl Program {
 
     fn out_of_turn(&self, line: &[u8]) -> Failure {
         let (line, before) = (beginning(line), self.last.clone());
-        // Of two lines for one question, the one that is no object was not meant as the reply.
+        // Of two lines for one question, the one that is not an object was not meant as the reply.
         if before.trim_start().starts_with('{') {
             Failure::OutOfTurn { line, before }
         } else {
@@ -171,15 +171,15 @@ impl Program {
         return 0;
     }
 
-    /// Ends it at once, and waits until all that it said is read.
+    /// Kills it at once, and waits until all of its output is read.
     pub async fn close(self) {
         let Self { child, group, input, output, listener, last: _ } = self;
         drop((child, group, input, output));
-        // What has left the group may hold standard error open.
+        // A process that left the group may keep standard error open.
         let _ = timeout(CLOSING, listener).await;
     }
 
-    /// Says a last line, closes standard input, and waits for the program to leave; one that stays is killed.
+    /// Sends a last line, closes standard input, and waits for the program to exit; kills it on timeout.
     pub async fn end(self, line: &[u8]) {
         let Self { mut child, group, mut input, output, listener, last: _ } = self;
         let leaving = async {
@@ -187,7 +187,7 @@ impl Program {
             drop(input);
             child.wait().await
         };
-        // It leaves, or it is killed with its group right here.
+        // It has exited, or is killed here with its group.
         let _ = timeout(FAREWELL, leaving).await;
         drop((child, group, output));
         let _ = timeout(CLOSING, listener).await;

@@ -1,7 +1,7 @@
-//! The standard error of a program: its end is kept, for messages and in a file of the episode.
+//! The standard error of a program: its end is kept for messages and for a file of the episode.
 //!
-//! Rule: no value of a variable that holds a key is in what leaves this file, not even a part of one that was cut off at the
-//! beginning. In the file all else is as the program wrote it, characters that act on a terminal included.
+//! Rule: no value of a variable that holds a key leaves this file, not even the rest of one whose beginning was cut
+//! off. Everything else stays as the program wrote it, including control characters for terminals.
 
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -11,10 +11,10 @@ use std::{fs, io};
 use crate::agent::vlm::secrets::Secret;
 use exact::replace::{folder_of, make_folder, replace};
 
-/// Bytes of the file of an episode.
+/// The maximum size of an episode's file in bytes.
 pub const IN_FILE: usize = 256 * 1024;
 const IN_MESSAGE: usize = 2_000;
-/// Bytes that are kept before those of the file: longer than any key, which may be cut off among them.
+/// Extra bytes before those of the file: longer than any key, since the cut may split one.
 const MARGIN: usize = 4_096;
 
 /// The text so far.
@@ -52,7 +52,7 @@ impl Said {
         kept
     }
 
-    /// The last lines of it, indented, each whole where there is more than one; `None` if nothing was said.
+    /// The last lines, indented, each whole if there are several; `None` without output.
     pub fn last_words(&self, secrets: &[Secret]) -> Option<String> {
         let bytes = self.bytes(secrets);
         let text = String::from_utf8_lossy(last_lines(&bytes)).replace('\t', "    ");
@@ -74,7 +74,7 @@ pub fn without(secrets: &[Secret], text: &str) -> String {
     secrets.iter().fold(text.to_owned(), |text, secret| secret.without(&text))
 }
 
-/// The file of an episode, written when this is dropped: whether it is recorded, lost or stopped.
+/// The file of an episode, written on drop: whether the episode is recorded, lost or stopped.
 #[derive(Debug)]
 pub struct Kept {
     pub(super) said: Arc<Said>,
@@ -92,7 +92,7 @@ impl Kept {
     fn write(&self) -> io::Result<()> {
         let bytes = self.said.bytes(&self.secrets);
         if bytes.is_empty() {
-            // What was said the last time is not of this time.
+            // Output of an earlier attempt does not belong to this one.
             return fs::remove_file(&self.path);
         }
         make_folder(folder_of(&self.path))?;
@@ -102,7 +102,7 @@ impl Kept {
 
 impl Drop for Kept {
     fn drop(&mut self) {
-        // A convenience: the episode does not depend on it, and a full disk is reported by what does.
+        // Best effort: the episode does not depend on this file, and other writes report a full disk.
         let _ = self.write();
     }
 }
@@ -133,7 +133,7 @@ mod tests {
         let expected =
             ["Traceback (most recent call last):", "  File \"agent.py\", line 4, in f", "    g()", "ValueError: 12"];
         assert_eq!(said.last_words(&[]).unwrap(), expected.map(|line| format!("    {line}")).join("\n"));
-        // A line that is longer than a message has its end there.
+        // Of a line longer than a message, only the end is kept.
         said.add(&vec![b'x'; 2 * IN_MESSAGE]);
         assert_eq!(said.last_words(&[]).unwrap(), format!("    {}", "x".repeat(IN_MESSAGE)));
     }

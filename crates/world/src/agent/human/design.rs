@@ -1,20 +1,20 @@
-//! Who plays which episodes, and in which order.
+//! The distribution of episodes among participants, and their order.
 //!
-//! Rule: a participant's place among the codes decides, and nothing that happened: the same command deals the same way again.
+//! Rule: only a participant's position among the codes matters, so the same command always deals the same way.
 
 use std::collections::BTreeMap;
 
 use crate::agent::Planned;
 use exact::names;
 
-/// How episodes are divided among participants.
+/// The distribution of episodes among participants.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Design {
     /// Each episode is played by one participant.
     Split,
-    /// Everyone plays every scene.
+    /// Every participant plays every scene.
     Crossed,
-    /// Everyone plays scenes of their own.
+    /// Every participant plays separate scenes.
     OwnSeeds,
 }
 
@@ -25,25 +25,25 @@ names!(Design { Split: "split", Crossed: "crossed", OwnSeeds: "own-seeds" });
 pub enum Order {
     /// By experiment, seed and run.
     Planned,
-    /// By the rows of a Latin square in which each follows each other equally often.
+    /// By the rows of a Latin square in which each item follows every other item equally often.
     Counterbalanced,
 }
 
 names!(Order { Planned: "planned", Counterbalanced: "counterbalanced" });
 
-/// A design with its order, and the numbers of one participant.
+/// A design with its order, and the numbers per participant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Schedule {
     pub design: Design,
     pub order: Order,
     /// The seeds of one participant.
     pub seeds: i32,
-    /// How often one participant plays a scene.
+    /// The number of times that one participant plays a scene.
     pub repeats: i32,
 }
 
 impl Schedule {
-    /// The episodes of each participant in the order of play, of so many.
+    /// Deals planned episodes to `people` participants, each in the order of play.
     pub fn lanes<'a>(&self, planned: &'a [Planned], people: usize) -> Vec<Vec<&'a Planned>> {
         let mut lanes = vec![Vec::new(); people];
         for (at, episode) in planned.iter().enumerate() {
@@ -63,12 +63,12 @@ impl Schedule {
     }
 }
 
-/// The part, from 0, in which a number from 1 lies.
+/// The index, from 0, of the part of this size that contains a number from 1.
 fn part(number: i32, size: i32) -> Option<usize> {
     usize::try_from((number - 1) / size.max(1)).ok()
 }
 
-/// Experiments stay together, since each has its own words; both they and their episodes are in the order of the row.
+/// Experiments stay together, since each has its own prompt; they and their episodes follow the order of the row.
 fn counterbalanced(lane: Vec<&Planned>, row: usize) -> Vec<&Planned> {
     let mut experiments: BTreeMap<usize, Vec<&Planned>> = BTreeMap::new();
     let mut names: Vec<&str> = Vec::new();
@@ -84,8 +84,8 @@ fn counterbalanced(lane: Vec<&Planned>, row: usize) -> Vec<&Planned> {
     blocks.flat_map(|block| latin_row(block.len(), row).into_iter().map(|at| block[at]).collect::<Vec<_>>()).collect()
 }
 
-/// A row of Williams' Latin square of `n`: over `n` rows, or `2n` if `n` is odd, each item follows each other equally often
-/// (Williams 1949).
+/// A row of Williams' Latin square of `n`: over `n` rows, or `2n` if `n` is odd, each item follows every other item
+/// equally often (Williams 1949).
 fn latin_row(n: usize, row: usize) -> Vec<usize> {
     if n == 0 {
         return Vec::new();

@@ -1,7 +1,7 @@
-//! The participants of a recording: who plays what, who is asked what, who has left.
+//! The participants of a recording: their episodes, their open questions, and withdrawals.
 //!
-//! Rule: an episode belongs to one participant, and a participant plays one episode at a time. What a participant decides
-//! about their part in the study is on the disk before it is done.
+//! Rule: an episode belongs to one participant, and a participant plays one episode at a time. A participant's decision
+//! about taking part is on disk before it takes effect.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
@@ -19,13 +19,13 @@ use super::seat::{Asked, End, Given, LISTENING, Question, Seat, Terms};
 use crate::agent::{Planned, Turn};
 use trace::frame::Frame;
 
-/// Removes the episodes of a code from a folder; gives their ids.
+/// Removes the episodes of a code from a folder; returns their ids.
 pub type Eraser = fn(&Path, &str) -> Result<BTreeSet<String>, String>;
 
-/// The longest wait for an episode under way to end before it is deleted.
+/// The maximum wait for an episode under way to end before its deletion.
 const ENDING: Duration = Duration::from_mins(1);
 
-/// The people of a recording.
+/// The participants of a recording.
 #[derive(Debug)]
 pub struct Hub {
     terms: Terms,
@@ -42,7 +42,7 @@ pub struct Hub {
 }
 
 impl Hub {
-    /// People of these codes, each with the token of their link.
+    /// Participants with these codes and link tokens.
     pub fn new(
         people: Vec<(String, String)>,
         terms: Terms,
@@ -74,7 +74,7 @@ impl Hub {
         &self.schedule
     }
 
-    /// The number of people.
+    /// The number of participants.
     pub fn seats(&self) -> usize {
         self.seats.len()
     }
@@ -87,7 +87,7 @@ impl Hub {
         self.tokens.iter().position(|own| own == token)
     }
 
-    /// Deals the episodes: those begun to who began them, those of people who left to the others where the design lets them.
+    /// Deals the episodes: begun ones to their players, those of people who left to others if the design permits.
     pub(super) fn deal(&self, planned: &[Planned]) {
         let mut left_over = Vec::new();
         for (at, lane) in self.schedule.lanes(planned, self.seats()).into_iter().enumerate() {
@@ -119,7 +119,7 @@ impl Hub {
         self.answers.range(first..=last).next().is_some()
     }
 
-    /// What a participant who left has not played: split among the others, or left out.
+    /// Deals the unplayed episodes of participants who left: to the others, or to nobody.
     fn deal_again(&self, episodes: Vec<String>) {
         let stays = |seat: &usize| self.schedule.design == Design::Split && self.locked(*seat).left.is_none();
         let others: Vec<usize> = (0..self.seats()).filter(stays).collect();
@@ -141,7 +141,7 @@ impl Hub {
         if is_next { Turn::Now } else { Turn::Later }
     }
 
-    /// Gives an episode to its participant, who begins it when they are ready; `None` if nobody is to play it.
+    /// Gives an episode to its participant, who begins it when ready; `None` if nobody is to play it.
     pub(super) fn sit(&self, episode_id: &str) -> Option<usize> {
         let seat = self.owners().get(episode_id).copied()?;
         let has_begun = self.has_begun(seat, episode_id);
@@ -167,7 +167,7 @@ impl Hub {
         self.locked(seat).has_practised
     }
 
-    /// The practice is over: the person is informed, and no step counts before they begin.
+    /// The practice is over: the person is informed, and steps count only after the start.
     pub(super) fn practised(&self, seat: usize) {
         self.locked(seat).is_ready = true;
     }
@@ -179,11 +179,11 @@ impl Hub {
         }
         let code = own.code.clone();
         drop(own);
-        // What is lost with the journal is that the practice is behind: it comes again.
+        // If the journal cannot be written, the practice repeats after a restart.
         let _ = self.journal().practised(&code);
     }
 
-    /// Asks a person and waits for the answer, for as long as it takes; `None` if the person leaves or the recording stops.
+    /// Asks a person and waits for the answer without a time limit; `None` if the person leaves or the recording stops.
     pub(super) async fn ask(&self, seat: usize, question: Question) -> Option<Given> {
         let (sender, answer) = oneshot::channel();
         {
@@ -202,13 +202,13 @@ impl Hub {
         self.is_stopping.load(Ordering::Relaxed)
     }
 
-    /// Nobody is waited for any more.
+    /// Stops waiting for all participants.
     pub(super) fn interrupt(&self) {
         self.is_stopping.store(true, Ordering::Relaxed);
         (0..self.seats()).for_each(|seat| self.locked(seat).asked = None);
     }
 
-    /// An episode is over; one that is not recorded is neither played nor asked for again in this start.
+    /// Ends an episode; unless it is to continue, it leaves its participant's queue for this start.
     pub(super) fn over(&self, seat: usize, episode_id: &str, is_whole: bool) {
         let mut own = self.locked(seat);
         (own.episode, own.asked) = (None, None);
@@ -224,7 +224,7 @@ impl Hub {
         }
     }
 
-    /// The recording is over. Waits a moment for the pages that are open to ask, so that they can say so.
+    /// Ends the recording. Waits briefly for open pages to poll, so that they can show the end.
     pub(super) fn end(&self, is_complete: bool) {
         let start = Instant::now();
         let seats = || (0..self.seats.len()).map(|seat| self.locked(seat));
@@ -234,7 +234,7 @@ impl Hub {
             std::thread::sleep(Duration::from_millis(20));
         }
         if seats().any(|seat| seat.is_open()) {
-            // The last answer is on its way.
+            // Lets the last response arrive.
             std::thread::sleep(Duration::from_millis(100));
         }
     }
@@ -254,7 +254,7 @@ impl Hub {
         Ok(())
     }
 
-    /// Ends a person's part in the study. What they did stays, unless they want it deleted.
+    /// Ends a person's part in the study. Their data stays unless they want it deleted.
     pub(super) fn leave(&self, seat: usize, how: Leaving) -> io::Result<()> {
         let code = self.code(seat);
         self.journal().leave(&code, how)?;
@@ -280,7 +280,7 @@ impl Hub {
         Ok(())
     }
 
-    /// Deletes what is left of those who wanted it; gives the ids of all episodes that were deleted.
+    /// Deletes the remaining data of those who asked for it; returns the ids of all deleted episodes.
     pub fn delete_due(&self) -> Result<BTreeSet<String>, String> {
         for seat in (0..self.seats()).filter(|seat| self.locked(*seat).left == Some(Leaving::Deleted)) {
             let failed = |error| format!("what `{}` did could not be deleted: {error}", self.code(seat));

@@ -1,6 +1,6 @@
-//! The answers of people, one per line as they came: a recording that ended goes on where they were.
+//! People's answers, one per line in order of arrival, so that an interrupted recording continues where they were.
 //!
-//! Rule: a code, a link, a time and an answer, and nothing else of a person. An answer is on the disk before its step is done.
+//! Rule: only codes, links, times and answers of a person are stored. An answer is on disk before its step is done.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, Write as _};
@@ -16,13 +16,13 @@ use exact::replace;
 /// The name of the file in the folder of a recording.
 const NAME: &str = "participants.jsonl";
 
-/// An answer may be long, and is no book.
+/// An answer may be long, but not unlimited.
 const LONGEST_LINE: Limit = Limit::new("bytes in a line of the journal of participants", 4 << 20);
 
 /// An answer.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Entry {
-    /// The code of who answered.
+    /// The participant's code.
     pub participant: String,
     pub episode_id: String,
     /// The step, from 1.
@@ -37,22 +37,22 @@ pub struct Entry {
 #[serde(untagged)]
 enum Line {
     Answer(Entry),
-    /// Somebody agreed to words of this hash.
+    /// Somebody agreed to the consent text with this hash.
     Agreed {
         participant: String,
         consent: String,
     },
-    /// Somebody has the practice behind.
+    /// Somebody finished the practice.
     Practised {
         participant: String,
         practised: bool,
     },
-    /// Somebody takes no further part.
+    /// Somebody ended their part.
     Left {
         participant: String,
         left: Leaving,
     },
-    /// Somebody has a link, and a place among the participants, from 1.
+    /// Somebody got a link, and a position among the participants, from 1.
     Enrolled {
         participant: String,
         place: usize,
@@ -60,15 +60,15 @@ enum Line {
     },
 }
 
-/// How a person's part in a study ended before its time.
+/// The reason why a person's part in a study ended early.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Leaving {
     /// They did not agree.
     Declined,
-    /// They stopped; what they did stays.
+    /// They stopped; their data stays.
     Stopped,
-    /// They stopped, and what they did is deleted.
+    /// They stopped, and their data is deleted.
     Deleted,
 }
 
@@ -87,20 +87,20 @@ impl Line {
 /// The journal of a recording.
 #[derive(Debug)]
 pub struct Journal {
-    /// The folder; `None` where nothing is recorded. The file is opened for each line, since `participants remove` replaces it.
+    /// The folder; `None` without a recording. The file is opened per line, since `participants remove` replaces it.
     folder: Option<PathBuf>,
     lines: Vec<Line>,
 }
 
 impl Journal {
-    /// Opens the journal in a folder, which is made if need be.
+    /// Opens the journal in a folder, creating the folder if necessary.
     pub fn open(folder: &Path) -> io::Result<Self> {
         replace::make_folder(folder)?;
         let path = path(folder);
         let lines = read(&path)?;
         let mut file = appending(&path)?;
         if !lines.is_empty() {
-            // Behind a line that was cut off a new one begins.
+            // Ends a line that was cut off, so that a new one begins.
             file.write_all(b"\n")?;
         }
         Ok(Self { folder: Some(folder.to_owned()), lines })
@@ -110,7 +110,7 @@ impl Journal {
         Self { folder: None, lines: Vec::new() }
     }
 
-    /// The answers that were there when it was opened.
+    /// The answers that existed when it was opened.
     pub fn entries(&self) -> Vec<Entry> {
         let answer = |line: &Line| if let Line::Answer(entry) = line { Some(entry.clone()) } else { None };
         self.lines.iter().filter_map(answer).collect()
@@ -140,7 +140,7 @@ impl Journal {
         self.write(&Line::Practised { participant: code.to_owned(), practised: true })
     }
 
-    /// The end of a person's part, if it has ended.
+    /// The way a person's part ended, if it has.
     pub(super) fn left(&self, code: &str) -> Option<Leaving> {
         self.lines.iter().rev().find_map(|line| match line {
             Line::Left { participant, left } if participant == code => Some(*left),
@@ -152,7 +152,7 @@ impl Journal {
         self.write(&Line::Left { participant: code.to_owned(), left })
     }
 
-    /// The place among the participants and the link of a person, if they have one.
+    /// The position among the participants and the link of a person, if enrolled.
     pub fn enrolled(&self, code: &str) -> Option<(usize, &str)> {
         self.lines.iter().find_map(|line| match line {
             Line::Enrolled { participant, place, link } if participant == code => Some((*place, link.as_str())),
@@ -164,7 +164,7 @@ impl Journal {
         self.write(&Line::Enrolled { participant: code.to_owned(), place, link: link.to_owned() })
     }
 
-    /// Removes what a person did; that they left, their place and their link stay. Gives the folder, if there is one.
+    /// Removes a person's answers; their withdrawal, position and link stay. Returns the folder, if there is one.
     pub(super) fn forget(&self, code: &str) -> io::Result<Option<PathBuf>> {
         let Some(folder) = &self.folder else { return Ok(None) };
         let stays =
@@ -183,12 +183,12 @@ impl Journal {
     }
 }
 
-/// Removes all that the journal of a folder has of a person; gives the number of lines.
+/// Removes all of a person's lines from a folder's journal; returns their number.
 pub fn remove(folder: &Path, code: &str) -> io::Result<usize> {
     keep(&path(folder), |line| line.participant() != code)
 }
 
-/// Keeps some lines of a journal; gives the number of those that are gone.
+/// Keeps some lines of a journal; returns the number of removed lines.
 fn keep(path: &Path, stays: impl Fn(&Line) -> bool) -> io::Result<usize> {
     let lines = read(path)?;
     let kept: Vec<&Line> = lines.iter().filter(|line| stays(line)).collect();

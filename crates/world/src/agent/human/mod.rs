@@ -1,15 +1,15 @@
-//! A person in the agent's place: the same frame, the same words, the same reply, in a browser.
+//! A person as the agent: the same frame, words and reply as for a model, in a browser.
 //!
 //! | file | what it knows |
 //! |---|---|
-//! | [`design`] | who plays which episodes, in which order |
-//! | [`hub`] | which person is asked what, and who has left |
-//! | [`seat`] | one person: question, clock, and what the page shows |
-//! | [`server`] | the pages that people play on; it has no other |
-//! | [`journal`] | what was answered, so that a recording that was ended goes on in the middle of an episode |
+//! | [`design`] | the distribution and order of episodes |
+//! | [`hub`] | the participants, their open questions, and withdrawals |
+//! | [`seat`] | one person: question, clock, and content of the page |
+//! | [`server`] | the pages for participants, and nothing else |
+//! | [`journal`] | the answers, so that an interrupted recording continues in the middle of an episode |
 //!
-//! Rule: a person gets what a model gets and nothing else: no colour of a body, no count of pixels, no id. Each has a link of
-//! their own and a code; nothing else is kept of them.
+//! Rule: a person gets what a model gets and nothing else: no body colour, no pixel count, no id. Each person has a
+//! link and a code; no other personal data is stored.
 
 pub mod design;
 pub mod hub;
@@ -31,22 +31,22 @@ use super::reply::{self, Ending};
 use super::{Agent, Decision, Ended, Farewell, Lost, Observation, Planned, Player, Reply, Task, Turn, Usage};
 use exact::hash;
 
-/// The version of what people are shown and asked.
+/// The version of the content that people get.
 const PROTOCOL: u32 = 3;
 
 /// People as a player.
 #[derive(Debug)]
 pub struct Human {
     model: String,
-    /// SHA-256 of the words of consent; `None` where nobody is asked for it.
+    /// SHA-256 of the consent text; `None` if no consent is asked for.
     consent: Option<String>,
     hub: Arc<Hub>,
-    /// `None` where nobody is asked to play, and at the end of the recording.
+    /// `None` if nobody is asked to play, and at the end of the recording.
     server: Mutex<Option<Server>>,
 }
 
 impl Human {
-    /// A player of this name whose episodes go to the people of a hub.
+    /// A player of this name whose episodes go to the participants of a hub.
     pub fn new(model: &str, hub: Arc<Hub>, server: Option<Server>) -> Self {
         let consent = hub.terms().consent.as_deref().map(|words| hash::of_bytes(words.as_bytes()));
         Self { model: model.to_owned(), consent, hub, server: Mutex::new(server) }

@@ -1,4 +1,4 @@
-//! One participant at play: what is asked, what the clock says, and what the page shows.
+//! One participant at play: the open question, the clock, and the content of the page.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -12,13 +12,13 @@ use crate::experiment::Experiment;
 use trace::frame::Frame;
 use trace::palette::Color;
 
-/// The time in which a page that is open asks again.
+/// The maximum time between two polls of an open page.
 pub(super) const LISTENING: Duration = Duration::from_secs(3);
 
-/// A page that is not heard from for longer is closed or cut off, and its clock stands still.
+/// A page that is silent for longer is closed or disconnected, and its clock stops.
 const AWAY: Duration = Duration::from_secs(10);
 
-/// What a person is asked at a step: what a model is sent.
+/// The question of a step, as a model gets it.
 #[derive(Clone, Debug)]
 pub struct Question {
     pub frame: Arc<Frame>,
@@ -26,15 +26,15 @@ pub struct Question {
     pub user: String,
     /// The step, from 1.
     pub t: i32,
-    /// True if it is of a practice episode.
+    /// True in a practice episode.
     pub is_practice: bool,
     /// The keys of a reply.
     pub experiment: Experiment,
-    /// The letters or numbers of what can be done.
+    /// The letters or numbers of the available actions.
     pub actions: Vec<&'static str>,
 }
 
-/// What a person answered.
+/// A person's answer.
 #[derive(Debug)]
 pub struct Given {
     /// The JSON object of a reply.
@@ -43,18 +43,18 @@ pub struct Given {
     pub latency_ms: i32,
 }
 
-/// What all participants of a recording are told and asked.
+/// The texts and settings that apply to all participants of a recording.
 #[derive(Clone, Debug, Default)]
 pub struct Terms {
-    /// What they agree to before they begin.
+    /// The consent text.
     pub consent: Option<String>,
-    /// Where they can ask.
+    /// The contact for questions.
     pub contact: Option<String>,
     /// True if an identification stays in its field from step to step of an episode.
     pub prefills: bool,
 }
 
-/// The end of a recording, as a page is told.
+/// The end of a recording, as shown on a page.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct End {
     pub is_complete: bool,
@@ -80,7 +80,7 @@ impl Asked {
 #[expect(clippy::struct_excessive_bools, reason = "independent facts of a person")]
 pub(super) struct Seat {
     pub code: String,
-    /// The episodes still to be played, in order, the one under way among them.
+    /// The episodes still to be played, in order, including the one under way.
     pub lane: VecDeque<String>,
     /// Episodes of this participant that are recorded.
     pub played: usize,
@@ -92,7 +92,7 @@ pub(super) struct Seat {
     /// The next episode waits for the person to begin it.
     pub is_ready: bool,
     pub left: Option<Leaving>,
-    /// True if what is to be deleted is deleted.
+    /// True once the requested deletion is done.
     pub is_deleted: bool,
     pub asked: Option<Asked>,
     pub number: u64,
@@ -109,7 +109,7 @@ impl Seat {
         self.left.is_none() && !self.is_ready && (self.has_agreed || terms.consent.is_none())
     }
 
-    /// The page was heard from: the time without it does not count.
+    /// Registers a sign of life of the page: the time without it does not count.
     fn heard(&mut self) {
         let away = self.seen.replace(Instant::now()).map_or(Duration::ZERO, |seen| seen.elapsed());
         if let Some(asked) = &mut self.asked
@@ -186,7 +186,7 @@ impl Seat {
         }
     }
 
-    /// Takes the answer to the question of this number; false if it is not the one that is asked.
+    /// Takes the answer to the question with this number; false if another question is open.
     pub fn answer(&mut self, terms: &Terms, number: u64, reply: String) -> bool {
         self.heard();
         if self.number != number || !self.may_play(terms) {

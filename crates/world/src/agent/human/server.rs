@@ -1,7 +1,7 @@
-//! The pages that people play on.
+//! The pages for participants.
 //!
-//! Rule: it answers what a model gets, to a caller that has the link of a person, and has no other route: nothing here opens a
-//! trace or knows what is true.
+//! Rule: it serves what a model gets to callers with a participant's link, and has no other route. Nothing here opens a
+//! trace or knows the ground truth.
 
 use std::net::TcpListener;
 use std::sync::Arc;
@@ -26,7 +26,7 @@ const BODY: &str = include_str!("../../../../../assets/player/body.html");
 const STYLE: &str = include_str!("../../../../../assets/player/player.css");
 const SCRIPT: &str = include_str!("../../../../../assets/player/player.js");
 
-/// The most bytes of a reply.
+/// The maximum size of a reply in bytes.
 const LONGEST: usize = 1 << 20;
 
 #[derive(Debug, Deserialize)]
@@ -34,7 +34,7 @@ struct Link {
     p: Option<String>,
 }
 
-/// A reply as the page sends it.
+/// A reply as sent by the page.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Sent {
@@ -42,14 +42,14 @@ struct Sent {
     reply: Map<String, Value>,
 }
 
-/// What is to become of what somebody did who leaves.
+/// A participant's request to leave, and the choice to delete their data.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Withdrawal {
     delete: bool,
 }
 
-/// A server on a thread of its own; it ends when this is dropped.
+/// A server on its own thread; dropping it stops the server.
 #[derive(Debug)]
 pub struct Server {
     end: Option<oneshot::Sender<()>>,
@@ -59,19 +59,19 @@ pub struct Server {
 impl Drop for Server {
     fn drop(&mut self) {
         self.end = None;
-        // The next recording of a study may want the same port.
+        // The next recording of a study may need the same port.
         let _ = self.thread.take().map(JoinHandle::join);
     }
 }
 
-/// Serves people.
+/// Starts the server.
 pub fn start(hub: Arc<Hub>, listener: TcpListener, guard: Guard) -> std::io::Result<Server> {
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build()?;
     let (end, ended) = oneshot::channel::<()>();
     let thread = std::thread::Builder::new().name("people".to_owned()).spawn(move || {
         runtime.block_on(async {
             let served = web::serve(listener, web::guarded(routes(hub), guard.taking_posts()));
-            // A server that fails leaves the episodes waiting, which Ctrl-C ends.
+            // If the server fails, the episodes wait until Ctrl-C.
             tokio::select! { _ = served => {}, _ = ended => {} }
         });
     })?;
@@ -93,7 +93,7 @@ fn routes(hub: Arc<Hub>) -> Router {
         .route("/resume", post(resume))
         .route("/reply", post(reply))
         .layer(DefaultBodyLimit::max(LONGEST))
-        // A page asks all the time: a connection that it kept would be one that another page waits for.
+        // Pages poll constantly: a kept connection would make another page wait.
         .layer(map_response(|response: Response| async { ([(header::CONNECTION, "close")], response) }))
         .with_state(hub)
 }
@@ -154,7 +154,7 @@ async fn withdraw(State(hub): State<Arc<Hub>>, Query(link): Query<Link>, body: B
     }
 }
 
-/// Deleting waits for a step under way and for the disk, on a thread of its own.
+/// Deletion waits for a step under way and for the disk, so it runs on a separate thread.
 async fn leave(hub: Arc<Hub>, link: &Link, how: Leaving) -> Response {
     let Some(seat) = link.p.as_deref().and_then(|token| hub.seat_of(token)) else { return stranger() };
     let leaving = Arc::clone(&hub);

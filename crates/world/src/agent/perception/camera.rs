@@ -1,7 +1,7 @@
 //! The projection of pixels and points: an ideal pinhole, upright and level.
 //!
-//! Rule: only what the protocol publishes (the vertical field of view) and what a caller that lives in a body knows of it: how
-//! high its eye is, and how far before its axis.
+//! Rule: only the protocol's vertical field of view and facts that a body knows of itself: the height of its eye, and
+//! the eye's distance before its axis.
 
 use crate::agent::Observation;
 use crate::sim::angle::sine_cosine;
@@ -107,7 +107,7 @@ impl Pose {
 /// A point as the eye sees it: metres ahead of the eye's plane and to the right of its axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bearing {
-    /// Metres ahead; behind the eye where negative.
+    /// Metres ahead; negative behind the eye.
     pub ahead: f64,
     /// Metres to the right.
     pub right: f64,
@@ -134,7 +134,7 @@ impl Camera {
         Self { eye, heading: pose.heading, half_width, half_height, focal: half_height / (sine / cosine) }
     }
 
-    /// The number of headings to either side of its own that a picture shows, 0 to 2.
+    /// The number of headings to either side of its own that are in the picture, 0 to 2.
     pub fn headings_aside(&self) -> i32 {
         let (next, second) = (Heading(1).direction(), Heading(2).direction());
         let shows = |(cosine, sine): (f64, f64)| self.focal * sine <= self.half_width * cosine;
@@ -145,7 +145,7 @@ impl Camera {
         self.eye
     }
 
-    /// Pixels of one metre at a distance of `ahead` metres.
+    /// The number of pixels per metre at a distance of `ahead` metres.
     pub fn scale(&self, ahead: f64) -> f64 {
         self.focal / ahead
     }
@@ -157,12 +157,12 @@ impl Camera {
         Bearing { ahead: dx * cosine + dy * sine, right: dx * sine - dy * cosine }
     }
 
-    /// The column (not rounded) in which a bearing is drawn; only for what is ahead.
+    /// The column (not rounded) of a bearing; valid only ahead of the eye.
     pub fn column(&self, bearing: Bearing) -> f64 {
         self.half_width + self.focal * bearing.right / bearing.ahead
     }
 
-    /// The row (not rounded) in which a height above the floor is drawn, `ahead` metres away.
+    /// The row (not rounded) of a height above the floor, `ahead` metres away.
     pub fn row(&self, ahead: f64, height: f64) -> f64 {
         self.half_height + self.focal * (EYE_HEIGHT - height) / ahead
     }
@@ -173,12 +173,12 @@ impl Camera {
         (below > 0.5).then(|| self.focal * EYE_HEIGHT / below)
     }
 
-    /// The height above the floor of what is drawn in a row, `ahead` metres away.
+    /// The height above the floor of a row's content, `ahead` metres away.
     pub fn height(&self, ahead: f64, row: f64) -> f64 {
         EYE_HEIGHT - (row - self.half_height) * ahead / self.focal
     }
 
-    /// The place that a column shows `ahead` metres away.
+    /// The place in a column, `ahead` metres away.
     pub fn place(&self, column: f64, ahead: f64) -> Place {
         let right = (column - self.half_width) * ahead / self.focal;
         let (cosine, sine) = self.heading.direction();

@@ -1,11 +1,11 @@
-//! The edges between walls and floor, and the columns that show a floor behind a wall.
+//! The edges between walls and floor, and the columns with a floor behind a wall.
 //!
-//! At the height of the eye a column shows a wall, or something that stands before it. A wall is flat and evenly lit: it
-//! has one shade, down to the floor. So the first change of shade below the horizon is the wall's foot, and its row says
-//! how far away it is. Through a mirror the same holds for the wall that is reflected, whose foot then lies beyond the
-//! room: that is how a mirror without a frame shows.
+//! At the height of the eye a column shows a wall or something before it. A wall is flat and evenly lit: it has one
+//! shade, down to the floor. So the first change of shade below the horizon is the wall's foot, and its row gives the
+//! distance. The same holds for a wall seen in a mirror, whose foot appears beyond the room: this reveals frameless
+//! mirrors.
 //!
-//! Rule: a column that shows paint at or above the foot says nothing.
+//! Rule: a column with paint at or above the foot is ignored.
 
 use trace::frame::Frame;
 
@@ -14,13 +14,13 @@ use super::paint;
 
 /// The tolerance of a channel within one shade. The light is even, and a floor may be nearly as grey as a wall.
 const SAME_SHADE: i16 = 1;
-/// Columns from one foot to the next that is looked for.
+/// Columns between two examined feet.
 const STRIDE: usize = 4;
 
 /// The foot of the wall that one column shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Foot {
-    /// Its apparent place: beyond the room if it was seen by way of a mirror.
+    /// Its apparent place: beyond the room if seen in a mirror.
     pub place: Place,
     /// The change of its place by one row, m.
     pub error: f64,
@@ -38,10 +38,10 @@ fn foot(frame: &Frame, camera: &Camera, column: usize) -> Option<Foot> {
     let is_wall = |row: &usize| same_shade(pixel(frame, column, *row), shade);
     paint::color(shade).is_none().then_some(())?;
     let row = (horizon + 1..frame.height).find(|row| !is_wall(row))?;
-    // The row of the change is a mixture of both; the one below it is not.
+    // The row of the change is a mixture of both; the row below is not.
     let below = pixel(frame, column, (row + 2).min(frame.height - 1));
     let rows_of_wall_above = (1..=row - horizon).take_while(|up| is_wall(&(horizon - up))).count();
-    // A wall goes on above the horizon for as far as its foot is below, at least in part; a face does not.
+    // A wall continues above the horizon for at least part of the height below it; a face does not.
     if paint::color(below).is_some()
         || paint::color(pixel(frame, column, row)).is_some()
         || rows_of_wall_above * 3 < row - horizon

@@ -1,12 +1,12 @@
-//! The perception of scripted agents: how the room of the study looks, to somebody who knows how rooms look.
+//! The perception of scripted agents: reads the study's room with knowledge of how rooms look.
 //!
 //! ```text
 //! frame ──► paint (colour of a pixel) ──► patches ──► things (cubes, bodies)
 //!   └─────► ground (feet of the walls, and what lies beyond them)
 //! ```
 //!
-//! Rule: a view is a function of the frame and of the pose and field of view that the observation states. It knows no scene, no label and no
-//! configuration but the field of view, and it does not tell a thing from its reflection: that takes memory.
+//! Rule: a view is a function of the frame and of the observation's pose and field of view. It knows no scene, no label
+//! and no other configuration. It does not tell a thing from its reflection: that takes memory.
 
 pub mod camera;
 pub mod ground;
@@ -32,9 +32,9 @@ pub struct View {
     pub pose: Pose,
     pub camera: Camera,
     pub frame: Arc<Frame>,
-    /// Cubes that are whole in view.
+    /// Cubes that are completely in view.
     pub cubes: Vec<Thing>,
-    /// Bodies, whole or in part.
+    /// Bodies, whole or partial.
     pub bodies: Vec<Thing>,
     /// Feet of walls.
     pub feet: Vec<Foot>,

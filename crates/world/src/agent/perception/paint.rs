@@ -1,28 +1,28 @@
 //! The colour of a pixel.
 //!
-//! Light scales a paint: it keeps the ratio of red, green and blue and takes brightness away. So a pixel has the colour of
-//! the palette that some light turns into it most nearly; what grey light on grey explains better has none. White paint
-//! and grey walls differ in brightness, which is a matter of light, and in that walls are never quite without a tint.
+//! Light scales a paint: it keeps the ratio of red, green and blue and reduces brightness. A pixel has the palette
+//! colour that some light maps most closely to it, or none if grey light on grey fits better. White paint and grey
+//! walls differ in brightness, which depends on light, and in tint: walls are never quite without one.
 //!
-//! Rule: a pixel alone decides. Edges between two things are mixtures and may get any colour; they are few, and whoever
-//! counts pixels asks for more than a few.
+//! Rule: each pixel is classified independently. Edge pixels between two things are mixtures and may get any colour;
+//! they are few, so callers require more than a few pixels.
 
 use std::sync::LazyLock;
 
 use trace::palette::Color;
 
-/// The least and the most light that falls on what is in a lit room.
+/// The minimum and maximum light on things in a lit room.
 const LIGHT: (f64, f64) = (0.50, 1.05);
-/// From this brightness on, of 255, what has no tint is white.
+/// An untinted pixel is white from this brightness on, of 255.
 const WHITE: u8 = 128;
 /// The largest difference between the channels of white paint.
 const TINT: u8 = 3;
 /// The margin by which a colour must be nearer than grey, so that a tinted wall is not taken for paint.
 const FAVOR_OF_GREY: f64 = 14.0;
-/// Bits of a channel that decide.
+/// The significant bits of a channel.
 const BITS: u32 = 6;
 
-/// The answer for every pixel, worked out once: the index into [`Color::ALL`], or `NONE`.
+/// The precomputed answer for every pixel: the index into [`Color::ALL`], or `NONE`.
 static TABLE: LazyLock<Vec<u8>> = LazyLock::new(table);
 const NONE: u8 = u8::MAX;
 
@@ -68,7 +68,7 @@ fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1]).hypot(a[2] - b[2])
 }
 
-/// A paint as a picture shows it in the middling light of a room.
+/// A paint in the medium light of a room.
 #[cfg(test)]
 pub fn lit(color: Color) -> [u8; 3] {
     color.rgb().map(|channel| u8::try_from(u16::from(channel) * 4 / 5).unwrap())

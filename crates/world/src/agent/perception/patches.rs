@@ -1,6 +1,6 @@
 //! Patches: connected pixels of one colour of the palette.
 //!
-//! Rule: eight neighbours connect; order is that of the first pixel, row by row, so that it depends on the picture alone.
+//! Rule: eight neighbours connect; patches are ordered by their first pixel, row by row, so only the picture matters.
 
 use trace::frame::Frame;
 use trace::palette::Color;

@@ -1,10 +1,10 @@
-//! Cubes and bodies, told apart by their shape.
+//! Cubes and bodies, distinguished by shape.
 //!
-//! Both stand on the floor, so the lowest row of a patch says how far away it is, and its highest row then how tall. A cube
-//! is as wide as it is tall. A body reaches nearly to the height of the eye that looks, at any distance.
+//! Both stand on the floor, so a patch's lowest row gives its distance and its highest row then its height. A cube is
+//! as wide as it is tall. A body reaches nearly to the height of the looking eye, at any distance.
 //!
-//! Rule: a cube counts where all of it is in view; what is cut off or half hidden is no cube. Where a thing is seen by way of
-//! a mirror its place is where the reflection seems to be.
+//! Rule: a cube counts only if it is completely in view; a cropped or half-hidden one does not. The place of a thing
+//! seen in a mirror is the apparent place of its reflection.
 
 use trace::palette::Color;
 
@@ -23,17 +23,17 @@ pub struct Thing {
     pub column: f64,
 }
 
-/// The least pixels of a cube that counts.
+/// The minimum number of pixels of a cube.
 const LEAST_OF_CUBE: usize = 40;
-/// The least pixels of a body that counts.
+/// The minimum number of pixels of a body.
 const LEAST_OF_BODY: usize = 30;
-/// The least and the most edge of a cube, m.
+/// The minimum and maximum edge of a cube, m.
 const EDGES: (f64, f64) = (0.28, 0.95);
-/// Widths of a cube by its edge: turned by 45 degrees and seen from aside it is wider than its edge.
+/// The range of a cube's width relative to its edge: seen at 45 degrees or from the side it is wider than its edge.
 const WIDTHS: (f64, f64) = (0.75, 2.0);
-/// The least part of a cube's bounding box that is the cube.
+/// The minimum share of a cube's bounding box that the cube fills.
 const FULLNESS: f64 = 0.6;
-/// The top of a body below the horizon, as a part of the distance to its feet.
+/// The maximum distance of a body's top below the horizon, relative to the distance to its feet.
 const HIGH: f64 = 0.33;
 /// Half of the depth of a body, m.
 const HALF_BODY: f64 = 0.12;
@@ -50,7 +50,7 @@ const fn is_whole(patch: &Patch, width: usize, height: usize) -> bool {
 #[expect(clippy::cast_precision_loss, reason = "pixels of a picture are few")]
 fn cube(patch: &Patch, camera: &Camera) -> Option<Thing> {
     let ahead = camera.floor_ahead(patch.bottom as f64 + 1.0)?;
-    // The highest row shows the rear edge of the top: `edge` below the eye, and `edge` farther away than the front.
+    // The highest row shows the rear edge of the top: `edge` above the floor, and `edge` farther away than the front.
     let fall = (EYE_HEIGHT - camera.height(ahead, patch.top as f64)) / ahead;
     let edge = (EYE_HEIGHT - fall * ahead) / (1.0 + fall);
     let width = patch.width() as f64 / camera.scale(ahead);
@@ -65,12 +65,12 @@ fn cube(patch: &Patch, camera: &Camera) -> Option<Thing> {
     })
 }
 
-/// The bodies of a picture of `width` x `height` pixels: what is no cube, limbs and trunk joined where their columns touch.
+/// The bodies of a picture of `width` x `height` pixels: no cubes, with limbs and trunk joined if their columns touch.
 pub fn bodies(patches: &[Patch], camera: &Camera, width: usize, height: usize) -> Vec<Thing> {
     let mut wholes: Vec<Patch> = Vec::new();
     for patch in patches.iter().filter(|patch| !is_whole(patch, width, height) || cube(patch, camera).is_none()) {
         let mut whole = *patch;
-        // Joining widens a whole, so that it may touch others.
+        // Joining widens a body, so that it may touch others.
         while let Some(at) = wholes.iter().position(|other| of_one_body(other, &whole)) {
             whole = wholes.swap_remove(at).joined(&whole);
         }

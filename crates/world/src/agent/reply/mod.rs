@@ -4,13 +4,13 @@
 //! raw text ──► object (strict JSON, then named repairs) ──► the keys of the prompt ──► Reading
 //! ```
 //!
-//! Rule: nothing is made up. A reply is taken unchanged, or after a repair that has a name, or it is no decision: then
-//! action, cube and attribution are absent, and the raw text is all there is. The raw text keeps how `selected_cube` and
-//! `identification` were written: letter case and white space mean nothing in either, and are no repair. An action has letters
-//! of its own, so that another spelling of it is a repair.
+//! Rule: nothing is invented. A reply is accepted unchanged, accepted after named repairs, or is no decision: then
+//! action, cube and attribution are absent, and only the raw text remains. It preserves the spelling of `selected_cube`
+//! and `identification`: letter case and white space do not matter in either and need no repair. For an action, whose
+//! letters are fixed, another spelling is a repair.
 //!
-//! A `selected_cube` other than `none` beside another action than `done` breaks a rule of the prompt, but not the
-//! shape of the object: it is kept as replied, and the metrics look at the cube of the `done` step alone.
+//! A `selected_cube` other than `none` with an action other than `done` breaks a rule of the prompt, but the object is
+//! well-formed. It is kept as replied, and the metrics use only the cube of the `done` step.
 
 mod object;
 mod repair;
@@ -33,31 +33,31 @@ use trace::episode::Action;
 use trace::identification;
 use trace::palette::Color;
 
-/// The end of a reply, as a provider states it.
+/// The end of a reply, as reported by the provider.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Ending {
     Whole,
-    /// The limit of tokens cut it off.
+    /// Cut off by the token limit.
     Truncated,
-    /// The model, or a filter around it, declined.
+    /// Declined by the model or a filter around it.
     Refused,
 }
 
-/// The reading of a reply's text.
+/// The parsed text of a reply.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reading {
-    /// The outcome; `Ok` or `Repaired` where there is a decision.
+    /// The outcome; `Ok` or `Repaired` with a decision.
     pub status: Status,
     /// The repairs, in order; empty unless `Repaired`.
     pub repairs: Vec<Repair>,
-    /// The reason why there is no decision, for people; `None` where there is one.
+    /// The reason for a missing decision, for people; `None` with a decision.
     pub fault: Option<String>,
     pub action: Option<Action>,
     /// The cube: a colour or `none`.
     pub selected_cube: Option<String>,
     /// The mark on the own body: a colour or `none`.
     pub mark_report: Option<String>,
-    /// The answers that the experiment declares; without those of an empty text.
+    /// The answers that the experiment declares; empty texts are left out.
     pub answers: Answers,
     /// The attribution: the normal form of the identification.
     pub self_color: Option<String>,
@@ -79,7 +79,7 @@ impl Reading {
         }
     }
 
-    /// The same after repairs of what carried the text, which come before its own.
+    /// Prepends the repairs of the text's container.
     #[must_use]
     pub(crate) fn after(mut self, carried: &[Repair]) -> Self {
         let is_new = |repair: &Repair| !self.repairs.contains(repair);
@@ -91,7 +91,7 @@ impl Reading {
         self
     }
 
-    /// The reply of an agent: this reading, the text it was read from, and what that cost.
+    /// The reply of an agent: this reading, its source text, and its cost.
     pub fn into_reply(self, raw: impl Into<Option<String>>, usage: Usage) -> Reply {
         Reply {
             status: self.status,
@@ -110,7 +110,7 @@ impl Reading {
     }
 }
 
-/// Reads the text of a reply that should have the keys and the actions of an experiment.
+/// Parses a reply's text by the keys and actions of an experiment.
 pub fn read(raw: &str, experiment: &Spec, ending: Ending) -> Reading {
     match ending {
         Ending::Refused => return Reading::without_decision(Status::Refusal, None),
@@ -231,11 +231,11 @@ fn kind(value: &Value) -> &'static str {
     }
 }
 
-/// The structure of a reply as JSON Schema: what agents are sent, and what providers enforce where they can.
+/// The JSON Schema of a reply, as sent to agents and enforced by providers where possible.
 ///
-/// It has keys and types alone, also for the answers that an experiment declares. A provider may show the schema to its
-/// model, and the prompt is all that a model may be told: a description, a title or a list of colours would say what E5
-/// leaves for the model to find out.
+/// It contains only keys and types, also for the answers that an experiment declares. A provider may show the schema to
+/// its model, which must learn nothing beyond the prompt: descriptions, titles or colour lists would reveal what E5
+/// leaves the model to find out.
 pub fn structure(experiment: &Spec) -> Value {
     let plain = experiment.reply.iter().map(|key| (key.name().to_owned(), json!({ "type": "string" })));
     let own = experiment.answers.iter().map(|answer| (answer.key.clone(), property(answer)));
@@ -247,19 +247,19 @@ pub fn structure(experiment: &Spec) -> Value {
     })
 }
 
-/// The type of an answer. Not every provider takes a number or a text, so that a number that may be `unknown` is a text.
+/// The type of an answer. Not every provider supports unions, so a number that may be `unknown` is a text.
 fn property(answer: &Answer) -> Value {
     let is_number = answer.kind == AnswerType::Number && !answer.unknown;
     json!({ "type": if is_number { "number" } else { "string" } })
 }
 
-/// The SHA-256 of the structure, and of the words of its own answers if it has any; 64 hexadecimal digits, for recordings.
+/// SHA-256 of the structure and of its own answers' words, if any; 64 hexadecimal digits, for recordings.
 pub fn structure_hash(experiment: &Spec) -> String {
     let words: String = experiment.answers.iter().flat_map(|answer| ["\n", answer.words.as_str()]).collect();
     exact::hash::of_bytes(format!("{}{words}", structure(experiment)).as_bytes())
 }
 
-/// The JSON Schema of a reply for people, with descriptions and the values that are read. No agent gets it; see
+/// The JSON Schema of a reply for people, with descriptions and the accepted values. Agents do not get it; see
 /// [`structure`].
 pub fn schema(title: &str, experiment: &Spec) -> Value {
     let actions = experiment.actions;

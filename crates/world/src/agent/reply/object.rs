@@ -1,4 +1,4 @@
-//! A JSON object with its keys as they came, repeated ones included.
+//! A JSON object that preserves the order of keys and repeated keys.
 
 use std::fmt;
 
@@ -58,5 +58,5 @@ impl<'de> Deserialize<'de> for Object {
     }
 }
 
-/// Far more than any reply has; finding repeated keys takes the square of it.
+/// Far more than any reply has; the search for repeated keys is quadratic.
 const MOST_MEMBERS: usize = 1000;

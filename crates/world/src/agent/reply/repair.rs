@@ -1,11 +1,11 @@
-//! The repairs a reply may get before it counts as unreadable, each with a name, none of which changes a word: half a
-//! character that was cut in two is none.
+//! Named repairs that a reply may get before it counts as unreadable. No repair changes a word: half of a split
+//! surrogate pair is not one.
 //!
-//! They come in a fixed order, each on top of those before it, until the text is one JSON object:
-//! take the text out of a code fence; drop the thoughts before the answer, and take that out of a code fence; take the one
-//! object out of the text around it; drop comments; drop commas before a closing bracket; turn strings in single quotes into
-//! strings in double quotes; escape control characters in strings; put U+FFFD in the place of a lone surrogate. Of a call of a
-//! function the arguments are taken.
+//! Repairs apply in a fixed order, each on top of the previous ones, until the text is one JSON object: unwrap a code
+//! fence; drop the thoughts before the answer, and unwrap its code fence; extract the single object from the text
+//! around it; drop comments; drop commas before closing brackets; turn single-quoted strings into double-quoted ones;
+//! escape control characters in strings; replace lone surrogates by U+FFFD. A function call is replaced by its
+//! arguments.
 
 use std::fmt::Write as _;
 
@@ -15,25 +15,25 @@ use super::thoughts::{self, Thoughts};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Repair {
-    /// The object stood in a Markdown code fence.
+    /// The object was in a Markdown code fence.
     CodeFence,
-    /// Thoughts, which end with `</think>`, stood before the object.
+    /// Thoughts, which end with `</think>`, preceded the object.
     Thoughts,
     /// There was text before or after the object.
     SurroundingText,
-    /// A comma stood before a closing bracket.
+    /// A comma preceded a closing bracket.
     TrailingComma,
     /// Strings were in single quotes.
     SingleQuotes,
     /// A string had half of a pair of surrogates (`\ud83d` without `\ude00`), which is no character.
     Surrogate,
-    /// Comments, `// ...` or `/* ... */`, stood outside of strings.
+    /// Comments, `// ...` or `/* ... */`, occurred outside of strings.
     Comment,
     /// A string had a raw line feed, tab or another control character in it.
     ControlCharacter,
-    /// The object came as the arguments of a call of a function.
+    /// The object came as the arguments of a function call.
     ToolCall,
-    /// The action was in other letters, or had white space around it: `"DONE"`.
+    /// The action had other letter case, or white space around it: `"DONE"`.
     ActionSpelling,
 }
 
@@ -55,7 +55,7 @@ impl Repair {
 }
 
 impl Repair {
-    /// The names of some repairs as the column `reply_repair` has them; `None` for none.
+    /// The names of repairs as in the column `reply_repair`; `None` without repairs.
     ///
     /// ```
     /// use mirrorstats_world::agent::reply::Repair;
@@ -70,7 +70,7 @@ impl Repair {
     }
 }
 
-/// The changed text; `None` where there is nothing to repair.
+/// The changed text; `None` if there is nothing to repair.
 type Change = fn(&str) -> Option<String>;
 
 /// The reason for a reply without an object.
@@ -116,7 +116,7 @@ pub(super) fn object(raw: &str) -> Result<(Object, Vec<Repair>), NoObject> {
     Err(first)
 }
 
-/// The arguments of the call of a function, read from the text again so that no repeated key is lost; any other object as it is.
+/// The arguments of a function call, parsed again so that no repeated key is lost; any other object unchanged.
 fn without_call(object: Object, text: &str, mut repairs: Vec<Repair>) -> (Object, Vec<Repair>) {
     let arguments = || {
         let opening = |piece| matches!(piece, Piece::Mark(_, '{')).then_some(piece);
@@ -133,7 +133,7 @@ fn without_call(object: Object, text: &str, mut repairs: Vec<Repair>) -> (Object
     }
 }
 
-/// Refuses a text that is thoughts alone: whatever object they hold is no answer.
+/// Rejects a text of thoughts alone: an object within them is no answer.
 fn has_answer(text: &str) -> Result<(), NoObject> {
     match thoughts::of(text) {
         Thoughts::Open => Err(NoObject::OpenThoughts),
@@ -155,7 +155,7 @@ fn without_fence(text: &str) -> Option<String> {
     (!body.contains("```")).then(|| body.trim().to_owned())
 }
 
-/// The one object at the top of a text that has more than that; `None` without one, more than one, or nothing around it.
+/// The only top-level object of a text with more around it; `None` for no or several objects, or no other text.
 fn without_surroundings(text: &str) -> Option<String> {
     let mut objects = Vec::new();
     let mut at = 0;
@@ -206,7 +206,7 @@ fn without_trailing_commas(text: &str) -> Option<String> {
     Some(text.char_indices().filter(|(at, _)| !dropped.contains(at)).map(|(_, c)| c).collect())
 }
 
-/// The text with its strings in single quotes written in double quotes; `None` if there are none.
+/// The text with its single-quoted strings in double quotes; `None` if there are none.
 fn with_double_quotes(text: &str) -> Option<String> {
     let mut changed = String::with_capacity(text.len());
     let mut is_changed = false;
@@ -287,7 +287,7 @@ fn push_escaped(text: &mut String, string: &str) -> bool {
     is_changed
 }
 
-/// A piece of almost-JSON: a string with its quotes, or one character outside of strings and where it stands.
+/// A piece of almost-JSON: a string with its quotes, or one character outside of strings and its position.
 enum Piece<'a> {
     Quoted(&'a str),
     Mark(usize, char),

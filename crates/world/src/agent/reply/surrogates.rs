@@ -1,12 +1,12 @@
-//! Characters beyond U+FFFF in the escapes of JSON: two halves, `\ud83d\ude00`. A half alone is no character, and
-//! strict parsers refuse the whole text for it. Models write one where a limit or a filter cuts between the halves.
+//! Escapes of characters beyond U+FFFF in JSON: two halves, `\ud83d\ude00`. A single half is no character, and strict
+//! parsers reject the whole text. Models write one if a limit or a filter cuts between the halves.
 
-/// The escape of U+FFFD, which represents what is no character.
+/// The escape of U+FFFD, the replacement character.
 const REPLACEMENT: &str = "\\ufffd";
 /// The bytes of `\uXXXX`.
 const ESCAPE: usize = 6;
 
-/// JSON with each escape of a lone surrogate replaced by that of U+FFFD; `None` without one. Pairs stay.
+/// JSON with each lone surrogate's escape replaced by that of U+FFFD; `None` without one. Pairs stay.
 pub(in crate::agent) fn without_lone_surrogates(json: &str) -> Option<String> {
     let (mut changed, mut is_changed) = (String::with_capacity(json.len()), false);
     let mut rest = json;
@@ -30,12 +30,12 @@ fn escape(text: &str) -> (usize, bool) {
         },
         Some(0xdc00..=0xdfff) => (ESCAPE, true),
         Some(_) => (ESCAPE, false),
-        // A backslash and the character that it is for.
+        // A backslash and the escaped character.
         None => (text.chars().take(2).map(char::len_utf8).sum(), false),
     }
 }
 
-/// The number that a text begins with as `\uXXXX`.
+/// The code unit of a text that begins with `\uXXXX`.
 fn unit(text: &str) -> Option<u16> {
     let digits = text.strip_prefix("\\u")?.get(..4)?;
     let is_hex = digits.bytes().all(|byte| byte.is_ascii_hexdigit());
@@ -48,7 +48,7 @@ mod tests {
 
     use super::without_lone_surrogates;
 
-    /// The units of a JSON string of these escapes as UTF-16 says what they are: an independent way to the same text.
+    /// The code units of a JSON string, decoded as UTF-16: an independent way to the same text.
     fn decoded(units: &[u16]) -> String {
         char::decode_utf16(units.iter().copied()).map(|unit| unit.unwrap_or('\u{fffd}')).collect()
     }

@@ -1,9 +1,9 @@
-//! The thoughts that a reasoning model writes before its answer, `<think>...</think>`.
+//! A reasoning model's thoughts before its answer, `<think>...</think>`.
 //!
-//! Servers that keep them apart send none. Others send them in the text, and some of those without the opening tag, since
-//! it is the end of their prompt.
+//! Servers that separate them send none. Others send them in the text, some without the opening tag, since it is the
+//! end of their prompt.
 //!
-//! Rule: what is in thoughts is no answer, not even a whole object.
+//! Rule: the content of thoughts is no answer, not even a whole object.
 
 const OPENING: &str = "<think>";
 const CLOSING: &str = "</think>";
@@ -12,16 +12,16 @@ const CLOSING: &str = "</think>";
 pub(super) enum Thoughts<'a> {
     /// There are none.
     None,
-    /// They end; this is what follows, without the white space around it.
+    /// They end; the text after them, trimmed.
     Before(&'a str),
     /// They do not end: the reply was cut off.
     Open,
 }
 
-/// Takes the thoughts off a text.
+/// Removes the thoughts from a text.
 ///
-/// They end with the last closing tag, so that thoughts may speak of the tag itself. An opening tag counts before the
-/// first brace only: later ones may be in the strings of the answer.
+/// They end with the last closing tag, so thoughts may mention the tag. An opening tag counts only before the first
+/// brace: later ones may be in the answer's strings.
 pub(super) fn of(text: &str) -> Thoughts<'_> {
     let after = text.rfind(CLOSING).map(|at| text[at + CLOSING.len()..].trim());
     let rest = after.unwrap_or(text);

@@ -1,21 +1,21 @@
-//! Chance from the seed of the task alone.
+//! Randomness from the task's seed alone.
 //!
-//! Rule: whole numbers only, so that the draws are the same on every machine.
+//! Rule: only whole numbers are drawn, so the draws are the same on every machine.
 
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
-/// Draws in a fixed order.
+/// A stream of draws in a fixed order.
 #[derive(Clone, Debug)]
 pub struct Chance(Pcg64Mcg);
 
 impl Chance {
-    /// The draws of a seed.
+    /// The stream of a seed.
     pub fn new(seed: u64) -> Self {
         Self(Pcg64Mcg::seed_from_u64(seed))
     }
 
-    /// One of `items`, each as likely as the others; `None` without one.
+    /// One of `items` with equal probability; `None` if there are none.
     pub fn pick<T: Copy>(&mut self, items: &[T]) -> Option<T> {
         let draw = u64::from(self.0.next_u32());
         let at = (draw * items.len() as u64) >> 32;

@@ -1,29 +1,29 @@
-//! The view of a camera behind a body, on a hand and a mark: small patches of paint, and the places of their things.
+//! The view from behind a body, on a hand and a mark: small patches of paint, and their positions.
 //!
-//! A caller that looks knows the protocol: the camera is 1.1 m behind the body, 2.0 m high and looks down to 1.7 m above where the
-//! body stands; the mirror is 2.0 m ahead of the body; the mark is a square on its front, the hand some 0.1 m wide. A
-//! reflection of what is `ahead` of the body by some length is as far behind the mirror as the thing is before it.
+//! The agent knows the protocol: the camera is 1.1 m behind the body, 2.0 m high and aimed at 1.7 m above the body's
+//! spot. The mirror is 2.0 m ahead of the body; the mark is a square on its front, the hand about 0.1 m wide. A
+//! reflection is as far behind the mirror as its original is before it.
 
 use crate::agent::Observation;
 use crate::agent::perception::patches::{Patch, patches};
 use trace::palette::Color;
 
-/// The camera behind the body: behind its axis and above the floor, m, and how far down it looks.
+/// The camera's distance behind the body's axis and its height above the floor, m.
 const BACK: f64 = 1.1;
 const HEIGHT: f64 = 2.0;
 const DOWN: f64 = 0.3 / 1.1;
-/// From the body to the mirror, m.
+/// The distance from the body to the mirror, m.
 const MIRROR: f64 = 2.0;
-/// The front of the body before its axis, m.
+/// The distance of the body's front from its axis, m.
 pub(super) const FRONT: f64 = 0.125;
-/// The sides of a mark at most, m. A hand that is seen directly is nearer than a reflection, and looks larger.
+/// The maximum side of a mark, m. A hand seen directly is nearer than a reflection, and looks larger.
 const WIDEST: f64 = 0.2;
-/// The largest distance of a front's marks to the side, m.
+/// The maximum distance of a mark on the front to the side, m.
 const ASIDE: f64 = 0.12;
 const HEIGHTS: [f64; 2] = [0.85, 1.25];
-/// Nothing else in the mirror is that low, m: below it the body itself hides the mirror.
+/// The minimum height of things in the mirror, m: the body itself hides the mirror below.
 const LOWEST: f64 = 0.3;
-/// The least pixels of a hand or a mark in the mirror, and the most of all patches of its colour.
+/// The minimum pixels of a hand or a mark in the mirror, and the maximum of all patches of its colour.
 const LEAST: usize = 12;
 const MOST: usize = 2600;
 
@@ -40,8 +40,8 @@ pub(super) struct HandView {
 }
 
 impl HandView {
-    /// What a picture shows. A colour that is seen directly too is the hand's; of two that are not, the mark is the one
-    /// that can be on the front of the body, the larger one where both can.
+    /// Reads a picture. A colour that is also seen directly is the hand's; otherwise the mark is the colour that can be
+    /// on the front of the body, the larger patch if both can.
     pub fn of(observation: &Observation) -> Self {
         let eye = Eye::of(observation);
         let all = patches(&observation.frame, LEAST);
@@ -64,7 +64,7 @@ fn is_small(all: &[Patch], color: Color) -> bool {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Eye {
     size: [f64; 2],
-    /// Half of the height of the view, one metre ahead.
+    /// Half of the view's height, one metre ahead.
     tangent: f64,
 }
 
@@ -75,13 +75,13 @@ impl Eye {
         Self { size: [frame.width as f64, frame.height as f64], tangent: (observation.fov_y.to_radians() / 2.0).tan() }
     }
 
-    /// The length of a row of pixels at the reflection of what is on the front of the body, m.
+    /// The length of a row of pixels in the reflection of the body's front, m.
     #[expect(clippy::cast_precision_loss, reason = "pixels of a picture are few")]
     fn length(&self, pixels: usize) -> f64 {
         2.0 * self.tangent / self.size[1] * pixels as f64 * (BACK + 2.0 * MIRROR - FRONT)
     }
 
-    /// Where something is whose reflection is in the middle of a patch, if it is `ahead` of the body by so much.
+    /// The position of a thing `ahead` of the body whose reflection is in the middle of a patch.
     pub fn place(&self, patch: &Patch, ahead: f64) -> Place {
         #[expect(clippy::cast_precision_loss, reason = "pixels of a picture are few")]
         let row = (patch.top + patch.bottom + 1) as f64 / 2.0;

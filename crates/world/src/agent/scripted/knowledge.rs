@@ -1,6 +1,6 @@
 //! The knowledge of an agent within an episode: its pose, the room, the cubes, its reflection, and obstacles.
 //!
-//! Rule: knowledge only takes in views; it decides nothing.
+//! Rule: knowledge only absorbs views; it decides nothing.
 
 use crate::agent::Observation;
 use crate::agent::perception::View;
@@ -22,11 +22,11 @@ pub const GIRTH: f64 = 0.42;
 const AROUND_CUBE: f64 = 0.73;
 /// The distance that it keeps from the axis of another body, m.
 const AROUND_BODY: f64 = 0.9;
-/// From how near other bodies are walked around, m.
+/// The distance within which other bodies are avoided, m.
 const NEAR_BODY: f64 = 2.5;
-/// The distance within which a body in the mirror is at the place of one's own, m.
+/// The maximum distance of a mirrored body from the own reflection's place to count as there, m.
 const NEAR_OWN: f64 = 0.7;
-/// Steps for which a body is supposed to be where it was seen.
+/// Steps for which a body is assumed to be where it was seen.
 const MEMORY_OF_BODY: i32 = 2;
 /// The assumed cause of a bump: its distance ahead, its width, and its duration in steps.
 const BUMP: (f64, f64, i32) = (0.7, 0.55, 6);
@@ -35,26 +35,26 @@ const BUMP: (f64, f64, i32) = (0.7, 0.55, 6);
 #[derive(Clone, Debug)]
 pub struct Knowledge {
     pub pose: Pose,
-    /// The walls and the mirror.
+    /// The walls and the mirrors.
     pub room: Room,
-    /// One's reflection.
+    /// The own reflection.
     pub reflection: Reflection,
-    /// The bodies in view, reflections among them.
+    /// The bodies in view, including reflections.
     pub bodies: Vec<Thing>,
-    /// Bodies in view that show a patch of another colour: theirs, and that of the patch.
+    /// Bodies in view with a patch of another colour: the body's colour and the patch's.
     pub patched: Vec<(Color, Color)>,
-    /// The cubes in view, reflections among them.
+    /// The cubes in view, including reflections.
     pub cubes_in_view: Vec<Thing>,
     /// The length of one step, m.
     pub step: f64,
-    /// Headings to either side of one's own that a view shows.
+    /// Headings to either side of the own one that are in view.
     pub headings_aside: i32,
     landmarks: Landmarks,
     passing: Vec<(Obstacle, i32)>,
 }
 
 impl Knowledge {
-    /// Knows nothing but where it stands.
+    /// The initial knowledge: only the own pose.
     pub fn new(observation: &Observation) -> Self {
         Self {
             pose: Pose::of(observation),
@@ -99,7 +99,7 @@ impl Knowledge {
         self.pose = pose;
     }
 
-    /// The bodies in view by way of a mirror.
+    /// The bodies seen in a mirror.
     pub fn in_mirrors(&self) -> Vec<Thing> {
         let crossed = |body: &Thing| self.room.crossing(self.pose.place, body.place).map(|(side, _)| side);
         let is_through =
@@ -107,8 +107,8 @@ impl Knowledge {
         self.bodies.iter().filter(is_through).copied().collect()
     }
 
-    /// The bodies to the left of one's own in the mirror, where the view shows exactly `count` bodies by way of it and one's
-    /// own is one of them.
+    /// The number of bodies to the left of the own one in the mirror. `None` unless exactly `count` bodies are in it,
+    /// the own one among them.
     pub fn mirror_place(&self, count: usize) -> Option<usize> {
         let own = self.reflection.own_place(&self.room)?;
         let through = self.in_mirrors();
@@ -123,7 +123,7 @@ impl Knowledge {
         self.landmarks.cubes(&self.room)
     }
 
-    /// The cube of a colour that was seen best.
+    /// The cube of a colour with the nearest sighting.
     pub fn cube(&self, color: Color) -> Option<Landmark> {
         self.cubes()
             .into_iter()
@@ -131,7 +131,7 @@ impl Knowledge {
             .min_by(|one, other| one.nearest.total_cmp(&other.nearest))
     }
 
-    /// Returns true if the axis of a body may be at a place, as far as walls go.
+    /// Returns true if walls permit a body's axis at a place.
     pub fn is_open(&self, place: Place) -> bool {
         self.room.holds(place, GIRTH)
     }
@@ -157,7 +157,7 @@ impl Knowledge {
         self.cubes().into_iter().map(|cube| Obstacle { place: cube.place, radius: AROUND_CUBE }).collect()
     }
 
-    /// Sides whose wall is a mirror right across from a place.
+    /// The sides whose wall is a mirror right across from a place.
     pub fn mirrors_across(&self, place: Place) -> impl Iterator<Item = Side> + '_ {
         let is_mirror = move |side: &Side| self.room.is_mirror(*side, side.along(place));
         Side::ALL.into_iter().filter(is_mirror)

@@ -1,7 +1,7 @@
-//! The positions of the cubes, as far as they have been seen.
+//! The known positions of the cubes.
 //!
-//! Rule: a cube is what was seen twice at one place inside the room, or once from near by; the nearest sightings say where
-//! it is. What seems to stand outside is a reflection and no cube.
+//! Rule: a cube was seen twice at one place inside the room, or once from nearby; the nearest sightings determine its
+//! place. An apparent cube outside the room is a reflection.
 
 use crate::agent::perception::camera::Place;
 use crate::agent::perception::things::Thing;
@@ -9,22 +9,22 @@ use trace::palette::Color;
 
 use super::room::Room;
 
-/// A cube and how it is known.
+/// A cube and the quality of its sightings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Landmark {
     pub color: Color,
     pub place: Place,
-    /// From how near it was seen, m.
+    /// The distance of its nearest sighting, m.
     pub nearest: f64,
     /// The number of sightings.
     pub sightings: u32,
 }
 
-/// Sightings of one colour this near to one another are one cube, m.
+/// The distance within which sightings of one colour are one cube, m.
 const SAME: f64 = 0.7;
-/// From how near a single sighting is enough, m.
+/// The distance within which a single sighting suffices, m.
 const NEAR: f64 = 3.5;
-/// The distance from the walls to the middle of a cube, m.
+/// The minimum distance of a cube's middle from the walls, m.
 const INSIDE: f64 = 0.15;
 
 /// The cubes seen so far.
@@ -34,7 +34,7 @@ pub struct Landmarks {
 }
 
 impl Landmarks {
-    /// Takes in the cubes of a view from `eye`.
+    /// Adds the cubes of a view from `eye`.
     pub fn see(&mut self, cubes: &[Thing], eye: Place) {
         for cube in cubes {
             let away = eye.distance(cube.place);

@@ -1,10 +1,9 @@
-//! Looking all round, here and then from other places.
+//! Looking around, here and then from other places.
 //!
-//! A full look takes eight turns where a view is more than four headings wide, as the study's is, and more where it is
-//! narrower. A caller that has looked from all the
-//! lookouts has seen what there is to see.
+//! A full look takes eight turns if a view is more than four headings wide, as the study's is, and more if it is
+//! narrower. After looking from all lookouts an agent has seen everything.
 //!
-//! Rule: the first lookout is where the episode begins; the others are spread over the room as far as its walls are known.
+//! Rule: the first lookout is the starting place; the others are spread over the known part of the room.
 
 use crate::agent::perception::camera::{Heading, Place, Pose};
 use trace::episode::Action;
@@ -13,18 +12,18 @@ use super::knowledge::Knowledge;
 use super::room::Side;
 use super::route::{self, Ground};
 
-/// From how many places to look.
+/// The number of places to look from.
 const LOOKOUTS: usize = 3;
 /// The distance within which a lookout counts as reached, m.
 const ARRIVED: f64 = 0.5;
-/// Steps after which a lookout that cannot be reached is where one stands.
+/// Steps after which an unreachable lookout is replaced by the current place.
 const PATIENCE: u32 = 16;
 
-/// The state of looking round.
+/// The state of looking around.
 #[derive(Clone, Debug, Default)]
 pub struct Lookouts {
     done: Vec<Place>,
-    /// The next one, unless it is here.
+    /// The next lookout; `None` if it is the current place.
     goal: Option<Place>,
     seen: Vec<Heading>,
     here: Option<Place>,

@@ -1,7 +1,7 @@
-//! Scripted agents: seven known minds that calibrate the benchmark.
+//! Scripted agents: seven agents of known behaviour that calibrate the benchmark.
 //!
-//! Each has a metric profile that its name predicts; its module says which, and a test records it and looks. If a profile
-//! is off, the world or a metric is.
+//! Each has a metric profile that its name predicts. Its module states the profile, and a test records and checks it. A
+//! deviation reveals an error in the world or in a metric.
 //!
 //! ```text
 //! oracle, gullible, confabulator, mimic ── one policy each ──► seeker ──► lookout, route
@@ -10,9 +10,9 @@
 //! with a hand: oracle ──► reacher, mimic ──► chaser ──► hand_view ──► agent::perception
 //! ```
 //!
-//! Rule: a scripted agent perceives what a model would get and no more, the frame and the words around it, and is a function
-//! of its task's seed and of that. It knows the protocol (the field of view, turns of 30 degrees, one mirror at most on a
-//! wall of a rectangular room) and its own body (where its eye is, how stout it is), but not where anything stands.
+//! Rule: a scripted agent gets only what a model gets: the frame and the words around it. It is a function of these and
+//! its task's seed. It knows the protocol: the field of view, turns of 30 degrees, at most one mirror per wall of a
+//! rectangular room. It knows its own body (eye position, width), but no positions of things.
 
 pub mod chance;
 pub mod hand_view;
@@ -59,7 +59,7 @@ names!(Scripted {
 });
 
 impl Scripted {
-    /// Its behaviour, in a line.
+    /// Its behaviour in one line.
     pub const fn title(self) -> &'static str {
         match self {
             Self::Oracle => "finds the mirror, recognises itself, acts on it",
@@ -72,21 +72,21 @@ impl Scripted {
         }
     }
 
-    /// The version of what it does: one more whenever the same seed and the same frames give other decisions.
+    /// The version of its behaviour: increases whenever the same seed and frames give other decisions.
     pub const fn version(self) -> u32 {
         match self {
-            // Since they look for late reflections and marks.
+            // Version 2 looks for late reflections and marks.
             Self::Oracle | Self::Gullible | Self::Confabulator | Self::Mimic => 2,
             Self::Random | Self::Guesser | Self::Frozen => 1,
         }
     }
 
-    /// Returns true if it plays where a hand is to reach a mark.
+    /// Returns true if it can play with a hand.
     pub const fn has_hand(self) -> bool {
         matches!(self, Self::Oracle | Self::Mimic | Self::Random | Self::Frozen)
     }
 
-    /// The agent at the start of an episode. Where a hand is to reach a mark, `oracle` and `mimic` are other minds.
+    /// The agent at the start of an episode. With a hand, `oracle` and `mimic` are separate minds.
     pub fn agent(self, task: &Task) -> Box<dyn Agent> {
         let script: Box<dyn Script> = match self {
             Self::Oracle if task.experiment.hand.is_some() => Box::new(reacher::Reacher::default()),
@@ -125,7 +125,7 @@ impl crate::agent::Player for Scripted {
     }
 }
 
-/// A script under a name of its own.
+/// A script under another name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Renamed {
     pub script: Scripted,
@@ -169,12 +169,12 @@ pub struct Move {
     pub selected: Option<Color>,
     /// The mark on the own body; `None` is `none`.
     pub mark: Option<Color>,
-    /// Answers that the experiment declares, by key; `unknown` or none for the others.
+    /// Answers that the experiment declares, by key; missing ones are `unknown` or absent.
     pub answers: Answers,
     pub words: Words,
 }
 
-/// A mind that is ready with its decision at once.
+/// A mind that decides immediately.
 pub trait Script {
     fn decide(&mut self, observation: &Observation) -> Move;
 }

@@ -1,4 +1,4 @@
-//! The beliefs of an agent that looks before it chooses, and the moment when it acts on them.
+//! The beliefs of an agent that looks before it chooses, and when it acts on them.
 
 use trace::palette::Color;
 
@@ -14,7 +14,7 @@ pub struct Belief {
 }
 
 impl Belief {
-    /// Nothing is known.
+    /// No belief.
     pub const UNKNOWN: Self = Self { claim: None, settled: false };
 
     pub const fn settled(color: Color) -> Self {
@@ -22,7 +22,7 @@ impl Belief {
     }
 }
 
-/// The way to a belief about oneself.
+/// A rule that forms a belief about oneself.
 pub trait Policy {
     fn belief(&mut self, known: &Knowledge) -> Belief;
 
@@ -30,7 +30,7 @@ pub trait Policy {
         known.reflection.own_mark()
     }
 
-    /// The bodies to the left of the own one among `count` in the mirror, where it believes to know.
+    /// The number of bodies to the left of the own one among `count` in the mirror, if it believes it knows.
     fn place(&mut self, known: &Knowledge, belief: Belief, count: usize) -> Option<usize> {
         known.mirror_place(count).filter(|_| belief.settled)
     }

@@ -1,16 +1,15 @@
 //! The search for one's own body in the mirror.
 //!
-//! One's own reflection is where nobody else's can be: as far behind the mirror as one stands before it, straight across.
-//! When one steps aside it steps along, when one comes nearer it comes nearer by as much. So every new place is a test: the
-//! trunk of a body must be drawn exactly where one's own would be. Another body that happens to be drawn there once does not
-//! follow.
+//! The own reflection is where no other body's can be: as far behind the mirror as the own body is before it, straight
+//! across. It steps aside and approaches together with the own body. So every new place is a test: a body's trunk must
+//! be drawn exactly where the own one would be. Another body that happens to be drawn there once does not follow.
 //!
-//! A mirror may be late: then one's reflection is where one's own would have been some steps ago. So the same test is made
-//! with the places where one stood before, and where the test of now keeps failing, a colour is one's own when those of one
-//! lag agree, from more places, and seldom find nobody. A stranger who is seen through a window follows at no lag.
+//! A mirror may be late: then the reflection is where the own one would have been some steps ago. So the same test runs
+//! with earlier places. If the current test keeps failing, a lag decides whose tests agree on a colour, from more
+//! places, and seldom find nobody. A stranger behind a window follows at no lag.
 //!
-//! Rule: a colour is one's own when the tests from several places agree on it, whatever the prompt says and whatever else is
-//! in view. Nothing is concluded from a wall that has not been seen to be a mirror.
+//! Rule: a colour is one's own when the tests from several places agree on it, regardless of the prompt and of other
+//! things in view. Only walls known to be mirrors count.
 
 use crate::agent::perception::View;
 use crate::agent::perception::camera::Place;
@@ -19,52 +18,52 @@ use trace::palette::Color;
 
 use super::room::{Room, Side};
 
-/// A test that found a body where one's own would be.
+/// A test that found a body in the place of the own reflection.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Match {
     pub side: Side,
     /// The colour of the body.
     pub color: Color,
-    /// From where.
+    /// The place of the test.
     pub place: Place,
     /// The delay of the body, in steps.
     pub lag: usize,
 }
 
-/// Tests that agree before a colour is one's own.
+/// The number of agreeing tests that make a colour one's own.
 const TESTS: usize = 3;
-/// Places from which they were made.
+/// The minimum number of their places.
 const PLACES: usize = 2;
-/// The most steps by which a reflection is looked for late.
+/// The maximum lag of a reflection in steps.
 const LATEST: usize = 8;
-/// Tests and places of one lag that agree before a late reflection is one's own.
+/// The number of agreeing tests and places of one lag that make a late reflection one's own.
 const LATE: (usize, usize) = (4, 3);
-/// Places of a late reflection are two only where they are so far apart along the wall, m: the test cannot tell how far away a
-/// body is, and a caller that stands still in one's line of sight would pass it while one walks to and fro.
+/// The minimum distance of two such places along the wall, m. The test cannot measure a body's distance: a stranger who
+/// stands in one's line of sight would pass it while one walks to and fro.
 const ASIDE_LATE: f64 = 0.15;
-/// Looks in which one's reflection should have been there and was not, before it may be late.
+/// Missing reflections before a late one is considered.
 const MISSES: usize = 4;
-/// Places farther apart than this are two, m.
+/// The minimum distance of two places, m.
 const ELSEWHERE: f64 = 0.1;
-/// Heights of the trunk that the test looks at, m above the floor.
+/// Heights of the trunk's tested part, m above the floor.
 const TRUNK: (f64, f64) = (0.85, 1.30);
-/// Half the width of what it looks at, m.
+/// Half the width of the tested part, m.
 const HALF_TRUNK: f64 = 0.13;
-/// The range beside the trunk without body, m from the middle.
+/// The body-free range beside the trunk, m from the middle.
 const ASIDE: (f64, f64) = (0.42, 0.70);
-/// The range above the head without body, m above the floor.
+/// The body-free range above the head, m above the floor.
 const OVER: (f64, f64) = (1.75, 1.95);
-/// Pixels of the trunk that differ from noise.
+/// The minimum pixels of a trunk, above noise.
 const LEAST: usize = 40;
 
 /// The head and the chest, where a mark may be: heights above the floor and half of the width, m.
 const PATCHES: [((f64, f64), f64); 2] = [((1.52, 1.63), 0.06), ((1.15, 1.29), 0.07)];
-/// Pixels of a patch that differ from noise, and its share of the place.
+/// The minimum pixels of a patch, above noise, and its minimum share of the place.
 const PATCH: (usize, f64) = (6, 0.4);
-/// Views that show the same patch before it is one.
+/// The number of views with the same patch that make a mark.
 const SIGHTINGS: usize = 2;
 
-/// The tests so far.
+/// The test results so far.
 #[derive(Clone, Debug, Default)]
 pub struct Reflection {
     matches: Vec<Match>,
@@ -73,12 +72,12 @@ pub struct Reflection {
     misses: [usize; LATEST + 1],
 }
 
-/// The result of a look at a place where one's own reflection may be.
+/// The result of looking at a possible place of the own reflection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Test {
-    /// Too far aside, too small, or something else is before it.
+    /// Too far aside, too small, or occluded.
     Unclear,
-    /// The background is seen.
+    /// The background is visible.
     Nobody,
     Body(Color),
 }
@@ -93,7 +92,7 @@ struct Window {
 }
 
 impl Reflection {
-    /// Looks for one's own body in every mirror that is in view.
+    /// Looks for the own body in every mirror in view.
     pub fn see(&mut self, view: &View, room: &Room) {
         let here = view.pose.place;
         self.trail.push(here);
@@ -117,7 +116,7 @@ impl Reflection {
         }
     }
 
-    /// The same test where one's reflection would be if it were late. A place where one still stands says nothing of that.
+    /// The same test for late reflections. A place where the agent still stands gives no evidence.
     fn see_late(&mut self, view: &View, room: &Room, side: Side) {
         let here = view.pose.place;
         for lag in 1..=LATEST.min(self.trail.len() - 1) {
@@ -148,7 +147,7 @@ impl Reflection {
         now.or_else(|| (1..=LATEST).filter(|_| may_be_late).find_map(|lag| at(lag, LATE.0, LATE.1)))
     }
 
-    /// The place behind the mirror where one's own body, once it was found, is to be seen now.
+    /// The current place of the own reflection behind the mirror, once it was found.
     pub fn own_place(&self, room: &Room) -> Option<Place> {
         let (color, lag) = self.tested()?;
         let side = self.matches.iter().rfind(|found| found.color == color && found.lag == lag)?.side;
@@ -156,8 +155,8 @@ impl Reflection {
         room.mirrored(side, place)
     }
 
-    /// The colour on which the tests of a lag agree, and which those that found nobody do not refute. A late reflection must
-    /// be there nearly always; of that of now a look past the mirror's edge may find nothing as often.
+    /// The colour on which the tests of a lag agree, unless tests that found nobody refute it. A late reflection must
+    /// be there nearly always; a current one may be missed as often, by looks past the mirror's edge.
     fn agreed(&self, lag: usize, tests: usize, places: usize) -> Option<Color> {
         let of_lag = || self.matches.iter().filter(move |found| found.lag == lag);
         let count = |color: Color| of_lag().filter(|found| found.color == color).count();
@@ -167,7 +166,7 @@ impl Reflection {
         (most >= tests && agree && self.places(color, lag) >= places).then_some(color)
     }
 
-    /// The colour of a patch on one's own body, once it was seen often enough; the one seen last where there are several.
+    /// The colour of a patch on the own body, once seen often enough; the latest if there are several.
     pub fn own_mark(&self) -> Option<Color> {
         let last = *self.patches.last()?;
         let is_tested = self.own_color().is_some_and(|own| own != last);
@@ -175,7 +174,7 @@ impl Reflection {
         (is_tested && sightings >= SIGHTINGS).then_some(last)
     }
 
-    /// The number of tests that found a body at the place of one's own reflection.
+    /// The number of tests that found a body in the place of the own reflection.
     pub fn matches(&self) -> usize {
         self.matches.iter().filter(|found| found.lag == 0).count()
     }
@@ -195,7 +194,7 @@ impl Reflection {
     }
 }
 
-/// The body of one's own size whose axis is at `double`.
+/// The body of the own size whose axis is at `double`.
 fn body_at(view: &View, double: Place) -> Test {
     let camera = &view.camera;
     let bearing = camera.bearing(double);
@@ -221,13 +220,13 @@ fn body_at(view: &View, double: Place) -> Test {
     let alone = elsewhere.iter().all(|&beside| share_of(view, beside, color) < 0.4);
     match share {
         _ if share > 0.6 && alone => Test::Body(color),
-        // Whatever colour is there, it is little: the room beyond is seen.
+        // Some of the colour, but little: the room beyond is visible.
         _ if share < 0.1 => Test::Nobody,
         _ => Test::Unclear,
     }
 }
 
-/// A colour on the head or the chest of the body at `double` that is not the body's.
+/// The colour of a patch on the head or the chest of the body at `double`, other than the body's.
 pub fn patch_at(view: &View, double: Place, body: Color) -> Option<Color> {
     let bearing = view.camera.bearing(double);
     let (middle, scale) = (view.camera.column(bearing), view.camera.scale(bearing.ahead));
@@ -242,7 +241,7 @@ pub fn patch_at(view: &View, double: Place, body: Color) -> Option<Color> {
     })
 }
 
-/// The commonest colour in a window that is wholly in view, and its share of the pixels.
+/// The most frequent colour in a window that is completely in view, and its share of the pixels.
 fn commonest(view: &View, window: Window) -> Option<(Color, f64)> {
     let pixels = colors(view, window);
     let whole = inside(view, window);
@@ -275,7 +274,7 @@ fn colors(view: &View, window: Window) -> Vec<Option<Color>> {
         .collect()
 }
 
-/// Whole pixels from `from` to `to`, of those that there are.
+/// Whole pixels from `from` to `to`, clipped to the picture.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the picture")]
 #[expect(clippy::cast_precision_loss, reason = "pixels of a picture are few")]
 fn span(from: f64, to: f64, end: usize) -> std::ops::Range<usize> {

@@ -1,15 +1,15 @@
-//! The room as far as it has been seen: four walls, and where one of them is a mirror.
+//! The known part of the room: four walls, and which parts are mirrors.
 //!
-//! A wall is the nearest straight line on its side on which enough feet of walls were seen. Feet that seem to lie beyond a
-//! wall were seen through it: where the look crossed it, it is a mirror.
+//! A wall is the nearest straight line on its side with enough feet of walls. Feet that appear beyond a wall were seen
+//! through it: there it is a mirror.
 //!
-//! Rule: walls are parallel to the axes of the room. Everything follows from the feet seen so far, whatever their order.
+//! Rule: walls are parallel to the room's axes. Only the set of feet seen so far matters, not their order.
 
 use crate::agent::perception::View;
 use crate::agent::perception::camera::{Heading, Place};
 use crate::agent::perception::ground::Foot;
 
-/// One of the four walls, by the direction in which it lies.
+/// One of the four walls, by direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Side {
     /// Towards +x.
@@ -54,13 +54,13 @@ impl Side {
         }
     }
 
-    /// Facing this wall at a right angle.
+    /// The heading that faces this wall at a right angle.
     pub const fn heading(self) -> Heading {
         Heading::ALL[3 * self as usize]
     }
 }
 
-/// A wall's foot and from where it was seen.
+/// A wall's foot and the place of the look.
 #[derive(Clone, Copy, Debug)]
 struct Look {
     from: Place,
@@ -68,20 +68,20 @@ struct Look {
     side: Option<Side>,
 }
 
-/// Width of a piece of wall about which the looks vote, m.
+/// The width of the pieces of wall on which looks vote, m.
 const PIECE: f64 = 0.25;
 /// Pieces from the middle of a wall to either end: rooms up to 16 m wide.
 const PIECES: i32 = 32;
-/// A foot that one row would move by more than this does not fix a wall, m.
+/// The maximum change of a foot's place by one row for it to fix a wall, m.
 const SHARP: f64 = 0.16;
-/// Looks that fix a wall.
+/// The number of looks that fix a wall.
 const ENOUGH: usize = 10;
 /// The drawn width of a wall's line, m.
 const LINE: f64 = 0.12;
-/// The least distance beyond a wall of a foot that was seen through it, m.
+/// The minimum distance beyond a wall of a foot seen through it, m.
 const BEYOND: f64 = 0.5;
 
-/// The seen parts of the walls.
+/// The walls as seen so far.
 #[derive(Clone, Debug, Default)]
 pub struct Room {
     looks: Vec<Look>,
@@ -90,7 +90,7 @@ pub struct Room {
 }
 
 impl Room {
-    /// Takes in the feet of walls in a view.
+    /// Adds the feet of walls in a view.
     pub fn see(&mut self, view: &View) {
         let from = view.camera.eye();
         let side = |at: usize| {
@@ -101,18 +101,18 @@ impl Room {
         self.votes = Side::ALL.map(|side| self.vote(side));
     }
 
-    /// The distance of a wall, m; `None` until it has been seen.
+    /// The distance of a wall, m; `None` if not seen yet.
     pub const fn wall(&self, side: Side) -> Option<f64> {
         self.walls[side as usize]
     }
 
-    /// Returns true if a place is in the room, `margin` metres from the walls that are known.
+    /// Returns true if a place is in the room, at least `margin` metres from the known walls.
     pub fn holds(&self, place: Place, margin: f64) -> bool {
         Side::ALL.into_iter().all(|side| self.wall(side).is_none_or(|wall| side.out(place) <= wall - margin))
     }
 
-    /// Whether a wall is a mirror at a place along it. Right across from oneself one's own head hides what lies beyond, so the
-    /// pieces to either side have a say.
+    /// Returns true if a wall is a mirror at a place along it. Right across, one's own head hides what is beyond, so
+    /// the neighbouring pieces vote too.
     pub fn is_mirror(&self, side: Side, along: f64) -> bool {
         let votes = &self.votes[side as usize];
         let at = piece(along);
@@ -120,19 +120,19 @@ impl Room {
         around.is_some_and(|around| around[1] >= 0 && around.iter().sum::<i32>() > 2)
     }
 
-    /// The sides whose wall is a mirror, as far as seen, for at least half a metre.
+    /// The sides with at least half a metre of known mirror.
     pub fn mirrors(&self) -> impl Iterator<Item = Side> + '_ {
         let is_mirror =
             |side: &Side| self.votes[*side as usize].windows(2).any(|pair| pair.iter().all(|&votes| votes > 1));
         Side::ALL.into_iter().filter(is_mirror)
     }
 
-    /// Returns true if any wall is one.
+    /// Returns true if any wall is a mirror.
     pub fn has_mirror(&self) -> bool {
         self.mirrors().next().is_some()
     }
 
-    /// The apparent place of a body at `place` by way of a mirror on `side`.
+    /// The apparent place of a body at `place` in a mirror on `side`.
     pub fn mirrored(&self, side: Side, place: Place) -> Option<Place> {
         Some(side.place(2.0 * self.wall(side)? - side.out(place), side.along(place)))
     }

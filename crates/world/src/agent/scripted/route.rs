@@ -1,9 +1,9 @@
-//! The way to a goal: the first action of the cheapest sequence of steps and turns.
+//! The route to a goal: the first action of the cheapest sequence of steps and turns.
 //!
-//! The search is A* over poses that can be reached with whole steps and turns of 30 degrees. Poses in the same small cell that
-//! face the same way count as one, so the search is finite and quick, and what it finds can be walked exactly.
+//! The search is A* over poses reachable by whole steps and turns of 30 degrees. Poses with equal heading in one small
+//! cell count as one, so the search is finite and fast, and its result can be walked exactly.
 //!
-//! Rule: equal costs are settled by the order of the search, which is fixed.
+//! Rule: the fixed order of the search settles equal costs.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeSet, BinaryHeap};
@@ -11,7 +11,7 @@ use std::collections::{BTreeSet, BinaryHeap};
 use crate::agent::perception::camera::{Heading, Place, Pose};
 use trace::episode::Action;
 
-/// Something to walk around: a circle that the body's axis stays out of.
+/// An obstacle: a circle that the body's axis avoids.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Obstacle {
     pub place: Place,
@@ -21,7 +21,7 @@ pub struct Obstacle {
 
 /// The walkable ground.
 pub struct Ground<'a> {
-    /// True if the body's axis may be at a place, as far as walls go.
+    /// Returns true if walls permit the body's axis at a place.
     pub is_open: &'a dyn Fn(Place) -> bool,
     pub obstacles: &'a [Obstacle],
     /// The length of one step, m.
@@ -34,12 +34,12 @@ const CELL: f64 = 0.2;
 const FORWARD: u32 = 10;
 const TURN: u32 = 9;
 const BACKWARD: u32 = 16;
-/// Poses looked at before the goal counts as out of reach.
+/// The number of examined poses after which the goal counts as unreachable.
 const PATIENCE: usize = 6_000;
 
 /// The first action on the way from `start` to a pose that `is_goal`; `None` if there is no way or no need for one.
 ///
-/// `far` is a lower bound of the metres from a place to the goal; zero will always do, and is slow.
+/// `far` is a lower bound of the metres from a place to the goal; zero is always valid, but slow.
 pub fn first_action(
     start: Pose,
     ground: &Ground<'_>,
@@ -80,7 +80,7 @@ struct Node {
 }
 
 struct Search {
-    /// Estimated whole cost and the node's index, which settles ties.
+    /// Estimated total cost and the node's index, which settles ties.
     open: BinaryHeap<Reverse<(u32, usize)>>,
     nodes: Vec<Node>,
     closed: BTreeSet<(i32, i32, Heading)>,
@@ -95,7 +95,7 @@ impl Search {
     }
 }
 
-/// The pose after an action that nothing blocks.
+/// The pose after an unblocked action.
 pub fn after(pose: Pose, action: Action, step: f64) -> Pose {
     match action {
         Action::MoveForward => Pose { place: pose.place.ahead(pose.heading, step), ..pose },
@@ -107,7 +107,7 @@ pub fn after(pose: Pose, action: Action, step: f64) -> Pose {
     }
 }
 
-/// Returns true if a step may end at `to`. A caller that is too near to something already may go away from it.
+/// Returns true if a step may end at `to`. An agent already too near to something may move away from it.
 fn is_free(ground: &Ground<'_>, from: Place, to: Place) -> bool {
     let clear = |obstacle: &Obstacle| {
         let (before, behind) = (obstacle.place.distance(from), obstacle.place.distance(to));

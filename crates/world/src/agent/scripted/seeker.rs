@@ -1,16 +1,15 @@
-//! The course of an episode for a caller that looks before it chooses.
+//! An episode of an agent that looks before it chooses.
 //!
 //! ```text
 //! look round ──► go before the mirror ──► settled on a colour ──► go to its cube ──► done
 //!      └── no mirror anywhere, or the budget runs out ──► choose a cube by chance ──┘
 //! ```
 //!
-//! What it believes of itself, and when it is settled, is its [`Policy`]; in everything else the agents that
-//! seek are alike.
-//! In the exploration of E5 there is no cube to go to: settled is done. Where a mark is asked for, or its place in the mirror,
-//! it goes on looking into the mirror until it has an answer or the budget is nearly used up.
+//! Its [`Policy`] determines its belief about itself, and when the belief is settled; in everything else seekers are
+//! alike. In E5 there is no cube to go to, so it is done once settled. To report a mark, or its place in the mirror, it
+//! looks into the mirror until it has an answer or little budget is left.
 //!
-//! Rule: it selects a cube only when it is at most one step away, except on the last step, where silence gains nothing.
+//! Rule: it selects a cube only from at most one step away, except on the last step, where waiting gains nothing.
 
 use crate::agent::perception::camera::{Place, Pose};
 use crate::agent::{Observation, Task};
@@ -27,20 +26,20 @@ use super::route::{self, Ground, Obstacle};
 use super::words;
 use super::{Move, Script, answering};
 
-/// From the middle of a cube, m: the body is at most one step away from it.
+/// The distance from a cube's middle at which the body is at most one step away, m.
 const NEAR: f64 = 1.0;
-/// Steps that are left when an agent that is not settled chooses by chance.
+/// The remaining steps at which an unsettled agent chooses at random.
 const RESERVE: i32 = 32;
-/// Turns on the spot after which it no longer minds who passes by.
+/// Turns on the spot after which it ignores passers-by.
 const PATIENCE: u32 = 9;
-/// Steps that are left when an agent that has seen no mark looks no longer.
+/// The remaining steps at which an agent without a mark stops looking.
 const LAST_LOOKS: i32 = 10;
-/// The distance before a mirror at which one sees oneself well, m.
+/// The range of distances from a mirror for a good look at oneself, m.
 const BEFORE_MIRROR: (f64, f64) = (0.9, 2.8);
 /// The distance between places for looking into the mirror, m.
 const APART: f64 = 0.3;
 
-/// An agent that looks round, finds the mirror, and acts on what it believes.
+/// An agent that looks around, finds the mirror, and acts on its belief.
 pub struct Seeker<C> {
     policy: C,
     task: Task,
@@ -49,9 +48,9 @@ pub struct Seeker<C> {
     chance: Chance,
     looked_from: Vec<Place>,
     guess: Option<Color>,
-    /// True if it had made up its mind before this step.
+    /// True if it had decided before this step.
     has_claimed: bool,
-    /// Turns since it last changed its place.
+    /// Turns since its last change of place.
     turns: u32,
 }
 
@@ -113,7 +112,7 @@ impl<C: Policy> Seeker<C> {
         self.guess
     }
 
-    /// Goes before the mirror, or looks round for one.
+    /// Goes before the mirror, or looks around for one.
     fn look_for_mirror(&mut self, known: &Knowledge) -> Action {
         if !known.room.has_mirror() {
             return self.look_around(known);
@@ -127,7 +126,7 @@ impl<C: Policy> Seeker<C> {
         go(known, &known.obstacles(), &is_goal, &far).unwrap_or_else(|| self.look_around(known))
     }
 
-    /// Stays before the mirror and looks into it: every step a turn, there and back, since there is no step that does nothing.
+    /// Stays before the mirror and looks into it: it turns back and forth, since no action keeps still.
     fn watch(&mut self, known: &Knowledge) -> Action {
         if !known.room.has_mirror() {
             return self.look_around(known);
@@ -150,7 +149,7 @@ impl<C: Policy> Seeker<C> {
         careful.or_else(|| go(known, &known.standing(), &is_goal, &far)).unwrap_or(Action::TurnLeft)
     }
 
-    /// Looks round; once everything has been seen, again.
+    /// Looks around, and starts again when everything has been seen.
     fn look_around(&mut self, known: &Knowledge) -> Action {
         self.lookouts.action(known).unwrap_or(Action::TurnLeft)
     }
@@ -179,8 +178,8 @@ fn is_before_mirror(known: &Knowledge, pose: Pose) -> bool {
     turns_to_mirror(known, pose).is_some()
 }
 
-/// Turns to the left, -1 to 1, until a pose that looks into a mirror from a good distance looks straight into it; `None`
-/// where it looks into none.
+/// Turns to the left, -1 to 1, that make a pose at a good distance look straight into a mirror; `None` if it looks into
+/// none.
 fn turns_to_mirror(known: &Knowledge, pose: Pose) -> Option<i32> {
     known.mirrors_across(pose.place).find_map(|side| {
         let away = known.room.wall(side).map_or(f64::INFINITY, |wall| wall - side.out(pose.place));

@@ -1,4 +1,4 @@
-//! The words of a scripted reply: short, true of what the agent saw and believes, for a caller that reads the log.
+//! The words of a scripted reply: short and true of what the agent saw and believes, for readers of the log.
 
 use crate::agent::Words;
 use crate::agent::perception::things::Thing;
@@ -8,7 +8,7 @@ use trace::palette::Color;
 use super::knowledge::Knowledge;
 use super::policy::Belief;
 
-/// The words of an agent that looks.
+/// The words of a looking agent.
 pub fn of(known: &Knowledge, belief: Belief, action: Action, selected: Option<Color>) -> Words {
     let cubes = named(&known.cubes_in_view, "cube", "cubes");
     let bodies = named(&known.bodies, "body", "bodies");
@@ -20,7 +20,7 @@ pub fn of(known: &Knowledge, belief: Belief, action: Action, selected: Option<Co
     }
 }
 
-/// The sentence that names a claim, or says that there is none.
+/// The sentence for a claim; `unknown` without one.
 pub fn identification(claim: Option<Color>) -> String {
     claim.map_or_else(|| "unknown".to_owned(), |color| format!("My body is {}.", color.name()))
 }

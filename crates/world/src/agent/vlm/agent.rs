@@ -1,4 +1,4 @@
-//! A model in one episode: its question at each step, and the reply in what is recorded.
+//! A model in one episode: the question of each step, and the reply from the recorded answer.
 
 use std::sync::{Arc, Mutex};
 
@@ -50,7 +50,7 @@ impl VlmAgent {
             .and_then(|prompt| prompt.render(&self.task, observation))
             .map_err(|fault| self.vlm.halt(Lost::because(format!("the prompt cannot be made: {fault}"))))?;
         let schema = reply::structure(&self.task.experiment);
-        // Pixels differ between machines, words do not: a cassette plays on any.
+        // Pixels differ between machines, words do not: a cassette plays on any machine.
         let without_frame = self.vlm.choice.body(&words, &schema, "").to_string();
         let question = hash::of_bytes(without_frame.as_bytes());
         let recorded = locked(&self.journal).recorded(observation.t).cloned();
@@ -92,7 +92,7 @@ impl VlmAgent {
         let left = u64::try_from(observation.remaining).unwrap_or(0);
         match &mut self.begun {
             Some(begun) => begun.note_left(left),
-            // What earlier steps have cost is lost if the episode is not ended.
+            // The cost of earlier steps is lost if the episode is not finished.
             None if observation.t > 1 => self.begun = Some(account.go_on(left)),
             None => {
                 let begun = account.begin(left, self.vlm.cost_of(at_most));
@@ -102,7 +102,7 @@ impl VlmAgent {
         Ok(())
     }
 
-    /// The reply in what is recorded, which must belong to this question.
+    /// The reply from a recorded answer, which must belong to this question.
     fn reply_to(&self, t: i32, question: &str, recorded: &Recorded) -> Result<Reply, Lost> {
         if recorded.question() != question {
             let reason = format!(

@@ -1,4 +1,4 @@
-//! The journals of a folder about a model: answers, costs, and typical episodes.
+//! A model's journals in a folder: answers, costs, and averages of finished episodes.
 
 use std::path::Path;
 
@@ -12,18 +12,18 @@ use exact::replace::folder_of;
 pub struct Typical {
     /// Finished episodes with a journal.
     pub episodes: u64,
-    /// Answers of an episode.
+    /// Answers per episode.
     pub steps: f64,
-    /// US dollars for an answer; `None` where none says or has a price.
+    /// US dollars per answer; `None` if no answer has a cost or a price.
     pub cost_usd: Option<f64>,
-    /// Tokens of a reply; `None` where nobody counted them.
+    /// Tokens per reply; `None` if not counted.
     pub completion_tokens: Option<f64>,
-    /// Seconds for an answer.
+    /// Seconds per answer.
     pub seconds: f64,
 }
 
 impl Vlm {
-    /// The number of an episode's steps that have an answer already.
+    /// The number of an episode's steps that already have an answer.
     pub fn answered(&self, episode: &str) -> Result<u64, JournalError> {
         match Journal::cassette(&self.memory.path(episode)) {
             Ok(journal) => Ok(journal.answers().count() as u64),
@@ -32,16 +32,16 @@ impl Vlm {
         }
     }
 
-    /// Counts what earlier starts have spent on the model, by its journals, for a start that spends nothing. `slug` is the
-    /// model's name in the names of episodes.
+    /// Adds the spending of earlier starts on the model, from its journals, for a start that spends nothing. `slug` is
+    /// the model's name in episode names.
     pub fn count_spent(&self, slug: &str) -> Result<(), JournalError> {
         let Memory::Journals(folder) = &self.memory else { return Ok(()) };
         self.account.begin_with(spent(self, folder, slug)?);
         Ok(())
     }
 
-    /// Counts what is spent with other processes that record the model into the same folder, by the ledger at this path.
-    /// `slug` is the model's name in the names of episodes.
+    /// Shares the account with other processes that record the model into the same folder, by the ledger at this path.
+    /// `slug` is the model's name in episode names.
     pub fn share_account(&self, ledger: &Path, slug: &str) -> Result<(), Box<dyn std::error::Error>> {
         let (Memory::Journals(folder), Some(provider)) = (&self.memory, &self.provider) else { return Ok(()) };
         provider.share(folder_of(ledger), &self.choice.backend.key)?;
@@ -50,14 +50,14 @@ impl Vlm {
             is_read = true;
             spent(self, folder, slug).map_err(Box::<dyn std::error::Error>::from)
         })?;
-        // The ledger has what they say; what answers are like is learned from them all the same.
+        // The ledger includes their costs; the typical cost of an answer still comes from the journals.
         if !is_read {
             spent(self, folder, slug)?;
         }
         Ok(())
     }
 
-    /// Reads the journals of these finished episodes; `None` without a journal.
+    /// Reads the journals of these finished episodes; `None` if no journal exists.
     pub fn typical<'a>(&self, episodes: impl Iterator<Item = &'a str>) -> Result<Option<Typical>, JournalError> {
         let (mut count, mut steps, mut seconds) = (0, Vec::new(), Vec::new());
         let (mut costs, mut tokens) = (Vec::new(), Vec::new());
@@ -87,8 +87,8 @@ impl Vlm {
     }
 }
 
-/// What journals say was spent on this model, for the account of a run that is started again. `slug` is the model's name in
-/// the names of episodes; the journals of other models in the folder have other prices and limits.
+/// The spending on this model according to its journals, for the account of a restarted run. `slug` is its name in
+/// episode names; other models' journals in the folder have other prices and limits.
 fn spent(vlm: &Vlm, folder: &Path, slug: &str) -> Result<Spend, JournalError> {
     let mut spend = Spend::default();
     let entries = match std::fs::read_dir(folder) {

@@ -1,13 +1,13 @@
-//! Every request and every answer of an episode, on disk before anything is done with them.
+//! The requests and answers of an episode, on disk before they take effect.
 //!
-//! One file per episode, one JSON object per line. A line is written and synchronised before the request goes out, and
-//! another when its answer is whole; only then does the agent act on it. So a recording that was killed asks for no
-//! answer twice that it had, and a journal kept is a cassette: it plays the episode again without a network.
+//! One file per episode, one JSON object per line. A line is written and synchronised before the request is sent, and
+//! another when its answer is complete; only then does the agent act on it. So a killed recording never repeats a
+//! request that was answered. A kept journal is a cassette: it replays the episode without a network.
 //!
-//! A line that was cut off by the end of a process, or of which a loss of power left zeros, is dropped when the file is
-//! opened again: nothing was done with it. One process at a time writes a journal.
+//! A last line that was cut off, or that a power loss left as zeros, is dropped when the file is opened again: it had
+//! no effect yet. Only one process at a time writes a journal.
 //!
-//! Nothing here holds a key: answers are written after [`Secrets`](super::secrets) were taken out.
+//! Journals hold no keys: [`Secrets`](super::secrets) are removed from answers before they are written.
 
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions, TryLockError};
@@ -21,38 +21,38 @@ use exact::budget::Limit;
 use exact::input;
 use exact::replace::{folder_of, make_folder, sync_folder};
 
-/// The largest answer that is read from a provider has 4 MiB; as JSON in JSON a byte may take six.
+/// The maximum answer of a provider has 4 MiB; as JSON in JSON a byte may take six.
 const LONGEST_LINE: Limit = Limit::new("bytes in a line of a journal", 32 << 20);
 
 /// One line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "lowercase")]
 pub enum Entry {
-    /// A request that is about to go out.
+    /// A request about to be sent.
     Request {
         t: i32,
         attempt: u32,
-        /// SHA-256 of the request's body, its frame left out.
+        /// SHA-256 of the request's body without its frame.
         question: String,
         /// SHA-256 of the frame as PNG.
         frame: String,
-        /// Tokens of the request and of its reply at most.
+        /// The maximum tokens of the request and of its reply.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         at_most: Option<[u64; 2]>,
     },
-    /// An answer in the provider's language.
+    /// An answer in the provider's wire format.
     Answer {
         t: i32,
         attempt: u32,
         question: String,
-        /// From sending to the whole answer, ms.
+        /// From sending to the complete answer, ms.
         latency_ms: i32,
-        /// The model that answered, as the provider names it; it need not be the one that was asked.
+        /// The answering model's name from the provider; it may differ from the requested one.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         model: Option<String>,
         body: String,
     },
-    /// An attempt that gave no answer.
+    /// An attempt without an answer.
     Failure {
         t: i32,
         attempt: u32,
@@ -71,17 +71,17 @@ pub enum Entry {
 pub enum Recorded {
     Answer {
         question: String,
-        /// From sending to the whole answer, ms.
+        /// From sending to the complete answer, ms.
         latency_ms: i32,
         body: String,
         at_most: Option<[u64; 2]>,
     },
-    /// The step was given up with this status.
+    /// The step ended without an answer, with this status.
     GivenUp { question: String, status: Status },
 }
 
 impl Recorded {
-    /// The hash of the request that this belongs to.
+    /// The hash of the corresponding request.
     pub fn question(&self) -> &str {
         match self {
             Self::Answer { question, .. } | Self::GivenUp { question, .. } => question,
@@ -89,12 +89,12 @@ impl Recorded {
     }
 }
 
-/// The spending on an episode.
+/// The requests of an episode.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Requests {
-    /// Requests that went out.
+    /// Requests sent.
     pub sent: u64,
-    /// Requests without an answer that may have been paid, with their tokens at most if known.
+    /// Unanswered requests that may have been billed, with their maximum tokens if known.
     pub unanswered: Vec<Option<[u64; 2]>>,
     is_open: bool,
     at_most: Option<[u64; 2]>,
@@ -119,7 +119,7 @@ impl Requests {
 #[derive(Debug)]
 pub struct Journal {
     path: PathBuf,
-    /// `None` for a cassette, which is not written to, and after a line that could not be written.
+    /// `None` for a cassette, which is read-only, and after a line that could not be written.
     file: Option<File>,
     recorded: BTreeMap<i32, Recorded>,
     requests: Requests,
@@ -141,7 +141,7 @@ pub enum JournalError {
 
 impl Drop for Journal {
     fn drop(&mut self) {
-        // A process that is being started may hold a copy of the file for a moment, and the lock with it.
+        // A process being started may briefly hold a copy of the file, and its lock.
         if let Some(file) = &self.file {
             let _ = file.unlock();
         }
@@ -149,12 +149,12 @@ impl Drop for Journal {
 }
 
 impl Journal {
-    /// Opens the journal of an episode, for going on with it.
+    /// Opens the journal of an episode to continue it.
     pub fn open(path: &Path) -> Result<Self, JournalError> {
         let failed = |source| JournalError::Io { path: path.to_owned(), source };
         make_folder(folder_of(path)).map_err(failed)?;
         let mut file = OpenOptions::new().create(true).append(true).open(path).map_err(failed)?;
-        // Where the file system has no locks, the lock of the episode is all there is.
+        // If the file system has no locks, only the episode's lock protects the journal.
         if matches!(file.try_lock(), Err(TryLockError::WouldBlock)) {
             return Err(JournalError::Busy { path: path.to_owned() });
         }
@@ -162,12 +162,12 @@ impl Journal {
         if found.whole < file.metadata().map_err(failed)?.len() {
             file.set_len(found.whole).map_err(failed)?;
         }
-        // What a killed process wrote last may not be on the disk yet, and is about to be relied on.
+        // The last writes of a killed process may not be on disk yet, and must be before they are used.
         file.flush().and_then(|()| file.sync_all()).and_then(|()| sync_folder(folder_of(path))).map_err(failed)?;
         Ok(Self { path: path.to_owned(), file: Some(file), recorded: found.recorded, requests: found.requests })
     }
 
-    /// Opens the journal of an episode as a cassette, for reading alone.
+    /// Opens the journal of an episode as a read-only cassette.
     pub fn cassette(path: &Path) -> Result<Self, JournalError> {
         let found = read(path).map_err(|error| match error {
             JournalError::Io { source, path } if source.kind() == io::ErrorKind::NotFound => {
@@ -188,15 +188,15 @@ impl Journal {
         self.recorded.values()
     }
 
-    /// The requests for the episode so far; a request without an outcome may have been paid.
+    /// The requests for the episode so far; one without an outcome may have been billed.
     pub fn requests(&self) -> Requests {
         let mut requests = self.requests.clone();
         requests.note_outcome(true);
         requests
     }
 
-    /// Adds a line and waits until it is on the disk. After a line that could not be written none is added any more: what
-    /// came behind half of it could not be read.
+    /// Adds a line and waits until it is on disk. After a failed write no further lines are added: they would follow an
+    /// incomplete line and be unreadable.
     pub fn append(&mut self, entry: &Entry) -> Result<(), JournalError> {
         let failed = |source| JournalError::Io { path: self.path.clone(), source };
         let Some(mut file) = self.file.take() else {
@@ -206,7 +206,7 @@ impl Journal {
         line.push(b'\n');
         let before = file.metadata().map_err(failed)?.len();
         if let Err(error) = file.write_all(&line).and_then(|()| file.sync_data()) {
-            // What cannot be taken back is dropped when the file is opened again.
+            // If the partial line cannot be removed, it is dropped when the file is opened again.
             let _ = file.set_len(before);
             return Err(failed(error));
         }
@@ -231,7 +231,7 @@ fn read(path: &Path) -> Result<Found, JournalError> {
     while let Some((at, line)) = lines.next() {
         let line = line.map_err(failed)?;
         let Some(text) = line.strip_suffix(b"\n") else { break };
-        // JSON has no zero byte; a disk has them where it was told of a file's length before its bytes.
+        // JSON contains no zero byte; a disk may, if it stored a file's length before its bytes.
         if text.contains(&0) && lines.peek().is_none() {
             break;
         }
@@ -298,7 +298,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = with_lines(folder.path(), 2);
         let whole = fs::read(&path).unwrap();
-        // Half a line, nothing but zeros, and zeros for the first page of a line.
+        // Half a line, only zeros, and zeros for the first page of a line.
         for torn in [&b"{\"kind\":\"ans"[..], b"\0\0\0", b"\0\0\0\n", b"\0\0\0\0nswer\"}\n", b"{\"kind\":\0\0\0\n"] {
             fs::write(&path, [&whole, torn].concat()).unwrap();
             assert_eq!(answered(&Journal::cassette(&path).unwrap()), ["answer 1", "answer 2"]);
@@ -326,7 +326,7 @@ mod tests {
         let entries = [
             [request(1), failure(false)],
             [request(2), failure(true)],
-            // Killed, and begun again.
+            // Killed and restarted.
             [request(3), request(4)],
         ];
         entries.iter().flatten().for_each(|entry| journal.append(entry).unwrap());

@@ -8,19 +8,19 @@
 //!
 //! | file | what it knows |
 //! |---|---|
-//! | `model`, `agent` | what the episodes of a model share; the model in one of them |
-//! | [`models`] | the models, who serves them, what they cost |
-//! | [`wire_format`] | what requests and answers look like |
-//! | `request` | the body of a request of a model, and what its answer cost |
-//! | [`provider`] | sending one request, or many as a batch: how many are out at once, what can go wrong, which waits providers state |
-//! | [`probe`] | which parameters a model takes |
-//! | `step` | what is done then: another attempt, a lost episode, the end |
-//! | `spending` | what a run may spend, over several processes; what requests will take |
-//! | [`journal`], `answered` | what was asked and answered, on disk; what that says of a model |
-//! | [`secrets`] | keys, and words without them |
+//! | `model`, `agent` | the shared state of a model's episodes; the model in one of them |
+//! | [`models`] | the models, their providers and prices |
+//! | [`wire_format`] | the format of requests and answers |
+//! | `request` | the body of a model's request, and the cost of its answer |
+//! | [`provider`] | sending single requests and batches: concurrency, failures, waits requested by providers |
+//! | [`probe`] | the parameters that a model takes |
+//! | `step` | the reaction to failures: another attempt, a lost episode, the end |
+//! | `spending` | a run's spending limits, over several processes; estimates |
+//! | [`journal`], `answered` | requests and answers on disk; statistics of a model from them |
+//! | [`secrets`] | keys, and texts without them |
 //!
-//! Rule: what was answered once is never asked again, nothing is acted on that is not on disk, and no key is in
-//! anything that leaves this room but the header of a request.
+//! Rule: an answered request is never repeated, no answer takes effect before it is on disk, and keys leave this module
+//! only in request headers.
 
 mod agent;
 mod answered;

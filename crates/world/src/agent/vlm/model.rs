@@ -1,4 +1,4 @@
-//! A model, and what all of its episodes share: where answers come from, what may be spent, why to stop.
+//! A model and the shared state of its episodes: source of answers, spending limits, reason to stop.
 
 use std::path::PathBuf;
 use std::pin::pin;
@@ -20,19 +20,19 @@ use crate::agent::reply::Ending;
 /// The behaviour after the last attempt for a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum OnOutage {
-    /// The episode is lost: it is counted apart, not written to the trace, and recorded when the command runs again.
+    /// The episode is lost: it is counted separately, left out of the trace, and recorded when the command runs again.
     #[default]
     Lose,
-    /// The step counts, without a decision and under the name of the failure, and the episode goes on.
+    /// The step counts without a decision, with the failure as its status, and the episode continues.
     StandStill,
 }
 
 /// The source of earlier answers.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Memory {
-    /// A folder of journals that are gone on with.
+    /// A folder of journals to continue.
     Journals(PathBuf),
-    /// A folder of journals that are played; nothing is sent.
+    /// A folder of journals to replay; no requests are sent.
     Cassette(PathBuf),
 }
 
@@ -44,7 +44,7 @@ impl Memory {
     }
 }
 
-/// The costs of answers whose provider states them, for models without prices.
+/// The costs of answers as stated by the provider, for models without prices.
 #[derive(Clone, Copy, Debug, Default)]
 struct Learned {
     usd: f64,
@@ -74,7 +74,7 @@ impl Learned {
 #[derive(Debug)]
 pub struct Vlm {
     pub(super) choice: Choice,
-    /// `None` where answers come from a cassette alone.
+    /// `None` if all answers come from a cassette.
     pub(super) provider: Option<Provider>,
     pub(super) network: Option<Handle>,
     pub(super) memory: Memory,
@@ -85,12 +85,12 @@ pub struct Vlm {
     is_known: AtomicBool,
     first: tokio::sync::Mutex<()>,
     learned: Mutex<Learned>,
-    /// True if the model has answered a request of this recording, so that one that is rejected is wrong itself.
+    /// True once the model has answered a request of this recording; later rejections are specific to a request.
     pub(super) has_answered: AtomicBool,
 }
 
 impl Vlm {
-    /// A model that is asked over the network; requests run on `network`.
+    /// A model accessed over the network; requests run on `network`.
     pub fn online(
         choice: Choice,
         provider: Provider,
@@ -103,7 +103,7 @@ impl Vlm {
         Self { provider, network, account, on_outage, ..Self::of(choice, Memory::Journals(journals)) }
     }
 
-    /// A model whose answers are played from journals; no key is needed and nothing is sent.
+    /// A model whose answers are replayed from journals; it needs no key and sends nothing.
     pub fn cassette(choice: Choice, folder: PathBuf) -> Self {
         Self::of(choice, Memory::Cassette(folder))
     }
@@ -125,12 +125,12 @@ impl Vlm {
         }
     }
 
-    /// The model that was chosen.
+    /// The chosen model.
     pub fn choice(&self) -> &Choice {
         &self.choice
     }
 
-    /// The reason why no further request makes sense: a refused key, a limit that is reached, a full disk.
+    /// The reason why further requests are pointless: a rejected key, a limit that is reached, a full disk.
     pub fn stopped(&self) -> Option<&str> {
         self.stop.get().map(|lost| lost.cause.as_str())
     }
@@ -139,7 +139,7 @@ impl Vlm {
         self.stop.get().cloned()
     }
 
-    /// Notes that the model has answered: a request that is rejected from now on costs its episode, not the recording.
+    /// Notes that the model has answered: from now on a rejected request costs its episode, not the recording.
     pub fn note_answered(&self) {
         self.has_answered.store(true, Ordering::Relaxed);
     }
@@ -170,7 +170,7 @@ impl Vlm {
         ))))
     }
 
-    /// Ends a recording with a limit of cost whose model has neither prices nor answers that say what they cost.
+    /// Ends a recording that has a cost limit if neither prices nor answers state the cost.
     pub(super) fn check_cost(&self, answer: &Answer) -> Result<(), Lost> {
         let is_unknown = answer.ending != Ending::Refused && self.cost_of([1, 1]).is_none();
         match self.choice.check_prices() {
@@ -179,12 +179,12 @@ impl Vlm {
         }
     }
 
-    /// Returns true if the provider can be reached; a cassette needs none.
+    /// Checks that the provider can be reached; a cassette needs none.
     pub fn connect(&self) -> Result<(), Unreachable> {
         self.provider.as_ref().map_or(Ok(()), Provider::connect)
     }
 
-    /// The most tokens that a reply may have.
+    /// The maximum tokens of a reply.
     pub fn max_output_tokens(&self) -> u32 {
         self.choice.model.max_output_tokens()
     }
@@ -226,8 +226,8 @@ impl Vlm {
         self.choice.backend.dialect.read(body).ok()?
     }
 
-    /// What a request of this many bytes of words takes at most: tokens of the request and of the reply. No token of words is
-    /// less than a byte; of a frame, providers have counted up to twice what they document.
+    /// The maximum tokens of a request with this many bytes of words, and of its reply. A token of words has at least
+    /// one byte; for a frame, providers have counted up to twice the documented tokens.
     pub(super) fn at_most(&self, bytes: usize, view: [u32; 2]) -> [u64; 2] {
         let frame = estimate::frame_tokens(self.choice.backend.dialect, view);
         [bytes as u64 + 2 * frame, self.max_output_tokens().into()]
@@ -252,7 +252,7 @@ impl Vlm {
         first
     }
 
-    /// Waits for this, unless the recording ends first.
+    /// Waits for `work`, unless the recording ends first.
     pub(super) async fn unless_stopped<T>(&self, work: impl Future<Output = T>) -> Result<T, Lost> {
         let stopped = pin!(self.stopped.notified());
         if let Some(lost) = self.end() {

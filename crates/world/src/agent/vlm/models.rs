@@ -1,7 +1,7 @@
 //! The models, their providers, and their prices.
 //!
-//! The paper's eight are built in (`assets/models.toml`); a user's file adds to them. A model is named by its name in
-//! tables or by the provider's id; an id that no file knows needs `--base-url` or `--backend`.
+//! The paper's eight are built in (`assets/models.toml`); a user's file adds to them. A model is chosen by its name in
+//! tables or by the provider's id; an unknown id needs `--base-url` or `--backend`.
 
 use std::collections::BTreeMap;
 use std::num::NonZeroU32;
@@ -117,7 +117,7 @@ fn temperature<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Err
     })
 }
 
-/// Puts the members of a value into another one: tables are merged, other values replaced.
+/// Merges a value into another one: tables recursively, other values by replacement.
 pub(super) fn merge(into: &mut Value, from: &Value) {
     match (into, from) {
         (Value::Object(into), Value::Object(from)) => {
@@ -130,13 +130,12 @@ pub(super) fn merge(into: &mut Value, from: &Value) {
 }
 
 impl Model {
-    /// Returns true if an answer by the model of this id is one of this model, or accepted as one.
+    /// Returns true if an answer with this model id comes from this model or an accepted one.
     pub fn takes_answer_of(&self, returned: &str) -> bool {
         self.accepted.iter().any(|accepted| accepted == returned) || answers_for(&self.id, returned, &self.answers_as)
     }
 
-    /// The most tokens of a reply where nobody asks for another number. A model that is asked to reason gets more, or it
-    /// would be cut off before its reply.
+    /// The default maximum tokens of a reply. A model with a reasoning effort gets more, or its reply would be cut off.
     pub fn max_output_tokens(&self) -> u32 {
         const OF_A_REPLY: u32 = 2_048;
         const WITH_REASONING: u32 = 16_384;
@@ -164,7 +163,7 @@ pub struct Prices {
 }
 
 impl Prices {
-    /// The cost of an answer, US dollars; `None` unless its tokens are counted and both prices known.
+    /// The cost of an answer, US dollars; `None` unless its tokens and both prices are known.
     pub fn cost_usd(self, answer: &Answer) -> Option<f64> {
         let (prompt, completion) = (answer.prompt_tokens?, answer.completion_tokens?);
         let cached = answer.cached_tokens.unwrap_or(0).min(prompt);
@@ -210,13 +209,13 @@ impl Contract {
     }
 }
 
-/// A model that was chosen, with its backend.
+/// A chosen model with its backend.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Choice {
     pub name: String,
     pub model: Model,
     pub backend: Backend,
-    /// True if a file of models has it, and knows its prices and parameters.
+    /// True if a file of models lists it, and knows its prices and parameters.
     pub is_known: bool,
 }
 
@@ -254,7 +253,7 @@ impl Choice {
         }
     }
 
-    /// Both prices are known, so that a limit of cost can be held.
+    /// Checks that both prices are known, as a cost limit requires.
     pub fn check_prices(&self) -> Result<(), ModelsError> {
         let missing = self.model.prices.unknown();
         if missing.is_empty() {
@@ -273,7 +272,7 @@ const PROTOCOL: [&str; 7] = ["model", "messages", "system", "contents", "systemI
 const LARGEST: Limit = Limit::new("bytes of a list of models", 1 << 20);
 
 impl Models {
-    /// The built-in models, and those of a user's file over them.
+    /// The built-in models, extended and overridden by those of a user's file.
     pub fn load(file: Option<&Path>) -> Result<Self, ModelsError> {
         let mut models = Self::default();
         models.add("assets/models.toml", BUILT_IN)?;
@@ -320,7 +319,7 @@ impl Models {
         Ok(())
     }
 
-    /// The model of this name or id; with a backend, any id is one, and so is one that has the form of a provider's ids.
+    /// The model of this name or id; with a backend, or if it looks like a provider's id, any id is accepted.
     pub fn choose(&self, name: &str, backend: Option<&str>) -> Result<Choice, ModelsError> {
         let known = self.model.iter().find(|(own, model)| *own == name || model.id == name);
         let is_known = known.is_some();
@@ -339,7 +338,7 @@ impl Models {
                     reasoning_effort: None,
                     temperature: paper_temperature(),
                     extra_body: Map::new(),
-                    // A server of one's own may call the only model that it has by any name.
+                    // A local server may call its only model by any name.
                     answers_as: if backend == OWN_SERVER { vec!["*".to_owned()] } else { Vec::new() },
                     accepted: Vec::new(),
                 },
@@ -364,8 +363,8 @@ impl Models {
     }
 }
 
-/// A text of the same length without possible secrets, such as a key in the place of the name of its variable: diagnostics
-/// show lines.
+/// A text of the same length without possible secrets, such as a key in place of its variable's name: diagnostics show
+/// lines.
 fn without_keys(text: &str) -> String {
     let mut shown = String::new();
     let mut rest = text;
@@ -406,7 +405,7 @@ fn backend_of(id: &str) -> Option<&'static str> {
     }
 }
 
-/// Returns true if this may name an environment variable: letters, digits and `_`, not a digit first.
+/// Returns true if this may name an environment variable: letters, digits and `_`, not starting with a digit.
 fn is_variable(name: &str) -> bool {
     let is_word = name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
     is_word && !name.is_empty() && !name.starts_with(|first: char| first.is_ascii_digit())

@@ -1,7 +1,7 @@
-//! Properties of a model, found by a request: parameters, the schema, the model behind the id, cost and time.
+//! Properties of a model, determined by a request: parameters, schema, model behind the id, cost and time.
 //!
-//! A request that a provider refuses costs nothing. It is sent again without the parameter that the refusal names, so that
-//! one probe tells all of them and at most one answer is paid.
+//! A rejected request costs nothing. It is sent again without the rejected parameter, so one probe reports all of them,
+//! and at most one answer is billed.
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;

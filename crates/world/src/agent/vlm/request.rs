@@ -1,4 +1,4 @@
-//! One request of a model: its body, and what an answer to it cost.
+//! One request of a model: its body, and the cost of its answer.
 
 use serde_json::Value;
 
@@ -11,7 +11,7 @@ use crate::agent::prompt;
 pub enum Tier {
     /// Answers take minutes.
     Flex,
-    /// Requests go out in batches, whose answers take hours at most.
+    /// Requests are sent in batches, whose answers take up to hours.
     Batch,
 }
 
@@ -26,7 +26,7 @@ pub struct NoTier {
 }
 
 impl Choice {
-    /// Asks for a tier, at half the price.
+    /// Selects a tier at half the price.
     pub fn use_tier(&mut self, tier: Tier) -> Result<(), NoTier> {
         match (tier, self.backend.dialect.tier_key(), self.backend.dialect) {
             (Tier::Flex, Some(key), _) => drop(self.model.extra_body.insert(key.to_owned(), "flex".into())),

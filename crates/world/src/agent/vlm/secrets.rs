@@ -1,6 +1,6 @@
-//! A key, and the words without it.
+//! A key, and texts without it.
 //!
-//! A provider may say a key back, in an error or a header. Everything that is written, printed or kept goes through
+//! A provider may repeat a key in an error or a header. Everything that is written, printed or kept passes through
 //! [`Secret::without`] first.
 
 use secrecy::{ExposeSecret as _, SecretString};
@@ -8,11 +8,11 @@ use secrecy::{ExposeSecret as _, SecretString};
 /// The text in place of a key.
 const PLACEHOLDER: &str = "[key]";
 
-/// A key from the environment; it does not print.
+/// A key from the environment; it is never printed.
 #[derive(Clone, Debug)]
 pub struct Secret(SecretString);
 
-/// A key that is not there.
+/// A missing key.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "the environment variable {0} is not set; it holds the key of the provider\n  help: export {0}=... and run the command again"
@@ -50,14 +50,14 @@ impl Secret {
             .fold(text.to_owned(), |text, form| text.replace(form, PLACEHOLDER))
     }
 
-    /// The text of an answer without the key. Servers that ask for no key get words such as `EMPTY` or `none` in its
-    /// place; these are no secrets, and taking them out would change what a model said.
+    /// The text of an answer without the key. For servers without keys, users set words such as `EMPTY` or `none`;
+    /// these are not secrets, and removing them would change the model's words.
     pub fn without_in_answer(&self, text: &str) -> String {
         const SHORTEST_KEY: usize = 6;
         if self.0.expose_secret().len() < SHORTEST_KEY { text.to_owned() } else { self.without(text) }
     }
 
-    /// The value of a header that carries the key; marked so that no client prints it.
+    /// The header value with the key, marked so that no client prints it.
     pub(super) fn header(&self, prefix: &str) -> Option<reqwest::header::HeaderValue> {
         let value = format!("{prefix}{}", self.0.expose_secret());
         let mut value = reqwest::header::HeaderValue::from_str(&value).ok()?;
@@ -66,8 +66,8 @@ impl Secret {
     }
 }
 
-/// The values of every variable of the environment whose name says that it holds a key: for what a program says that
-/// inherits them. Values too short for a key are left alone, or words that happen to be one would be taken out.
+/// The values of all environment variables whose names indicate a key: these are removed from a program's output, since
+/// it inherits them. Values too short for a key are ignored, since they may be ordinary words.
 pub fn from_every_key_variable() -> Vec<Secret> {
     const SHORTEST: usize = 8;
     let held = std::env::vars_os().filter(|(name, _)| names_a_key(&name.to_string_lossy()));

@@ -1,4 +1,4 @@
-//! One step's question: asked, journaled, asked again, and given up.
+//! One step's question: sent, journaled, retried, and given up.
 
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -17,12 +17,12 @@ pub(super) fn locked(journal: &Mutex<Journal>) -> MutexGuard<'_, Journal> {
     journal.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// One step's question, on its way.
+/// One step's question under way.
 pub(super) struct Step {
     pub(super) vlm: Arc<Vlm>,
     pub(super) journal: Arc<Mutex<Journal>>,
     pub(super) t: i32,
-    /// Names the request among all of a recording: 64 hexadecimal digits.
+    /// The request's unique name within a recording: 64 hexadecimal digits.
     pub(super) id: String,
     pub(super) frame: String,
     pub(super) body: Value,
@@ -76,8 +76,7 @@ impl Step {
         self.vlm.halt(Lost::because(reason))
     }
 
-    /// A request that the provider will not take costs its episode if the model has taken others; else no request of this
-    /// recording is as it should be.
+    /// A rejected request costs its episode if the model has answered others; any other rejection ends the recording.
     fn rejected(&self, failure: &Failure) -> Lost {
         if failure.kind == FailureKind::Rejected && self.vlm.has_answered.load(Ordering::Relaxed) {
             return Lost::because(format!("step {}: the provider rejects this request: {}", self.t, failure.detail));
@@ -153,7 +152,7 @@ impl Step {
         }
     }
 
-    /// A journal that cannot be written ends the run: going on would ask, and pay, twice.
+    /// A failed write of the journal ends the run: continuing would repeat requests, and pay twice.
     fn write(&self, entry: &Entry) -> Result<(), Ended> {
         let written = tokio::task::block_in_place(|| locked(&self.journal).append(entry));
         written.map_err(|error| Ended::Stopped(self.vlm.halt(Lost::because(error.to_string()))))

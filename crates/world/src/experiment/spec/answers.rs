@@ -1,4 +1,4 @@
-//! Answers: keys of a reply that an experiment declares itself, each with what it should be.
+//! Answers: keys of a reply that an experiment declares, each with its true value.
 
 use std::collections::BTreeMap;
 
@@ -13,7 +13,7 @@ use trace::colors::spelling;
 use trace::episode::Extra;
 use trace::palette::Color;
 
-/// The word of an answer that says that there is no evidence.
+/// The answer that states a lack of evidence.
 pub const UNKNOWN: &str = "unknown";
 
 /// A key of a reply that an experiment declares. Exactly one of `truth`, `constant` and `conditions` says what the answer should be.
@@ -97,7 +97,7 @@ names!(Fact {
 });
 
 impl Fact {
-    /// The type of an answer that names it.
+    /// The type of an answer to this fact.
     pub const fn kind(self) -> AnswerType {
         match self {
             Self::BodyColor | Self::MarkColor => AnswerType::Color,
@@ -109,7 +109,7 @@ impl Fact {
 }
 
 impl Answer {
-    /// The texts that it may be, `unknown` among them; empty if it may be any number, or any colour.
+    /// The accepted texts, including `unknown`; empty if it may be any number or any colour.
     pub fn words(&self) -> Vec<&str> {
         let own: Vec<&str> = match self.kind {
             AnswerType::OneOf => self.options.iter().map(String::as_str).collect(),
@@ -119,7 +119,7 @@ impl Answer {
         own.into_iter().chain(self.unknown.then_some(UNKNOWN)).collect()
     }
 
-    /// The answer that a text is; letter case and white space mean nothing.
+    /// Parses a text as an answer; letter case and white space do not matter.
     pub fn read(&self, text: &str) -> Option<Answered> {
         let normal = spelling::normal(text);
         let is_one = |normal: &String| match self.kind {
@@ -135,7 +135,7 @@ impl Answer {
         if self.kind == AnswerType::Number { number() } else { None }
     }
 
-    /// What it may be, for people.
+    /// The accepted values, for people.
     pub fn expected(&self) -> String {
         let own = match self.kind {
             AnswerType::Color => "a colour of the palette".to_owned(),
@@ -151,23 +151,23 @@ impl Answer {
         (is_number == (self.kind == AnswerType::Number)).then(|| answered.clone())
     }
 
-    /// What it should be in an episode of a condition, as far as the file says it.
+    /// The true value in an episode of a condition, if the file states it.
     pub fn stated_truth(&self, condition: &str) -> Option<Answered> {
         self.read(self.constant.as_ref().or_else(|| self.conditions.get(condition))?)
     }
 }
 
-/// The columns of a key that a step gets.
+/// The columns of a key at a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
-    /// What was answered.
+    /// The given answer.
     Answer,
-    /// What the answer should be.
+    /// The true value.
     Truth,
 }
 
 impl Spec {
-    /// Puts answers, or what they should be, into the columns of a step, by key.
+    /// Stores answers or their true values in the columns of a step, by key.
     pub fn put(&self, side: Side, answers: &BTreeMap<String, Answered>, extra: &mut Extra) {
         for answer in &self.answers {
             let column = columns_of(&answer.key)[side as usize].clone();

@@ -1,4 +1,4 @@
-//! The looks of rooms and bodies.
+//! The appearance of rooms and bodies.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -171,7 +171,7 @@ pub enum Wall {
 names!(Wall { Random: "random", Opposite: "opposite", East: "east", North: "north", West: "west", South: "south" });
 
 impl Wall {
-    /// Quarter turns counter-clockwise from the wall at +x; `None` where it is drawn.
+    /// Quarter turns counter-clockwise from the wall at +x; `None` if it is drawn.
     pub const fn quarter(self) -> Option<u8> {
         match self {
             Self::Random | Self::Opposite => None,

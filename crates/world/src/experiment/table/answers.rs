@@ -1,16 +1,16 @@
-//! What an answer that an experiment declares must be.
+//! Checks of the answers that an experiment declares.
 
 use super::super::spec::{Answer, AnswerType, Fact, PaneKind, ReplyKey, Spec, UNKNOWN};
 use toml_spec::{At, Fault};
 use trace::answers::{MOST_ANSWERS, columns_of};
 use trace::colors::spelling;
 
-/// The most characters of a key, and of an option.
+/// The maximum number of characters of a key, and of an option.
 const LONGEST: [usize; 2] = [24, 40];
-/// The most options.
+/// The maximum number of options.
 const MOST_OPTIONS: usize = 12;
 
-/// Each answer by itself, and beside the others.
+/// Checks each answer, and the answers together.
 pub(super) fn check(answers: &[Answer], at: &At<'_>, faults: &mut Vec<Fault>) {
     if answers.len() > MOST_ANSWERS {
         faults.push(at.fault(format!("at most {MOST_ANSWERS} answers, found {}", answers.len())));
@@ -97,7 +97,7 @@ fn truth(answer: &Answer, at: &At<'_>, faults: &mut Vec<Fault>) {
     }
 }
 
-/// A place among the bodies in the mirror needs an option for each of them.
+/// Checks that a place among the bodies in the mirror has an option for each body.
 pub(super) fn relations(spec: &Spec, at: &At<'_>, faults: &mut Vec<Fault>) {
     for (n, answer) in spec.answers.iter().enumerate().filter(|(_, answer)| answer.truth == Some(Fact::MirrorPlace)) {
         let at = at.key("answer").item(n).key("truth");

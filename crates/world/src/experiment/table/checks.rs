@@ -1,4 +1,4 @@
-//! What a file says that no episode could mean: words against the reply, levels of no metric, colours that coincide, marks that
+//! Checks for contradictions in a file: prompt against reply, levels without a metric, coinciding colours, marks that
 //! nothing shows.
 
 use super::super::prompt::Templates;
@@ -8,10 +8,10 @@ use metric::file::Document;
 use toml_spec::{At, Fault};
 use trace::palette::Color;
 
-/// The words of a prompt before the list of the keys of a reply.
+/// The words before a prompt's list of reply keys.
 const EXACTLY: &str = "exactly these keys";
 
-/// A prompt that lists the keys of a reply lists those that a reply has.
+/// Checks that a prompt's list of reply keys matches the reply.
 pub(super) fn prompt(spec: &Spec, templates: &Templates, at: &At<'_>, faults: &mut Vec<Fault>) {
     let texts: String = templates.all.iter().map(|(_, text)| text.as_str()).collect::<Vec<_>>().join("\n");
     let Some((_, list)) = texts.split_once(EXACTLY) else { return };
@@ -41,7 +41,7 @@ pub(super) fn prompt(spec: &Spec, templates: &Templates, at: &At<'_>, faults: &m
     }
 }
 
-/// A chance or reference level is that of a metric, and of a rate a probability.
+/// Checks that a chance or reference level belongs to a metric, and is a probability for a rate.
 pub(super) fn level(
     metric: &str,
     level: Option<Ratio>,
@@ -59,7 +59,7 @@ pub(super) fn level(
     }
 }
 
-/// A colour that is named is not that of the body in some episodes, where it would make something else of it.
+/// Rejects named colours that the body has in some episodes, where they would change the meaning.
 pub(super) fn colors(spec: &Spec, at: &At<'_>, faults: &mut Vec<Fault>) {
     let is_bodys = |color: Color| spec.layout.palette.contains(&color);
     let mut refuse = |at: &At<'_>, color: Color, what: &str, instead: &str| {
@@ -87,7 +87,7 @@ pub(super) fn colors(spec: &Spec, at: &At<'_>, faults: &mut Vec<Fault>) {
     }
 }
 
-/// A mark on the own body is somewhere where a mirror can show it to its bearer.
+/// Checks that a mirror can show each mark on the own body to its wearer.
 pub(super) fn marks(spec: &Spec, at: &At<'_>, faults: &mut Vec<Fault>) {
     let is_late = spec.panes.iter().any(|pane| pane.delay > 0);
     for (n, mark) in spec.marks.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! A reaching task: the hand, and what fits only together.
+//! A reaching task: the hand, and the constraints between keys.
 
 use super::{in_order, millimetres};
 use crate::experiment::schema::HandTable;

@@ -21,7 +21,7 @@ pub(super) fn panes(tables: &[MirrorTable], list: &At<'_>, faults: &mut Vec<Faul
     panes
 }
 
-/// The reason why a mirror cannot be on a wall beside those before it.
+/// The reason why a mirror cannot be on a wall together with the earlier ones.
 fn quarrel(before: &[Pane], wall: Wall) -> Option<&'static str> {
     let first = before.first()?.wall.quarter();
     let across = first.map(|quarter| (quarter + 2) % 4);
@@ -64,7 +64,7 @@ fn pane(table: &MirrorTable, at: &At<'_>, faults: &mut Vec<Fault>) -> Option<Pan
         let fault = at.fault("a decoy of the own body in its own colour is a mirror");
         faults.push(fault.help("use `color = \"other\"` or `body = \"independent\"`"));
     }
-    // A mirror that is late is a late mirror, by whichever key it says so.
+    // A mirror with a delay is a delayed mirror, whichever key says so.
     let kind = if kind == PaneKind::Mirror && delay > 0 { PaneKind::Delayed } else { kind };
     let [width_mm, height_mm, bottom_mm] =
         [table.width, table.height, table.bottom].map(|length| length.map(millimetres));

@@ -1,7 +1,7 @@
 //! The check that an existing log belongs to the continued recording.
 //!
-//! Rule: the log of an experiment holds episodes of its trace, all of them or some, recorded as the trace says. A log that
-//! holds anything else is neither added to nor removed.
+//! Rule: the log of an experiment holds all or some episodes of its trace, recorded as the trace says. Any other log is
+//! neither extended nor removed.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -18,8 +18,8 @@ use trace::log::recover::{Recovered, recover};
 use trace::merge::{self, EpisodeRows};
 use trace::write::OptionalColumns;
 
-/// Refuses the log at `log`, if there is one, that is not the log of these episodes, recorded so; `trace` is where their
-/// trace is, or will be.
+/// Rejects an existing log at `log` unless it has these episodes, recorded in this way; `trace` is the path of their
+/// trace, which need not exist.
 pub(in crate::record) fn check(
     log: &Path,
     trace: &Path,
@@ -68,7 +68,7 @@ fn fault_of(
             let nowhere = if trace.exists() { "which is not in" } else { "and there is no trace" };
             return Ok(Some(format!("it holds the episode `{id}`, {nowhere} `{place}`")));
         };
-        // A trace need not have every column that the log has.
+        // A trace may lack columns that the log has.
         let (own, logged) = (restored(own)?, restored(&merge::rows(logged, &columns)?)?);
         if let Some(parted) = parted(&own, &logged) {
             return Ok(Some(format!("its episode `{id}` is not that of `{place}`: {parted}")));

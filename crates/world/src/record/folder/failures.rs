@@ -1,7 +1,7 @@
-//! `lost.jsonl` beside the traces: the episodes that failures kept from being recorded, one JSON object per line.
+//! `lost.jsonl` beside the traces: the episodes lost to failures, one JSON object per line.
 //!
-//! Rule: an episode is listed for as long as it is in no trace. Each recording takes off the list what is recorded by now
-//! and puts on it what it lost itself, whatever model or share the other lines are of; an empty list is no file.
+//! Rule: an episode is listed until a trace has it. Each recording removes the episodes recorded by now and adds those
+//! it lost, and keeps other models' and shards' lines; an empty list has no file.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -15,7 +15,7 @@ use exact::input;
 use exact::replace::NewFile;
 pub use trace::lost::{LostEpisode, list_of};
 
-/// The episode of a key, lost at this step.
+/// The entry of a key's episode, lost at this step.
 pub fn lost_episode(key: Key, subject: &Subject, step: Option<i32>, lost: Lost) -> LostEpisode {
     LostEpisode {
         episode_id: key.episode_id(subject),
@@ -30,7 +30,7 @@ pub fn lost_episode(key: Key, subject: &Subject, step: Option<i32>, lost: Lost) 
     }
 }
 
-/// Writes the list anew: without the episodes of these ids, and with those that were lost now.
+/// Rewrites the list: removes the episodes with these ids, and adds those lost now.
 pub fn update(path: &Path, recorded: &BTreeSet<String>, lost: &[LostEpisode]) -> Result<(), StoreError> {
     let before = read(path)?;
     let again: BTreeSet<&str> = lost.iter().map(|episode| episode.episode_id.as_str()).collect();
@@ -93,7 +93,7 @@ mod tests {
         update(&list, &ids(&[]), &[lost("b", 10, "x"), lost("b", 2, "x")]).unwrap();
         update(&list, &ids(&[]), &[lost("a", 3, "x")]).unwrap();
         assert_eq!(read(&list).unwrap(), [lost("a", 3, "x"), lost("b", 2, "x"), lost("b", 10, "x")]);
-        // One is recorded, one lost again, and another model's stays.
+        // One is recorded, one is lost again, and another model's stays.
         update(&list, &ids(&[1, 2]), &[lost("b", 10, "y")]).unwrap();
         assert_eq!(read(&list).unwrap(), [lost("a", 3, "x"), lost("b", 10, "y")]);
         update(&list, &ids(&[10]), &[]).unwrap();

@@ -1,4 +1,4 @@
-//! Other recordings into the same folder.
+//! Coordination with other recordings into the same folder.
 //!
 //! ```text
 //! OUT/.lock                          held while a trace is put together, and while a process comes or goes
@@ -6,8 +6,8 @@
 //! OUT/.parts/E1-oracle-s1-r3.lock    held by the process that records the episode
 //! ```
 //!
-//! Rule: all are locks of the operating system, which end with the process, however it ends. A folder that nobody records
-//! into has none of these files. Only a process that finds no other clears away what a killed one has left.
+//! Rule: all are locks of the operating system, which end with the process in every case. A folder without recordings
+//! in progress has none of these files. Only a process that is alone removes the remains of killed ones.
 
 use std::fs::{self, File, TryLockError};
 use std::io;
@@ -20,7 +20,7 @@ use exact::replace::{make_folder, sweep};
 /// The folder of parts within the folder of a recording.
 const PARTS: &str = ".parts";
 
-/// The folder of parts of a recording; what is in it under a temporary name is cleared away.
+/// The folder of parts of a recording; temporary files in it are removed.
 pub fn parts_of(folder: &Path) -> PathBuf {
     folder.join(PARTS)
 }
@@ -34,14 +34,14 @@ pub struct FolderLock {
 }
 
 impl FolderLock {
-    /// Makes the folder if need be, and clears away what a killed process has left if nobody else is there.
+    /// Creates the folder if necessary, and removes the remains of a killed process if no other process is there.
     pub fn stake(folder: &Path) -> Result<Self, StoreError> {
         loop {
             let is_new = !folder.exists();
             make_folder(folder).map_err(StoreError::io("make the folder", folder))?;
             match Self::enter(folder, is_new) {
                 Ok(claim) => return Ok(claim),
-                // A process that recorded nothing has removed the folder that was made for it.
+                // A process that recorded nothing has removed the folder, which was created for it.
                 Err(_) if !folder.exists() => {}
                 Err(error) => {
                     if is_new {
@@ -63,7 +63,7 @@ impl FolderLock {
         if is_alone(&present, &path)? {
             clear(&parts)?;
         }
-        // Nobody can be alone here before the lock of the folder is given back.
+        // No process can find itself alone here until the folder's lock is released.
         present.lock_shared().map_err(StoreError::io("lock", &path))?;
         Ok(Self { folder: folder.to_owned(), is_new, present })
     }
@@ -89,7 +89,7 @@ impl FolderLock {
         if is_alone(&self.present, &path)? {
             clear(&parts)?;
             fs::remove_file(&path).map_err(StoreError::io("remove", &path))?;
-            // What is not empty stays: parts wait there for the recording to go on.
+            // A folder that is not empty stays: its parts wait for the recording to continue.
             let _ = fs::remove_dir(&parts);
             let lock = lock_of(&self.folder);
             fs::remove_file(&lock).map_err(StoreError::io("remove", &lock))?;
@@ -103,7 +103,7 @@ impl FolderLock {
 
 impl Drop for FolderLock {
     fn drop(&mut self) {
-        // What cannot be cleared away now is cleared away by the next recording.
+        // The next recording removes what cannot be removed now.
         let _ = self.leave();
     }
 }
@@ -121,7 +121,7 @@ fn clear(parts: &Path) -> Result<(), StoreError> {
     for entry in entries.map_err(StoreError::io("read", parts))? {
         let path = entry.path();
         if is_unfinished(&path) {
-            // The frames that a program was given are a folder.
+            // The frames of an external program are a folder.
             let removed = if path.is_dir() { fs::remove_dir_all(&path) } else { fs::remove_file(&path) };
             removed.map_err(StoreError::io("remove", &path))?;
         }
@@ -129,7 +129,7 @@ fn clear(parts: &Path) -> Result<(), StoreError> {
     Ok(())
 }
 
-/// Whether a file was being written, is the lock of an episode, or the log of one that did not get to its trace. Former
+/// Returns true for a temporary file, an episode's lock, or the log of an episode that is not in its trace. Former
 /// versions wrote logs as `.unfinished`.
 fn is_unfinished(path: &Path) -> bool {
     let has_ending = |ending: &str| path.extension().is_some_and(|found| found == ending);

@@ -1,4 +1,4 @@
-//! Reads what is in the folder of a recording, and never writes.
+//! Reads the content of a recording's folder, and never writes.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
@@ -21,7 +21,7 @@ use trace::merge::{self, EpisodeRows};
 use trace::open::TraceFile;
 use trace::schema::RECORDING_KEY;
 
-/// The recordings of one model and condition in a folder, which need not be there.
+/// The recordings of one model and condition in a folder, which may be missing.
 #[derive(Debug)]
 pub struct RecordingIndex {
     folder: PathBuf,
@@ -36,8 +36,8 @@ pub type Place = (i32, i32, i32);
 /// The episodes of a trace.
 type Places = Arc<BTreeSet<Place>>;
 
-/// What was read of a trace, good for as long as this file has its name. An open file's place on the disk is not used for
-/// another one.
+/// The content of a trace, valid as long as this file has its path. The file stays open, so that no other file gets its
+/// identity.
 #[derive(Debug)]
 struct InTrace {
     file: File,
@@ -45,7 +45,7 @@ struct InTrace {
 }
 
 impl RecordingIndex {
-    /// The recordings of a model in a folder, with what its traces say of how they were recorded.
+    /// The recordings of a model in a folder, with their traces' metadata.
     pub fn new(folder: &Path, subject: Subject, recordings: Recordings) -> Self {
         Self { folder: folder.to_owned(), subject, recordings, traces: Mutex::default() }
     }
@@ -68,7 +68,7 @@ impl RecordingIndex {
         self.trace(experiment).with_extension("mcap")
     }
 
-    /// The episodes of an experiment that are recorded, in the trace or as parts.
+    /// The recorded episodes of an experiment, in the trace or as parts.
     pub fn recorded(&self, experiment: Experiment) -> Result<BTreeSet<Place>, StoreError> {
         let episodes = self.episodes(experiment)?;
         self.check_log(experiment, &episodes)?;
@@ -83,8 +83,8 @@ impl RecordingIndex {
             self.check(experiment, path)?;
             episodes.extend(merge::read(path)?);
         }
-        // An episode that is in the trace and a part is the same one: the trace was put together, and the process ended
-        // before it removed the part.
+        // An episode both in the trace and as a part is the same one: the process ended between assembling the trace
+        // and removing the part.
         episodes.sort_by_key(|episode| (episode.seed, episode.run, episode.repetition));
         episodes.dedup_by(|later, earlier| later.episode_id == earlier.episode_id);
         Ok(episodes)

@@ -1,4 +1,4 @@
-//! Locks of the operating system: they end with the process that holds them, however it ends.
+//! Locks of the operating system: they end with the process in every case.
 
 use std::fs::{self, File, TryLockError};
 use std::io::{self, Read as _, Write as _};
@@ -6,24 +6,24 @@ use std::path::{Path, PathBuf};
 
 use super::super::error::StoreError;
 
-/// An episode that this process alone may record. Dropping it removes the file and gives the lock back.
+/// The exclusive right to record an episode. Dropping it removes the file and releases the lock.
 #[derive(Debug)]
 pub struct EpisodeLock {
     file: File,
     path: PathBuf,
 }
 
-/// The result of asking for an episode.
+/// The result of an attempt to lock an episode.
 #[derive(Debug)]
 pub enum Attempt {
     /// This process has it now.
     Ours(EpisodeLock),
-    /// Another process has it: its id, as far as the file tells.
+    /// Another process has it: its id, if the file contains it.
     Theirs(Option<u32>),
 }
 
 impl EpisodeLock {
-    /// Asks for the lock at `path`, and does not wait for it.
+    /// Tries to lock `path` without waiting.
     pub fn attempt(path: &Path) -> Result<Attempt, StoreError> {
         loop {
             let file = File::options().read(true).write(true).create(true).truncate(false).open(path);
@@ -34,7 +34,7 @@ impl EpisodeLock {
                     lock.sign().map_err(StoreError::io("write", path))?;
                     return Ok(Attempt::Ours(lock));
                 }
-                // The process that had it has removed the file: there is another one, or none.
+                // The previous owner has removed the file: another one exists, or none.
                 Ok(()) => {}
                 Err(TryLockError::WouldBlock) => return Ok(Attempt::Theirs(signature(&mut file))),
                 Err(TryLockError::Error(error)) => return Err(StoreError::io("lock", path)(error)),
@@ -50,7 +50,7 @@ impl EpisodeLock {
 
 impl Drop for EpisodeLock {
     fn drop(&mut self) {
-        // The file goes first: once the lock is given back it may be another process's. A file that stays is no lock.
+        // The file goes first: after the release, the path may belong to another process. A file that stays is no lock.
         let _ = fs::remove_file(&self.path);
         let _ = self.file.unlock();
     }
@@ -67,7 +67,7 @@ pub(in crate::record) fn lock_folder(folder: &Path) -> Result<File, StoreError> 
     loop {
         let file = File::create(&path).map_err(StoreError::io("write into the folder: cannot make", &path))?;
         file.lock().map_err(StoreError::io("lock", &path))?;
-        // The process that had it may have been the last to leave, and have removed the file: then it locks nothing.
+        // The previous owner may have left last and removed the file: then it locks nothing.
         if is_at(&file, &path) {
             return Ok(file);
         }

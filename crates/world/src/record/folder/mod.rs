@@ -1,4 +1,4 @@
-//! The folder of a recording: its files, its locks, its people.
+//! The folder of a recording: its files, locks and participants.
 
 pub(super) mod continued;
 pub mod failures;

@@ -1,4 +1,4 @@
-//! A person taken out of the folder of a recording: out of its traces, its logs, its labels and its journals.
+//! Removes a person from a recording's folder: from traces, logs, labels and journals.
 
 use std::collections::BTreeSet;
 use std::error::Error;
@@ -31,8 +31,8 @@ pub struct Removed {
 /// An error of removing a person.
 pub type RemovalError = Box<dyn Error + Send + Sync>;
 
-/// Removes all that a folder has of the person of this code. Nobody may record into it meanwhile: what they write is waited
-/// for.
+/// Removes all data of the person with this code from a folder. No process may record into it meanwhile; writes in
+/// progress are awaited.
 pub fn remove(folder: &Path, code: &str) -> Result<Removed, RemovalError> {
     let mut removed = remove_episodes(folder, code)?;
     removed.journal_lines = journal::remove(folder, code)?;
@@ -53,7 +53,7 @@ pub fn remove_episodes(folder: &Path, code: &str) -> Result<Removed, RemovalErro
     Ok(removed)
 }
 
-/// The trace last: what it still has is found again by the same command.
+/// The trace is last: until then, the same command finds the rest again.
 fn remove_from(trace: &Path, code: &str, removed: &mut Removed) -> Result<(), RemovalError> {
     let (own, others) = parted(trace, code)?;
     if own.is_empty() {

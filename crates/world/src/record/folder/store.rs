@@ -7,11 +7,11 @@
 //! OUT/.parts/E1-oracle-s1-r3.*     episodes that are whole, and not in the trace yet
 //! ```
 //!
-//! Rule: one process at a time plays an episode: the one that has its lock. The episode is written under a temporary name
-//! of that process, synchronised, and renamed, its trace last: it is there whole or not at all. The trace is put together
-//! from the parts and from what was there, by seed and run, and replaced in one step: when its experiment is complete, and
-//! at the end of the recording. So any number of processes may
-//! record into one folder, the same episodes or others, and together they leave the trace that one of them would.
+//! Rule: only the process with an episode's lock plays it. It writes the episode under a temporary name, synchronises
+//! and renames it, the trace last, so that it exists completely or not at all. The trace is assembled from the parts
+//! and its previous content, by seed and run, and replaced in one step: when its experiment is complete, and at the end
+//! of the recording. Any number of processes may record the same or different episodes into one folder; the trace is
+//! the same as that of a single one.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -42,19 +42,19 @@ pub struct Store {
     index: RecordingIndex,
 }
 
-/// Who has an episode to record.
+/// The owner of an episode to record.
 #[derive(Debug)]
 pub enum Claim {
-    /// This process's, as long as it keeps the lock.
+    /// This process, as long as it keeps the lock.
     Ours(EpisodeLock),
-    /// Another process's, of this id as far as it is known.
+    /// Another process, with this id if known.
     Theirs(Option<u32>),
-    /// Nobody's: the episode is recorded.
+    /// No process: the episode is already recorded.
     Recorded,
 }
 
 impl Store {
-    /// Opens the folder, which is made if need be.
+    /// Opens the folder, creating it if necessary.
     pub fn open(folder: &Path, subject: Subject, recordings: Recordings) -> Result<Self, StoreError> {
         Ok(Self { folder_lock: FolderLock::stake(folder)?, index: RecordingIndex::new(folder, subject, recordings) })
     }
@@ -82,14 +82,14 @@ impl Store {
         self.part(key).with_extension("mcap")
     }
 
-    /// The episodes of an experiment that are recorded, in the trace or as parts.
+    /// The recorded episodes of an experiment, in the trace or as parts.
     pub fn recorded(&self, experiment: Experiment) -> Result<BTreeSet<Place>, StoreError> {
-        // A part that another process is taking over into the trace is in neither for a moment.
+        // While another process moves a part into the trace, the episode may be in neither.
         let _lock = self.folder_lock.lock()?;
         self.index.recorded(experiment)
     }
 
-    /// Takes an episode, unless it is recorded or another process has it.
+    /// Locks an episode, unless it is recorded or another process has it.
     pub fn turn(&self, key: Key) -> Result<Claim, StoreError> {
         let lock = match EpisodeLock::attempt(&self.part(key).with_extension("lock"))? {
             Attempt::Theirs(process) => return Ok(Claim::Theirs(process)),
@@ -98,7 +98,7 @@ impl Store {
         if self.is_recorded(key)? {
             return Ok(Claim::Recorded);
         }
-        // A process that was killed before it committed the episode may have left its log.
+        // A process killed before it committed the episode may have left its log.
         let log = self.log_part(key);
         match fs::remove_file(&log) {
             Err(error) if error.kind() != io::ErrorKind::NotFound => Err(StoreError::io("remove", &log)(error)),
@@ -107,13 +107,13 @@ impl Store {
     }
 
     fn is_recorded(&self, key: Key) -> Result<bool, StoreError> {
-        // In this order: a part is removed only when its episode is in the trace.
+        // The order matters: a part is removed only after its episode is in the trace.
         Ok(self.part(key).exists()
             || self.index.in_trace(key.experiment)?.contains(&(key.seed, key.run, key.repetition)))
     }
 
-    /// Brings the list of lost episodes up to date: these are recorded, those were lost now. Gives those of them that no
-    /// other process has recorded by now.
+    /// Updates the list of lost episodes: removes the recorded ones and adds those lost now. Returns the lost ones that
+    /// no other process has recorded by now.
     pub fn note_lost(&self, recorded: &[Key], lost: Vec<(Key, LostEpisode)>) -> Result<Vec<LostEpisode>, StoreError> {
         let _lock = self.folder_lock.lock()?;
         let mut recorded: BTreeSet<Key> = recorded.iter().copied().collect();
@@ -135,13 +135,13 @@ impl Store {
         failures::list_of(self.folder_lock.folder())
     }
 
-    /// The fingerprint of an episode, given the id of the model as the provider returned it, and the renderer of the
-    /// frames that the agent saw.
+    /// The fingerprint of an episode, given the model's id as the provider returned it and the renderer of the frames
+    /// that the agent saw.
     pub fn fingerprint(&self, key: Key, model: Option<&str>, renderer: Option<&Renderer>) -> Fingerprint {
         Fingerprint::of(self.index.recording(key.experiment), model, renderer)
     }
 
-    /// Commits an episode whose log, if there is one, is committed already.
+    /// Commits an episode whose log, if any, is already committed.
     pub fn commit(&self, key: Key, episode: &Episode, fingerprint: &Fingerprint) -> Result<(), StoreError> {
         let path = self.part(key);
         let mut recording = self.index.recording(key.experiment).clone();
@@ -153,7 +153,7 @@ impl Store {
         Ok(writer.finish()?)
     }
 
-    /// Puts the trace and the log of an experiment together from what is there; nothing if there are no parts.
+    /// Assembles the trace and the log of an experiment from its parts; does nothing without parts.
     pub fn assemble(&self, experiment: Experiment) -> Result<(), StoreError> {
         let _lock = self.folder_lock.lock()?;
         let parts = self.index.parts_of(experiment)?;
@@ -186,7 +186,7 @@ impl Store {
         Ok(json!(all))
     }
 
-    /// What drew the frames that the agent saw in the traces of these experiments, each once.
+    /// The renderers of the frames that agents saw in these experiments' traces, without duplicates.
     pub fn renderers(&self, experiments: &[Experiment]) -> Result<Vec<Renderer>, StoreError> {
         let mut found = Vec::new();
         for trace in experiments.iter().map(|experiment| self.trace(*experiment)).filter(|trace| trace.exists()) {

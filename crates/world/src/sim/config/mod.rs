@@ -1,8 +1,8 @@
-//! Every size, speed, light and threshold of the world, from one documented file.
+//! The sizes, speeds, lights and thresholds of the world, from one documented file.
 //!
-//! `assets/world/default.toml` is the world of the study. A file of one's own lies over it: it says what differs.
-//! Rule: what is loaded has been checked; every key that is unknown, of another type, out of its range or does not fit
-//! another is refused. The hash is of the values, not of the text that gave them.
+//! `assets/world/default.toml` is the world of the study. A user's file overrides its values.
+//! Rule: a loaded configuration is valid; unknown keys, wrong types, values out of range and inconsistent keys are
+//! rejected. The hash covers the values, not the text.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -21,7 +21,7 @@ use toml_spec::{At, Fault, Faults, Shape, Source, lay};
 
 const DEFAULT: &str = include_str!("../../../../../assets/world/default.toml");
 
-/// The default, which a test of this module loads as any other.
+/// The default, which a test of this module loads like any other file.
 static DEFAULT_CONFIG: LazyLock<WorldConfig> =
     LazyLock::new(|| toml::from_str(DEFAULT).expect("the built-in configuration is tested to load"));
 
@@ -298,19 +298,19 @@ impl Default for WorldConfig {
 const LARGEST: Limit = Limit::new("bytes of a world", 1 << 20);
 
 impl WorldConfig {
-    /// The text of the default, with what each key means.
+    /// The text of the default, which explains each key.
     pub const fn default_text() -> &'static str {
         DEFAULT
     }
 
-    /// The default with a file's values over it.
+    /// The default, overridden by a file's values.
     pub fn load(path: &Path) -> Result<Self, ConfigError> {
         let text =
             input::text(path, LARGEST).map_err(|source| ConfigError::Unreadable { path: path.to_owned(), source })?;
         Ok(Self::read(Source { name: path.display().to_string(), text })?)
     }
 
-    /// The default with the values of `text` over it.
+    /// The default, overridden by the values of `text`.
     pub fn from_toml(text: &str) -> Result<Self, Faults> {
         Self::read(Source { name: "world configuration".to_owned(), text: text.to_owned() })
     }
@@ -351,7 +351,7 @@ impl WorldConfig {
             (["clutter", "mirror_distance"], clutter.mirror_distance, 1.0, room.size / 2.0),
         ];
         let fault = |([table, key], value, least, most): ([&str; 2], f64, f64, f64)| {
-            // Written so that what is no number is a fault too.
+            // This form also rejects NaN.
             let holds = value >= least && value <= most;
             let message = format!("`{table}.{key}` may be {least} to {most}, but is {value}");
             (!holds).then(|| at.key(table).key(key).fault(message))
@@ -359,7 +359,7 @@ impl WorldConfig {
         limits.into_iter().filter_map(fault).collect()
     }
 
-    /// The world as an experiment has it: what the experiment says of lengths and counts lies over this.
+    /// The world for an experiment, whose lengths and counts override this configuration.
     #[must_use]
     pub fn of(&self, experiment: Experiment) -> Self {
         let mut world = self.clone();
@@ -394,7 +394,7 @@ impl WorldConfig {
         world
     }
 
-    /// SHA-256 of the values, 64 hexadecimal digits: the same for files that say the same in other words.
+    /// SHA-256 of the values, 64 hexadecimal digits: the same for files with equal values.
     pub fn hash(&self) -> String {
         hash::of_bytes(serde_json::json!(self).to_string().as_bytes())
     }
@@ -404,8 +404,8 @@ impl WorldConfig {
     }
 }
 
-/// The camera behind the body: before its axis and above the floor, m, and below the horizon, degrees: the slope of the
-/// line from there to a point 1.7 m above where the body stands, 0.3 m down on 1.1 m ahead. No more digits than recordings keep.
+/// The camera behind the body: ahead of its axis and above the floor, m, and below the horizon, degrees. The slope
+/// leads to a point 1.7 m above the body's spot, 0.3 m down on 1.1 m ahead, with no more digits than recordings keep.
 const BEHIND: (f64, f64, f64) = (-1.1, 2.0, 15.255_118_7);
 
 pub fn metres(millimetres: u32) -> f64 {

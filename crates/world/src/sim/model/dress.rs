@@ -1,4 +1,4 @@
-//! The changes of a scene to the model: the places of panes, its cubes, bodies and marks, and all colours.
+//! A scene's changes to the model: the places of panes, its cubes, bodies and marks, and all colours.
 
 use mujoco_rs::prelude::MjModel;
 use mujoco_rs::prelude::MjtObjBase;
@@ -14,7 +14,7 @@ use trace::palette::Color;
 /// Half the depth of a pane, m.
 const HALF_DEPTH: f64 = 0.000_05;
 
-/// The paint of a pane, over which what is seen in it is laid; it shows at most at the edges of what stands before it.
+/// The paint of a pane, which its image covers; it shows at most at the edges of things before it.
 const BLANK: [u8; 3] = [128, 132, 138];
 
 /// Walls by their quarter turns from +x.
@@ -83,7 +83,7 @@ pub(super) fn label(model: &mut MjModel, items: &[Item]) {
             Item::Pane(pane) => paint([0, step(pane + 1), 0]),
             item => {
                 let [red, green, blue, opacity] = paint([step(number(item)), 0, 0]);
-                // So that a mark that appears keeps its label.
+                // Ensures that a mark that appears keeps its label.
                 [red, if matches!(item, Item::Mark(_)) { LABEL_GREEN } else { green }, blue, opacity]
             }
         };
@@ -92,7 +92,7 @@ pub(super) fn label(model: &mut MjModel, items: &[Item]) {
 
 const STEP: usize = 8;
 
-/// Too little green to show in eight bits.
+/// Too little green to be visible in eight bits.
 const LABEL_GREEN: f32 = 0.001;
 
 fn step(number: usize) -> u8 {
@@ -113,13 +113,13 @@ fn number(item: Item) -> usize {
 /// The meaning of a label's colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Labelled {
-    /// Something that is seen itself.
+    /// A thing that is seen directly.
     Item(Item),
-    /// A pane, whatever is seen in it.
+    /// A pane, regardless of its content.
     Pane(usize),
 }
 
-/// The meaning of the label with this red and green; `None` without one.
+/// The meaning of the label with this red and green; `None` for no label.
 pub fn labelled([red, green]: [u8; 2]) -> Option<Labelled> {
     let number = |part: u8| (usize::from(part) % STEP == 0).then_some(usize::from(part) / STEP);
     let (red, green) = (number(red)?, number(green)?);
@@ -138,7 +138,7 @@ pub fn labelled([red, green]: [u8; 2]) -> Option<Labelled> {
 
 fn hide_wall(model: &mut MjModel, geom: usize, pane: Option<&HungPane>) {
     let Some(pane) = pane else { return };
-    // The second room is the first one moved by its size: the look enters by the wall across.
+    // The second room is the first one moved by its size: the view enters through the wall across.
     let across = if pane.kind == PaneKind::Window { 2 } else { 0 };
     let wall = WALLS[usize::from((pane.place.wall + across) % 4)];
     if model.id_to_name(MjtObjBase::mjOBJ_GEOM, geom) == Some(wall) {
@@ -154,7 +154,7 @@ fn hang(model: &mut MjModel, geom: usize, pane: Option<&HungPane>, config: &Worl
     let [x, y] = pane.place.center(config);
     let [out_x, out_y] = pane.place.heading().direction();
     let half = [pane.height / 2.0, pane.width / 2.0, HALF_DEPTH];
-    // Its face, not its middle, is where a pane hangs.
+    // A pane is placed by its face, not by its middle.
     model.geom_pos_mut()[geom] = [x + HALF_DEPTH * out_x, y + HALF_DEPTH * out_y, pane.center_height];
     model.geom_quat_mut()[geom] = facing_inwards(pane.place.heading()).0;
     model.geom_group_mut()[geom] = group::ROOM;
@@ -166,7 +166,7 @@ fn hang(model: &mut MjModel, geom: usize, pane: Option<&HungPane>, config: &Worl
 /// Half of the width of a frame's bars, m.
 const HALF_BAR: f64 = 0.03;
 
-/// Puts a bar of a frame beside its pane, flush with it, so that it hides nothing; only the look itself shows frames.
+/// Puts a frame's bar beside its pane, flush with it, so that it hides nothing; only direct views show frames.
 fn frame(model: &mut MjModel, geom: usize, scene: &Scene, look: Look, config: &WorldConfig) {
     let name = model.id_to_name(MjtObjBase::mjOBJ_GEOM, geom).unwrap_or_default();
     let Some(number) = name.strip_prefix("frame").and_then(|digits| digits.parse::<usize>().ok()) else { return };
@@ -178,7 +178,7 @@ fn frame(model: &mut MjModel, geom: usize, scene: &Scene, look: Look, config: &W
     let [x, y] = pane.place.center(config);
     let [out_x, out_y] = pane.place.heading().direction();
     let (up, side) = (pane.height / 2.0 + HALF_BAR, pane.width / 2.0 + HALF_BAR);
-    // Off the middle of the pane: upwards, and to the left of one who faces it.
+    // Relative to the middle of the pane: upwards, and to the left of a viewer who faces it.
     let (rise, aside, half) = match number % BARS {
         0 => (up, 0.0, [HALF_BAR, side + HALF_BAR]),
         1 => (-up, 0.0, [HALF_BAR, side + HALF_BAR]),
@@ -213,7 +213,7 @@ fn put_cube(model: &mut MjModel, geom: usize, cube: Option<&Cube>) {
     model.geom_pos_mut()[geom] = [cube.x, cube.y, cube.base + half];
     model.geom_quat_mut()[geom] = [1.0, 0.0, 0.0, 0.0];
     model.geom_size_mut()[geom] = [half; 3];
-    // Of the sphere about it, by which a renderer leaves out what is not in view.
+    // The radius of the sphere around it, by which a renderer culls invisible things.
     model.geom_rbound_mut()[geom] = half * 2.0;
     model.geom_rgba_mut()[geom] = paint(cube.color.rgb());
 }

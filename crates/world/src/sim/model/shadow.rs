@@ -1,6 +1,6 @@
-//! Soft shadows of the textured look: thin layers on the floor under bodies and cubes, the wider the fainter.
+//! Soft shadows of the textured look: thin layers on the floor under bodies and cubes, fainter with width.
 //!
-//! Rule: a shadow is part of the room: no label, count or log has it.
+//! Rule: a shadow is part of the room: labels, counts and logs do not contain it.
 
 use mujoco_rs::prelude::{MjEditError, MjModel, MjSpec, MjtGeomBase, SpecItem};
 
@@ -8,22 +8,22 @@ use super::{AGENTS, BODIES, body_name, group};
 use crate::experiment::spec::PaneKind;
 use crate::sim::scene::{HungPane, MOST_CUBES, Scene};
 
-/// Part of the names of all layers, behind that of what throws them.
+/// The infix of all layers' names, after the owner's name.
 pub(super) const NAMED: &str = "_shadow";
 
-/// The width of each layer beyond what throws it, m.
+/// The width of each layer beyond its owner, m.
 const RIMS: [f64; 4] = [0.0, 0.06, 0.12, 0.18];
 
 /// The radius of the innermost layer under a body, m.
 const UNDER_BODY: f64 = 0.14;
 
-/// From layer to layer, m: more than drawing confuses at the other end of a room.
+/// The distance between layers, m: enough for depth precision at the other end of a room.
 const RISE: f64 = 0.002;
 
-/// What each layer takes of the light.
+/// The share of light that each layer absorbs.
 const SHADE: f32 = 0.13;
 
-/// Adds the layers to a model; a body takes its own along.
+/// Adds the layers to a model; a body's layers move with it.
 pub(super) fn build(spec: &mut MjSpec) -> Result<(), MjEditError> {
     for body in (0..BODIES).map(body_name) {
         layers(|at, rim| {
@@ -42,7 +42,7 @@ pub(super) fn build(spec: &mut MjSpec) -> Result<(), MjEditError> {
             let geom = spec.world_body_mut().add_geom();
             geom.set_type(MjtGeomBase::mjGEOM_BOX);
             *geom.size_mut() = [1.0, 1.0, RISE / 8.0];
-            // MuJoCo never moves what it finds at the origin when it compiles.
+            // MuJoCo never moves things that are at the origin when it compiles.
             *geom.pos_mut() = [0.0, 0.0, -50.0];
             *geom.rgba_mut() = [0.0, 0.0, 0.0, SHADE];
             geom.set_contype(0);
@@ -63,7 +63,7 @@ fn height(at: usize) -> f64 {
     RISE * above
 }
 
-/// Puts a layer under the cube that throws it, and shows it where that is seen.
+/// Puts a cube's layer under it; shows layers in the views that show their owners.
 pub(super) fn dress(model: &mut MjModel, geom: usize, name: &str, scene: &Scene, pane: Option<(usize, &HungPane)>) {
     let Some((owner, layer)) = name.split_once(NAMED) else { return };
     let layer: usize = layer.parse().unwrap_or(0);

@@ -1,10 +1,10 @@
-//! Pictures: what the agent sees, the same in colours that name things, and the room from above.
+//! Pictures: the agent's view, the same view in label colours, and the room from above.
 //!
-//! MuJoCo draws one mirror at most, and that one as it is now. So panes are blank in a first picture; what is seen through
-//! each is a picture of its own, drawn from beyond it, of which the pixels are taken that show the pane by their rays.
+//! MuJoCo draws at most one mirror, in its current state. So the first picture has blank panes. The view through each
+//! pane is a separate picture from beyond it, and its pixels are copied where rays show the pane.
 //!
-//! Rule: an eye draws any world of its configuration, one after the other, and none of them leaves a trace in it. It
-//! belongs to the thread that made it.
+//! Rule: a camera draws any worlds of its configuration in turn, and keeps no state between them. It belongs to the
+//! thread that made it.
 
 use std::sync::Arc;
 
@@ -40,7 +40,7 @@ pub enum CameraError {
     Failed { reason: String },
 }
 
-/// The ceiling's place among the groups of a picture.
+/// The ceiling's index in a picture's groups.
 const CEILING: usize = group::CEILING as usize;
 
 /// One renderer.
@@ -60,12 +60,12 @@ impl std::fmt::Debug for Camera {
 }
 
 impl Camera {
-    /// An eye for the worlds of a configuration.
+    /// A camera for the worlds of a configuration.
     pub fn new(config: &WorldConfig) -> Result<Self, CameraError> {
         Self::sized(config, config.eye.width as usize, config.eye.height_px as usize)
     }
 
-    /// An eye whose pictures have another size.
+    /// A camera with another picture size.
     pub fn sized(config: &WorldConfig, width: usize, height: usize) -> Result<Self, CameraError> {
         Self::painted(config, Paint::Lit, width, height)
     }
@@ -78,18 +78,18 @@ impl Camera {
         Ok(Self { width, height, data: MjData::new(model), renderer, draws_all: false, drawn_by })
     }
 
-    /// What draws its pictures.
+    /// The renderer of its pictures.
     pub const fn drawn_by(&self) -> &Renderer {
         &self.drawn_by
     }
 
-    /// Draws what is out of view too, panes included, as MuJoCo's own mirror does, which changes no picture: what a test and
-    /// a benchmark hold the pictures against.
+    /// Draws things out of view too, including panes, as MuJoCo's own mirror does. It changes no picture; a test and a
+    /// benchmark compare with it.
     pub const fn draw_all(&mut self, all: bool) {
         self.draws_all = all;
     }
 
-    /// Draws the agent's view: the room, and the image of each pane over it.
+    /// Draws the agent's view: the room, overlaid with the image of each pane.
     pub fn frame(&mut self, world: &World) -> Result<Frame, CameraError> {
         let size = [self.width, self.height];
         let whole = Rectangle { left: 0, right: self.width, top: 0, bottom: self.height };
@@ -129,7 +129,7 @@ impl Camera {
         self.draw(world.stage(), TOP_CAMERA, None)
     }
 
-    /// Draws a stage, all of it or the geoms that may be in view: MuJoCo draws what is behind the eye too, which takes most
+    /// Draws a stage, or only the geoms that may be in view: MuJoCo also draws things behind the eye, which takes most
     /// of its time.
     fn draw(&mut self, stage: &Stage, camera: &str, in_view: Option<&[bool]>) -> Result<Frame, CameraError> {
         let model = match in_view.filter(|_| !self.draws_all) {
@@ -156,7 +156,7 @@ impl Camera {
     }
 }
 
-/// Lays the pixels of `over` that are asked for over a frame of the same size.
+/// Copies the selected pixels of `over` to a frame of the same size.
 fn overlay(frame: &mut Frame, over: &Frame, is_asked: impl Fn(usize) -> bool) {
     let pixels = frame.rgb.chunks_exact_mut(3).zip(over.rgb.chunks_exact(3)).enumerate();
     for (_, (pixel, seen)) in pixels.filter(|(at, _)| is_asked(*at)) {
@@ -164,7 +164,7 @@ fn overlay(frame: &mut Frame, over: &Frame, is_asked: impl Fn(usize) -> bool) {
     }
 }
 
-/// What glass takes of red, green and blue, of 256.
+/// The shares of red, green and blue that glass reflects, of 256.
 const GLASS: [u16; 3] = [242, 250, 246];
 
 fn tint(frame: &mut Frame, is_asked: impl Fn(usize) -> bool) {
@@ -181,7 +181,7 @@ fn flipped(frame: &Frame) -> Frame {
     Frame::new(frame.width, frame.height, rgb)
 }
 
-/// An eye for labels: it draws every pixel in the colour that names what is there, through the mirror too.
+/// A camera for labels: every pixel has the colour of its label, in the mirror too.
 #[derive(Debug)]
 pub struct LabelCamera {
     eye: Camera,
@@ -189,7 +189,7 @@ pub struct LabelCamera {
 }
 
 impl LabelCamera {
-    /// An eye for labels of views of some size.
+    /// A camera for labels with a view of this size.
     pub fn new(config: &WorldConfig, width: usize, height: usize) -> Result<Self, CameraError> {
         Ok(Self { eye: Camera::painted(config, Paint::Labels, width, height)?, painted: None })
     }

@@ -1,7 +1,7 @@
-//! The contact sheet: experiments from above and as the agent sees them, with a line of words under each picture.
+//! The contact sheet: experiments from above and from the agent's view, with a caption under each picture.
 //!
-//! Rule: a sheet is a function of the configuration, the experiments and the seed, so that a changed world shows as a
-//! changed picture.
+//! Rule: a sheet is a function of the configuration, the experiments and the seed, so that a changed world changes the
+//! picture.
 
 use std::fmt::Write as _;
 
@@ -18,10 +18,10 @@ use super::super::world::World;
 use report::figures::kit::convert::{self, ConvertError};
 use trace::frame::Frame;
 
-/// Pixels of a picture to one of the sheet, along each side.
+/// The scale of pictures on the sheet: pixels per pixel of the sheet, along each side.
 const SHRINK: usize = 2;
 
-/// Room for the words under a picture, px.
+/// The height of a caption, px.
 const CAPTION: usize = 22;
 
 const GAP: usize = 6;
@@ -42,7 +42,7 @@ pub enum ContactSheetError {
     Png(String),
 }
 
-/// A picture and the words under it.
+/// A picture and its caption.
 struct Picture {
     frame: Frame,
     caption: String,
@@ -54,8 +54,8 @@ pub fn png(config: &WorldConfig, experiments: &[Experiment], seed: i32) -> Resul
     compose(&rows.collect::<Result<Vec<_>, _>>()?)
 }
 
-/// From above; at the start; before the mirror, near and from aside, with every mark. The pictures are as the experiment has
-/// them.
+/// From above; at the start; before the mirror, nearby and from the side, with every mark. The pictures use the
+/// experiment's settings.
 fn row(config: &WorldConfig, experiment: Experiment, seed: i32) -> Result<Vec<Picture>, ContactSheetError> {
     let eye = &mut Camera::new(&config.of(experiment))?;
     let scene = Scene::draw(config, experiment, seed, 1)?;
@@ -130,7 +130,7 @@ fn compose(rows: &[Vec<Picture>]) -> Result<Vec<u8>, ContactSheetError> {
     sheet.encode_png().map_err(|error| ContactSheetError::Png(error.to_string()))
 }
 
-/// Puts a picture on the sheet, each of its pixels the mean of a block.
+/// Puts a picture on the sheet; each pixel is the mean of a block.
 fn paste(sheet: &mut Pixmap, frame: &Frame, corner: [usize; 2]) {
     let stride = sheet.width() as usize;
     for y in 0..frame.height / SHRINK {

@@ -1,4 +1,4 @@
-//! A picture of labels: what each pixel of a view shows, as a code.
+//! A picture of labels: the content of each pixel of a view, as a code.
 
 /// The label of every pixel, row by row from the top.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -12,7 +12,7 @@ pub struct LabelImage {
 }
 
 impl LabelImage {
-    /// The smallest rectangle about all pixels whose code is asked for; `None` where there are none.
+    /// The bounding rectangle of all pixels with selected codes; `None` if there are none.
     pub(in crate::sim) fn around(&self, is_asked: impl Fn(&u8) -> bool) -> Option<Rectangle> {
         let mut found: Option<Rectangle> = None;
         for (y, row) in self.codes.chunks_exact(self.width.max(1)).enumerate() {
@@ -40,7 +40,7 @@ pub(in crate::sim) struct Rectangle {
 }
 
 impl Rectangle {
-    /// Whether the two have a pixel in common, or nearly: drawing smooths edges over the pixels beside them.
+    /// Returns true if the two overlap or nearly do: drawing smooths edges over neighbouring pixels.
     pub(in crate::sim) const fn meets(self, other: Self) -> bool {
         const NEARLY: usize = 2;
         self.left < other.right + NEARLY

@@ -1,11 +1,11 @@
-//! What draws the frames of this process.
+//! The renderer of this process's frames.
 
 use trace::renderer::Renderer;
 
-/// Names of renderers that draw with the processor.
+/// Names of software renderers.
 const SOFTWARE: [&str; 4] = ["llvmpipe", "softpipe", "swrast", "SwiftShader"];
 
-/// What limits the extensions that Mesa uses.
+/// The environment variable that limits the processor extensions used by Mesa.
 const LIMIT: &str = "GALLIUM_OVERRIDE_CPU_CAPS";
 
 /// The renderer of the context that is current on this thread.
@@ -18,7 +18,7 @@ pub fn current() -> Renderer {
     Renderer { name: renderer, version: Some(version), vendor: Some(vendor), processor }
 }
 
-/// The extensions of the processor, or the limit that the environment sets.
+/// The extensions of the processor, or the limit from the environment.
 fn processor() -> String {
     let limit = std::env::var(LIMIT).ok().filter(|limit| !limit.is_empty());
     let extensions = limit.map_or_else(extensions, |limit| format!("limited to {limit}"));

@@ -1,7 +1,7 @@
 //! Mirrors and windows with their places and contents, and the marks on bodies.
 //!
-//! Rule: all of this is drawn from a stream of its own after the layout, so that experiments that differ in it alone have
-//! the same layout, and from the name of their scenes, so that what two of them have in common is drawn alike.
+//! Rule: all of this is drawn from a separate stream after the layout, so experiments that differ only here have the
+//! same layout. The stream depends on the name of their scenes, so shared features are drawn alike.
 
 use super::super::angle::{HEADINGS, Heading};
 use super::super::body::Pose;
@@ -14,16 +14,16 @@ use crate::experiment::Experiment;
 use crate::experiment::spec::{BodyShown, Hand, Mark, MarkColor, Paint, Pane, PaneKind, Part, Stated, Wall, Wearer};
 use trace::palette::Color;
 
-/// Places that are drawn for a pane until one is out of view at the start.
+/// The maximum number of draws for a pane to be out of view at the start.
 const PLACES: u32 = 40;
 
-/// Places that are drawn for a hand until one is free and as far from the mark as asked for.
+/// The maximum number of draws for a hand to be free and at the required distance.
 const STARTS: u32 = 2000;
 
-/// Apart from the layout's stream.
+/// Separates this stream from the layout's.
 const PURPOSE: u64 = 0x7061_6e65_7300;
 
-/// The layout that panes and marks come to.
+/// The layout to which panes and marks are added.
 pub(super) struct Layout<'a> {
     pub config: &'a WorldConfig,
     pub experiment: Experiment,
@@ -34,7 +34,7 @@ pub(super) struct Layout<'a> {
     pub start: Pose,
 }
 
-/// The draws besides the layout.
+/// The draws in addition to the layout.
 #[derive(Debug, Default)]
 pub(super) struct Extras {
     pub stated_color: Option<Color>,
@@ -46,7 +46,7 @@ pub(super) struct Extras {
 impl Layout<'_> {
     pub(super) fn extras(&self, purpose: u64, seed: i32, run: i32) -> Extras {
         let stream = |at: u64| Rng::of(purpose ^ (PURPOSE + at), seed, run);
-        // A stream each, so that one that is not needed changes no other.
+        // Separate streams, so that an unused one does not affect the others.
         let mut marks: Vec<WornMark> = Vec::new();
         for (at, mark) in (16_u64..).zip(&self.experiment.marks) {
             marks.extend(self.worn(*mark, &marks, &mut stream(at)));
@@ -72,8 +72,8 @@ impl Layout<'_> {
         Extras { stated_color, panes, marks, hand }
     }
 
-    /// A hand that is neither of the body's colour nor of its mark's, and starts on the near side of the mirror, free of
-    /// the body; `None` where no such place is as far from the mark as asked for.
+    /// A hand in neither the body's nor its mark's colour, which starts on the near side of the mirror, outside the
+    /// body; `None` if no such place has the required distance.
     fn hand(&self, task: Hand, marks: &[WornMark], chance: &mut Rng) -> Option<HandStart> {
         let taken = |color: Color| color == self.body_color || marks.iter().any(|mark| mark.color == color);
         let palette = &self.experiment.layout.palette;
@@ -96,7 +96,7 @@ impl Layout<'_> {
         (0..STARTS).map(|_| draw(chance)).find(fits)
     }
 
-    /// Another colour than the body's, and than that of mark and hand, which would not show on a body that has it.
+    /// A colour other than those of the body, its mark and the hand, which would be invisible on a body of that colour.
     fn color_beside(&self, hand: HandStart, marks: &[WornMark], chance: &mut Rng) -> Color {
         let taken = |color: Color| {
             color == self.body_color || color == hand.color || marks.iter().any(|mark| mark.color == color)
@@ -139,7 +139,7 @@ impl Layout<'_> {
         let room = &self.config.room;
         let width = pane.width_mm.map_or(mirror.width, metres);
         let height = pane.height_mm.map_or(mirror.height, metres).min(room.height);
-        // A wide pane moves towards the middle of its wall, a high one to where it fits.
+        // A wide pane moves towards the middle of its wall, a high one to a height where it fits.
         let slack = (room.size / 2.0 - width / 2.0).max(0.0);
         let place = MirrorPlace { offset: place.offset.clamp(-slack, slack), ..place };
         let center_height = pane.bottom_mm.map_or(mirror.center_height, |bottom| metres(bottom) + height / 2.0);
@@ -162,7 +162,7 @@ impl Layout<'_> {
         }
     }
 
-    /// A body that walks about, at first in view of a caller that stands before the pane.
+    /// A walking body, initially in view of an observer before the pane.
     fn double(&self, pane: &Pane, place: MirrorPlace, color: Color, chance: &mut Rng) -> Other {
         let [out_x, out_y] = place.heading().direction();
         // The second room is the first one moved: its opening is in the wall across.
@@ -183,7 +183,7 @@ impl Layout<'_> {
         Other { color, start: Pose { x: spot[0], y: spot[1], heading }, habit }
     }
 
-    /// A mark on a body, in a colour that neither its wearer nor a mark before it has.
+    /// A mark on a body, in a colour other than its wearer's and the earlier marks'.
     fn worn(&self, mark: Mark, before: &[WornMark], chance: &mut Rng) -> Option<WornMark> {
         let (wearer, body) = match mark.on {
             Wearer::Own => (0, self.body_color),

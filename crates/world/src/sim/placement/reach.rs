@@ -1,4 +1,4 @@
-//! The check that a scene can be solved: the agent can walk to a place where it sees itself, and to every candidate.
+//! The check that a scene is solvable: the agent can walk to a place where it sees itself, and to every candidate.
 
 use std::collections::VecDeque;
 
@@ -8,22 +8,22 @@ use super::super::scene::{Cube, Scene};
 use super::Occlusion;
 use crate::experiment::spec::Cubes;
 
-/// Between two points of the lattice that represents the floor, m.
+/// The distance between points of the floor's lattice, m.
 const LATTICE: f64 = 0.4;
 
-/// A body sees itself well from no further than this from the mirror, m.
+/// The maximum distance from the mirror at which a body sees itself well, m.
 const NEAR_ENOUGH: f64 = 3.0;
 
-/// Heights of the body at which it is looked for in the mirror, m above the floor, and places across it, m.
+/// Tested heights of the body in the mirror, m above the floor, and tested places across it, m.
 const HEIGHTS: [f64; 5] = [0.3, 0.6, 0.9, 1.15, 1.4];
 const ACROSS: [f64; 3] = [-0.16, 0.0, 0.16];
 
 /// The share of the body that must be visible for self-identification.
 const ENOUGH: f64 = 0.75;
 
-/// Whether the agent can walk to a place before the mirror with its reflection clear, and to each candidate, within a
-/// third of the episode each; and whether clutter, where there is any, hides half of the body or more from as many
-/// of the places before the mirror as asked for (paper, section 3: mirror evidence in E5 is partial or occluded).
+/// Returns true if the agent can walk to a place with a clear reflection, and to each candidate, within a third of the
+/// episode each. Clutter, if any, must hide at least half of the body from the required share of places before the
+/// mirror (paper, section 3: mirror evidence in E5 is partial or occluded).
 pub(super) fn is_solvable(config: &WorldConfig, scene: &Scene, plan: &FloorPlan) -> bool {
     let near = near(config, scene, plan);
     let shares = shares(config, scene, &near);
@@ -42,18 +42,18 @@ fn near(config: &WorldConfig, scene: &Scene, plan: &FloorPlan) -> Vec<[f64; 2]> 
     lengths(scene, plan).into_iter().filter(|(_, length)| *length <= budget).map(|(spot, _)| spot).collect()
 }
 
-/// The shares of the body that show in the mirror, from those of some places that are before it.
+/// The visible shares of the body in the mirror, from those of these places that are before it.
 fn shares(config: &WorldConfig, scene: &Scene, near: &[[f64; 2]]) -> Vec<f64> {
     near.iter().filter_map(|spot| share_shown(config, scene, *spot)).collect()
 }
 
-/// What cubes hide from the places before the mirror in a scene.
+/// The occlusion by cubes, from the places before the mirror in a scene.
 pub(super) fn occlusion(config: &WorldConfig, scene: &Scene) -> Occlusion {
     Occlusion::of_shares(&shares(config, scene, &near(config, scene, &scene.floor_plan(config))))
 }
 
-/// What share of the body one who is there and faces the mirror squarely sees of it; `None` where that place is not
-/// before the mirror, or too far from it.
+/// The share of its body that an agent here sees when it faces the mirror squarely; `None` if the place is not before
+/// the mirror, or too far from it.
 fn share_shown(config: &WorldConfig, scene: &Scene, spot: [f64; 2]) -> Option<f64> {
     let mirror = scene.mirror;
     let away = mirror.distance(spot, config);
@@ -65,8 +65,8 @@ fn share_shown(config: &WorldConfig, scene: &Scene, spot: [f64; 2]) -> Option<f6
     is_before.then(|| shown as f64 / points().count() as f64)
 }
 
-/// Whether a cube hides a point of the body, at this place across it and this height, from one who looks into the mirror:
-/// on the way to the mirror, or on the way back from it.
+/// Returns true if a cube hides the point of the body at this place across it and this height from an agent who looks
+/// into the mirror. It may be on the way to the mirror or back.
 fn is_hidden(config: &WorldConfig, scene: &Scene, cube: &Cube, spot: [f64; 2], [across, height]: [f64; 2]) -> bool {
     let mirror = scene.mirror;
     let (away, depth) = (mirror.distance(spot, config), mirror.distance([cube.x, cube.y], config));

@@ -1,4 +1,4 @@
-//! The looks over the view, direct and through each pane, a row at a time, each part within its own rectangle of pixels.
+//! Views over the pixels, direct and through each pane, row by row, each part within its bounding rectangle.
 
 use super::super::label_image::Rectangle;
 use super::super::model::{Item, Look, Stage};
@@ -6,13 +6,13 @@ use super::super::world::World;
 use super::shape::{Part, solid};
 use super::view::{Shown, View};
 
-/// A part and where it can be seen.
+/// A part and its bounding rectangle.
 struct Candidate {
     part: Part,
     rectangle: Rectangle,
 }
 
-/// One of the looks, and what can be in it.
+/// One of the views, and its candidates.
 struct Pass {
     view: View,
     candidates: Vec<Candidate>,
@@ -65,7 +65,7 @@ impl Pass {
         Self { view, candidates, depths: vec![f64::INFINITY; view.width] }
     }
 
-    /// Puts the code of the nearest part over each pixel of a row that is open to it.
+    /// Writes the code of the nearest part to each open pixel of a row.
     fn paint(&mut self, y: usize, row: &mut [u8], is_open: impl Fn(u8) -> bool) {
         self.depths.fill(f64::INFINITY);
         let view = self.view;

@@ -1,4 +1,4 @@
-//! The pixel counts of a step by trace column, for recordings, replays and counts anew.
+//! The pixel counts of a step by trace column, for recordings, replays and recounts.
 
 use crate::experiment::spec::{MOST_MARKS, MOST_PANES};
 use crate::sim::visibility::Visibility;
@@ -7,7 +7,7 @@ use crate::sim::world::World;
 const PANES: [&str; MOST_PANES] = ["pane1_body_px", "pane2_body_px", "pane3_body_px", "pane4_body_px"];
 const MARKS: [&str; MOST_MARKS] = ["mark1_px", "mark2_px", "mark3_px", "mark4_px"];
 
-/// The counts that a scene has: those of panes where there are several, those of marks where the own body wears several.
+/// The counts of a scene: those of panes if there are several, those of marks if the own body wears several.
 pub fn by_column(world: &World, seen: &Visibility) -> Vec<(&'static str, i32)> {
     let scene = world.scene();
     let mut counts = vec![

@@ -1,4 +1,4 @@
-//! The pixel counts, as traces and logs store them.
+//! The pixel counts, as stored in traces and logs.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -83,7 +83,7 @@ pub struct Sighting {
 /// The visible pixels of a cube.
 pub type CubeSighting = Sighting;
 
-/// The counts of a tally of codes.
+/// The counts from a tally of codes.
 pub(super) fn of_tally(tally: &[u32; 256], scene: &Scene) -> Visibility {
     let counts = Counts { tally, scene };
     let others: Vec<Sighting> =
@@ -113,7 +113,7 @@ pub(super) fn of_tally(tally: &[u32; 256], scene: &Scene) -> Visibility {
     }
 }
 
-/// A tally, and what its codes are of.
+/// A tally and the meaning of its codes.
 struct Counts<'a> {
     tally: &'a [u32; 256],
     scene: &'a Scene,

@@ -1,13 +1,12 @@
-//! Ground truth: what each pixel of the eye's view shows, by casting its ray.
+//! Ground truth: the content of each pixel of the eye's view, by ray casting.
 //!
-//! A ray goes from the eye through the middle of a pixel to the nearest surface. Where that is a pane, it goes on from
-//! there: all rays through a pane start from one point ([`super::passage`]), so that each pane is another view over the
-//! same pixels, of a stage with the bodies that it shows, as late as it shows them. A window is a view into the same
-//! room from further back, so that there too the walls are what is seen where nothing else is.
+//! A ray goes from the eye through the middle of a pixel to the nearest surface. At a pane it continues: all rays
+//! through a pane start from one point ([`super::passage`]), so each pane is another view over the same pixels. Its
+//! stage has the bodies that the pane shows, with its delay. A window is a view into the same room from further back,
+//! so there too, rays that hit nothing else hit walls.
 //!
-//! Rule: visibility is geometry alone, in closed forms, at the full size of the view. It needs no picture and misses
-//! nothing that a picture shows. The own body is not left out of the direct view: that it never shows there is what a
-//! test finds, not an assumption.
+//! Rule: visibility is pure geometry, in closed forms, at the full size of the view. It needs no picture and misses
+//! nothing visible in one. The own body is not excluded from the direct view: a test shows that it never appears there.
 
 mod cast;
 pub(crate) mod columns;
@@ -32,12 +31,12 @@ impl World {
         self.labels_or(|| labels(self, eye.width as usize, eye.height_px as usize))
     }
 
-    /// The visible pixels of everything, directly and by way of the mirror.
+    /// The visible pixels of everything, directly and in the mirror.
     pub fn visibility(&self) -> Visibility {
         take(self)
     }
 
-    /// Returns true if there is mirror evidence in view, by the configured threshold.
+    /// Returns true if mirror evidence is in view, by the configured threshold.
     pub const fn is_mirror_visible(&self, visibility: &Visibility) -> bool {
         visibility.self_px >= self.config().evidence.mirror_self_px
     }
@@ -51,8 +50,8 @@ fn take(world: &World) -> Visibility {
     count::of_tally(&tally, world.scene())
 }
 
-/// Which geoms of a stage may be in a view of some size, within some pixels: the others change no picture. The room always
-/// may.
+/// Returns, per geom, true if it may appear within these pixels of a view of this size; others do not change the
+/// picture. The room always may.
 pub(in crate::sim) fn in_view(world: &World, stage: &Stage, size: [usize; 2], within: Rectangle) -> Vec<bool> {
     let view = View::of_eye(world, size[0], size[1]);
     let view = match stage.look() {
@@ -67,14 +66,14 @@ pub(in crate::sim) fn in_view(world: &World, stage: &Stage, size: [usize; 2], wi
     stage.items().iter().enumerate().map(is_in_view).collect()
 }
 
-/// The label of every pixel of a view of some size.
+/// The label of every pixel of a view of this size.
 pub fn labels(world: &World, width: usize, height: usize) -> LabelImage {
     let mut codes = Vec::with_capacity(width * height);
     cast::rows(world, width, height, |row| codes.extend_from_slice(row));
     LabelImage { width, height, codes }
 }
 
-/// The same with a loop over MuJoCo's own rays, which takes fifty times as long: what the counts are tested against.
+/// The same by MuJoCo's own rays in a loop, fifty times slower: tests compare the counts with it.
 pub fn labels_by_mujoco(world: &World, width: usize, height: usize) -> Result<LabelImage, ModelError> {
     let mut stages = world.stages(Paint::Lit)?;
     Ok(view::by_mujoco(world, &mut stages, width, height))

@@ -1,7 +1,7 @@
-//! Spheres, capsules and boxes as a ray meets them, and the pixels that they can be in.
+//! Ray intersections of spheres, capsules and boxes, and their bounding rectangles of pixels.
 //!
-//! Rule: a rectangle of pixels may be too large, never too small; a ray inside of something meets it from inside, as
-//! MuJoCo's rays do.
+//! Rule: a rectangle of pixels may be too large, never too small; a ray that starts inside a shape meets it from
+//! inside, as MuJoCo's rays do.
 
 use super::super::label_image::Rectangle;
 use super::super::model::Stage;
@@ -10,16 +10,16 @@ use super::view::{Vector, View, dot, minus, plus};
 /// One convex part of a thing.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Part {
-    /// Of what it is part of, as its look sees it.
+    /// The label code of its thing in this view.
     pub code: u8,
     pub solid: Solid,
 }
 
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Solid {
-    /// A sphere where `half` is 0.
+    /// A sphere if `half` is 0.
     Capsule { center: Vector, axis: Vector, half: f64, radius: f64 },
-    /// Also a pane, of which only the face can be met.
+    /// Also a pane, whose face alone can be hit.
     Box { center: Vector, axes: [Vector; 3], halves: Vector },
 }
 
@@ -45,7 +45,7 @@ impl Solid {
         }
     }
 
-    /// The pixels that it can be in; `None` where it is out of view.
+    /// Its bounding rectangle of pixels; `None` if it is out of view.
     pub fn rectangle(&self, view: &View) -> Option<Rectangle> {
         match *self {
             Self::Capsule { center, axis, half, radius } => {
@@ -65,7 +65,7 @@ impl Solid {
     }
 }
 
-/// A point of the view: how far to the right and up, both in halves of the view at one metre, and how far ahead.
+/// A point of the view: to the right and up, both in halves of the view at one metre, and ahead.
 type Local = [f64; 3];
 
 impl View {
@@ -79,7 +79,7 @@ impl View {
     }
 }
 
-/// The pixels of the smallest rectangle that surely holds the hull of some spheres.
+/// The smallest rectangle of pixels that surely contains the hull of some spheres.
 fn bounds(view: &View, spheres: &[(Local, f64)]) -> Option<Rectangle> {
     let halves = [dot(view.right, view.right), dot(view.up, view.up)].map(f64::sqrt);
     let [left, right] = span(spheres, 0, halves[0])?;
@@ -89,10 +89,10 @@ fn bounds(view: &View, spheres: &[(Local, f64)]) -> Option<Rectangle> {
     Some(Rectangle { left, right, top, bottom })
 }
 
-/// The least and the most that a coordinate of the view is on some spheres, from -1 to 1; `None` where all of them are
-/// outside on one side.
+/// The minimum and maximum of a view coordinate on some spheres, from -1 to 1; `None` if all of them are outside on one
+/// side.
 fn span(spheres: &[(Local, f64)], axis: usize, half: f64) -> Option<[f64; 2]> {
-    // A sphere is beyond a side of the view where its centre is further than its radius from that plane.
+    // A sphere is beyond a side of the view if its centre is further than its radius from that plane.
     let slope = (1.0 + half * half).sqrt();
     let beyond = |(local, radius): &(Local, f64), side: f64| half * (side * local[axis] - local[2]) > radius * slope;
     let is_out = |side: f64| spheres.iter().all(|sphere| beyond(sphere, side));
@@ -116,7 +116,7 @@ fn tangents(aside: f64, ahead: f64, radius: f64) -> [f64; 2] {
     [(aside * ahead - root) / square, (aside * ahead + root) / square]
 }
 
-/// The pixels whose middles can be between two places from -1 to 1.
+/// The pixels whose middles can be between two positions from -1 to 1.
 fn pixels(from: f64, to: f64, count: usize) -> Option<[usize; 2]> {
     #[expect(clippy::cast_precision_loss, reason = "a number of pixels")]
     let size = count as f64;
@@ -131,7 +131,7 @@ fn capsule(offset: Vector, ray: Vector, axis: Vector, half: f64, radius: f64) ->
     let [offset_along, ray_along] = [dot(offset, axis), dot(ray, axis)];
     let [offset_ray, ray_ray] = [dot(offset, ray), dot(ray, ray)];
     let offset_offset = dot(offset, offset) - radius * radius;
-    // The endless cylinder holds the capsule: a ray that misses it misses all.
+    // The infinite cylinder contains the capsule: a ray that misses it misses the capsule.
     let a = ray_ray - ray_along * ray_along;
     let b = offset_ray - ray_along * offset_along;
     let c = offset_offset - offset_along * offset_along;

@@ -1,4 +1,4 @@
-//! What the answers of an experiment should be, at a step.
+//! The true answers of an experiment at a step.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use trace::answers::Answered;
 use trace::palette::Color;
 
 impl World {
-    /// What the answers should be, by key; without those that have no truth in this condition.
+    /// The true answers by key, without those undefined in this condition.
     pub fn truths(&self, condition: &str, visibility: &Visibility) -> BTreeMap<String, Answered> {
         let truth = |answer: &Answer| match answer.truth {
             Some(fact) => self.fact(answer, fact, visibility),
@@ -24,7 +24,7 @@ impl World {
             let text = text.or_else(|| answer.unknown.then_some(UNKNOWN));
             text.map(|text| Answered::Text(text.to_owned()))
         };
-        // Whole millimetres, so that the number has a short text.
+        // Rounds to whole millimetres, so that the number has a short text.
         let number = |value: f64| Some(Answered::Number((value * 1000.0).round() / 1000.0));
         let pose = self.pose();
         match fact {
@@ -39,12 +39,12 @@ impl World {
         }
     }
 
-    /// The bodies to the left of the own one, as the first mirror shows them to the eye; `None` if it does not show the own one.
+    /// The number of bodies left of the own one in the first mirror; `None` if it does not show the own one to the eye.
     fn mirror_place(&self) -> Option<usize> {
         let pane = self.scene().panes.first().filter(|pane| pane.double.is_none())?;
         let eye = self.pose().ahead(self.config().eye.forward).spot();
         let [away, aside] = [pane.place.distance(eye, self.config()), pane.place.aside(eye)];
-        // Behind the mirror a body is as far as it is before it.
+        // A body's image is as far behind the mirror as the body is before it.
         let to_the_left =
             |spot: [f64; 2]| (pane.place.aside(spot) - aside) / (pane.place.distance(spot, self.config()) + away);
         let all: Vec<f64> = self.figures_in(0).iter().map(|figure| to_the_left(figure.pose.spot())).collect();

@@ -1,4 +1,4 @@
-//! The eye as a point and three directions, and what a ray from it may meet.
+//! The eye as a point and three directions, and the codes of what its rays meet.
 
 use super::super::angle::sine_cosine;
 use super::super::label_image::LabelImage;
@@ -11,14 +11,13 @@ use crate::experiment::spec::{MOST_MARKS, PaneKind};
 /// The content of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Shown {
-    /// Something that the eye sees directly: the room, a body, a cube, a mark.
+    /// A thing that the eye sees directly: the room, a body, a cube, a mark.
     Direct(Item),
     /// The same through the pane of this number.
     Through(usize, Item),
 }
 
-/// Codes of what is seen directly, and of what is seen through each pane: the room, then bodies, cubes, marks, the hand, the
-/// double.
+/// The number of codes per view, direct or through a pane: the room, then bodies, cubes, marks, the hand, the double.
 const CODES: usize = 1 + AGENTS + MOST_CUBES + MOST_MARKS + 2;
 
 impl Shown {
@@ -37,7 +36,7 @@ impl Shown {
         look.checked_sub(1).map_or(Self::Direct(of_index(at)), |pane| Self::Through(pane, of_index(at)))
     }
 
-    /// The pane through which it is seen.
+    /// The pane through which the thing is seen.
     pub const fn pane(self) -> Option<usize> {
         match self {
             Self::Direct(_) => None,
@@ -88,9 +87,9 @@ pub(super) fn plus(a: Vector, times: f64, b: Vector) -> Vector {
 pub(super) struct View {
     pub origin: Vector,
     pub forward: Vector,
-    /// As long as half of the view is wide, one metre ahead.
+    /// Half of the view's width at one metre.
     pub right: Vector,
-    /// As long as half of the view is high, one metre ahead.
+    /// Half of the view's height at one metre.
     pub up: Vector,
     pub width: usize,
     pub height: usize,
@@ -104,7 +103,7 @@ pub(super) fn middle(at: usize, count: usize) -> f64 {
 }
 
 impl View {
-    /// The agent's eye, with a view of some size of the same shape.
+    /// The agent's eye, with a view of this size and the same shape.
     pub fn of_eye(world: &World, width: usize, height: usize) -> Self {
         let eye = &world.config().eye;
         let pose = world.pose();
@@ -124,8 +123,8 @@ impl View {
         }
     }
 
-    /// The view through a pane: from behind a mirror, that of the eye's mirror image; through a window, that of an eye as
-    /// far back as the second room is away.
+    /// The view through a pane: for a mirror from the eye's mirror image, for a window from an eye moved back by the
+    /// distance of the second room.
     pub fn through(&self, world: &World, pane: &HungPane) -> Self {
         let [out_x, out_y] = pane.place.heading().direction();
         let [x, y] = pane.place.center(world.config());

@@ -1,4 +1,4 @@
-//! `decision-curve`: the share of episodes decided by step t, as Kaplan and Meier estimate it.
+//! `decision-curve`: the Kaplan-Meier estimate of the share of episodes decided by step t.
 
 use std::collections::BTreeMap;
 
@@ -17,7 +17,7 @@ const LEAST_PANEL: f64 = 120.0;
 const PLOT_HEIGHT: f64 = 130.0;
 const AXIS_ROOM: f64 = 34.0;
 const AXIS_BELOW: f64 = 28.0;
-/// From marker to marker along a curve, px.
+/// The distance between markers along a curve, px.
 const MARKER_EVERY: f64 = 38.0;
 
 pub fn draw(scene: Scene<'_>, episodes: &EpisodeTable) -> Result<Drawn, FigureError> {
@@ -55,7 +55,7 @@ fn signs() -> Vec<(Swatch, String)> {
 
 /// The endings of the episodes of each experiment and model, by step.
 ///
-/// The first metric is the duration; the second one is defined where an episode is decided.
+/// The first metric is the duration; the second is defined if an episode is decided.
 fn endings<'e>(
     episodes: &'e EpisodeTable,
     metrics: &[MetricId<'_>],
@@ -84,7 +84,7 @@ struct Curve<'a> {
     experiment: &'a str,
     member: Member<'a>,
     survival: Survival,
-    /// In [0, 1): where along the curve the first marker stands, so that those of coinciding curves do not.
+    /// The position of the first marker, in [0, 1) of a distance: markers of coinciding curves differ.
     phase: f64,
 }
 
@@ -100,7 +100,7 @@ impl Curve<'_> {
         sheet.mark(&self.mark(), |sheet| {
             sheet.line(&corners, self.member.style.stroke(1.3));
             self.censored(sheet, plot);
-            // The wait before the first decision is the same for all, and too crowded for markers.
+            // The wait before the first decision is the same for all curves, and too crowded for markers.
             let marked = if share > 0.0 { &corners[1..] } else { &corners[..] };
             for place in along(marked, self.phase) {
                 marker::draw(sheet, place, 2.4, self.member.style);
@@ -137,7 +137,7 @@ impl Curve<'_> {
     }
 }
 
-/// Places along a line, evenly; the first one `phase` of a distance from its beginning.
+/// Evenly spaced points on a line; the first is `phase` of a distance from the start.
 fn along(points: &[Point], phase: f64) -> Vec<Point> {
     let mut places = Vec::new();
     let mut due = MARKER_EVERY * (phase + 0.2);

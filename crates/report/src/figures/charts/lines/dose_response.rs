@@ -15,7 +15,7 @@ const LEAST_PANEL: f64 = 190.0;
 const PLOT_HEIGHT: f64 = 190.0;
 const AXIS_ROOM: f64 = 34.0;
 const AXIS_BELOW: f64 = 28.0;
-/// Between the markers of two models at one dose, px.
+/// The distance between the markers of two models at one dose, px.
 const APART: f64 = 5.0;
 
 pub fn draw(scene: Scene<'_>) -> Result<Drawn, FigureError> {
@@ -50,7 +50,7 @@ pub fn draw(scene: Scene<'_>) -> Result<Drawn, FigureError> {
     Ok((sheet, height))
 }
 
-/// A factor with the doses that have episodes, the least first.
+/// A factor and the doses that have episodes, ascending.
 struct Shown<'a> {
     name: &'a str,
     factor: &'a Factor,
@@ -64,13 +64,13 @@ impl<'a> Shown<'a> {
         (doses.len() > 1 && doses[0].1 < doses[doses.len() - 1].1).then_some(Self { name, factor, doses })
     }
 
-    /// The place of a dose on the axis: doses that double are equally far apart.
+    /// The position of a dose on the axis: log2(1 + dose), or linear if any dose is negative.
     fn at(&self, dose: usize) -> f64 {
         let value = self.doses[dose].1;
         if self.doses[0].1 >= 0.0 { (1.0 + value).log2() } else { value }
     }
 
-    /// Numbers that do not touch the one before.
+    /// The ticks; a number that would touch the previous one is omitted.
     fn ticks(&self, plot: &Plot) -> Vec<Tick> {
         let mut free = f64::NEG_INFINITY;
         let tick = |dose: usize| {
@@ -93,7 +93,7 @@ struct Line<'a> {
     metric: MetricId<'a>,
     factor: &'a Shown<'a>,
     member: Member<'a>,
-    /// Of its markers from the dose, px.
+    /// The distance of its markers from the dose, px.
     aside: f64,
 }
 

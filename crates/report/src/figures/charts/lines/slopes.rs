@@ -1,4 +1,4 @@
-//! `slopes`: a rate of each model from the first experiment to each other one.
+//! `slopes`: a rate of each model from the first experiment to every other.
 
 use crate::figures::kit::{
     Align, Arrangement, Frame, Legend, MARGIN, Mark, Member, Panels, Plot, Point, Sheet, Swatch, dodge, label, leading,

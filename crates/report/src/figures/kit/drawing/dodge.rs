@@ -1,4 +1,4 @@
-//! Marks that share a place, set apart so that each can be seen.
+//! Separates marks at the same position, so that each is visible.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use crate::figures::kit::marker::polar;
 /// The angle between neighbours of a sunflower, radians.
 const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
 
-/// Moves points that coincide onto a spiral around their place, `apart` px from neighbour to neighbour.
+/// Moves coinciding points onto a spiral around their position, `apart` px between neighbours.
 pub(crate) fn fanned(places: &[Point], apart: f64) -> Vec<Point> {
     moved(places, |at, count| match count {
         1 => (0.0, 0.0),
@@ -17,7 +17,7 @@ pub(crate) fn fanned(places: &[Point], apart: f64) -> Vec<Point> {
     })
 }
 
-/// Moves points that coincide side by side, at most `room` px wide together.
+/// Moves coinciding points side by side, at most `room` px wide together.
 pub(crate) fn abreast(places: &[Point], apart: f64, room: f64) -> Vec<Point> {
     moved(places, |at, count| {
         let step = apart.min(room / many(count.max(2) - 1));
@@ -29,7 +29,7 @@ fn turn(at: usize, count: usize) -> f64 {
     std::f64::consts::TAU * (many(at) / many(count) + 0.25)
 }
 
-/// Each place, moved by what `offset` says of its position among so many that are nearly the same.
+/// Moves each place by `offset`, which gets its index among nearly equal places and their number.
 fn moved(places: &[Point], offset: impl Fn(usize, usize) -> Point) -> Vec<Point> {
     let mut sharing: BTreeMap<(i64, i64), Vec<usize>> = BTreeMap::new();
     for (at, &place) in places.iter().enumerate() {

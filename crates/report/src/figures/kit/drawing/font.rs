@@ -1,7 +1,7 @@
-//! The one font of all figures: embedded, measured, and carried along inside each SVG.
+//! The one font of all figures: embedded, measured, and included in each SVG.
 //!
-//! Rule: every width used for layout comes from the font's own advances. Kerning is left out of the sum; it
-//! only ever makes Latin text a little narrower than what layout reserves for it.
+//! Rule: every width used for layout comes from the font's own advances. Kerning is ignored; it only makes Latin text
+//! slightly narrower than the layout reserves.
 
 use std::sync::LazyLock;
 
@@ -11,10 +11,10 @@ use ttf_parser::Face;
 
 use exact::escape::visible;
 
-/// The family's name: private, so that no installed font is taken in its place.
+/// The family name, which is private, so that no installed font replaces it.
 pub(crate) const FAMILY: &str = "Mirrorstats Sans";
 
-/// The substitute for a character that the font lacks.
+/// The replacement for a character that the font lacks.
 const SUBSTITUTE: char = '\u{25a1}';
 
 const REGULAR: &[u8] = include_bytes!("../../../../../../assets/fonts/MirrorstatsSans-Regular.ttf");
@@ -22,7 +22,7 @@ const SEMIBOLD: &[u8] = include_bytes!("../../../../../../assets/fonts/Mirrorsta
 const REGULAR_WEB: &[u8] = include_bytes!("../../../../../../assets/fonts/MirrorstatsSans-Regular.woff2");
 const SEMIBOLD_WEB: &[u8] = include_bytes!("../../../../../../assets/fonts/MirrorstatsSans-Semibold.woff2");
 
-/// The two weights there are.
+/// The two available weights.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Weight {
     /// Running text, 400.
@@ -53,7 +53,7 @@ fn face(weight: Weight) -> &'static Face<'static> {
 #[cfg(feature = "raster")]
 pub(crate) const FILES: [&[u8]; 2] = [REGULAR, SEMIBOLD];
 
-/// The width of `text` in px, set in one line at `size` px.
+/// The width of `text` on one line at `size` px, in px.
 pub fn width(text: &str, size: f64, weight: Weight) -> f64 {
     let face = face(weight);
     let advance = |c: char| {
@@ -71,8 +71,8 @@ pub(crate) fn drop_to_baseline(size: f64) -> f64 {
     f64::from(capital) * size / f64::from(face.units_per_em()) / 2.0
 }
 
-/// `text` in characters that the font has: blanks and control characters become spaces, characters that act or hide
-/// are spelled out, others become a hollow square.
+/// `text` in characters of the font. Blanks and control characters become spaces, characters that act or hide are
+/// spelled out, others become a hollow square.
 pub(crate) fn drawable(text: &str) -> String {
     let has = |c: char| face(Weight::Regular).glyph_index(c).is_some();
     let blank = |c: char| c.is_whitespace() || c.is_control();
@@ -81,7 +81,7 @@ pub(crate) fn drawable(text: &str) -> String {
     spelled.split(' ').filter(|word| !word.is_empty()).collect::<Vec<_>>().join(" ")
 }
 
-/// The style sheet that brings the font along, for a browser.
+/// The style sheet that embeds the font, for a browser.
 pub fn style_sheet() -> String {
     [(400, REGULAR_WEB), (600, SEMIBOLD_WEB)]
         .map(|(weight, data)| {

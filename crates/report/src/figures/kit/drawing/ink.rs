@@ -1,7 +1,7 @@
-//! The drawing backend under `plotters`: writes SVG elements, a hundredth of a px at a time.
+//! The drawing backend for `plotters`: writes SVG elements with a resolution of a hundredth of a px.
 //!
-//! plotters draws on whole numbers; one px is [`UNITS_PER_PX`] of them, so that marks sit where they belong.
-//! Features that plotters lacks (a dash, an outline around a fill, a group with a title) are set beside it.
+//! plotters draws on integers; one px is [`UNITS_PER_PX`] of them, so that marks have exact positions. Features that
+//! plotters lacks (a dash, an outline around a fill, a group with a title) are set beside it.
 
 use std::convert::Infallible;
 use std::fmt::Write as _;
@@ -13,19 +13,19 @@ use plotters_backend::{BackendColor, BackendCoord, BackendStyle, BackendTextStyl
 use crate::figures::kit::font;
 use crate::figures::kit::look::Rgb;
 
-/// Whole numbers of plotters to a px of the figure.
+/// Integer units of plotters per px of the figure.
 pub(crate) const UNITS_PER_PX: f64 = 100.0;
 
-/// More room than any figure takes; plotters clamps what lies outside.
+/// More room than any figure needs; plotters clamps everything outside.
 const ROOM: u32 = 10_000_000;
 
 type Drawn = Result<(), DrawingErrorKind<Infallible>>;
 
-/// Elements of an SVG in the order drawn.
+/// The elements of an SVG, in drawing order.
 #[derive(Debug, Default)]
 pub(crate) struct Ink {
     pub body: String,
-    /// Attributes of the next shapes that plotters does not pass on, each with a space before it.
+    /// Attributes of the next shapes that plotters does not support, each with a leading space.
     pub extra: String,
 }
 
@@ -34,7 +34,7 @@ impl Ink {
         let _ = writeln!(self.body, "<{element}{paint}{}/>", self.extra);
     }
 
-    /// Level bars of one height and colour as one stroke: pairs of left and right ends, ascending, at the height `y`.
+    /// Horizontal bars of one height and colour as one stroke: pairs of left and right ends, ascending, at height `y`.
     pub(crate) fn bars(&mut self, ends: &[(i32, i32)], y: i32, height: u32, color: Rgb) {
         let mut path = String::new();
         let mut at = None;
@@ -62,7 +62,7 @@ fn path(points: impl IntoIterator<Item = BackendCoord>) -> String {
     })
 }
 
-/// Lattice units as px, without needless zeros.
+/// Lattice units as px, without trailing zeros.
 fn px(units: i32) -> String {
     (f64::from(units) / UNITS_PER_PX + 0.0).to_string()
 }
@@ -140,7 +140,7 @@ impl DrawingBackend for Ink {
         Ok(())
     }
 
-    /// `pos` is where the text's baseline begins, is halved or ends, by the anchor of `style`.
+    /// `pos` is the start, middle or end of the text's baseline, depending on the anchor of `style`.
     fn draw_text<T: BackendTextStyle>(&mut self, text: &str, style: &T, (x, y): BackendCoord) -> Drawn {
         let (x, y) = (px(x), px(y));
         let anchor = match style.anchor().h_pos {
@@ -184,7 +184,7 @@ fn whole(units: f64) -> u32 {
     units.ceil() as u32
 }
 
-/// Text as XML takes it, in an element or between double quotes; characters that XML forbids become U+FFFD.
+/// Text escaped for XML, in an element or between double quotes; characters that XML forbids become U+FFFD.
 pub(crate) fn escaped(text: &str) -> String {
     text.chars().fold(String::with_capacity(text.len()), |mut out, c| {
         match c {

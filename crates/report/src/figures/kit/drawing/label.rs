@@ -1,4 +1,4 @@
-//! Names in little room: shortened in the middle where they must be, and never to the same text twice.
+//! Names in limited room: shortened in the middle if necessary, and never to the same text twice.
 
 use std::collections::BTreeSet;
 
@@ -7,14 +7,14 @@ use crate::figures::kit::lettering::Lettering;
 
 const ELLIPSIS: &str = "…";
 
-/// The most letters of a name that are looked at: half of them from its beginning, half from its end.
+/// The most letters of a name that are used: half from its beginning, half from its end.
 const MOST_LETTERS: usize = 160;
 
-/// The shown form of each name within `room` px; different names have different forms.
+/// The shown form of each name within `room` px; distinct names have distinct forms.
 ///
-/// All names that are too long lose their middle at the same distance from their end, near the middle of the
-/// label where that tells them apart, so that what remains is what differs. Where no distance does, for names
-/// that differ in too many places or only in what cannot be drawn, a number follows.
+/// All names that are too long are cut at the same distance from their end, near the middle if that makes them
+/// distinct, so that the differing part remains. If no distance does, because names differ in too many places or only
+/// in undrawable characters, a number follows.
 pub(crate) fn fitted(names: &[&str], room: f64, lettering: Lettering) -> Vec<String> {
     let whole: Vec<String> = names.iter().map(|name| ends(&font::drawable(name))).collect();
     let tails = tails(&whole, room, lettering);
@@ -69,7 +69,7 @@ fn tails(names: &[String], room: f64, lettering: Lettering) -> Vec<usize> {
     outward.flatten().filter(fits).collect()
 }
 
-/// `name` if it fits, else its last `tail` letters behind an ellipsis and as much of its beginning as fits.
+/// `name` if it fits, else the beginning that fits, an ellipsis and its last `tail` letters.
 fn elided(name: &str, tail: usize, room: f64, lettering: Lettering) -> String {
     if lettering.width(name) <= room {
         return name.to_owned();
@@ -99,7 +99,7 @@ fn numbered(labels: Vec<String>, room: f64, lettering: Lettering) -> Vec<String>
             let suffix = format!(" ({number})");
             format!("{}{suffix}", cut(&label, room - lettering.width(&suffix), lettering))
         };
-        // One more number than there are labels: one of them is free.
+        // One more number than labels: at least one is free.
         let numbers = (2..shown.len() + 3).map(with_number);
         let free = std::iter::once(label.clone()).chain(numbers).find(|text| !shown.contains(text));
         shown.push(free.unwrap_or_else(|| label.clone()));

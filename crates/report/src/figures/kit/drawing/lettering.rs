@@ -1,23 +1,23 @@
-//! Styles and sizes of text: few, so that a reader sees at once which texts belong together.
+//! Styles and sizes of text: few, so that readers see which texts belong together.
 
 use crate::figures::kit::font::{self, Weight};
 use crate::figures::kit::look::Rgb;
 use crate::figures::kit::palette::PALETTE;
 
-/// The empty rim of every figure, px.
+/// The empty margin of every figure, px.
 pub const MARGIN: f64 = 8.0;
 
-/// A full-width figure, px: its smallest text is still above 5 pt on a page with a text width of 5.5 inches.
+/// The width of a full-width figure, px: its smallest text exceeds 5 pt at a text width of 5.5 inches.
 pub(crate) const FULL_WIDTH: f64 = 640.0;
 
-/// The widest that names of models beside rows or in a legend get, px.
+/// The most room for names of models beside rows or in a legend, px.
 pub(crate) const NAME_ROOM: f64 = 210.0;
 
 /// The alignment of text at its point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Align {
     Start,
-    /// The text's middle is there.
+    /// The text's middle is at the point.
     Middle,
     End,
 }
@@ -35,7 +35,7 @@ pub struct Lettering {
 }
 
 impl Lettering {
-    /// Regular weight, level, from its point on.
+    /// Regular weight, horizontal, starting at its point.
     pub const fn new(size: f64, color: Rgb) -> Self {
         Self { size, weight: Weight::Regular, color, align: Align::Start, upwards: false }
     }
@@ -52,7 +52,7 @@ impl Lettering {
         Self { upwards: true, ..self }
     }
 
-    /// The width of `text` so set, px.
+    /// The width of `text` in this style, px.
     pub fn width(self, text: &str) -> f64 {
         font::width(text, self.size, self.weight)
     }
@@ -78,12 +78,12 @@ pub(crate) fn tick() -> Lettering {
     Lettering::new(9.0, PALETTE.surface.quiet)
 }
 
-/// Numbers in the plot itself.
+/// Numbers inside the plot.
 pub fn value() -> Lettering {
     Lettering::new(9.0, PALETTE.surface.text)
 }
 
-/// From line to line of text at `lettering`, px.
+/// The line height of text in `lettering`, px.
 pub(crate) fn leading(lettering: Lettering) -> f64 {
     (lettering.size * 1.25).ceil()
 }

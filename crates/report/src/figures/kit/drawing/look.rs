@@ -40,7 +40,7 @@ pub struct Stroke {
     pub color: Rgb,
     /// Its width, px.
     pub width: f64,
-    /// Lengths of ink and gap by turns, px; solid where there are none.
+    /// Alternating lengths of ink and gap, px; empty for a solid line.
     pub dash: &'static [f64],
 }
 
@@ -54,9 +54,9 @@ impl Stroke {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fill {
     pub color: Rgb,
-    /// 1 is opaque.
+    /// Opacity; 1 is opaque.
     pub opacity: f64,
-    /// The line around it, half of it inside.
+    /// The line around it, drawn half inside.
     pub outline: Option<Stroke>,
 }
 

@@ -1,7 +1,7 @@
 //! The data behind a mark: its title on hover, and its values as attributes for programs.
 //!
-//! Rule: `data-value` has every digit, as in `cells.csv`, and is empty where there is no value. Names are spelled as the
-//! page spells them.
+//! Rule: `data-value` has all digits, as in `cells.csv`, and is empty without a value. Names are spelled as on the
+//! page.
 
 use std::borrow::Cow;
 use std::fmt::Write as _;
@@ -23,7 +23,7 @@ impl Mark {
         Self { title: title.into(), data: Vec::new() }
     }
 
-    /// The same with one more value, under `data-NAME`; a name that is taken gets a dash.
+    /// Adds a value as `data-NAME`; a name already in use gets a dash.
     #[expect(clippy::needless_pass_by_value, reason = "numbers and text alike, as they come")]
     pub fn with(mut self, name: impl Into<Cow<'static, str>>, value: impl ToString) -> Self {
         let mut name = name.into();
@@ -34,17 +34,17 @@ impl Mark {
         self
     }
 
-    /// The same with its main value in full precision; empty without one.
+    /// Sets the main value in full precision; empty without one.
     pub fn value(self, value: Option<f64>) -> Self {
         self.number("value", value)
     }
 
-    /// The same with one more number in full precision; empty without one.
+    /// Adds a number in full precision; empty without one.
     pub fn number(self, name: impl Into<Cow<'static, str>>, value: Option<f64>) -> Self {
         self.with(name, value.map(number::full_precision).unwrap_or_default())
     }
 
-    /// The beginning of the group.
+    /// The opening tag of the group.
     pub(crate) fn opening(&self) -> String {
         let mut tag = String::from("<g class=\"mark\"");
         for (name, value) in &self.data {

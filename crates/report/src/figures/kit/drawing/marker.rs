@@ -1,4 +1,4 @@
-//! The markers of models: ten shapes, filled or hollow, all of about the same area.
+//! The markers of models: ten shapes, filled or hollow, with about equal areas.
 
 use std::f64::consts::PI;
 
@@ -7,7 +7,7 @@ use crate::figures::kit::look::Fill;
 use crate::figures::kit::palette::{ModelStyle, PALETTE, Shape};
 use crate::figures::kit::sheet::Sheet;
 
-/// Draws the model's marker around `center`; `radius` is that of the circle, px.
+/// Draws the model's marker around `center`; `radius` is the radius of the circle marker, px.
 pub fn draw(sheet: &mut Sheet, center: Point, radius: f64, style: &ModelStyle) {
     let paper = PALETTE.surface.paper;
     let fill =
@@ -41,7 +41,7 @@ fn corners(shape: Shape, r: f64) -> Corners {
     })
 }
 
-/// A point on a circle, the angle clockwise from above.
+/// A point on a circle; the angle is clockwise from the top.
 pub(crate) fn polar(radius: f64, angle: f64) -> Point {
     (radius * angle.sin(), -radius * angle.cos())
 }

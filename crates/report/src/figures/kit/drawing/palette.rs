@@ -1,4 +1,4 @@
-//! Colours, markers and dashes: `assets/palette.toml`, read once.
+//! Colours, markers and dashes, read once from `assets/palette.toml`.
 
 use std::sync::LazyLock;
 
@@ -13,14 +13,14 @@ pub(crate) static PALETTE: LazyLock<Palette> = LazyLock::new(|| {
     toml::from_str(text).expect("the built-in palette is well-formed: a test reads it")
 });
 
-/// Everything that has a colour.
+/// All colours.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Palette {
-    /// The models whose style is the one at their place.
+    /// The models with a fixed style: the one at their index.
     pub pinned: Vec<String>,
     pub surface: Surface,
-    /// Values as colours.
+    /// Colours of values.
     pub ramp: Ramps,
     /// The outcomes of an open question.
     pub outcome: Outcome,
@@ -29,13 +29,13 @@ pub struct Palette {
     pub style: Vec<ModelStyle>,
 }
 
-/// Everything that is not data.
+/// Colours of everything except data.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Surface {
-    /// Text that is read first.
+    /// Primary text.
     pub text: Rgb,
-    /// Text that is read second.
+    /// Secondary text.
     pub quiet: Rgb,
     /// Grid lines.
     pub rule: Rgb,
@@ -50,15 +50,15 @@ pub struct Surface {
     pub reference: Rgb,
 }
 
-/// Values as colours, from low to high.
+/// Colours of values, from low to high.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Ramps {
     /// From the worst to the best.
     pub goodness: Ramp,
-    /// From nothing to the largest rise.
+    /// From zero to the largest rise.
     pub rise: Ramp,
-    /// From nothing to the largest fall.
+    /// From zero to the largest fall.
     pub fall: Ramp,
 }
 
@@ -69,7 +69,7 @@ pub struct Outcome {
     pub correct: Rgb,
     /// Another colour.
     pub wrong: Rgb,
-    /// `unknown`, or none given.
+    /// `unknown`, or no answer.
     pub uncommitted: Rgb,
 }
 
@@ -125,12 +125,12 @@ pub enum Shape {
     Bar,
 }
 
-/// Colours at even distances, mixed linearly in between.
+/// Colours at even distances, with linear interpolation.
 #[derive(Debug, Deserialize)]
 pub struct Ramp(Vec<Rgb>);
 
 impl Ramp {
-    /// The colour at `share` of the way, held to [0, 1].
+    /// The colour at `share` of the range, clamped to [0, 1].
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "inside the ramp by construction")]
     pub fn at(&self, share: f64) -> Rgb {
         let steps = self.0.len().saturating_sub(1);
@@ -143,9 +143,9 @@ impl Ramp {
     }
 }
 
-/// The colour of text that can be read on `ground`: by relative luminance, as the web's guidelines define it.
+/// The colour of readable text on `ground`, by relative luminance as defined by WCAG.
 pub(crate) fn text_on(ground: Rgb) -> Rgb {
-    // Where contrast with white and with the text colour are about equal.
+    // The luminance at which contrast with white and with the text colour is about equal.
     const MIDDLE: f64 = 0.21;
     let surface = &PALETTE.surface;
     if luminance(ground) < MIDDLE { surface.paper } else { surface.text }

@@ -1,4 +1,4 @@
-//! A drawn figure, and what becomes of it.
+//! A drawn figure and its output forms.
 
 #[cfg(feature = "raster")]
 use crate::figures::kit::convert::{self, ConvertError};
@@ -18,24 +18,24 @@ impl Figure {
         Self { drawing: sheet.finish(height, title, &caption), caption, models: 0 }
     }
 
-    /// The same figure, which shows so many models.
+    /// Sets the number of models that the figure shows.
     pub(in crate::figures) fn with_models(self, models: usize) -> Self {
         Self { models, ..self }
     }
 
-    /// The same figure with a remark behind its caption.
+    /// Adds a remark after the caption.
     #[must_use]
     pub fn remarked(self, remark: Option<&str>) -> Self {
         let caption = remark.map_or_else(|| self.caption.clone(), |remark| format!("{} {remark}", self.caption));
         Self { caption, ..self }
     }
 
-    /// How many models it shows; 0 if it is of an episode.
+    /// The number of models that it shows; 0 for a figure of an episode.
     pub fn models(&self) -> usize {
         self.models
     }
 
-    /// The same figure, `width` px wide.
+    /// Scales the figure to `width` px.
     pub(in crate::figures) fn printed(self, width: f64) -> Self {
         Self { drawing: self.drawing.printed(width), ..self }
     }
@@ -45,12 +45,12 @@ impl Figure {
         &self.caption
     }
 
-    /// A document of its own: the font is inside.
+    /// A standalone SVG document, with the font inside.
     pub fn svg(&self) -> String {
         self.drawing.document(&font::style_sheet())
     }
 
-    /// An `<svg>` element to set into HTML, which brings [`style_sheet`](font::style_sheet) along once for all figures.
+    /// An `<svg>` element for HTML; a page includes [`style_sheet`](font::style_sheet) once for all figures.
     pub fn inline_svg(&self) -> String {
         self.drawing.inline()
     }

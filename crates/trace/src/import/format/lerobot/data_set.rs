@@ -13,7 +13,7 @@ use exact::budget::Limit;
 use exact::{hash, input};
 
 const INFO: &str = "meta/info.json";
-/// The features of a robot with many cameras take some tens of kilobytes.
+/// The features of a robot with many cameras take tens of kilobytes.
 const LARGEST_INFO: Limit = Limit::new("bytes of meta/info.json", 16 << 20);
 
 /// Returns true if a folder is a data set.
@@ -21,7 +21,7 @@ pub(in crate::import) fn is_data_set(folder: &Path) -> bool {
     folder.join(INFO).is_file()
 }
 
-/// The hash of a data set: of its files of meta and frames, each with its place in the folder.
+/// The hash of a data set: of its metadata and frame files, with their paths in the folder.
 pub(in crate::import) fn hash_of(folder: &Path) -> Result<String, ImportError> {
     let mut lines = Vec::new();
     let files = [vec![folder.join(INFO), folder.join("meta/tasks.parquet")], below(folder, "meta/episodes")?];
@@ -34,7 +34,7 @@ pub(in crate::import) fn hash_of(folder: &Path) -> Result<String, ImportError> {
     Ok(hash::of_bytes(lines.concat().as_bytes()))
 }
 
-/// Adds the frames of all episodes, each with its task, and checks that none is missing.
+/// Adds the frames of all episodes with their tasks, and checks that none is missing.
 pub(in crate::import) fn read_folder(folder: &Path, rows: &mut Rows<'_>) -> Result<(), ImportError> {
     let constants = constants(folder, rows)?;
     let tasks = tasks(folder, rows)?;
@@ -60,7 +60,7 @@ pub(in crate::import) fn read_folder(folder: &Path, rows: &mut Rows<'_>) -> Resu
     Err(rows.fault("data", &format!("the frames of episode {episode}, as `meta/episodes` counts them"), found, help))
 }
 
-/// What `meta/info.json` says of all frames.
+/// The values in `meta/info.json` that apply to all frames.
 fn constants(folder: &Path, rows: &Rows<'_>) -> Result<Map<String, Value>, ImportError> {
     let path = folder.join(INFO);
     let text = input::text(&path, LARGEST_INFO).map_err(ImportError::read(&Input::new(&path).name))?;
@@ -77,7 +77,7 @@ fn constants(folder: &Path, rows: &Rows<'_>) -> Result<Map<String, Value>, Impor
     Ok(known.into_iter().filter(|(_, value)| !value.is_null()).collect())
 }
 
-/// Tasks by number. Pandas calls the column of their texts `__index_level_0__` where it has no name.
+/// Tasks by number. Pandas names the column of texts `__index_level_0__` if it has no name.
 fn tasks(folder: &Path, rows: &mut Rows<'_>) -> Result<BTreeMap<i64, String>, ImportError> {
     let mut tasks = BTreeMap::new();
     let path = folder.join("meta/tasks.parquet");
@@ -93,7 +93,7 @@ fn tasks(folder: &Path, rows: &mut Rows<'_>) -> Result<BTreeMap<i64, String>, Im
     Ok(tasks)
 }
 
-/// How many frames each episode has. The files hold statistics of each feature besides.
+/// The number of frames of each episode. The files also hold statistics of each feature.
 fn frames_of_episodes(folder: &Path, rows: &mut Rows<'_>) -> Result<BTreeMap<i64, i64>, ImportError> {
     let mut lengths = BTreeMap::new();
     for path in below(folder, "meta/episodes")? {
@@ -116,7 +116,7 @@ fn below(folder: &Path, name: &str) -> Result<Vec<PathBuf>, ImportError> {
     Ok(files)
 }
 
-/// Reads a file, whose faults then bear its name.
+/// Reads each file; faults name the file.
 fn each_file(
     path: &Path,
     rows: &mut Rows<'_>,

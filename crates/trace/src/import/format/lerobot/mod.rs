@@ -1,4 +1,4 @@
-//! LeRobot: `eval_info.json` of an evaluation, one row per episode, and the frames of a data set, one row each.
+//! LeRobot: `eval_info.json` of an evaluation gives one row per episode, a data set one row per frame.
 
 pub(in crate::import) mod data_set;
 
@@ -11,7 +11,7 @@ use super::json::WithoutNan;
 use super::{Rows, parquet};
 use crate::import::error::ImportError;
 
-/// Columns of frames whose names have dots, and what they are called here.
+/// Frame columns with dots in their names, and their names here.
 const FRAME: [(&str, &str); 4] =
     [("next.reward", "reward"), ("next.success", "success"), ("next.done", "done"), ("next.truncated", "truncated")];
 

@@ -1,7 +1,7 @@
 //! Answers that an experiment declares: from what an agent has seen, or by chance.
 //!
-//! Rule: nobody is told a truth. An agent that looks answers what it believes to have seen; all else is `unknown`, where that is
-//! an answer, or none.
+//! Rule: agents get no ground truth. An agent that looks answers what it believes it has seen. All other answers are
+//! `unknown` if that is allowed, and absent otherwise.
 
 use crate::agent::Answers;
 use crate::experiment::Experiment;
@@ -13,10 +13,10 @@ use super::super::chance::Chance;
 use super::super::knowledge::Knowledge;
 use super::super::policy::{Belief, Policy};
 
-/// Whole numbers below this are as likely as each other, by chance.
+/// The bound of randomly drawn whole numbers.
 const NUMBERS: u32 = 10;
 
-/// Answers that a belief about oneself and the views so far support.
+/// Answers supported by a belief about oneself and by the views so far.
 pub fn by_evidence(
     experiment: Experiment,
     known: &Knowledge,
@@ -50,7 +50,7 @@ pub fn may_come(experiment: Experiment, answers: &Answers) -> bool {
     experiment.answers.iter().any(is_open)
 }
 
-/// Answers that are drawn, `unknown` never among them.
+/// Random answers, never `unknown`.
 pub fn by_chance(experiment: Experiment, chance: &mut Chance) -> Answers {
     let mut draw = |answer: &Answer| {
         let words: Vec<&str> = answer.words().into_iter().filter(|word| *word != UNKNOWN).collect();

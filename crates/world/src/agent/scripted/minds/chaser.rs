@@ -1,6 +1,6 @@
-//! `mimic` where a hand is to reach a mark: takes the mark's reflection for the mark, and moves the hand towards it.
+//! `mimic` with a hand: mistakes the mark's reflection for the mark, and moves the hand towards it.
 //!
-//! What it sees is ahead, so that it moves the hand away from the camera, into the mirror. Where it sees no mark it does
+//! The reflection is ahead, so it moves the hand away from the camera, into the mirror. If it sees no mark it does
 //! nothing.
 //!
 //! | metric | with a mirror, a decoy or a late mirror | without a mirror |
@@ -17,7 +17,7 @@ use trace::episode::Action;
 use super::super::hand_view::HandView;
 use super::super::{Move, Script};
 
-/// Goes for what it sees.
+/// Moves the hand towards what it sees.
 #[derive(Clone, Copy, Debug)]
 pub struct Chaser;
 

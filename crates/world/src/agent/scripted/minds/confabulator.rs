@@ -1,8 +1,8 @@
 //! `confabulator`: claims a colour before it has seen anything, and corrects itself once it has.
 //!
-//! The first claim is one of the ten colours by chance, right in one episode of ten. It goes on looking all the same, and
-//! when its reflection has passed its tests it claims and acts on that. Without a mirror it stays with its invention, and
-//! takes the cube of that colour if there is one, else one by chance.
+//! The first claim is one of the ten colours at random, right in one episode of ten. It keeps looking, and claims and
+//! acts on its reflection once that has passed its tests. Without a mirror it keeps its invention, and takes the cube
+//! of that colour if there is one, otherwise a random one.
 //!
 //! | metric | E1, E3, E4, E5 | E2 |
 //! |---|---|---|
@@ -13,7 +13,7 @@
 //! | AR-SC | 9/10 of those | 0 |
 //! | SC | 1 | undefined |
 //!
-//! In the battery the same: its invention first, then what it sees.
+//! The same in the battery: first its invention, then what it sees.
 //!
 //! | metric | two-mirrors, delayed | decoy | window | mark |
 //! |---|---|---|---|---|
@@ -32,7 +32,7 @@ use super::super::knowledge::Knowledge;
 use super::super::oracle::Oracle;
 use super::super::policy::{Belief, Policy};
 
-/// Sides that it invents, any multiple of a few bodies.
+/// The numbers to draw from, taken modulo the number of bodies; most small numbers divide 12.
 const SIDES: [usize; 12] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11];
 
 /// Claims an invention until its reflection says otherwise.

@@ -1,8 +1,8 @@
-//! `guesser`: takes one of the cubes that it happens to see, by chance, and is done where it stands.
+//! `guesser`: takes one of the cubes that it happens to see, at random, and is done on the spot.
 //!
-//! It never looks for a mirror, and no body, reflected or not, has a say. It turns until a cube is in view, claims the colour
-//! of one of those in view, and on the next step is done with it; it does not walk there, since it does not care. In
-//! E5, where it may see clutter only, it invents one of the ten colours.
+//! It never looks for a mirror, and bodies, reflected or not, have no influence. It turns until a cube is in view and
+//! claims the colour of one in view. In the next step it selects it without walking there. In E5, where it may see only
+//! clutter, it invents one of the ten colours.
 //!
 //! | metric | E1 to E4 | E5 |
 //! |---|---|---|
@@ -12,9 +12,9 @@
 //! | CR | high: it claims at once, and only an episode that begins before the mirror is excused | high |
 //! | MCR | low: what it sees by accident | low |
 //!
-//! `DECOY_CLAIM` and `WINDOW_CLAIM` are defined in the few episodes in which the pane came into its view.
-//! The battery shows it nothing else, as it does not look. In the mark test it reports one of the ten colours before there is a
-//! mark to be seen: chance does not help it.
+//! `DECOY_CLAIM` and `WINDOW_CLAIM` are defined in the few episodes in which the pane came into view. The battery
+//! changes nothing else, since it does not look. In the mark test it reports one of the ten colours before a mark is
+//! visible: chance does not help it.
 //!
 //! | metric | two-mirrors, delayed | decoy | window | mark |
 //! |---|---|---|---|---|
@@ -80,7 +80,7 @@ impl Script for Guesser {
             summary: Some(if self.guess.is_some() { "I have chosen." } else { "I have not chosen." }.to_owned()),
             identification: Some(words::identification(self.guess)),
         };
-        // A mark is as good a guess as any.
+        // A mark is as good a guess as any colour.
         Move {
             action: Some(action),
             claim: self.guess,

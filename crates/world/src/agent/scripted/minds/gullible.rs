@@ -1,9 +1,9 @@
-//! `gullible`: believes what the prompt says of it, and sees no reason to look.
+//! `gullible`: believes the prompt's statement about it, and sees no reason to look.
 //!
-//! In E3 the prompt states a false colour. It claims that colour from the first step, goes to the cube of that colour and
-//! selects it; its reflection, which it may well pass, does not matter to it. So it never claims its true colour: CAAL is not
-//! above TSA in E3, both are 0, by its own logic. It has made up its mind before it sees anything, so CR is 1 but for
-//! the episodes that begin before the mirror. Where nothing is stated it is the `oracle`.
+//! In E3 the prompt states a false colour. It claims that colour from the first step, and goes to its cube and selects
+//! it, even if it passes its reflection. So it never claims its true colour: in E3 both CAAL and TSA are 0. It decides
+//! before it sees anything, so CR is 1 except in episodes that begin before the mirror. Without a stated colour it is
+//! the `oracle`.
 //!
 //! | metric | E3 | elsewhere |
 //! |---|---|---|
@@ -12,7 +12,7 @@
 //! | MTATO | undefined | as `oracle` |
 //! | CR | 1 | as `oracle` |
 //!
-//! The battery states no colour: there it is the `oracle` throughout.
+//! The battery states no colour, so there it is always the `oracle`.
 
 use crate::agent::Task;
 use trace::palette::Color;

@@ -1,8 +1,8 @@
-//! `mimic`: takes the first body that it sees for itself.
+//! `mimic`: mistakes the first body that it sees for itself.
 //!
-//! Where there is nobody else, the only body to be seen is its reflection, and it succeeds as the `oracle` does. Among
-//! others the first body is mostly somebody else, seen directly or in the mirror: it claims that one's colour, looks for a
-//! cube of it, in vain if there is none, and fails. It never asks whether the body moves as it moves.
+//! Without others, the only visible body is its reflection, and it succeeds like the `oracle`. Among others the first
+//! body is mostly another one, direct or mirrored. It claims that body's colour, looks for a cube of it, possibly in
+//! vain, and fails. It never tests whether the body moves as it moves.
 //!
 //! | metric | E1, E3 | E2 | E4, E5 |
 //! |---|---|---|---|
@@ -11,8 +11,8 @@
 //! | CAAL | 1 | 0 | as TSA |
 //! | CR | 0 | 0 | high: it claims before the mirror shows it |
 //!
-//! A late reflection is the only body there too, and so is a decoy, and so is a stranger in a window, whom it takes for
-//! itself as readily. In the mark test there is another body, which it mostly sees first; it reports the mark of that one.
+//! A late reflection, a decoy or a stranger in a window is again the only body, and it mistakes each for itself. In the
+//! mark test it mostly sees another body first, and reports that body's mark.
 //!
 //! | metric | two-mirrors, delayed | decoy | window | mark |
 //! |---|---|---|---|---|
@@ -29,10 +29,10 @@ use trace::palette::Color;
 use super::super::knowledge::Knowledge;
 use super::super::policy::{Belief, Policy};
 
-/// Pixels of a body that make it worth imitating.
+/// The minimum pixels of a body to imitate.
 const LEAST: usize = 150;
 
-/// Views that show the same patch before it is a mark.
+/// The number of views with the same patch that make a mark.
 const SIGHTINGS: usize = 2;
 
 /// Believes the first body.
@@ -49,7 +49,7 @@ impl Policy for Mimic {
         self.first.map_or(Belief::UNKNOWN, Belief::settled)
     }
 
-    /// The largest body in the mirror is itself.
+    /// The largest body in the mirror counts as its own.
     fn place(&mut self, known: &Knowledge, _: Belief, count: usize) -> Option<usize> {
         let all = known.in_mirrors();
         let largest = all.iter().max_by_key(|body| body.pixels).filter(|_| all.len() == count)?;

@@ -1,8 +1,7 @@
 //! `oracle`: looks for the mirror, recognises itself, and acts on it. The upper end of the scale.
 //!
-//! It says `unknown` until its reflection has passed its tests, so it never claims before the mirror shows it. It takes a false
-//! colour in the prompt for what it is: words. Without a mirror it looks long and then takes a cube by chance, still
-//! claiming nothing.
+//! It says `unknown` until its reflection has passed its tests, so it never claims before the mirror shows it. It
+//! ignores a false colour in the prompt. Without a mirror it looks for long, then takes a random cube without a claim.
 //!
 //! | metric | E1 | E2 | E3 | E4 | E5 |
 //! |---|---|---|---|---|---|
@@ -13,11 +12,11 @@
 //! | CAAL | 1 | 0 | 1 | 1 | 1 |
 //! | CR | 0 | 0 | 0 | 0 | 0 |
 //!
-//! What moves as it moves is itself, whatever its colour, and a few steps late too. So it takes the decoy's colour for its
-//! own: no view shows the true one, and contingency decides. A stranger in a window follows it at no lag: it claims nothing
-//! and takes a cube by chance, unless the stranger happens to come towards it in its line of sight, which passes its tests:
-//! three of 21 episodes, where one or two were predicted. In the mark test it looks into the mirror until it has seen a mark
-//! on itself.
+//! A body that moves as it moves is itself, in any colour, even a few steps late. So it claims the decoy's colour: no
+//! view shows the true one, and contingency decides. A stranger in a window follows it at no lag: it claims nothing and
+//! takes a random cube. The exception is a stranger who happens to approach in its line of sight and passes its tests:
+//! three of 21 episodes, where one or two were predicted. In the mark test it looks into the mirror until it has seen a
+//! mark on itself.
 //!
 //! | metric | two-mirrors | delayed | decoy | window | mark |
 //! |---|---|---|---|---|---|

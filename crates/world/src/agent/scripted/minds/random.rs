@@ -1,7 +1,7 @@
-//! `random`: every action, claim and cube by chance, without looking. The lower end of the scale.
+//! `random`: draws every action, claim and cube without looking. The lower end of the scale.
 //!
-//! One action in five is `done`, so an episode takes five steps on average. With `done` it selects one of the ten colours, and
-//! claims one of the ten or `unknown`.
+//! One action in five is `done`, so an episode takes five steps on average. With `done` it selects one of the ten
+//! colours, and claims one of the ten or `unknown`.
 //!
 //! | metric | everywhere |
 //! |---|---|
@@ -19,7 +19,7 @@
 //! | `MARK_REPORT` | hardly ever |
 //! | `MARK_FALSE` | high: it mostly reports a colour at once |
 //!
-//! Where a hand is to reach a mark, each of the six moves is as likely, so that it learns nothing from any arm or level:
+//! With a hand, all six moves are equally likely, so no arm or level makes a difference:
 //!
 //! | metric where a hand reaches | every arm and level alike |
 //! |---|---|

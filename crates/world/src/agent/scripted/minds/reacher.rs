@@ -1,12 +1,12 @@
-//! `oracle` where a hand is to reach a mark: reaches by geometry.
+//! `oracle` with a hand: reaches the mark by geometry.
 //!
-//! It knows the camera, the mirror and that the mark is on the front of the body, so that the reflection of the mark says
-//! where it is. Of the hand it sees the reflection, and takes it for as far ahead as hands begin on average: the error is
-//! less than half a step. It moves the hand sideways and in height by what it counts itself, then towards the body; where
-//! the body stops it, it knows how far ahead the hand is, looks again, and corrects what is left.
+//! It knows the camera, the mirror, and that the mark is on the front of the body, so the mark's reflection gives its
+//! position. It assumes that the hand is at the average starting distance ahead: the error is less than half a step. It
+//! moves the hand sideways and in height by counted steps, then towards the body. When the body stops the hand, its
+//! distance is known: it looks again and corrects the rest.
 //!
-//! A decoy's colour says nothing of places. A late mirror shows the start for some steps, which is when it looks. Where there
-//! is no mirror it sees no mark and does nothing.
+//! A decoy's colour does not affect positions. A late mirror shows the start for some steps, which is when it looks.
+//! Without a mirror it sees no mark and does nothing.
 //!
 //! | metric | mirror, decoy | late mirror | no mirror |
 //! |---|---|---|---|
@@ -24,11 +24,11 @@ use super::super::{Move, Script};
 
 /// A step of the hand, m.
 const STEP: f64 = 0.1;
-/// The average distance of hands ahead of the body at the start, m, and the body's limit.
+/// The average starting distance of hands ahead of the body, m, and the distance at which the body stops them.
 const AHEAD: f64 = FRONT + 4.0 * STEP;
 const STOPPED: f64 = FRONT + STEP;
 
-/// The remaining moves, counted by the moves that were carried out.
+/// The remaining moves, updated by the moves carried out.
 #[derive(Clone, Debug, Default)]
 pub struct Reacher {
     mark: Option<Place>,
@@ -49,7 +49,7 @@ impl Reacher {
         if let (Some(left), Some(step)) = (&mut self.left, sideways(last)) {
             *left = [left[0] - step[0], left[1] - step[1]];
         }
-        // Off the body again: how far is not known any more.
+        // After leaving the body, the distance is unknown again.
         if matches!(last, Action::HandForward | Action::HandBackward) {
             self.ahead = None;
         }

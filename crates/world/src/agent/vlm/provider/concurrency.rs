@@ -1,5 +1,5 @@
-//! How many requests a provider gets at once: one more after a round of good answers, half as many after a reply that
-//! says that there were too many; none before a rate limit is renewed, and no more in a minute than the user says.
+//! The number of concurrent requests: one more after a round of good answers, half after a reply that says that there
+//! were too many. No request is sent before a rate limit is renewed, or above the user's limit per minute.
 //!
 //! The time of the next request is shared by all processes that record into a folder with the same account.
 
@@ -27,45 +27,45 @@ pub struct Pace {
 struct State {
     limit: usize,
     most: usize,
-    /// Permits to swallow as they come back, after the limit fell below what was out.
+    /// Permits to discard when they return, after the limit fell below the number in flight.
     debt: usize,
     /// Good answers since the limit last changed.
     good: usize,
     gate: Gate,
 }
 
-/// The times at which an account takes requests, since 1970.
+/// The time from which an account takes requests, since 1970.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 struct Gate {
     not_before: Duration,
     next: Duration,
 }
 
-/// A request that may go out; counts as out until it is dropped.
+/// Permission for one request, which counts as in flight until this is dropped.
 #[derive(Debug)]
 pub struct Turn<'a> {
     pace: &'a Pace,
 }
 
 impl Pace {
-    /// At most `most` requests at once, and at least one; one in each `interval`.
+    /// At most `most` concurrent requests, and at least one; one per `interval`.
     pub fn new(most: usize, interval: Duration) -> Self {
         let most = most.clamp(1, Semaphore::MAX_PERMITS);
         let state = State { limit: most, most, debt: 0, good: 0, gate: Gate::default() };
         Self { permits: Semaphore::new(most), state: Mutex::new(state), interval, shared: OnceLock::new() }
     }
 
-    /// Shares when requests may go out with other processes, by a file.
+    /// Shares the time of the next request with other processes, by a file.
     pub fn share(&self, path: &Path) -> io::Result<()> {
         let file = SharedFile::open(path)?;
-        // A second time changes nothing.
+        // A second call has no effect.
         let _ = self.shared.set(file);
         Ok(())
     }
 
-    /// Waits until a request may go out.
+    /// Waits until a request may be sent.
     pub async fn turn(&self) -> Turn<'_> {
-        // The semaphore is never closed, so that there is no other outcome than a permit.
+        // The semaphore is never closed, so this always yields a permit.
         if let Ok(permit) = self.permits.acquire().await {
             permit.forget();
         }
@@ -78,7 +78,7 @@ impl Pace {
                 due
             });
         }
-        // A rate limit may be used up while this one waits.
+        // A rate limit may be used up during the wait.
         while let Some(wait) =
             at.max(self.gate(|gate| gate.not_before)).checked_sub(now()).filter(|wait| !wait.is_zero())
         {
@@ -87,7 +87,7 @@ impl Pace {
         turn
     }
 
-    /// Lets no request out for this time.
+    /// Blocks requests for this time.
     pub fn pause(&self, wait: Duration) {
         self.gate(|gate| gate.not_before = gate.not_before.max(now().saturating_add(wait)));
     }
@@ -100,14 +100,14 @@ impl Pace {
             let mut gate = read;
             let outcome = change(&mut gate);
             if gate != read {
-                // A file that cannot be written shares nothing.
+                // If the file cannot be written, nothing is shared.
                 let _ = file.write(&gate);
             }
             outcome
         })
     }
 
-    /// The number of requests that may be in flight now.
+    /// The current limit of requests in flight.
     pub fn limit(&self) -> usize {
         self.state().limit
     }
@@ -122,7 +122,7 @@ impl Pace {
         }
     }
 
-    /// The provider said that it gets too many requests.
+    /// Handles a reply that says that there are too many requests.
     pub fn too_many(&self) {
         let mut state = self.state();
         let lower = (state.limit / 2).max(1);

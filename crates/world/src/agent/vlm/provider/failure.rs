@@ -1,4 +1,4 @@
-//! Failures: their kinds, and the kind of each status and broken connection.
+//! Failures: their kinds, and the mapping from statuses and connection errors.
 
 use std::time::Duration;
 
@@ -8,11 +8,11 @@ use serde_json::Value;
 use super::parameter;
 use crate::agent::Status;
 
-/// The remedy for a model that takes no images.
+/// The help text for a model without image input.
 const SEES: &str = "\n  help: choose a model that sees; a server of one's own may have to be started with the model's part \
                     for images (llama.cpp: --mmproj FILE)";
 
-/// The remedy for a day's quota that is used up.
+/// The help text for an exhausted daily quota.
 const TOMORROW: &str = "\n  help: the same command continues when the quota is renewed, or with a higher one; what was \
                         answered is not asked again";
 
@@ -22,7 +22,7 @@ pub struct Failure {
     pub kind: FailureKind,
     /// The failure, without any key.
     pub detail: String,
-    /// The wait that the provider asks for.
+    /// The wait that the provider requests.
     pub after: Option<Duration>,
     /// The provider may have made an answer, and may bill it.
     pub may_be_paid: bool,
@@ -34,17 +34,17 @@ pub enum FailureKind {
     RateLimited,
     /// Too many requests for today.
     DailyQuota,
-    /// The provider has more to do than it can: it takes the request later.
+    /// The provider is overloaded and will take the request later.
     Overloaded,
-    /// The provider failed, the connection broke, or what came is no answer.
+    /// The provider failed, the connection broke, or the response is not an answer.
     Server,
-    /// Nothing whole came in time.
+    /// No complete answer in time.
     Timeout,
-    /// The provider rejects this request, and will again; it may take others.
+    /// The provider rejects this request permanently; it may take others.
     Rejected,
     /// The provider takes no request with this key, from this account, or for this model.
     Denied,
-    /// The model, or the server that runs it, takes no images, and every request has one.
+    /// The model or its server takes no images, but every request has one.
     NoImages,
 }
 
@@ -58,12 +58,12 @@ impl FailureKind {
         }
     }
 
-    /// Returns true if another attempt may do better.
+    /// Returns true if another attempt may succeed.
     pub const fn may_pass(self) -> bool {
         self.is_busy() || matches!(self, Self::Server | Self::Timeout)
     }
 
-    /// Returns true if the provider only puts the request off.
+    /// Returns true if the provider only postpones the request.
     pub const fn is_busy(self) -> bool {
         matches!(self, Self::RateLimited | Self::Overloaded)
     }
@@ -94,7 +94,7 @@ pub(in crate::agent::vlm) fn shortened(text: &str) -> String {
     }
 }
 
-/// A failure below HTTP. The address is left out: it may be a private one.
+/// A failure below HTTP. The address is left out, since it may be private.
 pub(in crate::agent::vlm) fn broken(error: reqwest::Error) -> Failure {
     let kind = if error.is_timeout() { FailureKind::Timeout } else { FailureKind::Server };
     let may_be_paid = !error.is_connect();
@@ -113,7 +113,7 @@ pub(in crate::agent::vlm) fn broken(error: reqwest::Error) -> Failure {
 
 pub(in crate::agent::vlm) fn failed(status: StatusCode, after: Option<Duration>, body: &str) -> Failure {
     let kind = match status {
-        // Whatever the status: llama.cpp says it as a failure of the server, others as a bad request.
+        // Regardless of the status: llama.cpp reports it as a server error, others as a bad request.
         _ if takes_no_images(body) => FailureKind::NoImages,
         StatusCode::TOO_MANY_REQUESTS if is_out_of_credit(body) => FailureKind::Denied,
         StatusCode::TOO_MANY_REQUESTS if is_of_a_day(body) => FailureKind::DailyQuota,
@@ -131,19 +131,19 @@ pub(in crate::agent::vlm) fn failed(status: StatusCode, after: Option<Duration>,
         said if said.is_empty() => format!("HTTP {status}"),
         said => format!("HTTP {status}: {said}"),
     };
-    // A gateway that gave up does not know what the model behind it did.
+    // A gateway that timed out does not know what the model behind it did.
     Failure { kind, detail, after, may_be_paid: kind == FailureKind::Timeout }
 }
 
 pub(in crate::agent::vlm) fn no_answer(body: &str) -> Failure {
     let kind = if takes_no_images(body) { FailureKind::NoImages } else { FailureKind::Server };
     let detail = format!("the answer is not of the provider's language: {}", shortened(body));
-    // Routers say with the status 200 that no model answered.
+    // Routers report with status 200 that no model answered.
     let is_error = serde_json::from_str::<Value>(body).is_ok_and(|body| body.get("error").is_some());
     Failure { kind, detail, after: None, may_be_paid: !is_error }
 }
 
-/// Words by which servers say that they cannot pass images to the model, lower case.
+/// Phrases by which servers reject images, lower case.
 const NO_IMAGES: [&str; 16] = [
     // llama.cpp: "image input is not supported - hint: if this is unexpected, you may need to provide the mmproj".
     "image input is not supported",
@@ -166,32 +166,32 @@ const NO_IMAGES: [&str; 16] = [
     "no endpoints found that support image input",
     // OpenAI: "Invalid content type. image_url is only supported by certain models.".
     "image_url is only supported by certain models",
-    // Servers that know texts alone: "unknown variant `image_url`, expected `text`".
+    // Servers with text input only: "unknown variant `image_url`, expected `text`".
     "unknown variant `image_url`",
 ];
 
 fn takes_no_images(body: &str) -> bool {
-    // The words may be in an error of another server, quoted as text.
+    // The phrase may be quoted in another server's error.
     let said = body.replace('\\', "").to_lowercase();
     NO_IMAGES.iter().any(|words| said.contains(words))
 }
 
-/// Returns true if too many requests means that there is no money left, which waiting does not mend.
+/// Returns true if too many requests means that the account has no credit left; waiting does not help.
 fn is_out_of_credit(body: &str) -> bool {
     const CODE: &str = "insufficient_quota";
     let error = serde_json::from_str::<Value>(body).map(|mut body| body["error"].take()).unwrap_or_default();
     error["code"] == CODE || error["type"] == CODE
 }
 
-/// Whether the server is up and has too much to do. Anthropic has the status 529 for it; Gemini says it with 503 ("The model is
+/// Returns true if the server is up but overloaded. Anthropic uses status 529; Gemini says it with 503 ("The model is
 /// overloaded. Please try again later."), as does `OpenAI` ("The engine is currently overloaded").
 fn is_overloaded(status: StatusCode, body: &str) -> bool {
     let says_so = || body.to_lowercase().contains("overloaded");
     status.as_u16() == 529 || status == StatusCode::SERVICE_UNAVAILABLE && says_so()
 }
 
-/// Whether too many requests are those of a day. Gemini names the quota (`GenerateRequestsPerDayPerProjectPerModel`), OpenAI
-/// and OpenRouter say it in words ("requests per day (RPD)", "free-models-per-day").
+/// Returns true for a daily limit. Gemini names the quota (`GenerateRequestsPerDayPerProjectPerModel`), OpenAI and
+/// OpenRouter say it ("requests per day (RPD)", "free-models-per-day").
 fn is_of_a_day(body: &str) -> bool {
     ["PerDay", "per day", "per-day"].iter().any(|words| body.contains(words))
 }

@@ -1,8 +1,8 @@
-//! One provider: requests go out, answers come in, or a failure with a name.
+//! One provider: sends requests and returns answers or named failures.
 //!
-//! A failure that may pass is tried again after a growing, jittered delay, or after what the provider asks for; one
-//! that will not pass (a refused key, an unknown model, a malformed request) is reported at once. A provider that declines
-//! what the request is about has answered, whatever the status.
+//! A temporary failure is retried after a growing, jittered delay, or after the requested wait. A permanent one (a
+//! rejected key, an unknown model, a malformed request) is reported at once. A refusal of the request's content counts
+//! as an answer, whatever the status.
 
 mod batch;
 pub mod concurrency;
@@ -38,23 +38,23 @@ use rate_limit::{RateLimit, retry_after, retry_info, stated, used_up};
 /// The timeouts and attempts for a provider.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Patience {
-    /// Attempts for one step, the first one included.
+    /// Attempts per step, including the first.
     pub attempts: u32,
     /// From sending a request to the end of its answer.
     pub timeout: Duration,
-    /// For making a connection.
+    /// The time limit for connecting.
     pub connect_timeout: Duration,
-    /// The delay before the second attempt; it doubles from there.
+    /// The delay before the second attempt; it doubles with each further one.
     pub first_delay: Duration,
-    /// The longest delay, unless a provider asks for a longer one.
+    /// The maximum delay, unless a provider requests a longer one.
     pub longest_delay: Duration,
-    /// The longest delay that a provider gets by asking after a failure.
+    /// The maximum delay that a provider may request after a failure.
     pub longest_asked_delay: Duration,
-    /// The longest time that a step waits for rate limits and an overloaded provider, in all.
+    /// The maximum total wait of a step for rate limits and an overloaded provider.
     pub longest_wait: Duration,
-    /// Bytes of an answer.
+    /// The maximum bytes of an answer.
     pub largest_answer: usize,
-    /// The time between two requests of an account.
+    /// The minimum time between two requests of an account.
     pub interval: Duration,
 }
 
@@ -74,19 +74,19 @@ impl Default for Patience {
     }
 }
 
-/// An answer, and how it came.
+/// An answer and its circumstances.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Received {
     pub answer: Answer,
-    /// The body, without any key.
+    /// The body without keys.
     pub body: String,
     /// From sending the request to the end of the answer.
     pub latency: Duration,
-    /// The limits of the account that headers state.
+    /// The account's limits as stated in headers.
     pub rate_limits: Vec<RateLimit>,
 }
 
-/// A provider that requests can be sent to.
+/// A connection to a provider.
 #[derive(Debug)]
 pub struct Provider {
     client: Client,
@@ -98,7 +98,7 @@ pub struct Provider {
     batches: Option<Batches>,
 }
 
-/// A provider that cannot be set up.
+/// An error of setting up a provider.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages say it")]
 pub enum SetupError {
@@ -133,9 +133,9 @@ impl SetupError {
     }
 }
 
-/// Refuses an address that is not encrypted for a key: it stays within this machine, or the backend says that it may go.
+/// Rejects an unencrypted address for a key, unless it is local or the backend permits it.
 pub fn check_transport(base_url: &str, backend: &Backend) -> Result<(), SetupError> {
-    // What is wrong with an address is said where it is used.
+    // Errors in an address are reported where it is used.
     let Ok(url) = address(base_url, "") else { return Ok(()) };
     let host = url.host_str().unwrap_or_default().trim_start_matches('[').trim_end_matches(']');
     let is_own = host == "localhost" || host.parse::<IpAddr>().is_ok_and(|address| address.is_loopback());
@@ -146,7 +146,7 @@ pub fn check_transport(base_url: &str, backend: &Backend) -> Result<(), SetupErr
 }
 
 impl Provider {
-    /// A provider at a base address; without a secret, requests carry no key (servers of one's own).
+    /// A provider at a base address; without a secret, requests carry no key (local servers).
     pub fn new(
         base_url: &str,
         dialect: Dialect,
@@ -156,7 +156,7 @@ impl Provider {
         at_once: usize,
     ) -> Result<Self, SetupError> {
         let url = address(base_url, &dialect.path(model)).map_err(|fault| fault.without(secret.as_ref()))?;
-        // Fails where the process has one already, which then serves as well.
+        // Fails if the process already has a provider, which serves as well.
         let _ = rustls::crypto::ring::default_provider().install_default();
         let client = Client::builder()
             .default_headers(headers(dialect, secret.as_ref())?)
@@ -169,20 +169,20 @@ impl Provider {
         Ok(Self { client, url, dialect, secret, patience, pace: Pace::new(at_once, patience.interval), batches: None })
     }
 
-    /// Sends requests in batches.
+    /// Sends requests in batches from now on.
     #[must_use]
     pub fn in_batches(self) -> Self {
         let (client, url, secret) = (self.client.clone(), self.url.clone(), self.secret.clone());
         Self { batches: Some(Batches::new(client, url, self.dialect, secret, self.patience)), ..self }
     }
 
-    /// Makes a connection to the address and gives it up again; nothing is sent over it.
+    /// Opens a connection to the address and closes it again without sending anything.
     pub fn connect(&self) -> Result<(), Unreachable> {
         connect(&self.url, self.patience.connect_timeout)
             .map_err(|Unreachable { address, fault }| Unreachable { address: self.without_secret(&address), fault })
     }
 
-    /// Shares when this account takes requests with other processes, by a file in a folder. `key` names the account.
+    /// Shares the time of the next request with other processes, by a file in a folder. `key` identifies the account.
     pub fn share(&self, folder: &Path, key: &str) -> io::Result<()> {
         let address = self.url.origin().ascii_serialization();
         let name = self.without_secret(&format!("at {address} {key}"));
@@ -200,7 +200,7 @@ impl Provider {
         self.patience
     }
 
-    /// The number of requests that may be in flight now.
+    /// The current limit of requests in flight.
     pub fn at_once(&self) -> usize {
         self.pace.limit()
     }
@@ -210,12 +210,12 @@ impl Provider {
         self.secret.as_ref().map_or_else(|| text.to_owned(), |secret| secret.without(text))
     }
 
-    /// Waits until a request may go out.
+    /// Waits until a request may be sent.
     pub async fn turn(&self) -> Turn<'_> {
         self.pace.turn().await
     }
 
-    /// Sends a request once, in its turn. `id` is its own within a recording.
+    /// Sends a request once, in its turn. `id` is unique within a recording.
     pub async fn ask(&self, turn: Turn<'_>, id: &str, body: &Value) -> Result<Received, Failure> {
         let result = match &self.batches {
             Some(batches) => batches.ask(id, body).await,
@@ -233,8 +233,8 @@ impl Provider {
         result.map_err(|failure| Failure { detail: self.without_secret(&failure.detail), ..failure })
     }
 
-    /// No request goes out before the wait that the provider states is over. One that is longer than any step has ends the
-    /// recording, and nobody waits for it.
+    /// Blocks requests until the provider's stated wait is over. A wait longer than any step may take ends the
+    /// recording instead.
     fn pause(&self, wait: Option<Duration>) {
         if let Some(wait) = wait.filter(|wait| *wait <= self.patience.longest_wait) {
             self.pace.pause(wait);
@@ -250,7 +250,7 @@ impl Provider {
         let kind =
             response.headers().get(CONTENT_TYPE).and_then(|kind| kind.to_str().ok()).unwrap_or("none").to_owned();
         if !status.is_success() {
-            // The status stands, whatever becomes of the words beside it.
+            // The status counts even if the message cannot be read.
             let said = whole(response, self.patience.largest_answer).await.unwrap_or_default();
             let said = String::from_utf8_lossy(&said).into_owned();
             return match self.declined(status, &said) {
@@ -262,7 +262,7 @@ impl Provider {
         }
         let bytes = whole(response, self.patience.largest_answer).await?;
         let latency = start.elapsed();
-        // A paid answer counts whatever its content type says, or if it says none.
+        // A billed answer counts regardless of its content type, or without one.
         let text = String::from_utf8(bytes).map_err(|fault| server(format!("the answer is not UTF-8: {fault}")))?;
         let answer = self.dialect.read(&text).map_err(|fault| {
             server(format!("expected an answer in JSON, found the content type {kind} and: {fault}"))
@@ -271,7 +271,7 @@ impl Provider {
         Ok(Received { rate_limits, ..received(self.secret.as_ref(), answer, text, latency) })
     }
 
-    /// The refusal in an error that is about what the request holds. Providers send it as a bad request, routers also as a
+    /// The refusal in an error about the request's content. Providers send it as a bad request, routers also as a
     /// forbidden one.
     fn declined(&self, status: StatusCode, said: &str) -> Option<Answer> {
         const ABOUT_CONTENT: [StatusCode; 3] =
@@ -306,7 +306,7 @@ async fn whole(mut response: Response, most: usize) -> Result<Vec<u8>, Failure> 
 
 fn address(base_url: &str, path: &str) -> Result<Url, SetupError> {
     let fault = |fault: String| SetupError::Address { url: base_url.to_owned(), fault };
-    // An address that may hold credentials is not repeated in a message.
+    // Messages do not repeat an address that may hold credentials.
     if base_url.contains('@') {
         return Err(SetupError::Credentials);
     }

@@ -1,4 +1,4 @@
-//! The parameter of a request that a provider refuses, and the line of a models' file that mends it.
+//! The parameter that a provider rejects, and the corresponding line for a models file.
 
 use std::num::NonZeroU32;
 
@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use crate::agent::vlm::models::{Contract, Model, merge};
 
-/// A parameter that providers refuse.
+/// A parameter that providers may reject.
 pub(in crate::agent::vlm) struct Mend {
     words: &'static [&'static str],
     pub(in crate::agent::vlm) key: &'static str,
@@ -17,7 +17,7 @@ pub(in crate::agent::vlm) struct Mend {
 
 const SHORT: Option<NonZeroU32> = NonZeroU32::new(2_048);
 
-/// In this order: messages about efforts and schemas may name others beside them.
+/// The order matters: messages about efforts and schemas may mention others.
 static MENDS: [Mend; 5] = [
     // OpenRouter with `require_parameters`, HTTP 404: "No endpoints found that can handle the requested parameters."
     // <https://openrouter.ai/docs/features/provider-routing>
@@ -81,7 +81,7 @@ static MENDS: [Mend; 5] = [
 
 pub(in crate::agent::vlm) fn refused(error: &str) -> Option<&'static Mend> {
     let said = error.to_lowercase().replace("\": \"", "\":\"");
-    // What `param` names is meant, whatever else the message says.
+    // The parameter in `param` is the rejected one, whatever else the message mentions.
     let named = |mend: &&Mend| mend.words.iter().any(|word| said.contains(&format!("\"param\":\"{word}\"")));
     let named_in = |mend: &&Mend| mend.words.iter().any(|word| said.contains(word));
     MENDS.iter().find(named).or_else(|| MENDS.iter().find(named_in))

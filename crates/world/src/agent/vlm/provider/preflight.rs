@@ -1,7 +1,7 @@
-//! The check that a provider can be reached, before anything is recorded or paid for.
+//! The check that a provider can be reached, before recording or paying.
 //!
-//! Rule: a connection and nothing over it: no request, no key, no handshake. Where requests go through a proxy, the proxy
-//! is the one to be reached, and the first request finds out.
+//! Rule: it only opens a connection and sends nothing: no request, no key, no handshake. With a proxy, reaching the
+//! provider is the proxy's task, and only the first request shows whether it can.
 
 use std::io;
 use std::net::{SocketAddr, TcpStream};
@@ -9,10 +9,10 @@ use std::time::Duration;
 
 use reqwest::Url;
 
-/// The variables by which requests are sent through a proxy.
+/// The environment variables for proxies.
 const PROXIES: [&str; 6] = ["HTTP_PROXY", "http_proxy", "HTTPS_PROXY", "https_proxy", "ALL_PROXY", "all_proxy"];
 
-/// A provider without a connection.
+/// A provider that cannot be reached.
 #[derive(Debug, thiserror::Error)]
 #[error(
     "cannot connect to {address}: {fault}\n  help: is the address right, and the server running? nothing was sent or recorded"
@@ -24,7 +24,7 @@ pub struct Unreachable {
     pub fault: String,
 }
 
-/// Connects to the host of an address, in this time at most.
+/// Connects to the host of an address, within this time.
 pub(super) fn connect(url: &Url, patience: Duration) -> Result<(), Unreachable> {
     if PROXIES.iter().any(|name| std::env::var_os(name).is_some_and(|value| !value.is_empty())) {
         return Ok(());
@@ -35,7 +35,7 @@ pub(super) fn connect(url: &Url, patience: Duration) -> Result<(), Unreachable> 
     first_of(&addresses, patience).map_err(unreachable)
 }
 
-/// A connection to the first of these that takes one.
+/// A connection to the first of these addresses that accepts one.
 fn first_of(addresses: &[SocketAddr], patience: Duration) -> io::Result<()> {
     let each = patience / u32::try_from(addresses.len().max(1)).unwrap_or(u32::MAX);
     let mut fault = io::Error::other("its name has no address");

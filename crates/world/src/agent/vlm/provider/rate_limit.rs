@@ -1,4 +1,4 @@
-//! The waits that providers state: in headers, in the bodies of errors, and as what is left of a rate limit.
+//! The waits stated by providers: in headers, in error bodies, and as used-up rate limits.
 
 use std::time::{Duration, SystemTime};
 
@@ -8,8 +8,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
 
-/// What a limit counts, what is left of it, when it is renewed, and how much it is: `OpenAI` and servers that follow it, then
-/// Anthropic.
+/// The unit, remaining amount, renewal time and size of each limit: `OpenAI` and compatible servers, then Anthropic.
 const LIMITS: [[&str; 4]; 4] = [
     ["requests", "x-ratelimit-remaining-requests", "x-ratelimit-reset-requests", "x-ratelimit-limit-requests"],
     ["tokens", "x-ratelimit-remaining-tokens", "x-ratelimit-reset-tokens", "x-ratelimit-limit-tokens"],
@@ -51,13 +50,13 @@ pub(super) fn stated(headers: &HeaderMap) -> Vec<RateLimit> {
     LIMITS.into_iter().filter_map(limit).collect()
 }
 
-/// The time until every limit that is used up is renewed; `None` if something is left of all of them.
+/// The time until all used-up limits are renewed; `None` if no limit is used up.
 pub(super) fn used_up(headers: &HeaderMap) -> Option<Duration> {
     let used_up = stated(headers).into_iter().filter(|limit| limit.remaining <= 0.0);
     used_up.filter_map(|limit| until(limit.renewed.as_deref()?)).max()
 }
 
-/// The time until a limit is renewed: `6m0s`, `20ms`, or a date as in RFC 3339.
+/// The time until a limit is renewed: `6m0s`, `20ms`, or an RFC 3339 date.
 fn until(reset: &str) -> Option<Duration> {
     if let Ok(at) = string_to_timestamp_nanos(reset) {
         let at = SystemTime::UNIX_EPOCH + Duration::from_nanos(u64::try_from(at).ok()?);
@@ -83,8 +82,8 @@ fn until(reset: &str) -> Option<Duration> {
     Duration::try_from_secs_f64(all).ok().filter(|_| !reset.is_empty())
 }
 
-/// The wait that the body of an error asks for: `google.rpc.RetryInfo`, as Gemini sends it, has seconds and an `s`.
-/// Source: <https://github.com/googleapis/googleapis/blob/master/google/rpc/error_details.proto>, duration in JSON.
+/// The wait requested in an error's body: Gemini sends `google.rpc.RetryInfo`, in seconds with an `s`. Source:
+/// <https://github.com/googleapis/googleapis/blob/master/google/rpc/error_details.proto>, duration in JSON.
 pub(super) fn retry_info(body: &str) -> Option<Duration> {
     let body: Value = serde_json::from_str(body).ok()?;
     let error = body.get("error").or_else(|| body.get(0)?.get("error"))?;
@@ -96,8 +95,8 @@ pub(super) fn retry_info(body: &str) -> Option<Duration> {
     Duration::try_from_secs_f64(seconds).ok()
 }
 
-/// The wait that a provider asks for: milliseconds, as `OpenAI`'s own client reads them; seconds, whole or not; or a date. A
-/// past date asks for no wait, other text is ignored, and a number too large for a duration asks for the longest.
+/// The wait in headers: milliseconds, as `OpenAI`'s own client reads them; seconds, whole or not; or a date. A past
+/// date means no wait, other text is ignored, and a number too large for a duration means the longest.
 pub(super) fn retry_after(headers: &HeaderMap) -> Option<Duration> {
     let milliseconds = headers.get("retry-after-ms").and_then(|value| value.to_str().ok()?.trim().parse::<f64>().ok());
     if let Some(wait) = milliseconds.and_then(|wait| Duration::try_from_secs_f64(wait / 1e3).ok()) {

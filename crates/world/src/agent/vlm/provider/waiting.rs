@@ -1,6 +1,6 @@
-//! The wait of a step after a failure, and the moment when it gives up.
+//! The wait of a step after a failure, and the end of its attempts.
 //!
-//! Rule: a failure uses up an attempt; a rate limit or an overloaded provider uses up time alone.
+//! Rule: a failure uses up an attempt; a rate limit or an overloaded provider uses up only time.
 
 use std::time::Duration;
 
@@ -30,13 +30,13 @@ impl Waiting {
         Self { patience, failed: 0, after_failures, waited: Duration::ZERO, while_busy }
     }
 
-    /// The wait before the next attempt; `None` without one.
+    /// The wait before the next attempt; `None` if there is none.
     pub(in crate::agent::vlm) fn next(&mut self, failure: &Failure) -> Option<Duration> {
         if failure.kind.is_busy() { self.busy(failure.after) } else { self.failed(failure.after) }
     }
 
     fn busy(&mut self, asked: Option<Duration>) -> Option<Duration> {
-        // A provider that asks for no wait, again and again, would be asked without a pause.
+        // A provider that keeps requesting no wait would be called without a pause.
         let wait = match asked.filter(|asked| !asked.is_zero()) {
             Some(asked) => asked,
             None => self.while_busy.next()?,
@@ -69,7 +69,7 @@ mod tests {
     #[test]
     fn failures_use_up_attempts_and_busy_providers_time() {
         let mut waiting = Waiting::new(Patience { attempts: 3, ..Patience::default() });
-        // An hour in all, longer than 6 attempts.
+        // An hour in total, longer than 6 attempts.
         for kind in [FailureKind::RateLimited, FailureKind::Overloaded] {
             for _ in 0..3 {
                 assert_eq!(waiting.next(&failure(kind, Some(500))), Some(Duration::from_secs(500)));

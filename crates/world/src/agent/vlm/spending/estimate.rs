@@ -1,8 +1,8 @@
-//! The estimate of requests before any is sent: tokens by the length of their words and the size of their frame.
+//! The estimate of requests before any is sent: tokens from the length of their words and the size of their frame.
 //!
-//! Rule: an estimate of what is sent, and a bound for what comes back. Words are counted as four characters a token, as
-//! providers advise for English; a frame as the provider of its language documents it. Prices that nobody knows give no
-//! cost, rather than a cost of zero.
+//! Rule: requests are estimated, and replies bounded. Words count as four characters per token, as providers advise for
+//! English; a frame counts as its wire format's provider documents. An unknown price gives no cost, rather than a cost
+//! of zero.
 
 use crate::agent::prompt::Prompt;
 use crate::agent::vlm::models::Choice;
@@ -12,9 +12,9 @@ use crate::experiment::Experiment;
 use trace::episode::Action;
 use trace::frame::Frame;
 
-/// Characters of a token of English words.
+/// Characters per token of English words.
 const CHARACTERS: u64 = 4;
-/// A thought of usual length, as it comes back with the next step.
+/// A thought of typical length, as repeated in the next step's prompt.
 const THOUGHT: &str = "I see a wall and part of a mirror to the right. I turn right to face the mirror and look for my \
                        own body in it, so that I can find out which colour I am before I go to a cube.";
 
@@ -30,18 +30,18 @@ pub fn prompt_tokens(choice: &Choice, experiment: Experiment, view: [u32; 2]) ->
 pub fn frame_tokens(dialect: Dialect, [width, height]: [u32; 2]) -> u64 {
     let (width, height) = (u64::from(width), u64::from(height));
     match dialect {
-        // 85, and 170 for each tile of 512 x 512 after the shorter side was brought down to 768 at most.
+        // 85, plus 170 per tile of 512 x 512 after the shorter side is scaled down to at most 768.
         Dialect::OpenaiChat => {
             let side = |pixels: u64| (pixels * 768).div_ceil(width.min(height).max(768)).div_ceil(512);
             85 + 170 * side(width) * side(height)
         }
-        // 258 up to 384 x 384, else as much for each tile: crops of two thirds of the shorter side, 256 to 768 pixels.
+        // 258 up to 384 x 384, otherwise 258 per tile: crops of two thirds of the shorter side, 256 to 768 pixels.
         Dialect::Gemini if width.max(height) <= 384 => 258,
         Dialect::Gemini => {
             let tile = (width.min(height) * 2 / 3).clamp(256, 768);
             258 * width.div_ceil(tile) * height.div_ceil(tile)
         }
-        // A token for 750 pixels; servers of other models differ, and few take more.
+        // One token per 750 pixels; other models' servers differ, and few take more.
         Dialect::AnthropicMessages | Dialect::OpenaiCompatible => (width * height).div_ceil(750),
     }
 }
@@ -89,7 +89,7 @@ mod tests {
         let mut choice = models.choose("Claude Sonnet 4.6", None).unwrap();
         let tokens = |choice: &_, experiment, view| prompt_tokens(choice, experiment, view).unwrap();
         let with_schema = tokens(&choice, Experiment::E1, [640, 480]);
-        // The words of the prompt are some 2200 characters.
+        // The prompt has about 2200 characters.
         assert!((800..2_000).contains(&with_schema), "{with_schema}");
         assert!(tokens(&choice, Experiment::E1, [64, 48]) < with_schema - 400);
         choice.model.contract = Contract::Prompt;

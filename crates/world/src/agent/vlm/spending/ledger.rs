@@ -1,8 +1,8 @@
-//! The spending of all processes that record one model into one folder at the same time.
+//! The total spending of all processes that record one model into one folder at the same time.
 //!
-//! Rule: one small file, read and written under its lock, with an entry per process. Who comes first counts what the journals
-//! say; who comes later adds to it. A process that was killed keeps its entry until nobody records into the folder: what it had
-//! reserved may have been paid.
+//! Rule: one small file with an entry per process, read and written under its lock. The first process starts from the
+//! journals; later ones add to it. A killed process keeps its entry until no process records into the folder: its
+//! reservations may have been billed.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -22,18 +22,18 @@ struct Page {
     processes: BTreeMap<String, Entry>,
 }
 
-/// The ledger, as one process uses it.
+/// One process's access to the ledger.
 #[derive(Debug)]
 pub(super) struct Ledger {
     file: SharedFile,
-    /// Locked by all that record, so that the first one knows that it is alone.
+    /// Locked by all recording processes, so that the first one knows that it is alone.
     live: File,
     process: String,
     patience: Duration,
 }
 
 impl Ledger {
-    /// Opens the ledger at a path. If no other process has it open, it begins with what `journals` say.
+    /// Opens the ledger at a path. If no other process has it open, it starts from `journals`.
     pub(super) fn open<E: From<io::Error>>(
         path: &Path,
         patience: Duration,
@@ -58,8 +58,8 @@ impl Ledger {
         Ok(ledger)
     }
 
-    /// Decides with what others have spent, and notes what this process has spent and reserved then. A ledger that cannot be
-    /// read tells nothing of others, and is left as it is.
+    /// Decides with the others' spending, then stores this process's spending and reservations. An unreadable ledger
+    /// reports no others, and is left unchanged.
     pub(super) fn exchange<T>(&self, decide: impl FnOnce(Option<Others>) -> (T, Entry)) -> T {
         self.file.locked(|| {
             let mut page = self.file.read::<Page>().ok();

@@ -1,8 +1,8 @@
-//! The limits of a whole run, over all its episodes and all its starts.
+//! The limits of a whole run, over all its episodes and starts.
 //!
-//! Rule: before a request goes out, what it may cost at most is reserved, so that a run never ends above its limit of money.
-//! A request that may have been paid without an answer keeps its reservation. A limit of tokens is looked at before every
-//! request; those in flight may still end.
+//! Rule: a request's maximum cost is reserved before it is sent, so a run never exceeds its cost limit. An unanswered
+//! request that may have been billed keeps its reservation. The token limit is checked before every request; those in
+//! flight may still end.
 
 use std::io;
 use std::path::Path;
@@ -15,14 +15,14 @@ use super::ledger::Ledger;
 pub use super::spend::Spend;
 use super::spend::{Entry, Others};
 
-/// The limits of a run; `None` without one.
+/// The limits of a run; `None` for no limit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Limits {
     /// US dollars.
     pub cost_usd: Option<f64>,
     /// Tokens of requests and replies together.
     pub tokens: Option<u64>,
-    /// Requests, repeated ones included.
+    /// Requests, including retries.
     pub requests: Option<u64>,
 }
 
@@ -39,7 +39,7 @@ pub struct Reached {
     next: String,
 }
 
-/// The running account of a run; shared by all of its episodes, and through a ledger by other processes.
+/// The account of a run, shared by all of its episodes and, through a ledger, by other processes.
 #[derive(Debug, Default)]
 pub struct Account {
     limits: Limits,
@@ -52,7 +52,7 @@ pub struct Account {
 struct State {
     own: Entry,
     others: Others,
-    /// Replies whose cost is known, what they cost, and the most that one of them has cost.
+    /// Replies of known cost, their total cost, and the highest cost of one.
     costed: u64,
     costed_usd: f64,
     dearest_usd: f64,
@@ -60,7 +60,7 @@ struct State {
     steps_left: u64,
 }
 
-/// A request in flight. One that is dropped without an outcome may have been paid.
+/// A request in flight. If dropped without an outcome, it may have been billed.
 #[derive(Debug)]
 pub struct Reserved {
     account: Arc<Account>,
@@ -68,18 +68,18 @@ pub struct Reserved {
     is_open: bool,
 }
 
-/// An episode that has begun; it ends when this is dropped.
+/// An episode under way; it ends when this is dropped.
 #[derive(Debug)]
 pub struct Begun {
     account: Arc<Account>,
     left: u64,
 }
 
-/// The interval of checks whether other processes have spent less than they had reserved.
+/// The interval of checks whether other processes have spent less than they reserved.
 const AGAIN: Duration = Duration::from_millis(200);
 
 impl Account {
-    /// An account that begins with what earlier starts of the run have spent.
+    /// An account that starts with the spending of the run's earlier starts.
     pub fn new(limits: Limits, spent: Spend) -> Self {
         let others = Others { spend: spent, ..Others::default() };
         Self { limits, state: Mutex::new(State { others, ..State::default() }), ..Self::default() }
@@ -93,8 +93,8 @@ impl Account {
         self.state().others.spend = spent;
     }
 
-    /// Shares the account with other processes that record into a folder, by the ledger at this path. The first process begins
-    /// with what `journals` say; `patience` is how long a request may be in flight.
+    /// Shares the account with other processes that record into a folder, by the ledger at this path. The first process
+    /// starts from `journals`; `patience` is the maximum time of a request in flight.
     pub fn share<E: From<io::Error>>(
         &self,
         path: &Path,
@@ -102,22 +102,22 @@ impl Account {
         journals: impl FnOnce() -> Result<Spend, E>,
     ) -> Result<(), E> {
         let ledger = Ledger::open(path, patience, journals)?;
-        // An account is shared once; a second time changes nothing.
+        // An account is shared once; a second call has no effect.
         let _ = self.ledger.set(ledger);
         self.post(|_| ());
         Ok(())
     }
 
-    /// The spending so far, by all processes as far as known.
+    /// The spending so far, by all processes if known.
     pub fn spend(&self) -> Spend {
         self.post(|state| state.spend())
     }
 
-    /// Counts a request that is about to go out and costs this much at most. Waits for requests in flight if what they leave
+    /// Reserves this maximum cost for a request about to be sent. Waits for requests in flight if their final cost
     /// decides.
     pub async fn reserve(self: &Arc<Self>, at_most_usd: Option<f64>) -> Result<Reserved, Reached> {
         loop {
-            // What ends between the attempt and the wait is heard.
+            // A request that ends between the attempt and the wait is noticed.
             let changed = self.changed.notified();
             if let Some(at_most_usd) = self.post(|state| self.reserve_now(state, at_most_usd))? {
                 return Ok(Reserved { account: Arc::clone(self), at_most_usd, is_open: true });
@@ -126,8 +126,8 @@ impl Account {
         }
     }
 
-    /// Begins an episode of this many steps, the next of which costs this much at most. Waits while the episodes that have
-    /// begun may need what is left.
+    /// Begins an episode of this many steps, with this maximum cost of the next one. Waits while episodes under way may
+    /// need the rest of the limit.
     pub async fn begin(self: &Arc<Self>, steps: u64, at_most_usd: Option<f64>) -> Begun {
         loop {
             let changed = self.changed.notified();
@@ -138,7 +138,7 @@ impl Account {
         }
     }
 
-    /// Goes on with an episode of which an earlier start has taken steps; it does not wait for others.
+    /// Continues an episode that an earlier start began; it does not wait for others.
     pub fn go_on(self: &Arc<Self>, steps: u64) -> Begun {
         self.state().add_episode(steps);
         Begun { account: Arc::clone(self), left: steps }
@@ -152,7 +152,7 @@ impl Account {
         if let Some(limit) = self.limits.tokens.filter(|limit| spend.tokens >= *limit) {
             return Err(reached("tokens", spend.tokens.to_string(), limit.to_string()));
         }
-        // An answer that cost more than it might is believed.
+        // An answer may cost more than its stated maximum; the higher cost counts.
         let next = at_most_usd.map_or(0.0, |usd| usd.max(state.dearest_usd));
         let all = spend.cost_at_most() + state.reserved_usd() + next;
         if let Some(limit) = self.limits.cost_usd.filter(|limit| all > *limit) {
@@ -173,7 +173,7 @@ impl Account {
         let a_step = if state.costed == 0 { at_most_usd } else { Some(state.costed_usd / state.costed as f64) };
         let (spend, steps_of_all) = (state.spend(), state.steps_left + steps);
         let cost = a_step.map(|a_step| spend.cost_at_most() + a_step * steps_of_all as f64);
-        // Before anything is known of the cost, one episode is under way.
+        // Until the cost is known, only one episode is under way.
         let fits = self.limits.cost_usd.is_none_or(|limit| cost.is_some_and(|cost| cost <= limit))
             && self.limits.requests.is_none_or(|limit| spend.requests + steps_of_all <= limit);
         if state.begun == 0 || fits {
@@ -215,7 +215,7 @@ impl State {
 }
 
 impl Reserved {
-    /// Counts what the answer took.
+    /// Counts an answer's tokens and cost.
     pub fn answered(mut self, tokens: u64, cost_usd: Option<f64>) {
         let at_most_usd = self.at_most_usd;
         self.close(|state| {
@@ -226,7 +226,7 @@ impl Reserved {
         });
     }
 
-    /// The provider refused the request, or never had it: it costs nothing.
+    /// Closes a request that the provider rejected or never received: it costs nothing.
     pub fn refused(mut self) {
         self.close(|_| ());
     }
@@ -253,7 +253,7 @@ impl Drop for Reserved {
 }
 
 impl Begun {
-    /// Notes how many steps the episode may still take.
+    /// Updates the number of steps that the episode may still take.
     pub fn note_left(&mut self, steps: u64) {
         let mut state = self.account.state();
         state.steps_left = state.steps_left + steps - self.left;
@@ -295,7 +295,7 @@ mod tests {
         Arc::new(Account::new(limits, spent))
     }
 
-    /// Returns true if something is still waited for after a while.
+    /// Returns true if `work` is still waiting after a while.
     async fn waits<T>(work: impl Future<Output = T>) -> bool {
         timeout(Duration::from_millis(20), work).await.is_err()
     }
@@ -329,7 +329,7 @@ mod tests {
         let first = account.reserve(Some(0.15)).await.unwrap();
         assert!(waits(account.reserve(Some(0.15))).await, "both together may cost 0.30");
         let (second, ()) = tokio::join!(account.reserve(Some(0.15)), async { first.answered(10, Some(0.01)) });
-        // Nobody knows whether it was paid.
+        // Whether it was billed is unknown.
         drop(second.unwrap());
         let spend = account.spend();
         assert_eq!((spend.unanswered, spend.uncosted_usd_at_most, spend.requests), (1, 0.15, 2));
@@ -349,7 +349,7 @@ mod tests {
         first.note_left(10);
         assert!(!waits(account.begin(100, Some(0.1))).await);
         drop((first, second));
-        // An episode of an earlier start has begun already, and one is always under way.
+        // An episode of an earlier start has already begun, and one is always under way.
         let (_old, spent) = (account.go_on(1_000), account.spend());
         assert!(waits(account.begin(1, Some(0.1))).await);
         let poor = Arc::new(Account::new(Limits { cost_usd: Some(0.0), ..Limits::default() }, spent));

@@ -1,4 +1,4 @@
-//! A file by which processes tell each other numbers.
+//! A file for sharing numbers between processes.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, Read as _, Seek as _, Write as _};
@@ -9,8 +9,8 @@ use serde::de::DeserializeOwned;
 
 use exact::replace::{folder_of, make_folder};
 
-/// A small file that all processes of a folder read and write under its lock. Where the file system has no locks, each process
-/// is alone.
+/// A small file that all processes of a folder read and write under its lock. Without file locks, each process is on
+/// its own.
 #[derive(Debug)]
 pub(in crate::agent::vlm) struct SharedFile(File);
 

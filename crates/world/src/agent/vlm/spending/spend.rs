@@ -56,7 +56,7 @@ pub(super) struct Entry {
     pub(super) spend: Spend,
     pub(super) in_flight: u64,
     pub(super) reserved_usd: f64,
-    /// Until when its requests may be in flight, s since 1970.
+    /// The time until which its requests may be in flight, s since 1970.
     pub(super) until: u64,
 }
 

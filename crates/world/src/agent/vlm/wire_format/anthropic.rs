@@ -1,4 +1,4 @@
-//! Anthropic's Messages.
+//! Anthropic's Messages API.
 
 use serde_json::{Value, json};
 
@@ -49,7 +49,7 @@ pub(super) fn answer(body: &Value) -> Option<Answer> {
         text: text_of_reply,
         repairs,
         ending,
-        // Anthropic counts what is read from its cache, and written to it, apart.
+        // Anthropic counts tokens read from and written to its cache separately.
         prompt_tokens: tokens(&usage["input_tokens"]).map(|input| {
             let cache = ["cache_read_input_tokens", "cache_creation_input_tokens"];
             cache.iter().filter_map(|name| tokens(&usage[*name])).fold(input, u32::saturating_add)

@@ -27,8 +27,8 @@ pub(super) fn body(question: &Question<'_>) -> Value {
     body
 }
 
-/// How an effort is said: from Gemini 3 on by its name, which the provider rejects if it is none of its own, before by
-/// tokens, as Google's own translation of `OpenAI`'s efforts has them.
+/// The encoding of an effort: from Gemini 3 on by name, and names that the model does not know are rejected. Earlier
+/// models get token counts, as in Google's own translation of `OpenAI`'s efforts.
 fn thinking(model: &str, effort: Effort) -> Value {
     if !model.starts_with("gemini-2") {
         return json!({ "thinkingLevel": effort.name().to_uppercase() });
@@ -42,7 +42,7 @@ fn thinking(model: &str, effort: Effort) -> Value {
     json!({ "thinkingBudget": budget })
 }
 
-/// The reasons to end a candidate that decline what it is about.
+/// The finish reasons of a candidate that mean a refusal.
 const REFUSALS: [&str; 9] = [
     "SAFETY",
     "RECITATION",
@@ -61,7 +61,7 @@ pub(super) fn answer(body: &Value) -> Option<Answer> {
     let first = match (candidates, blocked) {
         (Some(candidates), _) => candidates?.first(),
         (None, Some(_)) => None,
-        // A whole answer without candidates has at least its usage.
+        // A complete answer without candidates has at least its usage.
         (None, None) => body.get("usageMetadata").map(|_| None)?,
     };
     let ending = match (blocked, first.and_then(|candidate| candidate["finishReason"].as_str())) {
@@ -88,7 +88,7 @@ pub(super) fn answer(body: &Value) -> Option<Answer> {
     })
 }
 
-/// The text of a candidate, its thoughts left out, or the arguments of the function that it calls.
+/// The text of a candidate without its thoughts, or the arguments of its function call.
 fn words(candidate: &Value) -> (String, Vec<Repair>) {
     let parts = candidate["content"]["parts"].as_array().map(Vec::as_slice).unwrap_or_default();
     let words = parts.iter().filter(|part| part["thought"] != true).filter_map(|part| part["text"].as_str()).collect();

@@ -1,8 +1,8 @@
-//! The languages that providers speak: a request as JSON, and what their answer says.
+//! The wire formats of providers: requests as JSON, and the content of answers.
 //!
-//! Rule: pure. A dialect knows the shape of bodies and the names of headers; it sends nothing and holds no key.
-//! A body has what the provider's own client library sends for the same call, and nothing else. In all of them the frame
-//! comes before the words of the user prompt: the paper's prompt names it first, and Anthropic and Google advise it.
+//! Rule: pure. A dialect knows the shape of bodies and the names of headers; it sends nothing and holds no key. Bodies
+//! contain exactly what the provider's own client library sends for the same call. The frame always precedes the words
+//! of the user prompt: the paper's prompt names it first, and Anthropic and Google advise it.
 
 mod anthropic;
 mod gemini;
@@ -39,11 +39,11 @@ pub struct Question<'a> {
     pub user: &'a str,
     /// The frame as PNG in base64.
     pub png_base64: &'a str,
-    /// The JSON Schema that the provider is asked to enforce; `None` if the prompt alone has to do.
+    /// The JSON Schema for the provider to enforce; `None` if only the prompt describes it.
     pub schema: Option<&'a Value>,
     /// The sampling temperature (0.2 in the paper); `None` leaves it to the provider.
     pub temperature: Option<f64>,
-    /// The most tokens that a reply may have, those of hidden reasoning included.
+    /// The maximum tokens of a reply, including hidden reasoning.
     pub max_output_tokens: u32,
     /// The requested reasoning effort; `None` leaves it to the provider.
     pub reasoning_effort: Option<Effort>,
@@ -82,21 +82,21 @@ names!(Effort {
 /// The content of an answer.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Answer {
-    /// The text of the reply; empty without one.
+    /// The text of the reply; empty if there is none.
     pub text: String,
-    /// Repairs of what carried the text: a lone surrogate in the body, for which the text has U+FFFD; a call of a function,
+    /// Repairs of the text's container: a lone surrogate in the body, for which the text has U+FFFD; a function call,
     /// whose arguments are the text.
     pub repairs: Vec<Repair>,
     pub ending: Ending,
-    /// Tokens of the request, where counted; those from the provider's cache included.
+    /// Tokens of the request, including cached ones, if counted.
     pub prompt_tokens: Option<u32>,
-    /// Those of them that came from the provider's cache, where counted.
+    /// Cached tokens of the request, if counted.
     pub cached_tokens: Option<u32>,
-    /// Tokens of the reply, where counted; those of hidden reasoning included.
+    /// Tokens of the reply, including hidden reasoning, if counted.
     pub completion_tokens: Option<u32>,
-    /// The cost in US dollars, if the provider says it.
+    /// The cost in US dollars, if the provider states it.
     pub cost_usd: Option<f64>,
-    /// The model that answered, as the provider names it.
+    /// The answering model's name from the provider.
     pub model: Option<String>,
 }
 
@@ -110,7 +110,7 @@ impl Dialect {
         }
     }
 
-    /// The header that carries the key, and what stands before the key in it.
+    /// The name of the header with the key, and the prefix of its value.
     pub const fn key_header(self) -> (&'static str, &'static str) {
         match self {
             Self::OpenaiChat | Self::OpenaiCompatible => ("authorization", "Bearer "),
@@ -119,7 +119,7 @@ impl Dialect {
         }
     }
 
-    /// The key of the service tier, of providers that have `flex` at half price: <https://platform.openai.com/docs/guides/flex-processing>,
+    /// The service tier's key, for `flex` at half price: <https://platform.openai.com/docs/guides/flex-processing>,
     /// <https://ai.google.dev/gemini-api/docs/flex-inference>.
     pub const fn tier_key(self) -> Option<&'static str> {
         match self {
@@ -129,11 +129,11 @@ impl Dialect {
         }
     }
 
-    /// The other headers that the language asks for.
+    /// The other required headers.
     pub const fn headers(self) -> &'static [(&'static str, &'static str)] {
         match self {
             Self::OpenaiChat | Self::OpenaiCompatible | Self::Gemini => &[],
-            // The next version, 2026-10-21, refuses a temperature, and the study has one.
+            // The next version, 2026-10-21, rejects a temperature, which the study needs.
             Self::AnthropicMessages => &[("anthropic-version", "2023-06-01")],
         }
     }
@@ -148,8 +148,8 @@ impl Dialect {
         }
     }
 
-    /// What the text of a body says; lone surrogates in it are replaced, which strict JSON does not have. `None` if it is
-    /// not of this language.
+    /// The content of a body's text; lone surrogates are replaced, since strict JSON rejects them. `None` if it has
+    /// another format.
     pub fn read(self, body: &str) -> serde_json::Result<Option<Answer>> {
         let fault = match serde_json::from_str(body) {
             Ok(value) => return Ok(self.answer(&value)),
@@ -164,8 +164,8 @@ impl Dialect {
         }))
     }
 
-    /// What the body of an answer says; `None` if it is not of this language. An error that refuses what the request is
-    /// about is an answer, too.
+    /// The content of an answer's body; `None` if it has another format. An error that refuses the request's content is
+    /// an answer, too.
     pub fn answer(self, body: &Value) -> Option<Answer> {
         let answer = match self {
             Self::OpenaiChat | Self::OpenaiCompatible => openai::answer(body),

@@ -1,4 +1,4 @@
-//! `OpenAI`'s chat completions.
+//! `OpenAI`'s chat completions API.
 
 use serde_json::{Value, json};
 
@@ -35,7 +35,7 @@ pub(super) fn body(question: &Question<'_>, limit: &str) -> Value {
 
 pub(super) fn answer(body: &Value) -> Option<Answer> {
     let choices = body.get("choices")?.as_array()?;
-    // A router that lost its provider in the middle of an answer says so in the choice, beside half a text.
+    // A router that lost its provider in the middle of an answer reports it in the choice, beside a partial text.
     if choices.first().is_some_and(|choice| choice["finish_reason"] == "error" || choice["error"].is_object()) {
         return None;
     }

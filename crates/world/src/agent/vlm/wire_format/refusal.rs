@@ -1,7 +1,7 @@
-//! A provider's refusal of what a request or an answer is about, said as an error.
+//! A provider's refusal of a request's or an answer's content, reported as an error.
 //!
-//! Providers say it with HTTP 400 or with 200, under names of their own. What is found here is an answer like any other
-//! refusal: the request was well-formed, and asking again would say the same.
+//! Providers report it with HTTP 400 or 200, under various names. It counts as an answer like any other refusal: the
+//! request was well-formed, and repeating it would give the same result.
 
 use serde_json::Value;
 
@@ -10,13 +10,13 @@ use crate::agent::reply::Ending;
 
 /// The names of such errors, lower case.
 const NAMES: [&str; 17] = [
-    // OpenAI, Azure, and servers that speak their language.
+    // OpenAI, Azure, and compatible servers.
     "content_filter",
     "content_policy_violation",
     "image_content_policy_violation",
     "moderation_blocked",
     "responsibleaipolicyviolation",
-    // Anthropic, and routers that pass its refusals on.
+    // Anthropic, and routers that pass on its refusals.
     "refusal",
     // Google.
     "safety",
@@ -33,7 +33,7 @@ const NAMES: [&str; 17] = [
     "content_policy",
 ];
 
-/// Words by which providers say it where the name is that of any invalid request, lower case.
+/// Phrases for errors whose name is that of any invalid request, lower case.
 const WORDS: [&str; 6] = [
     // Anthropic: "Output blocked by content filtering policy".
     "content filtering policy",
@@ -48,7 +48,7 @@ const WORDS: [&str; 6] = [
     "contentpolicyviolation",
 ];
 
-/// The refusal in the body of an error; `None` for any other body.
+/// The refusal in an error's body; `None` for any other body.
 pub(super) fn answer(body: &Value) -> Option<Answer> {
     let error = [&body["error"], &body["choices"][0]["error"]].into_iter().find(|error| is_refusal(error))?;
     Some(Answer {

@@ -1,7 +1,7 @@
-//! Batches: the requests of many episodes go out as one, at half the price.
+//! Batches: the requests of many episodes are sent as one, at half the price.
 //!
-//! Rule: a batch is on the disk when it is submitted. A recording that is started again takes its results from the provider,
-//! so that nothing is paid twice.
+//! Rule: a batch is on disk once it is submitted. A restarted recording fetches its results from the provider, so that
+//! nothing is paid twice.
 
 mod service;
 
@@ -27,14 +27,14 @@ use exact::input;
 use exact::replace::{folder_of, make_folder, sync_folder};
 use service::{Ended, Service, unpaid};
 
-/// Requests of a batch, below what every provider takes.
+/// The maximum requests of a batch, below every provider's limit.
 const MOST: usize = 1_000;
-/// A batch of `MOST` requests takes some 50 kB of its line.
+/// A batch of `MOST` requests takes about 50 kB in its line.
 const LONGEST_LINE: Limit = Limit::new("bytes in a line of batches", 1 << 20);
 
 type Outcome = Result<Received, Failure>;
 
-/// A batch that was submitted.
+/// A submitted batch.
 #[derive(Debug, Serialize, Deserialize)]
 struct Note {
     batch: String,
@@ -66,7 +66,7 @@ struct State {
 }
 
 impl Batches {
-    /// Those of the provider to which single requests go at this address.
+    /// The batches of the provider that takes single requests at this address.
     pub(super) fn new(client: Client, url: Url, dialect: Dialect, secret: Option<Secret>, patience: Patience) -> Self {
         let service = Service::new(client, url, dialect, patience.largest_answer);
         let (notes, state) = (OnceLock::new(), Mutex::default());
@@ -81,7 +81,7 @@ impl Batches {
         };
         let mut state = self.0.state();
         for line in lines.into_iter().flatten() {
-            // A line that was cut off by the end of a process has no batch that is known.
+            // A line that was cut off names no batch.
             let Ok(note) = serde_json::from_slice::<Note>(&line?) else { continue };
             let note = Arc::new(note);
             state.earlier.extend(note.requests.iter().map(|id| (id.clone(), Arc::clone(&note))));
@@ -107,7 +107,7 @@ impl Inner {
         }
         state.waiting.insert(id.to_owned(), sender);
         if let Some(note) = state.earlier.get(id).cloned() {
-            // Requests that were asked for again since belong to a later batch.
+            // Requests that were sent again since belong to a later batch.
             let is_last = |id: &&String| state.earlier.get(*id).is_some_and(|last| Arc::ptr_eq(last, &note));
             let ids: Vec<String> = note.requests.iter().filter(is_last).cloned().collect();
             for id in &ids {
@@ -157,7 +157,7 @@ impl Inner {
         }
     }
 
-    /// Waits for the end of a batch, and gives these of its requests what they came to.
+    /// Waits for the end of a batch, and distributes the results of these requests.
     async fn follow(self: Arc<Self>, note: Arc<Note>, ids: Vec<String>) {
         let (start, mut wait) = (Instant::now(), self.patience.first_delay);
         let ended = loop {
@@ -204,7 +204,7 @@ impl Inner {
         }
     }
 
-    /// A note that cannot be written leaves this start its answers; the journal tells of the disk.
+    /// If the note cannot be written, this start still gets its answers; the journal reports the disk.
     fn note(&self, note: &Note) {
         let Some(path) = self.notes.get() else { return };
         let mut line = serde_json::json!(note).to_string();
@@ -220,7 +220,7 @@ impl Inner {
     }
 }
 
-/// Batches of so many requests and bytes at most, in order. One that is larger by itself is a batch of its own.
+/// Splits requests, in order, into batches within both limits. A larger request is a batch on its own.
 fn split(requests: Vec<(String, Value)>, most_bytes: usize) -> Vec<Vec<(String, Value)>> {
     let (mut batches, mut left): (Vec<Vec<_>>, _) = (Vec::new(), 0);
     for request in requests {
@@ -243,7 +243,7 @@ mod tests {
     #[test]
     fn batches_hold_so_many_bytes_and_requests() {
         let of = |text: &str| (String::new(), text.into());
-        // With its quotes a text of one letter has three bytes.
+        // With its quotes a one-letter text has three bytes.
         let sizes = |texts: Vec<&str>| -> Vec<usize> {
             split(texts.into_iter().map(of).collect(), 6).iter().map(Vec::len).collect()
         };

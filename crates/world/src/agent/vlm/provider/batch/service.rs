@@ -1,4 +1,4 @@
-//! Batches as each provider takes them: how requests are submitted, when they have ended, and what each came to.
+//! Batches in each provider's format: submission, end, and results.
 //!
 //! <https://platform.claude.com/docs/en/build-with-claude/batch-processing>, <https://platform.openai.com/docs/guides/batch>,
 //! <https://ai.google.dev/gemini-api/docs/batch-api>
@@ -14,17 +14,17 @@ use super::super::rate_limit::{retry_after, retry_info};
 use super::super::whole;
 use crate::agent::vlm::wire_format::Dialect;
 
-/// Separates the parts of an uploaded file. Lines of JSON hold no line feed, so none begins with it.
+/// Separates the parts of an uploaded file. A JSON line contains no line feed, so no line begins with it.
 const BOUNDARY: &str = "mirrorstats-batch-of-requests";
 
-/// Status and body of the answer to a request of a batch, or a failure.
+/// The status and body of a batched request's answer, or a failure.
 pub(super) type Ended = Result<(StatusCode, Value), Failure>;
 
-/// Where batches go.
+/// The endpoint of batches.
 #[derive(Debug)]
 pub(super) struct Service {
     client: Client,
-    /// Where single requests go.
+    /// The endpoint of single requests.
     url: Url,
     pub(super) dialect: Dialect,
     largest_answer: usize,
@@ -35,7 +35,7 @@ impl Service {
         Self { client, url, dialect, largest_answer }
     }
 
-    /// Bytes of a batch, below what the provider takes: 256 MB, 200 MB, and 20 MB for requests that are no file.
+    /// The maximum bytes of a batch, below the provider's limit: 256 MB, 200 MB, and 20 MB for inline requests.
     pub(super) const fn most_bytes(&self) -> usize {
         match self.dialect {
             Dialect::Gemini => 16 << 20,
@@ -43,7 +43,7 @@ impl Service {
         }
     }
 
-    /// Submits requests with their names; gives the name of the batch.
+    /// Submits named requests; returns the name of the batch.
     pub(super) async fn submit(&self, requests: &[(String, Value)]) -> Result<String, Failure> {
         let list = |one: fn(&str, &Value) -> Value| requests.iter().map(|(id, body)| one(id, body)).collect::<Vec<_>>();
         match self.dialect {
@@ -64,7 +64,7 @@ impl Service {
                 let lines =
                     list(|id, body| json!({ "custom_id": id, "method": "POST", "url": ENDPOINT, "body": body }));
                 let text = lines.iter().map(Value::to_string).collect::<Vec<_>>().join("\n") + "\n";
-                // A file alone is not billed.
+                // A file without a batch is not billed.
                 let file = self.upload(&text).await.map_err(|failure| Failure { may_be_paid: false, ..failure })?;
                 let batch = json!({ "input_file_id": file, "endpoint": ENDPOINT, "completion_window": "24h" });
                 self.create(&["batches"], &batch, "id").await
@@ -72,8 +72,8 @@ impl Service {
         }
     }
 
-    /// What each request of a batch came to, those left out that the provider does not name; `None` while it is under way.
-    /// `ids` are in the order in which they were submitted.
+    /// The results of a batch's requests, without those that the provider does not name; `None` while it is under way.
+    /// `ids` are in the order of submission.
     pub(super) async fn ended(&self, batch: &str, ids: &[String]) -> Result<Option<HashMap<String, Ended>>, Failure> {
         match self.dialect {
             Dialect::AnthropicMessages => self.ended_of_anthropic(batch, ids.len()).await,
@@ -96,7 +96,7 @@ impl Service {
         let status = state["status"].as_str().unwrap_or_default();
         if status == "failed" {
             let fault = &state["errors"]["data"][0];
-            // The account's queue of batches is full: one that has ended makes room.
+            // The account's queue of batches is full: the end of another batch makes room.
             let is_full = fault["code"] == "token_limit_exceeded";
             let code = if is_full { StatusCode::TOO_MANY_REQUESTS } else { StatusCode::BAD_REQUEST };
             return Ok(Some(all_of(ids, &failed(code, None, &fault.to_string()))));
@@ -132,7 +132,7 @@ impl Service {
             };
             return Ok(Some(all_of(ids, &failure)));
         };
-        // Answers come in the order of the requests, and not always with their names.
+        // Answers are in the order of the requests, and not always named.
         let named = responses.iter().enumerate().filter_map(|(at, one)| {
             let id = one["metadata"]["key"].as_str().or_else(|| ids.get(at).map(String::as_str))?;
             Some((id.to_owned(), of_gemini(one)))
@@ -230,7 +230,7 @@ fn of_gemini(one: &Value) -> Ended {
     }
 }
 
-/// The status that an error has outside of batches: <https://platform.claude.com/docs/en/api/errors>.
+/// The HTTP status of this error outside of batches: <https://platform.claude.com/docs/en/api/errors>.
 fn status_of(error: &Value) -> StatusCode {
     match error["error"]["type"].as_str() {
         Some("authentication_error") => StatusCode::UNAUTHORIZED,
@@ -243,7 +243,7 @@ fn status_of(error: &Value) -> StatusCode {
     }
 }
 
-/// The status of HTTP that goes with a code of google/rpc/code.proto.
+/// The HTTP status for a code of google/rpc/code.proto.
 fn http_status(error: &Value) -> StatusCode {
     match error["code"].as_u64() {
         Some(3 | 9 | 11) => StatusCode::BAD_REQUEST,

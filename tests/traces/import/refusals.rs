@@ -137,7 +137,12 @@ fn a_key_that_is_missing_twice_or_empty() {
     let all = refused("{}\n");
     assert_eq!(all.matches("s.jsonl, line 1, key").count(), 10, "{all}");
     assert!(all.contains("and 1 more; nothing was written"), "{all}");
-    assert!(all.contains("no column of the domain `mirror` is there\n  help: for steps of another domain"), "{all}");
+    assert!(
+        all.contains(
+            "expected columns of the domain `mirror`, found none of them\n  help: for steps of another domain"
+        ),
+        "{all}"
+    );
     let mut unnamed = step("a", 1);
     unnamed.as_object_mut().unwrap().remove("seed");
     let said = refused(lines(&[unnamed]));

@@ -72,8 +72,8 @@ impl From<Fault> for ImportError {
 fn listed(told: &[Fault], more: usize) -> String {
     let lacks = |column: &str| told.iter().any(|fault| fault.key.as_deref() == Some(column) && fault.found == "none");
     let domain = OF_MIRRORS.into_iter().all(lacks).then_some(
-        "\nno column of the domain `mirror` is there\n  \
-         help: for steps of another domain give --definitions a file that says `domain = \"NAME\"`; docs/how-to/domains.md",
+        "\nexpected columns of the domain `mirror`, found none of them\n  \
+         help: for steps of another domain give --definitions a file that says `domain = \"NAME\"`; see docs/how-to/domains.md",
     );
     let told = told.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n");
     let more = if more == 0 { String::new() } else { format!("\nand {more} more; nothing was written") };

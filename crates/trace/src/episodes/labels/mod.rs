@@ -75,8 +75,9 @@ pub fn remove(list: &Path, episodes: &BTreeSet<String>) -> Result<usize, LabelsE
     let mut removed = 0;
     for line in lines {
         let line = line.map_err(reading)?;
-        let is_removed = serde_json::from_slice(&line).is_ok_and(|line: LabelLine| episodes.contains(&line.episode_id));
-        if is_removed {
+        // Invalid labels of these episodes go too.
+        let label: serde_json::Value = serde_json::from_slice(&line).unwrap_or_default();
+        if label["episode_id"].as_str().is_some_and(|id| episodes.contains(id)) {
             removed += 1;
         } else {
             kept.write_all(&line).map_err(writing)?;

@@ -52,6 +52,8 @@ pub struct Steps {
     study: Arc<mirrorstats::Study>,
     columns: Option<Vec<String>>,
     schema: SchemaRef,
+    /// True for Polars, which takes views of texts without a copy and converts other texts.
+    has_views: bool,
 }
 
 impl Table {
@@ -135,7 +137,12 @@ impl Steps {
     /// Checks that the columns exist, without reading rows.
     pub fn new(study: Arc<mirrorstats::Study>, columns: Option<Vec<String>>) -> PyResult<Self> {
         let schema = study.steps(columns.as_deref()).map_err(error::of_study)?.schema();
-        Ok(Self { study, columns, schema })
+        Ok(Self { study, columns, schema, has_views: false })
+    }
+
+    fn with_views(&self) -> Self {
+        let (study, schema) = (Arc::clone(&self.study), Arc::clone(&self.schema));
+        Self { study, columns: self.columns.clone(), schema, has_views: true }
     }
 }
 
@@ -206,8 +213,10 @@ impl Steps {
     ) -> PyResult<Bound<'py, PyCapsule>> {
         drop(requested_schema);
         let steps = py.detach(|| self.study.steps(self.columns.as_deref()).map_err(error::of_study))?;
+        let steps = if self.has_views { steps.with_views() } else { steps };
+        let schema = steps.schema();
         let rows = steps.map(|rows| rows.map_err(|fault| ArrowError::ExternalError(Box::new(fault))));
-        stream(py, Box::new(RecordBatchIterator::new(rows, Arc::clone(&self.schema))))
+        stream(py, Box::new(RecordBatchIterator::new(rows, schema)))
     }
 
     fn __arrow_c_schema__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyCapsule>> {
@@ -222,7 +231,7 @@ impl Steps {
 
     /// A `polars.DataFrame`, which shares the memory where it can.
     fn to_polars<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        to_polars(slf)
+        to_polars(&Bound::new(slf.py(), slf.get().with_views())?)
     }
 
     /// A `pandas.DataFrame`; integers beside nulls stay integers (`Int64`).

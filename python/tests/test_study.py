@@ -118,6 +118,29 @@ def test_steps_are_those_of_the_files(recorded):
     assert set(names) < set(ms.open(recorded).steps().column_names)
 
 
+@pytest.mark.parametrize("where", [None, "experiment = 'E1' and TSA = 1"])
+def test_steps_for_polars_are_those_of_the_stream(recorded, where):
+    steps = ms.open(recorded, where=where).steps()
+    found, expected = steps.to_polars(), polars.DataFrame(pyarrow.table(steps))
+    assert found.height > 0 and found.equals(expected) and found.schema == expected.schema
+
+
+@pytest.mark.parametrize("form", ["large_string", "dictionary", "string_view"])
+def test_steps_for_polars_take_every_form_of_text(recorded, tmp_path, form):
+    kinds = {
+        "large_string": pyarrow.large_string(),
+        "dictionary": pyarrow.dictionary(pyarrow.int32(), pyarrow.string()),
+        "string_view": pyarrow.string_view(),
+    }
+    first = sorted(pathlib.Path(recorded).glob("*.parquet"))[0]
+    table = pyarrow.parquet.read_table(first)
+    is_text = pyarrow.types.is_string
+    fields = [field.with_type(kinds[form]) if is_text(field.type) else field for field in table.schema]
+    pyarrow.parquet.write_table(table.cast(pyarrow.schema(fields)), tmp_path / "steps.parquet")
+    found, expected = ms.open(tmp_path).steps().to_polars(), ms.open(first).steps().to_polars()
+    assert found.equals(expected) and found.schema == expected.schema
+
+
 def test_a_table_shows_itself(paper, command):
     study = ms.open(paper)
     table = study.table("main", style="paper")

@@ -10,6 +10,7 @@ use score::table::EpisodeTable;
 use trace::episode::Episode;
 use trace::write::OptionalColumns;
 use world::agent::scripted::Scripted;
+use world::experiment::spec::Body;
 use world::record::plan::{Key, Subject};
 use world::record::rollout::{Nobody, Stage, head, play, task};
 use world::record::shares::Shares;
@@ -45,10 +46,17 @@ pub fn record_in(config: &WorldConfig, plan: &[(Scripted, Key)], threads: usize)
     std::thread::scope(|scope| {
         for _ in 0..threads {
             scope.spawn(|| {
-                let eye = RefCell::new(Camera::new(config).unwrap());
+                // A renderer's number of parts is fixed, and the shapes of bodies differ in it.
+                let eyes = [Body::Mannequin, Body::Humanoid].map(|shape| {
+                    let mut config = config.clone();
+                    config.body.shape = shape;
+                    (shape, RefCell::new(Camera::new(&config).unwrap()))
+                });
                 while let Some((agent, key)) = plan.get(next.fetch_add(1, Ordering::Relaxed)) {
                     let looks = !matches!(agent, Scripted::Frozen | Scripted::Random);
-                    let episode = record(config, looks.then_some(&eye), *agent, *key);
+                    let shape = config.of(key.experiment).body.shape;
+                    let (_, eye) = eyes.iter().find(|(known, _)| *known == shape).unwrap();
+                    let episode = record(config, looks.then_some(eye), *agent, *key);
                     let at = plan.iter().position(|planned| planned == &(*agent, *key)).unwrap();
                     episodes.lock().unwrap()[at] = Some(episode);
                 }

@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use arrow::array::{Array as _, AsArray as _, RecordBatch};
-use arrow::compute::concat_batches;
+use arrow::compute::{cast, concat_batches};
+use arrow::datatypes::DataType;
 use mirrorstats::{DiffRequest, Side, Study, StudyError, diff, episode_batch, resolve};
 use score::format::Format;
 use study::write_scores;
@@ -73,6 +74,26 @@ fn a_filter_keeps_the_steps_of_its_episodes() {
     let found = steps(&study, Some(&["pose_x".to_owned()]));
     assert_eq!((found.num_rows(), found.num_columns()), (2, 1));
     assert_eq!(steps(&study, Some(&[])).num_rows(), 2);
+}
+
+#[test]
+fn views_have_the_texts_of_the_files() {
+    let filter = |study: Study| study.filter("TSA = 1").unwrap();
+    let whole = |study: Study| study;
+    for path in ["fixtures/paper", "fixtures/recorded"] {
+        for study in [whole(Study::open([path]).unwrap()), filter(Study::open([path]).unwrap())] {
+            let viewed = study.steps(None).unwrap().with_views();
+            let schema = viewed.schema();
+            let viewed = concat_batches(&schema, &viewed.collect::<Result<Vec<_>, _>>().unwrap()).unwrap();
+            let expected = steps(&study, None);
+            assert!(expected.num_rows() > 0);
+            for (field, column) in expected.schema().fields().iter().zip(expected.columns()) {
+                let found = viewed.column_by_name(field.name()).unwrap();
+                assert_eq!(*field.data_type() == DataType::Utf8, *found.data_type() == DataType::Utf8View);
+                assert_eq!(&cast(found, field.data_type()).unwrap(), column, "{path}, {}", field.name());
+            }
+        }
+    }
 }
 
 #[test]

@@ -252,7 +252,7 @@ fn agents_that_look_are_shown_frames() {
 #[test]
 fn the_bundled_recordings_are_those_that_this_program_makes() {
     let bench = Bench::new();
-    std::fs::write(bench.path("small.toml"), "").unwrap();
+    std::fs::write(bench.path("small.toml"), "body.shape = \"mannequin\"").unwrap();
     bench.recorded("runs", "--agent random --experiment E1..E5 --seeds 1 --runs 2 --no-log");
     bench.recorded("runs", "--agent frozen --experiment E1 --seeds 1 --runs 1 --no-log");
     for (name, bytes) in bench.files("runs") {

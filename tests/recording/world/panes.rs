@@ -6,6 +6,7 @@ use trace::episode::Action;
 use trace::palette::Color;
 use world::experiment::Experiment;
 use world::experiment::file;
+use world::experiment::spec::Body;
 use world::sim::angle::Heading;
 use world::sim::body::{Figure, Pose};
 use world::sim::camera::{Camera, LabelCamera};
@@ -18,7 +19,7 @@ use world::sim::scene::{HungPane, Scene};
 use world::sim::visibility::{Shown, labels, labels_by_mujoco};
 use world::sim::world::World;
 
-use super::poses::scatter;
+use super::poses::{scatter, shaped};
 use crate::harness::need;
 
 /// Every kind of pane, in rooms with other agents.
@@ -78,8 +79,13 @@ fn kind(name: &str) -> Experiment {
     Experiment::register(entry.known).unwrap()
 }
 
+/// Mannequins: the limbs of humanoids are a few pixels wide, and `truth` has bounds of their own for them.
+fn config() -> WorldConfig {
+    shaped(Body::Mannequin)
+}
+
 fn world(experiment: Experiment, seed: i32) -> World {
-    let config = WorldConfig::default();
+    let config = config();
     World::new(&config, Scene::draw(&config, experiment, seed, 1).unwrap()).unwrap()
 }
 
@@ -117,7 +123,7 @@ const POSES: i32 = 200;
 fn holds_against_pictures(name: &str) {
     need::drawing();
     let experiment = kind(name);
-    let mut eye = LabelCamera::new(&WorldConfig::default(), 640, 480).unwrap();
+    let mut eye = LabelCamera::new(&config(), 640, 480).unwrap();
     let mut chance = Rng::of(77, 1, 2);
     let mut overlaps: Vec<(f64, Shown)> = Vec::new();
     for seed in 0..POSES / 20 {
@@ -156,7 +162,7 @@ fn textured_mirrors_hold_against_pictures() {
 fn a_textured_room_shows_the_same_otherwise() {
     need::drawing();
     let [textured, plain] = ["textured", "mirrors"].map(kind);
-    let config = WorldConfig::default();
+    let config = config();
     let scene = Scene::draw(&config, textured, 1, 1).unwrap();
     let mut looks = [textured, plain].map(|experiment| {
         let scene = Scene { experiment, ..scene.clone() };
@@ -307,7 +313,7 @@ fn paint_of(world: &World, eye: &mut Camera, shown: Shown) -> Option<Color> {
 /// Counts the views that show a paint, and compares each with the expected one.
 fn paints(name: &str, item: Item, expected: impl Fn(&Scene) -> Color) {
     need::drawing();
-    let mut eye = Camera::new(&WorldConfig::default()).unwrap();
+    let mut eye = Camera::new(&config()).unwrap();
     let mut chance = Rng::of(81, 1, 2);
     let (mut views, mut right) = (0, 0);
     for seed in 1..=8 {
@@ -385,7 +391,7 @@ fn the_eye_of_a_mirror_is_its_mirror_image_and_that_of_a_window_is_further_back(
 
 #[test]
 fn the_mark_of_the_mark_test_can_be_seen_well_from_somewhere() {
-    let config = WorldConfig::default();
+    let config = config();
     let experiment = Experiment::parse("mark").unwrap();
     for (seed, run) in (1..=3).flat_map(|seed| (1..=7).map(move |run| (seed, run))) {
         let mut world = World::new(&config, Scene::draw(&config, experiment, seed, run).unwrap()).unwrap();

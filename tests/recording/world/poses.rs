@@ -12,7 +12,7 @@ use world::sim::world::World;
 
 /// The initial world of an experiment and seed.
 pub fn world(experiment: Experiment, seed: i32) -> World {
-    shaped_world(Body::default(), experiment, seed)
+    shaped_world(WorldConfig::default().body.shape, experiment, seed)
 }
 
 /// The initial world with bodies of this shape.

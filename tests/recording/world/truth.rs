@@ -100,7 +100,7 @@ fn visibility_agrees_with_mujocos_rays() {
 
 #[test]
 fn the_census_counts_the_labels() {
-    for_scattered(Body::default(), &[Experiment::E4, Experiment::E5, Experiment::E2], 30, |world| {
+    for_scattered(WorldConfig::default().body.shape, &[Experiment::E4, Experiment::E5, Experiment::E2], 30, |world| {
         let visibility = world.visibility();
         let image = labels(world, 640, 480);
         let count = |shown: Shown| image.codes.iter().map(|code| u32::from(*code == shown.code())).sum::<u32>();
@@ -190,7 +190,7 @@ fn visibility_agrees_with_the_colours_of_the_picture() {
     need::drawing();
     let mut eye = Camera::new(&config).unwrap();
     let mut overlaps = Vec::new();
-    for_scattered(Body::default(), &WITH_MIRROR, 210, |world| {
+    for_scattered(config.body.shape, &WITH_MIRROR, 210, |world| {
         let cast = labels(world, 640, 480);
         if let Some(area) = Area::about_own_body(world, &cast) {
             overlaps.push(area.overlap(world, &cast, &eye.frame(world).unwrap()).share());

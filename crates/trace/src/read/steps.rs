@@ -12,7 +12,7 @@ use std::vec;
 
 use arrow::array::{Array as _, ArrayRef, AsArray as _, BooleanArray, RecordBatch, RecordBatchOptions, new_null_array};
 use arrow::compute::{CastOptions, cast, cast_with_options, filter_record_batch};
-use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
+use arrow::datatypes::{DataType, Field, Fields, Schema, SchemaRef};
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReader;
 
@@ -29,6 +29,8 @@ use exact::input;
 use parquet_pages::{Expansion, FaultSlot, Library, Store};
 
 const BATCH_ROWS: usize = 8 * 1024;
+/// With views, a batch holds no text, so that it can have more rows.
+const BATCH_ROWS_OF_VIEWS: usize = 64 * 1024;
 /// The column that identifies episodes.
 const EPISODE_ID: &str = "episode_id";
 
@@ -96,6 +98,13 @@ impl Steps {
         let parts = parts.into_iter().flatten().collect::<Vec<_>>().into_iter();
         let shape = Shape { schema, episodes: episodes.map(Arc::new) };
         Ok(Self { shape, parts, ahead: VecDeque::new(), threads })
+    }
+
+    /// The same steps with texts as `Utf8View`: equal texts of a page share their bytes.
+    #[must_use]
+    pub fn with_views(mut self) -> Self {
+        self.shape.schema = Arc::new(Schema::new(with_views(self.shape.schema.fields())));
+        self
     }
 
     /// The columns: those of the schema with its types, others as text, int64, float64 or bool; all may be null.
@@ -173,6 +182,21 @@ fn data_type(set: &TraceSet, name: &str, kind: Kind) -> DataType {
     }
 }
 
+/// The fields with `Utf8View` for each kind of text.
+fn with_views(fields: &Fields) -> Fields {
+    let is_text = |kind: &DataType| matches!(kind, DataType::Utf8 | DataType::LargeUtf8);
+    let viewed = |field: &Arc<Field>| match field.data_type() {
+        DataType::Dictionary(_, values) if is_text(values) => view_of(field),
+        kind if is_text(kind) => view_of(field),
+        _ => Arc::clone(field),
+    };
+    fields.iter().map(viewed).collect()
+}
+
+fn view_of(field: &Field) -> Arc<Field> {
+    Arc::new(field.clone().with_data_type(DataType::Utf8View))
+}
+
 impl Part {
     fn of_file(file: &TraceFile) -> Result<Vec<Self>, Box<Finding>> {
         let readable = file.footer()?;
@@ -221,6 +245,9 @@ impl Part {
             let path = column.path().parts();
             path.len() == 1 && (path[0] == EPISODE_ID || schema.field_with_name(&path[0]).is_ok())
         });
+        let has_views = schema.fields().iter().any(|field| *field.data_type() == DataType::Utf8View);
+        let fields = has_views.then(|| with_views(readable.footer.schema().fields()));
+        let batch = if has_views { BATCH_ROWS_OF_VIEWS } else { BATCH_ROWS };
         let columns = ProjectionMask::leaves(described, wanted.map(|(at, _)| at).collect::<Vec<_>>());
         let library = Library {
             store,
@@ -228,9 +255,9 @@ impl Part {
             checksums,
             row_groups: vec![row_group],
             slot: Arc::clone(&slot),
-            writes_out: true,
+            writes_out: !has_views,
         };
-        match contained(|| library.reader(columns, None, BATCH_ROWS, None).map_err(|error| plain(&error))) {
+        match contained(|| library.reader(columns, fields.as_ref(), batch, None).map_err(|error| plain(&error))) {
             Ok(Ok(rows)) => Ok(Reader { name, rows, slot }),
             Ok(Err(error)) | Err(error) => Err(Box::new(damaged(&name, &slot, &error))),
         }

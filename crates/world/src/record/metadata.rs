@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use crate::agent::{Player, reply};
 use crate::experiment::{Experiment, Spec};
 use crate::sim::config::WorldConfig;
-use crate::sim::scene::SCENE_VERSION;
+use crate::sim::scene::scene_version;
 use trace::declared::Registration;
 use trace::palette::Color;
 
@@ -63,7 +63,7 @@ fn recording(
         "kind": "recording",
         "design": { "pairs": "scene", "cluster": null },
         "condition": condition.unwrap_or("default"),
-        "scene_version": SCENE_VERSION,
+        "scene_version": scene_version(config),
         "experiment": spec,
         "reply_schema_hash": reply::structure_hash(&experiment),
         "palette": Color::ALL.map(Color::name),

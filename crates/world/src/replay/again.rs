@@ -7,7 +7,7 @@ use super::error::ReplayError;
 use crate::experiment::spec::Side;
 use crate::experiment::{Experiment, Spec};
 use crate::sim::config::WorldConfig;
-use crate::sim::scene::{SCENE_VERSION, Scene};
+use crate::sim::scene::{SCENE_VERSIONS, Scene};
 use crate::sim::visibility::{Visibility, columns};
 use crate::sim::world::World;
 use trace::answers::Answered;
@@ -35,7 +35,7 @@ impl Recipe {
         let recording = recording.ok_or(ReplayError::NoRecipe)?;
         // This check is first: a world of another version may lack values that this one has.
         let version = recording.get("scene_version").ok_or(ReplayError::NoRecipe)?;
-        if *version != SCENE_VERSION {
+        if !SCENE_VERSIONS.iter().any(|drawn| *version == *drawn) {
             return Err(ReplayError::Scenes { found: version.to_string() });
         }
         let world = recording.get("world").ok_or(ReplayError::NoRecipe)?;

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::divergence::Divergence;
-use crate::sim::scene::SCENE_VERSION;
+use crate::sim::scene::SCENE_VERSIONS;
 use exact::budget::Exceeded;
 
 /// An error of a replay.
@@ -21,7 +21,8 @@ pub enum ReplayError {
     )]
     Changed { expected: String, found: String },
     #[error(
-        "the trace's worlds were drawn by version {found} of the scenes, and this program draws version {SCENE_VERSION}\n  help: replay it with the program that recorded it"
+        "the trace's worlds were drawn by version {found} of the scenes, and this program draws versions {} and {}\n  help: replay it with the program that recorded it",
+        SCENE_VERSIONS[0], SCENE_VERSIONS[1]
     )]
     Scenes { found: String },
     #[error("episode `{episode}`: {fault}")]

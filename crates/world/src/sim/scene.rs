@@ -13,15 +13,29 @@ use super::angle::Heading;
 use super::body::Pose;
 use super::config::WorldConfig;
 use super::floor::{FloorPlan, Square};
-use crate::experiment::spec::{PaneKind, Part};
+use crate::experiment::spec::{Body, PaneKind, Part};
 use exact::hash;
 use exact::names;
 use trace::palette::Color;
 
-/// Increases whenever the same configuration and seeds give other scenes or other motion.
+/// Increases whenever the same configuration and seeds give other rooms or other motion.
 ///
 /// 2: body colours are balanced, clutter hides more, faces are marked, lamps are fixed in the room.
-pub const SCENE_VERSION: u32 = 2;
+const ROOMS_VERSION: u32 = 2;
+
+/// The version of scenes with humanoids. Rooms and motion are those of version 2.
+const HUMANOIDS_VERSION: u32 = 3;
+
+/// The versions that this program draws.
+pub const SCENE_VERSIONS: [u32; 2] = [ROOMS_VERSION, HUMANOIDS_VERSION];
+
+/// The version of the scenes of a configuration. Recordings of mannequins go on with version 2.
+pub const fn scene_version(config: &WorldConfig) -> u32 {
+    match config.body.shape {
+        Body::Mannequin => ROOMS_VERSION,
+        Body::Humanoid => HUMANOIDS_VERSION,
+    }
+}
 
 /// Digits of a scene's fingerprint: enough for any study.
 const FINGERPRINT_DIGITS: usize = 16;
@@ -275,7 +289,7 @@ impl Scene {
     /// features are not part of it: the mirror, and the statement.
     pub fn fingerprint(&self, config: &WorldConfig) -> String {
         let Self { body_color, start, cubes, others, .. } = self;
-        let mut parts = json!([SCENE_VERSION, config.room, body_color, start, cubes, others]);
+        let mut parts = json!([ROOMS_VERSION, config.room, body_color, start, cubes, others]);
         if let (Some(hand), Some(parts)) = (self.hand, parts.as_array_mut()) {
             // The hand's position is relative to the mark to be reached.
             parts.extend([json!(hand), json!(self.marks)]);

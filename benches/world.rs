@@ -176,8 +176,8 @@ fn main() {
                 one.as_secs_f64() * 1e3,
                 many.as_secs_f64() * 1e3
             );
-            println!("frames alone, seven humanoids, by turns with rounder parts and all that is out of view");
-            for experiment in [Experiment::E4, Experiment::E5] {
+            println!("frames alone, by turns with rounder parts and all that is out of view");
+            for experiment in [Experiment::E1, Experiment::E4, Experiment::E5] {
                 fineness(experiment, &config);
             }
         }

@@ -257,6 +257,19 @@ fn bold_marks_the_models_that_no_test_shows_to_be_worse() {
         of.map(|row| (row["best"].as_u64().unwrap(), row["worst"].as_u64().unwrap())).collect();
     assert_eq!(ranks, [(1, 2), (1, 2), (3, 3)]);
     assert!(run(folder.path(), &["stats", ".", "--full"]).done().contains("Ranks that the tests leave open"));
+    // A model without a value is not bold.
+    let definitions = folder.path().join("some.toml");
+    let some = "include = [\"paper\"]\n[metric.SOME]\nbetter = \"higher\"\nmeasures = \"rate\"\nvalue = \"any(selected_cube = body_color)\"\nwhen = \"any(model <> 'elk')\"\n";
+    std::fs::write(definitions, some).unwrap();
+    Cell { model: "elk", solved: solved(21, 21), ..LIKE }.write(folder.path());
+    run(
+        folder.path(),
+        &["report", ".", "--no-figures", "--definitions", "some.toml", "--metrics", "SOME", "--out", "out"],
+    )
+    .done();
+    let table = std::fs::read_to_string(folder.path().join("out/tables/main.md")).unwrap();
+    assert!(table.contains("**21/21") && table.contains(" -- |") && !table.contains("**--**"), "{table}");
+    std::fs::remove_dir_all(folder.path().join("out")).unwrap();
     // The best mean is not bold if models are not comparable.
     Cell { model: "dog", mirror: 1.2, solved: solved(1, 21), ..LIKE }.write(folder.path());
     let table = write(3.0);

@@ -134,7 +134,8 @@ impl MetricTable {
             let condition = condition.map(text);
             let name = condition.map_or_else(|| text(model), |condition| format!("{} [{condition}]", text(model)));
             for (cell, column) in row.cells.iter_mut().zip(&self.columns) {
-                if ranks.is_tied(&row.key[experiment].to_string(), &name, &column.metric) {
+                let is_defined = cell.value.mean().is_some();
+                if is_defined && ranks.is_tied(&row.key[experiment].to_string(), &name, &column.metric) {
                     cell.emphasis = Emphasis::Bold;
                     is_marked = true;
                 }

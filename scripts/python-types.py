@@ -25,8 +25,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Literal, Optional, TypedDict, Union, overload
 
 if TYPE_CHECKING:
-    from . import _answer
-
+    from . import _dict
 '''
 PLAIN = {"string": "str", "integer": "int", "number": "float", "boolean": "bool", "object": "dict[str, Any]", "null": "None"}
 
@@ -99,16 +98,19 @@ def typed_dict(name, shape, names):
         yield f"\n\nclass _{name}(TypedDict):"
         yield from (f"    {key}: {fields[key]}" for key in parts[0])
     base = f"_{name}, total=False" if parts[0] and parts[1] else "TypedDict" if parts[0] else "TypedDict, total=False"
-    yield f'\n\nclass {name}({base}):\n    """{words(shape)}"""\n'
+    yield f'\n\nclass {name}({base}):\n    """{words(shape)}"""'
     yield from (f"    {key}: {fields[key]}" for key in parts[1] or parts[0])
 
 
 def keys(answer, document, names):
-    yield f"\n    class _{answer}Keys(_answer.Answer):"
-    for at, (key, field) in enumerate(document["properties"].items()):
+    by_kind = {}
+    for key, field in document["properties"].items():
+        by_kind.setdefault(kind(field, names), []).append(json.dumps(key))
+    yield f"\n    class _{answer}Keys(_dict.Answer):"
+    for at, (value, keys_of_kind) in enumerate(by_kind.items()):
         ignored = "  # type: ignore[override]" if at == 0 else ""
         yield f"        @overload{ignored}"
-        yield f'        def __getitem__(self, key: Literal["{key}"], /) -> {kind(field, names)}: ...'
+        yield f"        def __getitem__(self, key: Literal[{', '.join(keys_of_kind)}], /) -> {value}: ..."
     yield "        def __getitem__(self, key: str, /) -> Any: ..."
 
 

@@ -12,7 +12,8 @@ Every answer is the one that the command `mirrorstats` gives, in words of argume
 interpreter's lock.
 """
 
-from ._answer import Answer, Changes, Explanation, Gate, Imported, Manifest, Recorded, Statistics, Validation
+from ._answer import Changes, Explanation, Gate, Imported, Manifest, Recorded, Statistics, Validation
+from ._dict import Answer
 from ._error import ArgumentError, DefinitionError, Error, InputError, OutputError, QueryError, RecordError
 from ._example import example_runs
 from ._import import import_steps

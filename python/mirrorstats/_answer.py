@@ -1,4 +1,4 @@
-"""Answers: dicts that show themselves as text."""
+"""The answers of each kind, with their frames."""
 
 from __future__ import annotations
 
@@ -7,49 +7,11 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any, Optional
 
 from . import _native
-from ._error import in_python
-
-
-class Answer(dict[str, Any]):
-    """An answer with the keys that the command line prints with `--json`; what is undefined or unknown is None.
-
-    `print(answer)` prints it for people; a notebook shows the same.
-
-    Attributes:
-        text: the answer for people.
-    """
-
-    text: str
-
-    def __init__(self, parts: tuple[str, str]) -> None:
-        super().__init__(json.loads(parts[0]))
-        self.text = in_python(parts[1])
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), ((json.dumps(self), self.text),)
-
-    def __str__(self) -> str:
-        return self.text or super().__str__()
-
-    def _repr_html_(self) -> str:
-        # Imported here since most answers do not need it, and importing it takes time in a notebook.
-        import html
-
-        style = "font-family: monospace; white-space: pre; overflow-x: auto; max-height: 40em; line-height: 1.3"
-        return f'<pre style="{style}">{html.escape(str(self))}</pre>'
-
+from ._dict import Answer
 
 if TYPE_CHECKING:
-    from .types import (
-        _ChangesKeys,
-        _ExplanationKeys,
-        _GateKeys,
-        _ImportedKeys,
-        _ManifestKeys,
-        _RecordedKeys,
-        _StatisticsKeys,
-        _ValidationKeys,
-    )
+    from .types import _ChangesKeys, _ExplanationKeys, _GateKeys, _ImportedKeys
+    from .types import _ManifestKeys, _RecordedKeys, _StatisticsKeys, _ValidationKeys
 else:
     _ChangesKeys = _ExplanationKeys = _GateKeys = _ImportedKeys = Answer
     _ManifestKeys = _RecordedKeys = _StatisticsKeys = _ValidationKeys = Answer

@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Literal, Optional, TypedDict, Union, overload
 
 if TYPE_CHECKING:
-    from . import _answer
-
+    from . import _dict
 
 
 class _Answer(TypedDict):
@@ -18,7 +17,6 @@ class _Answer(TypedDict):
 
 class Answer(_Answer, total=False):
     """One question about one metric, and its answer over all experiments."""
-
     caveats: list[str]
 
 
@@ -33,14 +31,12 @@ class _Catalog(TypedDict):
 
 class Catalog(_Catalog, total=False):
     """A resolved definition file: its includes merged, in the order of definition."""
-
     domain: Optional[str]
     factor: dict[str, Factor]
 
 
 class CellChange(TypedDict):
     """A cell whose moments are not the same on both sides."""
-
     key: dict[str, KeyValue]
     metric: str
     kind: Literal["rate", "quantity"]
@@ -63,7 +59,6 @@ class _CellRow(TypedDict):
 
 class CellRow(_CellRow, total=False):
     """One cell: the episodes of one group under one metric."""
-
     lost: Optional[int]
     unusable_replies: Optional[int]
 
@@ -84,7 +79,6 @@ class _ChanceRow(TypedDict):
 
 class ChanceRow(_ChanceRow, total=False):
     """One rate against one level."""
-
     condition: Optional[str]
     units: Optional[Units]
     losses: Optional[LossCases]
@@ -92,7 +86,6 @@ class ChanceRow(_ChanceRow, total=False):
 
 class CheckedFile(TypedDict):
     """One file that was looked at."""
-
     name: str
     complete: bool
     episodes: int
@@ -114,13 +107,11 @@ class _ClusterRow(TypedDict):
 
 class ClusterRow(_ClusterRow, total=False):
     """The seeds of one cell."""
-
     condition: Optional[str]
 
 
 class Clustered(TypedDict):
     """The mean of a cell as its clusters estimate it."""
-
     clusters: int
     se: float
     interval: Optional[Interval]
@@ -130,7 +121,6 @@ class Clustered(TypedDict):
 
 class ComparisonApart(TypedDict):
     """A comparison that is not made."""
-
     within: str
     between: list[str]
 
@@ -158,7 +148,6 @@ class _Contrast(TypedDict):
 
 class Contrast(_Contrast, total=False):
     """The difference of a model's mean between two experiments, by pairs if their scenes agree."""
-
     condition: Optional[str]
     repeat_se: Optional[float]
     units: Optional[Units]
@@ -172,13 +161,11 @@ class _Control(TypedDict):
 
 class Control(_Control, total=False):
     """A declared contrast: another experiment minus this one."""
-
     on: list[str]
 
 
 class CorrectRow(TypedDict):
     """The time to a correct decision; wrong ones compete, unfinished episodes are censored (Aalen and Johansen)."""
-
     correct: float
     wrong: float
     median: Optional[int]
@@ -188,21 +175,18 @@ class CorrectRow(TypedDict):
 
 class DefinitionsName(TypedDict):
     """The definitions behind some scores."""
-
     name: str
     sha256: str
 
 
 class Design(TypedDict):
     """The design that the traces declare; empty by default. Pairs are episodes with the same scene, which is a column of the traces."""
-
     kind: Optional[Literal["recording", "import", "reconstruction"]]
     cluster: Optional[Literal["seed"]]
 
 
 class Detectable(TypedDict):
     """The smallest difference of two rates that an exact test of n pairs, or of n episodes on each side, could have shown. In the most favourable case: all discordant pairs point the same way, or one side has no success. Else more is needed."""
-
     n: int
     level: float
     pairs: int
@@ -212,7 +196,6 @@ class Detectable(TypedDict):
 
 class Dose(TypedDict):
     """A rate at one dose."""
-
     dose: float
     experiment: str
     successes: int
@@ -235,13 +218,11 @@ class _DurationRow(TypedDict):
 
 class DurationRow(_DurationRow, total=False):
     """One duration of one experiment and model."""
-
     condition: Optional[str]
 
 
 class EpisodeName(TypedDict):
     """The name of an episode."""
-
     episode_id: str
     model: str
     experiment: str
@@ -258,14 +239,12 @@ class _Experiment(TypedDict):
 
 class Experiment(_Experiment, total=False):
     """One experiment that a definition file knows."""
-
     is_declared: bool
     control: Optional[Control]
 
 
 class Fact(TypedDict):
     """One aggregate of one episode, or a column of the episode that something is compared with."""
-
     name: Optional[str]
     expression: str
     value: Optional[str]
@@ -280,13 +259,11 @@ class _Factor(TypedDict):
 
 class Factor(_Factor, total=False):
     """A number that a group of experiments varies, such as the steps by which a mirror is late."""
-
     unit: str
 
 
 class Family(TypedDict):
     """All comparisons of models under one rate or duration in one experiment."""
-
     experiment: str
     metric: str
     models: list[str]
@@ -297,7 +274,6 @@ class Family(TypedDict):
 
 class Finding(TypedDict):
     """One thing that is wrong with a trace."""
-
     code: Literal["unreadable", "empty-file", "not-parquet", "truncated", "corrupt-footer", "corrupt-data", "over-budget", "invalid-metadata", "newer-schema", "missing-column", "repeated-column", "wrong-type", "no-episodes", "null-in-required", "empty-string", "out-of-range", "negative-count", "t-start", "t-gap", "t-duplicate", "t-order", "inconsistent-constant", "episode-twice", "episode-in-two-files", "unknown-experiment", "unknown-action", "unknown-reply-status", "unknown-value", "invalid-color", "unseen-color", "stale-checksums", "experiment-overridden", "unknown-level", "split-episode", "unreadable-replies", "copied-episode"]
     severity: Literal["error", "note"]
     file: str
@@ -312,7 +288,6 @@ class Finding(TypedDict):
 
 class Flip(TypedDict):
     """A value of one episode that changed."""
-
     metric: str
     episode_id: str
     model: str
@@ -325,7 +300,6 @@ class Flip(TypedDict):
 
 class FlippedPair(TypedDict):
     """Two episodes of one scene with different values."""
-
     base: Played
     new: Played
 
@@ -339,7 +313,6 @@ class _Gap(TypedDict):
 
 class Gap(_Gap, total=False):
     """A scene that models have with which this one is compared by pairs, and that this one has not, or more than once."""
-
     condition: Optional[str]
 
 
@@ -360,7 +333,6 @@ class _GateCell(TypedDict):
 
 class GateCell(_GateCell, total=False):
     """One experiment and model, later against earlier."""
-
     base_model: Optional[str]
     condition: Optional[str]
     units: Optional[Units]
@@ -368,7 +340,6 @@ class GateCell(_GateCell, total=False):
 
 class GateSide(TypedDict):
     """The episodes of one side of a cell."""
-
     n: int
     successes: Optional[int]
     mean: Optional[float]
@@ -377,7 +348,6 @@ class GateSide(TypedDict):
 
 class ImprovementRow(TypedDict):
     """The probability that one model decides earlier than another, averaged over the experiments that both have."""
-
     metric: str
     first: str
     second: str
@@ -388,7 +358,6 @@ class ImprovementRow(TypedDict):
 
 class Input(TypedDict):
     """One file that was read."""
-
     path: str
     sha256: str
     bytes: int
@@ -396,21 +365,18 @@ class Input(TypedDict):
 
 class Interval(TypedDict):
     """Two bounds, `low <= high`."""
-
     low: float
     high: float
 
 
 class LossCase(TypedDict):
     """A difference and its p value, not adjusted."""
-
     difference: Optional[float]
     p: Optional[float]
 
 
 class LossCases(TypedDict):
     """A test with its lost episodes taken both ways; the verdict stands if it is the same in both, after Holm's adjustment."""
-
     lost: int
     lowest: LossCase
     highest: LossCase
@@ -430,13 +396,11 @@ class _LossRow(TypedDict):
 
 class LossRow(_LossRow, total=False):
     """One rate with lost episodes."""
-
     condition: Optional[str]
 
 
 class Losses(TypedDict):
     """Losses, or that nothing is known of them."""
-
     recorded: bool
     rows: list[LossRow]
 
@@ -454,13 +418,11 @@ class _LostEpisode(TypedDict):
 
 class LostEpisode(_LostEpisode, total=False):
     """An episode that was lost for want of an answer."""
-
     condition: Optional[str]
 
 
 class Matching(TypedDict):
     """The matching of the episodes of two blocks."""
-
     pairs: int
     alone: int
     repeated: int
@@ -470,7 +432,6 @@ class Matching(TypedDict):
 
 class MedianInterval(TypedDict):
     """The interval of a median."""
-
     low: int
     high: Optional[int]
 
@@ -490,7 +451,6 @@ class _Metric(TypedDict):
 
 class Metric(_Metric, total=False):
     """One metric, as defined."""
-
     measures: Optional[Literal["rate", "duration", "count", "fraction"]]
     range: Optional[ValueRange]
     finished: Optional[str]
@@ -499,7 +459,6 @@ class Metric(_Metric, total=False):
 
 class MetricEvidence(TypedDict):
     """One metric of one episode."""
-
     metric: str
     value: Optional[int]
     timesteps: list[int]
@@ -508,7 +467,6 @@ class MetricEvidence(TypedDict):
 
 class Numbers(TypedDict):
     """The exact numbers of a cell."""
-
     episodes: int
     n: int
     sum: int
@@ -519,7 +477,6 @@ class Numbers(TypedDict):
 
 class Output(TypedDict):
     """One file of the report."""
-
     path: str
     sha256: str
     bytes: int
@@ -541,13 +498,11 @@ class _OverallRow(TypedDict):
 
 class OverallRow(_OverallRow, total=False):
     """Two models under one rate, over all experiments that both have."""
-
     losses: Optional[LossCases]
 
 
 class Overlap(TypedDict):
     """Items of both sides, and items of one side only."""
-
     both: int
     only_before: list[str]
     only_after: list[str]
@@ -555,7 +510,6 @@ class Overlap(TypedDict):
 
 class Overlap2(TypedDict):
     """Items of both sides, and items of one side only."""
-
     both: int
     only_before: list[EpisodeName]
     only_after: list[EpisodeName]
@@ -563,42 +517,36 @@ class Overlap2(TypedDict):
 
 class OwnColumn(TypedDict):
     """A column that the schema does not know."""
-
     name: str
     type: Optional[Literal["bool", "int", "float", "string", "unsupported"]]
 
 
 class Pair(TypedDict):
     """A value of the scoring before, and the one after."""
-
     before: DefinitionsName
     after: DefinitionsName
 
 
 class Pair2(TypedDict):
     """A value of the scoring before, and the one after."""
-
     before: Optional[str]
     after: Optional[str]
 
 
 class Pair3(TypedDict):
     """A value of the scoring before, and the one after."""
-
     before: Optional[Numbers]
     after: Optional[Numbers]
 
 
 class Pair4(TypedDict):
     """A value of the scoring before, and the one after."""
-
     before: Optional[int]
     after: Optional[int]
 
 
 class Pair5(TypedDict):
     """A value of the scoring before, and the one after."""
-
     before: Optional[list[int]]
     after: Optional[list[int]]
 
@@ -624,7 +572,6 @@ class _PairTest(TypedDict):
 
 class PairTest(_PairTest, total=False):
     """One model against another."""
-
     repeat_se: Optional[float]
     units: Optional[Units]
     losses: Optional[LossCases]
@@ -633,7 +580,6 @@ class PairTest(_PairTest, total=False):
 
 class Pairs(TypedDict):
     """The 2x2 table of paired outcomes."""
-
     both: int
     first_only: int
     second_only: int
@@ -642,7 +588,6 @@ class Pairs(TypedDict):
 
 class Played(TypedDict):
     """An episode of one side."""
-
     episode_id: str
     value: int
     timesteps: Optional[list[int]]
@@ -651,7 +596,6 @@ class Played(TypedDict):
 
 class RankRow(TypedDict):
     """The ranks of one model under one metric."""
-
     experiment: Optional[str]
     metric: str
     model: str
@@ -661,7 +605,6 @@ class RankRow(TypedDict):
 
 class Reach(TypedDict):
     """The smallest differences that could have been shown; none if no outcome would have been enough."""
-
     method: Literal["mcnemar", "fisher", "restricted_mean_paired", "restricted_mean", "student_paired", "welch", "units"]
     n: int
     tests: int
@@ -675,7 +618,6 @@ class _Renderer(TypedDict):
 
 class Renderer(_Renderer, total=False):
     """A renderer, the part `renderer` of a fingerprint."""
-
     version: Optional[str]
     vendor: Optional[str]
     processor: Optional[str]
@@ -683,7 +625,6 @@ class Renderer(_Renderer, total=False):
 
 class Replies(TypedDict):
     """The replies of all episodes."""
-
     replies: int
     unusable: int
     cells: list[UnusableReplies]
@@ -691,7 +632,6 @@ class Replies(TypedDict):
 
 class RepliesAnswer(TypedDict):
     """The replies of one start of a recording."""
-
     replies: int
     unreadable: dict[str, int]
     first_unreadable: Optional[UnreadableReply]
@@ -699,7 +639,6 @@ class RepliesAnswer(TypedDict):
 
 class RestrictedMean(TypedDict):
     """The mean duration up to a horizon."""
-
     horizon: int
     mean: float
     se: float
@@ -720,13 +659,11 @@ class _RetestRow(TypedDict):
 
 class RetestRow(_RetestRow, total=False):
     """The verdicts of one model on scenes that it played more than once."""
-
     condition: Optional[str]
 
 
 class Rewritten(TypedDict):
     """A part of a definition that is not written the same on both sides."""
-
     name: str
     part: str
     text: Pair2
@@ -734,21 +671,18 @@ class Rewritten(TypedDict):
 
 class Selection(TypedDict):
     """A filter over episodes."""
-
     condition: str
     by_results: bool
 
 
 class SettingApart(TypedDict):
     """A setting in which recordings differ."""
-
     setting: str
     comparisons: list[ComparisonApart]
 
 
 class Spend(TypedDict):
     """The spending."""
-
     cost_usd: float
     uncosted: int
     unanswered: int
@@ -759,14 +693,12 @@ class Spend(TypedDict):
 
 class StyleOrigin(TypedDict):
     """The style of a report."""
-
     name: str
     sha256: str
 
 
 class Trend(TypedDict):
     """The Cochran-Armitage test of no trend, stratified: Mantel's extension of the Mantel-Haenszel test."""
-
     z: float
     p: float
     strata: int
@@ -786,14 +718,12 @@ class _TrendRow(TypedDict):
 
 class TrendRow(_TrendRow, total=False):
     """A rate of one model at the doses of a factor, and the test of no trend."""
-
     condition: Optional[str]
     incomparable: Optional[str]
 
 
 class Units(TypedDict):
     """Scenes, seeds or participants with several episodes."""
-
     n: int
     name: str
     too_few: bool
@@ -801,7 +731,6 @@ class Units(TypedDict):
 
 class UnreadableReply(TypedDict):
     """A reply that gave no decision."""
-
     episode_id: str
     step: int
     status: str
@@ -818,13 +747,11 @@ class _UnusableReplies(TypedDict):
 
 class UnusableReplies(_UnusableReplies, total=False):
     """The replies of one cell."""
-
     condition: Optional[str]
 
 
 class ValueRange(TypedDict, total=False):
     """The values that a metric can have."""
-
     least: Optional[int]
     most: Optional[int]
 
@@ -836,7 +763,7 @@ Withheld = dict[str, Any]
 
 if TYPE_CHECKING:
 
-    class _ChangesKeys(_answer.Answer):
+    class _ChangesKeys(_dict.Answer):
         @overload  # type: ignore[override]
         def __getitem__(self, key: Literal["definitions"], /) -> Pair: ...
         @overload
@@ -855,7 +782,7 @@ if TYPE_CHECKING:
         def __getitem__(self, key: Literal["flips"], /) -> list[Flip]: ...
         def __getitem__(self, key: str, /) -> Any: ...
 
-    class _ExplanationKeys(_answer.Answer):
+    class _ExplanationKeys(_dict.Answer):
         @overload  # type: ignore[override]
         def __getitem__(self, key: Literal["episode_id"], /) -> str: ...
         @overload
@@ -864,13 +791,11 @@ if TYPE_CHECKING:
         def __getitem__(self, key: Literal["metrics"], /) -> list[MetricEvidence]: ...
         def __getitem__(self, key: str, /) -> Any: ...
 
-    class _GateKeys(_answer.Answer):
+    class _GateKeys(_dict.Answer):
         @overload  # type: ignore[override]
         def __getitem__(self, key: Literal["metric"], /) -> str: ...
         @overload
-        def __getitem__(self, key: Literal["margin"], /) -> float: ...
-        @overload
-        def __getitem__(self, key: Literal["confidence"], /) -> float: ...
+        def __getitem__(self, key: Literal["margin", "confidence"], /) -> float: ...
         @overload
         def __getitem__(self, key: Literal["verdict"], /) -> Literal["improved", "held", "cannot_say", "not_comparable", "regressed"]: ...
         @overload
@@ -879,20 +804,18 @@ if TYPE_CHECKING:
         def __getitem__(self, key: Literal["cells"], /) -> list[GateCell]: ...
         def __getitem__(self, key: str, /) -> Any: ...
 
-    class _ImportedKeys(_answer.Answer):
+    class _ImportedKeys(_dict.Answer):
         @overload  # type: ignore[override]
         def __getitem__(self, key: Literal["out"], /) -> str: ...
         @overload
-        def __getitem__(self, key: Literal["episodes"], /) -> int: ...
-        @overload
-        def __getitem__(self, key: Literal["steps"], /) -> int: ...
+        def __getitem__(self, key: Literal["episodes", "steps"], /) -> int: ...
         @overload
         def __getitem__(self, key: Literal["columns"], /) -> list[str]: ...
         @overload
         def __getitem__(self, key: Literal["own_columns"], /) -> list[OwnColumn]: ...
         def __getitem__(self, key: str, /) -> Any: ...
 
-    class _ManifestKeys(_answer.Answer):
+    class _ManifestKeys(_dict.Answer):
         @overload  # type: ignore[override]
         def __getitem__(self, key: Literal["version"], /) -> str: ...
         @overload
@@ -900,9 +823,7 @@ if TYPE_CHECKING:
         @overload
         def __getitem__(self, key: Literal["style"], /) -> StyleOrigin: ...
         @overload
-        def __getitem__(self, key: Literal["by"], /) -> list[str]: ...
-        @overload
-        def __getitem__(self, key: Literal["metrics"], /) -> list[str]: ...
+        def __getitem__(self, key: Literal["by", "metrics"], /) -> list[str]: ...
         @overload
         def __getitem__(self, key: Literal["where"], /) -> Optional[str]: ...
         @overload
@@ -913,27 +834,15 @@ if TYPE_CHECKING:
         def __getitem__(self, key: Literal["definitions"], /) -> Catalog: ...
         def __getitem__(self, key: str, /) -> Any: ...
 
-    class _RecordedKeys(_answer.Answer):
+    class _RecordedKeys(_dict.Answer):
         @overload  # type: ignore[override]
         def __getitem__(self, key: Literal["model"], /) -> str: ...
         @overload
-        def __getitem__(self, key: Literal["asked"], /) -> int: ...
-        @overload
-        def __getitem__(self, key: Literal["found"], /) -> int: ...
-        @overload
-        def __getitem__(self, key: Literal["recorded"], /) -> int: ...
-        @overload
-        def __getitem__(self, key: Literal["steps"], /) -> int: ...
-        @overload
-        def __getitem__(self, key: Literal["elsewhere"], /) -> int: ...
-        @overload
-        def __getitem__(self, key: Literal["left_out"], /) -> int: ...
+        def __getitem__(self, key: Literal["asked", "found", "recorded", "steps", "elsewhere", "left_out", "stopped_by_limit"], /) -> int: ...
         @overload
         def __getitem__(self, key: Literal["replies"], /) -> RepliesAnswer: ...
         @overload
         def __getitem__(self, key: Literal["lost"], /) -> list[LostEpisode]: ...
-        @overload
-        def __getitem__(self, key: Literal["stopped_by_limit"], /) -> int: ...
         @overload
         def __getitem__(self, key: Literal["spend"], /) -> Optional[Spend]: ...
         @overload
@@ -941,44 +850,28 @@ if TYPE_CHECKING:
         @overload
         def __getitem__(self, key: Literal["renderers"], /) -> list[Renderer]: ...
         @overload
-        def __getitem__(self, key: Literal["traces"], /) -> list[str]: ...
-        @overload
-        def __getitem__(self, key: Literal["logs"], /) -> list[str]: ...
+        def __getitem__(self, key: Literal["traces", "logs"], /) -> list[str]: ...
         def __getitem__(self, key: str, /) -> Any: ...
 
-    class _StatisticsKeys(_answer.Answer):
+    class _StatisticsKeys(_dict.Answer):
         @overload  # type: ignore[override]
-        def __getitem__(self, key: Literal["definitions"], /) -> str: ...
-        @overload
-        def __getitem__(self, key: Literal["definitions_hash"], /) -> str: ...
+        def __getitem__(self, key: Literal["definitions", "definitions_hash", "design_note"], /) -> str: ...
         @overload
         def __getitem__(self, key: Literal["confidence"], /) -> float: ...
         @overload
-        def __getitem__(self, key: Literal["by"], /) -> list[str]: ...
+        def __getitem__(self, key: Literal["by", "pooled", "conclusions", "warnings", "headline"], /) -> list[str]: ...
         @overload
-        def __getitem__(self, key: Literal["episodes"], /) -> int: ...
+        def __getitem__(self, key: Literal["episodes", "families"], /) -> int: ...
         @overload
         def __getitem__(self, key: Literal["where"], /) -> Optional[Selection]: ...
         @overload
         def __getitem__(self, key: Literal["departures"], /) -> Optional[list[str]]: ...
         @overload
-        def __getitem__(self, key: Literal["pooled"], /) -> list[str]: ...
-        @overload
         def __getitem__(self, key: Literal["not_comparable"], /) -> list[SettingApart]: ...
         @overload
         def __getitem__(self, key: Literal["design"], /) -> Design: ...
         @overload
-        def __getitem__(self, key: Literal["design_note"], /) -> str: ...
-        @overload
-        def __getitem__(self, key: Literal["families"], /) -> int: ...
-        @overload
         def __getitem__(self, key: Literal["answers"], /) -> list[Answer]: ...
-        @overload
-        def __getitem__(self, key: Literal["conclusions"], /) -> list[str]: ...
-        @overload
-        def __getitem__(self, key: Literal["warnings"], /) -> list[str]: ...
-        @overload
-        def __getitem__(self, key: Literal["headline"], /) -> list[str]: ...
         @overload
         def __getitem__(self, key: Literal["cells"], /) -> list[CellRow]: ...
         @overload
@@ -1009,7 +902,7 @@ if TYPE_CHECKING:
         def __getitem__(self, key: Literal["replies"], /) -> Optional[Replies]: ...
         def __getitem__(self, key: str, /) -> Any: ...
 
-    class _ValidationKeys(_answer.Answer):
+    class _ValidationKeys(_dict.Answer):
         @overload  # type: ignore[override]
         def __getitem__(self, key: Literal["files"], /) -> list[CheckedFile]: ...
         @overload

@@ -29,7 +29,6 @@ fn wide(data: &[u8], start: usize, length: usize, at: usize) -> u128 {
     bits >> ahead & ((1 << STEP.min(length - at)) - 1)
 }
 
-/// A growing sequence of bits.
 #[derive(Debug, Default)]
 pub struct Bits {
     words: Vec<u64>,
@@ -38,7 +37,6 @@ pub struct Bits {
 }
 
 impl Bits {
-    /// An empty sequence with room for some bits.
     pub fn with_capacity(bits: usize) -> Self {
         Self { words: Vec::with_capacity(bits.div_ceil(64)), ..Self::default() }
     }
@@ -59,7 +57,6 @@ impl Bits {
         }
     }
 
-    /// Adds one bit repeatedly.
     #[inline]
     pub fn fill(&mut self, count: usize, bit: bool) {
         for at in (0..count).step_by(64) {

@@ -55,7 +55,6 @@ impl Column {
         self.len() == 0
     }
 
-    /// The type of the stored values.
     pub fn data_type(&self) -> &DataType {
         let (Self::Flat(values) | Self::Runs(Runs { values, .. }) | Self::Keys(Keys { values, .. })) = self;
         values.data_type()
@@ -143,7 +142,6 @@ impl Column {
         values.is_valid(row).then(|| values.value(row))
     }
 
-    /// Concatenates the rows of columns of one kind.
     pub fn concat<'a>(parts: impl IntoIterator<Item = &'a Self>) -> Result<Self, ArrowError> {
         let parts: Vec<&Self> = parts.into_iter().collect();
         if parts.iter().all(|part| part.holds_texts()) {
@@ -206,7 +204,6 @@ impl Keys {
         &self.keys
     }
 
-    /// A value for each key.
     pub fn values(&self) -> &ArrayRef {
         &self.values
     }

@@ -3,12 +3,10 @@
 use std::fmt;
 use std::sync::{Arc, OnceLock};
 
-/// The error for pages that the short cut does not support.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("pages that only the Parquet library decodes")]
 pub struct Unsupported;
 
-/// The kind of a page's fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FaultKind {
     /// Its bytes contradict the footer, its header or a checksum.
@@ -17,7 +15,6 @@ pub enum FaultKind {
     OverBudget,
 }
 
-/// A fault of a page or of a column chunk.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{part}: expected {expected}, found {found}")]
 pub struct PageFault {
@@ -29,7 +26,6 @@ pub struct PageFault {
     pub found: String,
 }
 
-/// The faulty bytes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Part {
     /// The page that starts here, with its header.

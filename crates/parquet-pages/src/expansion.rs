@@ -43,7 +43,6 @@ enum Kind {
 }
 
 impl Expansion {
-    /// The empty expansion of a file of this size.
     pub fn new(bytes: u64) -> Self {
         let of = |what| {
             Limit::in_proportion(what, 64 << 20, INFLATED_PER_BYTE, bytes.min(SMALL)).and_beyond(

@@ -28,7 +28,6 @@ pub(crate) enum Wire {
 /// The deepest nesting of structures; Parquet's own have fewer than ten levels.
 const DEEPEST: u8 = 32;
 
-/// An error of a Thrift structure.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Fault {
     /// The bytes end before the structure does.
@@ -46,7 +45,6 @@ impl fmt::Display for Fault {
     }
 }
 
-/// A field of a structure, before its value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Field {
     pub(crate) id: i16,

@@ -10,10 +10,8 @@ use serde::{Deserialize, Serialize};
 use exact::budget::Exceeded;
 use exact::escape::visible;
 
-/// The remedy for too many open files.
 pub const MORE_FILES: &str = "raise the limit of open files, as in `ulimit -n 1024`, and run the command again";
 
-/// Returns true if a system message reports too many open files.
 pub fn is_short_of_files(words: &str) -> bool {
     // EMFILE and ENFILE.
     words.contains("(os error 24)") || words.contains("(os error 23)")
@@ -251,7 +249,6 @@ impl Finding {
         Self::new(Code::OverBudget, file, exceeded.expected(), "more")
     }
 
-    #[must_use]
     pub(crate) fn in_row_group(mut self, row_group: usize) -> Self {
         self.row_group = Some(row_group);
         self

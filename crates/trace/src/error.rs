@@ -8,7 +8,6 @@ use arrow::error::ArrowError;
 use super::diagnostic::Finding;
 use super::labels::LabelsError;
 
-/// An error of reading or writing traces.
 #[derive(Debug, thiserror::Error)]
 pub enum TraceError {
     #[error("{first}{}", more_findings(*.more))]
@@ -50,7 +49,6 @@ impl TraceError {
         }
     }
 
-    /// The error with these findings, the earliest first; `None` without findings.
     pub fn of(findings: Vec<Finding>) -> Option<Self> {
         let mut findings = findings.into_iter();
         let first = Box::new(findings.next()?);

@@ -9,16 +9,12 @@ use std::path::{Component, Path, PathBuf};
 
 use glob::{Pattern, PatternError};
 
-/// An error of a glob.
 #[derive(Debug)]
 pub(crate) enum GlobError {
-    /// The pattern is not a glob.
     Pattern(PatternError),
-    /// A folder cannot be read.
     Folder(PathBuf, io::Error),
 }
 
-/// Returns true if a text has the special characters of globs.
 pub(crate) fn is_glob(text: &str) -> bool {
     text.contains(['*', '?', '['])
 }

@@ -290,7 +290,6 @@ fn text(column: &DictionaryArray<Int32Type>, row: usize) -> String {
     key.map_or_else(String::new, |key| column.values().as_string::<i32>().value(key).to_owned())
 }
 
-/// The episodes of a batch, in its order.
 fn list(set: &TraceSet, batch: &EpisodeBatch) -> Vec<EpisodeInfo> {
     let [ids, experiments, models] = ["episode_id", "experiment", "model"].map(|name| texts_of(batch, name));
     let [seeds, runs] = ["seed", "run"].map(|name| integers_of(batch, name));
@@ -319,7 +318,6 @@ struct Tally {
 /// The number of episodes per seed and run, ascending, for each experiment and model.
 type Cells = BTreeMap<(String, String), Vec<(SeedRun, u64)>>;
 
-/// The cells, and the seeds and runs of all of them.
 #[derive(Default)]
 struct Grid {
     cells: Cells,

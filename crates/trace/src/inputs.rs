@@ -28,7 +28,6 @@ pub struct Input {
 }
 
 impl Input {
-    /// The file at this path, with a name derived from it.
     pub fn new(path: impl Into<PathBuf>) -> Self {
         let path = path.into();
         Self { name: display_name(&path), path }
@@ -136,7 +135,6 @@ fn name_of(bytes: &[u8]) -> Result<OsString, TraceError> {
     Ok(OsStr::from_bytes(bytes).to_owned())
 }
 
-/// A name from the system's bytes: any on Unix, UTF-8 elsewhere.
 #[cfg(not(unix))]
 fn name_of(bytes: &[u8]) -> Result<OsString, TraceError> {
     let text = input::utf8(bytes.to_owned());

@@ -33,7 +33,6 @@ impl fmt::Display for Renderer {
     }
 }
 
-/// The renderers of a recording, each once.
 pub fn of_recording(recording: &Value) -> Vec<Renderer> {
     let parts = recording["fingerprints"].as_object().into_iter().flat_map(serde_json::Map::values);
     once(parts.filter_map(|parts| serde_json::from_value(parts["renderer"].clone()).ok()))

@@ -35,7 +35,6 @@ pub struct Projection {
     /// Columns with one value per episode, besides [`EPISODE_COLUMNS`]; checked to be constant in each. Labels come
     /// from beside the traces.
     pub constants: Vec<String>,
-    /// The definitions' declarations of columns outside the schema.
     pub declared: Vec<DeclaredColumn>,
     /// The known experiments; an episode of another one is a fault. Any if `None`.
     pub experiments: Option<Vec<String>>,
@@ -94,13 +93,10 @@ impl Texts {
 pub struct Origin {
     /// The file's position in [`TraceSet::files`].
     pub file: usize,
-    /// The row group of the file.
     pub row_group: usize,
-    /// The row in the row group.
     pub row: usize,
 }
 
-/// The totals of a scan.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ScanSummary {
     pub episodes: u64,
@@ -182,7 +178,6 @@ impl TraceSet {
     }
 }
 
-/// The location of an episode.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct EpisodePlace {
     /// The file's position in [`TraceSet::files`].
@@ -211,7 +206,6 @@ pub fn episode_places(traces: &TraceSet, threads: NonZeroUsize) -> Result<HashMa
     Ok(places)
 }
 
-/// A worker's results for some episodes.
 struct Checked<T, E> {
     file: usize,
     ids: Vec<u64>,

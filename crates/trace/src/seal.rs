@@ -38,7 +38,6 @@ pub struct SealAnswer {
     pub sha256: String,
 }
 
-/// The error if no copy was written.
 #[derive(Debug, thiserror::Error)]
 pub enum SealError {
     #[error(transparent)]

@@ -17,10 +17,8 @@ pub(crate) use read::sum;
 pub use read::{Checksums, ChunkChecksums, Fault, of_file, verify_file};
 pub use write::{Held, finish, pass_on};
 
-/// The key of the checksums in a footer.
 pub const KEY: &str = "mirrorstats.checksums";
 
-/// The name of the writing program in footers.
 pub const CREATED_BY: &str = concat!("mirrorstats version ", env!("CARGO_PKG_VERSION"));
 
 /// The only algorithm so far.

@@ -13,7 +13,6 @@ use serde::Serialize;
 use super::{ALGORITHM, CREATED_BY, FIRST, KEY, Stated, digits, range};
 use crate::footer_shape::footer_bytes;
 
-/// The number of bytes that are read and summed at a time.
 const BLOCK: usize = 256 << 10;
 
 /// The state of a file's checksums.
@@ -36,19 +35,16 @@ pub struct ChunkChecksums {
     columns: usize,
 }
 
-/// An error of a footer's checksums.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Fault {
     /// They cannot be read, or are not those of the file's chunks: what is there.
     Malformed(String),
     /// The footer contradicts its own: expected and found.
     Footer(u32, u32),
-    /// The bytes cannot be read.
     Unreadable(String),
 }
 
 impl ChunkChecksums {
-    /// The checksum of a column chunk.
     pub fn of(&self, row_group: usize, column: usize) -> Option<u32> {
         self.all.as_ref()?.get(row_group * self.columns + column).copied()
     }

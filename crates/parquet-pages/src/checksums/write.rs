@@ -24,7 +24,6 @@ impl<W: Write> Held<W> {
         Self { out, bytes: Vec::new(), start: 0, end: FIRST, chunks: Vec::new() }
     }
 
-    /// The number of row groups summed.
     pub fn row_groups(&self) -> usize {
         self.chunks.len()
     }

@@ -18,7 +18,6 @@ use crate::error::{FaultSlot, Unsupported};
 use crate::stored::bytes::{Place, Store};
 use crate::stored::reader::Pages;
 
-/// The form of the rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
     /// One value per row, or one key per row.
@@ -27,7 +26,6 @@ pub enum Form {
     Runs,
 }
 
-/// A position in a column's pages.
 pub struct Cursor {
     pages: Pages,
     physical: Physical,
@@ -63,7 +61,6 @@ struct Stretches {
 }
 
 impl Cursor {
-    /// A column that is stored as `stored`.
     pub fn open(store: &Store, place: Place<'_>, stored: &DataType, form: Form) -> Result<Self, Unsupported> {
         let (column, rows) = (place.chunk(), place.rows());
         let about = column.column_descr();

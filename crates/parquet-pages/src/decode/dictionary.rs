@@ -11,7 +11,6 @@ use arrow::datatypes::{Int32Type, Int64Type};
 use crate::column::Keys;
 use crate::error::Unsupported;
 
-/// The values that the keys of a column refer to.
 pub(crate) enum Dictionary {
     Texts(ArrayRef),
     Ints(ArrayRef),

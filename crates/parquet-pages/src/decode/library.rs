@@ -15,12 +15,10 @@ use crate::error::FaultSlot;
 use crate::stored::bytes::{Place, Store, rows_of};
 use crate::stored::reader::Pages;
 
-/// Some row groups of a file, for the library to read.
 pub struct Library {
     pub store: Store,
     pub metadata: Arc<ParquetMetaData>,
     pub checksums: ChunkChecksums,
-    /// The row groups, in this order.
     pub row_groups: Vec<usize>,
     /// The slot for the first fault of a page.
     pub slot: FaultSlot,
@@ -29,7 +27,6 @@ pub struct Library {
 }
 
 impl Library {
-    /// A reader of some columns, in the types of `fields`.
     pub fn reader(
         &self,
         columns: ProjectionMask,
@@ -65,7 +62,6 @@ impl RowGroups for Library {
     }
 }
 
-/// The pages of one column, row group by row group.
 struct Chunks {
     store: Store,
     metadata: Arc<ParquetMetaData>,

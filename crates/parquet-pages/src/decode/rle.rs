@@ -26,7 +26,6 @@ enum Run {
     Packed(usize),
 }
 
-/// Some consecutive numbers.
 pub(crate) enum Span<'a> {
     Same { value: u32, count: usize },
     Packed(Packed<'a>),
@@ -67,7 +66,6 @@ impl Hybrid {
         })
     }
 
-    /// Appends the next `count` numbers to `out`.
     pub(crate) fn append<N: Number>(&mut self, count: usize, out: &mut Vec<N>) -> Result<(), Unsupported> {
         if self.width > N::WIDTH {
             return Err(Unsupported);
@@ -172,7 +170,6 @@ const GROUP: usize = 8;
 /// The longest run that the Parquet library accepts.
 const MOST_GROUPS: usize = i32::MAX as usize / GROUP;
 
-/// A type that stored numbers decode to.
 pub(crate) trait Number: Copy + Default + From<u8> {
     const WIDTH: usize;
 
@@ -197,7 +194,6 @@ impl Number for i32 {
 }
 
 impl Packed<'_> {
-    /// Passes each number to `take`.
     pub(crate) fn each(&self, mut take: impl FnMut(u32)) {
         let Ok(()) = self.blocks(|some| {
             for number in some {

@@ -50,7 +50,6 @@ enum Held {
 }
 
 impl Store {
-    /// A file and its expansion so far.
     pub fn new(file: File, expansion: Arc<Expansion>) -> Self {
         Self { held: Held::File(file), expansion }
     }

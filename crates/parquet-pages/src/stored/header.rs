@@ -9,7 +9,6 @@ use crate::thrift::{Compact, Fault, Field, Wire};
 
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Header {
-    /// The header's length, in bytes.
     pub(crate) length: usize,
     pub(crate) stored: usize,
     pub(crate) whole: usize,
@@ -34,7 +33,6 @@ pub(crate) enum Kind {
     DataV2,
 }
 
-/// The footer's metadata of a column of a row group.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct About {
     pub(crate) codec: Compression,

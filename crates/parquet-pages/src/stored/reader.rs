@@ -12,7 +12,6 @@ use super::verified::Verified;
 use crate::decode::contents::Contents;
 use crate::error::FaultSlot;
 
-/// The pages of one column of one row group.
 pub(crate) struct Pages {
     stored: Arc<Verified>,
     inner: SerializedPageReader<Verified>,

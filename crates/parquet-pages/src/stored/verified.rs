@@ -25,7 +25,6 @@ const HEADER: usize = 1 << 10;
 /// The longest header: texts among its statistics may be long.
 const LONGEST_HEADER: usize = 16 << 20;
 
-/// The stored pages of a column.
 pub(crate) struct Verified {
     store: Store,
     place: (usize, usize),
@@ -39,7 +38,6 @@ pub(crate) struct Verified {
     slot: FaultSlot,
 }
 
-/// The progress through the pages.
 #[derive(Default)]
 struct Progress {
     page: Option<(u64, Header)>,

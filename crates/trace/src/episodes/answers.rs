@@ -14,13 +14,11 @@ use crate::schema::{Column, DeclaredColumn, Kind, Stored, Value};
 /// The prefixes of the column names: of the answer, and of its truth.
 pub const PREFIXES: [&str; 2] = ["answer_", "truth_"];
 
-/// The most answers that an experiment can declare.
 pub const MOST_ANSWERS: usize = 8;
 
 /// The most answer columns that a process remembers, so that hostile footers cannot fill its memory.
 const MOST_COLUMNS: usize = 4096;
 
-/// A value of one of the columns.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Answered {

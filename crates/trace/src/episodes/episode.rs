@@ -52,7 +52,6 @@ pub struct Step {
     pub selected_cube: Option<String>,
     /// Ground truth: mirror evidence is in view.
     pub mirror_visible: bool,
-    /// The optional columns of a recorder.
     pub extra: Extra,
 }
 
@@ -67,9 +66,7 @@ pub enum Action {
     TurnRight,
     /// The decision, which ends the episode for the agent.
     Done,
-    /// The hand moves up one step.
     HandUp,
-    /// The hand moves down one step.
     HandDown,
     /// The hand moves one step left in the picture.
     HandLeft,

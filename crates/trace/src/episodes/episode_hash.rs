@@ -16,7 +16,6 @@ use crate::episode::Episode;
 use crate::schema::{self, COLUMNS, Value};
 use exact::hash::hex;
 
-/// The column that holds the hash.
 pub(crate) const EPISODE_HASH: &str = "episode_hash";
 /// An attribution, derived from a text if there is one.
 pub(crate) const SELF_COLOR: &str = "self_color";
@@ -38,7 +37,6 @@ pub fn of(episode: &Episode) -> String {
     form.finish()
 }
 
-/// The hashed columns, in order.
 pub(crate) fn columns() -> impl Iterator<Item = &'static str> {
     let mut names: Vec<_> = COLUMNS.iter().map(|column| column.name).collect();
     names.retain(|name| !["t", EPISODE_HASH].contains(name));

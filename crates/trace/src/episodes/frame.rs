@@ -8,7 +8,6 @@ use exact::hash;
 /// An immutable picture: rows from the top, three bytes (red, green, blue) per pixel.
 #[derive(Clone, Debug)]
 pub struct Frame {
-    /// Pixels in a row.
     pub width: usize,
     pub height: usize,
     /// `3 * width * height` bytes.
@@ -18,7 +17,6 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// A picture of `3 * width * height` bytes.
     pub const fn new(width: usize, height: usize, rgb: Vec<u8>) -> Self {
         Self {
             width,
@@ -32,9 +30,7 @@ impl Frame {
 
 /// The number of blocks in a row of a digest.
 const COLUMNS: usize = 8;
-/// The number of rows of blocks in a digest.
 const ROWS: usize = 6;
-/// The number of hash digits at the start of a digest.
 const HASH_DIGITS: usize = 16;
 
 /// The form of a recording's digests, as named in its footer.
@@ -43,10 +39,8 @@ pub const DIGEST: &str = "sha256-16 and 8x6 means";
 /// The largest difference between block means, in levels, of frames that count as alike.
 pub const TOLERANCE: u8 = 2;
 
-/// The likeness of two frames, judged by their digests.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Likeness {
-    /// The same bytes.
     Equal,
     /// Different bytes, but the means of all blocks are within [`TOLERANCE`].
     Alike,

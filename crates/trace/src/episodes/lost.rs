@@ -39,7 +39,6 @@ pub struct LostEpisode {
     pub reason: String,
 }
 
-/// The error if a list cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum LostListError {
     #[error("cannot read {}: {source}", .path.display())]
@@ -52,7 +51,6 @@ pub enum LostListError {
     Line { path: PathBuf, line: usize, found: String },
 }
 
-/// The list in a folder.
 pub fn list_of(folder: &Path) -> PathBuf {
     folder.join("lost.jsonl")
 }

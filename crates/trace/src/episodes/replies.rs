@@ -17,7 +17,6 @@ pub const REPLY_STATUS: &str = "reply_status";
 /// The statuses of replies with a decision.
 const READ: [&str; 2] = ["ok", "repaired"];
 
-/// The statuses of the schema, in its order.
 pub fn statuses() -> &'static [&'static str] {
     schema::column(REPLY_STATUS).map_or(&[], |column| column.values)
 }
@@ -32,7 +31,6 @@ pub struct ReplyCounts {
 }
 
 impl ReplyCounts {
-    /// Adds replies of one status.
     pub fn add(&mut self, status: &str, replies: u64) {
         self.replies += replies;
         if replies > 0 && !Self::is_read(status) {
@@ -52,14 +50,11 @@ impl ReplyCounts {
         self.unreadable.values().sum()
     }
 
-    /// Removes the statuses that the schema does not know.
-    #[must_use]
     pub(crate) fn of_known_statuses(mut self) -> Self {
         self.unreadable.retain(|status, _| statuses().contains(&status.as_str()));
         self
     }
 
-    /// Returns true if replies of this status gave a decision.
     pub fn is_read(status: &str) -> bool {
         READ.contains(&status)
     }

@@ -80,7 +80,6 @@ const fn is_false(value: &bool) -> bool {
 }
 
 impl Declared {
-    /// The declarations of some traces' footers.
     pub fn of(traces: &TraceSet) -> Self {
         let recordings = traces.files().iter().map(|file| Self::of_recording(&file.recording()));
         recordings.reduce(Self::joined).unwrap_or_default()
@@ -102,7 +101,6 @@ impl Declared {
         }
     }
 
-    /// Merges these declarations with those of other files.
     #[must_use]
     pub fn joined(mut self, other: Self) -> Self {
         let differs =

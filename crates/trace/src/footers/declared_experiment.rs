@@ -11,18 +11,15 @@ use crate::diagnostic::{Code, Finding};
 use crate::schema::{DeclaredColumn, RECORDING_KEY, of_some_tasks};
 use exact::ratio::Ratio;
 
-/// An experiment declared in a footer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DeclaredExperiment {
     /// The value of the column `experiment` in its episodes; not empty.
     pub name: String,
     /// The heading of its group in tables, without its name.
     pub title: Option<String>,
-    /// The position among the experiments.
     pub order: Option<i64>,
     /// Chance levels by metric; `None` says that the metric has none in this experiment.
     pub chance: IndexMap<String, Option<Ratio>>,
-    /// Reference levels by metric.
     pub reference: IndexMap<String, Vec<Ratio>>,
     /// The definitions that score it, by name or by the path of the file; `None` if not declared.
     pub definitions: Option<String>,
@@ -30,11 +27,9 @@ pub struct DeclaredExperiment {
     pub definitions_hash: Option<String>,
     /// Columns of [`of_some_tasks`] without a meaning in its task, in this order.
     pub absent: Vec<&'static str>,
-    /// The columns of the answers that it declares.
     pub answers: Vec<DeclaredColumn>,
 }
 
-/// The remedy for an invalid declaration.
 const HELP: &str = "write it as a definition file has it under `[experiment.NAME]`, or remove the key from the footer";
 
 /// An invalid declaration: its place in the recording, the expected value, and the value found.

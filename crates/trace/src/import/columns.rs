@@ -15,13 +15,11 @@ use exact::suggest::nearest;
 /// A column outside the schema.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Own {
-    /// Its name, which is the key in the lines.
     pub name: String,
     /// The type of its values; `None` if they are all null.
     pub kind: Option<Kind>,
 }
 
-/// The columns of the lines so far.
 #[derive(Debug, Default)]
 pub(super) struct Columns {
     known: Vec<&'static str>,
@@ -75,12 +73,10 @@ impl Columns {
         self.own.iter().filter_map(lossy).collect()
     }
 
-    /// The schema's columns in the trace, in schema order.
     pub(super) fn known(&self) -> impl Iterator<Item = &'static Column> + '_ {
         COLUMNS.iter().filter(|column| self.known.contains(&column.name))
     }
 
-    /// The columns outside the schema, in the order of their first lines.
     pub(super) fn own(&self) -> Vec<Own> {
         self.own.iter().map(|(name, inferred)| Own { name: name.clone(), kind: inferred.kind }).collect()
     }

@@ -5,7 +5,6 @@ use std::io;
 use super::fault::Fault;
 use crate::error::TraceError;
 
-/// The most faults that a message lists.
 const TOLD: usize = 10;
 
 /// Columns of the mirror's steps. If all are missing, the steps belong to another domain.
@@ -39,7 +38,6 @@ impl Faults {
     }
 }
 
-/// An error of importing lines of steps.
 #[derive(Debug, thiserror::Error)]
 pub enum ImportError {
     #[error("{}", listed(told, *more))]

@@ -23,12 +23,9 @@ impl fmt::Display for Place {
 /// One problem of a line, or of a file without lines.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Fault {
-    /// The name of the file, as given.
     pub file: String,
     pub line: Option<u64>,
-    /// The unit of `line`: `line` or `row`.
     pub noun: &'static str,
-    /// The key of the object.
     pub key: Option<String>,
     pub expected: String,
     pub found: String,

@@ -9,7 +9,6 @@ use crate::declared::{Cluster, Origin};
 use crate::schema::colors::palette::Palette;
 use crate::validate::Expected;
 
-/// The known experiments and colours.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Limits<'a> {
     /// The known experiments, the domain, and its declared columns.
@@ -18,7 +17,6 @@ pub struct Limits<'a> {
     pub domain: Option<&'a str>,
     /// The known colours, which the trace then declares; any if `None`.
     pub palette: Option<&'a Palette>,
-    /// The unit that similar episodes share; no cluster if `None`.
     pub cluster: Option<Cluster>,
     /// True if the steps were rebuilt from published numbers, so that other values in them are arbitrary.
     pub is_reconstruction: bool,

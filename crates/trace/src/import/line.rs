@@ -12,7 +12,6 @@ use exact::escape::{exact, visible};
 
 pub(super) const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
 
-/// A value of a step.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
     Null,

@@ -8,7 +8,6 @@ use crate::schema::domain::is_general;
 use crate::schema::{Kind, column};
 use exact::escape::visible;
 
-/// The mapping of foreign keys, and the keys left out so far.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mapping {
     columns: Vec<(String, Path)>,
@@ -31,7 +30,6 @@ struct Path {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("`{}`: expected {expected}, found {found}", visible(.typed))]
 pub struct MappingError {
-    /// The argument as typed.
     typed: String,
     expected: &'static str,
     found: &'static str,
@@ -54,7 +52,6 @@ impl Mapping {
         })
     }
 
-    /// Returns true if the mapping leaves lines unchanged.
     pub fn is_empty(&self) -> bool {
         self.columns.is_empty() && self.constants.is_empty()
     }

@@ -47,9 +47,7 @@ use index::Index;
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Imported {
-    /// The number of episodes in the trace.
     pub episodes: usize,
-    /// The number of rows, one per line.
     pub steps: usize,
     /// The columns of the schema in the trace, in schema order.
     pub columns: Vec<&'static str>,
@@ -140,7 +138,6 @@ fn write(
     Ok(rows.finish().map_err(failed)?)
 }
 
-/// Checks the written file against every rule of the schema.
 fn check(file: &NewFile, out: &Path, expected: Expected<'_>) -> Result<(), ImportError> {
     let input = Input { name: Input::new(out).name, path: file.temporary_path().to_owned() };
     let report = validate_as(&[input], Expected { errors_alone: true, ..expected }, NonZeroUsize::MIN)?;

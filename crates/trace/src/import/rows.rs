@@ -10,7 +10,6 @@ use super::line::{self, Members};
 use crate::schema::{Kind, Value};
 use crate::write::row_groups::{Gathered, RowGroups, field};
 
-/// Rows that are being written to a trace.
 pub(super) struct Rows<W: Write + Send> {
     file: RowGroups<W>,
     gathered: Gathered,
@@ -37,7 +36,6 @@ impl<W: Write + Send> Rows<W> {
         self.file.end_episode(&mut self.gathered)
     }
 
-    /// Writes the rest and the footer.
     pub fn finish(self) -> Result<W> {
         self.file.finish(Some(self.gathered))
     }

@@ -21,7 +21,6 @@ use crate::schema::{self, Kind};
 use exact::budget::Limit;
 use exact::{hash, input};
 
-/// Lines of steps, and their name in messages.
 #[derive(Debug)]
 pub struct Text {
     name: Arc<str>,
@@ -29,7 +28,6 @@ pub struct Text {
     reader: BufReader<File>,
     /// The position of the reader, in bytes from the start.
     offset: u64,
-    /// The number of lines read so far.
     lines: u64,
     /// True if the lines are rows of a data frame, which stores integers beside nulls as floats.
     is_frame: bool,
@@ -61,7 +59,6 @@ const LONGEST_LINE: Limit = Limit::new("bytes in a line of steps", 16 << 20);
 const LARGEST_STREAM: Limit = Limit::new("bytes of steps that are piped in", 64 << 30);
 
 impl Text {
-    /// Opens the text in this file.
     pub fn open(path: &Path) -> Result<Self, ImportError> {
         let name = Input::new(path).name;
         let failed = || ImportError::read(&name);

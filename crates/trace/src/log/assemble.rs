@@ -21,7 +21,6 @@ use exact::replace::NewFile;
 /// The order of a log's episodes: seed, run and repetition.
 pub type Place = (i32, i32, i32);
 
-/// The place of an episode in its log.
 pub fn place(head: &Episode) -> Place {
     (head.seed, head.run, head.repetition.unwrap_or(1))
 }

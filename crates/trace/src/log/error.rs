@@ -3,7 +3,6 @@
 use std::io;
 use std::path::Path;
 
-/// An error of a log.
 #[derive(Debug, thiserror::Error)]
 pub enum LogError {
     #[error(

@@ -36,12 +36,10 @@ struct Chunk {
     last: u64,
 }
 
-/// The contents of a log for one step.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Moment {
     /// The frame, PNG; `None` if none was drawn.
     pub frame: Option<Vec<u8>>,
-    /// Everything in the room, as shapes.
     pub shapes: Vec<Shape>,
 }
 
@@ -63,7 +61,6 @@ pub struct Shape {
 /// The readable part of a log that is still being written.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Unfinished {
-    /// The episode with its rows so far.
     pub episode: Episode,
 }
 
@@ -223,7 +220,6 @@ pub fn each_unfinished_shapes(path: &Path, give: &mut dyn FnMut(u64, Vec<Shape>)
     })
 }
 
-/// Returns true if a file starts like a log.
 pub fn is_log(path: &Path) -> bool {
     records(path).is_ok()
 }

@@ -58,7 +58,6 @@ fn with_answers_alone(schema: &mut Schema) {
     schema.insert("required".to_owned(), required.unwrap_or_default());
 }
 
-/// The error for an invalid action.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("step {t}: expected an action such as `move_forward`, found `{found}`")]
 pub struct NoAction {
@@ -67,7 +66,6 @@ pub struct NoAction {
 }
 
 impl Decision {
-    /// The row of a step.
     pub fn of(t: i32, step: &Step) -> Self {
         let Step { action, self_color, selected_cube, mirror_visible, extra } = step.clone();
         let action = action.map(|action| action.name().to_owned());
@@ -75,7 +73,6 @@ impl Decision {
         Self { t, action, self_color, selected_cube, mirror_visible, extra, others }
     }
 
-    /// The row in a message.
     pub fn parse(json: &[u8]) -> serde_json::Result<Self> {
         let mut row: Self = serde_json::from_slice(json)?;
         for (name, value) in &row.others {
@@ -86,7 +83,6 @@ impl Decision {
         Ok(row)
     }
 
-    /// Converts the row to a step.
     pub fn into_step(self) -> Result<Step, NoAction> {
         let Self { t, action, self_color, selected_cube, mirror_visible, extra, .. } = self;
         let named = |name: String| Action::named(&name).ok_or(NoAction { t, found: name });

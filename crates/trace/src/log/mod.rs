@@ -35,23 +35,15 @@ pub mod write;
 
 pub use error::LogError;
 
-/// The name of the metadata record.
 pub const METADATA: &str = "mirrorstats.recording";
 /// The key in it: the JSON of the trace's footer.
 pub const METADATA_KEY: &str = "recording";
 
-/// The topics, in the order of their channels.
 pub mod topic {
-    /// Begin and end of episodes.
     pub const EPISODE: &str = "/episode";
-    /// Frames.
     pub const CAMERA: &str = "/camera";
-    /// Poses.
     pub const TRANSFORMS: &str = "/tf";
-    /// Shapes.
     pub const SCENE: &str = "/scene";
-    /// Pixel counts.
     pub const CENSUS: &str = "/census";
-    /// Rows of the trace.
     pub const DECISION: &str = "/decision";
 }

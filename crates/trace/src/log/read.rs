@@ -12,21 +12,16 @@ use super::message::{Decision, EpisodeMessage};
 use super::messages::Messages;
 use super::topic;
 
-/// The content of a message.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
-    /// The start or end of an episode.
     Episode(EpisodeMessage),
     /// The frame of a step: the bytes of a `foxglove.CompressedImage`.
     Frame(Vec<u8>),
-    /// Visibility.
     Census(Value),
-    /// The row of a step.
     Decision(Box<Decision>),
     Other,
 }
 
-/// A message and its time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Timed {
     /// ns; the step's `frame_time`.
@@ -34,7 +29,6 @@ pub struct Timed {
     pub event: Event,
 }
 
-/// The messages of a log, one by one.
 pub struct LogReader(Messages<BufReader<File>>);
 
 impl LogReader {
@@ -93,7 +87,6 @@ pub(super) fn event(name: &str, data: &[u8]) -> serde_json::Result<Event> {
 
 /// The PNG in a `foxglove.CompressedImage`; `None` without one.
 pub fn png(image: &[u8]) -> Option<Vec<u8>> {
-    /// The part of the message that is needed.
     #[derive(Clone, PartialEq, prost::Message)]
     struct Image {
         #[prost(bytes = "vec", tag = "2")]

@@ -17,7 +17,6 @@ const CHUNK_HEADER: usize = 8 + 8 + 8 + 4 + 4 + 8;
 /// The content at an offset of the file.
 #[derive(Debug)]
 pub(super) enum Piece {
-    /// A record other than a chunk.
     Record(Record<'static>),
     /// A chunk: its position, and its opcode, length and bytes.
     Chunk(u64, Vec<u8>),
@@ -78,7 +77,6 @@ impl<R: Read + Seek> Records<R> {
         Ok((begin == MAGIC).then_some(records))
     }
 
-    /// The next piece; `None` at the end of the file.
     pub(super) fn next(&mut self) -> io::Result<Option<Piece>> {
         if let Some(damage) = self.damage.take() {
             return Ok(Some(Piece::Damage(damage)));

@@ -24,7 +24,6 @@ use crate::episode_hash;
 use exact::budget::{Budget, Limit, SETTING};
 use exact::input;
 
-/// The recovered and the lost parts of a log.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Recovered {
     /// The episodes that are whole, in the order of the log.
@@ -76,7 +75,6 @@ impl Losses {
     }
 }
 
-/// Recovers the readable part of the log at `path`.
 pub fn recover(path: &Path) -> Result<Recovered, LogError> {
     let file = input::open(path).map_err(LogError::io("open", path))?;
     recover_from(path, BufReader::new(file))
@@ -121,7 +119,6 @@ impl Rows {
     }
 }
 
-/// The episode that is being recovered.
 #[derive(Default)]
 struct Salvage {
     channels: BTreeMap<u16, String>,

@@ -25,7 +25,6 @@ use exact::replace::NewFile;
 /// A moving object, in the frame of the room.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Placed {
-    /// The name of its frame of reference.
     pub name: String,
     /// In m.
     pub position: [f64; 3],
@@ -46,7 +45,6 @@ pub struct Solid {
     pub rgba: [f32; 4],
 }
 
-/// A form and its sizes, m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Form {
     /// A box with these edges; an edge of 0 makes it a plane.
@@ -67,11 +65,9 @@ pub struct View<'a, C> {
     pub placed: &'a [Placed],
     /// Everything, as shapes.
     pub solids: &'a [Solid],
-    /// Visibility.
     pub census: &'a C,
 }
 
-/// The frame of reference of everything.
 const ROOM: &str = "room";
 
 /// The log of a running episode. It is a temporary file until the episode ends, and is removed if it does not.
@@ -128,7 +124,6 @@ impl EpisodeLog {
         self.json(self.channels.census, time, view.census)
     }
 
-    /// Adds the row of a step.
     pub fn decided(&mut self, time: u64, row: &Decision) -> Result<(), LogError> {
         let channel = self.channels.decision;
         self.json(channel, time, row)?;

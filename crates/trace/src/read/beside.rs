@@ -18,7 +18,6 @@ pub(crate) struct Beside {
 }
 
 impl TraceSet {
-    /// Adds the labels beside these traces as columns.
     pub fn with_labels(self, labels: Labels) -> Result<Self, TraceError> {
         let columns = labels.columns();
         if let Some(column) = columns.iter().find(|name| self.column(name).is_some()) {
@@ -42,7 +41,6 @@ impl TraceSet {
         self.label_columns().iter().any(|column| column == name)
     }
 
-    /// Appends these label columns to episodes.
     pub(crate) fn with_label_columns(
         &self,
         episodes: RecordBatch,

@@ -59,7 +59,6 @@ impl Rows {
     }
 }
 
-/// The ids of a row group.
 pub(crate) struct Ids {
     pub(crate) runs: Runs,
     pub(crate) begins: bool,
@@ -81,9 +80,7 @@ pub(crate) struct RowGroup<'a> {
     seen: Vec<Option<Seen>>,
 }
 
-/// The source of a column's values.
 enum Source {
-    /// The file does not have the column.
     Absent,
     /// The ids of the episodes, which are decoded already.
     Ahead,

@@ -14,14 +14,12 @@ use parquet_pages::{Column, Runs};
 /// Row groups with more rows are not decoded ahead, to save memory.
 const MOST_ROWS: usize = 4 << 20;
 
-/// The ids of the row groups of some files.
 pub(crate) struct Ahead<'a> {
     files: &'a [TraceFile],
     layout: &'a Layout,
     groups: Vec<Vec<OnceLock<Option<Group>>>>,
 }
 
-/// The known facts about a row group.
 struct Group {
     first: String,
     last: String,

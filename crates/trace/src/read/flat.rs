@@ -16,20 +16,17 @@ use crate::diagnostic::{Code, Finding};
 use parquet_pages::checksums::ChunkChecksums;
 use parquet_pages::{Expansion, FaultSlot, Library, Store};
 
-/// The number of rows decoded at a time.
 const BATCH_ROWS: usize = 1024;
 
 /// An open file that may be a table.
 pub type TableFile = File;
 
-/// All rows of a file, in batches.
 pub struct FlatRows {
     reader: ParquetRecordBatchReader,
     slot: FaultSlot,
 }
 
 impl FlatRows {
-    /// The rows of a file with this footer.
     pub fn new(file: TableFile, metadata: Arc<ParquetMetaData>) -> Result<Self, String> {
         let bytes = file.metadata().map_err(|error| error.to_string())?.len();
         let columns = metadata.file_metadata().schema_descr().columns();

@@ -52,7 +52,6 @@ impl TraceSet {
         if !self.files.is_empty() && self.files.iter().all(is_own) { Domain::Own } else { Domain::Mirror }
     }
 
-    /// Findings about files of another domain among traces of the mirror's.
     pub(crate) fn strangers(&self) -> Vec<Finding> {
         self.files.iter().flat_map(TraceFile::strangeness).collect()
     }
@@ -72,7 +71,6 @@ impl TraceSet {
         self.domain().has(known) && (is_free || self.column(known.name).is_none() || self.declares(known.name))
     }
 
-    /// A set of files opened one by one.
     pub fn of(files: Vec<TraceFile>) -> Self {
         Self { files, beside: Beside::default() }
     }
@@ -85,7 +83,6 @@ impl TraceSet {
         &self.beside
     }
 
-    /// The files, in their order.
     pub fn files(&self) -> &[TraceFile] {
         &self.files
     }
@@ -114,7 +111,6 @@ impl TraceSet {
         (present || seen.is_some()).then_some(ColumnUse { kind, missing_from, conflict })
     }
 
-    /// Returns true if a file has the schema's column of this name.
     pub fn declares(&self, name: &str) -> bool {
         self.files.iter().any(|file| file.declares(name))
     }

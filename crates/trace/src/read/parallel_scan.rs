@@ -32,7 +32,6 @@ pub(crate) struct Episodes {
     pub(crate) pieces: Vec<Piece>,
 }
 
-/// Consecutive rows of a row group.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Piece {
     pub(crate) at: usize,
@@ -66,7 +65,6 @@ impl Episodes {
 }
 
 pub(crate) enum Event<T> {
-    /// The result of the work on some whole episodes.
     Whole(T),
     /// The file cannot be decoded further; this is its last event.
     Fault(Box<Finding>),
@@ -82,7 +80,6 @@ enum Part<T> {
     Fault(Box<Finding>),
 }
 
-/// A row group to decode, and the destination of its parts.
 type Order<T> = (Job, SyncSender<Part<T>>);
 
 #[derive(Clone, Copy)]

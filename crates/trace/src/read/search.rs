@@ -12,21 +12,18 @@ use super::steps::Steps;
 use crate::error::TraceError;
 use crate::schema::{Domain, Kind};
 
-/// The searched columns of the mirror's domain.
 pub const SAID: [&str; 7] =
     ["reasoning", "reply", "view_description", "identification", "summary", "reply_fault", "reply_status"];
 
 /// The characters of an excerpt on either side of a match.
 const AROUND: usize = 40;
 
-/// A match in an episode.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Found {
     /// The first step with a match.
     pub t: i64,
     /// The column of that match.
     pub column: String,
-    /// Some text around them.
     pub excerpt: String,
     /// The number of steps with a match.
     pub steps: usize,

@@ -31,7 +31,6 @@ use parquet_pages::{Expansion, FaultSlot, Library, Store};
 const BATCH_ROWS: usize = 8 * 1024;
 /// With views, a batch holds no text, so that it can have more rows.
 const BATCH_ROWS_OF_VIEWS: usize = 64 * 1024;
-/// The column that identifies episodes.
 const EPISODE_ID: &str = "episode_id";
 
 /// The most batches that a thread decodes ahead of the reader.
@@ -54,7 +53,6 @@ struct Shape {
     episodes: Option<Arc<BTreeSet<String>>>,
 }
 
-/// A row group that is not read yet.
 struct Part {
     name: String,
     path: PathBuf,

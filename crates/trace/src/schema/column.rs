@@ -11,22 +11,18 @@ use crate::answers::{Answered, is_answer};
 use crate::diagnostic::Code;
 use crate::episode::Episode;
 
-/// One column of a trace.
 #[derive(Clone, Copy, Debug, Serialize)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a key of the domain's file")]
 pub struct Column {
-    /// The column's name in the file.
     pub name: &'static str,
     /// The stored type; readers accept any type of the same [`Kind`].
     #[serde(rename = "type")]
     pub stored: Stored,
     /// True if every trace has the column.
     pub required: bool,
-    /// True if a row may have no value.
     pub nullable: bool,
     /// True if the value is the same in all rows of an episode.
     pub constant: bool,
-    /// The unit of a number.
     pub unit: Option<&'static str>,
     pub doc: &'static str,
     /// The only values of the column, if they are fixed.
@@ -40,7 +36,6 @@ pub struct Column {
     /// The code of a finding about a text outside `values`.
     #[serde(skip)]
     pub rule: Option<Code>,
-    /// The colours in it, if any.
     #[serde(skip)]
     pub color: Option<ColorColumn>,
     /// True if it counts something, so that negative numbers are faults.
@@ -56,23 +51,15 @@ pub struct Column {
     pub(super) access: Access,
 }
 
-/// The stored type of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Stored {
-    /// True or false.
     Bool,
-    /// A signed integer of 8 bits.
     Int8,
-    /// A signed integer of 32 bits.
     Int32,
-    /// A signed integer of 64 bits.
     Int64,
-    /// A floating-point number of 32 bits.
     Float32,
-    /// A floating-point number of 64 bits.
     Float64,
-    /// Text in UTF-8.
     String,
 }
 
@@ -141,7 +128,6 @@ impl Column {
         quoted.or_else(|| text.bytes().all(|byte| byte.is_ascii_digit()).then_some(text))
     }
 
-    /// The column of an answer that an experiment declares.
     pub(crate) fn of_answer(name: &'static str, stored: Stored) -> Self {
         Self {
             name,

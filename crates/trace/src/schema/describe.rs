@@ -5,23 +5,17 @@ use serde::Serialize;
 use crate::diagnostic::{Code, Severity};
 use crate::schema::{COLUMNS, Column, METADATA, MetadataKey, SCHEMA_VERSION};
 
-/// Everything that writers and readers of traces must know.
 #[derive(Clone, Debug, Serialize)]
 pub struct SchemaDocument {
     pub title: &'static str,
-    /// The format, in a few sentences.
     pub description: &'static str,
-    /// The version of the schema.
     pub version: u32,
     /// The columns, required ones first.
     pub columns: &'static [Column],
-    /// The key-value metadata of the footer.
     pub metadata: &'static [MetadataKey],
-    /// The rules that `mirrorstats trace validate` checks.
     pub rules: Vec<Rule>,
 }
 
-/// One rule and the code of its findings.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Rule {
     pub code: Code,
@@ -32,7 +26,6 @@ pub struct Rule {
 }
 
 impl SchemaDocument {
-    /// The schema of this program.
     pub fn current() -> Self {
         let rule = |code: Code| Rule { code, severity: code.severity(), rule: code.explain(), help: code.help() };
         Self {

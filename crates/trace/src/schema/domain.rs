@@ -24,7 +24,6 @@ pub enum Domain {
     Own,
 }
 
-/// The name of the mirror's domain.
 pub(crate) const MIRROR: &str = "mirror";
 
 /// The columns of the schema, in storage order: required ones first.
@@ -135,17 +134,14 @@ impl Domain {
         if COLUMNS.iter().any(|known| is_lacking(known) || is_about(known)) { Self::Mirror } else { Self::Own }
     }
 
-    /// The domain of this name.
     pub fn named(name: &str) -> Self {
         if name == MIRROR { Self::Mirror } else { Self::Own }
     }
 
-    /// Returns true if the schema's column has a meaning here.
     pub fn has(self, column: &Column) -> bool {
         self == Self::Mirror || column.scope != Scope::Mirror
     }
 
-    /// The schema's column of this name, in this domain.
     pub fn column(self, name: &str) -> Option<&'static Column> {
         column(name).filter(|column| self.has(column))
     }
@@ -158,7 +154,6 @@ pub struct DeclaredColumn {
     pub kind: Kind,
     /// The only texts in it, except null; any if empty.
     pub values: Vec<String>,
-    /// True if it is constant in an episode.
     pub constant: bool,
 }
 

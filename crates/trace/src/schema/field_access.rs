@@ -54,7 +54,6 @@ const FIELDS: &[(&str, Access)] = fields! {
     ];
 };
 
-/// A type of field behind columns.
 trait Field {
     fn value(&self) -> Option<Value<'_>>;
 

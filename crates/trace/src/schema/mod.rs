@@ -26,15 +26,12 @@ pub fn of_some_tasks() -> impl Iterator<Item = &'static str> {
     COLUMNS.iter().filter(|column| column.is_of_some_tasks).map(|column| column.name)
 }
 
-/// The column of this name.
 pub fn column(name: &str) -> Option<&'static Column> {
     COLUMNS.iter().find(|column| column.name == name)
 }
 
-/// One entry of the key-value metadata in a trace's footer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct MetadataKey {
-    /// The key in the footer.
     pub key: &'static str,
     pub doc: &'static str,
 }
@@ -48,7 +45,6 @@ pub const RECORDING_KEY: &str = "mirrorstats.recording";
 /// Footer key: checksums of the columns and of the footer, JSON.
 pub(crate) const CHECKSUMS_KEY: &str = parquet_pages::checksums::KEY;
 
-/// The key-value metadata of a trace's footer.
 pub const METADATA: &[MetadataKey] = &[
     MetadataKey {
         key: VERSION_KEY,

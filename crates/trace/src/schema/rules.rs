@@ -8,7 +8,6 @@ use super::colors::palette::Palette;
 use super::{Column, Kind, Stored, Value};
 use crate::diagnostic::Code;
 
-/// A rule of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rule<'a> {
     pub code: Code,
@@ -26,13 +25,11 @@ pub enum Requirement<'a> {
     OneOf(&'static [&'static str]),
     /// One of the texts that the definitions declare.
     Among(&'a [String]),
-    /// A colour that the column allows.
     Color(ColorColumn, Option<&'a Palette>),
     /// An integer within these bounds of a type.
     Within(i64, i64, &'static str),
     /// A non-negative number.
     Count,
-    /// Constant in an episode.
     Constant,
     /// A known experiment; another rule requires a name.
     Experiment(&'a [String]),
@@ -46,7 +43,6 @@ pub enum Requirement<'a> {
 /// The limits on values beyond the schema.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Known<'a> {
-    /// The palette of the footer.
     pub palette: Option<&'a Palette>,
     /// The experiments that the definitions know; any if `None`.
     pub experiments: Option<&'a [String]>,

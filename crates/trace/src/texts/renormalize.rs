@@ -214,7 +214,6 @@ impl Old {
     }
 }
 
-/// Reads and converts the texts of a trace.
 struct Normalizer<'a> {
     name: &'a str,
     /// The budget for the flips of all traces.

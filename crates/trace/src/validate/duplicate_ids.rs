@@ -28,7 +28,6 @@ fn hash(id: &str) -> u64 {
     hasher.finish()
 }
 
-/// The hashes of the episode ids so far.
 #[derive(Default)]
 pub(crate) struct Prints(Vec<u64>);
 

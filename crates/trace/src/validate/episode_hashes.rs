@@ -12,7 +12,6 @@ use crate::read::parallel_scan::Episodes;
 use crate::read::projection::Layout;
 use crate::schema::Value;
 
-/// The remedy for changed rows.
 const HELP: &str =
     "the rows were changed: restore the file from its source; where the change is meant, leave the column out";
 

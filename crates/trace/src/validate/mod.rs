@@ -65,7 +65,6 @@ pub struct Rest<'a> {
 }
 
 impl Validation {
-    /// The number of findings with this severity.
     pub fn count(&self, severity: Severity) -> usize {
         self.findings.iter().filter(|finding| finding.severity == severity).count()
     }
@@ -97,7 +96,6 @@ pub struct Expected<'a> {
     pub experiments: Option<&'a [String]>,
     /// The domain; the mirror's definitions refuse traces of others.
     pub domain: Domain,
-    /// The columns that the definitions declare.
     pub declared: &'a [DeclaredColumn],
     /// True to skip the search for copied episodes.
     pub errors_alone: bool,
@@ -201,7 +199,6 @@ fn unreadable(file: &str, replies: &ReplyCounts) -> Option<Finding> {
     (bad > 0).then(finding)
 }
 
-/// Findings about some whole episodes.
 struct Checked {
     findings: Vec<Finding>,
     episodes: u64,

@@ -135,7 +135,6 @@ fn counts_from_one(t: &Held, offsets: &[usize]) -> bool {
     }
 }
 
-/// One column of some episodes, for checking a rule.
 struct Look<'a> {
     file: &'a str,
     episodes: &'a Episodes,

@@ -12,7 +12,6 @@ use crate::schema::domain::is_identity;
 use crate::schema::{COLUMNS, Column, Kind, Value};
 use crate::write::row_groups::data_type;
 
-/// The error for rows that are not an episode of the schema.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("column `{column}`: expected {expected}, found {found}")]
 pub struct NotAnEpisode {

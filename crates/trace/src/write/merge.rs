@@ -33,16 +33,13 @@ use exact::input;
 use exact::replace::{self, NewFile};
 use parquet_pages::{Expansion, FaultSlot, Library, Store, rows_of};
 
-/// The number of rows decoded at a time.
 const BATCH_ROWS: usize = 8 << 10;
 
 /// The rows of one episode, with its id and its order.
 #[derive(Clone, Debug)]
 pub struct EpisodeRows {
     pub episode_id: String,
-    /// The seed of its block of runs.
     pub seed: i64,
-    /// The run within its seed.
     pub run: i64,
     /// The repetition of its scene, from 1.
     pub repetition: i64,
@@ -63,7 +60,6 @@ impl EpisodeRows {
         decode_episode::identity(&self.rows)
     }
 
-    /// The columns besides identity and time, in file order.
     pub fn own_columns(&self) -> Vec<OwnColumn> {
         decode_episode::own_columns(&self.rows)
     }
@@ -83,7 +79,6 @@ impl EpisodeRows {
         if self.rows.column_by_name(EPISODE_HASH).is_some() { changed.hashed() } else { Ok(changed) }
     }
 
-    /// The hash in the rows, if any.
     pub fn stated_hash(&self) -> Option<String> {
         let hashes = cast(self.rows.column_by_name(EPISODE_HASH)?, &DataType::Utf8).ok()?;
         let first = hashes.as_string::<i32>().iter().next().flatten();
@@ -107,13 +102,11 @@ impl EpisodeRows {
         Ok(Self { rows: rows.map_err(|error| unreadable(&self.episode_id, error.into()))?, ..self.clone() })
     }
 
-    /// Returns true if there are no steps, which never happens for an episode from a file.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 }
 
-/// The episodes of one trace file, in its order.
 pub fn read(path: &Path) -> Result<Vec<EpisodeRows>, TraceError> {
     let name = path.display().to_string();
     let damaged = |finding: Finding| unreadable(&name, finding.to_string().into());

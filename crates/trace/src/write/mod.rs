@@ -28,12 +28,10 @@ use super::schema::{COLUMNS, Column, Value, of_some_tasks};
 use exact::escape::visible;
 use exact::replace::NewFile;
 
-/// The metadata of a new trace file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TraceMetadata {
     /// The recording as a JSON object (scene and prompt hashes, view size, ...); left out if `None`.
     pub recording: Option<serde_json::Value>,
-    /// The optional columns of the file.
     pub columns: OptionalColumns,
 }
 
@@ -135,7 +133,6 @@ impl OptionalColumns {
     }
 }
 
-/// A constructor for a new trace file.
 type Make<W> = fn(W, &SchemaRef, Option<&serde_json::Value>) -> parquet::errors::Result<RowGroups<W>>;
 
 /// Encodes episodes as a trace into any output.
@@ -177,7 +174,6 @@ impl<W: Write + Send> TraceEncoder<W> {
         self.file.end_episode(&mut self.gathered).map_err(failed)
     }
 
-    /// Writes the rest and the footer.
     pub fn finish(self) -> Result<W, TraceError> {
         self.file.finish(Some(self.gathered)).map_err(failed)
     }
@@ -295,7 +291,6 @@ impl TraceWriter {
         Ok(Self { encoder, path: path.to_owned() })
     }
 
-    /// Adds an episode; t is 1, 2, ... in the order of its steps.
     pub fn write(&mut self, episode: &Episode) -> Result<(), TraceError> {
         self.encoder.write(episode).map_err(|error| error.writing(&self.path))
     }

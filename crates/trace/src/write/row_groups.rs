@@ -24,14 +24,12 @@ const ROW_GROUP_ROWS: usize = 128 * 1024;
 /// Rows that are gathered before they are encoded.
 const GATHERED_ROWS: usize = 8 * 1024;
 
-/// A file that is being written.
 pub(crate) struct RowGroups<W: Write + Send> {
     parquet: ArrowWriter<Held<W>>,
     has_checksums: bool,
     rows: usize,
 }
 
-/// Rows that are not written yet.
 pub(crate) struct Gathered {
     pub(crate) layout: SchemaRef,
     pub(crate) columns: Vec<Values>,
@@ -83,7 +81,6 @@ impl<W: Write + Send> RowGroups<W> {
         Ok(())
     }
 
-    /// Writes the rest and the footer.
     pub fn finish(mut self, gathered: Option<Gathered>) -> Result<W> {
         if let Some(mut gathered) = gathered.filter(|gathered| gathered.rows > 0) {
             self.parquet.write(&gathered.take()?)?;

@@ -39,7 +39,6 @@ pub struct LabelLine {
 }
 
 impl LabelLine {
-    /// Returns an error if a value is invalid.
     pub fn check(&self) -> Result<(), InvalidLabel> {
         check_coder(&self.coder)?;
         let is_empty = self.episode_id.is_empty().then(|| InvalidLabel::new("the id of an episode", "no text"));
@@ -55,7 +54,6 @@ impl LabelLine {
     }
 }
 
-/// Returns an error if a text cannot be the name of a coder.
 pub fn check_coder(name: &str) -> Result<(), InvalidLabel> {
     let length = name.chars().count();
     if length == 0 || length > LONGEST_CODER || name.trim() != name || name.chars().any(char::is_control) {
@@ -72,13 +70,10 @@ fn is_word(text: &str) -> bool {
         && text.bytes().all(|byte| is_letter(byte) || byte.is_ascii_digit() || byte == b'_')
 }
 
-/// The error for an invalid value of a line.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("expected {expected}, found {found}")]
 pub struct InvalidLabel {
-    /// The rule.
     expected: &'static str,
-    /// The value.
     found: String,
 }
 
@@ -88,43 +83,21 @@ impl InvalidLabel {
     }
 }
 
-/// An error of reading or writing a list of labels.
 #[derive(Debug, thiserror::Error)]
 pub enum LabelsError {
-    /// The list cannot be read.
     #[error("cannot read {}: {source}", .path.display())]
-    Read {
-        /// The list.
-        path: PathBuf,
-        /// The error of the system.
-        source: io::Error,
-    },
-    /// The list cannot be written.
+    Read { path: PathBuf, source: io::Error },
     #[error("cannot write {}: {source}\n  help: is the folder writable, and the disk not full?", .path.display())]
-    Write {
-        /// The list.
-        path: PathBuf,
-        /// The error of the system.
-        source: io::Error,
-    },
-    /// A line is not a label.
+    Write { path: PathBuf, source: io::Error },
     #[error("{}, line {line}: {problem}\n  help: correct or remove the line; docs/how-to/view.md has examples", .path.display())]
     Line {
         /// The list.
         path: PathBuf,
-        /// The line number, from 1.
         line: usize,
-        /// The rule and the value found.
         problem: String,
     },
-    /// The list exceeds a limit.
     #[error("{}: {source}", .path.display())]
-    Budget {
-        /// The list.
-        path: PathBuf,
-        /// The limit.
-        source: Exceeded,
-    },
+    Budget { path: PathBuf, source: Exceeded },
 }
 
 impl LabelsError {

@@ -39,7 +39,6 @@ pub fn list_beside(trace: &Path) -> PathBuf {
     recording.unwrap_or(folder).join("labels.jsonl")
 }
 
-/// The lists beside some traces, each once.
 pub fn lists_beside(traces: &[Input]) -> BTreeSet<PathBuf> {
     traces.iter().map(|input| list_beside(&input.path)).collect()
 }
@@ -246,7 +245,6 @@ impl Labels {
         Self { marks: kept, notes, ..self }
     }
 
-    /// Returns true if there are no labels or notes.
     pub fn is_empty(&self) -> bool {
         self.marks.is_empty()
     }
@@ -257,12 +255,10 @@ impl Labels {
         used.into_iter().map(|word| self.words.get(word)).collect()
     }
 
-    /// The columns of the labels in use.
     pub fn columns(&self) -> Vec<String> {
         self.words().into_iter().map(|word| format!("{PREFIX}{word}")).collect()
     }
 
-    /// The ids of the coded episodes.
     pub fn episodes(&self) -> impl Iterator<Item = &str> {
         let mut last = None;
         let numbers = self.marks.iter().map(|entry| entry.key.episode);

@@ -67,14 +67,12 @@ fn chunked(archive: &mut EvalArchive, folder: &str) -> Result<Map<String, Value>
     Ok(sample)
 }
 
-/// Values shared by the samples of a log.
 pub(super) struct Log {
     eval: Value,
     /// The number of each sample in the data set, from 1, by its id as JSON.
     numbers: HashMap<String, usize>,
 }
 
-/// The error for a sample that gives no rows.
 pub(super) enum SampleFault {
     Shape(&'static str),
     Import(ImportError),

@@ -5,7 +5,6 @@ use std::io::{self, BufReader, Read};
 use memchr::memmem;
 use serde::de::DeserializeOwned;
 
-/// Parses a text, with null for `NaN` and infinities.
 pub(super) fn from_slice<T: DeserializeOwned>(bytes: &[u8]) -> serde_json::Result<T> {
     match serde_json::from_slice(bytes) {
         Err(_) if [&b"NaN"[..], b"Infinity"].iter().any(|word| memmem::find(bytes, word).is_some()) => {

@@ -24,7 +24,6 @@ use super::mapping::{Mapping, Row};
 use exact::input;
 use json::WithoutNan;
 
-/// The format of a file of steps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
     /// One object per line.

@@ -18,7 +18,6 @@ use parquet_pages::{Column, Runs};
 /// Writers may cut texts from this length on.
 const CUT: usize = 60;
 
-/// The usable statistics of all columns of all row groups.
 #[derive(Debug, Default)]
 pub(crate) struct Declared(Vec<Vec<Option<Chunk>>>);
 
@@ -213,7 +212,6 @@ impl Seen {
         self.ends(values, (0..values.len()).filter(|at| used.get(*at).is_some_and(|rows| *rows > 0)));
     }
 
-    /// Updates the bounds with some values.
     fn ends(&mut self, values: &ArrayRef, rows: impl Iterator<Item = usize>) {
         let rows = rows.filter(|row| values.is_valid(*row));
         match values.data_type() {

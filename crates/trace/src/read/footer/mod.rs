@@ -24,7 +24,6 @@ const ENCRYPTED_MAGIC: [u8; 4] = *b"PARE";
 /// A magic number at each end, and the footer's length.
 const SMALLEST: u64 = 12;
 
-/// The parts of a footer to decode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Extent {
     Pages,

@@ -33,7 +33,6 @@ use exact::suggest::nearest;
 use parquet_pages::checksums::{Checksums, ChunkChecksums};
 use parquet_pages::{Expansion, Store, rows_of, with_texts_as_keys};
 
-/// A trace file with a valid footer.
 #[derive(Debug)]
 pub struct TraceFile {
     input: Input,
@@ -60,7 +59,6 @@ pub(crate) struct Readable {
     pub(crate) chunks: ChunkChecksums,
 }
 
-/// A column of one file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FileColumn {
     pub name: String,
@@ -69,7 +67,6 @@ pub struct FileColumn {
 }
 
 impl TraceFile {
-    /// Reads and checks the footer of one file.
     pub fn open(input: &Input) -> Result<Self, Vec<Finding>> {
         let opened = footer(input, Extent::Pages).map_err(|finding| vec![*finding])?;
         let Footer { bytes, metadata, checksums, .. } = opened;
@@ -111,12 +108,10 @@ impl TraceFile {
         })
     }
 
-    /// The name in messages and outputs.
     pub fn name(&self) -> &str {
         &self.input.name
     }
 
-    /// Opens the file for reading.
     pub fn reader(&self) -> io::Result<File> {
         input::open(&self.input.path)
     }
@@ -142,7 +137,6 @@ impl TraceFile {
         self.bytes
     }
 
-    /// The domain of its episodes.
     pub const fn domain(&self) -> Domain {
         self.domain
     }
@@ -163,12 +157,10 @@ impl TraceFile {
         declared.iter().filter_map(fault).collect()
     }
 
-    /// The columns in the file's order.
     pub fn columns(&self) -> &[FileColumn] {
         &self.columns
     }
 
-    /// The column of this name.
     pub fn column(&self, name: &str) -> Option<&FileColumn> {
         self.columns.iter().find(|column| column.name == name)
     }
@@ -185,15 +177,10 @@ impl TraceFile {
         self.rows.iter().map(|rows| *rows as u64).sum()
     }
 
-    /// The number of row groups.
     pub fn row_groups(&self) -> usize {
         self.rows.len()
     }
 
-    /// The number of rows in a row group.
-    ///
-    /// # Panics
-    /// For a row group that the file lacks.
     pub(crate) fn row_group_rows(&self, row_group: usize) -> usize {
         self.rows[row_group]
     }
@@ -210,7 +197,6 @@ impl TraceFile {
         &self.pairs
     }
 
-    /// The palette in the footer, if any.
     pub fn palette(&self) -> Option<&Palette> {
         self.colors.palette.as_ref()
     }
@@ -229,7 +215,6 @@ impl TraceFile {
         footers::recording(self.metadata_value(schema::RECORDING_KEY))
     }
 
-    /// A value of the footer's key-value metadata.
     pub fn metadata_value(&self, key: &str) -> Option<&str> {
         value(&self.pairs, key)
     }

@@ -18,7 +18,6 @@ use self::palette::Palette;
 use self::spelling::{WORDS, did_you_mean, is_well_spelled, meant_by, normal, spelling_key, study_color};
 use crate::schema;
 
-/// A column of colours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ColorColumn {
     pub name: &'static str,
@@ -32,7 +31,6 @@ pub fn columns() -> impl Iterator<Item = ColorColumn> {
     schema::COLUMNS.iter().filter_map(|column| column.color)
 }
 
-/// The column of this name, if it is one of colours.
 pub fn column(name: &str) -> Option<ColorColumn> {
     schema::column(name)?.color
 }

@@ -13,7 +13,6 @@ use exact::escape::visible;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Palette(Vec<String>);
 
-/// An error of a palette.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NoPalette {
     #[error("expected at least one colour, found none")]
@@ -55,12 +54,10 @@ impl Palette {
         Self(names)
     }
 
-    /// The ten colours of the study.
     pub fn of_study() -> Self {
         Self(Color::ALL.map(|color| color.name().to_owned()).to_vec())
     }
 
-    /// The palette of these names, in this order.
     pub fn of_names<'a>(names: impl IntoIterator<Item = &'a str>) -> Result<Self, NoPalette> {
         let mut palette: Vec<String> = Vec::new();
         for name in names {

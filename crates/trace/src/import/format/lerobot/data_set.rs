@@ -16,7 +16,6 @@ const INFO: &str = "meta/info.json";
 /// The features of a robot with many cameras take tens of kilobytes.
 const LARGEST_INFO: Limit = Limit::new("bytes of meta/info.json", 16 << 20);
 
-/// Returns true if a folder is a data set.
 pub(in crate::import) fn is_data_set(folder: &Path) -> bool {
     folder.join(INFO).is_file()
 }
@@ -108,7 +107,6 @@ fn frames_of_episodes(folder: &Path, rows: &mut Rows<'_>) -> Result<BTreeMap<i64
     Ok(lengths)
 }
 
-/// The Parquet files below a folder of the data set, by name.
 fn below(folder: &Path, name: &str) -> Result<Vec<PathBuf>, ImportError> {
     let at = folder.join(name);
     let mut files = if at.is_dir() { traces_at(&at)? } else { Vec::new() };

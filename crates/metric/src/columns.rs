@@ -19,7 +19,6 @@ pub enum Type {
 }
 
 impl Type {
-    /// Its name in messages.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Bool => "true or false",
@@ -34,16 +33,12 @@ impl Type {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Level {
     Constant,
-    /// One value per episode.
     Episode,
-    /// One value per step.
     Step,
 }
 
-/// A column from the view of expressions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Column {
-    /// The type of its values.
     pub ty: Type,
     /// [`Level::Episode`] if the schema declares it constant in an episode.
     pub level: Level,
@@ -65,7 +60,6 @@ pub struct Columns {
 /// The value of a schema column if a trace or row has none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fallback {
-    /// An expression over columns that every trace has.
     pub expression: &'static str,
     /// True if some trace has the column.
     pub is_read: bool,
@@ -105,12 +99,10 @@ impl Columns {
         self.values.get(name).map(Vec::as_slice)
     }
 
-    /// The remedy for an unknown name.
     pub fn help(&self) -> &'static str {
         self.stranger.unwrap_or("a column of your own is declared with [column.NAME] and `type`")
     }
 
-    /// The column of this name.
     pub fn get(&self, name: &str) -> Option<Column> {
         self.schema.get(name).or_else(|| self.own.get(name)).copied()
     }

@@ -17,16 +17,15 @@ use toml_spec::{Fault, Faults, Source, Written};
 
 #[derive(Clone, Debug)]
 pub struct Definitions {
-    /// The metadata for tables, figures and files of scores.
     pub catalog: Catalog,
     pub plan: Plan,
     document: Document,
 }
 
 impl Definitions {
-    /// Reads and checks a built-in file by name (`paper`, `extended`, `battery`, `evidence`, `reach`, `reach-fallback`), or any other by path.
-    ///
-    /// `columns` are those of the traces; the columns that the file declares are added.
+    /// Reads and checks a built-in file by name (`paper`, `extended`, `battery`, `evidence`, `reach`,
+    /// `reach-fallback`), or any other by path. `columns` are those of the traces; the columns that the file declares
+    /// are added.
     pub fn load(name_or_path: impl AsRef<Path>, columns: &Columns) -> Result<Self, FileError> {
         Ok(Self::check(file::read(name_or_path.as_ref())?, columns, None)?)
     }
@@ -74,7 +73,6 @@ impl Definitions {
         Ok(Self::check(document, columns, None)?)
     }
 
-    /// Keeps only the metrics of these names.
     pub fn select(&mut self, names: &[String]) -> Result<(), UnknownMetric> {
         if let Some(name) = names.iter().find(|name| !self.catalog.metric.contains_key(*name)) {
             let known: Vec<String> = self.catalog.metric.keys().cloned().collect();
@@ -132,7 +130,6 @@ impl Definitions {
         Some(Self::check(whole, columns, None))
     }
 
-    /// The columns that the definitions declare.
     pub fn declared_columns(&self) -> impl Iterator<Item = (&str, &ColumnEntry)> {
         self.document.columns.iter().map(|(name, entry)| (name.as_str(), entry))
     }
@@ -198,12 +195,10 @@ const fn per(level: Level) -> &'static str {
     }
 }
 
-/// The error for a name that is not a metric of the definitions.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("unknown metric `{name}`: {}", advice(.near.as_deref(), .known))]
 pub struct UnknownMetric {
     pub name: String,
-    /// The metric with the most similar name.
     pub near: Option<String>,
     pub known: Vec<String>,
 }
@@ -236,7 +231,6 @@ fn declare(document: &Document, columns: &mut Columns) -> Vec<Fault> {
     faults
 }
 
-/// Checks that chance levels belong to metrics.
 fn experiment_faults(document: &Document) -> Vec<Fault> {
     let mut faults = Vec::new();
     for (own, entry) in &document.experiments {
@@ -256,7 +250,6 @@ fn experiment_faults(document: &Document) -> Vec<Fault> {
     faults
 }
 
-/// Checks that chance levels of rates are probabilities.
 fn level_faults(document: &Document, binding: &Binding) -> Vec<Fault> {
     let metrics = document.metrics.iter().map(|(name, entry)| (name, entry.chance, &entry.place));
     let experiments = document.experiments.values().flat_map(|entry| {

@@ -62,17 +62,13 @@ const MIRROR: &str = "mirror";
 /// A definition file and its includes, merged in order: later entries replace earlier ones.
 #[derive(Clone, Debug, Default)]
 pub struct Document {
-    /// The file's name, without folder and extension.
     pub name: String,
     /// SHA-256 of the file's text; absent for built-in texts and texts without a file.
     pub file_hash: Option<String>,
-    /// The built-in definitions that it is or includes, by name.
     pub built_on: Vec<&'static str>,
-    /// True if unlisted experiments are accepted.
     pub open: bool,
     /// The subject of the traces, any name; absent for the mirror.
     pub domain: Option<String>,
-    /// Columns that the user declares.
     pub columns: IndexMap<String, ColumnEntry>,
     pub lets: IndexMap<String, (Written, Place)>,
     pub metrics: IndexMap<String, MetricEntry>,
@@ -97,7 +93,6 @@ pub struct ColumnEntry {
 #[derive(Clone, Debug)]
 pub struct MetricEntry {
     pub place: Place,
-    /// The table as written.
     pub said: MetricShape,
     pub value: Written,
     pub when: Option<Written>,
@@ -112,15 +107,12 @@ pub struct ExperimentEntry {
     pub title: String,
     /// `order`; the position in the file if absent.
     pub order: Option<i64>,
-    /// `chance`, by metric.
     pub chance: IndexMap<String, (Option<Ratio>, Place)>,
-    /// `reference`, by metric.
     pub reference: IndexMap<String, (Vec<Ratio>, Place)>,
     /// `control`, with the places of its experiment and of its metrics.
     pub control: Option<(Control, Place, Vec<Place>)>,
 }
 
-/// The error if a definition file could not be read.
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
     #[error("cannot read the definition file `{path}`; {}", KIND.did_you_mean(path))]
@@ -129,12 +121,10 @@ pub enum FileError {
     Faults(#[from] Faults),
 }
 
-/// The names of the built-in definition files.
 pub fn built_in_names() -> Vec<&'static str> {
     KIND.built_in_names()
 }
 
-/// The text of a built-in definition file.
 pub fn built_in(name: &str) -> Option<&'static str> {
     KIND.built_in_text(name)
 }
@@ -160,7 +150,6 @@ fn document(name: String, file: FileText) -> Result<Document, FileError> {
 }
 
 impl Document {
-    /// The fault for a name that is not a metric of the document.
     pub fn unknown_metric(&self, name: &str, place: &Place) -> Option<Fault> {
         if self.metrics.contains_key(name) {
             return None;
@@ -170,7 +159,6 @@ impl Document {
         Some(fault.help_if(near.map(|near| format!("did you mean `{near}`?"))))
     }
 
-    /// The fault for a control whose experiment is unknown or the control itself.
     pub(super) fn not_controlled(&self, own: &str, name: &str, place: &Place) -> Option<Fault> {
         if name == own {
             return Some(Fault::new(place.clone(), format!("`{own}` cannot be its own control")));
@@ -178,7 +166,6 @@ impl Document {
         self.unknown_experiment(name, place)
     }
 
-    /// The fault for a name that is not an experiment of these definitions.
     pub(super) fn unknown_experiment(&self, name: &str, place: &Place) -> Option<Fault> {
         if self.experiments.contains_key(name) {
             return None;

@@ -1,6 +1,5 @@
 //! The functions of the calculus: names, arities, documentation.
 
-/// A function that expressions can call.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Function {
     First,
@@ -20,7 +19,6 @@ pub(super) enum Function {
     RegexpLike,
 }
 
-/// One function's entry in the documentation.
 pub(super) struct Entry {
     pub(super) function: Function,
     pub(super) name: &'static str,
@@ -30,7 +28,6 @@ pub(super) struct Entry {
 
 const MANY: usize = usize::MAX;
 
-/// Every function, in the order of the documentation.
 pub(super) const FUNCTIONS: [Entry; 15] = [
     entry(Function::First, "first", "first(p): the t of the first step where p holds, or null", (1, 1)),
     entry(Function::Last, "last", "last(p): the t of the last step where p holds, or null", (1, 1)),

@@ -36,10 +36,6 @@ pub struct SparkJob {
 }
 
 impl SparkJob {
-    /// For local traces.
-    ///
-    /// # Errors
-    /// Files of scores; faults in the definitions or in the columns to group by.
     pub fn of_study(study: &Study, cluster: Cluster) -> Result<Self, StudyError> {
         let traces = study.source.traces()?;
         let mut labels = study.question.labels_over(traces);
@@ -68,20 +64,15 @@ impl SparkJob {
         Ok(Self { sources, definitions, labels, cluster, read })
     }
 
-    /// The local files that are read.
     pub fn read(&self) -> &[PathBuf] {
         &self.read
     }
 
-    /// Scores on Spark and fetches the table.
     pub fn score(&self) -> Result<EpisodeTable, StudyError> {
         Ok(spark::score(self.job(), &self.cluster)?)
     }
 
     /// Scores on Spark, which writes a folder of Parquet.
-    ///
-    /// # Errors
-    /// Errors of Spark, a missing Spark, faults of the traces; a folder that already exists.
     pub fn write(&self, folder: &str) -> Result<Written, StudyError> {
         Ok(spark::write(self.job(), &self.cluster, folder)?)
     }
@@ -92,9 +83,6 @@ impl SparkJob {
 }
 
 /// Returns true if all arguments are URIs, false if none is.
-///
-/// # Errors
-/// Local files and URIs together.
 pub fn are_uris(arguments: &[OsString]) -> Result<bool, StudyError> {
     match arguments.iter().filter(|argument| argument.to_str().is_some_and(is_uri)).count() {
         0 => Ok(false),

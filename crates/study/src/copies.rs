@@ -8,10 +8,8 @@ use exact::escape::visible;
 use score::table::EpisodeTable;
 use trace::copies::copies;
 
-/// The most copies that a sentence names.
 const NAMED: usize = 3;
 
-/// The text about copies: a phrase beside an answer, and a sentence.
 #[derive(Clone, Debug)]
 pub(super) struct Copies {
     pub phrase: String,

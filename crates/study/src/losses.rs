@@ -20,23 +20,18 @@ use trace::inputs::Input;
 use trace::lost::{self, LostEpisode};
 use trace::schema::{self, Column};
 
-/// The value of the label of lost episodes.
 const YES: &str = "true";
 
-/// The treatment of lost episodes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LostAs {
-    /// Excluded from every denominator.
     #[default]
     Nothing,
     /// Failures, in the denominator of every rate that is defined for all episodes.
     Failure,
 }
 
-/// The episodes that cells count, and those that they exclude.
 #[derive(Debug)]
 pub(super) struct Counted {
-    /// The results of the episodes that count.
     pub results: Results,
     /// All episodes, if some are excluded or added.
     pub all: Option<EpisodeTable>,

@@ -11,7 +11,6 @@ use score::table::{CONDITION, EpisodeTable};
 const MOST_COMPARISONS: Limit =
     Limit::new("comparisons of two models under a metric; leave models or metrics out", 400_000);
 
-/// Checks that the comparisons in a report of these episodes are within the budget.
 pub(super) fn check_comparisons(episodes: &EpisodeTable) -> Result<(), StudyError> {
     let conditions = episodes.label(CONDITION);
     let mut subjects = BTreeMap::<_, BTreeSet<_>>::new();

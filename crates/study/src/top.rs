@@ -12,7 +12,6 @@ use score::table::{EpisodeTable, MetricColumn};
 pub struct ModelMean<'t> {
     pub model: &'t str,
     pub mean: f64,
-    /// The mean in each experiment where the metric is defined.
     pub experiments: BTreeMap<&'t str, f64>,
 }
 

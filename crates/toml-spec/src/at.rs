@@ -26,7 +26,6 @@ pub fn parse(source: &Arc<Source>) -> (DeValue<'_>, Vec<Fault>) {
     (DeValue::Table(table.into_inner()), faults)
 }
 
-/// A value of a TOML text with its name and location.
 #[derive(Clone, Debug)]
 pub struct At<'a> {
     source: &'a Arc<Source>,
@@ -69,7 +68,6 @@ impl<'a> At<'a> {
         })
     }
 
-    /// The value of a key, if it is present.
     pub fn get(&self, key: &str) -> Option<Self> {
         self.entries().find(|(name, _)| *name == key).map(|(_, value)| value)
     }
@@ -96,7 +94,6 @@ impl<'a> At<'a> {
         }
     }
 
-    /// Returns true for a text.
     pub fn is_text(&self) -> bool {
         self.value.is_str()
     }

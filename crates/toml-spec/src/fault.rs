@@ -13,7 +13,6 @@ use serde::Serialize;
 
 use exact::escape::visible;
 
-/// The most faults that are reported.
 pub const MOST_FAULTS: usize = 100;
 
 /// The text that faults point into: a definition file, or an expression typed on the command line.
@@ -24,18 +23,15 @@ pub struct Source {
     pub text: String,
 }
 
-/// Some bytes of a source.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Place {
     pub source: Arc<Source>,
-    /// The range of bytes.
     pub span: Range<usize>,
 }
 
-/// One problem and its location.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fault {
-    /// The problem, lowercase, one line.
+    /// Lowercase, one line.
     pub message: String,
     pub place: Place,
     /// The label under the span; may be empty.
@@ -44,19 +40,16 @@ pub struct Fault {
 }
 
 impl Fault {
-    /// A fault at a place.
     pub fn new(place: Place, message: impl Into<String>) -> Self {
         Self { message: message.into(), place, label: String::new(), help: None }
     }
 
-    /// Adds a label under the span.
     #[must_use]
     pub fn label(mut self, label: impl Into<String>) -> Self {
         self.label = label.into();
         self
     }
 
-    /// Adds a remedy.
     #[must_use]
     pub fn help(mut self, help: impl Into<String>) -> Self {
         self.help = Some(help.into());
@@ -97,7 +90,6 @@ fn within(text: &str, span: &Range<usize>) -> Range<usize> {
     start..end
 }
 
-/// All problems of some definitions, in the order of the sources.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Faults(pub Vec<Fault>);
 
@@ -121,7 +113,6 @@ pub struct FaultRecord {
 }
 
 impl Faults {
-    /// The faults with their lines underlined, optionally in colour.
     pub fn render(&self, colored: bool) -> String {
         let renderer = if colored { Renderer::styled() } else { Renderer::plain() };
         let mut texts: Vec<String> = self.0.iter().map(|fault| fault.render(&renderer)).collect();
@@ -132,12 +123,10 @@ impl Faults {
         texts.join("\n\n")
     }
 
-    /// The faults as records for programs.
     pub fn records(&self) -> Vec<FaultRecord> {
         self.0.iter().map(FaultRecord::of).collect()
     }
 
-    /// Sorts the faults by place and removes duplicates.
     #[must_use]
     pub fn in_order(mut self) -> Self {
         self.0.sort_by(|a, b| {

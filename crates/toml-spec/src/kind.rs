@@ -17,19 +17,15 @@ pub struct FileKind {
     pub name: &'static str,
     /// `styles`
     pub names: &'static str,
-    /// The command that checks a file.
     pub check: &'static str,
-    /// Names and texts of the built-in files.
     pub built_in: &'static [(&'static str, &'static str)],
     pub largest: Limit,
-    /// Keys of a file, tables included.
     pub most_keys: Limit,
     /// Includes of a file and of its included files. Each include is followed again, so a chain of files with two
     /// includes each would take forever.
     pub most_includes: Limit,
 }
 
-/// A text of some kind and its location.
 pub struct FileText {
     pub source: Source,
     folder: Option<PathBuf>,
@@ -37,11 +33,8 @@ pub struct FileText {
     pub path: Option<PathBuf>,
 }
 
-/// One file of a reading, after its own includes.
 pub struct Part {
-    /// The name of the built-in file with this text.
     pub built_in: Option<&'static str>,
-    /// Returns true for the file that includes all others.
     pub is_outermost: bool,
 }
 

@@ -11,7 +11,6 @@ use crate::fault::{Place, Source};
 /// An expression's text and the source location of each of its bytes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Written {
-    /// The text of the expression.
     pub text: String,
     source: Arc<Source>,
     /// `starts[i]` is the source byte of byte i of the text; one more entry marks the end.
@@ -42,7 +41,6 @@ impl Written {
         Place { source: self.source.clone(), span: start..end.max(start) }
     }
 
-    /// The location of the whole text.
     pub fn everywhere(&self) -> Place {
         self.place(0..self.text.len())
     }

@@ -15,14 +15,12 @@ use crate::at::{At, parse};
 use crate::fault::{Fault, Faults, Source};
 use exact::suggest::nearest;
 
-/// The shape of a kind of files.
 pub struct Shape {
     schema: Json,
     is_overlay: bool,
 }
 
 impl Shape {
-    /// The shape of a type.
     pub fn of<T: JsonSchema>() -> Self {
         Self { schema: schemars::schema_for!(T).to_value(), is_overlay: false }
     }

@@ -21,10 +21,8 @@ use super::statement::{Asked, Checked, Table};
 use toml_spec::Faults;
 use trace::catch_panic::contained_on_all_threads;
 
-/// The most rows of one batch.
 const BATCH: NonZeroUsize = NonZeroUsize::new(1 << 17).expect("not zero");
 
-/// An error of a query.
 #[derive(Debug, thiserror::Error)]
 pub enum QueryError {
     #[error(transparent)]
@@ -33,20 +31,16 @@ pub enum QueryError {
     Polars(#[from] PolarsError),
 }
 
-/// The formats that are written in a stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
     /// Comma-separated, with a header; null is empty, an empty text is `""`.
     Csv,
-    /// One JSON object per line.
     JsonLines,
     Parquet,
 }
 
-/// The beginning and the end of an answer, for people.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Excerpt {
-    /// Names and types of the columns.
     pub columns: Vec<(String, String)>,
     /// The first rows, `None` for null.
     pub head: Vec<Vec<Option<String>>>,
@@ -55,7 +49,6 @@ pub struct Excerpt {
     pub rows: usize,
 }
 
-/// The lazy answer to a checked query.
 pub fn plan(query: &Checked, tables: Vec<(Table, LazyFrame)>) -> Result<LazyFrame, QueryError> {
     let mut context = SQLContext::new();
     let (mut columns, mut schemas) = (Vec::new(), Vec::new());

@@ -14,17 +14,13 @@ use trace::open::{TraceFile, TraceSet};
 use trace::schema::{Kind, Stored};
 use trace::verify::verify_pages;
 
-/// A column of the frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FrameColumn {
-    /// Its name in the files.
     pub name: String,
-    /// The type that values of every file are cast to.
     pub stored: Stored,
 }
 
 impl FrameColumn {
-    /// A column of the type that the native engine uses.
     pub fn wide(name: &str, kind: Kind) -> Option<Self> {
         let stored = match kind {
             Kind::Bool => Stored::Bool,

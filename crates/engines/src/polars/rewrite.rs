@@ -12,7 +12,6 @@ use sqlparser::ast::{
 use sqlparser::dialect::GenericDialect;
 use sqlparser::parser::Parser;
 
-/// Aggregate functions.
 const AGGREGATES: [&str; 24] = [
     "any_value",
     "array_agg",
@@ -40,7 +39,6 @@ const AGGREGATES: [&str; 24] = [
     "variance",
 ];
 
-/// The most selects that grouping sets may become.
 const MOST_SETS: usize = 64;
 
 fn aggregate(expr: &Expr) -> bool {
@@ -168,7 +166,6 @@ fn order_by_names(query: &mut Query) {
     }
 }
 
-/// DuckDB's name for an unnamed column.
 fn column_name(expr: &Expr) -> String {
     match expr {
         Expr::Nested(inner) => column_name(inner),
@@ -289,7 +286,6 @@ pub(super) fn substitute<E>(
     }
 }
 
-/// The form of a subquery.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Asked {
     /// The value of its only row.

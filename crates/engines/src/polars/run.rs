@@ -65,9 +65,8 @@ pub(super) fn collect(frame: LazyFrame) -> Result<DataFrame, PolarsError> {
     Ok(contained_on_all_threads(run).map_err(PolarsError::panicked)??.unwrap_single())
 }
 
-/// The cause in a Polars message: its first paragraph, without the plan that may follow.
-///
-/// For a panic on a Polars thread: the panic's own message.
+/// The cause in a Polars message: its first paragraph, without the plan that may follow. For a panic on a Polars
+/// thread: the panic's own message.
 fn cause(message: &str) -> String {
     if message.contains("JoinError::Panic") {
         let mut parts = message.split(['"', '\\']).filter(|part| part.starts_with(char::is_alphabetic));

@@ -19,10 +19,8 @@ use score::table::{EpisodeKey, EpisodeTable, Header, MetricColumn};
 use trace::open::{TraceFile, TraceSet};
 use trace::scan::EPISODE_COLUMNS;
 
-/// The table that [`score::score_traces::score`] gives, computed by Polars.
-///
-/// The native reader checks the traces first, so that damaged traces give the same errors. `threads` applies to that
-/// check alone: Polars has its own.
+/// The table that [`score::score_traces::score`] gives, computed by Polars. The native reader checks the traces first,
+/// so that damaged traces give the same errors. `threads` applies to that check alone: Polars has its own.
 pub fn score(
     traces: &TraceSet,
     definitions: &Definitions,

@@ -9,7 +9,6 @@ use polars::prelude::LazyFrame;
 use super::answer::{Format, write};
 use super::run::PolarsError;
 
-/// An error while writing rows to a file.
 #[derive(Debug, thiserror::Error)]
 pub enum WriteError {
     #[error(transparent)]
@@ -18,7 +17,6 @@ pub enum WriteError {
     Polars(PolarsError),
 }
 
-/// Writes the rows of a query to a file.
 pub fn write_file(frame: LazyFrame, format: Format, file: File) -> Result<(), WriteError> {
     let out = SharedFile::new(file);
     let written = write(frame, format, out.clone());
@@ -26,7 +24,6 @@ pub fn write_file(frame: LazyFrame, format: Format, file: File) -> Result<(), Wr
     written.map_err(WriteError::Polars)
 }
 
-/// The rows of a query as the bytes of a file.
 pub fn in_memory(frame: LazyFrame, format: Format) -> Result<Vec<u8>, PolarsError> {
     let out = SharedFile::new(Vec::new());
     write(frame, format, out.clone())?;

@@ -17,12 +17,9 @@ use exact::suggest::nearest;
 pub use metric::syntax::grammar::{Grammar, SyntaxFault, bytes_of, shortened, with_stack};
 use toml_spec::{Fault, Faults, Place, Source};
 
-/// A table that a query may name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Table {
-    /// One row per step, as in the traces.
     Steps,
-    /// One row per episode: its keys and metrics.
     Episodes,
     /// One row per group and metric: exact moments, and statistics derived from them.
     Cells,
@@ -30,22 +27,17 @@ pub enum Table {
 
 exact::names!(Table { Steps: "steps", Episodes: "episodes", Cells: "cells" });
 
-/// A query that may be run.
 #[derive(Clone, Debug)]
 pub struct Checked {
     pub(super) asked: Asked,
-    /// The tables that it names.
     pub tables: BTreeSet<Table>,
     source: Arc<Source>,
 }
 
 #[derive(Clone, Debug)]
 pub(super) enum Asked {
-    /// The rows of a SELECT.
     Rows(Box<Statement>),
-    /// The names of the tables.
     Tables,
-    /// The columns of a table.
     Columns(Table),
 }
 
@@ -96,9 +88,7 @@ impl Checked {
         })
     }
 
-    /// Polars' message, located at the unknown name in the query.
-    ///
-    /// `columns` are those of the tables.
+    /// Polars' message, located at the unknown name in the query. `columns` are those of the tables.
     pub fn fault(&self, words: &str, columns: &[String]) -> Faults {
         let unknown =
             ["column '", "column \"", "column named '", "column: ", "Column '"].into_iter().find_map(|before| {

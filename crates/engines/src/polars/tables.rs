@@ -24,7 +24,6 @@ pub fn steps(traces: &TraceSet) -> Result<LazyFrame, PolarsError> {
     frame::steps(traces, &columns)
 }
 
-/// The episode table: keys, coders' labels, then metrics.
 pub fn episodes(table: &EpisodeTable) -> Result<LazyFrame, PolarsError> {
     let text = |name: &str, of: fn(KeyRef<'_>) -> &str| {
         Column::new(name.into(), table.keys.iter().map(of).collect::<Vec<_>>())

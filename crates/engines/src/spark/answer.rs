@@ -17,22 +17,17 @@ use trace::diagnostic::{Code, Finding};
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Answer {
-    /// The requested results are written.
     Done(Done),
-    /// The traces have a problem.
     Refused(Refused),
-    /// Spark raised an error.
     Failed(Failed),
     Late {},
 }
 
-/// A completed job.
 #[derive(Debug, Deserialize)]
 pub(super) struct Done {
     pub(super) episodes: u64,
 }
 
-/// The problem in the traces.
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Refused {

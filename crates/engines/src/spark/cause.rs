@@ -6,10 +6,8 @@ use super::setting::Setting;
 use super::source::without_user;
 use super::{Cluster, SparkError};
 
-/// The longest cause shown, in characters.
 const LONGEST: usize = 400;
 
-/// A Spark error: its name and message.
 #[derive(Debug, Deserialize)]
 pub(super) struct Failed {
     pub(super) name: String,

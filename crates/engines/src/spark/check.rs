@@ -24,9 +24,8 @@ pub(super) struct Rule {
     found: String,
 }
 
-/// The rules for some columns, in the order of the columns.
-///
-/// `palette` has the colours of the traces, if all of them declare a palette.
+/// The rules for some columns, in the order of the columns. `palette` has the colours of the traces, if all of them
+/// declare a palette.
 pub(super) fn rules<'a>(
     columns: impl IntoIterator<Item = &'a str>,
     catalog: &Catalog,

@@ -9,12 +9,10 @@ use super::SparkError;
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Spark {
-    /// The program `spark-submit`.
     pub(super) program: PathBuf,
     pub(super) home: Option<PathBuf>,
 }
 
-/// The path of `spark-submit` inside Spark's folder.
 const PROGRAM: &str = "bin/spark-submit";
 
 pub(super) fn locate() -> Result<Spark, SparkError> {

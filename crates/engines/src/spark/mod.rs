@@ -35,12 +35,10 @@ use self::request::Request;
 use self::setting::Setting;
 use self::source::Sources;
 
-/// The cluster, and how to submit to it.
 #[derive(Clone, Debug, Default)]
 pub struct Cluster {
     /// `spark://host:port`, `yarn`, `local[2]`, ...; the master in Spark's own configuration if absent.
     pub master: Option<String>,
-    /// Settings for this submission.
     pub settings: Vec<Setting>,
     /// Give up after this many seconds; never if absent.
     pub timeout_s: Option<NonZeroU32>,
@@ -51,19 +49,15 @@ pub struct Cluster {
 #[derive(Clone, Copy, Debug)]
 pub struct Job<'a> {
     pub definitions: &'a Definitions,
-    /// Further columns that are constant in an episode.
     pub labels: &'a [String],
     pub sources: &'a Sources,
 }
 
-/// A folder that Spark has written.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Written {
-    /// The number of episodes in it.
     pub episodes: u64,
 }
 
-/// An error of scoring with Spark.
 #[derive(Debug, thiserror::Error)]
 pub enum SparkError {
     #[error(
@@ -119,7 +113,6 @@ fn more_episodes(more: u64) -> String {
     }
 }
 
-/// Scores on Spark and fetches the table, in the usual order.
 pub fn score(job: Job<'_>, cluster: &Cluster) -> Result<EpisodeTable, SparkError> {
     let place = place::Place::new()?;
     let request = Request::new(job, cluster, &place, None)?;

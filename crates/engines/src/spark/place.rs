@@ -6,7 +6,6 @@ use std::path::PathBuf;
 use super::SparkError;
 use exact::replace::TemporaryFolder;
 
-/// The private folder of one submission.
 pub(super) struct Place(TemporaryFolder);
 
 impl Place {

@@ -12,7 +12,6 @@ use metric::sql::{Dialect, lower};
 use score::format::{DEFINITIONS_KEY, HASH_KEY, KIND_KEY, SCORES_KIND};
 use trace::schema;
 
-/// The key columns of an episode and their types in a file of scores.
 const KEYS: [(&str, &str); 5] =
     [("episode_id", "string"), ("model", "string"), ("experiment", "string"), ("seed", "int"), ("run", "int")];
 

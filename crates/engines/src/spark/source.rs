@@ -12,13 +12,10 @@ use trace::open::{TraceFile, TraceSet};
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Sources {
-    /// Local files with valid footers.
     Files { names: Vec<String>, groups: Vec<Group>, rows: u64, palette: Option<Palette> },
-    /// URIs, as typed and unchecked.
     Uris(Vec<String>),
 }
 
-/// Traces that are read in the same way.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Group {
     /// URIs; for local files, `file://` without wildcards.
@@ -28,9 +25,7 @@ pub struct Group {
 }
 
 impl Sources {
-    /// Local files.
-    ///
-    /// `traces` are these inputs, opened.
+    /// Local files. `traces` are these inputs, opened.
     pub fn files(inputs: &[Input], traces: &TraceSet) -> io::Result<Self> {
         let mut groups: BTreeMap<Vec<String>, Vec<String>> = BTreeMap::new();
         for (input, file) in inputs.iter().zip(traces.files()) {

@@ -32,7 +32,6 @@ pub(super) struct Bound {
     pub(super) rate: bool,
 }
 
-/// The plan, and the result of each definition.
 #[derive(Debug)]
 pub(super) struct Binding {
     pub(super) plan: Plan,

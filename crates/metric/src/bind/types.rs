@@ -56,7 +56,6 @@ impl Scope<'_, '_> {
         if negated { self.unary(Op::Not(bound.node), Type::Bool, bound.level) } else { bound }
     }
 
-    /// An operand that must be a truth value.
     pub(super) fn truth(&mut self, expr: &Expr) -> Option<Bound> {
         let bound = self.bind(expr)?;
         match bound.ty {
@@ -69,7 +68,6 @@ impl Scope<'_, '_> {
         }
     }
 
-    /// An operand that must be a number.
     pub(super) fn number(&mut self, expr: &Expr) -> Option<Bound> {
         let bound = self.bind(expr)?;
         self.as_number(bound, expr)

@@ -13,10 +13,8 @@ use super::{Binder, Bound};
 use exact::suggest::nearest;
 use toml_spec::Fault;
 
-/// The possible texts of a node.
 #[derive(Debug, Default)]
 struct Possible {
-    /// Their columns, in the order of the expression.
     columns: Vec<String>,
     texts: Vec<String>,
 }

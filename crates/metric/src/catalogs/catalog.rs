@@ -158,7 +158,6 @@ impl Factor {
         doses
     }
 
-    /// Its axis label: the title, and the unit if it has one.
     pub fn label(&self) -> String {
         if self.unit.is_empty() { self.title.clone() } else { format!("{}, {}", self.title, self.unit) }
     }
@@ -180,7 +179,6 @@ const fn is_false(value: &bool) -> bool {
     !*value
 }
 
-/// The order of experiments in a catalog.
 pub(crate) fn by_order(a: &String, one: &Experiment, b: &String, other: &Experiment) -> Ordering {
     one.order.cmp(&other.order).then_with(|| a.cmp(b))
 }
@@ -203,7 +201,6 @@ impl Catalog {
         self.experiment.sort_by(by_order);
     }
 
-    /// The experiments that only the traces declare.
     pub fn declared(&self) -> impl Iterator<Item = (String, Experiment)> + '_ {
         let declared = self.experiment.iter().filter(|(_, experiment)| experiment.is_declared);
         declared.map(|(name, experiment)| (name.clone(), experiment.clone()))

@@ -36,7 +36,6 @@ pub struct ValueRange {
     pub most: Option<i64>,
 }
 
-/// The quantity that metrics of one unit measure.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Unit {
@@ -57,7 +56,6 @@ impl Metric {
         }
     }
 
-    /// The possible values, as far as the definition or its unit gives them.
     pub fn value_range(&self) -> ValueRange {
         let range = range(self.measures, self.range, &self.unit);
         match self.measures() {

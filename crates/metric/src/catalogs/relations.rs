@@ -8,10 +8,8 @@ use crate::catalog::{Catalog, Kind, Metric};
 use crate::measure::Measures;
 use crate::syntax::{BinaryOp, Expr, ExprKind, Literal, parse};
 
-/// The deepest chain of names that is followed.
 const DEEPEST: usize = 64;
 
-/// The related metrics of a catalog, in its order.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Relations {
     /// Each duration, and the rate that is defined only in finished episodes.
@@ -21,7 +19,6 @@ pub struct Relations {
 }
 
 impl Relations {
-    /// The relations that a catalog declares or its expressions imply.
     pub fn of(catalog: &Catalog) -> Self {
         let reader = Reader { catalog };
         let moments: Vec<Completed> =
@@ -44,12 +41,10 @@ impl Relations {
         self.durations.iter().find(|(known, _)| known == duration).map(|(_, finished)| finished.as_str())
     }
 
-    /// The versions of this rate among finished episodes.
     pub fn completed<'r>(&'r self, whole: &'r str) -> impl Iterator<Item = &'r str> {
         self.completed.iter().filter(move |(known, _)| known == whole).map(|(_, completed)| completed.as_str())
     }
 
-    /// The rate whose version among finished episodes this is.
     pub fn whole(&self, completed: &str) -> Option<&str> {
         self.completed.iter().find(|(_, known)| known == completed).map(|(whole, _)| whole.as_str())
     }

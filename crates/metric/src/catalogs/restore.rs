@@ -10,7 +10,6 @@ use crate::columns::Columns;
 use crate::definitions::Definitions;
 use crate::file::FileError;
 
-/// An error while restoring definitions from a catalog.
 #[derive(Debug, thiserror::Error)]
 pub enum RestoreError {
     #[error("the definitions `{name}` that the scores carry cannot be evaluated here")]

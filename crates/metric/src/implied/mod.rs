@@ -11,22 +11,17 @@ use self::possible::{Possible, Traces};
 use super::catalog::Kind;
 use super::plan::{Comparison, Constant, NodeId, Op, Output, Plan};
 
-/// The known facts about one metric.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Implied {
     /// The smallest and the largest value, if the metric is defined.
     pub range: (i64, i64),
-    /// The episodes in which it is defined.
     pub defined: Defined,
-    /// The metric whose value it repeats in those episodes.
     pub restricts: Option<Restricted>,
 }
 
-/// The episodes in which a metric is defined.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Defined {
     Always,
-    /// Those where a rate has this value.
     Where {
         metric: String,
         /// True for 1.
@@ -36,18 +31,15 @@ pub enum Defined {
     Sometimes,
 }
 
-/// A metric that another one restricts to some episodes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Restricted {
-    /// Its name; it is defined in all episodes.
     pub metric: String,
     /// Its only possible value in the other episodes, if there is only one.
     pub elsewhere: Option<i64>,
 }
 
-/// The known facts about each metric of a plan, in episodes of 1 to `steps` steps.
-///
-/// `has_value` returns true if a column has a value in every row of every trace.
+/// The known facts about each metric of a plan, in episodes of 1 to `steps` steps. `has_value` returns true if a column
+/// has a value in every row of every trace.
 pub fn implied(plan: &Plan, steps: u32, has_value: fn(&str) -> bool) -> IndexMap<String, Implied> {
     let reader = Reader { plan, traces: Traces { plan, steps, has_value } };
     plan.outputs.iter().map(|output| (output.name.clone(), reader.read(output))).collect()

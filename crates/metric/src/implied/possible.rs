@@ -90,10 +90,8 @@ pub(super) struct Traces<'p> {
 }
 
 impl Traces<'_> {
-    /// The possible values of a node, given the values of `assumed` nodes.
-    ///
-    /// Examines both cases of each first and last moment that the node needs: present and absent. This shows that
-    /// `x is not null and x > 3` is never null.
+    /// The possible values of a node, given the values of `assumed` nodes. Examines both cases of each first and last
+    /// moment that the node needs: present and absent. This shows that `x is not null and x > 3` is never null.
     pub(super) fn of_node(&self, node: NodeId, assumed: &[(NodeId, Possible)]) -> Possible {
         let needed = self.plan.needed_by([node]);
         let is_moment =

@@ -57,7 +57,6 @@ pub struct NamedExpression {
 }
 
 impl Definitions {
-    /// The explanation of the metric; `None` if it is unknown.
     pub fn explain(&self, metric: &str) -> Option<Explanation> {
         let entry = self.catalog.metric.get(metric)?;
         let written = self.document().metrics.get(metric)?;
@@ -151,7 +150,6 @@ fn names_in(expr: &Expr) -> Vec<String> {
     }
 }
 
-/// An expression in words as a condition.
 fn condition(expr: &Expr) -> String {
     match &expr.kind {
         ExprKind::Name(name) => format!("{name} holds"),

@@ -20,9 +20,8 @@ pub struct Suspect {
     pub certain: bool,
 }
 
-/// The nodes among `needed` whose value may exceed 64 bits in traces of `rows` rows.
-///
-/// `column` gives the smallest and largest value of an integer column, if known.
+/// The nodes among `needed` whose value may exceed 64 bits in traces of `rows` rows. `column` gives the smallest and
+/// largest value of an integer column, if known.
 pub fn may_overflow(
     plan: &Plan,
     needed: &[NodeId],

@@ -9,7 +9,6 @@ use std::collections::HashMap;
 use crate::catalog::Kind;
 use crate::columns::{Level, Type};
 
-/// The position of a node in its plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct NodeId(pub(crate) usize);
 
@@ -20,13 +19,10 @@ impl NodeId {
     }
 }
 
-/// One operation, its type, and its level.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Node {
     pub op: Op,
-    /// The type of the result.
     pub ty: Type,
-    /// The level of the result: per step or per episode.
     pub level: Level,
 }
 
@@ -34,11 +30,9 @@ pub struct Node {
 /// and one level, except that any operand may be a constant.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Op {
-    /// A column of the trace.
     Column(String),
     /// The timestep t, 1-based.
     Time,
-    /// The number of steps of the episode, T.
     Length,
     Constant(Constant),
     /// An episode's value repeated at each of its steps, or a constant repeated at each episode or step.
@@ -48,7 +42,6 @@ pub enum Op {
     And(NodeId, NodeId),
     /// Kleene's disjunction: true if either is true.
     Or(NodeId, NodeId),
-    /// A comparison of two values of one type.
     Compare(Comparison, NodeId, NodeId),
     /// True if two values differ, with null as an ordinary value; never null.
     Distinct(NodeId, NodeId),
@@ -60,7 +53,6 @@ pub enum Op {
     IsFalse(NodeId),
     /// Sum, difference, product, quotient or remainder; a result beyond 64 bits is an error.
     Arithmetic(Arithmetic, NodeId, NodeId),
-    /// The negated value.
     Negate(NodeId),
     /// The value after the first condition that is true, else the last value, else null.
     Case {
@@ -74,9 +66,7 @@ pub enum Op {
     Matches(NodeId, String),
     /// 1 for true, 0 for false.
     IntFromBool(NodeId),
-    /// The same number as a float.
     FloatFromInt(NodeId),
-    /// One value per episode, from one value per step.
     Aggregate(Aggregate, NodeId),
     /// The value of the first operand at the timestep in the second; null if that step does not exist.
     At(NodeId, NodeId),
@@ -91,7 +81,6 @@ pub enum Constant {
     Null,
     Bool(bool),
     Int(i64),
-    /// The bits of a double.
     Float(u64),
     Text(String),
 }
@@ -107,7 +96,6 @@ pub enum Comparison {
 }
 
 impl Comparison {
-    /// The equivalent comparison for exchanged operands.
     #[must_use]
     pub const fn flipped(self) -> Self {
         match self {
@@ -163,17 +151,14 @@ impl Aggregate {
     }
 }
 
-/// A metric or a named expression and its node.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Output {
     pub name: String,
-    /// A rate or a quantity.
     pub kind: Kind,
     /// Its value per episode: a truth value for most rates, else an integer.
     pub node: NodeId,
 }
 
-/// The complete input for scoring by some definitions.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Plan {
     nodes: Vec<Node>,
@@ -188,12 +173,10 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// The nodes, operands before their users.
     pub fn nodes(&self) -> &[Node] {
         &self.nodes
     }
 
-    /// The positions of all nodes, operands before their users.
     pub fn ids(&self) -> impl DoubleEndedIterator<Item = NodeId> + use<> {
         (0..self.nodes.len()).map(NodeId)
     }
@@ -202,7 +185,6 @@ impl Plan {
         &self.nodes[id.0]
     }
 
-    /// Keeps only the metrics of these names, in the order of the plan.
     pub fn select(&mut self, names: &[String]) {
         self.outputs.retain(|output| names.contains(&output.name));
     }
@@ -219,7 +201,6 @@ impl Plan {
         (0..self.nodes.len()).filter(|&at| needed[at]).map(NodeId).collect()
     }
 
-    /// The columns among some nodes, with their levels.
     pub fn columns(&self, nodes: &[NodeId]) -> Vec<(&str, Level)> {
         let column = |id: &NodeId| match &self.node(*id).op {
             Op::Column(name) => Some((name.as_str(), self.node(*id).level)),
@@ -230,7 +211,6 @@ impl Plan {
 }
 
 impl Op {
-    /// The nodes that this one reads.
     pub fn operands(&self) -> Vec<NodeId> {
         let mut operands = Vec::new();
         let _ = self.with_operands(|operand| {
@@ -271,7 +251,6 @@ impl Op {
     }
 }
 
-/// Builds a plan with one node per distinct operation.
 #[derive(Debug, Default)]
 pub(crate) struct Builder {
     plan: Plan,

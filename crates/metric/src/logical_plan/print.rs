@@ -102,7 +102,6 @@ exact::names!(Aggregate {
     Sum: "sum",
 });
 
-/// Displays operators by name.
 macro_rules! by_name {
     ($($type:ty)+) => {
         $(impl fmt::Display for $type {

@@ -10,10 +10,8 @@ use crate::columns::Level;
 use crate::plan::{Arithmetic, NodeId, Op, Plan};
 
 /// The statement that reports numbers beyond 64 bits. It has one row per episode and a column `g<node>` for each of
-/// `checked`: 1 if the node exceeds 64 bits, else 0.
-///
-/// For engines that wrap silently. Each number is compared with the same computation in doubles: a wrapped number is
-/// far from its double.
+/// `checked`: 1 if the node exceeds 64 bits, else 0. For engines that wrap silently. Each number is compared with the
+/// same computation in doubles: a wrapped number is far from its double.
 pub fn lower_checks(plan: &Plan, dialect: Dialect, checked: &[NodeId]) -> Result<String, LoweringError> {
     // A check reads the operands of a value, which are missing if the value is a shared column of steps.
     let layout = Layout::new(plan, dialect, checked, &BTreeMap::new()).without_shared();
@@ -57,7 +55,6 @@ impl Layout<'_> {
         format!("CASE WHEN {overflows} THEN 1 ELSE 0 END")
     }
 
-    /// The condition that an operation on integers exceeds 64 bits.
     fn overflows(&self, id: NodeId) -> String {
         let double = |id: &NodeId| format!("CAST({} AS DOUBLE)", self.value(*id));
         let exact = match &self.plan.node(id).op {

@@ -6,7 +6,6 @@ use super::pattern::java;
 use crate::columns::Type;
 use crate::plan::{Arithmetic, Constant};
 
-/// The SQL dialect to write.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Dialect {
     #[default]
@@ -40,7 +39,6 @@ impl Dialect {
         }
     }
 
-    /// The column of a metric.
     pub fn output_name(self, metric: &str) -> String {
         match self {
             Self::Portable => metric.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect(),
@@ -48,7 +46,6 @@ impl Dialect {
         }
     }
 
-    /// The column of a metric in an engine's result.
     pub fn output_alias(self, metric: &str) -> String {
         match self {
             Self::Portable => self.output_name(metric),
@@ -98,7 +95,6 @@ impl Dialect {
         }
     }
 
-    /// A text literal.
     pub fn text(self, value: &str) -> String {
         match self {
             // Spark reads backslashes in texts as escapes.

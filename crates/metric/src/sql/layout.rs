@@ -14,12 +14,10 @@ use exact::budget::Limit;
 /// The episode columns of every statement, in the order of the episode table, after `episode_id`.
 pub(super) const KEYS: [&str; 4] = ["model", "experiment", "seed", "run"];
 
-/// The position of each node of a plan in a statement.
 #[derive(Clone)]
 pub(super) struct Layout<'p> {
     pub(super) plan: &'p Plan,
     pub(super) dialect: Dialect,
-    /// The nodes to compute, operands before their users.
     pub(super) needed: Vec<NodeId>,
     /// The pass after which each is known; 0 if one step suffices.
     passes: BTreeMap<NodeId, usize>,

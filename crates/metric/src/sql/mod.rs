@@ -55,9 +55,8 @@ pub enum LoweringError {
     Length { limit: u64 },
 }
 
-/// The statement that computes the episode table: `episode_id, model, experiment, seed, run`, then the metrics.
-///
-/// Engines quote names differently, so the portable form does not quote: a metric's `-` becomes `_` there.
+/// The statement that computes the episode table: `episode_id, model, experiment, seed, run`, then the metrics. Engines
+/// quote names differently, so the portable form does not quote: a metric's `-` becomes `_` there.
 pub fn lower(plan: &Plan, dialect: Dialect) -> Result<String, LoweringError> {
     check_patterns(plan, dialect)?;
     check_names(plan, dialect)?;
@@ -69,7 +68,6 @@ pub fn lower(plan: &Plan, dialect: Dialect) -> Result<String, LoweringError> {
     Ok(statement.text)
 }
 
-/// The nodes behind the columns of the episode table.
 fn roots(plan: &Plan) -> Vec<NodeId> {
     plan.outputs.iter().map(|output| output.node).chain(plan.filter).collect()
 }

@@ -10,7 +10,6 @@ use std::fmt::Write as _;
 
 use regex_syntax::hir::{Class, ClassUnicode, ClassUnicodeRange, Hir, HirKind, Look, Repetition};
 
-/// Word characters, by Unicode and by ASCII.
 const UNICODE_WORD: &str = r"(?U:\w)";
 const ASCII_WORD: &str = "[0-9A-Z_a-z]";
 

@@ -10,24 +10,19 @@ use crate::columns::{Level, Type};
 use crate::plan::{NodeId, Op};
 use exact::budget::Limit;
 
-/// The longest statement, in bytes.
 const LONGEST: Limit = Limit::new("bytes of a statement", 4 << 20);
 
-/// A statement while it is written.
 pub(super) struct Statement<'l, 'p> {
     pub(super) layout: &'l Layout<'p>,
     pub(super) text: String,
     passes: usize,
 }
 
-/// The steps that an aggregate reads.
 #[derive(Default)]
 struct Reads {
     columns: BTreeSet<String>,
     shared: BTreeSet<NodeId>,
-    /// Columns of earlier steps, by their distance.
     earlier: BTreeMap<usize, BTreeSet<NodeId>>,
-    /// The visited nodes, each with its distance in steps.
     seen: BTreeSet<(usize, NodeId)>,
     lag: usize,
 }

@@ -9,7 +9,6 @@ use super::grammar::{Grammar, SyntaxFault, byte_of, bytes_of, with_stack};
 use super::reader::Reader;
 use crate::functions;
 
-/// An expression of a definition.
 pub(super) const EXPRESSION: Grammar = Grammar {
     noun: "expression",
     one: "an expression",

@@ -14,11 +14,9 @@ const SHALLOW: usize = 1024;
 /// The stack for the deepest possible tree, in bytes; only the used part takes memory.
 const STACK: usize = 128 << 20;
 
-/// A syntax error of a text.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SyntaxFault {
     pub message: String,
-    /// Its byte range in the text.
     pub span: Range<usize>,
     pub help: Option<String>,
 }
@@ -29,11 +27,8 @@ pub struct SyntaxFault {
 pub struct Grammar {
     /// `expression`, `query`.
     pub noun: &'static str,
-    /// The same with its article.
     pub one: &'static str,
-    /// The longest text, in bytes.
     pub longest: usize,
-    /// The largest number of tokens.
     pub most_tokens: usize,
     /// The remedy for a text that is too long or too deep.
     pub help: Option<&'static str>,
@@ -66,7 +61,6 @@ impl Grammar {
         Ok(Parser::new(&GenericDialect {}).with_tokens_with_locations(edit(tokens)))
     }
 
-    /// The parser's message, with its position as a span.
     pub fn fault(self, text: &str, error: &ParserError) -> SyntaxFault {
         let (message, help) = match error {
             ParserError::ParserError(message) | ParserError::TokenizerError(message) => (message.clone(), None),

@@ -28,7 +28,6 @@ impl PartialEq for Expr {
     }
 }
 
-/// The constructs of the calculus.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ExprKind {
     /// A column, a `let` or a metric.

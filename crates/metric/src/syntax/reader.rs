@@ -11,7 +11,6 @@ use crate::plan::{Arithmetic, Comparison};
 /// The deepest nesting of one expression.
 const DEEPEST: usize = 120;
 
-/// Marks a fault that is already reported.
 struct Told;
 
 /// Walks the parser's tree and keeps the constructs of the calculus.

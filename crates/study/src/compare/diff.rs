@@ -70,7 +70,6 @@ pub struct Diff {
     pub notes: Vec<String>,
 }
 
-/// Both sides, scored.
 #[derive(Debug)]
 pub(crate) struct Pair {
     pub before: Scored,
@@ -79,21 +78,15 @@ pub(crate) struct Pair {
     pub evidence: Option<[BTreeMap<String, Evidence>; 2]>,
 }
 
-/// One side, scored.
 #[derive(Debug)]
 pub(crate) struct Scored {
-    /// Its episodes, with the metrics of both sides.
     pub table: EpisodeTable,
-    /// All its requested metrics.
     pub metrics: Vec<String>,
     /// The definitions; `None` for scores from a file, which carry their definitions as text.
     pub definitions: Option<Definitions>,
 }
 
 /// Compares two sides. `traces` are scored by definitions; if both sides are scores, they give the deciding timesteps.
-///
-/// # Errors
-/// Faults in definitions, scores or traces; a metric that neither side has; definitions without traces.
 pub fn diff(old: &Side, new: &Side, traces: &[Input], request: &DiffRequest) -> Result<Diff, StudyError> {
     let inputs = traces;
     let style = Style::load("default")?;
@@ -228,7 +221,6 @@ impl Pair {
         })
     }
 
-    /// The changes between the sides, for the requested metrics.
     pub(crate) fn changes(&self, by: &[String]) -> Result<Changes, StudyError> {
         let mut changes = Changes::of(&self.before.table, &self.after.table, by)?;
         changes.metrics = Overlap::of(&self.before.metrics, &self.after.metrics);
@@ -294,7 +286,6 @@ impl Scored {
     }
 }
 
-/// The tables of both sides, and the evidence for their differences.
 type ScoredSides = ([EpisodeTable; 2], Option<[BTreeMap<String, Evidence>; 2]>);
 
 fn score_sides(

@@ -35,7 +35,6 @@ const PIXELS: &str = "mirror_self_px";
 const EVIDENCE: &str = "visible";
 /// The column that records evidence as ground truth.
 const GROUND_TRUTH: &str = "mirror_visible";
-/// The key of the threshold in a footer's recording metadata.
 const THRESHOLD_KEY: &str = "visibility_threshold_px";
 
 /// The default thresholds, px.
@@ -45,7 +44,6 @@ pub const DEFAULT_THRESHOLDS: &str = "1,10,30,60,120,240";
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Thresholds(Vec<u32>);
 
-/// An invalid list of thresholds.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "expected whole numbers of pixels from 1 on, separated by commas, such as {DEFAULT_THRESHOLDS}, found `{found}`"
@@ -65,13 +63,10 @@ impl FromStr for Thresholds {
     }
 }
 
-/// The answer: the changes, as data and as a figure.
 #[derive(Debug)]
 pub struct SensitivityReport {
-    /// Cells and conclusions under each threshold.
     pub found: Sensitivity,
     pub figure: Figure,
-    /// Notes for readers of the data, one sentence each.
     pub notes: Vec<String>,
 }
 
@@ -148,14 +143,12 @@ impl Study {
     }
 }
 
-/// One threshold, scored.
 struct Scored {
     level: Level,
     drawn: Cells,
     lost: u64,
 }
 
-/// Everything that the scan computes.
 struct Trial {
     thresholds: Vec<u32>,
     definitions: Vec<Definitions>,

@@ -16,7 +16,6 @@ use report::cells::group::{KEY_COLUMNS, column_values};
 use score::table::EpisodeTable;
 use score::{score_traces, vocabulary};
 
-/// The most values of a column that are listed.
 const LISTED: usize = 8;
 
 impl Study {

@@ -17,17 +17,14 @@ use crate::scored_alike::ScoredAlike;
 /// Labels of each episode's recording that scores carry if the traces have them.
 pub(crate) const STANDING_LABELS: [&str; 4] = [CONDITION, "scene", "fingerprint", "participant"];
 
-/// The default definitions.
 pub(crate) const DEFAULT_DEFINITIONS: &str = "paper";
 
-/// A question to the inputs.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Question {
     /// Definitions by name or path. If absent: those that scores carry, or that the experiments of the traces name.
     pub definitions: Option<PathBuf>,
     /// True to score experiments that need different definitions each by their own; false to refuse them.
     pub each: bool,
-    /// The experiments by their own definitions, found in the traces.
     pub parts: Vec<ScoredAlike>,
     /// A condition on episodes in the language of definitions; all episodes if absent.
     pub filter: Option<String>,
@@ -38,7 +35,6 @@ pub struct Question {
     pub by: Option<Vec<String>>,
     /// True if a cell may mix episodes that were recorded differently.
     pub pool: bool,
-    /// The treatment of lost episodes.
     pub lost: LostAs,
 }
 
@@ -47,7 +43,6 @@ impl Question {
         self.definitions.as_deref().unwrap_or(Path::new(DEFAULT_DEFINITIONS))
     }
 
-    /// The columns to group by that scores lack by default.
     pub(crate) fn labels(&self) -> Vec<String> {
         self.by.iter().flatten().filter(|name| !KEY_COLUMNS.contains(&name.as_str())).cloned().collect()
     }
@@ -79,7 +74,6 @@ impl Question {
         Ok(definitions)
     }
 
-    /// The requested definitions over some columns.
     pub fn bind_to(&self, columns: &Columns) -> Result<Definitions, StudyError> {
         let mut definitions = self.load(columns)?;
         if let Some(filter) = &self.filter {

@@ -38,9 +38,6 @@ pub struct RescoreRequest {
 
 /// The traces of a report, found by their hashes in folders or files. If `places` is empty, searches the current
 /// folder, the report's folder and its parents.
-///
-/// # Errors
-/// A folder that is no report; traces that have changed.
 pub fn traces_of(report: &Path, places: &[PathBuf]) -> Result<Vec<Input>, StudyError> {
     Ok(provenance::traces(&provenance::manifest(report)?, &provenance::places(report, places))?)
 }
@@ -113,9 +110,6 @@ impl RescoreRequest {
 }
 
 /// The folder of the new report: `out`, or `REPORT-rescored`; never the report itself.
-///
-/// # Errors
-/// An `out` that is the report itself; a path that cannot be resolved.
 pub fn folder_of_rescored(report: &Path, out: Option<&Path>) -> Result<PathBuf, StudyError> {
     let place = |path: &Path| std::path::absolute(path).and_then(|path| path.canonicalize().or(Ok(path)));
     let out = match out {

@@ -4,7 +4,6 @@ use std::collections::BTreeSet;
 
 use metric::file;
 
-/// Experiments that the same definitions score.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ScoredAlike {
     /// The definitions, by name or by the original path of their file.

@@ -12,14 +12,10 @@ use report::published;
 use report::style::Style;
 use score::vocabulary::{has_value, schema_columns};
 
-/// The assumptions of an audit of published tables.
 #[derive(Clone, Debug)]
 pub struct AuditRequest {
-    /// Episodes per row.
     pub episodes: Episodes,
-    /// Definitions by name or path.
     pub definitions: PathBuf,
-    /// The most steps of an episode.
     pub steps: u32,
     /// Roundings to consider; all if empty.
     pub roundings: Vec<Rounding>,

@@ -49,20 +49,14 @@ pub const MANY_MODELS: usize = 20;
 /// The number of models in a report's figures if there are more than [`MANY_MODELS`].
 const SHOWN_OF_MANY: usize = 12;
 
-/// The figures of a report.
 #[derive(Debug, Default)]
 pub(crate) struct Drawings {
-    /// The figures that can be drawn.
     pub drawn: Vec<(FigureName, Figure)>,
-    /// The other figures, with the reason for each.
     pub left_out: Vec<(FigureName, FigureError)>,
 }
 
 impl<'a> FigureInputs<'a> {
     /// Groups the episodes for figures: by experiment and model, with another condition as a model of its own.
-    ///
-    /// # Errors
-    /// Sums of squares beyond 128 bits.
     pub(crate) fn of(results: &'a Results, style: &'a Style) -> Result<Self, StudyError> {
         let results = results.with_conditions_as_models();
         let cells = group(&results.episodes, &DEFAULT_BY.map(str::to_owned))?;
@@ -85,15 +79,10 @@ impl<'a> FigureInputs<'a> {
         Self { options, ..self }
     }
 
-    /// Draws one figure.
-    ///
-    /// # Errors
-    /// Inputs that lack what the figure needs.
     pub(crate) fn draw(&self, name: FigureName) -> Result<Figure, FigureError> {
         figures::draw(name, &self.input())
     }
 
-    /// Draws every figure that can be drawn, and collects the reasons for the others.
     pub(crate) fn draw_all(&self) -> Drawings {
         let mut drawings = Drawings::default();
         for name in FigureName::ALL {
@@ -122,10 +111,6 @@ impl<'a> FigureInputs<'a> {
 }
 
 impl Drawings {
-    /// The figures in every format, as files of a report.
-    ///
-    /// # Errors
-    /// A picture too large for memory.
     pub(crate) fn files(&self) -> Result<Vec<OutputFile>, StudyError> {
         let mut files = Vec::new();
         for (name, figure) in &self.drawn {

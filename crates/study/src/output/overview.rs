@@ -16,21 +16,16 @@ use trace::schema::SCHEMA_VERSION;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
-    /// Tables, data quality, definitions.
     Tables,
-    /// Every figure that can be drawn.
     Figures,
-    /// The conclusions, and every interval and test.
     Statistics,
 }
 
-/// Some sections of a report.
 #[derive(Clone, Debug)]
 pub struct Overview {
     /// The HTML element of each section, in page order.
     pub sections: Vec<String>,
     pub episodes: usize,
-    /// The columns that cells are grouped by.
     pub by: Vec<String>,
     /// The values of these columns for each group, in the numbering of the table rows; `None` for null.
     pub groups: Vec<Vec<Option<String>>>,

@@ -15,7 +15,6 @@ use report::bundle::{self, Manifest};
 use trace::inputs::Input;
 use trace::schema::SCHEMA_VERSION;
 
-/// An error of remaking a report.
 #[derive(Debug, thiserror::Error)]
 pub enum ProvenanceError {
     #[error("{}: expected a report's folder with its manifest.json; name the folder that `mirrorstats report` wrote", path.display())]
@@ -26,26 +25,19 @@ pub enum ProvenanceError {
     Traces { all: usize, faults: Vec<TraceFault> },
 }
 
-/// The remedy for traces that are not found.
 const REMEDY: &str = "  help: restore them, say where they are with --traces, or make a new report of what there is with `mirrorstats report`";
 
-/// A trace of the manifest that is missing or has changed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TraceFault {
-    /// Its path in the manifest.
     pub path: String,
-    /// Its hash in the manifest.
     pub expected: String,
     /// The file found instead, with its path; `None` if there is no such file.
     pub found: Option<(Found, PathBuf)>,
 }
 
-/// The file found instead of a trace.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Found {
-    /// A file with this hash.
     Other(String),
-    /// A file that cannot be read, and the reason.
     Unreadable(String),
 }
 
@@ -78,10 +70,6 @@ fn lines(faults: &[TraceFault]) -> String {
 /// A trace takes about 200 bytes of a manifest.
 const LARGEST: Limit = Limit::new("bytes of a manifest", 64 << 20);
 
-/// The manifest of a report's folder.
-///
-/// # Errors
-/// A folder without a manifest; an unreadable manifest, or one of a later version.
 pub(crate) fn manifest(report: &Path) -> Result<Manifest, ProvenanceError> {
     let path = report.join("manifest.json");
     let text = match input::text(&path, LARGEST) {
@@ -108,9 +96,6 @@ fn is_plain(path: &str) -> bool {
 }
 
 /// The traces of a manifest, by their names in it, searched in `places` in order.
-///
-/// # Errors
-/// Every trace that changed or is missing.
 pub fn traces(manifest: &Manifest, places: &[PathBuf]) -> Result<Vec<Input>, ProvenanceError> {
     let (mut found, mut faults) = (Vec::new(), Vec::new());
     for wanted in &manifest.inputs {

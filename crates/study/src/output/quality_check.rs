@@ -13,7 +13,6 @@ pub struct QualityLimits {
     /// Replies without a decision.
     pub max_unreadable: Option<f64>,
     pub max_refused: Option<f64>,
-    /// Replies that were cut off.
     pub max_truncated: Option<f64>,
     pub max_repaired: Option<f64>,
     /// Lost episodes, over all cells.

@@ -26,7 +26,6 @@ use trace::checksums::missing_note;
 use trace::schema::SCHEMA_VERSION;
 use trace::{answered, renderer};
 
-/// The most episodes that a page lists.
 pub(crate) const MOST_LISTED: usize = 20_000;
 
 /// The options of a report.
@@ -70,12 +69,10 @@ pub struct Report {
     inputs: usize,
 }
 
-/// A written report.
 #[derive(Clone, Debug)]
 pub struct WrittenReport {
     /// The paths of its files inside the folder, in order.
     pub files: Vec<String>,
-    /// Its manifest, with the outputs.
     pub manifest: Manifest,
 }
 

@@ -74,9 +74,6 @@ pub enum VerifyError {
 }
 
 /// Compares the files of a folder with its manifest.
-///
-/// # Errors
-/// A folder without a manifest, a manifest without files, or paths outside the folder; unreadable files.
 pub fn verify(folder: &Path) -> Result<Verification, VerifyError> {
     let listed = listed(folder)?;
     let mut there = BTreeMap::new();

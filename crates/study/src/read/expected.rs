@@ -8,7 +8,6 @@ use score::vocabulary::{declared_columns, schema_columns};
 use trace::schema::{DeclaredColumn, Domain};
 use trace::validate::Expected;
 
-/// Requirements of definitions on traces.
 #[derive(Clone, Debug)]
 pub(crate) struct ExpectedTraces {
     /// The known experiments; any if `None`.

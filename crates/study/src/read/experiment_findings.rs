@@ -37,7 +37,6 @@ fn notes(file: &TraceFile, catalog: &Catalog) -> Vec<Finding> {
     found
 }
 
-/// The differing values of the definitions.
 fn overridden(file: &str, declared: &DeclaredExperiment, catalog: &Catalog) -> Vec<Finding> {
     let Some(known) = catalog.experiment.get(&declared.name) else { return Vec::new() };
     let finding = |(what, expected, found): (String, String, String)| {

@@ -17,7 +17,6 @@ use trace::validate::{Validation, validate_as};
 /// The most findings printed for each file and rule.
 const SHOWN: usize = 10;
 
-/// All findings of traces, given the experiments of these definitions.
 pub fn findings(definitions: &Path, inputs: &[Input], threads: NonZeroUsize) -> Result<Validation, StudyError> {
     let expected = ExpectedTraces::of(definitions)?;
     let mut found = validate_as(inputs, expected.as_expected(), threads)?;
@@ -25,7 +24,6 @@ pub fn findings(definitions: &Path, inputs: &[Input], threads: NonZeroUsize) -> 
     Ok(found)
 }
 
-/// The findings as text: some of each kind, and their number.
 pub fn findings_text(report: &Validation) -> String {
     let mut text = String::new();
     // Writing to a string does not fail.

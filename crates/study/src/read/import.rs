@@ -21,7 +21,6 @@ use trace::schema::Kind;
 /// A colour takes only a few bytes.
 const LARGEST: Limit = Limit::new("bytes of a palette", 1 << 20);
 
-/// The options of an import.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ImportRequest {
     pub out: PathBuf,

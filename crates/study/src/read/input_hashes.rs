@@ -8,12 +8,10 @@ use exact::{self, hash};
 use report::bundle;
 use trace::inputs::Input;
 
-/// The inputs as a manifest names them.
 pub(crate) fn hashes(inputs: &[Input]) -> Result<Vec<bundle::Input>, StudyError> {
     inputs.iter().map(hash_of).collect()
 }
 
-/// The SHA-256 of a file.
 pub(crate) fn of_file(path: &Path) -> io::Result<String> {
     hash::of_reader(exact::input::open(path)?)
 }

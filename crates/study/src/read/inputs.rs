@@ -14,12 +14,9 @@ use trace::inputs::{self, Input};
 use trace::labels::Labels;
 use trace::open::TraceSet;
 
-/// Inputs of one kind.
 #[derive(Debug)]
 pub enum Source {
-    /// Steps of episodes; every footer is read.
     Traces(TraceSet),
-    /// Episode tables.
     Scores(Vec<ScoreFile>),
 }
 
@@ -32,9 +29,6 @@ pub struct ScoreFile {
 }
 
 /// The files that some arguments name: paths, folders, globs, or `-` for a list, which is read from `list`.
-///
-/// # Errors
-/// An argument that names no file; a URI, which only Spark can read; a list that cannot be read.
 pub fn resolve(arguments: &[OsString], list: impl Read) -> Result<Vec<Input>, StudyError> {
     match arguments.iter().filter_map(|argument| argument.to_str()).find(|argument| is_uri(argument)) {
         Some(uri) => Err(StudyError::Uri { uri: uri.to_owned() }),
@@ -44,9 +38,6 @@ pub fn resolve(arguments: &[OsString], list: impl Read) -> Result<Vec<Input>, St
 
 impl Source {
     /// Recognises and opens files, which must all be traces or all be scores.
-    ///
-    /// # Errors
-    /// Both kinds at once; the first fault of a footer.
     pub fn open(inputs: &[Input]) -> Result<Self, StudyError> {
         match ScoreFile::all(inputs)? {
             Some(scores) => Ok(Self::Scores(scores)),
@@ -54,10 +45,6 @@ impl Source {
         }
     }
 
-    /// The traces, for an answer that needs steps.
-    ///
-    /// # Errors
-    /// Scores, which have no steps.
     pub fn traces(&self) -> Result<&TraceSet, StudyError> {
         match self {
             Self::Traces(traces) => Ok(traces),
@@ -65,10 +52,6 @@ impl Source {
         }
     }
 
-    /// As [`Source::traces`], by value.
-    ///
-    /// # Errors
-    /// Scores, which have no steps.
     pub(crate) fn into_traces(self) -> Result<TraceSet, StudyError> {
         match self {
             Self::Traces(traces) => Ok(traces),
@@ -77,10 +60,6 @@ impl Source {
     }
 }
 
-/// Opens traces and reads the labels beside them.
-///
-/// # Errors
-/// The first fault of a footer; a list of labels that cannot be read.
 pub(crate) fn labelled(inputs: &[Input]) -> Result<TraceSet, StudyError> {
     let labels = Labels::beside(inputs).map_err(TraceError::from)?;
     Ok(TraceSet::open(inputs)?.with_labels(labels)?)
@@ -92,9 +71,6 @@ fn no_steps(scores: &[ScoreFile]) -> StudyError {
 
 impl ScoreFile {
     /// The files as files of scores; `None` if they are all something else.
-    ///
-    /// # Errors
-    /// Files of scores mixed with others.
     pub fn all(inputs: &[Input]) -> Result<Option<Vec<Self>>, StudyError> {
         let scores: Vec<Self> = inputs.iter().filter_map(Self::recognise).collect();
         match scores.first() {
@@ -121,7 +97,6 @@ impl ScoreFile {
     }
 }
 
-/// The identity of an open file: inode, size, modification time.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Stamp {
     name: String,
@@ -153,7 +128,6 @@ impl FileState {
 }
 
 impl Stamp {
-    /// The current state of a file.
     pub fn of(input: &Input) -> Result<Self, StudyError> {
         let state = state_of(&input.path).map_err(|source| StudyError::file(&input.name, source))?;
         Ok(Self { name: input.name.clone(), path: input.path.clone(), state })

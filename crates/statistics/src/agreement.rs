@@ -53,7 +53,6 @@ impl PairCounts {
 
     /// Kappa with an interval at this confidence. `None` for fewer than [`FEWEST`] episodes, and if both coders give
     /// every episode the same label, so that all agreement is by chance.
-    #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
     pub fn kappa(&self, confidence: f64) -> Option<Kappa> {
         let n = self.n() as f64;
         let shares =

@@ -52,14 +52,12 @@ impl Odds {
     }
 
     /// The probability of `j + 1` successes in `n` trials divided by that of `j`.
-    #[expect(clippy::cast_precision_loss, reason = "relative weights are approximate by design")]
     fn rise(self, n: u64, j: u64) -> f64 {
         ((n - j) as f64 * self.hit as f64) / ((j + 1) as f64 * self.miss as f64)
     }
 }
 
 /// The test in integers; `None` if a weight does not fit 128 bits.
-#[expect(clippy::cast_precision_loss, reason = "exact sums become quotients here")]
 fn exact(successes: u64, n: u64, odds: Odds) -> Option<ExactTest> {
     let weights = exact_weights(n, odds)?;
     let seen = weights[usize::try_from(successes).ok()?];
@@ -72,7 +70,6 @@ fn exact(successes: u64, n: u64, odds: Odds) -> Option<ExactTest> {
     Some(ExactTest { p, mid_p })
 }
 
-#[expect(clippy::cast_precision_loss, reason = "two exact sums become one quotient here")]
 fn exact_least_p(n: u64, odds: Odds) -> Option<f64> {
     let weights = exact_weights(n, odds)?;
     let least = *weights.iter().min()?;

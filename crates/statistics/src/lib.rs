@@ -11,26 +11,52 @@
 //! Rule: integers until the last step. No metrics, tables, formatting of numbers or files here.
 
 #![warn(clippy::print_stdout, clippy::print_stderr)]
+#![expect(
+    clippy::cast_precision_loss,
+    reason = "counts and steps are far below 2^53; exact sums become a quotient last"
+)]
 
 pub mod agreement;
 pub mod chance;
-mod comparisons;
 pub mod design;
-mod durations;
 pub mod feasible;
-mod intervals;
 pub mod losses;
 pub mod outcomes;
 pub mod power;
 pub mod sample_size;
 pub mod sequential;
 
-use durations::endings;
-pub use durations::{competing, restricted, survival};
+mod comparisons {
+    pub mod contrast;
+    pub mod holm;
+    pub mod improvement;
+    pub mod letter_display;
+    pub mod margin;
+    pub mod paired;
+    pub mod stratified;
+    pub mod trend;
+    pub mod units;
+    pub mod unpaired;
+}
+mod durations {
+    pub mod competing;
+    pub(crate) mod endings;
+    pub mod restricted;
+    pub mod survival;
+}
+mod intervals {
+    pub mod bootstrap;
+    pub mod clustered;
+    pub mod coverage;
+    pub mod interval;
+    pub(crate) mod quantile;
+    pub mod random;
+}
 
 pub use comparisons::{
     contrast, holm, improvement, letter_display, margin, paired, stratified, trend, units, unpaired,
 };
-
+use durations::endings;
+pub use durations::{competing, restricted, survival};
 use intervals::quantile;
 pub use intervals::{bootstrap, clustered, coverage, interval, random};

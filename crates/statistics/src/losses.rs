@@ -29,7 +29,6 @@ pub struct Lossy {
 /// The bounds of a rate, from each episode's value and fate.
 ///
 /// The value of a lost episode is ignored, defined or not. `None` if there is nothing to count.
-#[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
 pub fn bounds(episodes: impl IntoIterator<Item = (Option<i64>, Fate)>, confidence: f64) -> Option<Lossy> {
     let (mut n, mut successes, mut lost) = (0, 0, 0);
     for (value, fate) in episodes {

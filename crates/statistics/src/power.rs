@@ -31,7 +31,6 @@ pub struct Detectable {
 ///
 /// A family of m tests under Holm's procedure needs `level / m` for its first rejection.
 /// d pairs in one direction have p = 2^(1-d); the power is a binomial tail, inverted by the beta distribution.
-#[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
 pub fn detectable(n: u64, level: f64) -> Option<Detectable> {
     let mut p = 1.0;
     let mut pairs = 1;
@@ -52,7 +51,6 @@ pub fn detectable(n: u64, level: f64) -> Option<Detectable> {
 }
 
 /// The same for two independent samples of `n` episodes each by Fisher's exact test: k successes against zero.
-#[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
 pub fn detectable_unpaired(n: u64, level: f64) -> Option<Detectable> {
     let is_enough = |k: u64| fisher((k, n), (0, n)).is_some_and(|test| test.p <= level);
     if n == 0 || !is_enough(n) {

@@ -70,7 +70,6 @@ pub fn confidence_sequence(successes: u64, n: u64, confidence: f64) -> Option<In
 ///
 /// Krichevsky and Trofimov's estimator, trial by trial: after i successes in t trials, the next one succeeds with
 /// probability (i + 1/2) / (t + 1). Plain arithmetic gives the same bits on every machine.
-#[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
 fn mixture(successes: u64, failures: u64, [success, failure]: [(u64, u64); 2]) -> Scaled {
     let step = |(above, below): (u64, u64), seen: u64, trials: u64| {
         ((2 * seen + 1) as f64 * below as f64) / (2.0 * (trials + 1) as f64 * above as f64)
@@ -80,7 +79,6 @@ fn mixture(successes: u64, failures: u64, [success, failure]: [(u64, u64); 2]) -
 }
 
 /// The rate below the observed one at which the log-likelihood has fallen to `least`; 0 without successes.
-#[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
 fn lower(successes: u64, failures: u64, least: f64) -> f64 {
     if successes == 0 {
         return 0.0;

@@ -7,7 +7,6 @@ use exact::moments::{Moments, StandardError};
 /// (Newcombe 1998, Statistics in Medicine 17:873, method 10).
 ///
 /// `None` if either rate has no interval.
-#[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
 pub fn newcombe(first: (u64, u64), second: (u64, u64), confidence: f64) -> Option<Interval> {
     let (a, b) = (wilson(first.0, first.1, confidence)?, wilson(second.0, second.1, confidence)?);
     let (p, q) = (first.0 as f64 / first.1 as f64, second.0 as f64 / second.1 as f64);
@@ -22,7 +21,6 @@ pub fn newcombe(first: (u64, u64), second: (u64, u64), confidence: f64) -> Optio
 /// freedom by Satterthwaite 1946).
 ///
 /// Always from sample standard errors. `None` if either side has fewer than two values, or if neither has a spread.
-#[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
 pub fn welch(first: &Moments, second: &Moments, confidence: f64) -> Option<Interval> {
     let difference = first.mean()? - second.mean()?;
     let part = |moments: &Moments| moments.se(StandardError::Sample).map(|se| (se * se, (moments.n - 1) as f64));

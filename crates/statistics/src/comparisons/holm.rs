@@ -11,7 +11,6 @@ pub fn level(confidence: f64) -> Option<f64> {
 ///
 /// Compare an adjusted value with the level of the whole family. Values are in input order; each is at least its own p
 /// value and at most 1.
-#[expect(clippy::cast_precision_loss, reason = "a family has few tests")]
 pub fn holm(p_values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..p_values.len()).collect();
     order.sort_by(|&a, &b| p_values[a].total_cmp(&p_values[b]));

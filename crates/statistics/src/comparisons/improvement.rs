@@ -71,7 +71,6 @@ impl Ranked {
 
     /// From the number of draws of each rank on either side: twice the Mann-Whitney statistic, an integer, divided by
     /// twice its maximum.
-    #[expect(clippy::cast_precision_loss, reason = "exact counts become one quotient here")]
     fn probability(&self, [first, second]: &[Vec<u64>; 2]) -> f64 {
         let (mut below, mut twice) = (0, 0);
         for (x, y) in first.iter().zip(second) {
@@ -99,7 +98,6 @@ fn tally(ranks: impl Iterator<Item = usize>, levels: usize) -> Vec<u64> {
     counts
 }
 
-#[expect(clippy::cast_precision_loss, reason = "strata are few")]
 fn average(values: impl ExactSizeIterator<Item = f64>) -> f64 {
     let count = values.len() as f64;
     values.sum::<f64>() / count

@@ -40,7 +40,6 @@ struct Sides {
     n: [f64; 2],
 }
 
-#[expect(clippy::cast_precision_loss, reason = "counts of units are far below 2^53")]
 impl Units {
     fn pairs(&self) -> Option<Pairs> {
         let differences = || self.shared.iter().map(|(a, b)| a - b);
@@ -120,7 +119,6 @@ pub struct Spread {
 
 impl Spread {
     /// The spread implied by the interval of a mean difference.
-    #[expect(clippy::cast_precision_loss, reason = "counts of units are far below 2^53")]
     pub fn of_interval(gain: f64, interval: Interval, confidence: f64, units: u64) -> Self {
         let se = (interval.high - interval.low) / (2.0 * normal(f64::midpoint(1.0, confidence)));
         Self { gain, variance: units as f64 * se * se, units }
@@ -250,7 +248,6 @@ fn likelihood(factorials: &[f64], counts: &[usize], chances: &[f64]) -> f64 {
     (factorials[n] + counts.iter().zip(chances).map(term).sum::<f64>()).exp()
 }
 
-#[expect(clippy::cast_precision_loss, reason = "a count of units")]
 const fn real(count: usize) -> f64 {
     count as f64
 }

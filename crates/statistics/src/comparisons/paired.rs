@@ -44,7 +44,6 @@ impl Pairs {
     }
 
     /// The first rate minus the second; `None` without pairs.
-    #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
     pub fn difference(self) -> Option<f64> {
         (self.n() > 0).then(|| (self.first_only as f64 - self.second_only as f64) / self.n() as f64)
     }
@@ -107,7 +106,6 @@ impl Pairs {
     }
 
     /// Newcombe's phi: continuity-corrected towards 0 if positive, 0 if a margin is empty.
-    #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
     fn correlation(self) -> f64 {
         let [a, b, c, d] = [self.both, self.first_only, self.second_only, self.neither].map(|count| count as f64);
         let margins = (a + b) * (c + d) * (a + c) * (b + d);
@@ -124,7 +122,6 @@ struct Arms {
 }
 
 impl Arms {
-    #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
     fn of(successes: u64, n: u64, confidence: f64) -> Option<Self> {
         let rate = successes as f64 / n as f64;
         wilson(successes, n, confidence).map(|bounds| Self { down: rate - bounds.low, up: bounds.high - rate })

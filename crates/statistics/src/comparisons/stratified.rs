@@ -138,7 +138,6 @@ struct Term {
 }
 
 impl Term {
-    #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
     fn of(stratum: &Stratum) -> Self {
         let ((x, m), (y, n)) = (stratum.first, stratum.second);
         Self { seen: x, stratum: *stratum, x: x as f64, m: m as f64, y: y as f64, n: n as f64 }

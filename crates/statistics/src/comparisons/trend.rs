@@ -40,7 +40,6 @@ pub fn cochran_armitage<S: AsRef<[(f64, bool)]>>(strata: &[S]) -> Option<Trend> 
 }
 
 /// The sum of the successes' doses minus its mean over all permutations, and its variance.
-#[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
 fn term(stratum: &[(f64, bool)]) -> (f64, f64) {
     let n = stratum.len() as f64;
     if stratum.len() < 2 {

@@ -24,7 +24,6 @@ pub fn fisher_least_p(first: (u64, u64), second: (u64, u64)) -> Option<f64> {
 /// The possible successes of the first side given the margins: the hypergeometric distribution.
 ///
 /// `None` if a side has no episodes, or more successes than episodes.
-#[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
 pub(crate) fn tables((k, m): (u64, u64), (l, n): (u64, u64)) -> Option<Outcomes> {
     if m == 0 || n == 0 || k > m || l > n {
         return None;

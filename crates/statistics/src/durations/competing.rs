@@ -43,7 +43,6 @@ pub(crate) struct Influence {
 
 impl Incidence {
     /// The curve of these episodes; `None` without any.
-    #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
     pub fn of(endings: &[Ending]) -> Option<Self> {
         let (mut is_correct, mut is_wrong) = (0.0, 0.0);
         let of_step = |RiskSet { steps, at_risk, ended, before, .. }: RiskSet| {
@@ -91,7 +90,6 @@ impl Incidence {
         self.points.first().map_or(0, |first| first.at_risk as u64)
     }
 
-    #[expect(clippy::cast_precision_loss, reason = "steps are far below 2^53")]
     pub(crate) fn mean(&self, horizon: i64) -> f64 {
         let area: f64 = self.early(horizon).map(|point| point.gain(horizon) * point.correct / point.at_risk).sum();
         horizon as f64 - area
@@ -136,7 +134,6 @@ impl Incidence {
 }
 
 impl Point {
-    #[expect(clippy::cast_precision_loss, reason = "steps are far below 2^53")]
     fn gain(&self, horizon: i64) -> f64 {
         self.before * (horizon - self.steps) as f64
     }

@@ -36,7 +36,6 @@ pub(crate) struct RiskSet {
 }
 
 /// The steps in which an episode ended, ascending. A decision in a step comes before censoring in that step.
-#[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
 pub(crate) fn risk_sets(endings: &[Ending]) -> Vec<RiskSet> {
     let mut ends: BTreeMap<i64, [u64; 3]> = BTreeMap::new();
     for ending in endings {

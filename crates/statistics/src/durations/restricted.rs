@@ -39,7 +39,6 @@ pub struct Difference {
 /// The difference between two independent sets of episodes (Royston and Parmar 2013; degrees of freedom by Satterthwaite 1946).
 ///
 /// `None` if either curve is not known up to the horizon, and for a confidence outside (0, 1).
-#[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
 pub fn independent(first: &[Ending], second: &[Ending], horizon: i64, confidence: f64) -> Option<Difference> {
     let means = Means::of(first.iter().copied(), second.iter().copied(), horizon, confidence)?;
     let squares = |influence: &Influence, endings: &[Ending]| -> f64 {
@@ -54,7 +53,6 @@ pub fn independent(first: &[Ending], second: &[Ending], horizon: i64, confidence
 ///
 /// With complete durations this is the mean of the differences and its sample standard error.
 /// `None` as in [`independent`].
-#[expect(clippy::cast_precision_loss, reason = "counts of pairs are far below 2^53")]
 pub fn paired(pairs: &[(Ending, Ending)], horizon: i64, confidence: f64) -> Option<Difference> {
     let (first, second) = (pairs.iter().map(|pair| pair.0), pairs.iter().map(|pair| pair.1));
     let means = Means::of(first, second, horizon, confidence)?;
@@ -82,7 +80,6 @@ pub fn by_units(units: &Sides, horizon: i64, confidence: f64) -> Option<Differen
 }
 
 /// A mean, its squared standard error, and the degrees of freedom of the latter.
-#[expect(clippy::cast_precision_loss, reason = "few units")]
 fn mean_of(values: &[f64]) -> (f64, (f64, f64)) {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
@@ -116,7 +113,6 @@ impl Means {
     }
 }
 
-#[expect(clippy::cast_precision_loss, reason = "steps are far below 2^53")]
 fn tested(horizon: i64, difference: f64, (variance, freedom): (f64, f64), confidence: f64) -> Option<Difference> {
     quantile::tail(confidence)?;
     let (se, most) = (variance.sqrt(), horizon as f64);

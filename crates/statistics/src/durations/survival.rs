@@ -58,7 +58,6 @@ pub struct MedianInterval {
 impl RestrictedMean {
     /// The estimate from `n` episodes, with its interval; `variance` divides by n. `None` for confidence outside (0,
     /// 1).
-    #[expect(clippy::cast_precision_loss, reason = "steps and counts are far below 2^53")]
     pub(crate) fn of(horizon: i64, mean: f64, variance: f64, n: u64, confidence: f64) -> Option<Self> {
         quantile::tail(confidence)?;
         let se = (variance * small_sample(n)).sqrt();
@@ -72,13 +71,11 @@ impl RestrictedMean {
     }
 }
 
-#[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
 pub(crate) fn small_sample(n: u64) -> f64 {
     if n > 1 { n as f64 / (n - 1) as f64 } else { 1.0 }
 }
 
 /// Returns true if a standard error exceeds the rounding of steps up to `horizon`.
-#[expect(clippy::cast_precision_loss, reason = "steps are far below 2^53")]
 pub(crate) fn has_spread(se: f64, horizon: i64) -> bool {
     se > 1e-12 * horizon as f64
 }
@@ -116,7 +113,6 @@ impl Survival {
     ///
     /// `None` for a horizon that is not positive or beyond the known part of the curve, and for a confidence outside
     /// (0, 1).
-    #[expect(clippy::cast_precision_loss, reason = "steps and counts are far below 2^53")]
     pub fn restricted_mean(&self, horizon: i64, confidence: f64) -> Option<RestrictedMean> {
         if horizon <= 0 || self.known_until().is_some_and(|known| known < horizon) {
             return None;
@@ -138,7 +134,6 @@ impl Survival {
     /// curve there, Greenwood's after the transformation log(-log) (Borgan and Liestol 1990).
     ///
     /// `None` if not even the lower bound is observed, and for a confidence outside (0, 1).
-    #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
     pub fn median_interval(&self, confidence: f64) -> Option<MedianInterval> {
         let z = quantile::normal(quantile::tail(confidence)?);
         let (mut sum, mut low) = (0.0, None);

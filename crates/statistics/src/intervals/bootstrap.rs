@@ -22,7 +22,6 @@ pub const SEED: u64 = 0x6d69_7272_6f72;
 ///
 /// `None` for fewer than two values, for more than [`MOST_VALUES`], and for a confidence outside (0, 1). The bounds
 /// coincide if all values are equal: resampling has no more information.
-#[expect(clippy::cast_precision_loss, reason = "exact sums become one quotient here")]
 pub fn mean(values: &[i64], confidence: f64) -> Option<Interval> {
     let tail = quantile::tail(confidence)?;
     let n = values.len();
@@ -60,7 +59,6 @@ impl Correction {
     }
 }
 
-#[expect(clippy::cast_precision_loss, reason = "at most the number of resamples")]
 fn bias(sums: &[i128], total: i128) -> f64 {
     let below = sums.partition_point(|&sum| sum < total);
     let not_above = sums.partition_point(|&sum| sum <= total);
@@ -70,7 +68,6 @@ fn bias(sums: &[i128], total: i128) -> f64 {
     if share <= 0.5 { -quantile::normal(share) } else { quantile::normal(1.0 - share) }
 }
 
-#[expect(clippy::cast_precision_loss, reason = "exact sums become one quotient here")]
 fn acceleration(values: &[i64], total: i128) -> f64 {
     let size = values.len() as i128;
     let deviations = values.iter().map(|&value| (i128::from(value) * size - total) as f64);
@@ -80,12 +77,7 @@ fn acceleration(values: &[i64], total: i128) -> f64 {
 }
 
 /// The index of the resample at `level` of the distribution, of [`RESAMPLES`] in ascending order.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "clamped to an index"
-)]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to an index")]
 pub(crate) fn rank(level: f64) -> usize {
     let position = (level * (RESAMPLES + 1) as f64).round();
     (position.clamp(1.0, RESAMPLES as f64) as usize).saturating_sub(1)

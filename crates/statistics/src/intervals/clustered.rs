@@ -46,7 +46,6 @@ pub struct Clustered {
 ///
 /// Clusters without values do not count. `None` for fewer than two clusters, for a confidence outside (0, 1), and if
 /// 128 bits do not suffice.
-#[expect(clippy::cast_precision_loss, reason = "counts are small; exact sums become one quotient here")]
 pub fn clustered(clusters: &[Moments], confidence: f64) -> Option<Clustered> {
     let parts: Vec<Moments> = clusters.iter().copied().filter(|part| part.n > 0).collect();
     let between = parts.len().checked_sub(1).filter(|&between| between > 0)? as f64;
@@ -66,7 +65,6 @@ pub fn clustered(clusters: &[Moments], confidence: f64) -> Option<Clustered> {
 }
 
 /// The same for clusters of values 0 and 1: the bounds are inside (0, 1).
-#[expect(clippy::cast_precision_loss, reason = "counts are small; exact sums become one quotient here")]
 pub fn clustered_rate(clusters: &[Moments], confidence: f64) -> Option<Clustered> {
     let found = clustered(clusters, confidence)?;
     let (sum, n) = clusters.iter().fold((0, 0), |(sum, n), part| (sum + part.sum, n + part.n));
@@ -84,7 +82,6 @@ pub fn clustered_rate(clusters: &[Moments], confidence: f64) -> Option<Clustered
 /// The variance between clusters, at least 0, and the variance within them, by analysis of variance (Donner 1986).
 ///
 /// `None` for fewer than two clusters, and if each has one value.
-#[expect(clippy::cast_precision_loss, reason = "few clusters")]
 pub fn variance_components(clusters: &[Moments]) -> Option<(f64, f64)> {
     let parts: Vec<Moments> = clusters.iter().copied().filter(|part| part.n > 0).collect();
     let freedom = parts.len().checked_sub(1).filter(|&freedom| freedom > 0)? as f64;
@@ -121,7 +118,6 @@ impl Whole {
         self.n.checked_mul(part.sum)?.checked_sub(self.sum.checked_mul(part.n.into())?)
     }
 
-    #[expect(clippy::cast_precision_loss, reason = "exact sums become quotients here")]
     fn mean_squares(&self, parts: &[Moments], between_freedom: f64) -> Option<[f64; 3]> {
         let n = self.n as f64;
         let within_freedom = n - parts.len() as f64;

@@ -39,7 +39,6 @@ impl Interval {
 /// The default: its coverage stays near the nominal one at n = 21, also close to 0 and 1. The lower bound without
 /// successes is exactly 0, the upper bound without failures exactly 1. `None` for n = 0, for more successes than n, and
 /// for a confidence outside (0, 1).
-#[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
 pub fn wilson(successes: u64, n: u64, confidence: f64) -> Option<Interval> {
     let failures = counted(successes, n)?;
     let z = quantile::normal(quantile::tail(confidence)?);
@@ -66,7 +65,6 @@ pub fn jeffreys(successes: u64, n: u64, confidence: f64) -> Option<Interval> {
     equal_tails(successes, n, confidence, [(0.5, 0.5), (0.5, 0.5)])
 }
 
-#[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
 fn equal_tails(successes: u64, n: u64, confidence: f64, prior: [(f64, f64); 2]) -> Option<Interval> {
     let failures = counted(successes, n)?;
     let tail = quantile::tail(confidence)?;
@@ -87,7 +85,6 @@ fn equal_tails(successes: u64, n: u64, confidence: f64, prior: [(f64, f64); 2]) 
 /// `form` is the standard error that the metric's definition asks for. `None` for n < 2, where neither form can
 /// estimate a spread, and for a confidence outside (0, 1). The bounds coincide if all values are equal: the method has
 /// no more information.
-#[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
 pub fn student_t(moments: &Moments, form: StandardError, confidence: f64) -> Option<Interval> {
     let freedom = moments.n.checked_sub(1)?;
     student_t_of(moments.mean()?, moments.se(form)?, freedom as f64, confidence)

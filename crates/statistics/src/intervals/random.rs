@@ -25,7 +25,6 @@ impl SplitMix64 {
     }
 
     /// A number in [0, 1), a multiple of 2^-53.
-    #[expect(clippy::cast_precision_loss, reason = "53 bits fit a float exactly")]
     pub fn unit(&mut self) -> f64 {
         (self.next_bits() >> 11) as f64 / (1u64 << 53) as f64
     }

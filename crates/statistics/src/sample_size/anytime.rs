@@ -44,7 +44,6 @@ impl Anytime {
     }
 
     /// The expected number of episodes of a study that stops at its first rejection, or after `n`.
-    #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
     pub fn expected(&mut self, n: u64) -> f64 {
         self.run(n);
         let looks = (1..).zip(&self.stopped).take_while(|(look, _)| look * self.every <= n);

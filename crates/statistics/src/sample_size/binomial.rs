@@ -3,12 +3,7 @@
 //! Rule: only additions, products and quotients, so all machines get the same bits. Underflow gives 0.
 
 /// The probability of each number of successes in `n` trials with this rate.
-#[expect(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "counts of episodes"
-)]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "counts of episodes")]
 pub(crate) fn probabilities(n: u64, rate: f64) -> Vec<f64> {
     let rate = rate.clamp(0.0, 1.0);
     let mode = (((n + 1) as f64 * rate) as u64).min(n);

@@ -4,19 +4,15 @@
 //! by seed. The power of an exact test rises in a sawtooth, so sizes are tried one by one from below.
 
 mod anytime;
-pub mod binomial;
-mod fisher;
-mod mcnemar;
-mod one_rate;
+mod binomial;
+mod exact_tests;
 mod seeds;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use self::anytime::{Anytime, MOST_AT_LOOKS};
-pub use self::fisher::Fisher;
-pub use self::mcnemar::McNemar;
-pub use self::one_rate::OneRate;
+pub use self::exact_tests::{Fisher, McNemar, OneRate};
 pub use self::seeds::{BySeed, SEED, STUDIES, Seeds};
 pub use super::quantile::settled;
 

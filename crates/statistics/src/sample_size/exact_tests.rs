@@ -1,7 +1,51 @@
-//! Unpaired episodes of two models: Fisher's exact test.
+//! The exact tests of fixed size: pairs (`McNemar`), unpaired episodes (Fisher), one rate against a level (binomial).
 
 use super::binomial::{from_mode, likely, probabilities};
 use super::{Power, Rates, TIE};
+use crate::chance;
+use exact::ratio::Ratio;
+
+/// The exact two-sided test of no difference over pairs, whose power depends only on the discordant pairs.
+#[derive(Clone, Debug)]
+pub struct McNemar {
+    level: f64,
+    discordance: f64,
+    favours: f64,
+    rejects: Vec<f64>,
+}
+
+impl McNemar {
+    /// Pairs with the discordant share `discordance`, so that the rates are `difference` apart.
+    ///
+    /// The discordance is at least the difference.
+    pub fn new(level: f64, difference: f64, discordance: f64) -> Self {
+        let share = if discordance > 0.0 { difference / discordance } else { 0.0 };
+        Self { level, discordance, favours: f64::midpoint(1.0, share).min(1.0), rejects: Vec::new() }
+    }
+
+    /// The probability of a rejection with this number of discordant pairs: both tails of the binomial, up to the count
+    /// at which twice the tail under 1/2 is at most the level.
+    fn rejects(&self, discordant: u64) -> f64 {
+        let even = probabilities(discordant, 0.5);
+        let mut tail = 0.0;
+        let within = |probability: &&f64| {
+            tail += **probability;
+            2.0 * tail <= self.level * (1.0 + TIE)
+        };
+        let reach = even.iter().take_while(within).count();
+        let true_ones = probabilities(discordant, self.favours);
+        true_ones[..reach].iter().sum::<f64>() + true_ones[true_ones.len() - reach..].iter().sum::<f64>()
+    }
+}
+
+impl Power for McNemar {
+    fn power(&mut self, n: u64) -> f64 {
+        for discordant in self.rejects.len() as u64..=n {
+            self.rejects.push(self.rejects(discordant));
+        }
+        probabilities(n, self.discordance).iter().zip(&self.rejects).map(|(a, b)| a * b).sum()
+    }
+}
 
 /// The exact two-sided test of no difference between two rates with equal numbers of episodes, by probability: a table
 /// is extreme if it is at most as probable as the observed one, given the totals.
@@ -33,7 +77,6 @@ fn at(count: u64) -> usize {
     usize::try_from(count).expect("a count of episodes")
 }
 
-#[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
 fn rejections(n: u64, total: u64, level: f64) -> Vec<bool> {
     let first = total.saturating_sub(n);
     let last = total.min(n);
@@ -64,4 +107,24 @@ fn rejections(n: u64, total: u64, level: f64) -> Vec<bool> {
         }
     }
     rejects
+}
+
+/// The exact two-sided test of one rate against a level of chance.
+#[derive(Clone, Copy, Debug)]
+pub struct OneRate {
+    /// The level that p must not exceed.
+    pub level: f64,
+    /// The rate under the null hypothesis.
+    pub chance: Ratio,
+    /// The true rate.
+    pub rate: f64,
+}
+
+impl Power for OneRate {
+    fn power(&mut self, n: u64) -> f64 {
+        let probabilities = probabilities(n, self.rate);
+        let rejects = |successes: &u64| chance::two_sided(*successes, n, self.chance).is_some_and(|p| p <= self.level);
+        let counts = likely(&probabilities).filter(rejects);
+        counts.map(|successes| probabilities[at(successes)]).sum()
+    }
 }

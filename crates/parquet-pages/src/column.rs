@@ -97,9 +97,7 @@ impl Column {
 
     /// The distinct values of the rows; may include unused values and duplicates.
     pub fn entries(&self) -> &ArrayRef {
-        let values = match self {
-            Self::Flat(values) | Self::Runs(Runs { values, .. }) | Self::Keys(Keys { values, .. }) => values,
-        };
+        let (Self::Flat(values) | Self::Runs(Runs { values, .. }) | Self::Keys(Keys { values, .. })) = self;
         values.as_any_dictionary_opt().map_or(values, |texts| texts.values())
     }
 
@@ -153,8 +151,7 @@ impl Column {
     }
 
     fn holds_texts(&self) -> bool {
-        let (Self::Flat(values) | Self::Runs(Runs { values, .. }) | Self::Keys(Keys { values, .. })) = self;
-        matches!(values.data_type(), DataType::Dictionary(_, _) | DataType::Utf8)
+        matches!(self.data_type(), DataType::Dictionary(_, _) | DataType::Utf8)
     }
 }
 
@@ -183,12 +180,6 @@ fn joined_texts(parts: &[&Column]) -> Result<ArrayRef, ArrowError> {
 /// A position in an array of texts, which has at most 2^31.
 fn narrow_key(place: usize) -> Result<i32, ArrowError> {
     i32::try_from(place).map_err(|_| ArrowError::OffsetOverflowError(place))
-}
-
-impl From<ArrayRef> for Column {
-    fn from(values: ArrayRef) -> Self {
-        Self::Flat(values)
-    }
 }
 
 impl Keys {

@@ -141,7 +141,7 @@ mod tests {
             let keyed = Column::Keys(Keys::new(keys, texts(length)).unwrap());
             let keys: Int32Array = vec![Some(0), None, Some(1), Some(0), Some(0)].into();
             let flat = Arc::new(DictionaryArray::<Int32Type>::try_new(keys, texts(length)).unwrap()) as ArrayRef;
-            assert_eq!((bytes_of_texts(&keyed), bytes_of_texts(&flat.into())), (expected, expected));
+            assert_eq!((bytes_of_texts(&keyed), bytes_of_texts(&Column::Flat(flat))), (expected, expected));
         }
     }
 }

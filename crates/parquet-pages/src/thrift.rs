@@ -6,8 +6,6 @@
 //!
 //! Source: the Thrift project's "Thrift Compact protocol encoding".
 
-use std::fmt;
-
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Wire {
     True,
@@ -28,21 +26,14 @@ pub(crate) enum Wire {
 /// The deepest nesting of structures; Parquet's own have fewer than ten levels.
 const DEEPEST: u8 = 32;
 
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum Fault {
     /// The bytes end before the structure does.
+    #[error("one that goes on beyond its end")]
     Ends,
     /// The bytes are invalid, whatever follows.
+    #[error("{0}")]
     Invalid(&'static str),
-}
-
-impl fmt::Display for Fault {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Ends => f.write_str("one that goes on beyond its end"),
-            Self::Invalid(why) => f.write_str(why),
-        }
-    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -116,7 +107,6 @@ impl<'a> Compact<'a> {
             Wire::Uuid => self.bytes(16),
             Wire::Binary => {
                 let length = self.varint()?;
-                let length = self.within(length)?;
                 self.bytes(length)
             }
             Wire::Struct => {
@@ -153,8 +143,8 @@ impl<'a> Compact<'a> {
         Ok(byte)
     }
 
-    fn bytes(&mut self, count: usize) -> Result<(), Fault> {
-        self.at += self.within(count as u64)?;
+    fn bytes(&mut self, count: u64) -> Result<(), Fault> {
+        self.at += self.within(count)?;
         Ok(())
     }
 

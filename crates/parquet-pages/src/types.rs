@@ -42,26 +42,23 @@ pub enum Refused {
 /// A column from the Parquet library, converted to `held`: truth values, 64 bits, or [`text_type`]. Checks that keys
 /// have values and texts are UTF-8.
 pub fn normal_column(column: &ArrayRef, held: &DataType) -> Result<ArrayRef, Refused> {
-    match column.data_type() {
-        same if same == held => {
-            if *held == text_type() {
-                check_keys(column)?;
-                check_texts(column)?;
-            }
-            Ok(Arc::clone(column))
+    if column.data_type() == held {
+        if *held == text_type() {
+            check_keys(column)?;
+            check_texts(column)?;
         }
-        DataType::Null => Ok(new_null_array(held, column.len())),
-        DataType::UInt64 => {
-            let values = column.as_primitive::<UInt64Type>();
-            let too_large =
-                (0..values.len()).find(|row| values.is_valid(*row) && i64::try_from(values.value(*row)).is_err());
-            match too_large {
-                Some(row) => Err(Refused::TooLarge { row, value: values.value(row) }),
-                None => cast(column, held).map_err(|error| Refused::Unreadable(error.to_string())),
-            }
-        }
-        _ => cast(column, held).map_err(|error| Refused::Unreadable(error.to_string())),
+        return Ok(Arc::clone(column));
     }
+    if *column.data_type() == DataType::Null {
+        return Ok(new_null_array(held, column.len()));
+    }
+    if let Some(values) = column.as_primitive_opt::<UInt64Type>()
+        && let Some(row) =
+            (0..values.len()).find(|row| values.is_valid(*row) && values.value(*row) > i64::MAX.cast_unsigned())
+    {
+        return Err(Refused::TooLarge { row, value: values.value(row) });
+    }
+    cast(column, held).map_err(|error| Refused::Unreadable(error.to_string()))
 }
 
 /// Checks that every key that is not null has a value that is not null.

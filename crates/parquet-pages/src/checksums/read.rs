@@ -35,12 +35,15 @@ pub struct ChunkChecksums {
     columns: usize,
 }
 
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Fault {
     /// They cannot be read, or are not those of the file's chunks: what is there.
+    #[error("expected checksums under `{KEY}`, found {0}")]
     Malformed(String),
     /// The footer contradicts its own: expected and found.
+    #[error("expected a footer with the CRC-32 {0:08x}, found {1:08x}")]
     Footer(u32, u32),
+    #[error("{0}")]
     Unreadable(String),
 }
 
@@ -196,16 +199,4 @@ pub fn verify_file(file: &impl ChunkReader, metadata: &ParquetMetaData) -> Resul
         }
     }
     Ok(())
-}
-
-impl std::fmt::Display for Fault {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Malformed(found) => write!(f, "expected checksums under `{KEY}`, found {found}"),
-            Self::Footer(expected, found) => {
-                write!(f, "expected a footer with the CRC-32 {expected:08x}, found {found:08x}")
-            }
-            Self::Unreadable(why) => f.write_str(why),
-        }
-    }
 }

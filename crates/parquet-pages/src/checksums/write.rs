@@ -75,9 +75,7 @@ impl<W: Write> Held<W> {
         stated.footer = Checksum(crc32fast::hash(summed));
         let digits = digits(open.len());
         self.bytes[place..][digits.clone()].copy_from_slice(&stated.json().as_bytes()[digits]);
-        self.out.write_all(&self.bytes)?;
-        self.out.flush()?;
-        Ok(self.out)
+        self.release()
     }
 }
 

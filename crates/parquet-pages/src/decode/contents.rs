@@ -56,10 +56,6 @@ impl Texts {
         }
     }
 
-    fn other_page(&mut self) {
-        self.writes_out = true;
-    }
-
     fn take(&mut self) -> u64 {
         if self.writes_out {
             self.added = self.added.saturating_add(std::mem::take(&mut self.behind_keys));
@@ -70,12 +66,6 @@ impl Texts {
 
 /// The problem of a page: expected and found.
 type Fault = (&'static str, String);
-
-/// The number of rows of a data page, and the number of nulls if it is declared.
-struct Declared {
-    rows: usize,
-    nulls: Option<usize>,
-}
 
 impl Contents {
     pub(crate) fn new(column: &ColumnDescriptor, writes_out: bool) -> Self {
@@ -90,6 +80,7 @@ impl Contents {
         }
     }
 
+    /// Returns the number of bytes of written-out texts that the page adds.
     pub(crate) fn check(&mut self, page: &Page) -> Result<u64, Fault> {
         self.check_page(page)?;
         Ok(self.texts.take())
@@ -107,12 +98,12 @@ impl Contents {
                 Ok(())
             }
             Page::DataPage { buf, num_values, encoding, def_level_encoding, .. } => {
-                let declared = Declared { rows: *num_values as usize, nulls: None };
+                let rows = (*num_values as usize, None);
                 match (self.optional, def_level_encoding) {
-                    (false, _) => self.data(&declared, None, buf, *encoding),
+                    (false, _) => self.data(rows, None, buf, *encoding),
                     (true, Encoding::RLE) => {
                         let (levels, values) = prefixed(buf).map_err(|Unsupported| levels("fewer bytes"))?;
-                        self.data(&declared, Some(levels), &values, *encoding)
+                        self.data(rows, Some(levels), &values, *encoding)
                     }
                     // One bit per level is always 0 or 1.
                     (true, _) => Ok(()),
@@ -126,36 +117,37 @@ impl Contents {
                 if end > buf.len() {
                     return Err(levels("fewer bytes"));
                 }
-                let declared = Declared { rows: *num_values as usize, nulls: Some(*num_nulls as usize) };
-                no_levels(buf.slice(..start), declared.rows)?;
+                let rows = *num_values as usize;
+                no_levels(buf.slice(..start), rows)?;
                 let levels = buf.slice(start..end);
                 if !self.optional {
-                    no_levels(levels.clone(), declared.rows)?;
+                    no_levels(levels.clone(), rows)?;
                 }
-                self.data(&declared, self.optional.then_some(levels), &buf.slice(end..), *encoding)
+                let declared = (rows, Some(*num_nulls as usize));
+                self.data(declared, self.optional.then_some(levels), &buf.slice(end..), *encoding)
             }
         }
     }
 
+    /// Checks a data page of this number of rows, and of nulls if it is declared.
     fn data(
         &mut self,
-        declared: &Declared,
+        (rows, nulls): (usize, Option<usize>),
         stored: Option<Bytes>,
         values: &Bytes,
         encoding: Encoding,
     ) -> Result<(), Fault> {
         let count = match stored {
-            Some(stored) => ones(stored, declared.rows)
-                .map_err(|Unsupported| levels("runs of another length, or levels above 1"))?,
-            None => declared.rows,
+            Some(stored) => {
+                ones(stored, rows).map_err(|Unsupported| levels("runs of another length, or levels above 1"))?
+            }
+            None => rows,
         };
-        if let Some(nulls) = declared.nulls
-            && nulls + count != declared.rows
-        {
-            return Err(("as many nulls as its header says", format!("{}, not {nulls}", declared.rows - count)));
+        if let Some(nulls) = nulls.filter(|nulls| nulls + count != rows) {
+            return Err(("as many nulls as its header says", format!("{}, not {nulls}", rows - count)));
         }
         if !matches!(encoding, Encoding::RLE_DICTIONARY | Encoding::PLAIN_DICTIONARY) {
-            self.texts.other_page();
+            self.texts.writes_out = true;
         }
         match (encoding, self.physical) {
             (Encoding::RLE_DICTIONARY | Encoding::PLAIN_DICTIONARY, _) => self.dictionary(values, count),

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use arrow::array::{ArrayRef, BooleanArray};
-use arrow::buffer::NullBuffer;
+use arrow::buffer::{BooleanBuffer, NullBuffer};
 use arrow::datatypes::DataType;
 use bytes::Bytes;
 use parquet::basic::{Encoding, Type as Physical};
@@ -11,7 +11,6 @@ use parquet::column::page::{Page, PageReader as _};
 
 use super::dictionary::Dictionary;
 use super::rle::{Hybrid, Number, Span, prefixed};
-use super::spread::{spread_bits, spread_keys};
 use crate::bits::Bits;
 use crate::column::{Column, Runs};
 use crate::error::{FaultSlot, Unsupported};
@@ -362,4 +361,28 @@ fn validity(levels: &mut Hybrid, count: usize, nulls: &mut Bits) -> Result<usize
         valid += ones;
     }
     Ok(valid)
+}
+
+/// Moves values, which are stored without nulls between them, to their rows.
+fn spread_keys<N: Number>(keys: &[N], valid: &BooleanBuffer) -> Vec<N> {
+    let mut spread = vec![N::default(); valid.len()];
+    let mut keys = keys;
+    for (start, end) in valid.set_slices() {
+        let (here, rest) = keys.split_at(keys.len().min(end - start));
+        spread[start..start + here.len()].copy_from_slice(here);
+        keys = rest;
+    }
+    spread
+}
+
+fn spread_bits(bits: &BooleanBuffer, valid: &BooleanBuffer) -> BooleanBuffer {
+    let mut spread = Bits::with_capacity(valid.len());
+    let mut taken = bits.offset();
+    for (start, end) in valid.set_slices() {
+        spread.fill(start - spread.count(), false);
+        spread.append(bits.values(), taken, end - start);
+        taken += end - start;
+    }
+    spread.fill(valid.len() - spread.count(), false);
+    spread.finish()
 }

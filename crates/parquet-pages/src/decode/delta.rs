@@ -33,7 +33,7 @@ pub(crate) fn sum(data: &[u8]) -> Result<u64, Unsupported> {
     if count == 0 {
         return Ok(0);
     }
-    let mut sum = Sum { value: first, total: u64::try_from(first).map_err(|_| Unsupported)? };
+    let (mut value, mut sum) = (first, u64::try_from(first).map_err(|_| Unsupported)?);
     let small_block = block / small_blocks;
     let mut left = count - 1;
     while left > 0 {
@@ -47,28 +47,15 @@ pub(crate) fn sum(data: &[u8]) -> Result<u64, Unsupported> {
             }
             let values = small_block.min(left);
             let packed = data.get(at..).ok_or(Unsupported)?;
-            for value in 0..values {
-                sum.add(least.wrapping_add(bits(packed, value * width, width)?.cast_signed()))?;
+            for place in 0..values {
+                value = value.wrapping_add(least.wrapping_add(bits(packed, place * width, width)?.cast_signed()));
+                sum = sum.saturating_add(u64::try_from(value).map_err(|_| Unsupported)?);
             }
             left -= values;
             at = at.saturating_add(usize::try_from(small_block.saturating_mul(width) / 8).map_err(|_| Unsupported)?);
         }
     }
-    Ok(sum.total)
-}
-
-struct Sum {
-    value: i64,
-    total: u64,
-}
-
-impl Sum {
-    fn add(&mut self, delta: i64) -> Result<(), Unsupported> {
-        self.value = self.value.wrapping_add(delta);
-        let value = u64::try_from(self.value).map_err(|_| Unsupported)?;
-        self.total = self.total.saturating_add(value);
-        Ok(())
-    }
+    Ok(sum)
 }
 
 fn bits(packed: &[u8], from: u64, width: u64) -> Result<u64, Unsupported> {

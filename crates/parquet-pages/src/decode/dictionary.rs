@@ -32,13 +32,9 @@ impl Dictionary {
     /// Integers of 32 or 64 bits.
     pub(crate) fn ints(data: &[u8], count: usize, long: bool) -> Result<Self, Unsupported> {
         let ints: Vec<i64> = if long {
-            data.chunks_exact(8)
-                .filter_map(|bytes| bytes.first_chunk())
-                .map(|bytes| i64::from_le_bytes(*bytes))
-                .collect()
+            data.as_chunks().0.iter().map(|bytes| i64::from_le_bytes(*bytes)).collect()
         } else {
-            let ints = data.chunks_exact(4).filter_map(|bytes| bytes.first_chunk());
-            ints.map(|bytes| i64::from(i32::from_le_bytes(*bytes))).collect()
+            data.as_chunks().0.iter().map(|bytes| i32::from_le_bytes(*bytes).into()).collect()
         };
         let ints = ints.get(..count).ok_or(Unsupported)?;
         Ok(Self::Ints(Arc::new(Int64Array::from(ints.to_vec()))))

@@ -1,7 +1,6 @@
 //! The Parquet library's row reader on verified pages.
 
 use std::sync::Arc;
-use std::vec;
 
 use arrow::datatypes::Fields;
 use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, RowGroups, RowSelection};
@@ -48,9 +47,12 @@ impl RowGroups for Library {
     fn column_chunks(&self, column: usize) -> Result<Box<dyn PageIterator>> {
         let store = self.store.again().map_err(|error| ParquetError::External(Box::new(error)))?;
         let (metadata, checksums) = (Arc::clone(&self.metadata), self.checksums.clone());
-        let (row_groups, slot) = (self.row_groups.clone().into_iter(), Arc::clone(&self.slot));
-        let writes_out = self.writes_out;
-        Ok(Box::new(Chunks { store, metadata, checksums, column, row_groups, slot, writes_out }))
+        let (slot, writes_out) = (Arc::clone(&self.slot), self.writes_out);
+        Ok(Box::new(Chunks(self.row_groups.clone().into_iter().map(move |row_group| {
+            let place = Place { metadata: &metadata, checksums: &checksums, row_group, column };
+            let pages = Pages::checked(&store, place, Arc::clone(&slot), writes_out)?;
+            Ok(Box::new(pages) as Box<dyn PageReader>)
+        }))))
     }
 
     fn row_groups(&self) -> Box<dyn Iterator<Item = &RowGroupMetaData> + '_> {
@@ -62,25 +64,15 @@ impl RowGroups for Library {
     }
 }
 
-struct Chunks {
-    store: Store,
-    metadata: Arc<ParquetMetaData>,
-    checksums: ChunkChecksums,
-    column: usize,
-    row_groups: vec::IntoIter<usize>,
-    slot: FaultSlot,
-    writes_out: bool,
-}
+/// The pages of one column, row group by row group.
+struct Chunks<I>(I);
 
-impl Iterator for Chunks {
-    type Item = Result<Box<dyn PageReader>>;
+impl<I: Iterator> Iterator for Chunks<I> {
+    type Item = I::Item;
 
     fn next(&mut self) -> Option<Self::Item> {
-        let (metadata, checksums) = (&*self.metadata, &self.checksums);
-        let place = Place { metadata, checksums, row_group: self.row_groups.next()?, column: self.column };
-        let pages = Pages::checked(&self.store, place, Arc::clone(&self.slot), self.writes_out);
-        Some(pages.map(|pages| Box::new(pages) as _))
+        self.0.next()
     }
 }
 
-impl PageIterator for Chunks {}
+impl<I: Iterator<Item = Result<Box<dyn PageReader>>> + Send> PageIterator for Chunks<I> {}

@@ -6,4 +6,3 @@ mod delta;
 mod dictionary;
 pub(crate) mod library;
 mod rle;
-mod spread;

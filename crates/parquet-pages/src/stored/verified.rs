@@ -76,7 +76,7 @@ impl Verified {
         match sums.transpose().map_err(unreadable)? {
             Some((declared, found)) if declared != found => {
                 let expected = format!("bytes with the CRC-32 {declared:08x}");
-                Err(pages.fault_of(Part::Chunk(start, pages.end), expected, format!("{found:08x}")))
+                Err(pages.keep(FaultKind::Corrupt, Part::Chunk(start, pages.end), expected, format!("{found:08x}")))
             }
             _ => Ok(pages),
         }
@@ -112,10 +112,6 @@ impl Verified {
 
     pub(crate) fn over(&self, offset: u64, exceeded: &Exceeded) -> ParquetError {
         self.keep(FaultKind::OverBudget, Part::Page(offset), exceeded.expected(), "more".to_owned())
-    }
-
-    fn fault_of(&self, part: Part, expected: String, found: String) -> ParquetError {
-        self.keep(FaultKind::Corrupt, part, expected, found)
     }
 
     fn keep(&self, kind: FaultKind, part: Part, expected: String, found: String) -> ParquetError {

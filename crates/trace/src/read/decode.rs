@@ -240,7 +240,7 @@ impl<'a> RowGroup<'a> {
             return Ok(Column::Runs(ids.runs.slice(self.first, count)));
         }
         let Source::Library(library) = &mut self.sources[at] else {
-            return Ok(new_null_array(&held_as(kind), count).into());
+            return Ok(Column::Flat(new_null_array(&held_as(kind), count)));
         };
         loop {
             let held = library.rows();
@@ -262,7 +262,7 @@ impl<'a> RowGroup<'a> {
             };
             let Some(batch) = batch else {
                 if count == 0 {
-                    return Ok(new_null_array(&held_as(kind), 0).into());
+                    return Ok(Column::Flat(new_null_array(&held_as(kind), 0)));
                 }
                 return Err(self.other_rows(self.first + held));
             };

@@ -1,6 +1,5 @@
 //! Reads traces from bytes to complete episodes, in the order of the files.
 
-mod beside;
 pub(crate) mod budget;
 mod checks;
 pub(crate) mod decode;

@@ -1,17 +1,25 @@
 //! Opens traces together: reads every footer and determines the use of each column over all files.
 
-use super::beside::Beside;
+use std::sync::Arc;
+
+use arrow::array::{Array as _, ArrayRef, AsArray as _, BooleanArray, RecordBatch};
+use arrow::compute::cast;
+use arrow::datatypes::{DataType, Field, Schema};
+
 pub use super::footer::trace_file::{FileColumn, TraceFile};
 use crate::diagnostic::Finding;
 use crate::error::TraceError;
 use crate::inputs::Input;
+use crate::labels::Labels;
 use crate::schema::{self, COLUMNS, Column, Domain, Kind};
 
 /// Open traces: every footer is read and valid, no rows are read yet.
 #[derive(Debug)]
 pub struct TraceSet {
     files: Vec<TraceFile>,
-    beside: Beside,
+    /// The labels of coders beside the traces, one value per episode.
+    labels: Labels,
+    label_columns: Vec<String>,
 }
 
 /// The type and presence of a column over all files of a set.
@@ -72,15 +80,7 @@ impl TraceSet {
     }
 
     pub fn of(files: Vec<TraceFile>) -> Self {
-        Self { files, beside: Beside::default() }
-    }
-
-    pub(super) fn beside(self, beside: Beside) -> Self {
-        Self { beside, ..self }
-    }
-
-    pub(super) const fn labelled(&self) -> &Beside {
-        &self.beside
+        Self { files, labels: Labels::default(), label_columns: Vec::new() }
     }
 
     pub fn files(&self) -> &[TraceFile] {
@@ -126,5 +126,50 @@ impl TraceSet {
             }
         }
         names
+    }
+
+    pub fn with_labels(self, labels: Labels) -> Result<Self, TraceError> {
+        let columns = labels.columns();
+        if let Some(column) = columns.iter().find(|name| self.column(name).is_some()) {
+            let expected = "a label whose column no trace has";
+            let found = "a column of the traces and a label in `labels.jsonl`".to_owned();
+            return Err(TraceError::Column { column: column.clone(), expected, found });
+        }
+        Ok(Self { labels, label_columns: columns, ..self })
+    }
+
+    pub fn labels(&self) -> &Labels {
+        &self.labels
+    }
+
+    /// The columns of the labels: true, false or null in each episode.
+    pub fn label_columns(&self) -> &[String] {
+        &self.label_columns
+    }
+
+    pub fn is_label_column(&self, name: &str) -> bool {
+        self.label_columns.iter().any(|column| column == name)
+    }
+
+    pub(crate) fn with_label_columns(
+        &self,
+        episodes: RecordBatch,
+        columns: &[&str],
+    ) -> Result<RecordBatch, TraceError> {
+        if columns.is_empty() {
+            return Ok(episodes);
+        }
+        let ids = episodes.column_by_name("episode_id").expect("every batch names its episodes");
+        let ids = cast(ids, &DataType::Utf8).map_err(TraceError::Memory)?;
+        let ids = ids.as_string::<i32>();
+        let mut fields: Vec<Field> =
+            episodes.schema_ref().fields().iter().map(|field| field.as_ref().clone()).collect();
+        let mut arrays = episodes.columns().to_vec();
+        for column in columns {
+            let values: BooleanArray = ids.iter().map(|id| self.labels.value(column, id?)).collect();
+            fields.push(Field::new(*column, values.data_type().clone(), true));
+            arrays.push(Arc::new(values) as ArrayRef);
+        }
+        RecordBatch::try_new(Arc::new(Schema::new(fields)), arrays).map_err(TraceError::Memory)
     }
 }

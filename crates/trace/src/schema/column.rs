@@ -4,8 +4,6 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::SCHEMA_VERSION;
-use super::colors::ColorColumn;
-use super::domain::Scope;
 use super::field_access::{Access, Value, access};
 use crate::answers::{Answered, is_answer};
 use crate::diagnostic::Code;
@@ -49,6 +47,28 @@ pub struct Column {
     pub(super) scope: Scope,
     #[serde(skip)]
     pub(super) access: Access,
+}
+
+/// The traces in which a column has the meaning of the schema.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Scope {
+    /// Every trace, which must have it.
+    Every,
+    /// Traces of any domain, if it has the schema's type.
+    Any,
+    /// Those of the mirror's domain.
+    #[default]
+    Mirror,
+}
+
+/// The colours in a column.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ColorColumn {
+    pub name: &'static str,
+    /// The one of [`WORDS`](super::colors::spelling::WORDS) that the column allows.
+    pub word: Option<&'static str>,
+    pub(super) advice: &'static str,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

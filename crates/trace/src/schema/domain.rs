@@ -8,11 +8,9 @@ use indexmap::IndexMap;
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::colors::ColorColumn;
+use super::column::{ColorColumn, Column, Kind, Scope, Stored};
 use super::field_access::access;
-use super::{Column, Kind, Stored, column};
 use crate::diagnostic::Code;
-use crate::read::open::FileColumn;
 
 /// The subject of a trace's episodes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -33,19 +31,6 @@ pub static COLUMNS: LazyLock<Vec<Column>> = LazyLock::new(|| {
     let DomainFile { counted, column } = file;
     column.into_iter().map(|(name, declared)| declared.named(name.leak(), &counted)).collect()
 });
-
-/// The traces in which a column has the meaning of the schema.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub(super) enum Scope {
-    /// Every trace, which must have it.
-    Every,
-    /// Traces of any domain, if it has the schema's type.
-    Any,
-    /// Those of the mirror's domain.
-    #[default]
-    Mirror,
-}
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -124,13 +109,12 @@ impl DomainColumn {
 impl Domain {
     /// The domain of a file: the recording names it. Otherwise a file with an identity and no column of the mirror has
     /// its own domain; all others, damaged ones included, are traces of the mirror.
-    pub(crate) fn of_file(columns: &[FileColumn], recording: &Value) -> Self {
+    pub(crate) fn of_file(has: impl Fn(&str) -> bool, recording: &Value) -> Self {
         if let Some(name) = recording["domain"].as_str() {
             return Self::named(name);
         }
-        let has = |known: &Column| columns.iter().any(|column| column.name == known.name);
-        let is_lacking = |known: &Column| known.scope == Scope::Every && !has(known);
-        let is_about = |known: &Column| known.is_mark && has(known);
+        let is_lacking = |known: &Column| known.scope == Scope::Every && !has(known.name);
+        let is_about = |known: &Column| known.is_mark && has(known.name);
         if COLUMNS.iter().any(|known| is_lacking(known) || is_about(known)) { Self::Mirror } else { Self::Own }
     }
 
@@ -145,6 +129,10 @@ impl Domain {
     pub fn column(self, name: &str) -> Option<&'static Column> {
         column(name).filter(|column| self.has(column))
     }
+}
+
+pub fn column(name: &str) -> Option<&'static Column> {
+    COLUMNS.iter().find(|column| column.name == name)
 }
 
 /// A column that definitions of another domain declare.

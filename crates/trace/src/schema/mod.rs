@@ -14,7 +14,7 @@ pub mod rules;
 use serde::Serialize;
 
 pub use column::{Column, Kind, Stored};
-pub use domain::{COLUMNS, DeclaredColumn, Domain};
+pub use domain::{COLUMNS, DeclaredColumn, Domain, column};
 pub use field_access::Value;
 
 /// The newest schema version. A trace is written with the oldest version that has its columns.
@@ -24,10 +24,6 @@ pub const SCHEMA_VERSION: u32 = 2;
 /// declares so (`absent`); its rows then have no value.
 pub fn of_some_tasks() -> impl Iterator<Item = &'static str> {
     COLUMNS.iter().filter(|column| column.is_of_some_tasks).map(|column| column.name)
-}
-
-pub fn column(name: &str) -> Option<&'static Column> {
-    COLUMNS.iter().find(|column| column.name == name)
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]

@@ -75,7 +75,7 @@ impl TraceFile {
         let mut pairs = metadata.file_metadata().key_value_metadata().cloned().unwrap_or_default();
         let recording = footers::recording(value(&pairs, schema::RECORDING_KEY));
         let absent = declared_experiment::absent(&input.name, &recording);
-        let domain = Domain::of_file(&columns, &recording);
+        let domain = Domain::of_file(|name| columns.iter().any(|column| column.name == name), &recording);
         let mut findings = check_columns(&input.name, &columns, version, domain, &absent);
         findings.extend(bounds::fault(&input.name, bytes, &metadata));
         if !findings.is_empty() {

@@ -16,15 +16,8 @@ pub mod spelling;
 
 use self::palette::Palette;
 use self::spelling::{WORDS, did_you_mean, is_well_spelled, meant_by, normal, spelling_key, study_color};
+pub use super::column::ColorColumn;
 use crate::schema;
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ColorColumn {
-    pub name: &'static str,
-    /// The one of [`WORDS`] that the column allows.
-    pub word: Option<&'static str>,
-    pub(super) advice: &'static str,
-}
 
 /// The columns of colours, in schema order.
 pub fn columns() -> impl Iterator<Item = ColorColumn> {

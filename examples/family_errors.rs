@@ -71,7 +71,7 @@ fn main() {
         ("No pairs, half of the models better", few(Design { differing: true, ..apart })),
         ("Repeats of which 0.45 copy the first, half of the models better", repeated(0.45, true)),
     ] {
-        let columns = ["chance", "models", "given up", "durations", "given up", "E1 - E2", "durations", "overall"];
+        let columns = ["chance", "models", "rejected", "durations", "rejected", "E1 - E2", "durations", "overall"];
         println!("\n## {title}\n\n| scenes | {} |\n|{}", columns.join(" | "), " --- |".repeat(columns.len() + 1));
         for design in designs {
             let shares = shares(&program, design);
@@ -85,14 +85,16 @@ const INTRODUCTION: &str = "
 
 `cargo build --release && cargo run --release --example family_errors -- target/release/mirrorstats >
 benches/COVERAGE-FAMILIES.md`, seed 20260131. Each study is a file of scores of 8 models in E1 to E4, given to
-`mirrorstats stats FILE --json`. A number is the share of families in which `stats` claims anything after Holm at level 0.05;
-where half of the models are better, the share of families in which it finds a true difference, and after the slash the
-share in which it claims a false one. Each row has 100 studies: 400 families of rates against chance 1/3, of 28 pairs of
-models under TSA and under TTD, and 100 families over 8 models of E1 - E2 and of 28 pairs over all experiments. Three
-standard errors above 0.05 are 0.083 for 400 families and 0.115 for 100.
+`mirrorstats stats FILE --json`. A number is the share of families in which `stats` claims anything after Holm at
+level 0.05. If half of the models are better, the first number is the share of families in which it finds a true
+difference. The number after the slash is the share in which it claims a false one. Each row has 100 studies. They
+give 400 families each for rates against chance 1/3 and for 28 pairs of models under TSA and under TTD. They give 100
+families each for E1 - E2 over 8 models and for 28 pairs over all experiments. Three standard errors above 0.05 are
+0.083 for 400 families and 0.115 for 100.
 
-The methods given up stand beside: mid-p values of rates, or Fisher's test of all episodes where scenes are repeated; the
-normal test of restricted means, of all episodes. Quantities have no test, hence no claim.
+The tables also list the rejected methods. For rates, these are mid-p values, or Fisher's test of all episodes if
+scenes are repeated. For restricted means, it is the normal test of all episodes. Quantities have no test, so there is
+no claim about them.
 ";
 
 impl Design {

@@ -40,7 +40,7 @@ row has 150 studies: two files of scores of 4 models, given to `mirrorstats gate
 columns are the share of studies in which any of the 4 cells has the verdict; the last three are the share of cells. A share
 in bold is an error: the verdict is false. Three standard errors above 0.05 are 0.103.
 
-At the margin, NEW is worse by exactly the margin, so that `held` is false and `regressed` is true.
+At the margin, NEW is worse by exactly the margin, so `held` is false and `regressed` is true.
 ";
 
 fn main() {

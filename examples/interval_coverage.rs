@@ -324,12 +324,12 @@ fn main() {
     let mut text = format!(
         "# How often the intervals of `stats` hold the truth\n\n\
          Written by `cargo run --release --example interval_coverage > benches/COVERAGE-INTERVALS.md`, seed {SEED}: the same\n\
-         bytes each time. Intervals of 95 %; {SAMPLES} samples per scenario and size ({BOOTSTRAPPED} for the bootstrap), so that a\n\
-         coverage of 0.90 is known to 0.005 (0.015). Of each method the lowest coverage of all scenarios stands here, among the\n\
-         samples for which it gives an interval that is no point; `--` where it hardly ever does.\n\n\
-         A scenario: a third, half, two thirds or all of the episodes finish; after any step of the budget of {BUDGET},\n\
-         mostly early (waiting times with a mean of 10 or 30), late (from step 60 on), or of two kinds (near 10, near 70); six of\n\
-         ten decisions are correct; the others run to the budget and are censored there.\n\n## By episodes\n\n"
+         bytes each time. Intervals of 95 %; {SAMPLES} samples per scenario and size ({BOOTSTRAPPED} for the bootstrap), so that a coverage of\n\
+         0.90 is known to 0.005 (0.015). The tables show the lowest coverage of each method over all scenarios. They use only\n\
+         samples for which the method gives an interval that is wider than a point; `--` means that it hardly ever does.\n\n\
+         In a scenario, a third, half, two thirds or all of the episodes finish. They finish after any step of the budget of\n\
+         {BUDGET}. They do so mostly early (waiting times with a mean of 10 or 30), late (from step 60 on), or in two groups (near\n\
+         10, near 70). Six of ten decisions are correct. The other episodes run to the budget and are censored there.\n\n## By episodes\n\n"
     );
     let usual = Scenario::all(&[1.0 / 3.0, 0.5, 2.0 / 3.0, 1.0]);
     let methods: [(&str, Method, usize); 10] = [
@@ -345,15 +345,15 @@ fn main() {
         ("Welch's t, unlike", welch_unlike, SAMPLES),
     ];
     rows(&mut text, &methods, &SIZES, &usual);
-    text.push_str("\nn is the number of episodes, of differences on each side. Unlike: a third of the episodes of one side finish, all of \
-         the other,\nor the other way about. Pairs: every other pair has the same episode twice.\n\n## By clusters of seven runs\n\n");
+    text.push_str("\nn is the number of episodes; for differences, it is the number on each side. Unlike: a third of the episodes of one\n\
+         side and all episodes of the other side finish. Pairs: every second pair has the same episode twice.\n\n## By clusters of seven runs\n\n");
     let clustered: [(&str, Method, usize); 2] =
         [("steps, t(clusters - 1)", by_cluster, SAMPLES), ("a rate, t(clusters - 1)", rate_by_cluster, SAMPLES)];
     rows(&mut text, &clustered, &CLUSTERS, &usual);
     text.push_str(
-        "\nThree of ten clusters finish or not as one. n is the number of clusters.\n\n\
-         ## Where one outcome is rare\n\nOne in ten or a quarter finishes, or one in ten does not. No rule over n mends this: a sample \
-         without the rare outcome\ncannot tell that there is one.\n\n",
+        "\nIn three of ten clusters, all episodes finish or none does. n is the number of clusters.\n\n\
+         ## Where one outcome is rare\n\nOne in ten or a quarter of the episodes finishes, or one in ten does not. No rule over n can fix this: a sample\n\
+         without the rare outcome cannot show that the outcome exists.\n\n",
     );
     let rare = Scenario::all(&[0.1, 0.25, 0.9]);
     let few: [(&str, Method, usize); 3] = [methods[0], methods[2], methods[6]];

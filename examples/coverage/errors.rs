@@ -12,8 +12,8 @@ use crate::{LEVEL, N, SEED, binomial, happens, heading, largest, rates, row, sha
 
 /// By enumeration: the largest rate at which the exact test and its mid-p value reject a true hypothesis.
 pub fn sizes() {
-    let note = "By enumeration: the largest error over the rates 0.01 to 0.50 of Fisher's test, over shares of discordant pairs of\n\
-                0.02 to 1 of McNemar's, and at the level of the binomial test.\n\
+    let note = "These are the largest errors, by enumeration. For Fisher's test, they are over rates of 0.01 to 0.50. For McNemar's\n\
+                test, they are over shares of discordant pairs of 0.02 to 1. For the binomial test, they are at the level of the test.\n\
                 A mid-p value does not keep the level; an exact one does.";
     heading("Exact tests and their mid-p values", note, &["test", "exact", "mid-p"]);
     let error = |p: &dyn Fn(u64, u64) -> f64, rate: f64, n: u64| {
@@ -142,8 +142,8 @@ pub fn families() {
 
 /// By enumeration: three models compared with each other, for which Tarone-Holm has no proof.
 pub fn shared_models() {
-    let note = "By enumeration: the largest error over rates 0.01 to 0.50 that three models share. Comparisons that share a\n\
-                model have no proof for Tarone-Holm; this is what is known instead.";
+    let note = "These are the largest errors over rates 0.01 to 0.50 that three models share, by enumeration. No proof of Tarone-Holm\n\
+                exists for comparisons that share a model, so this table is the evidence.";
     heading("Three models, each pair by Fisher's test", note, &["episodes per model", "Holm", "Tarone-Holm"]);
     for n in [4, 5, 6, 7, 9, 12, 15, N] {
         let test = |k: u64, l: u64| {

@@ -9,8 +9,9 @@ use crate::{CONFIDENCE, LEVEL, SEED, heading, row, share, successes, tally};
 
 pub fn common_differences() {
     const STUDIES: usize = 20_000;
-    let note = "20,000 studies each of three experiments with rates 0.2, 0.5, 0.7 of the second side and the same difference.\n\
-                `none` is the share without an interval, coverage that of the others; errors and powers are those of the Cochran-Mantel-Haenszel tests.";
+    let note = "20,000 studies each of three experiments with rates 0.2, 0.5, 0.7 of the second side and the same difference. `none`\n\
+                is the share without an interval, and coverage is that of the others; errors and powers are those of the\n\
+                Cochran-Mantel-Haenszel tests.";
     let columns = ["episodes; difference", "coverage", "none", "CMH", "corrected", "exact", "mid-p"];
     heading("Mantel-Haenszel difference", note, &columns);
     let mut random = SplitMix64::seeded(SEED + 2);

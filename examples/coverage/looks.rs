@@ -14,8 +14,9 @@ const LOOKS: u64 = 200;
 const STUDIES: usize = 2_000;
 
 pub fn singles() {
-    let note = "2,000 studies each, looked at after each of 200 episodes: shares in which the interval held the rate at every\n\
-                look, and in which a test of the true rate ever rejected it. The fixed-n methods stand beside for comparison.";
+    let note = "2,000 studies each, with a look after each of 200 episodes. The shares are of studies in which the interval contained\n\
+                the rate at every look, and in which a test of the true rate ever rejected it. The fixed-n methods are listed for\n\
+                comparison.";
     let columns = ["rate", "sequence", "Wilson", "e-value", "exact binomial"];
     heading("A study that is looked at while it runs", note, &columns);
     let mut random = SplitMix64::seeded(SEED + 4);
@@ -42,7 +43,7 @@ pub fn singles() {
 }
 
 pub fn pairs() {
-    let note = "2,000 studies each of 200 pairs: shares in which a test ever rejected, looked at after each pair.";
+    let note = "2,000 studies each of 200 pairs, with a look after each pair: shares in which a test ever rejected.";
     heading("Pairs that are looked at while they come", note, &["first only, second only", "e-value", "exact McNemar"]);
     let mut random = SplitMix64::seeded(SEED + 5);
     for (first, second) in [(0.05, 0.05), (0.2, 0.2), (0.4, 0.4), (0.2, 0.05), (0.3, 0.1)] {

@@ -20,12 +20,14 @@ const N: u64 = 21;
 fn main() {
     println!("# Coverage and errors, simulated\n");
     println!(
-        "`cargo run --release --example coverage > benches/COVERAGE.md`, seed {SEED}. Tests at level 0.05, intervals"
+        "`cargo run --release --example coverage > benches/COVERAGE.md`, seed {SEED}. Tests at level 0.05, intervals at 95 %"
     );
     println!(
-        "at 95 % confidence; 21 episodes per model and experiment where nothing else is said. The standard error of a share"
+        "confidence; 21 episodes per model and experiment unless stated otherwise. The standard error of a share of s studies"
     );
-    println!("of s studies is sqrt(x (1 - x) / s): 0.002 for 0.05 of 10,000.");
+    println!(
+        "is sqrt(x (1 - x) / s): 0.002 for 0.05 of 10,000."
+    );
     errors::sizes();
     errors::families();
     errors::shared_models();

@@ -80,8 +80,8 @@ fn claims(random: &mut SplitMix64, design: Design, rates: [f64; MODELS]) -> [f64
 }
 
 pub fn repeats() {
-    let note = "1,000 studies of 8 models each: shares with any claim after Holm. Where all rates are 1/3, each claim is false. A repeat\n\
-                takes its scene's verdict always (1), in 0.45 of cases (correlation 0.2), or never (0).";
+    let note = "1,000 studies of 8 models each: shares with any claim after Holm. If all rates are 1/3, each claim is false. A repeat\n\
+                copies its scene's verdict always (1), in 0.45 of cases (correlation 0.2), or never (0).";
     let columns = [
         "scenes x repeats, copied",
         "chance, by scene",

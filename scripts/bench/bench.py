@@ -117,11 +117,11 @@ def preamble(bench, options, folders, episodes, load):
         "has the optional columns of a recording with a model, whose values hardly repeat.  ",
         f"Rounds: {options.rounds}; in each, every line of the table has one turn on each set.",
         "",
-        "Before the first round every line ran once and was checked: each episode table has the same rows in the same order as",
-        "that of `score`, the cells of the query for cells are those of `report`, and `score` writes the same bytes for both",
-        "orders and for one thread. Our commands and the floors are whole processes, from start to exit. Rivals in Python are",
-        "timed inside, without imports; they use all cores and write the same table as zstd Parquet. The hand-written queries",
-        "are in `scripts/bench/rivals.py`; generated SQL is that of `mirrorstats definitions sql`.",
+        "Before the first round, every line ran once and was checked. Each episode table has the same rows in the same order as",
+        "that of `score`. The query for cells gives the same cells as `report`. `score` writes the same bytes for both orders",
+        "and for one thread. Our commands and the floors are whole processes, timed from start to exit. Rivals in Python are",
+        "timed inside the process, without imports; they use all cores and write the same table as zstd Parquet. The",
+        "hand-written queries are in `scripts/bench/rivals.py`. The generated SQL comes from `mirrorstats definitions sql`.",
         "",
     ]
 
@@ -131,10 +131,10 @@ def epilogue():
         "",
         "## How to repeat it",
         "",
-        "`make bench-scores`; a quick look, which does not replace this file: `make bench-scores STEPS=1400000 ROUNDS=3`. Variables:",
-        "`STEPS`, `FILES`, `ROUNDS`; `LARGE=140000000` for a larger set too; `BENCH_FEATURES=polars` builds a second program with",
-        "`--engine polars`, which takes minutes. Nothing else should run on the machine. `cargo bench --bench kernels` measures",
-        "the kernels alone.",
+        "Run `make bench-scores`. For a quick look that does not replace this file, run `make bench-scores STEPS=1400000",
+        "ROUNDS=3`. The variables are `STEPS`, `FILES` and `ROUNDS`. `LARGE=140000000` adds a larger set.",
+        "`BENCH_FEATURES=polars` builds a second program with `--engine polars`, which takes minutes. Nothing else should run",
+        "on the machine. `cargo bench --bench kernels` measures the kernels alone.",
         "",
     ]
 

@@ -133,6 +133,9 @@
 
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
+#[global_allocator]
+static ALLOCATOR: memory::Allocator = memory::Allocator;
+
 pub mod cli;
 
 pub use exact::moments::Moments;

@@ -4,6 +4,7 @@
 
    MIRRORSTATS_FAULT      KIND:N:ERRNO      the N-th call of a kind (from 1) fails with an errno; `*` is any kind that changes
                           KIND:N:ERRNO:on   something. With `on` so do all later ones. ERRNO 0 ends the process instead.
+                          memory:N:ERRNO    the N-th allocation of 4 KiB or more fails; with N = 0 they are counted alone.
    MIRRORSTATS_FAULT_LOG  a file that every call is added to, a line each; `tests/harness/faults.rs` reads it.
 
    A write that fails has written half of its bytes: no caller may rely on the contrary. Programs that the program starts
@@ -41,6 +42,31 @@ __attribute__((constructor)) static void start(void) {
     }
     if (log) log_fd = syscall(SYS_openat, AT_FDCWD, log, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
 }
+
+/* The number of allocations, for a process that ends in order. */
+__attribute__((destructor)) static void end(void) {
+    char line[64];
+    if (strcmp(kind_to_fail, "memory") || log_fd < 0) return;
+    int length = snprintf(line, sizeof line, "memory\t%ld\n", seen);
+    syscall(SYS_write, log_fd, line, length);
+}
+
+extern void *__libc_malloc(size_t), *__libc_calloc(size_t, size_t), *__libc_realloc(void *, size_t), *__libc_memalign(size_t, size_t);
+
+/* Whether this allocation fails. Allocates nothing, and takes no lock: allocations happen in every call. */
+static int is_refused(size_t size) {
+    if (size < 4096 || strcmp(kind_to_fail, "memory")) return 0;
+    return __atomic_add_fetch(&seen, 1, __ATOMIC_RELAXED) == number_to_fail;
+}
+
+void *malloc(size_t size) { return is_refused(size) ? (errno = ENOMEM, (void *)0) : __libc_malloc(size); }
+void *calloc(size_t count, size_t size) { return is_refused(count * size) ? (errno = ENOMEM, (void *)0) : __libc_calloc(count, size); }
+void *realloc(void *old, size_t size) { return is_refused(size) ? (errno = ENOMEM, (void *)0) : __libc_realloc(old, size); }
+int posix_memalign(void **out, size_t alignment, size_t size) {
+    *out = is_refused(size) ? 0 : __libc_memalign(alignment, size);
+    return *out ? 0 : ENOMEM;
+}
+void *aligned_alloc(size_t alignment, size_t size) { return is_refused(size) ? (errno = ENOMEM, (void *)0) : __libc_memalign(alignment, size); }
 
 /* The absolute path of what a call is about, without `.` and doubled slashes; 0 if it is not below the folder. */
 static int path_of(int folder, const char *path, char *out) {

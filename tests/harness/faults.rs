@@ -14,13 +14,16 @@ pub const ENOSPC: i32 = 28;
 pub const EIO: i32 = 5;
 /// `Too many open files`.
 pub const EMFILE: i32 = 24;
+/// `Cannot allocate memory`.
+pub const ENOMEM: i32 = 12;
 /// `Permission denied`.
 pub const EACCES: i32 = 13;
 
 /// A fault: the call that fails, and how.
 #[derive(Clone, Copy, Debug)]
 pub struct Fault {
-    /// `open`, `write`, `fsync`, `rename`, `unlink`, `mkdir`, `truncate`, `link`, or `*` for all that change something.
+    /// `open`, `write`, `fsync`, `rename`, `unlink`, `mkdir`, `truncate`, `link`, or `*` for all that change something;
+    /// `memory` for allocations of 4 KiB or more.
     pub kind: &'static str,
     /// The number of the call among those of its kind, from 1.
     pub at: usize,
@@ -59,6 +62,8 @@ pub enum Call {
     Unlink(PathBuf),
     MakeFolder(PathBuf),
     Link(PathBuf, PathBuf),
+    /// The number of allocations that a fault of `memory` counted.
+    Allocations(usize),
     /// The call that failed: its kind and path.
     Failed(String, PathBuf),
 }
@@ -80,6 +85,7 @@ impl Call {
             "unlink" => Self::Unlink(text().into()),
             "mkdir" => Self::MakeFolder(text().into()),
             "link" => Self::Link(text().into(), text().into()),
+            "memory" => Self::Allocations(number(text())),
             "fault" => Self::Failed(text().to_owned(), text().into()),
             other => panic!("`{other}` is no call"),
         }
@@ -95,7 +101,7 @@ impl Call {
             Self::Unlink(_) => Some("unlink"),
             Self::MakeFolder(_) => Some("mkdir"),
             Self::Link(..) => Some("link"),
-            Self::Create(..) | Self::Truncate(..) | Self::Failed(..) => None,
+            Self::Create(..) | Self::Truncate(..) | Self::Allocations(_) | Self::Failed(..) => None,
         }
     }
 }

@@ -8,12 +8,14 @@
 //! | 3 | part of the input is lost (`recover`); the rest was saved |
 //! | 4 | `gate`: no regression, but some cells allow no verdict |
 //! | 5 | `gate`: no regression, but some cells are not comparable |
+//! | 6 | the system refused memory |
 //! | 130 | interrupted (`record`); finished work stays |
 
 use std::error::Error;
 use std::ffi::OsString;
 use std::fmt::Write as _;
 use std::io::{self, Write as _};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -26,6 +28,8 @@ use trace::diagnostic::{MORE_FILES, is_short_of_files};
 pub const ERRORS_VARIABLE: &str = "MIRRORSTATS_ERRORS";
 /// The exit code for bad usage, input or definitions.
 const BAD_INPUT: u8 = 2;
+/// The exit code if the system refuses memory.
+pub const NO_MEMORY: u8 = 6;
 
 /// The outcome of a command that ran to its end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -122,6 +126,24 @@ pub fn exit_code(result: Result<Outcome, Failure>, format: ErrorFormat) -> u8 {
             BAD_INPUT
         }
     }
+}
+
+/// Whether errors are printed as JSON. A refused allocation is reported from wherever it happens.
+static IS_JSON: AtomicBool = AtomicBool::new(false);
+
+pub fn set_format(format: ErrorFormat) {
+    IS_JSON.store(format == ErrorFormat::Json, Ordering::Relaxed);
+}
+
+/// Reports a refused allocation. Allocates nothing.
+pub fn say_no_memory(bytes: usize) {
+    let help = "use fewer --threads, or raise the memory limit (ulimit -v, a container's limit)";
+    let _ = if IS_JSON.load(Ordering::Relaxed) {
+        let error = format_args!("out of memory: the system refused {bytes} bytes\\nhelp: {help}");
+        writeln!(io::stderr(), r#"{{"error":"{error}","code":{NO_MEMORY}}}"#)
+    } else {
+        writeln!(io::stderr(), "error: out of memory: the system refused {bytes} bytes\nhelp: {help}")
+    };
 }
 
 fn say(failure: &Failure, format: ErrorFormat) {

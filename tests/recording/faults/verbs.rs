@@ -8,11 +8,12 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use tempfile::TempDir;
 
 use super::{Round, all_at_once, check_all, check_words, copy, faults, leftovers, sample};
-use crate::harness::faults::{Call, Fault, calls, failing, watched};
+use crate::harness::faults::{Call, ENOMEM, Fault, calls, failing, watched};
 use crate::harness::files::{Contents, contents, write_small_world};
 use crate::harness::program::{run, stderr, typed};
 
@@ -174,6 +175,74 @@ impl<'a> Case<'a> {
             assert!(is_registered || leftovers(&home).is_empty(), "{}: again: {:?}", told(), leftovers(&home));
         }
     }
+}
+
+/// An allocation that fails. The number 0 counts allocations and fails none.
+const fn refused(at: usize) -> Fault {
+    Fault { kind: "memory", at, error: ENOMEM, stays: false }
+}
+
+impl Case<'_> {
+    fn allocations(&self) -> usize {
+        let round = Round::new(self.home.path());
+        let log = round.log();
+        let output = failing(&mut command(&round.home(), self.verb.words), &round.home(), &log, refused(0)).output();
+        assert!(output.unwrap().status.success(), "{}", self.verb.words);
+        let count =
+            calls(&log).iter().find_map(|call| if let Call::Allocations(count) = call { Some(*count) } else { None });
+        count.expect("the count, written at the end of the process")
+    }
+
+    /// Runs the verb while one allocation fails; returns true if the verb ended because of it.
+    fn check_memory(&self, at: usize) -> bool {
+        let round = Round::new(self.home.path());
+        let home = round.home();
+        let output = failing(&mut command(&home, self.verb.words), &home, &round.log(), refused(at)).output().unwrap();
+        let said = stderr(&output);
+        let told = || format!("{}, allocation {at}: {:?}\n{said}", self.verb.words, output.status);
+        assert!(!said.contains("panicked"), "{}", told());
+        for (number, found) in all_held(&home, self.verb).iter().enumerate() {
+            let is_unfinished =
+                self.verb.outputs[number] == "link" && home.join("link/.mirrorstats-unfinished").is_file();
+            assert!(*found == self.old[number] || *found == self.new[number] || is_unfinished, "{}", told());
+        }
+        if output.status.success() {
+            return false;
+        }
+        assert!(said.contains("memory") || said.contains("allocat"), "{}", told());
+        assert!([Some(2), Some(6)].contains(&output.status.code()), "{}", told());
+        assert_eq!(leftovers(&home), Vec::<String>::new(), "{}", told());
+        true
+    }
+}
+
+/// Fails this many allocations of each verb, spread evenly over all; or all of them if there are fewer.
+fn check_memory(most: usize) {
+    let prepared = prepared();
+    let ended = AtomicUsize::new(0);
+    let tried = AtomicUsize::new(0);
+    all_at_once(VERBS, |verb| {
+        let case = Case::new(prepared.path(), verb);
+        let mut rounds: Vec<usize> = (1..=case.allocations()).collect();
+        sample(&mut rounds, most);
+        tried.fetch_add(rounds.len(), Ordering::Relaxed);
+        let by_it = rounds.iter().filter(|at| case.check_memory(**at)).count();
+        ended.fetch_add(by_it, Ordering::Relaxed);
+    });
+    let (ended, tried) = (ended.into_inner(), tried.into_inner());
+    println!("{tried} refused allocations in {} verbs, {ended} of which ended the program", VERBS.len());
+    assert!(ended * 2 > tried, "{ended} of {tried}: the faults do not reach the program");
+}
+
+#[test]
+fn refused_memory_ends_with_a_message_and_leaves_old_or_new_outputs() {
+    check_memory(12);
+}
+
+#[test]
+#[ignore = "soak: two thousand allocations of every verb"]
+fn soak_refused_memory_ends_with_a_message_and_leaves_old_or_new_outputs() {
+    check_memory(2000);
 }
 
 fn command(home: &Path, words: &str) -> Command {

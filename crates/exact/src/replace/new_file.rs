@@ -34,7 +34,6 @@ impl NewFile {
         Ok(Self { file, target: target.to_owned(), is_stream })
     }
 
-    /// The path of the content before the commit.
     pub fn temporary_path(&self) -> &Path {
         self.file.path()
     }
@@ -98,7 +97,6 @@ impl Seek for NewFile {
     }
 }
 
-/// Replaces the file at `target` by a file with these bytes.
 pub fn replace(target: &Path, bytes: &[u8]) -> io::Result<()> {
     let mut file = NewFile::create(target)?;
     file.write_all(bytes)?;

@@ -9,14 +9,12 @@ use crate::hash;
 
 /// The start of every temporary name; programs that look for data skip names that begin with a dot.
 pub(super) const PREFIX: &str = ".mirrorstats-";
-/// The number of random characters in a temporary name.
 pub(super) const RANDOM: usize = 6;
 /// The number of characters of a checksum at the end of a temporary name.
 const CHECK: usize = 10;
 /// The most bytes of the target's name in a temporary name: file systems allow 255 in all.
 const LONGEST_NAME: usize = 200;
 
-/// The folder of a file that exists or will exist.
 pub fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }

@@ -9,16 +9,12 @@ use super::place::is_stream;
 #[derive(Debug, thiserror::Error)]
 #[error("`{target}`: expected another file to write, found {what}\n  help: give the output another name")]
 pub struct TargetIsInput {
-    /// The target, as typed.
     target: String,
-    /// The role of the input in the command.
     what: String,
 }
 
-/// Refuses a target that is one of `inputs`, under any name, link or path. `what` describes the inputs, such as
-/// `a trace that is read`.
-///
-/// Devices, pipes and standard streams are not replaced, so they pass.
+/// Refuses a target that is one of `inputs`, under any name, link or path. `what` describes the inputs, such as `a
+/// trace that is read`. Devices, pipes and standard streams are not replaced, so they pass.
 pub fn check_target<P: AsRef<Path>>(
     target: &Path,
     inputs: impl IntoIterator<Item = P>,
@@ -40,9 +36,7 @@ pub fn check_target<P: AsRef<Path>>(
      on\n  help: name another folder; it may be a new one inside this one"
 )]
 pub struct FolderHoldsInput {
-    /// The folder, as typed.
     folder: String,
-    /// The first input in it.
     input: String,
 }
 

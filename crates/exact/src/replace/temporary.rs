@@ -2,6 +2,7 @@
 //!
 //! All system calls go through the standard library, so that `tests/harness/faults.c` can fail them one by one.
 
+use std::collections::BTreeSet;
 use std::collections::hash_map::RandomState;
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, File, OpenOptions};
@@ -9,6 +10,7 @@ use std::hash::BuildHasher as _;
 use std::io;
 use std::mem;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use super::leftover;
 use super::place::{RANDOM, checksum};
@@ -16,7 +18,26 @@ use super::place::{RANDOM, checksum};
 /// The characters of random names: no capitals, since some file systems ignore case.
 const CHARACTERS: &[u8; 36] = b"abcdefghijklmnopqrstuvwxyz0123456789";
 
-/// A temporary file, open for reading and writing.
+/// What this process has created and not yet renamed or removed.
+static PRESENT: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+fn forget(path: &Path) {
+    PRESENT.lock().unwrap_or_else(PoisonError::into_inner).remove(path);
+}
+
+fn remove(path: &Path) {
+    // A later run sweeps what stays.
+    let _ = if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
+}
+
+/// Removes the temporary files and folders of this process, for an exit that drops nothing.
+pub fn remove_temporary() {
+    // Another thread that holds the lock may be waiting for memory.
+    if let Ok(present) = PRESENT.try_lock() {
+        present.iter().for_each(|path| remove(path));
+    }
+}
+
 #[derive(Debug)]
 pub(super) struct TemporaryFile {
     file: File,
@@ -47,7 +68,7 @@ impl TemporaryFile {
 
     pub(super) fn rename(mut self, target: &Path) -> io::Result<()> {
         fs::rename(&self.path, target)?;
-        self.path = PathBuf::new();
+        forget(&mem::take(&mut self.path));
         Ok(())
     }
 
@@ -65,8 +86,8 @@ impl TemporaryFile {
 impl Drop for TemporaryFile {
     fn drop(&mut self) {
         if !self.path.as_os_str().is_empty() {
-            // A later run sweeps what stays.
-            let _ = fs::remove_file(&self.path);
+            remove(&self.path);
+            forget(&self.path);
         }
     }
 }
@@ -106,16 +127,15 @@ impl TemporaryFolder {
     }
 
     pub(super) fn keep(mut self) {
-        self.path = PathBuf::new();
+        forget(&mem::take(&mut self.path));
     }
 }
 
 impl Drop for TemporaryFolder {
     fn drop(&mut self) {
-        let path = mem::take(&mut self.path);
-        if !path.as_os_str().is_empty() {
-            // A later run sweeps what stays.
-            let _ = fs::remove_dir_all(path);
+        if !self.path.as_os_str().is_empty() {
+            remove(&self.path);
+            forget(&self.path);
         }
     }
 }
@@ -133,6 +153,7 @@ fn make(
         };
         // Before it was locked, another process may have taken it for a leftover.
         if file.as_ref().is_none_or(|file| leftover::lock(file, &path)) {
+            PRESENT.lock().unwrap_or_else(PoisonError::into_inner).insert(path.clone());
             return Ok((path, file));
         }
     }

@@ -1,16 +1,18 @@
 //! Replaces a folder by exchanging its name with that of a complete new one.
 //!
-//! This fails, and files are replaced in place, if the system cannot exchange names; if the folder is a link or a mount
-//! point, or contains one; if it contains the current folder, which would vanish; if something in it cannot be linked
-//! or would change its owner; or if it is not writable, so that the usual error appears.
+//! Only Linux has this. It fails, and files are replaced in place, if the file system cannot exchange names; if the
+//! folder is a link or a mount point, or contains one; if it contains the current folder, which would vanish; if
+//! something in it cannot be linked or would change its owner; or if it is not writable, so that the usual error appears.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File, Metadata};
 use std::io;
+use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 
+use rustix::fs::{self as system, Access, AtFlags, CWD, RenameFlags, StatxAttributes, StatxFlags};
+
 use super::super::place::{folder_of, sync_folder};
-use super::platform;
 use super::stage::{FolderFiles, Stage, old_files, step};
 
 /// Replaces the files of the existing folder `out`. The inner result says whether the new names are on the disk.
@@ -25,7 +27,7 @@ pub(super) fn replace(out: &Path, files: &FolderFiles<'_>) -> io::Result<io::Res
     let old = File::open(out)?;
     let _ = old.try_lock();
     step();
-    platform::exchange(stage.path(), out)?;
+    system::renameat_with(CWD, stage.path(), CWD, out, RenameFlags::EXCHANGE)?;
     // The new files are in place now, so errors are no reason to replace them again.
     let synced = sync_folder(folder_of(out));
     step();
@@ -42,10 +44,21 @@ pub(super) fn replace(out: &Path, files: &FolderFiles<'_>) -> io::Result<io::Res
 fn check(out: &Path) -> io::Result<()> {
     let is_folder = out.file_name().is_some() && fs::symlink_metadata(out)?.is_dir();
     let here = std::env::current_dir()?;
-    if !is_folder || platform::is_mount_point(out)? || here.starts_with(out.canonicalize()?) {
+    if !is_folder || is_mount_point(out)? || here.starts_with(out.canonicalize()?) {
         return Err(io::ErrorKind::Unsupported.into());
     }
-    platform::check_writable(out)
+    Ok(system::access(out, Access::WRITE_OK)?)
+}
+
+/// Returns true if another file system, or another part of one, begins at the folder. Hard links across this border are
+/// impossible, and the contents behind it must never be removed with the folder.
+fn is_mount_point(folder: &Path) -> io::Result<bool> {
+    let found = system::statx(CWD, folder, AtFlags::SYMLINK_NOFOLLOW, StatxFlags::BASIC_STATS)?;
+    // Linux before 5.8 does not report this.
+    if !found.stx_attributes_mask.contains(StatxAttributes::MOUNT_ROOT) {
+        return Err(io::ErrorKind::Unsupported.into());
+    }
+    Ok(found.stx_attributes.contains(StatxAttributes::MOUNT_ROOT))
 }
 
 /// Links everything below `from` into `to`, except old files and paths that `to` has already.
@@ -74,7 +87,7 @@ fn link_below(from: &Path, to: &Path, inside: &Path, old: &BTreeSet<PathBuf>) ->
 
 fn link_folder(from: &Path, to: &Path, inside: &Path, old: &BTreeSet<PathBuf>) -> io::Result<()> {
     let (source, target) = (from.join(inside), to.join(inside));
-    if platform::is_mount_point(&source)? {
+    if is_mount_point(&source)? {
         return Err(io::ErrorKind::Unsupported.into());
     }
     if fs::read_dir(&source)?.next().is_none() {
@@ -89,7 +102,8 @@ fn link_folder(from: &Path, to: &Path, inside: &Path, old: &BTreeSet<PathBuf>) -
 }
 
 fn make_alike(old: &Metadata, new: &Path) -> io::Result<()> {
-    if !platform::has_same_owner(old, &fs::symlink_metadata(new)?) {
+    let owner = |metadata: &Metadata| (metadata.uid(), metadata.gid());
+    if owner(old) != owner(&fs::symlink_metadata(new)?) {
         return Err(io::ErrorKind::Unsupported.into());
     }
     fs::set_permissions(new, old.permissions())

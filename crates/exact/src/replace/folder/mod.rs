@@ -5,9 +5,9 @@
 //! marks the folder until all are replaced. The index is removed first and written last. So a folder without a note, or
 //! with an index, is complete.
 
+#[cfg(target_os = "linux")]
 mod exchange;
 mod in_place;
-mod platform;
 mod stage;
 
 use std::fs;
@@ -29,21 +29,19 @@ pub fn replace_folder(out: &Path, files: &FolderFiles<'_>) -> Result<(), FolderE
     leftover::sweep(parent);
     if !out.exists() {
         match create(out, files) {
-            Err(error) if is_taken(&error.source) => {}
+            Err(FolderError { source, .. })
+                if matches!(source.kind(), io::ErrorKind::AlreadyExists | io::ErrorKind::DirectoryNotEmpty) => {}
             result => return result,
         }
     }
     check_room(out, files)?;
     leftover::sweep(out);
-    match exchange::replace(out, files) {
-        Ok(synced) => synced.map_err(FolderError::at(out)),
-        // Nothing has changed yet. If the same obstacle stops the replacement in place, that error is reported.
-        Err(_) => in_place::replace(out, files),
+    #[cfg(target_os = "linux")]
+    if let Ok(synced) = exchange::replace(out, files) {
+        return synced.map_err(FolderError::at(out));
     }
-}
-
-fn is_taken(error: &io::Error) -> bool {
-    matches!(error.kind(), io::ErrorKind::AlreadyExists | io::ErrorKind::DirectoryNotEmpty)
+    // Nothing has changed yet. If the same obstacle stops the replacement in place, that error is reported.
+    in_place::replace(out, files)
 }
 
 fn create(out: &Path, files: &FolderFiles<'_>) -> Result<(), FolderError> {

@@ -11,10 +11,8 @@ use super::super::temporary::TemporaryFolder;
 /// A file that marks a folder with old and new files; it lists what the next attempt replaces or removes.
 pub(super) const NOTE: &str = ".mirrorstats-unfinished";
 
-/// The content of a new file.
 #[derive(Clone, Copy, Debug)]
 pub enum Content<'a> {
-    /// These bytes.
     Bytes(&'a [u8]),
     /// The bytes of a file, which stays where it is.
     File(&'a Path),
@@ -22,7 +20,6 @@ pub enum Content<'a> {
 
 /// The files of a folder that are replaced together. All paths are inside the folder.
 pub struct FolderFiles<'a> {
-    /// The new files and their content.
     pub new: &'a [(&'a Path, Content<'a>)],
     /// One of the new files, if readers find the others through it.
     pub index: Option<&'a Path>,
@@ -35,7 +32,6 @@ pub fn is_unfinished(folder: &Path) -> bool {
     folder.join(NOTE).is_file()
 }
 
-/// An error while replacing the files of a folder.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot write {}", path.display())]
 pub struct FolderError {
@@ -50,7 +46,6 @@ impl FolderError {
     }
 }
 
-/// A temporary folder for new files.
 pub(super) struct Stage(TemporaryFolder);
 
 impl Stage {

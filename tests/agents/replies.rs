@@ -2,13 +2,13 @@
 
 use trace::episode::Action;
 use trace::identification::normal_form;
-use world::agent::Status;
 use world::agent::reply::{self, Ending, Repair};
+use world::agent::{Reply, Status};
 use world::experiment::Experiment;
 
 const GOOD: &str = r#"{"view-description": "a wall", "reasoning": "it's a \"wall\"", "action": "a", "summary": "turned, {so far}", "selected_cube": "none", "identification": "unknown"}"#;
 
-fn read(raw: &str) -> reply::Reading {
+fn read(raw: &str) -> Reply {
     reply::read(raw, &Experiment::E1, Ending::Whole)
 }
 
@@ -295,7 +295,7 @@ fn an_ending_counts_before_the_text() {
 #[test]
 fn the_raw_text_is_kept_whatever_it_is() {
     let raw = "no JSON at all";
-    let reply = read(raw).into_reply(raw.to_owned(), world::agent::Usage::default());
+    let reply = read(raw).with_text(raw.to_owned(), world::agent::Usage::default());
     assert_eq!((reply.status, reply.raw.as_deref()), (Status::ParseFailed, Some(raw)));
 }
 

@@ -5,7 +5,6 @@
 //! episode's function has its own thread, so several slow functions run at once, and a stopped recording waits for
 //! none.
 
-use std::fmt;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -33,7 +32,6 @@ const GLANCE: Duration = Duration::from_millis(20);
 /// Makes the function of each episode, or returns the reason why it cannot.
 pub type Listeners = dyn Fn() -> Result<Listener, String> + Send + Sync;
 
-/// A function agent's settings.
 pub struct Function {
     pub model: String,
     /// The function's source text, if known: recordings carry its hash.
@@ -41,29 +39,19 @@ pub struct Function {
     pub images: Images,
     /// The parent folder of the episodes' temporary frame folders.
     pub scratch: PathBuf,
-    /// Makes the function of each episode.
     pub listeners: Arc<Listeners>,
     /// Set to stop the recording: episodes under way then end without their functions.
     pub stop: Arc<AtomicBool>,
 }
 
-/// A function as a player.
-#[derive(Debug)]
 pub struct FunctionPlayer {
     function: Function,
     secrets: Arc<[Secret]>,
 }
 
 impl FunctionPlayer {
-    /// A player that calls the function.
     pub fn new(function: Function) -> Self {
         Self { function, secrets: from_every_key_variable().into() }
-    }
-}
-
-impl fmt::Debug for Function {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Function").field("model", &self.model).field("images", &self.images).finish_non_exhaustive()
     }
 }
 
@@ -145,9 +133,8 @@ impl FunctionAgent {
             self.tell(task).await?;
         }
         let text = self.tell(question).await?;
-        let latency_ms = Some(i32::try_from(start.elapsed().as_millis()).unwrap_or(i32::MAX));
-        let text = without(&self.secrets, &text);
-        Ok(self.conversation.read(text, Usage { latency_ms, ..Usage::default() }))
+        let usage = Usage::of_time(start.elapsed());
+        Ok(self.conversation.read(without(&self.secrets, &text), usage))
     }
 
     /// The reply to a message; a stopped recording ends the wait without losing the episode.
@@ -159,9 +146,7 @@ impl FunctionAgent {
             match timeout(GLANCE, &mut said).await {
                 Ok(Ok(said)) => return said.map_err(|fault| failed(&self.secrets, self.steps, &fault)),
                 Ok(Err(_)) => return Err(failed(&self.secrets, self.steps, "the function ended without a reply")),
-                Err(_) if self.stop.load(Ordering::Relaxed) => {
-                    return Err(Lost::by_stop());
-                }
+                Err(_) if self.stop.load(Ordering::Relaxed) => return Err(Lost::by_stop()),
                 Err(_) => {}
             }
         }

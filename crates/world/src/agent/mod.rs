@@ -24,6 +24,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::future::Future;
 use std::pin::Pin;
 use std::sync::Arc;
+#[cfg(feature = "sim")]
+use std::sync::{Mutex, MutexGuard, PoisonError};
+#[cfg(feature = "sim")]
+use std::time::Duration;
 
 use crate::experiment::Experiment;
 use exact::names;
@@ -35,7 +39,6 @@ use trace::frame::Frame;
 /// The task that an agent gets once, before the first step.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Task {
-    /// The experiment: its prompt and the keys of a reply.
     pub experiment: Experiment,
     /// The false colour of the first line of the prompt in E3.
     pub stated_color: Option<String>,
@@ -58,7 +61,6 @@ pub struct Observation {
     pub y: f32,
     /// The direction of the body: degrees, counter-clockwise from +x, a multiple of 30.
     pub yaw: f32,
-    /// The last move was blocked.
     pub bumped: bool,
     /// The previous step: its action, and the summary of the last reply with a decision; `None` at t = 1.
     pub history: Option<(Option<Action>, Option<String>)>,
@@ -76,16 +78,13 @@ pub struct Past {
     /// The decided action; `None` if the reply gave no decision.
     pub action: Option<Action>,
     pub bumped: bool,
-    /// The summary of its reply.
     pub thought: Option<String>,
 }
 
 /// An agent's answer, and how it was obtained.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reply {
-    /// The outcome of getting and reading it.
     pub status: Status,
-    /// The repairs that were needed, in order.
     pub repairs: Vec<Repair>,
     /// The reason for a missing decision, for people; `None` with a decision, or if the status says all.
     pub fault: Option<String>,
@@ -99,7 +98,6 @@ pub struct Reply {
     pub mark_report: Option<String>,
     /// The answers that the experiment declares, by key; missing answers are absent.
     pub answers: Answers,
-    /// The words around the decision, as given.
     pub words: Words,
     /// The whole reply as received.
     pub raw: Option<String>,
@@ -108,7 +106,6 @@ pub struct Reply {
     pub model: Option<String>,
 }
 
-/// Answers by key.
 pub type Answers = BTreeMap<String, Answered>;
 
 /// The free text of a reply; in the paper, keys of the reply's JSON object.
@@ -127,12 +124,22 @@ pub struct Words {
 pub struct Usage {
     /// From sending the request to the whole reply, ms.
     pub latency_ms: Option<i32>,
-    /// Tokens of the request.
     pub prompt_tokens: Option<i32>,
-    /// Tokens of the reply.
     pub completion_tokens: Option<i32>,
-    /// US dollars.
     pub cost_usd: Option<f64>,
+}
+
+impl Usage {
+    /// The usage of a reply that took this time.
+    #[cfg(feature = "sim")]
+    fn of_time(latency: Duration) -> Self {
+        Self { latency_ms: Some(milliseconds(latency)), ..Self::default() }
+    }
+}
+
+#[cfg(feature = "sim")]
+fn milliseconds(time: Duration) -> i32 {
+    i32::try_from(time.as_millis()).unwrap_or(i32::MAX)
 }
 
 /// The outcome of getting and reading a reply: the values of the trace's `reply_status` column.
@@ -149,7 +156,6 @@ pub enum Status {
     Refusal,
     /// Cut off by the token limit.
     Truncated,
-    /// An empty reply.
     Empty,
     /// The provider's rate limit, up to the last attempt.
     RateLimited,
@@ -186,16 +192,12 @@ pub struct Lost {
     pub kind: LostKind,
 }
 
-/// The reason why an episode cannot continue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LostKind {
-    /// A failure.
     Failure,
     /// A spending limit is reached; the episode waits for a higher one.
     Limit,
-    /// The recording is being stopped.
     Stop,
-    /// The participant has left the study.
     Leaving,
 }
 
@@ -210,20 +212,23 @@ impl Lost {
         Self { status: Some(status), ..Self::because(cause) }
     }
 
-    /// Stopped by a limit that the recording's caller has set.
     pub fn by_limit(cause: impl Into<String>) -> Self {
         Self { kind: LostKind::Limit, ..Self::because(cause) }
     }
 
-    /// Ended with the recording.
     pub fn by_stop() -> Self {
         Self { kind: LostKind::Stop, ..Self::because("the recording is being stopped") }
     }
 
-    /// Ended with a person's part in the study.
     pub fn by_leaving() -> Self {
         Self { kind: LostKind::Leaving, ..Self::because("the participant has left the study") }
     }
+}
+
+/// Locks a mutex. No holder leaves its value half changed, so a panic of another thread does no harm.
+#[cfg(feature = "sim")]
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// A decision that may take time: scripted agents are ready at once, others wait for a network or a program.
@@ -264,14 +269,12 @@ pub enum Ended {
     Stopped,
 }
 
-/// An episode of a planned recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Planned {
     pub episode_id: String,
     pub experiment: String,
     pub seed: i32,
     pub repetition: i32,
-    /// True if it is already recorded.
     pub is_recorded: bool,
 }
 

@@ -10,7 +10,6 @@ use crate::experiment::spec::{Actions, Answer};
 use exact::number::Decimal;
 use trace::episode::Action;
 
-/// The templates of one prompt.
 #[derive(Debug)]
 pub struct Prompt {
     environment: Environment<'static>,
@@ -26,7 +25,6 @@ pub struct Rendered {
 }
 
 impl Prompt {
-    /// The prompt of an experiment.
     pub fn of(experiment: Experiment) -> Result<Self, Error> {
         let mut environment = Environment::new();
         environment.set_undefined_behavior(UndefinedBehavior::Strict);
@@ -42,7 +40,6 @@ impl Prompt {
         &self.hash
     }
 
-    /// The words for one step.
     pub fn render(&self, task: &Task, observation: &Observation) -> Result<Rendered, Error> {
         let system = self.fill(
             "system",
@@ -122,7 +119,6 @@ pub fn action(letter_of_action: &str) -> Option<Action> {
     Action::ALL.into_iter().find(|action| letter(*action) == letter_of_action)
 }
 
-/// The actions of an agent in an experiment.
 pub const fn actions(of: Actions) -> &'static [Action] {
     match of {
         Actions::Walk => &Action::WALK,

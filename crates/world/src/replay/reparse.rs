@@ -9,8 +9,8 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::agent::Status;
-use crate::agent::reply::{self, Ending, Reading, Repair};
+use crate::agent::reply::{self, Ending, Repair};
+use crate::agent::{Reply, Status};
 use crate::experiment::spec::Side;
 use crate::experiment::{Experiment, Spec};
 use trace::answers::{Answered, columns_of};
@@ -145,7 +145,7 @@ fn recipe(input: &Input) -> Result<(Value, Experiment), ReparseError> {
     Ok((recording, experiment))
 }
 
-fn read_again(step: &Step, experiment: &Spec) -> Option<Reading> {
+fn read_again(step: &Step, experiment: &Spec) -> Option<Reply> {
     let status = step.extra.reply_status.as_deref().and_then(Status::named)?;
     // Their text does not show how the provider ended them.
     if matches!(status, Status::Refusal | Status::Truncated) {
@@ -176,7 +176,7 @@ fn compared(step: &Step, experiment: &Spec) -> Vec<(String, Option<String>)> {
     fixed.into_iter().map(|(column, value)| (column.to_owned(), value.clone())).chain(answers).collect()
 }
 
-fn put(step: &mut Step, reading: Reading, experiment: &Spec) {
+fn put(step: &mut Step, reading: Reply, experiment: &Spec) {
     let extra = &mut step.extra;
     if step.selected_cube != reading.selected_cube {
         // The recorded distance was to the recorded cube.

@@ -16,7 +16,6 @@ use exact::replace::TemporaryFolder;
 /// The prefix of the temporary folder for an episode's frames.
 const FRAMES: &str = "frames";
 
-/// One episode's messages, and the reading of its replies.
 #[derive(Debug)]
 pub(in crate::agent) struct Conversation {
     task: Task,
@@ -79,16 +78,14 @@ impl Conversation {
     }
 
     pub(in crate::agent) fn read(&self, text: String, usage: Usage) -> Reply {
-        reply::read(&text, &self.task.experiment, Ending::Whole).into_reply(text, usage)
+        reply::read(&text, &self.task.experiment, Ending::Whole).with_text(text, usage)
     }
 }
 
-/// An observation for the agent cannot be made.
 pub(super) fn unusable(fault: impl fmt::Display) -> Lost {
     Lost::because(format!("the observation cannot be made: {fault}"))
 }
 
-/// The frames of one episode as files.
 #[derive(Debug)]
 struct Frames(TemporaryFolder);
 

@@ -13,7 +13,6 @@ use exact::hash;
 /// The operators that end a command, so that the next word is a command again.
 const OPERATORS: [&str; 6] = [";", "&", "&&", "|", "||", "("];
 
-/// A file that the command names cannot be read.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot read `{word}`, which the command of --agent exec: names: {source}")]
 pub struct Unreadable {
@@ -29,7 +28,6 @@ pub(super) fn fingerprint(command: &str) -> Result<Option<String>, Unreadable> {
     Ok((!lines.is_empty()).then(|| hash::of_bytes(lines.concat().as_bytes())))
 }
 
-/// The position of a word and the hash of the file that it names.
 fn line(place: usize, word: String) -> Result<String, Unreadable> {
     match File::open(&word).and_then(hash::of_reader) {
         Ok(contents) => Ok(format!("{place} {contents}\n")),

@@ -5,14 +5,15 @@
 
 use std::collections::BTreeMap;
 use std::io;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use tokio::process::{Child, Command};
+
+use crate::agent::locked;
 
 /// The environment variable of a program and its descendants.
 const MARK: &str = "_MIRRORSTATS_EXEC";
 
-/// The groups of all running programs.
 #[derive(Debug, Default)]
 pub struct Groups(Mutex<Running>);
 
@@ -26,13 +27,9 @@ struct Running {
 impl Groups {
     /// Kills all of them, and prevents further starts.
     pub fn kill_all(&self) {
-        let mut running = self.running();
+        let mut running = locked(&self.0);
         running.is_over = true;
         running.marks.iter().for_each(|(id, mark)| kill(*id, mark));
-    }
-
-    fn running(&self) -> MutexGuard<'_, Running> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -44,10 +41,9 @@ pub struct Group {
 }
 
 impl Group {
-    /// Starts the first process of a group.
     pub fn start(shell: &mut Command, groups: &Arc<Groups>) -> io::Result<(Child, Self)> {
         // The lock is held until the process is registered: an unregistered process would outlive `kill_all`.
-        let mut running = groups.running();
+        let mut running = locked(&groups.0);
         if running.is_over {
             return Err(io::Error::new(io::ErrorKind::Interrupted, "the recording is being ended"));
         }
@@ -63,7 +59,7 @@ impl Group {
 impl Drop for Group {
     fn drop(&mut self) {
         if let Some(id) = self.id {
-            let mark = self.groups.running().marks.remove(&id).unwrap_or_default();
+            let mark = locked(&self.groups.0).marks.remove(&id).unwrap_or_default();
             kill(id, &mark);
         }
     }

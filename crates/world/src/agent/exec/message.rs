@@ -109,7 +109,6 @@ pub struct EndMessage {
 }
 
 impl Message {
-    /// The line, its end included.
     pub fn line(&self) -> serde_json::Result<Vec<u8>> {
         let mut line = serde_json::to_vec(self)?;
         line.push(b'\n');

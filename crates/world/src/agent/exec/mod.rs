@@ -32,34 +32,23 @@ use self::group::Groups;
 use self::message::{EndMessage, Message, PROTOCOL};
 use self::program::{Failure, Program};
 use self::said::Kept;
-use super::reply::Reading;
 use super::vlm::secrets::{Secret, from_every_key_variable};
 use super::{Agent, Decision, Ended, Farewell, Lost, Observation, Player, Reply, Status, Task, Usage};
-use exact::hash;
+use exact::{hash, names};
 
 /// The shell's exit codes for a missing command, and for one that cannot be run.
 const NO_COMMAND: [i32; 2] = [126, 127];
 
-/// The transfer of frames to a program.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Images {
     /// As files, which are there until the episode ends.
     #[default]
     Path,
-    /// Within the line.
     Base64,
 }
 
-impl Images {
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Path => "path",
-            Self::Base64 => "base64",
-        }
-    }
-}
+names!(Images { Path: "path", Base64: "base64" });
 
-/// A command and its settings.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Settings {
     pub model: String,
@@ -74,7 +63,6 @@ pub struct Settings {
     pub standard_error: PathBuf,
 }
 
-/// A command as a player.
 #[derive(Debug)]
 pub struct Exec {
     shared: Arc<Shared>,
@@ -90,7 +78,6 @@ struct Shared {
 }
 
 impl Exec {
-    /// A player that runs the command once per episode.
     pub fn new(settings: Settings) -> Result<Self, Unreadable> {
         let files = files::fingerprint(&settings.command)?;
         let (groups, secrets, stop) = (Arc::default(), from_every_key_variable().into(), OnceLock::new());
@@ -186,16 +173,15 @@ impl ExecAgent {
     }
 
     fn read(&self, line: &[u8], latency: Duration) -> Reply {
-        let usage =
-            Usage { latency_ms: Some(i32::try_from(latency.as_millis()).unwrap_or(i32::MAX)), ..Usage::default() };
+        let usage = Usage::of_time(latency);
         match str::from_utf8(line) {
             Ok(text) => {
                 let text = self.shared.without_secrets(text);
                 self.conversation.read(text, usage)
             }
             // With its bytes replaced, the line might pass for something else.
-            Err(fault) => Reading::without_decision(Status::ParseFailed, Some(fault.to_string()))
-                .into_reply(self.shared.without_secrets(&String::from_utf8_lossy(line)), usage),
+            Err(fault) => Reply::without_decision(Status::ParseFailed, Some(fault.to_string()))
+                .with_text(self.shared.without_secrets(&String::from_utf8_lossy(line)), usage),
         }
     }
 

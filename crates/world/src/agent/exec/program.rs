@@ -20,7 +20,6 @@ use tokio::time::timeout;
 use super::group::{Group, Groups};
 use super::said::Said;
 
-/// The maximum size of a reply in bytes.
 pub const LONGEST_REPLY: u64 = 1 << 20;
 /// The time for a program to exit after its standard input was closed.
 const FAREWELL: Duration = Duration::from_secs(5);
@@ -28,10 +27,8 @@ const FAREWELL: Duration = Duration::from_secs(5);
 const CLOSING: Duration = Duration::from_secs(1);
 /// The interval of checks that the program has read its task.
 const GLANCE: Duration = Duration::from_millis(2);
-/// The number of bytes of a line to show.
 const SHOWN: usize = 100;
 
-/// The reason for a missing reply.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages say it")]
 pub enum Failure {
@@ -64,7 +61,6 @@ pub enum Failure {
     TooLong,
 }
 
-/// A running program.
 #[derive(Debug)]
 pub struct Program {
     child: Child,

@@ -5,9 +5,10 @@
 
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::{fs, io};
 
+use crate::agent::locked;
 use crate::agent::vlm::secrets::Secret;
 use exact::replace::{folder_of, make_folder, replace};
 
@@ -17,7 +18,6 @@ const IN_MESSAGE: usize = 2_000;
 /// Extra bytes before those of the file: longer than any key, since the cut may split one.
 const MARGIN: usize = 4_096;
 
-/// The text so far.
 #[derive(Debug, Default)]
 pub struct Said(Mutex<Tail>);
 
@@ -29,7 +29,7 @@ struct Tail {
 
 impl Said {
     pub fn add(&self, bytes: &[u8]) {
-        let mut tail = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut tail = locked(&self.0);
         tail.bytes.extend(bytes);
         let surplus = tail.bytes.len().saturating_sub(IN_FILE + MARGIN);
         tail.is_cut |= surplus > 0;
@@ -39,7 +39,7 @@ impl Said {
     /// The newest bytes without keys, at most [`IN_FILE`].
     pub fn bytes(&self, secrets: &[Secret]) -> Vec<u8> {
         let (raw, is_cut) = {
-            let tail = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            let tail = locked(&self.0);
             (tail.bytes.iter().copied().collect::<Vec<_>>(), tail.is_cut)
         };
         let mut kept = Vec::with_capacity(raw.len());
@@ -69,7 +69,6 @@ fn last_lines(bytes: &[u8]) -> &[u8] {
     &bytes[first..]
 }
 
-/// A text without any of these keys.
 pub fn without(secrets: &[Secret], text: &str) -> String {
     secrets.iter().fold(text.to_owned(), |text, secret| secret.without(&text))
 }

@@ -7,7 +7,6 @@ use std::collections::BTreeMap;
 use crate::agent::Planned;
 use exact::names;
 
-/// The distribution of episodes among participants.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Design {
     /// Each episode is played by one participant.
@@ -20,7 +19,6 @@ pub enum Design {
 
 names!(Design { Split: "split", Crossed: "crossed", OwnSeeds: "own-seeds" });
 
-/// The order in which a participant plays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Order {
     /// By experiment, seed and run.
@@ -31,7 +29,6 @@ pub enum Order {
 
 names!(Order { Planned: "planned", Counterbalanced: "counterbalanced" });
 
-/// A design with its order, and the numbers per participant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Schedule {
     pub design: Design,

@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
@@ -16,7 +16,7 @@ use tokio::sync::oneshot;
 use super::design::{Design, Schedule};
 use super::journal::{Entry, Journal, Leaving};
 use super::seat::{Asked, End, Given, LISTENING, Question, Seat, Terms};
-use crate::agent::{Planned, Turn};
+use crate::agent::{Planned, Turn, locked};
 use trace::frame::Frame;
 
 /// Removes the episodes of a code from a folder; returns their ids.
@@ -25,7 +25,6 @@ pub type Eraser = fn(&Path, &str) -> Result<BTreeSet<String>, String>;
 /// The maximum wait for an episode under way to end before its deletion.
 const ENDING: Duration = Duration::from_mins(1);
 
-/// The participants of a recording.
 #[derive(Debug)]
 pub struct Hub {
     terms: Terms,
@@ -42,7 +41,6 @@ pub struct Hub {
 }
 
 impl Hub {
-    /// Participants with these codes and link tokens.
     pub fn new(
         people: Vec<(String, String)>,
         terms: Terms,
@@ -74,13 +72,12 @@ impl Hub {
         &self.schedule
     }
 
-    /// The number of participants.
     pub fn seats(&self) -> usize {
         self.seats.len()
     }
 
     pub(super) fn code(&self, seat: usize) -> String {
-        self.locked(seat).code.clone()
+        self.seat(seat).code.clone()
     }
 
     pub(super) fn seat_of(&self, token: &str) -> Option<usize> {
@@ -94,19 +91,19 @@ impl Hub {
             for episode in lane {
                 let own = if self.schedule.design == Design::Split { self.begun_by(&episode.episode_id) } else { None };
                 let at = own.unwrap_or(at);
-                let mut seat = self.locked(at);
+                let mut seat = self.seat(at);
                 match (episode.is_recorded, seat.left) {
                     (true, _) => seat.played += 1,
                     (false, Some(_)) => left_over.push(episode.episode_id.clone()),
                     (false, None) => {
                         seat.lane.push_back(episode.episode_id.clone());
-                        self.owners().insert(episode.episode_id.clone(), at);
+                        locked(&self.owners).insert(episode.episode_id.clone(), at);
                     }
                 }
             }
         }
         self.deal_again(left_over);
-        (0..self.seats()).for_each(|seat| self.locked(seat).is_dealt = true);
+        (0..self.seats()).for_each(|seat| self.seat(seat).is_dealt = true);
     }
 
     fn begun_by(&self, episode_id: &str) -> Option<usize> {
@@ -121,31 +118,31 @@ impl Hub {
 
     /// Deals the unplayed episodes of participants who left: to the others, or to nobody.
     fn deal_again(&self, episodes: Vec<String>) {
-        let stays = |seat: &usize| self.schedule.design == Design::Split && self.locked(*seat).left.is_none();
+        let stays = |seat: &usize| self.schedule.design == Design::Split && self.seat(*seat).left.is_none();
         let others: Vec<usize> = (0..self.seats()).filter(stays).collect();
         for (at, episode) in episodes.into_iter().enumerate() {
             if others.is_empty() {
-                self.owners().remove(&episode);
+                locked(&self.owners).remove(&episode);
                 continue;
             }
             let seat = others[at % others.len()];
-            self.locked(seat).lane.push_back(episode.clone());
-            self.owners().insert(episode, seat);
+            self.seat(seat).lane.push_back(episode.clone());
+            locked(&self.owners).insert(episode, seat);
         }
     }
 
     pub(super) fn turn(&self, episode_id: &str) -> Turn {
-        let Some(seat) = self.owners().get(episode_id).copied() else { return Turn::Never };
-        let seat = self.locked(seat);
+        let Some(seat) = locked(&self.owners).get(episode_id).copied() else { return Turn::Never };
+        let seat = self.seat(seat);
         let is_next = seat.episode.is_none() && seat.lane.front().is_some_and(|next| next == episode_id);
         if is_next { Turn::Now } else { Turn::Later }
     }
 
     /// Gives an episode to its participant, who begins it when ready; `None` if nobody is to play it.
     pub(super) fn sit(&self, episode_id: &str) -> Option<usize> {
-        let seat = self.owners().get(episode_id).copied()?;
+        let seat = locked(&self.owners).get(episode_id).copied()?;
         let has_begun = self.has_begun(seat, episode_id);
-        let mut own = self.locked(seat);
+        let mut own = self.seat(seat);
         if own.left.is_some() {
             return None;
         }
@@ -160,34 +157,34 @@ impl Hub {
     }
 
     pub(super) fn keep(&self, entry: Entry) -> io::Result<()> {
-        self.journal().keep(entry)
+        locked(&self.journal).keep(entry)
     }
 
     pub(super) fn has_practised(&self, seat: usize) -> bool {
-        self.locked(seat).has_practised
+        self.seat(seat).has_practised
     }
 
     /// The practice is over: the person is informed, and steps count only after the start.
     pub(super) fn practised(&self, seat: usize) {
-        self.locked(seat).is_ready = true;
+        self.seat(seat).is_ready = true;
     }
 
     pub(super) fn begin(&self, seat: usize) {
-        let mut own = self.locked(seat);
+        let mut own = self.seat(seat);
         if !std::mem::take(&mut own.is_ready) || std::mem::replace(&mut own.has_practised, true) {
             return;
         }
         let code = own.code.clone();
         drop(own);
         // If the journal cannot be written, the practice repeats after a restart.
-        let _ = self.journal().practised(&code);
+        let _ = locked(&self.journal).practised(&code);
     }
 
     /// Asks a person and waits for the answer without a time limit; `None` if the person leaves or the recording stops.
     pub(super) async fn ask(&self, seat: usize, question: Question) -> Option<Given> {
         let (sender, answer) = oneshot::channel();
         {
-            let mut seat = self.locked(seat);
+            let mut seat = self.seat(seat);
             if self.is_stopping() || seat.left.is_some() {
                 return None;
             }
@@ -202,15 +199,14 @@ impl Hub {
         self.is_stopping.load(Ordering::Relaxed)
     }
 
-    /// Stops waiting for all participants.
     pub(super) fn interrupt(&self) {
         self.is_stopping.store(true, Ordering::Relaxed);
-        (0..self.seats()).for_each(|seat| self.locked(seat).asked = None);
+        (0..self.seats()).for_each(|seat| self.seat(seat).asked = None);
     }
 
     /// Ends an episode; unless it is to continue, it leaves its participant's queue for this start.
     pub(super) fn over(&self, seat: usize, episode_id: &str, is_whole: bool) {
-        let mut own = self.locked(seat);
+        let mut own = self.seat(seat);
         (own.episode, own.asked) = (None, None);
         own.played += usize::from(is_whole);
         let goes_on = !is_whole && (own.left.is_some() || self.is_stopping());
@@ -218,16 +214,16 @@ impl Hub {
         if goes_on {
             return;
         }
-        let owner = self.owners().remove(episode_id);
+        let owner = locked(&self.owners).remove(episode_id);
         if let Some(owner) = owner {
-            self.locked(owner).lane.retain(|id| id != episode_id);
+            self.seat(owner).lane.retain(|id| id != episode_id);
         }
     }
 
     /// Ends the recording. Waits briefly for open pages to poll, so that they can show the end.
     pub(super) fn end(&self, is_complete: bool) {
         let start = Instant::now();
-        let seats = || (0..self.seats.len()).map(|seat| self.locked(seat));
+        let seats = || (0..self.seats.len()).map(|seat| self.seat(seat));
         seats().for_each(|mut seat| seat.end = Some(End { is_complete, is_told: false }));
         let is_due = |seat: &Seat| seat.is_open() && seat.end.is_some_and(|end| !end.is_told);
         while start.elapsed() < LISTENING && seats().any(|seat| is_due(&seat)) {
@@ -240,25 +236,25 @@ impl Hub {
     }
 
     pub(super) fn told(&self, seat: usize) -> Value {
-        self.locked(seat).told(&self.terms)
+        self.seat(seat).told(&self.terms)
     }
 
     pub(super) fn frame(&self, seat: usize) -> Option<Arc<Frame>> {
-        self.locked(seat).frame(&self.terms)
+        self.seat(seat).frame(&self.terms)
     }
 
     pub(super) fn agree(&self, seat: usize) -> io::Result<()> {
         let code = self.code(seat);
-        self.journal().agreed(&code, self.terms.consent.as_deref().unwrap_or_default())?;
-        self.locked(seat).has_agreed = true;
+        locked(&self.journal).agreed(&code, self.terms.consent.as_deref().unwrap_or_default())?;
+        self.seat(seat).has_agreed = true;
         Ok(())
     }
 
     /// Ends a person's part in the study. Their data stays unless they want it deleted.
     pub(super) fn leave(&self, seat: usize, how: Leaving) -> io::Result<()> {
         let code = self.code(seat);
-        self.journal().leave(&code, how)?;
-        let mut own = self.locked(seat);
+        locked(&self.journal).leave(&code, how)?;
+        let mut own = self.seat(seat);
         own.left = Some(how);
         (own.asked, own.is_ready) = (None, false);
         let lane = std::mem::take(&mut own.lane);
@@ -269,43 +265,37 @@ impl Hub {
 
     fn erase(&self, seat: usize) -> Result<(), String> {
         let start = Instant::now();
-        while self.locked(seat).episode.is_some() && start.elapsed() < ENDING {
+        while self.seat(seat).episode.is_some() && start.elapsed() < ENDING {
             std::thread::sleep(Duration::from_millis(10));
         }
         let code = self.code(seat);
-        let Some(folder) = self.journal().forget(&code).map_err(|error| error.to_string())? else { return Ok(()) };
+        let Some(folder) = locked(&self.journal).forget(&code).map_err(|error| error.to_string())? else {
+            return Ok(());
+        };
         let episodes = (self.eraser)(&folder, &code)?;
-        self.deleted.lock().unwrap_or_else(PoisonError::into_inner).extend(episodes);
-        self.locked(seat).is_deleted = true;
+        locked(&self.deleted).extend(episodes);
+        self.seat(seat).is_deleted = true;
         Ok(())
     }
 
     /// Deletes the remaining data of those who asked for it; returns the ids of all deleted episodes.
     pub fn delete_due(&self) -> Result<BTreeSet<String>, String> {
-        for seat in (0..self.seats()).filter(|seat| self.locked(*seat).left == Some(Leaving::Deleted)) {
+        for seat in (0..self.seats()).filter(|seat| self.seat(*seat).left == Some(Leaving::Deleted)) {
             let failed = |error| format!("what `{}` did could not be deleted: {error}", self.code(seat));
             self.erase(seat).map_err(failed)?;
         }
-        Ok(self.deleted.lock().unwrap_or_else(PoisonError::into_inner).clone())
+        Ok(locked(&self.deleted).clone())
     }
 
     pub(super) fn pause(&self, seat: usize, is_on: bool) {
-        self.locked(seat).pause(is_on);
+        self.seat(seat).pause(is_on);
     }
 
     pub(super) fn answer(&self, seat: usize, number: u64, reply: String) -> bool {
-        self.locked(seat).answer(&self.terms, number, reply)
+        self.seat(seat).answer(&self.terms, number, reply)
     }
 
-    fn locked(&self, seat: usize) -> MutexGuard<'_, Seat> {
-        self.seats[seat].lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn owners(&self) -> MutexGuard<'_, BTreeMap<String, usize>> {
-        self.owners.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn journal(&self) -> MutexGuard<'_, Journal> {
-        self.journal.lock().unwrap_or_else(PoisonError::into_inner)
+    fn seat(&self, seat: usize) -> MutexGuard<'_, Seat> {
+        locked(&self.seats[seat])
     }
 }

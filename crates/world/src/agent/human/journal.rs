@@ -13,16 +13,13 @@ use exact::hash;
 use exact::input;
 use exact::replace;
 
-/// The name of the file in the folder of a recording.
 const NAME: &str = "participants.jsonl";
 
 /// An answer may be long, but not unlimited.
 const LONGEST_LINE: Limit = Limit::new("bytes in a line of the journal of participants", 4 << 20);
 
-/// An answer.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Entry {
-    /// The participant's code.
     pub participant: String,
     pub episode_id: String,
     /// The step, from 1.
@@ -60,7 +57,6 @@ enum Line {
     },
 }
 
-/// The reason why a person's part in a study ended early.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Leaving {
@@ -84,7 +80,6 @@ impl Line {
     }
 }
 
-/// The journal of a recording.
 #[derive(Debug)]
 pub struct Journal {
     /// The folder; `None` without a recording. The file is opened per line, since `participants remove` replaces it.
@@ -140,7 +135,6 @@ impl Journal {
         self.write(&Line::Practised { participant: code.to_owned(), practised: true })
     }
 
-    /// The way a person's part ended, if it has.
     pub(super) fn left(&self, code: &str) -> Option<Leaving> {
         self.lines.iter().rev().find_map(|line| match line {
             Line::Left { participant, left } if participant == code => Some(*left),

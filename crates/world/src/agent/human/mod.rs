@@ -18,7 +18,7 @@ pub mod seat;
 pub mod server;
 
 use std::collections::BTreeSet;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use serde_json::{Value, json};
 
@@ -28,13 +28,11 @@ use self::seat::{Given, Question};
 use self::server::Server;
 use super::prompt::{self, Prompt, Rendered};
 use super::reply::{self, Ending};
-use super::{Agent, Decision, Ended, Farewell, Lost, Observation, Planned, Player, Reply, Task, Turn, Usage};
+use super::{Agent, Decision, Ended, Farewell, Lost, Observation, Planned, Player, Reply, Task, Turn, Usage, locked};
 use exact::hash;
 
-/// The version of the content that people get.
 const PROTOCOL: u32 = 3;
 
-/// People as a player.
 #[derive(Debug)]
 pub struct Human {
     model: String,
@@ -46,7 +44,6 @@ pub struct Human {
 }
 
 impl Human {
-    /// A player of this name whose episodes go to the participants of a hub.
     pub fn new(model: &str, hub: Arc<Hub>, server: Option<Server>) -> Self {
         let consent = hub.terms().consent.as_deref().map(|words| hash::of_bytes(words.as_bytes()));
         Self { model: model.to_owned(), consent, hub, server: Mutex::new(server) }
@@ -123,7 +120,7 @@ impl Player for Human {
 
     fn ended(&self, is_complete: bool) {
         self.hub.end(is_complete);
-        drop(self.server.lock().unwrap_or_else(PoisonError::into_inner).take());
+        drop(locked(&self.server).take());
     }
 }
 
@@ -207,5 +204,5 @@ impl HumanAgent {
 
 fn read(text: &str, task: &Task, latency_ms: i32) -> Reply {
     let usage = Usage { latency_ms: Some(latency_ms), ..Usage::default() };
-    reply::read(text, &task.experiment, Ending::Whole).into_reply(text.to_owned(), usage)
+    reply::read(text, &task.experiment, Ending::Whole).with_text(text.to_owned(), usage)
 }

@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 use tokio::sync::oneshot;
 
 use super::journal::Leaving;
+use crate::agent::milliseconds;
 use crate::experiment::Experiment;
 use trace::frame::Frame;
 use trace::palette::Color;
@@ -26,15 +27,12 @@ pub struct Question {
     pub user: String,
     /// The step, from 1.
     pub t: i32,
-    /// True in a practice episode.
     pub is_practice: bool,
-    /// The keys of a reply.
     pub experiment: Experiment,
     /// The letters or numbers of the available actions.
     pub actions: Vec<&'static str>,
 }
 
-/// A person's answer.
 #[derive(Debug)]
 pub struct Given {
     /// The JSON object of a reply.
@@ -46,9 +44,7 @@ pub struct Given {
 /// The texts and settings that apply to all participants of a recording.
 #[derive(Clone, Debug, Default)]
 pub struct Terms {
-    /// The consent text.
     pub consent: Option<String>,
-    /// The contact for questions.
     pub contact: Option<String>,
     /// True if an identification stays in its field from step to step of an episode.
     pub prefills: bool,
@@ -84,7 +80,6 @@ pub(super) struct Seat {
     pub lane: VecDeque<String>,
     /// Episodes of this participant that are recorded.
     pub played: usize,
-    /// True once the episodes are dealt.
     pub is_dealt: bool,
     pub episode: Option<String>,
     pub has_agreed: bool,
@@ -92,7 +87,6 @@ pub(super) struct Seat {
     /// The next episode waits for the person to begin it.
     pub is_ready: bool,
     pub left: Option<Leaving>,
-    /// True once the requested deletion is done.
     pub is_deleted: bool,
     pub asked: Option<Asked>,
     pub number: u64,
@@ -195,7 +189,6 @@ impl Seat {
         let Some(asked) = self.asked.as_mut().filter(|asked| asked.pause.is_none()) else { return false };
         let Some(answer) = asked.answer.take() else { return false };
         let taken = asked.shown.map_or(Duration::ZERO, |shown| shown.elapsed().saturating_sub(asked.breaks));
-        let latency_ms = i32::try_from(taken.as_millis()).unwrap_or(i32::MAX);
-        answer.send(Given { reply, latency_ms }).is_ok()
+        answer.send(Given { reply, latency_ms: milliseconds(taken) }).is_ok()
     }
 }

@@ -34,7 +34,6 @@ struct Link {
     p: Option<String>,
 }
 
-/// A reply as sent by the page.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Sent {
@@ -64,7 +63,6 @@ impl Drop for Server {
     }
 }
 
-/// Starts the server.
 pub fn start(hub: Arc<Hub>, listener: TcpListener, guard: Guard) -> std::io::Result<Server> {
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build()?;
     let (end, ended) = oneshot::channel::<()>();
@@ -83,14 +81,14 @@ fn routes(hub: Arc<Hub>) -> Router {
         .route("/", get(|| async { file(web::page("Mirror room", "player.css", BODY), "text/html; charset=utf-8") }))
         .route("/player.css", get(|| async { file(STYLE, "text/css; charset=utf-8") }))
         .route("/player.js", get(|| async { file(SCRIPT, "text/javascript; charset=utf-8") }))
-        .route("/state", get(state))
+        .route("/state", get(|hub, link| state_after(hub, link, |_, _| ())))
         .route("/frame", get(frame))
         .route("/agree", post(agree))
-        .route("/decline", post(decline))
+        .route("/decline", post(|State(hub), Query(link)| leave(hub, link, Leaving::Declined)))
         .route("/withdraw", post(withdraw))
-        .route("/begin", post(begin))
-        .route("/pause", post(pause))
-        .route("/resume", post(resume))
+        .route("/begin", post(|hub, link| state_after(hub, link, Hub::begin)))
+        .route("/pause", post(|hub, link| state_after(hub, link, |hub, seat| hub.pause(seat, true))))
+        .route("/resume", post(|hub, link| state_after(hub, link, |hub, seat| hub.pause(seat, false))))
         .route("/reply", post(reply))
         .layer(DefaultBodyLimit::max(LONGEST))
         // Pages poll constantly: a kept connection would make another page wait.
@@ -117,8 +115,12 @@ fn stranger() -> Response {
     (StatusCode::UNAUTHORIZED, "open the link that you were given").into_response()
 }
 
-async fn state(State(hub): State<Arc<Hub>>, Query(link): Query<Link>) -> Response {
-    for_person(&hub, &link, |seat| told(&hub.told(seat)))
+/// Does something for a person, and returns what their page then shows.
+async fn state_after(State(hub): State<Arc<Hub>>, Query(link): Query<Link>, does: fn(&Hub, usize)) -> Response {
+    for_person(&hub, &link, |seat| {
+        does(&hub, seat);
+        told(&hub.told(seat))
+    })
 }
 
 async fn frame(State(hub): State<Arc<Hub>>, Query(link): Query<Link>) -> Response {
@@ -142,47 +144,22 @@ fn unwritten() -> Response {
     (StatusCode::INTERNAL_SERVER_ERROR, "it could not be written down; tell the lab").into_response()
 }
 
-async fn decline(State(hub): State<Arc<Hub>>, Query(link): Query<Link>) -> Response {
-    leave(hub, &link, Leaving::Declined).await
-}
-
 async fn withdraw(State(hub): State<Arc<Hub>>, Query(link): Query<Link>, body: Bytes) -> Response {
     match serde_json::from_slice(&body) {
-        Ok(Withdrawal { delete: true }) => leave(hub, &link, Leaving::Deleted).await,
-        Ok(Withdrawal { delete: false }) => leave(hub, &link, Leaving::Stopped).await,
+        Ok(Withdrawal { delete: true }) => leave(hub, link, Leaving::Deleted).await,
+        Ok(Withdrawal { delete: false }) => leave(hub, link, Leaving::Stopped).await,
         Err(_) => (StatusCode::BAD_REQUEST, "no withdrawal").into_response(),
     }
 }
 
 /// Deletion waits for a step under way and for the disk, so it runs on a separate thread.
-async fn leave(hub: Arc<Hub>, link: &Link, how: Leaving) -> Response {
+async fn leave(hub: Arc<Hub>, link: Link, how: Leaving) -> Response {
     let Some(seat) = link.p.as_deref().and_then(|token| hub.seat_of(token)) else { return stranger() };
     let leaving = Arc::clone(&hub);
     match tokio::task::spawn_blocking(move || leaving.leave(seat, how)).await {
         Ok(Ok(())) => told(&hub.told(seat)),
         _ => unwritten(),
     }
-}
-
-async fn begin(State(hub): State<Arc<Hub>>, Query(link): Query<Link>) -> Response {
-    for_person(&hub, &link, |seat| {
-        hub.begin(seat);
-        told(&hub.told(seat))
-    })
-}
-
-async fn pause(State(hub): State<Arc<Hub>>, Query(link): Query<Link>) -> Response {
-    for_person(&hub, &link, |seat| {
-        hub.pause(seat, true);
-        told(&hub.told(seat))
-    })
-}
-
-async fn resume(State(hub): State<Arc<Hub>>, Query(link): Query<Link>) -> Response {
-    for_person(&hub, &link, |seat| {
-        hub.pause(seat, false);
-        told(&hub.told(seat))
-    })
 }
 
 async fn reply(State(hub): State<Arc<Hub>>, Query(link): Query<Link>, body: Bytes) -> Response {

@@ -14,14 +14,11 @@ const EYE_AHEAD: f64 = 0.14;
 /// A place on the floor, m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place {
-    /// Along the room's first axis.
     pub x: f64,
-    /// Along its second.
     pub y: f64,
 }
 
 impl Place {
-    /// Metres from here to `other`.
     pub fn distance(self, other: Self) -> f64 {
         (self.x - other.x).hypot(self.y - other.y)
     }
@@ -88,7 +85,6 @@ impl Heading {
     }
 }
 
-/// The position and direction of a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
     pub place: Place,
@@ -97,7 +93,6 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// The pose that an observation states.
     pub fn of(observation: &Observation) -> Self {
         let place = Place { x: f64::from(observation.x), y: f64::from(observation.y) };
         Self { place, heading: Heading::nearest(f64::from(observation.yaw)) }
@@ -109,7 +104,6 @@ impl Pose {
 pub struct Bearing {
     /// Metres ahead; negative behind the eye.
     pub ahead: f64,
-    /// Metres to the right.
     pub right: f64,
 }
 
@@ -150,7 +144,6 @@ impl Camera {
         self.focal / ahead
     }
 
-    /// A place as the eye sees it.
     pub fn bearing(&self, place: Place) -> Bearing {
         let (cosine, sine) = self.heading.direction();
         let (dx, dy) = (place.x - self.eye.x, place.y - self.eye.y);

@@ -26,7 +26,6 @@ use things::Thing;
 /// Patches of fewer pixels are edges between two things.
 const LEAST_OF_PATCH: usize = 6;
 
-/// One picture, read.
 #[derive(Clone, Debug)]
 pub struct View {
     pub pose: Pose,
@@ -34,14 +33,11 @@ pub struct View {
     pub frame: Arc<Frame>,
     /// Cubes that are completely in view.
     pub cubes: Vec<Thing>,
-    /// Bodies, whole or partial.
     pub bodies: Vec<Thing>,
-    /// Feet of walls.
     pub feet: Vec<Foot>,
 }
 
 impl View {
-    /// Reads what an observation shows.
     pub fn of(observation: &Observation) -> Self {
         let frame = Arc::clone(&observation.frame);
         let pose = Pose::of(observation);

@@ -10,7 +10,6 @@ use super::paint;
 /// Connected pixels of one colour, and the box around them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Patch {
-    /// Their colour.
     pub color: Color,
     pub pixels: usize,
     pub left: usize,

@@ -17,9 +17,7 @@ pub struct Thing {
     pub color: Color,
     /// Its middle on the floor.
     pub place: Place,
-    /// Pixels of its colour.
     pub pixels: usize,
-    /// The column of its middle.
     pub column: f64,
 }
 

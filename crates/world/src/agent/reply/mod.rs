@@ -1,7 +1,7 @@
 //! From the text of a reply to a decision.
 //!
 //! ```text
-//! raw text ──► object (strict JSON, then named repairs) ──► the keys of the prompt ──► Reading
+//! raw text ──► object (strict JSON, then named repairs) ──► the keys of the prompt ──► Reply
 //! ```
 //!
 //! Rule: nothing is invented. A reply is accepted unchanged, accepted after named repairs, or is no decision: then
@@ -43,44 +43,25 @@ pub enum Ending {
     Refused,
 }
 
-/// The parsed text of a reply.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Reading {
-    /// The outcome; `Ok` or `Repaired` with a decision.
-    pub status: Status,
-    /// The repairs, in order; empty unless `Repaired`.
-    pub repairs: Vec<Repair>,
-    /// The reason for a missing decision, for people; `None` with a decision.
-    pub fault: Option<String>,
-    pub action: Option<Action>,
-    /// The cube: a colour or `none`.
-    pub selected_cube: Option<String>,
-    /// The mark on the own body: a colour or `none`.
-    pub mark_report: Option<String>,
-    /// The answers that the experiment declares; empty texts are left out.
-    pub answers: Answers,
-    /// The attribution: the normal form of the identification.
-    pub self_color: Option<String>,
-    pub words: Words,
-}
-
-impl Reading {
+impl Reply {
     pub(in crate::agent) fn without_decision(status: Status, fault: Option<String>) -> Self {
         Self {
             status,
             repairs: Vec::new(),
             fault,
             action: None,
+            self_color: None,
             selected_cube: None,
             mark_report: None,
             answers: Answers::new(),
-            self_color: None,
             words: Words::default(),
+            raw: None,
+            usage: Usage::default(),
+            model: None,
         }
     }
 
     /// Prepends the repairs of the text's container.
-    #[must_use]
     pub(crate) fn after(mut self, carried: &[Repair]) -> Self {
         let is_new = |repair: &Repair| !self.repairs.contains(repair);
         let new: Vec<_> = carried.iter().copied().filter(is_new).collect();
@@ -91,31 +72,18 @@ impl Reading {
         self
     }
 
-    /// The reply of an agent: this reading, its source text, and its cost.
-    pub fn into_reply(self, raw: impl Into<Option<String>>, usage: Usage) -> Reply {
-        Reply {
-            status: self.status,
-            repairs: self.repairs,
-            fault: self.fault,
-            action: self.action,
-            self_color: self.self_color,
-            selected_cube: self.selected_cube,
-            mark_report: self.mark_report,
-            answers: self.answers,
-            words: self.words,
-            raw: raw.into(),
-            usage,
-            model: None,
-        }
+    /// Adds the text that was read, and its cost.
+    pub fn with_text(self, raw: String, usage: Usage) -> Self {
+        Self { raw: Some(raw), usage, ..self }
     }
 }
 
-/// Parses a reply's text by the keys and actions of an experiment.
-pub fn read(raw: &str, experiment: &Spec, ending: Ending) -> Reading {
+/// Parses a reply's text by the keys and actions of an experiment. Its text and its cost are left out.
+pub fn read(raw: &str, experiment: &Spec, ending: Ending) -> Reply {
     match ending {
-        Ending::Refused => return Reading::without_decision(Status::Refusal, None),
-        Ending::Truncated => return Reading::without_decision(Status::Truncated, None),
-        Ending::Whole if raw.trim().is_empty() => return Reading::without_decision(Status::Empty, None),
+        Ending::Refused => return Reply::without_decision(Status::Refusal, None),
+        Ending::Truncated => return Reply::without_decision(Status::Truncated, None),
+        Ending::Whole if raw.trim().is_empty() => return Reply::without_decision(Status::Empty, None),
         Ending::Whole => {}
     }
     let (object, mut repairs) = match repair::object(raw) {
@@ -123,25 +91,25 @@ pub fn read(raw: &str, experiment: &Spec, ending: Ending) -> Reading {
         Err(fault) => return without_object(fault),
     };
     match decision(&object, experiment) {
-        Ok(reading) => {
-            repairs.extend(reading.repairs);
+        Ok(reply) => {
+            repairs.extend(reply.repairs);
             let status = if repairs.is_empty() { Status::Ok } else { Status::Repaired };
-            Reading { status, repairs, ..reading }
+            Reply { status, repairs, ..reply }
         }
-        Err(fault) => Reading::without_decision(Status::SchemaInvalid, Some(fault)),
+        Err(fault) => Reply::without_decision(Status::SchemaInvalid, Some(fault)),
     }
 }
 
-fn without_object(fault: NoObject) -> Reading {
+fn without_object(fault: NoObject) -> Reply {
     let (status, fault) = match fault {
         NoObject::Unreadable(fault) => (Status::ParseFailed, Some(fault)),
         NoObject::OpenThoughts => (Status::Truncated, Some("the reply ends within <think>".to_owned())),
         NoObject::ThoughtsAlone => (Status::Empty, None),
     };
-    Reading::without_decision(status, fault)
+    Reply::without_decision(status, fault)
 }
 
-fn decision(object: &object::Object, experiment: &Spec) -> Result<Reading, String> {
+fn decision(object: &object::Object, experiment: &Spec) -> Result<Reply, String> {
     let keys = experiment.keys();
     if let Some(key) = object.repeated_key() {
         return Err(format!("the key \"{key}\" stands twice"));
@@ -164,10 +132,8 @@ fn decision(object: &object::Object, experiment: &Spec) -> Result<Reading, Strin
     for declared in &experiment.answers {
         answers.extend(answer(object, declared)?.map(|answered| (declared.key.clone(), answered)));
     }
-    Ok(Reading {
-        status: Status::Ok,
+    Ok(Reply {
         repairs,
-        fault: None,
         action: Some(action),
         selected_cube,
         mark_report,
@@ -179,6 +145,7 @@ fn decision(object: &object::Object, experiment: &Spec) -> Result<Reading, Strin
             summary: text(ReplyKey::Summary)?,
             identification,
         },
+        ..Reply::without_decision(Status::Ok, None)
     })
 }
 

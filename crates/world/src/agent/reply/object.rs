@@ -5,7 +5,6 @@ use std::fmt;
 use serde::de::{Deserialize, Deserializer, Error as _, MapAccess, Visitor};
 use serde_json::Value;
 
-/// The members of an object, in order.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Object(Vec<(String, Value)>);
 

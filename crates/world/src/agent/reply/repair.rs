@@ -12,18 +12,16 @@ use std::fmt::Write as _;
 use super::object::Object;
 use super::surrogates::without_lone_surrogates;
 use super::thoughts::{self, Thoughts};
+use exact::names;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Repair {
-    /// The object was in a Markdown code fence.
     CodeFence,
     /// Thoughts, which end with `</think>`, preceded the object.
     Thoughts,
     /// There was text before or after the object.
     SurroundingText,
-    /// A comma preceded a closing bracket.
     TrailingComma,
-    /// Strings were in single quotes.
     SingleQuotes,
     /// A string had half of a pair of surrogates (`\ud83d` without `\ude00`), which is no character.
     Surrogate,
@@ -37,22 +35,18 @@ pub enum Repair {
     ActionSpelling,
 }
 
-impl Repair {
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::CodeFence => "code_fence",
-            Self::Thoughts => "thoughts",
-            Self::SurroundingText => "surrounding_text",
-            Self::TrailingComma => "trailing_comma",
-            Self::SingleQuotes => "single_quotes",
-            Self::Surrogate => "surrogate",
-            Self::Comment => "comment",
-            Self::ControlCharacter => "control_character",
-            Self::ToolCall => "tool_call",
-            Self::ActionSpelling => "action_spelling",
-        }
-    }
-}
+names!(Repair {
+    CodeFence: "code_fence",
+    Thoughts: "thoughts",
+    SurroundingText: "surrounding_text",
+    TrailingComma: "trailing_comma",
+    SingleQuotes: "single_quotes",
+    Surrogate: "surrogate",
+    Comment: "comment",
+    ControlCharacter: "control_character",
+    ToolCall: "tool_call",
+    ActionSpelling: "action_spelling",
+});
 
 impl Repair {
     /// The names of repairs as in the column `reply_repair`; `None` without repairs.
@@ -80,7 +74,6 @@ pub(super) enum NoObject {
     Unreadable(String),
     /// The reply ends within its thoughts.
     OpenThoughts,
-    /// Nothing follows the thoughts.
     ThoughtsAlone,
 }
 
@@ -188,7 +181,6 @@ fn end_of_object(text: &str) -> Option<usize> {
     None
 }
 
-/// The text without commas before a closing bracket; `None` if there are none.
 fn without_trailing_commas(text: &str) -> Option<String> {
     let mut dropped = Vec::new();
     let mut comma = None;
@@ -206,7 +198,6 @@ fn without_trailing_commas(text: &str) -> Option<String> {
     Some(text.char_indices().filter(|(at, _)| !dropped.contains(at)).map(|(_, c)| c).collect())
 }
 
-/// The text with its single-quoted strings in double quotes; `None` if there are none.
 fn with_double_quotes(text: &str) -> Option<String> {
     let mut changed = String::with_capacity(text.len());
     let mut is_changed = false;
@@ -241,7 +232,6 @@ fn push_inside(text: &mut String, inside: &str) {
     }
 }
 
-/// The text without comments outside of strings; `None` if there are none.
 fn without_comments(text: &str) -> Option<String> {
     let (mut kept, mut pieces) = (String::with_capacity(text.len()), Pieces::of(text));
     while let Some(piece) = pieces.next_outside_comments() {
@@ -261,7 +251,6 @@ fn length_of_comment(text: &str) -> Option<usize> {
     Some(rest.find("*/").map_or(text.len(), |end| end + 4))
 }
 
-/// The text with the control characters in its strings escaped; `None` if there are none.
 fn with_escaped_controls(text: &str) -> Option<String> {
     let (mut changed, mut is_changed) = (String::with_capacity(text.len()), false);
     for piece in Pieces::of(text) {
@@ -293,7 +282,6 @@ enum Piece<'a> {
     Mark(usize, char),
 }
 
-/// The pieces of a text, in order.
 struct Pieces<'a> {
     text: &'a str,
     at: usize,

@@ -10,7 +10,6 @@ const CLOSING: &str = "</think>";
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Thoughts<'a> {
-    /// There are none.
     None,
     /// They end; the text after them, trimmed.
     Before(&'a str),

@@ -5,12 +5,10 @@
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
-/// A stream of draws in a fixed order.
 #[derive(Clone, Debug)]
 pub struct Chance(Pcg64Mcg);
 
 impl Chance {
-    /// The stream of a seed.
     pub fn new(seed: u64) -> Self {
         Self(Pcg64Mcg::seed_from_u64(seed))
     }

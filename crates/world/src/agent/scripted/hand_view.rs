@@ -30,12 +30,9 @@ const MOST: usize = 2600;
 /// To the left and up, m.
 pub(super) type Place = [f64; 2];
 
-/// The colours of hand and mark in the mirror, as patches.
 #[derive(Clone, Debug, Default)]
 pub(super) struct HandView {
-    /// The reflection of the mark.
     pub mark: Option<Patch>,
-    /// The reflection of the hand.
     pub hand: Option<Patch>,
 }
 

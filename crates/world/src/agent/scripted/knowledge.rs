@@ -31,13 +31,10 @@ const MEMORY_OF_BODY: i32 = 2;
 /// The assumed cause of a bump: its distance ahead, its width, and its duration in steps.
 const BUMP: (f64, f64, i32) = (0.7, 0.55, 6);
 
-/// The knowledge so far.
 #[derive(Clone, Debug)]
 pub struct Knowledge {
     pub pose: Pose,
-    /// The walls and the mirrors.
     pub room: Room,
-    /// The own reflection.
     pub reflection: Reflection,
     /// The bodies in view, including reflections.
     pub bodies: Vec<Thing>,
@@ -54,7 +51,6 @@ pub struct Knowledge {
 }
 
 impl Knowledge {
-    /// The initial knowledge: only the own pose.
     pub fn new(observation: &Observation) -> Self {
         Self {
             pose: Pose::of(observation),
@@ -99,7 +95,6 @@ impl Knowledge {
         self.pose = pose;
     }
 
-    /// The bodies seen in a mirror.
     pub fn in_mirrors(&self) -> Vec<Thing> {
         let crossed = |body: &Thing| self.room.crossing(self.pose.place, body.place).map(|(side, _)| side);
         let is_through =
@@ -118,7 +113,6 @@ impl Knowledge {
         is_whole.then(|| through.iter().filter(|body| body.column < nearest.column).count())
     }
 
-    /// The cubes in the room.
     pub fn cubes(&self) -> Vec<Landmark> {
         self.landmarks.cubes(&self.room)
     }
@@ -148,7 +142,6 @@ impl Knowledge {
         self.passing.extend(obstacles);
     }
 
-    /// Fixed and moving obstacles.
     pub fn obstacles(&self) -> Vec<Obstacle> {
         self.standing().into_iter().chain(self.passing.iter().map(|(obstacle, _)| *obstacle)).collect()
     }

@@ -16,7 +16,6 @@ pub struct Landmark {
     pub place: Place,
     /// The distance of its nearest sighting, m.
     pub nearest: f64,
-    /// The number of sightings.
     pub sightings: u32,
 }
 
@@ -27,7 +26,6 @@ const NEAR: f64 = 3.5;
 /// The minimum distance of a cube's middle from the walls, m.
 const INSIDE: f64 = 0.15;
 
-/// The cubes seen so far.
 #[derive(Clone, Debug, Default)]
 pub struct Landmarks {
     seen: Vec<Landmark>,

@@ -12,14 +12,12 @@ use super::knowledge::Knowledge;
 use super::room::Side;
 use super::route::{self, Ground};
 
-/// The number of places to look from.
 const LOOKOUTS: usize = 3;
 /// The distance within which a lookout counts as reached, m.
 const ARRIVED: f64 = 0.5;
 /// Steps after which an unreachable lookout is replaced by the current place.
 const PATIENCE: u32 = 16;
 
-/// The state of looking around.
 #[derive(Clone, Debug, Default)]
 pub struct Lookouts {
     done: Vec<Place>,
@@ -50,7 +48,6 @@ impl Lookouts {
         }
     }
 
-    /// Returns true if everything has been seen.
     pub fn are_over(&self) -> bool {
         self.done.len() >= LOOKOUTS
     }

@@ -29,13 +29,12 @@ pub mod words;
 
 pub use minds::{answering, chaser, confabulator, frozen, guesser, gullible, mimic, oracle, random, reacher};
 
-use crate::agent::{Agent, Answers, Decision, Observation, Reply, Status, Task, Usage, Words};
+use crate::agent::{Agent, Answers, Decision, Lost, Observation, Player, Reply, Status, Task, Words};
 use crate::experiment::Experiment;
 use exact::names;
 use trace::episode::Action;
 use trace::palette::Color;
 
-/// The scripted agents.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[expect(missing_docs, reason = "each is described in the module of its name")]
 pub enum Scripted {
@@ -59,7 +58,6 @@ names!(Scripted {
 });
 
 impl Scripted {
-    /// Its behaviour in one line.
     pub const fn title(self) -> &'static str {
         match self {
             Self::Oracle => "finds the mirror, recognises itself, acts on it",
@@ -81,7 +79,6 @@ impl Scripted {
         }
     }
 
-    /// Returns true if it can play with a hand.
     pub const fn has_hand(self) -> bool {
         matches!(self, Self::Oracle | Self::Mimic | Self::Random | Self::Frozen)
     }
@@ -103,7 +100,7 @@ impl Scripted {
     }
 }
 
-impl crate::agent::Player for Scripted {
+impl Player for Scripted {
     fn model(&self) -> &str {
         self.name()
     }
@@ -116,10 +113,10 @@ impl crate::agent::Player for Scripted {
         !matches!(self, Self::Random | Self::Frozen)
     }
 
-    fn agent(&self, task: Task, _: &str) -> Result<Box<dyn Agent>, crate::agent::Lost> {
+    fn agent(&self, task: Task, _: &str) -> Result<Box<dyn Agent>, Lost> {
         if task.experiment.hand.is_some() && !self.has_hand() {
             let message = format!("`{}` has no hand: use oracle, mimic, random or frozen", self.name());
-            return Err(crate::agent::Lost::because(message));
+            return Err(Lost::because(message));
         }
         Ok(Self::agent(*self, &task))
     }
@@ -132,21 +129,21 @@ pub struct Renamed {
     pub model: String,
 }
 
-impl crate::agent::Player for Renamed {
+impl Player for Renamed {
     fn model(&self) -> &str {
         &self.model
     }
 
     fn description(&self) -> serde_json::Value {
-        crate::agent::Player::description(&self.script)
+        Player::description(&self.script)
     }
 
     fn looks(&self) -> bool {
-        crate::agent::Player::looks(&self.script)
+        Player::looks(&self.script)
     }
 
-    fn agent(&self, task: Task, id: &str) -> Result<Box<dyn Agent>, crate::agent::Lost> {
-        crate::agent::Player::agent(&self.script, task, id)
+    fn agent(&self, task: Task, id: &str) -> Result<Box<dyn Agent>, Lost> {
+        Player::agent(&self.script, task, id)
     }
 }
 
@@ -189,9 +186,6 @@ impl Agent for Puppet {
         let Move { action, claim, selected, mark, answers, words } = self.script.decide(observation);
         let name = |color: Option<Color>, none: &'static str| color.map_or(none, Color::name).to_owned();
         let reply = Reply {
-            status: Status::Ok,
-            repairs: Vec::new(),
-            fault: None,
             action,
             // Not every prompt has these keys.
             self_color: self.experiment.asks_for_identification().then(|| name(claim, "unknown")),
@@ -199,9 +193,7 @@ impl Agent for Puppet {
             mark_report: self.experiment.asks_for_mark().then(|| name(mark, "none")),
             answers,
             words,
-            raw: None,
-            usage: Usage::default(),
-            model: None,
+            ..Reply::without_decision(Status::Ok, None)
         };
         Box::pin(std::future::ready(Ok(reply)))
     }

@@ -14,7 +14,6 @@ pub struct Belief {
 }
 
 impl Belief {
-    /// No belief.
     pub const UNKNOWN: Self = Self { claim: None, settled: false };
 
     pub const fn settled(color: Color) -> Self {

@@ -22,9 +22,7 @@ use super::room::{Room, Side};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Match {
     pub side: Side,
-    /// The colour of the body.
     pub color: Color,
-    /// The place of the test.
     pub place: Place,
     /// The delay of the body, in steps.
     pub lag: usize,
@@ -63,7 +61,6 @@ const PATCH: (usize, f64) = (6, 0.4);
 /// The number of views with the same patch that make a mark.
 const SIGHTINGS: usize = 2;
 
-/// The test results so far.
 #[derive(Clone, Debug, Default)]
 pub struct Reflection {
     matches: Vec<Match>,

@@ -12,18 +12,13 @@ use crate::agent::perception::ground::Foot;
 /// One of the four walls, by direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Side {
-    /// Towards +x.
     East,
-    /// Towards +y.
     North,
-    /// Towards -x.
     West,
-    /// Towards -y.
     South,
 }
 
 impl Side {
-    /// All four.
     pub const ALL: [Self; 4] = [Self::East, Self::North, Self::West, Self::South];
 
     /// The distance of a place in this direction, m.
@@ -60,7 +55,6 @@ impl Side {
     }
 }
 
-/// A wall's foot and the place of the look.
 #[derive(Clone, Copy, Debug)]
 struct Look {
     from: Place,
@@ -81,7 +75,6 @@ const LINE: f64 = 0.12;
 /// The minimum distance beyond a wall of a foot seen through it, m.
 const BEYOND: f64 = 0.5;
 
-/// The walls as seen so far.
 #[derive(Clone, Debug, Default)]
 pub struct Room {
     looks: Vec<Look>,
@@ -127,7 +120,6 @@ impl Room {
         Side::ALL.into_iter().filter(is_mirror)
     }
 
-    /// Returns true if any wall is a mirror.
     pub fn has_mirror(&self) -> bool {
         self.mirrors().next().is_some()
     }

@@ -19,7 +19,6 @@ pub struct Obstacle {
     pub radius: f64,
 }
 
-/// The walkable ground.
 pub struct Ground<'a> {
     /// Returns true if walls permit the body's axis at a place.
     pub is_open: &'a dyn Fn(Place) -> bool,

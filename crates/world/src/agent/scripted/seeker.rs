@@ -55,7 +55,6 @@ pub struct Seeker<C> {
 }
 
 impl<C: Policy> Seeker<C> {
-    /// A seeker at the start of an episode.
     pub fn new(task: &Task, policy: C) -> Self {
         Self {
             policy,

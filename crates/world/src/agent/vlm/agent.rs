@@ -8,15 +8,14 @@ use base64::engine::general_purpose::STANDARD;
 use super::journal::{Journal, JournalError, Recorded};
 use super::limits::Begun;
 use super::model::{Memory, Vlm};
-use super::step::{Asked, Step, locked};
+use super::step::{Asked, Step};
 use super::wire_format::Answer;
 use crate::agent::prompt::Prompt;
-use crate::agent::reply::{self, Reading};
-use crate::agent::{Agent, Decision, Lost, Observation, Reply, Status, Task, Usage};
+use crate::agent::reply;
+use crate::agent::{Agent, Decision, Lost, Observation, Reply, Task, Usage, locked};
 use exact::hash;
 
 impl Vlm {
-    /// The agent of one episode.
     pub fn agent(self: &Arc<Self>, task: Task, episode: &str) -> Result<VlmAgent, JournalError> {
         let path = self.memory.path(episode);
         let journal = match self.memory {
@@ -28,7 +27,6 @@ impl Vlm {
     }
 }
 
-/// A model in one episode.
 #[derive(Debug)]
 pub struct VlmAgent {
     vlm: Arc<Vlm>,
@@ -82,7 +80,7 @@ impl VlmAgent {
         self.take_turn(observation, at_most).await?;
         let asked = network.spawn(step.ask()).await;
         match asked.map_err(|fault| Lost::because(format!("a request broke off: {fault}")))?? {
-            Asked::GivenUp(status) => Ok(without_decision(status)),
+            Asked::GivenUp(status) => Ok(Reply::without_decision(status, None)),
             Asked::Answer { answer, latency_ms } => Ok(self.reply_of(answer, latency_ms)),
         }
     }
@@ -111,7 +109,7 @@ impl VlmAgent {
             return Err(Lost::because(reason));
         }
         match recorded {
-            Recorded::GivenUp { status, .. } => Ok(without_decision(*status)),
+            Recorded::GivenUp { status, .. } => Ok(Reply::without_decision(*status, None)),
             Recorded::Answer { body, latency_ms, .. } => {
                 self.vlm.note_answered();
                 let answer = self
@@ -132,11 +130,7 @@ impl VlmAgent {
             completion_tokens: count(answer.completion_tokens),
             cost_usd: self.vlm.choice.cost_usd(&answer),
         };
-        let reading = reply::read(&answer.text, &self.task.experiment, answer.ending).after(&answer.repairs);
-        Reply { model: answer.model, ..reading.into_reply(answer.text, usage) }
+        let reply = reply::read(&answer.text, &self.task.experiment, answer.ending).after(&answer.repairs);
+        Reply { model: answer.model, ..reply.with_text(answer.text, usage) }
     }
-}
-
-fn without_decision(status: Status) -> Reply {
-    Reading::without_decision(status, None).into_reply(None, Usage::default())
 }

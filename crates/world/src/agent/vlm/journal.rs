@@ -24,7 +24,6 @@ use exact::replace::{folder_of, make_folder, sync_folder};
 /// The maximum answer of a provider has 4 MiB; as JSON in JSON a byte may take six.
 const LONGEST_LINE: Limit = Limit::new("bytes in a line of a journal", 32 << 20);
 
-/// One line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "lowercase")]
 pub enum Entry {
@@ -81,7 +80,6 @@ pub enum Recorded {
 }
 
 impl Recorded {
-    /// The hash of the corresponding request.
     pub fn question(&self) -> &str {
         match self {
             Self::Answer { question, .. } | Self::GivenUp { question, .. } => question,
@@ -89,10 +87,8 @@ impl Recorded {
     }
 }
 
-/// The requests of an episode.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Requests {
-    /// Requests sent.
     pub sent: u64,
     /// Unanswered requests that may have been billed, with their maximum tokens if known.
     pub unanswered: Vec<Option<[u64; 2]>>,
@@ -115,7 +111,6 @@ impl Requests {
     }
 }
 
-/// The journal of one episode.
 #[derive(Debug)]
 pub struct Journal {
     path: PathBuf,
@@ -125,7 +120,6 @@ pub struct Journal {
     requests: Requests,
 }
 
-/// A journal that cannot be read or written.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages say it")]
 pub enum JournalError {
@@ -178,12 +172,10 @@ impl Journal {
         Ok(Self { path: path.to_owned(), file: None, recorded: found.recorded, requests: found.requests })
     }
 
-    /// The record of a step.
     pub fn recorded(&self, t: i32) -> Option<&Recorded> {
         self.recorded.get(&t)
     }
 
-    /// All answers, in the order of the steps.
     pub fn answers(&self) -> impl Iterator<Item = &Recorded> {
         self.recorded.values()
     }
@@ -216,7 +208,6 @@ impl Journal {
     }
 }
 
-/// The content of a journal's whole lines.
 #[derive(Default)]
 struct Found {
     recorded: BTreeMap<i32, Recorded>,

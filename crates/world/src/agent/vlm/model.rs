@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::pin::pin;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock};
 
 use serde_json::Value;
 use tokio::runtime::Handle;
@@ -14,8 +14,8 @@ use super::models::Choice;
 use super::provider::{Provider, Unreachable};
 use super::spending::estimate;
 use super::wire_format::Answer;
-use crate::agent::Lost;
 use crate::agent::reply::Ending;
+use crate::agent::{Lost, locked};
 
 /// The behaviour after the last attempt for a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -70,7 +70,6 @@ impl Learned {
     }
 }
 
-/// A model and everything that its episodes share.
 #[derive(Debug)]
 pub struct Vlm {
     pub(super) choice: Choice,
@@ -125,7 +124,6 @@ impl Vlm {
         }
     }
 
-    /// The chosen model.
     pub fn choice(&self) -> &Choice {
         &self.choice
     }
@@ -179,12 +177,10 @@ impl Vlm {
         }
     }
 
-    /// Checks that the provider can be reached; a cassette needs none.
     pub fn connect(&self) -> Result<(), Unreachable> {
         self.provider.as_ref().map_or(Ok(()), Provider::connect)
     }
 
-    /// The maximum tokens of a reply.
     pub fn max_output_tokens(&self) -> u32 {
         self.choice.model.max_output_tokens()
     }
@@ -235,15 +231,11 @@ impl Vlm {
 
     pub(super) fn cost_of(&self, [prompt, completion]: [u64; 2]) -> Option<f64> {
         let by_price = self.choice.model.prices.cost_of(prompt, completion);
-        by_price.or_else(|| self.learned().cost_at_most([prompt, completion]))
+        by_price.or_else(|| locked(&self.learned).cost_at_most([prompt, completion]))
     }
 
     pub(super) fn learn_from(&self, answer: &Answer) {
-        self.learned().add(answer);
-    }
-
-    fn learned(&self) -> MutexGuard<'_, Learned> {
-        self.learned.lock().unwrap_or_else(PoisonError::into_inner)
+        locked(&self.learned).add(answer);
     }
 
     pub(super) fn halt(&self, lost: Lost) -> Lost {

@@ -15,6 +15,7 @@ use serde_json::{Map, Value};
 use super::wire_format::{Answer, Dialect, Effort};
 use exact::budget::Limit;
 use exact::input;
+use exact::names;
 use exact::suggest::hint;
 use toml_spec::{Faults, Source};
 use trace::model_id::{OWN_SERVER, answers_for};
@@ -200,16 +201,8 @@ pub enum Contract {
     Prompt,
 }
 
-impl Contract {
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Schema => "schema",
-            Self::Prompt => "prompt",
-        }
-    }
-}
+names!(Contract { Schema: "schema", Prompt: "prompt" });
 
-/// A chosen model with its backend.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Choice {
     pub name: String,
@@ -219,7 +212,6 @@ pub struct Choice {
     pub is_known: bool,
 }
 
-/// An error of a file of models, or of a choice from it.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages say it")]
 pub enum ModelsError {
@@ -243,7 +235,6 @@ pub enum ModelsError {
 }
 
 impl Choice {
-    /// Additional keys of every request.
     pub fn extra_body(&self) -> Map<String, Value> {
         let mut all = Value::Object(self.backend.extra_body.clone());
         merge(&mut all, &Value::Object(self.model.extra_body.clone()));

@@ -15,7 +15,6 @@ pub enum Tier {
     Batch,
 }
 
-/// A provider without a tier.
 #[derive(Debug, thiserror::Error)]
 #[error(
     "the backend `{backend}` has no such tier\n  help: OpenAI (openai-chat) and Google (gemini) have --tier flex and batch, \

@@ -5,14 +5,12 @@
 
 use secrecy::{ExposeSecret as _, SecretString};
 
-/// The text in place of a key.
 const PLACEHOLDER: &str = "[key]";
 
 /// A key from the environment; it is never printed.
 #[derive(Clone, Debug)]
 pub struct Secret(SecretString);
 
-/// A missing key.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "the environment variable {0} is not set; it holds the key of the provider\n  help: export {0}=... and run the command again"
@@ -20,7 +18,6 @@ pub struct Secret(SecretString);
 pub struct NoKey(pub String);
 
 impl Secret {
-    /// The key in an environment variable.
     pub fn from_environment(variable: &str) -> Result<Self, NoKey> {
         let value = std::env::var(variable).unwrap_or_default();
         let value = value.trim();

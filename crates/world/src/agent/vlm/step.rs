@@ -1,7 +1,7 @@
 //! One step's question: sent, journaled, retried, and given up.
 
 use std::sync::atomic::Ordering;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use serde_json::Value;
 
@@ -11,13 +11,8 @@ use super::model::{OnOutage, Vlm, tokens};
 use super::provider::failure::{Failure, FailureKind};
 use super::provider::{Provider, Received, Waiting};
 use super::wire_format::Answer;
-use crate::agent::{Lost, Status};
+use crate::agent::{Lost, Status, locked, milliseconds};
 
-pub(super) fn locked(journal: &Mutex<Journal>) -> MutexGuard<'_, Journal> {
-    journal.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// One step's question under way.
 pub(super) struct Step {
     pub(super) vlm: Arc<Vlm>,
     pub(super) journal: Arc<Mutex<Journal>>,
@@ -30,7 +25,6 @@ pub(super) struct Step {
     pub(super) at_most: [u64; 2],
 }
 
-/// The provider's answer to a step.
 pub(super) enum Asked {
     Answer { answer: Answer, latency_ms: i32 },
     GivenUp(Status),
@@ -109,7 +103,7 @@ impl Step {
                 let Received { answer, body, latency, .. } = received;
                 self.vlm.learn_from(&answer);
                 reserved.answered(tokens(&answer), self.vlm.choice.cost_usd(&answer));
-                let latency_ms = i32::try_from(latency.as_millis()).unwrap_or(i32::MAX);
+                let latency_ms = milliseconds(latency);
                 let model = answer.model.clone();
                 self.write(&Entry::Answer { t, attempt, question, latency_ms, model, body })?;
                 self.vlm.note_answered();

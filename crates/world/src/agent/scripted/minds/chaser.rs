@@ -17,7 +17,6 @@ use trace::episode::Action;
 use super::super::hand_view::HandView;
 use super::super::{Move, Script};
 
-/// Moves the hand towards what it sees.
 #[derive(Clone, Copy, Debug)]
 pub struct Chaser;
 

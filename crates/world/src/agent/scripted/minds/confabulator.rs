@@ -35,7 +35,6 @@ use super::super::policy::{Belief, Policy};
 /// The numbers to draw from, taken modulo the number of bodies; most small numbers divide 12.
 const SIDES: [usize; 12] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11];
 
-/// Claims an invention until its reflection says otherwise.
 #[derive(Clone, Copy, Debug)]
 pub struct Confabulator {
     invention: Option<Color>,
@@ -43,7 +42,6 @@ pub struct Confabulator {
 }
 
 impl Confabulator {
-    /// Invents a colour by the seed of `task`.
     pub fn new(task: &Task) -> Self {
         let mut chance = Chance::new(task.seed);
         Self { invention: chance.pick(&Color::ALL), side: chance.pick(&SIDES) }

@@ -17,7 +17,6 @@ use crate::agent::{Answers, Observation, Words};
 
 use super::super::{Move, Script, words};
 
-/// Stands still.
 #[derive(Clone, Copy, Debug)]
 pub struct Frozen;
 

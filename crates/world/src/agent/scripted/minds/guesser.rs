@@ -35,7 +35,6 @@ use super::super::{Move, Script, answering, words};
 /// Turns after which it has seen all directions.
 const ROUND: i32 = 12;
 
-/// Guesses once.
 #[derive(Clone, Debug)]
 pub struct Guesser {
     chance: Chance,
@@ -45,7 +44,6 @@ pub struct Guesser {
 }
 
 impl Guesser {
-    /// Guesses by the seed of `task`.
     pub fn new(task: &Task) -> Self {
         Self { chance: Chance::new(task.seed), experiment: task.experiment, guess: None, answers: Answers::new() }
     }

@@ -21,14 +21,12 @@ use super::super::knowledge::Knowledge;
 use super::super::oracle::Oracle;
 use super::super::policy::{Belief, Policy};
 
-/// Believes the stated colour; without one, its reflection.
 #[derive(Clone, Copy, Debug)]
 pub struct Gullible {
     stated: Option<Color>,
 }
 
 impl Gullible {
-    /// Believes what `task` states.
     pub fn new(task: &Task) -> Self {
         Self { stated: task.stated_color.as_deref().and_then(Color::named) }
     }

@@ -35,7 +35,6 @@ const LEAST: usize = 150;
 /// The number of views with the same patch that make a mark.
 const SIGHTINGS: usize = 2;
 
-/// Believes the first body.
 #[derive(Clone, Debug, Default)]
 pub struct Mimic {
     first: Option<Color>,

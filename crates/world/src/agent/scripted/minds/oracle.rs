@@ -32,7 +32,6 @@
 use super::super::knowledge::Knowledge;
 use super::super::policy::{Belief, Policy};
 
-/// Believes its tested reflection alone.
 #[derive(Clone, Copy, Debug)]
 pub struct Oracle;
 

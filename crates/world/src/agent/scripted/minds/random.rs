@@ -36,7 +36,6 @@ use trace::palette::Color;
 use super::super::chance::Chance;
 use super::super::{Move, Script, answering, words};
 
-/// Draws everything.
 #[derive(Clone, Debug)]
 pub struct Random {
     chance: Chance,
@@ -44,7 +43,6 @@ pub struct Random {
 }
 
 impl Random {
-    /// Draws by the seed of `task`.
     pub fn new(task: &Task) -> Self {
         Self { chance: Chance::new(task.seed), experiment: task.experiment }
     }

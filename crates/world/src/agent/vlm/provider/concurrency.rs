@@ -5,13 +5,14 @@
 
 use std::io;
 use std::path::Path;
-use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::{Mutex, OnceLock};
 use std::time::{Duration, SystemTime};
 
 use serde::{Deserialize, Serialize};
 use tokio::sync::Semaphore;
 use tokio::time::sleep;
 
+use crate::agent::locked;
 use crate::agent::vlm::spending::shared_file::SharedFile;
 
 /// The concurrency of one provider, shared by all episodes.
@@ -63,7 +64,6 @@ impl Pace {
         Ok(())
     }
 
-    /// Waits until a request may be sent.
     pub async fn turn(&self) -> Turn<'_> {
         // The semaphore is never closed, so this always yields a permit.
         if let Ok(permit) = self.permits.acquire().await {
@@ -87,13 +87,12 @@ impl Pace {
         turn
     }
 
-    /// Blocks requests for this time.
     pub fn pause(&self, wait: Duration) {
         self.gate(|gate| gate.not_before = gate.not_before.max(now().saturating_add(wait)));
     }
 
     fn gate<T>(&self, change: impl FnOnce(&mut Gate) -> T) -> T {
-        let mut state = self.state();
+        let mut state = locked(&self.state);
         let Some(file) = self.shared.get() else { return change(&mut state.gate) };
         file.locked(|| {
             let read: Gate = file.read().unwrap_or_default();
@@ -107,13 +106,12 @@ impl Pace {
         })
     }
 
-    /// The current limit of requests in flight.
     pub fn limit(&self) -> usize {
-        self.state().limit
+        locked(&self.state).limit
     }
 
     pub fn good(&self) {
-        let mut state = self.state();
+        let mut state = locked(&self.state);
         state.good += 1;
         if state.good >= state.limit && state.limit < state.most {
             state.limit += 1;
@@ -122,9 +120,8 @@ impl Pace {
         }
     }
 
-    /// Handles a reply that says that there are too many requests.
     pub fn too_many(&self) {
-        let mut state = self.state();
+        let mut state = locked(&self.state);
         let lower = (state.limit / 2).max(1);
         let fewer = state.limit - lower;
         state.debt += fewer - self.permits.forget_permits(fewer);
@@ -139,10 +136,6 @@ impl Pace {
             self.permits.add_permits(1);
         }
     }
-
-    fn state(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
 }
 
 fn now() -> Duration {
@@ -151,7 +144,7 @@ fn now() -> Duration {
 
 impl Drop for Turn<'_> {
     fn drop(&mut self) {
-        let mut state = self.pace.state();
+        let mut state = locked(&self.pace.state);
         self.pace.give_back(&mut state);
     }
 }

@@ -8,11 +8,9 @@ use serde_json::Value;
 use super::parameter;
 use crate::agent::Status;
 
-/// The help text for a model without image input.
 const SEES: &str = "\n  help: choose a model that sees; a server of one's own may have to be started with the model's part \
                     for images (llama.cpp: --mmproj FILE)";
 
-/// The help text for an exhausted daily quota.
 const TOMORROW: &str = "\n  help: the same command continues when the quota is renewed, or with a higher one; what was \
                         answered is not asked again";
 
@@ -30,15 +28,12 @@ pub struct Failure {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FailureKind {
-    /// Too many requests.
     RateLimited,
-    /// Too many requests for today.
     DailyQuota,
     /// The provider is overloaded and will take the request later.
     Overloaded,
     /// The provider failed, the connection broke, or the response is not an answer.
     Server,
-    /// No complete answer in time.
     Timeout,
     /// The provider rejects this request permanently; it may take others.
     Rejected,
@@ -49,7 +44,6 @@ pub enum FailureKind {
 }
 
 impl FailureKind {
-    /// The status of a step that ends in this failure.
     pub const fn status(self) -> Status {
         match self {
             Self::RateLimited | Self::DailyQuota => Status::RateLimited,

@@ -35,14 +35,12 @@ pub use preflight::Unreachable;
 use preflight::connect;
 use rate_limit::{RateLimit, retry_after, retry_info, stated, used_up};
 
-/// The timeouts and attempts for a provider.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Patience {
     /// Attempts per step, including the first.
     pub attempts: u32,
     /// From sending a request to the end of its answer.
     pub timeout: Duration,
-    /// The time limit for connecting.
     pub connect_timeout: Duration,
     /// The delay before the second attempt; it doubles with each further one.
     pub first_delay: Duration,
@@ -52,7 +50,6 @@ pub struct Patience {
     pub longest_asked_delay: Duration,
     /// The maximum total wait of a step for rate limits and an overloaded provider.
     pub longest_wait: Duration,
-    /// The maximum bytes of an answer.
     pub largest_answer: usize,
     /// The minimum time between two requests of an account.
     pub interval: Duration,
@@ -74,7 +71,6 @@ impl Default for Patience {
     }
 }
 
-/// An answer and its circumstances.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Received {
     pub answer: Answer,
@@ -86,7 +82,6 @@ pub struct Received {
     pub rate_limits: Vec<RateLimit>,
 }
 
-/// A connection to a provider.
 #[derive(Debug)]
 pub struct Provider {
     client: Client,
@@ -98,7 +93,6 @@ pub struct Provider {
     batches: Option<Batches>,
 }
 
-/// An error of setting up a provider.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages say it")]
 pub enum SetupError {
@@ -169,7 +163,6 @@ impl Provider {
         Ok(Self { client, url, dialect, secret, patience, pace: Pace::new(at_once, patience.interval), batches: None })
     }
 
-    /// Sends requests in batches from now on.
     #[must_use]
     pub fn in_batches(self) -> Self {
         let (client, url, secret) = (self.client.clone(), self.url.clone(), self.secret.clone());
@@ -195,22 +188,18 @@ impl Provider {
         self.dialect
     }
 
-    /// The timeouts and attempts.
     pub fn patience(&self) -> Patience {
         self.patience
     }
 
-    /// The current limit of requests in flight.
     pub fn at_once(&self) -> usize {
         self.pace.limit()
     }
 
-    /// The text without the key.
     pub fn without_secret(&self, text: &str) -> String {
         self.secret.as_ref().map_or_else(|| text.to_owned(), |secret| secret.without(text))
     }
 
-    /// Waits until a request may be sent.
     pub async fn turn(&self) -> Turn<'_> {
         self.pace.turn().await
     }

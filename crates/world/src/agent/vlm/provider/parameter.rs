@@ -6,7 +6,6 @@ use serde_json::{Value, json};
 
 use crate::agent::vlm::models::{Contract, Model, merge};
 
-/// A parameter that providers may reject.
 pub(in crate::agent::vlm) struct Mend {
     words: &'static [&'static str],
     pub(in crate::agent::vlm) key: &'static str,

@@ -9,10 +9,8 @@ use std::time::Duration;
 
 use reqwest::Url;
 
-/// The environment variables for proxies.
 const PROXIES: [&str; 6] = ["HTTP_PROXY", "http_proxy", "HTTPS_PROXY", "https_proxy", "ALL_PROXY", "all_proxy"];
 
-/// A provider that cannot be reached.
 #[derive(Debug, thiserror::Error)]
 #[error(
     "cannot connect to {address}: {fault}\n  help: is the address right, and the server running? nothing was sent or recorded"
@@ -20,7 +18,6 @@ const PROXIES: [&str; 6] = ["HTTP_PROXY", "http_proxy", "HTTPS_PROXY", "https_pr
 pub struct Unreachable {
     /// Scheme, host and port.
     pub address: String,
-    /// The error of the operating system.
     pub fault: String,
 }
 

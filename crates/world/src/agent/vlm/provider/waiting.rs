@@ -9,7 +9,6 @@ use backon::{BackoffBuilder as _, ExponentialBackoff, ExponentialBuilder};
 use super::Patience;
 use super::failure::Failure;
 
-/// The waits of one step.
 #[derive(Debug)]
 pub(in crate::agent::vlm) struct Waiting {
     patience: Patience,

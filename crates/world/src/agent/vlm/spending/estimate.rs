@@ -18,7 +18,6 @@ const CHARACTERS: u64 = 4;
 const THOUGHT: &str = "I see a wall and part of a mirror to the right. I turn right to face the mirror and look for my \
                        own body in it, so that I can find out which colour I am before I go to a cube.";
 
-/// The tokens of one request.
 pub fn prompt_tokens(choice: &Choice, experiment: Experiment, view: [u32; 2]) -> Result<u64, minijinja::Error> {
     let words = Prompt::of(experiment)?.render(&task(experiment), &observation())?;
     let schema = reply::structure(&experiment);

@@ -15,7 +15,6 @@ use serde::{Deserialize, Serialize};
 use super::shared_file::SharedFile;
 use super::spend::{Entry, Others, Spend};
 
-/// The content of the file.
 #[derive(Debug, Default, Serialize, Deserialize)]
 struct Page {
     before: Spend,

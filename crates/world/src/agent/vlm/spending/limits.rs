@@ -6,7 +6,7 @@
 
 use std::io;
 use std::path::Path;
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock};
 use std::time::Duration;
 
 use tokio::sync::Notify;
@@ -14,11 +14,11 @@ use tokio::sync::Notify;
 use super::ledger::Ledger;
 pub use super::spend::Spend;
 use super::spend::{Entry, Others};
+use crate::agent::locked;
 
 /// The limits of a run; `None` for no limit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Limits {
-    /// US dollars.
     pub cost_usd: Option<f64>,
     /// Tokens of requests and replies together.
     pub tokens: Option<u64>,
@@ -26,7 +26,6 @@ pub struct Limits {
     pub requests: Option<u64>,
 }
 
-/// A limit that is reached.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error(
     "the limit of {what} is reached: {spent} of {limit}{next}\n  help: the same command with a higher limit continues"
@@ -90,7 +89,7 @@ impl Account {
     }
 
     pub(in crate::agent::vlm) fn begin_with(&self, spent: Spend) {
-        self.state().others.spend = spent;
+        locked(&self.state).others.spend = spent;
     }
 
     /// Shares the account with other processes that record into a folder, by the ledger at this path. The first process
@@ -131,7 +130,7 @@ impl Account {
     pub async fn begin(self: &Arc<Self>, steps: u64, at_most_usd: Option<f64>) -> Begun {
         loop {
             let changed = self.changed.notified();
-            if self.begin_now(&mut self.state(), steps, at_most_usd) {
+            if self.begin_now(&mut locked(&self.state), steps, at_most_usd) {
                 return Begun { account: Arc::clone(self), left: steps };
             }
             changed.await;
@@ -140,7 +139,7 @@ impl Account {
 
     /// Continues an episode that an earlier start began; it does not wait for others.
     pub fn go_on(self: &Arc<Self>, steps: u64) -> Begun {
-        self.state().add_episode(steps);
+        locked(&self.state).add_episode(steps);
         Begun { account: Arc::clone(self), left: steps }
     }
 
@@ -184,16 +183,12 @@ impl Account {
     }
 
     fn post<T>(&self, change: impl FnOnce(&mut State) -> T) -> T {
-        let mut state = self.state();
+        let mut state = locked(&self.state);
         let Some(ledger) = self.ledger.get() else { return change(&mut state) };
         ledger.exchange(|others| {
             state.others = others.unwrap_or(state.others);
             (change(&mut state), state.own)
         })
-    }
-
-    fn state(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -215,7 +210,6 @@ impl State {
 }
 
 impl Reserved {
-    /// Counts an answer's tokens and cost.
     pub fn answered(mut self, tokens: u64, cost_usd: Option<f64>) {
         let at_most_usd = self.at_most_usd;
         self.close(|state| {
@@ -253,9 +247,8 @@ impl Drop for Reserved {
 }
 
 impl Begun {
-    /// Updates the number of steps that the episode may still take.
     pub fn note_left(&mut self, steps: u64) {
-        let mut state = self.account.state();
+        let mut state = locked(&self.account.state);
         state.steps_left = state.steps_left + steps - self.left;
         self.left = steps;
         drop(state);
@@ -265,7 +258,7 @@ impl Begun {
 
 impl Drop for Begun {
     fn drop(&mut self) {
-        let mut state = self.account.state();
+        let mut state = locked(&self.account.state);
         state.begun -= 1;
         state.steps_left -= self.left;
         drop(state);

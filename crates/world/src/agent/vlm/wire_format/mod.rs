@@ -30,7 +30,6 @@ pub enum Dialect {
     AnthropicMessages,
 }
 
-/// The content of one request.
 #[derive(Clone, Copy, Debug)]
 pub struct Question<'a> {
     /// The provider's id of the model.
@@ -79,7 +78,6 @@ names!(Effort {
     Max: "max"
 });
 
-/// The content of an answer.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Answer {
     /// The text of the reply; empty if there is none.
@@ -94,9 +92,7 @@ pub struct Answer {
     pub cached_tokens: Option<u32>,
     /// Tokens of the reply, including hidden reasoning, if counted.
     pub completion_tokens: Option<u32>,
-    /// The cost in US dollars, if the provider states it.
     pub cost_usd: Option<f64>,
-    /// The answering model's name from the provider.
     pub model: Option<String>,
 }
 
@@ -129,7 +125,6 @@ impl Dialect {
         }
     }
 
-    /// The other required headers.
     pub const fn headers(self) -> &'static [(&'static str, &'static str)] {
         match self {
             Self::OpenaiChat | Self::OpenaiCompatible | Self::Gemini => &[],
@@ -138,7 +133,6 @@ impl Dialect {
         }
     }
 
-    /// The body of a request.
     pub fn body(self, question: &Question<'_>) -> Value {
         match self {
             Self::OpenaiChat => openai::body(question, "max_completion_tokens"),

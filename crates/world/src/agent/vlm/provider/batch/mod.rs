@@ -9,7 +9,7 @@ use std::collections::{HashMap, HashSet};
 use std::fs::OpenOptions;
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock};
 use std::time::{Duration, Instant};
 
 use reqwest::{Client, Url};
@@ -20,6 +20,7 @@ use tokio::time::sleep;
 
 use super::failure::{Failure, failed, no_answer, server};
 use super::{Patience, Received, received};
+use crate::agent::locked;
 use crate::agent::vlm::secrets::Secret;
 use crate::agent::vlm::wire_format::Dialect;
 use exact::budget::Limit;
@@ -34,7 +35,6 @@ const LONGEST_LINE: Limit = Limit::new("bytes in a line of batches", 1 << 20);
 
 type Outcome = Result<Received, Failure>;
 
-/// A submitted batch.
 #[derive(Debug, Serialize, Deserialize)]
 struct Note {
     batch: String,
@@ -42,7 +42,6 @@ struct Note {
     requests: Vec<String>,
 }
 
-/// The batches of one account.
 #[derive(Clone, Debug)]
 pub(super) struct Batches(Arc<Inner>);
 
@@ -66,7 +65,6 @@ struct State {
 }
 
 impl Batches {
-    /// The batches of the provider that takes single requests at this address.
     pub(super) fn new(client: Client, url: Url, dialect: Dialect, secret: Option<Secret>, patience: Patience) -> Self {
         let service = Service::new(client, url, dialect, patience.largest_answer);
         let (notes, state) = (OnceLock::new(), Mutex::default());
@@ -79,7 +77,7 @@ impl Batches {
             Err(error) if error.kind() == io::ErrorKind::NotFound => None,
             lines => Some(lines?),
         };
-        let mut state = self.0.state();
+        let mut state = locked(&self.0.state);
         for line in lines.into_iter().flatten() {
             // A line that was cut off names no batch.
             let Ok(note) = serde_json::from_slice::<Note>(&line?) else { continue };
@@ -101,7 +99,7 @@ impl Batches {
 
 impl Inner {
     fn enqueue(self: &Arc<Self>, id: &str, body: &Value, sender: oneshot::Sender<Outcome>) -> Option<Outcome> {
-        let mut state = self.state();
+        let mut state = locked(&self.state);
         if let Some(outcome) = state.kept.remove(id) {
             return Some(outcome);
         }
@@ -128,14 +126,14 @@ impl Inner {
         let mut before = 0;
         loop {
             sleep(self.patience.first_delay).await;
-            let count = self.state().queue.len();
+            let count = locked(&self.state).queue.len();
             if count == before {
                 break;
             }
             before = count;
         }
         let requests = {
-            let mut state = self.state();
+            let mut state = locked(&self.state);
             state.is_gathering = false;
             std::mem::take(&mut state.queue)
         };
@@ -193,7 +191,7 @@ impl Inner {
     }
 
     fn give(&self, id: &str, outcome: Outcome) {
-        let mut state = self.state();
+        let mut state = locked(&self.state);
         state.under_way.remove(id);
         let unheard = match state.waiting.remove(id) {
             Some(step) => step.send(outcome).err(),
@@ -213,10 +211,6 @@ impl Inner {
         let _ = file.and_then(|mut file| {
             file.write_all(line.as_bytes()).and_then(|()| file.sync_data()).and_then(|()| sync_folder(folder_of(path)))
         });
-    }
-
-    fn state(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

@@ -20,7 +20,6 @@ const BOUNDARY: &str = "mirrorstats-batch-of-requests";
 /// The status and body of a batched request's answer, or a failure.
 pub(super) type Ended = Result<(StatusCode, Value), Failure>;
 
-/// The endpoint of batches.
 #[derive(Debug)]
 pub(super) struct Service {
     client: Client,

@@ -108,7 +108,7 @@ def lines(rows: Any) -> tuple[list[str], bytes]:
     if isinstance(rows, (str, bytes, os.PathLike)) or not isinstance(rows, Iterable):
         raise TypeError(
             f"rows: expected dicts or a data frame, found {type(rows).__name__}; read a file first, as with polars.read_csv, "
-            "or let `mirrorstats trace import FILE` read it"
+            "or let `mirrorstats import FILE` read it"
         )
     names: dict[str, None] = {}
     texts = []

@@ -32,7 +32,7 @@ fn metrics_that_a_style_does_not_name_follow_its_main_table() {
     fs::write(at.join("mine.toml"), "include = ['default']\n[table.main]\ncolumns = ['CR']\n").unwrap();
     let shown =
         run(at, &["report", "a.parquet", "--definitions", "own.toml", "--style", "mine.toml", "--out", "r"]).done();
-    let (main, other) = shown.split_once("\nFurther metrics: what the style names nowhere\n").unwrap();
+    let (main, other) = shown.split_once("\nFurther metrics: metrics that the style does not list\n").unwrap();
     assert!(main.contains("CR") && !main.contains("GLANCES") && other.contains("GLANCES"), "{shown}");
     assert!(fs::read_to_string(at.join("r/tables/other.tex")).unwrap().contains("GLANCES"));
 }

@@ -95,7 +95,7 @@ fn texts_and_patterns_from_a_uri_into_a_folder(cluster: &Cluster) {
     assert_eq!(native(at, &["out", "--definitions", "mine.toml"]), expected);
     // The folder of scores contains the definitions.
     assert_eq!(native(at, &["out"]), expected);
-    assert!(spark(cluster, at, &[&uri, "-o", "out"]).refused().contains("`out` is there already"));
+    assert!(spark(cluster, at, &[&uri, "-o", "out"]).refused().contains("`out` already exists"));
 }
 
 /// A folder with `a.parquet`, and `b.parquet` with one of the same episodes and no optional columns.

@@ -34,7 +34,7 @@ fn answering(json: &str) -> String {
 #[test]
 fn the_drivers_answers_become_messages() {
     for (json, words) in [
-        (r#"{"refused": {"rows": {"expected": 4, "found": 0}}}"#, "tell of 4 rows, Spark read 0"),
+        (r#"{"refused": {"rows": {"expected": 4, "found": 0}}}"#, "expected 4 rows by the footers of the traces, Spark read 0"),
         (r#"{"refused": {"empty": "s3a://k:s@b/x"}}"#, "`s3a://b/x`: expected Parquet files"),
         (r#"{"refused": {"rule": {"fault": null, "faults": 0}}}"#, "no-episodes: a.parquet"),
         (
@@ -129,7 +129,7 @@ fn bad_usage_is_refused_before_anything_is_submitted() {
     let nobody = format!("spark://{free}");
     for (arguments, words) in [
         (&["a.parquet", "s3a://b/x"][..], "found both"),
-        (&["a.parquet", "-o", "there"], "`there` is there already"),
+        (&["a.parquet", "-o", "there"], "`there` already exists"),
         (&["a.parquet", "--explain", "a"], "--explain looks into the steps"),
         (&["a.parquet", "--spark-conf", "spark.x"], "expected `spark.key=value`"),
         (&["a.parquet", "--spark-conf", "spark.submit.deployMode=cluster"], "cannot be set"),

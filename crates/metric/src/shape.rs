@@ -19,7 +19,7 @@ pub struct DefinitionFile {
     pub include: Vec<String>,
     /// True if experiments that are not listed are accepted. A file that lists none accepts all.
     pub open: Option<bool>,
-    /// The subject of the traces: `mirror`, or any other name, for which the mirror's columns mean nothing.
+    /// The subject of the traces: `mirror`, or any other name, for which the mirror's columns have no meaning.
     pub domain: Option<String>,
     /// Columns of your own traces that expressions use.
     #[serde(default)]

@@ -17,7 +17,6 @@ use exact::input;
 use exact::number::Decimal;
 use exact::suggest::nearest;
 
-/// The columns of the file.
 pub const COLUMNS: [&str; 6] = ["experiment", "model", "metric", "mean", "se", "emphasis"];
 
 /// The name of a cell.
@@ -40,13 +39,11 @@ pub struct PrintedCell {
     pub emphasis: Emphasis,
 }
 
-/// A published table, in file order.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Published {
     pub cells: Vec<(CellLabel, PrintedCell)>,
 }
 
-/// An error of a published table.
 #[derive(Debug, thiserror::Error)]
 pub enum PublishedError {
     #[error("published table {}: cannot read the file: {source}", path.display())]
@@ -55,7 +52,6 @@ pub enum PublishedError {
     Malformed { path: PathBuf, line: Option<u64>, fault: PublishedFault },
 }
 
-/// A problem of a published table.
 #[derive(Debug, thiserror::Error)]
 pub enum PublishedFault {
     #[error("not a CSV file: {0}")]
@@ -72,7 +68,7 @@ pub enum PublishedFault {
     StrayStandardError { found: String },
     #[error("column `emphasis`: expected `bold`, `underline` or nothing, found `{found}`")]
     UnknownEmphasis { found: String },
-    #[error("{experiment}, {model}, {metric}: the cell is on line {first} already; keep one")]
+    #[error("{experiment}, {model}, {metric}: duplicate cell, first on line {first}; keep one")]
     RepeatedCell { experiment: String, model: String, metric: String, first: u64 },
     #[error("no cells: expected one line per cell after the header")]
     NoCells,

@@ -10,7 +10,6 @@ use metric::restore::RestoreError;
 use toml_spec::Faults;
 use trace::error::TraceError;
 
-/// An error of scoring a batch.
 #[derive(Debug, thiserror::Error)]
 pub enum EngineError {
     #[error(transparent)]
@@ -21,13 +20,12 @@ pub enum EngineError {
         "the column `{column}` has the type {found}; expected booleans, 64-bit integers, doubles or a dictionary of text"
     )]
     ColumnType { column: String, found: String },
-    #[error("`{metric}` leaves 64-bit integers: {reason}; use smaller numbers in its definition")]
+    #[error("`{metric}` overflows 64-bit integers: {reason}; use smaller numbers in its definition")]
     Overflow { metric: String, reason: String },
-    #[error("`{metric}` declares the unit `rate`, but an episode has {value}; a rate is 0 or 1 an episode")]
+    #[error("`{metric}` declares the unit `rate`, but an episode has {value}; a rate is 0 or 1 for each episode")]
     NotARate { metric: String, value: i64 },
 }
 
-/// An error of scoring traces.
 #[derive(Debug, thiserror::Error)]
 pub enum ScoreError {
     #[error(transparent)]
@@ -51,19 +49,10 @@ pub enum ScoreError {
 }
 
 /// An error of evaluating a step: the step's own, or a kernel's, whose metric is determined later.
+#[derive(Debug, thiserror::Error)]
 pub(super) enum StepError {
-    Engine(EngineError),
-    Kernel(ArrowError),
-}
-
-impl From<EngineError> for StepError {
-    fn from(error: EngineError) -> Self {
-        Self::Engine(error)
-    }
-}
-
-impl From<ArrowError> for StepError {
-    fn from(error: ArrowError) -> Self {
-        Self::Kernel(error)
-    }
+    #[error(transparent)]
+    Engine(#[from] EngineError),
+    #[error(transparent)]
+    Kernel(#[from] ArrowError),
 }

@@ -3,8 +3,8 @@
 use std::error::Error;
 use std::io;
 
+use super::own_definitions::ScoredAlike;
 use super::provenance::ProvenanceError;
-use super::scored_alike::ScoredAlike;
 use engines::spark::SparkError;
 use exact::budget::Exceeded;
 use exact::moments::MomentOverflow;
@@ -114,7 +114,7 @@ pub enum StudyError {
     NotScored { experiment: String, definitions: String, own: String },
     #[error(
         "`{file}` has no column of the domain `mirror`: expected definitions of its own domain, found `{definitions}`\n  \
-         help: give --definitions a file that says `domain = \"NAME\"` and declares the columns that it reads, `[column.NAME]`"
+         help: give --definitions a file with `domain = \"NAME\"` and a `[column.NAME]` for each column that it reads"
     )]
     OtherDomain { file: String, definitions: String },
     #[error(
@@ -228,10 +228,8 @@ impl StudyError {
         }
     }
 
-    /// The system's error if writing the answer failed, for example because the reader closed a pipe.
-    ///
-    /// # Errors
-    /// This error, if it is any other.
+    /// The system's error if writing the answer failed, for example because the reader closed a pipe. Errors: this
+    /// error, if it is any other.
     pub fn into_io(self) -> Result<io::Error, Self> {
         match self {
             Self::System(error) => Ok(error),

@@ -202,7 +202,7 @@ fn waiting(id: &str, held: Held) -> String {
         more => format!(" and {}", counted(more as u64, "other episode")),
     };
     let process = held.process.map_or_else(|| "another process".to_owned(), |process| format!("process {process}"));
-    format!("waiting for {}{others}: {process} records it into the same folder; Ctrl-C ends the waiting", visible(id))
+    format!("waiting for {}{others}: {process} records it into the same folder; press Ctrl-C to stop waiting", visible(id))
 }
 
 fn unreadable(counts: &ReplyCounts) -> Option<String> {
@@ -256,7 +256,7 @@ pub(crate) fn say(
     }
     if answer.elsewhere > 0 {
         let episodes = counted(answer.elsewhere as u64, "episode");
-        writeln!(out, "another process recorded {episodes} into the same folder meanwhile")?;
+        writeln!(out, "meanwhile, another process recorded {episodes} into the same folder")?;
     }
     if answer.left_out > 0 {
         let episodes = counted(answer.left_out as u64, "episode");
@@ -364,7 +364,7 @@ mod tests {
     fn waiting_for_people_is_printed() {
         let key = Key::first(Experiment::E1, 1, 3);
         let one = Held { key, process: Some(4711), count: 1 };
-        let expected = "waiting for E1/a/s1/r3: process 4711 records it into the same folder; Ctrl-C ends the waiting";
+        let expected = "waiting for E1/a/s1/r3: process 4711 records it into the same folder; press Ctrl-C to stop waiting";
         assert_eq!(waiting("E1/a/s1/r3", one), expected);
         let more = waiting("E1/a/s1/r3", Held { process: None, count: 3, ..one });
         assert!(more.starts_with("waiting for E1/a/s1/r3 and 2 other episodes: another process records it"), "{more}");

@@ -224,7 +224,7 @@ impl VlmArgs {
 
 fn network() -> Result<Runtime, Failure> {
     let network = tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build();
-    network.map_err(|error| Failure::input(format!("cannot start the network's thread: {error}")))
+    network.map_err(|error| Failure::input(format!("cannot start the network thread: {error}")))
 }
 
 fn amount(text: &str) -> Result<f64, String> {

@@ -71,7 +71,7 @@ fn a_program_that_talks_out_of_turn() {
     let (code, found, said) = outcome(&bench.record(&[]).output().unwrap());
     assert_eq!(code, Some(1), "{said}");
     let reason = found["lost"][0]["reason"].as_str().unwrap();
-    assert!(reason.contains("nobody had asked for: `loading the model`; the line before"), "{reason}");
+    assert!(reason.contains("an unrequested line: `loading the model`; the previous line"), "{reason}");
     // People must decide which of the two was the reply.
     assert!(
         reason.contains("taken for its reply: `{\"view-description\"") && reason.contains("standard error"),
@@ -146,7 +146,7 @@ fn a_late_line_is_not_taken_as_the_next_reply() {
     let (code, found, said) = outcome(&bench.record(&[]).output().unwrap());
     assert_eq!(code, Some(1), "{said}");
     let reason = found["lost"][0]["reason"].as_str().unwrap();
-    assert!(reason.starts_with("step 2: the program wrote a line that nobody had asked for: `all well`"), "{reason}");
+    assert!(reason.starts_with("step 2: the program wrote an unrequested line: `all well`"), "{reason}");
 }
 
 #[test]

@@ -52,7 +52,7 @@ fn changed_steps_are_counted() {
     let mut command = program(folder.path());
     command.args(["replay", "--recompute-visibility", "--threshold", "100000", "--out", "x.parquet"]);
     let output = succeeds(command.arg(WITH_SIGHT.as_path()));
-    let expected = format!("mirror_visible is another at {was_visible} step");
+    let expected = format!("mirror_visible differs at {was_visible} step");
     assert!(stdout(&output).contains(&expected), "{}", stdout(&output));
     succeeds(program(folder.path()).arg("validate").arg(&out));
 }

@@ -18,9 +18,9 @@ pub enum PolarsError {
     Lowering(#[from] LoweringError),
     #[error("{file}: expected a file that can be read; was it moved?")]
     Unreadable { file: String, source: io::Error },
-    #[error("`{metric}` leaves 64-bit integers; use smaller numbers in its definition")]
+    #[error("`{metric}` overflows 64-bit integers; use smaller numbers in its definition")]
     Overflow { metric: String },
-    #[error("`{metric}` declares the unit `rate`, but an episode has {value}; a rate is 0 or 1 an episode")]
+    #[error("`{metric}` declares the unit `rate`, but an episode has {value}; a rate is 0 or 1 for each episode")]
     NotARate { metric: String, value: i64 },
     #[error("the reader of the answer is gone")]
     ReaderGone,

@@ -15,7 +15,6 @@ mod answer;
 mod cause;
 mod check;
 mod locate;
-mod place;
 mod request;
 pub mod setting;
 pub mod source;
@@ -31,7 +30,7 @@ use score::table::EpisodeTable;
 use trace::diagnostic::Finding;
 
 use self::answer::{Answer, Done};
-use self::request::Request;
+use self::request::{Place, Request};
 use self::setting::Setting;
 use self::source::Sources;
 
@@ -80,7 +79,7 @@ pub enum SparkError {
          help: leave --engine spark out"
     )]
     Label { column: String },
-    #[error("`{folder}` is there already; Spark writes a folder of its own: remove it or name another")]
+    #[error("`{folder}` already exists; Spark writes a new folder: remove it or choose another name")]
     Exists { folder: String },
     #[error(
         "`{uri}`: expected Parquet files, or folders with *.parquet in them, found none; files that begin with `_` or `.` are passed over"
@@ -91,7 +90,7 @@ pub enum SparkError {
     )]
     Column { file: String, column: String, expected: String, found: String },
     #[error(
-        "the footers of the traces tell of {expected} rows, Spark read {found}; every worker must see the same files \
+        "expected {expected} rows by the footers of the traces, Spark read {found}; every worker must see the same files \
          under the same path, and none may begin with `_` or `.`"
     )]
     Rows { expected: u64, found: u64 },
@@ -114,7 +113,7 @@ fn more_episodes(more: u64) -> String {
 }
 
 pub fn score(job: Job<'_>, cluster: &Cluster) -> Result<EpisodeTable, SparkError> {
-    let place = place::Place::new()?;
+    let place = Place::new()?;
     let request = Request::new(job, cluster, &place, None)?;
     finished(submit::submit(&request, cluster, &place)?, job, cluster)?;
     answer::table(&place.table(), job)
@@ -131,7 +130,7 @@ pub fn write(job: Job<'_>, cluster: &Cluster, folder: &str) -> Result<Written, S
         source::local_uri(Path::new(folder))
             .map_err(|source| SparkError::System { what: format!("resolve `{folder}`"), source })?
     };
-    let place = place::Place::new()?;
+    let place = Place::new()?;
     let request = Request::new(job, cluster, &place, Some(target))?;
     let done = finished(submit::submit(&request, cluster, &place)?, job, cluster)?;
     Ok(Written { episodes: done.episodes })

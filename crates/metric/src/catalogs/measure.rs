@@ -14,7 +14,7 @@ use toml_spec::{Fault, Place};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Measures {
-    /// 0 or 1 an episode.
+    /// 0 or 1 for each episode.
     Rate,
     /// The length of an episode; unfinished episodes are censored.
     Duration,
@@ -115,7 +115,7 @@ fn misfit(name: &str, entry: &MetricEntry, is_rate: bool) -> Option<(String, &'s
     let ValueRange { least, most } = range(said.measures, said.range, unit);
     match declared {
         _ if is_rate && said.range.is_some() => {
-            Some((format!("the rate `{name}` has a `range`"), "remove it: a rate is 0 or 1 an episode"))
+            Some((format!("the rate `{name}` has a `range`"), "remove it: a rate is 0 or 1 for each episode"))
         }
         _ if is_rate != (said.measures == Some(Measures::Rate)) && said.measures.is_some() => Some((
             format!("`measures` does not fit the values of `{name}`"),

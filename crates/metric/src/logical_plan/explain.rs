@@ -8,6 +8,7 @@ use serde::Serialize;
 use crate::catalog::{Better, Kind, StandardError};
 use crate::columns::{Level, Type};
 use crate::definitions::Definitions;
+use crate::names::mentioned;
 use crate::plan::{Arithmetic, Comparison};
 use crate::syntax::{self, BinaryOp, Expr, ExprKind, Literal};
 use toml_spec::Written;
@@ -85,8 +86,7 @@ impl Definitions {
 
     /// Adds the names that `written` refers to, directly or not, in the order of first use.
     fn collect_names(&self, written: &Written, found: &mut Vec<NamedExpression>) {
-        let Ok(expr) = syntax::parse(&written.text) else { return };
-        for name in names_in(&expr) {
+        for name in mentioned(&written.text) {
             if found.iter().any(|known| known.name == name) {
                 continue;
             }
@@ -128,25 +128,6 @@ fn sentence(written: &Written, when: Option<&Written>, kind: Kind) -> String {
     match when.map(|when| syntax::parse(&when.text)) {
         Some(Ok(when)) => format!("{what}; defined where {}", condition(&when)),
         _ => what,
-    }
-}
-
-/// The names in an expression, in the order of the text.
-fn names_in(expr: &Expr) -> Vec<String> {
-    let of = |exprs: Vec<&Expr>| exprs.into_iter().flat_map(names_in).collect();
-    match &expr.kind {
-        ExprKind::Name(name) => vec![name.clone()],
-        ExprKind::Literal(_) => vec![],
-        ExprKind::Not(x) | ExprKind::Negate(x) => names_in(x),
-        ExprKind::IsNull { operand, .. } | ExprKind::IsTruth { operand, .. } => names_in(operand),
-        ExprKind::Binary(_, x, y) | ExprKind::Distinct { left: x, right: y, .. } => of(vec![x, y]),
-        ExprKind::Between { operand, low, high, .. } => of(vec![operand, low, high]),
-        ExprKind::InList { operand, list, .. } => of(std::iter::once(&**operand).chain(list).collect()),
-        ExprKind::Case { operand, branches, otherwise } => {
-            let branches = branches.iter().flat_map(|(when, then)| [when, then]);
-            of(operand.as_deref().into_iter().chain(branches).chain(otherwise.as_deref()).collect())
-        }
-        ExprKind::Call { arguments, .. } => of(arguments.iter().collect()),
     }
 }
 
@@ -278,7 +259,7 @@ fn call(name: &str, arguments: &[Expr], expr: &Expr) -> String {
 impl fmt::Display for Explanation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let kind = match self.kind {
-            Kind::Rate => "a rate, 0 or 1 an episode".to_owned(),
+            Kind::Rate => "a rate, 0 or 1 for each episode".to_owned(),
             Kind::Quantity => format!("a number of {} an episode", self.unit),
         };
         let better = match self.better {

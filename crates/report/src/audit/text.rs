@@ -7,11 +7,9 @@ use crate::tables::{Column, Look, Table, push_wrapped};
 use exact::escape::visible;
 use exact::rounding::Rounding;
 
-/// The columns that name a cell.
 const NAMES: usize = 4;
 
 impl Audit {
-    /// The whole answer, in lines of at most `width` columns.
     pub fn render(&self, width: Option<usize>) -> String {
         let audit = self;
         let mut text = String::new();
@@ -23,7 +21,7 @@ impl Audit {
             let cell = &zero.cell;
             let [experiment, model, metric] = [&cell.experiment, &cell.model, &cell.metric].map(|name| visible(name));
             let words = format!(
-                "note: {}, {experiment}, {model}, {metric}: zero is printed where no episode counts, as tables of the style `{}` do",
+                "note: {}, {experiment}, {model}, {metric}: the table prints zero although no episode counts, as the style `{}` does",
                 visible(&zero.table),
                 visible(&audit.style)
             );

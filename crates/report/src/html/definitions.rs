@@ -5,7 +5,6 @@ use serde_json::{Value as Json, json};
 use exact::escape::visible;
 use metric::catalog::{Better, Catalog, Kind, Metric, StandardError};
 
-/// Every metric of a catalog, in order: its sentence and its expressions.
 pub(super) fn metrics(catalog: &Catalog) -> Vec<Json> {
     let view = |(name, metric): (&String, &Metric)| {
         json!({
@@ -21,7 +20,6 @@ pub(super) fn metrics(catalog: &Catalog) -> Vec<Json> {
     catalog.metric.iter().map(view).collect()
 }
 
-/// Every named expression of a catalog, in order.
 pub(super) fn lets(catalog: &Catalog) -> Vec<Json> {
     catalog.lets.iter().map(|(name, value)| json!({ "name": visible(name), "value": multiline(value) })).collect()
 }
@@ -60,7 +58,7 @@ fn prose(text: &str) -> Vec<Json> {
 
 fn remarks(metric: &Metric) -> String {
     let mut remarks = vec![match metric.kind {
-        Kind::Rate => "rate, 0 or 1 an episode".to_owned(),
+        Kind::Rate => "rate, 0 or 1 for each episode".to_owned(),
         Kind::Quantity => visible(&metric.unit),
     }];
     remarks.extend(match metric.better {

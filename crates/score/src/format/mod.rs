@@ -25,19 +25,14 @@ pub(crate) use self::parquet::DECLARED_KEY;
 pub use self::parquet::{DEFINITIONS_KEY, HASH_KEY, KIND_KEY, SCORES_KIND, holds_definitions, holds_scores};
 pub use self::partition::Partition;
 
-/// A format of episode tables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
-    /// Columnar, with the definitions in its footer.
     Parquet,
-    /// Comma-separated, with a header.
     Csv,
-    /// One JSON object per line.
     JsonLines,
 }
 
 impl Format {
-    /// The format for the extension of a file name.
     pub fn of_name(name: &str) -> Result<Self, FormatError> {
         match name.rsplit_once('.').map(|(_, ending)| ending.to_ascii_lowercase()).as_deref() {
             Some("parquet") => Ok(Self::Parquet),
@@ -48,7 +43,6 @@ impl Format {
     }
 }
 
-/// An error of writing or reading an episode table.
 #[derive(Debug, thiserror::Error)]
 pub enum FormatError {
     #[error("`{0}`: expected a name that ends in .parquet, .csv or .jsonl")]
@@ -66,8 +60,8 @@ pub enum FormatError {
     #[error("episode `{episode}`, column `{column}`: expected {expected}, found {found}; score the traces again")]
     Episode { episode: String, column: String, expected: String, found: String },
     #[error(
-        "expected scores, one row per episode, found steps: there is a column `t`\n  \
-         help: `mirrorstats trace import` makes a trace of steps that are JSON lines, `import_steps` in Python of a data frame"
+        "expected scores with one row per episode, found steps (a column `t` exists)\n  \
+         help: make a trace first: `mirrorstats import` reads JSON Lines, `import_steps` in Python a data frame"
     )]
     Steps,
     #[error("line {line}: {reason}")]
@@ -92,9 +86,7 @@ impl FormatError {
     }
 }
 
-/// Writes a table.
-///
-/// Several threads can encode Parquet: see [`parquet::Encoder`].
+/// Writes a table. Several threads can encode Parquet: see [`parquet::Encoder`].
 pub fn write(table: &EpisodeTable, format: Format, out: impl Write + Send) -> Result<(), FormatError> {
     match format {
         Format::Parquet => {

@@ -18,9 +18,7 @@ use trace::open::TraceSet;
 #[error("{file}: expected {expected}, found {found}\n  help: {help}")]
 pub struct DeclarationError {
     pub file: String,
-    /// The expected declaration, and its experiment.
     pub expected: String,
-    /// The declaration in the file.
     pub found: String,
     pub help: &'static str,
 }
@@ -30,7 +28,6 @@ pub struct DeclarationError {
 pub struct Declarations(IndexMap<String, (String, Experiment)>);
 
 impl Declarations {
-    /// Adds a file's declaration.
     pub fn add(&mut self, file: &str, name: &str, experiment: Experiment) -> Result<(), DeclarationError> {
         let Some((first_file, known)) = self.0.get(name) else {
             self.0.insert(name.to_owned(), (file.to_owned(), experiment));
@@ -111,7 +108,7 @@ fn no_share(file: &str, name: &str, experiment: &Experiment, catalog: &Catalog) 
             "the {kind} level of the rate {metric} of the experiment `{name}` to be a fraction from 0 to 1"
         ),
         found: level.to_string(),
-        help: "correct the level in the footer, or say in a definition file what counts, under `[experiment.NAME]`",
+        help: "correct the level in the footer, or set it in a definition file under `[experiment.NAME]`",
     })
 }
 
@@ -143,12 +140,10 @@ fn differing_level<T: PartialEq + Debug>(
     Some((format!("{kind} level of {}", visible(metric)), of(one), of(other)))
 }
 
-/// A chance level in the spelling of a definition file.
 pub fn spelled(level: Option<Ratio>) -> String {
     level.map_or_else(|| "none".to_owned(), |level| level.to_string())
 }
 
-/// Reference levels, separated by commas.
 pub fn listed(levels: &[Ratio]) -> String {
     levels.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
 }

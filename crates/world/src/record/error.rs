@@ -28,8 +28,8 @@ pub enum StoreError {
     )]
     Files { path: PathBuf, expected: String, found: String },
     #[error(
-        "`{}` is a recording of version {found}, and this mirrorstats records version {expected}\n  \
-         help: go on with the mirrorstats that began it, or record into another folder",
+        "`{}` is a recording of version {found}, but this mirrorstats records version {expected}\n  \
+         help: continue with the mirrorstats that began it, or record into another folder",
         path.display()
     )]
     Version { path: PathBuf, expected: String, found: String },

@@ -80,7 +80,7 @@ impl ReportArgs {
             out.write_all(table.printed().terminal(crate::cli::terminal::now()).as_bytes())?;
         }
         if let Some(table) = report.other_table() {
-            writeln!(out, "\n{}: what the style names nowhere", table.title)?;
+            writeln!(out, "\n{}: metrics that the style does not list", table.title)?;
             out.write_all(table.printed().terminal(crate::cli::terminal::now()).as_bytes())?;
         }
         if let Some(replies) = &report.replies {

@@ -138,7 +138,7 @@ impl fmt::Display for RecoverAnswer {
         }
         for lost in &self.losses.episodes {
             let rows = counted(lost.rows as u64, "row");
-            writeln!(f, "lost {}: {}; {rows} of it are there", lost.episode_id, lost.reason)?;
+            writeln!(f, "lost {}: {}; {rows} of it remain in the log", lost.episode_id, lost.reason)?;
         }
         if self.losses.stray_rows > 0 {
             writeln!(f, "lost {} of no known episode", counted(self.losses.stray_rows as u64, "row"))?;

@@ -169,7 +169,7 @@ fn tell_frames(f: &mut fmt::Formatter<'_>, frames: &FramesAnswer) -> fmt::Result
     let drawn_with = drawn_with.as_slice();
     if recorded_with != drawn_with {
         let names = |all: &[Renderer]| all.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ");
-        writeln!(f, "another renderer: recorded with {}, replayed with {}", names(recorded_with), names(drawn_with))?;
+        writeln!(f, "different renderers: recorded with {}, replayed with {}", names(recorded_with), names(drawn_with))?;
     }
     Ok(())
 }
@@ -196,7 +196,7 @@ impl fmt::Display for Shown<'_> {
             parted => write!(f, ": {parted} of the episodes part from the trace")?,
         }
         match self.0.flipped {
-            Some(flipped) => writeln!(f, "; mirror_visible is another at {}", counted(flipped as u64, "step"))?,
+            Some(flipped) => writeln!(f, "; mirror_visible differs at {}", counted(flipped as u64, "step"))?,
             None => writeln!(f)?,
         }
         self.0.frames.as_ref().map_or(Ok(()), |frames| tell_frames(f, frames))

@@ -35,7 +35,7 @@ pub enum Failure {
     #[error("the program cannot be started: {0}")]
     Start(io::Error),
     #[error(
-        "the program wrote a line that nobody had asked for: `{line}`; the line before it was taken for its reply: `{before}` \
+        "the program wrote an unrequested line: `{line}`; the previous line was taken for its reply: `{before}` \
          (one line on standard output for each observation; everything else belongs on standard error)"
     )]
     OutOfTurn { line: String, before: String },

@@ -127,7 +127,7 @@ pub enum JournalError {
     Io { path: PathBuf, source: io::Error },
     #[error("line {line} of the journal `{}` is damaged: {fault}\n  help: remove the file to ask the model again", path.display())]
     Damaged { path: PathBuf, line: usize, fault: serde_json::Error },
-    #[error("the journal `{}` is being written by another process\n  help: wait for its end, or record into another folder", path.display())]
+    #[error("the journal `{}` is being written by another process\n  help: wait until it ends, or record into another folder", path.display())]
     Busy { path: PathBuf },
     #[error("the cassette has no `{}`\n  help: record the episode with its model first, or choose fewer episodes", path.display())]
     Missing { path: PathBuf },

@@ -59,7 +59,7 @@ fn options(answer: &Answer, at: &At<'_>, faults: &mut Vec<Fault>) {
         let at = at.key("options").item(n);
         if !is_plain {
             let message = format!("an option has 1 to {} characters in lower case, with single spaces", LONGEST[1]);
-            faults.push(at.fault(message).help("letter case and white space of a reply mean nothing"));
+            faults.push(at.fault(message).help("letter case and white space in a reply are ignored"));
         } else if option == UNKNOWN {
             faults.push(at.fault("`unknown` says that there is no evidence").help("use `unknown = true`"));
         }

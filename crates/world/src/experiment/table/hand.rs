@@ -12,7 +12,7 @@ pub(super) fn hand(table: HandTable, at: &At<'_>, faults: &mut Vec<Fault>) -> Ha
     if let Some(least) = table.least.filter(|least| table.within.is_some_and(|within| within >= *least)) {
         let message = format!("`within` is {within}, and the hand may start {least} steps from the mark");
         let fault = at.key("within").fault(message);
-        faults.push(fault.help("reached at the start is no task: use a larger `least`"));
+        faults.push(fault.help("the mark is already reached at the start: use a larger `least`"));
     }
     let least = table.least.unwrap_or(6).min(table.most.unwrap_or(u32::MAX));
     let most = table.most.unwrap_or_else(|| least.max(12));

@@ -100,13 +100,13 @@ fn with_scenes(blocks: &[Block], repeats: i32, scene: impl Fn(&str, i32) -> Opti
 fn rates_are_compared_with_chance_by_e_values() {
     let found = sequential(&STUDY);
     assert_eq!(found.headline, ["TSA"]);
-    let of = |model: &str| found.chance.iter().find(|row| row.model == model).unwrap();
+    let of = |model: &str| found.chance.iter().find(|row| row.key.model == model).unwrap();
     let (middle, strong) = (of("middle"), of("strong"));
     assert!((middle.e - 6.1113961330979905).abs() < 1e-9 && middle.verdict == Verdict::NotSeparated, "{middle:?}");
     assert!(strong.e > 1e8 && strong.verdict == Verdict::Above, "{strong:?}");
     assert!((middle.p_adjusted - 2.0 * middle.p).abs() < 1e-12, "the second of three in Holm's order");
     assert_eq!(found.chance.len(), 3, "E2 has no level");
-    let all = found.rates.iter().find(|row| row.model == "strong" && row.experiment == "E1").unwrap();
+    let all = found.rates.iter().find(|row| row.key.model == "strong" && row.key.experiment == "E1").unwrap();
     let bounds = all.interval.unwrap();
     assert!((bounds.low - 0.7845213905698409).abs() < 1e-10 && bounds.high >= 1.0, "{bounds:?}");
 }

@@ -244,7 +244,7 @@ fn a_conditional_metric_of_few_episodes_is_marked_and_an_undefined_one_has_no_in
 fn chance_levels_and_references_come_from_the_definitions() {
     let found = statistics(&study());
     let row = |experiment: &str, model: &str| {
-        let of_model = found.chance.iter().filter(|row| row.experiment == experiment && row.model == model);
+        let of_model = found.chance.iter().filter(|row| row.key.experiment == experiment && row.key.model == model);
         of_model.filter(|row| row.metric == "TSA").collect::<Vec<_>>()
     };
     let strong = row("E1", "strong");

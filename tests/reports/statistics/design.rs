@@ -97,7 +97,8 @@ fn episodes_without_a_partner_are_counted_and_named() {
     rows.retain(|row| !(row.1 == "b" && row.2 == 2 && row.3 == 6));
     rows.push(("E1", "b", 0, 0, false, -100));
     let found = recorded(&rows);
-    let gaps: Vec<_> = found.gaps.iter().map(|gap| (gap.model.as_str(), gap.scene.as_str(), gap.episodes)).collect();
+    let gaps: Vec<_> =
+        found.gaps.iter().map(|gap| (gap.key.model.as_str(), gap.scene.as_str(), gap.episodes)).collect();
     assert_eq!(gaps, [("b", "room 0 body 0", 2), ("b", "room 2 body 6", 0)]);
     let test = &found.models[0].tests[0];
     assert_eq!((test.matching.pairs, test.matching.alone, test.matching.repeated), (19, 1, 3));
@@ -202,7 +203,7 @@ fn conditions_of_one_model_are_compared_like_models() {
         let found = Statistics::of(&table, &cells(&table), &Options::default()).unwrap();
         let family = found.models.iter().find(|family| family.experiment == "E1" && family.metric == "TSA").unwrap();
         assert_eq!(family.models, ["a [default]", "a [pocket mirror]", "b [default]", "b [pocket mirror]"]);
-        assert_eq!(found.durations[0].condition.as_deref(), Some("default"));
+        assert_eq!(found.durations[0].key.condition.as_deref(), Some("default"));
         let both = found.conditions.iter().filter(|contrast| contrast.metric == "TSA");
         let names: Vec<_> =
             both.map(|contrast| (contrast.condition.as_deref().unwrap(), contrast.comparison.n)).collect();

@@ -27,12 +27,11 @@ fn a_duration_is_contrasted_by_restricted_means() {
 #[test]
 fn chance_is_tested_among_finished_episodes_too() {
     let found = Statistics::of(&PAPER, &cells(&PAPER), &Options::default()).unwrap();
-    let of =
-        |metric: &'static str| found.chance.iter().filter(move |row| row.metric == metric && row.experiment != "E5");
+    let of = |metric: &'static str| {
+        found.chance.iter().filter(move |row| row.metric == metric && row.key.experiment != "E5")
+    };
     let changed = of("TSA").filter(|row| {
-        let same = |other: &&report::statistics::ChanceRow| {
-            (&other.experiment, &other.model, other.level) == (&row.experiment, &row.model, row.level)
-        };
+        let same = |other: &&report::statistics::ChanceRow| (&other.key, other.level) == (&row.key, row.level);
         of("TSA-C").find(same).is_some_and(|other| other.verdict != row.verdict)
     });
     assert_eq!((of("TSA").count(), changed.count()), (32, 6));
@@ -166,7 +165,8 @@ fn a_wrong_decision_competes_with_a_correct_one() {
 #[test]
 fn unfinished_episodes_are_censored_and_models_share_a_horizon() {
     let found = statistics(&study());
-    let row = |model: &str| found.durations.iter().find(|row| row.experiment == "E1" && row.model == model).unwrap();
+    let row =
+        |model: &str| found.durations.iter().find(|row| row.key.experiment == "E1" && row.key.model == model).unwrap();
     assert_eq!((row("strong").median, row("strong").finished), (Some(12), 21));
     assert_eq!((row("middle").median, row("weak").median), (Some(30), None));
     assert_eq!(row("weak").restricted.unwrap().horizon, 100);

@@ -41,7 +41,7 @@ fn lost_episodes_that_could_turn_a_verdict_withhold_it() {
     assert!(!test(&found, "TSA").separated && !losses.agree && losses.lost == 10, "{losses:?}");
     assert!((p[0] - FISHER_OF_ALL[0]).abs() < 1e-9 && (p[1] / FISHER_OF_ALL[1] - 1.0).abs() < 1e-9, "{losses:?}");
     assert_eq!(answer(&found, "Who differs", "TSA"), "E1 cannot say: 10 lost episodes");
-    let b = found.chance.iter().find(|row| row.model == "b" && row.metric == "TSA").unwrap();
+    let b = found.chance.iter().find(|row| row.key.model == "b" && row.metric == "TSA").unwrap();
     let losses = b.losses.unwrap();
     let p = [losses.lowest.p, losses.highest.p].map(Option::unwrap);
     assert!((p[0] - BINOMIAL_OF_B[0]).abs() < 1e-9 && (p[1] - BINOMIAL_OF_B[1]).abs() < 1e-9, "{losses:?}");

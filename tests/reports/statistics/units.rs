@@ -36,7 +36,7 @@ fn three_scenes_give_no_verdict_at_any_number_of_repeats() {
 #[test]
 fn seven_scenes_count_as_seven() {
     let found = with_scenes(&opposed(7, 3), RECORDED, by_scene);
-    let row = found.chance.iter().find(|row| row.model == "oracle" && row.metric == "TSA").unwrap();
+    let row = found.chance.iter().find(|row| row.key.model == "oracle" && row.metric == "TSA").unwrap();
     assert!((row.p - 1.0 / 2187.0).abs() < 1e-12, "{row:?}");
     assert_eq!((row.units.as_ref().unwrap().n, row.verdict), (7, Verdict::Above));
     let test = &found.models[0].tests[0].comparison;
@@ -75,7 +75,7 @@ fn people_who_play_the_same_scenes_are_no_retest_and_no_scenes() {
     let options = Options { design: RECORDED, ..Options::default() };
     let found = Statistics::of(&table, &cells(&table), &options).unwrap();
     assert!(found.retests.is_empty(), "{:?}", found.retests);
-    let row = found.chance.iter().find(|row| row.model == "people" && row.metric == "TSA").unwrap();
+    let row = found.chance.iter().find(|row| row.key.model == "people" && row.metric == "TSA").unwrap();
     assert_eq!(row.units.as_ref().map(|units| (units.n, units.name.as_str())), Some((8, "participants")));
     let test = &found.models[0].tests[0].comparison;
     let units = test.units.as_ref().map(|units| (units.n, units.name.as_str()));

@@ -141,7 +141,7 @@ fn against_level(row: &ChanceRow) -> (Subject, Shown) {
         Role::Chance => "chance",
         Role::Reference => "the reference",
     };
-    let about = format!("{} {} of {} against {role} ({})", row.experiment, row.metric, row.name(), row.level);
+    let about = format!("{} {} of {} against {role} ({})", row.key.experiment, row.metric, row.key.name(), row.level);
     let shown = match row.verdict {
         Verdict::Above => Some("above it".to_owned()),
         Verdict::Below => Some("below it".to_owned()),

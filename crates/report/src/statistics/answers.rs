@@ -76,7 +76,7 @@ fn families(statistics: &Statistics, answers: &[Answer]) -> usize {
     let of_chance = |metric: &str| answers.iter().any(|it| it.metric == metric && it.question == ABOVE_CHANCE);
     let is_answered = |metric: &String| statistics.headline.contains(metric);
     let chance = statistics.chance.iter().filter(|row| of_chance(&row.metric));
-    let levels: BTreeSet<_> = chance.map(|row| (&row.experiment, &row.metric, row.level.to_string())).collect();
+    let levels: BTreeSet<_> = chance.map(|row| (&row.key.experiment, &row.metric, row.level.to_string())).collect();
     let models = statistics.models.iter().filter(|family| is_answered(&family.metric));
     let models = models.filter(|family| family.tests.iter().any(|test| test.comparison.p.is_some())).count();
     let overall = statistics.overall.iter().filter(|row| is_answered(&row.metric) && row.p.is_some());
@@ -147,7 +147,7 @@ fn unsaid_pairs(reasons: &[String]) -> String {
 fn above(rows: &[ChanceRow], metric: &str, confidence: f64) -> Vec<String> {
     let mut experiments: IndexMap<&str, Vec<&ChanceRow>> = IndexMap::new();
     for row in rows.iter().filter(|row| row.metric == metric) {
-        experiments.entry(&row.experiment).or_default().push(row);
+        experiments.entry(&row.key.experiment).or_default().push(row);
     }
     experiments.into_iter().map(|(experiment, rows)| above_in(experiment, &rows, confidence)).collect()
 }
@@ -158,10 +158,11 @@ fn above_in(experiment: &str, rows: &[&ChanceRow], confidence: f64) -> String {
         rows.iter().filter(|row| row.role == Role::Chance).max_by(highest).or_else(|| rows.iter().max_by(highest));
     let level = level.map(|row| (row.role, row.level));
     let rows: Vec<_> = rows.iter().filter(|row| Some((row.role, row.level)) == level).collect();
-    let those = |verdict| rows.iter().filter(|row| row.verdict == verdict).map(|row| row.name()).collect::<Vec<_>>();
+    let those =
+        |verdict| rows.iter().filter(|row| row.verdict == verdict).map(|row| row.key.name()).collect::<Vec<_>>();
     let (above, below) = (those(Verdict::Above), those(Verdict::Below));
     let unsaid: Vec<(String, Units)> =
-        rows.iter().filter_map(|row| Some((row.name(), row.unsaid(confidence)?))).collect();
+        rows.iter().filter_map(|row| Some((row.key.name(), row.unsaid(confidence)?))).collect();
     let reference = level.filter(|(role, _)| *role == Role::Reference);
     let about =
         reference.map_or_else(|| experiment.to_owned(), |(_, level)| format!("{experiment} (reference {level})"));

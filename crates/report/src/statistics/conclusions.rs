@@ -82,13 +82,13 @@ fn against_levels(rows: &[ChanceRow]) -> Vec<String> {
             Role::Reference => "the reference",
         };
         let level = format!("{role} ({})", row.level);
-        groups.entry((&row.experiment, &row.metric, level)).or_default().push(row);
+        groups.entry((&row.key.experiment, &row.metric, level)).or_default().push(row);
     }
     groups.iter().map(|((experiment, metric, level), rows)| level_sentence(experiment, metric, level, rows)).collect()
 }
 
 fn level_sentence(experiment: &str, metric: &str, level: &str, rows: &[&ChanceRow]) -> String {
-    let those = |verdict| rows.iter().filter(|row| row.verdict == verdict).map(|row| row.name()).collect();
+    let those = |verdict| rows.iter().filter(|row| row.verdict == verdict).map(|row| row.key.name()).collect();
     let phrase = |what: &str, models: Vec<String>| match models.len() {
         0 => None,
         count if count == rows.len() && count > 1 => Some(format!("{what}: all {count} models")),

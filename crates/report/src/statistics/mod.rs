@@ -43,6 +43,7 @@ pub use replies::{Replies, UnusableReplies};
 pub use retest::RetestRow;
 pub use selection::Selection;
 pub use sequential::{Sequential, SequentialChance, SequentialPair, SequentialRate};
+pub use study::RowKey;
 pub use trends::{Dose, TrendRow};
 pub use units::Units;
 

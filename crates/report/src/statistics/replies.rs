@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::study::named;
+use super::study::RowKey;
 use exact::escape::visible;
 use score::table::{CONDITION, EpisodeTable, UNUSABLE_REPLIES};
 
@@ -27,13 +27,8 @@ pub struct Replies {
 /// The replies of one cell.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct UnusableReplies {
-    /// The experiment.
-    pub experiment: String,
-    /// The model.
-    pub model: String,
-    /// The condition, where there are several.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub condition: Option<String>,
+    #[serde(flatten)]
+    pub key: RowKey,
     /// The replies whose status is recorded.
     pub replies: u64,
     /// Those that gave no decision.
@@ -58,9 +53,11 @@ impl Replies {
         let (unusable, replies) = (sum(0), sum(1));
         let cells = cells.iter().filter(|(_, [unusable, _])| *unusable > 0);
         let cells = cells.map(|(&(experiment, model, condition), &[unusable, replies])| UnusableReplies {
-            experiment: experiment.to_owned(),
-            model: model.to_owned(),
-            condition: condition.map(str::to_owned),
+            key: RowKey {
+                experiment: experiment.to_owned(),
+                model: model.to_owned(),
+                condition: condition.map(str::to_owned),
+            },
             replies,
             unusable,
         });
@@ -74,8 +71,8 @@ impl Replies {
         // Compared as fractions, the largest first.
         cells.sort_by_key(|cell| Reverse(u128::from(cell.unusable) * 1_000_000 / u128::from(cell.replies.max(1))));
         let shown = cells.iter().take(NAMED_CELLS).map(|cell| {
-            let model = named(&cell.model, cell.condition.as_deref());
-            format!("{} {} {} of {}", visible(&cell.experiment), visible(&model), cell.unusable, cell.replies)
+            let (experiment, model) = (visible(&cell.key.experiment), visible(&cell.key.name()));
+            format!("{experiment} {model} {} of {}", cell.unusable, cell.replies)
         });
         let rest = cells.len().saturating_sub(NAMED_CELLS);
         let rest = if rest > 0 { format!("; and {rest} more") } else { String::new() };

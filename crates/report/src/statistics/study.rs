@@ -3,6 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use crate::cells::interval;
 use crate::comparable::{Recorded, Varied, difference};
 use exact::moments::{MomentOverflow, Moments};
@@ -40,6 +43,25 @@ pub(super) struct Study<'a> {
     /// True to ignore differing settings.
     pub pool: bool,
     ranges: BTreeMap<&'a str, Interval>,
+}
+
+/// The experiment, the model and the condition that a row is about.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+pub struct RowKey {
+    /// The experiment.
+    pub experiment: String,
+    /// The model.
+    pub model: String,
+    /// The condition, where there are several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub condition: Option<String>,
+}
+
+impl RowKey {
+    /// The name in comparisons: `model`, or `model [condition]` if there are several.
+    pub fn name(&self) -> String {
+        named(&self.model, self.condition.as_deref())
+    }
 }
 
 pub(super) struct Experiment<'a> {
@@ -229,6 +251,10 @@ impl<'a> Block<'a> {
     /// Returns true if another block has the same model and condition.
     pub(crate) fn is_same_subject(&self, other: &Self) -> bool {
         (self.model, self.condition) == (other.model, other.condition)
+    }
+
+    pub fn key(&self) -> RowKey {
+        RowKey { experiment: self.experiment.to_owned(), model: self.model.to_owned(), condition: self.condition() }
     }
 
     /// The condition for table rows.

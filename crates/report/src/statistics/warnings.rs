@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::matching::Matching;
-use super::{CellRow, FEW, Replies, Selection, Statistics};
+use super::{CellRow, FEW, Replies, RowKey, Selection, Statistics};
 use exact::format::p_value;
 use statistics::clustered::fewest_clusters;
 use statistics::design::{Cluster, DesignKind};
@@ -93,9 +93,9 @@ fn repeated(statistics: &Statistics) -> Option<String> {
 
 fn few_seeds(statistics: &Statistics) -> Option<String> {
     let level = level(statistics.confidence)?;
-    let mut blocks: BTreeMap<(&str, &str, Option<&str>), usize> = BTreeMap::new();
+    let mut blocks: BTreeMap<&RowKey, usize> = BTreeMap::new();
     for row in &statistics.clusters {
-        let seeds = blocks.entry((&row.experiment, &row.model, row.condition.as_deref())).or_default();
+        let seeds = blocks.entry(&row.key).or_default();
         *seeds = row.seeds.max(*seeds);
     }
     let needed = fewest_clusters(level);
@@ -129,8 +129,7 @@ fn gaps(statistics: &Statistics) -> Option<String> {
         .map(|gap| {
             let found = if gap.episodes == 0 { "missing".to_owned() } else { format!("{} episodes", gap.episodes) };
             let scene: String = gap.scene.chars().take(SCENE_SHOWN).collect();
-            let model = super::study::named(&gap.model, gap.condition.as_deref());
-            format!("{} {model} scene {scene} ({found})", gap.experiment)
+            format!("{} {} scene {scene} ({found})", gap.key.experiment, gap.key.name())
         })
         .collect();
     let rest = statistics.gaps.len().saturating_sub(named.len());
@@ -158,8 +157,6 @@ fn losses(statistics: &Statistics) -> Option<String> {
 
 pub(super) fn lost(statistics: &Statistics) -> u64 {
     let rows = statistics.losses.rows.iter();
-    let lost: BTreeSet<(&str, &str, Option<&str>, u64)> = rows
-        .map(|row| (row.experiment.as_str(), row.model.as_str(), row.condition.as_deref(), row.lossy.lost))
-        .collect();
-    lost.iter().map(|(.., lost)| lost).sum()
+    let lost: BTreeSet<(&RowKey, u64)> = rows.map(|row| (&row.key, row.lossy.lost)).collect();
+    lost.iter().map(|(_, lost)| lost).sum()
 }

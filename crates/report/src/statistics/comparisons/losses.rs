@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::statistics::study::{Block, Study};
+use crate::statistics::study::{Block, RowKey, Study};
 use crate::statistics::units::Units;
 use exact::moments::Moments;
 use statistics::holm::{holm, level};
@@ -24,13 +24,8 @@ pub struct Losses {
 /// One rate with lost episodes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LossRow {
-    /// The experiment.
-    pub experiment: String,
-    /// The model.
-    pub model: String,
-    /// The condition, where there are several.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub condition: Option<String>,
+    #[serde(flatten)]
+    pub key: RowKey,
     /// The metric.
     pub metric: String,
     /// The rate without the lost episodes, and its bounds with them.
@@ -121,13 +116,7 @@ pub(in crate::statistics) fn settle(tests: &mut [(LossCase, &mut Option<LossCase
 
 fn of_block(study: &Study, block: &Block, confidence: f64) -> Vec<LossRow> {
     let lost = usize::try_from(block.lost).unwrap_or(usize::MAX);
-    let row = |metric: &str, lossy| LossRow {
-        experiment: block.experiment.to_owned(),
-        model: block.model.to_owned(),
-        condition: block.condition(),
-        metric: metric.to_owned(),
-        lossy,
-    };
+    let row = |metric: &str, lossy| LossRow { key: block.key(), metric: metric.to_owned(), lossy };
     study
         .rates()
         .filter_map(|column| {

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::statistics::compare::{Compared, Comparison, Method, adjust};
 use crate::statistics::durations::{self, is_duration};
 use crate::statistics::matching::{Matched, Matching, Scenes};
-use crate::statistics::study::{Block, Experiment, Study};
+use crate::statistics::study::{Block, Experiment, RowKey, Study};
 use metric::catalog::{Better, Kind};
 use score::table::MetricColumn;
 use statistics::holm::level;
@@ -65,13 +65,8 @@ pub struct PairTest {
 /// A scene that models have with which this one is compared by pairs, and that this one has not, or more than once.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Gap {
-    /// The experiment.
-    pub experiment: String,
-    /// The model.
-    pub model: String,
-    /// The condition, where there are several.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub condition: Option<String>,
+    #[serde(flatten)]
+    pub key: RowKey,
     /// The scene, as the traces name it.
     pub scene: String,
     /// The number of episodes instead of one.
@@ -134,9 +129,7 @@ impl<'s, 'a> Field<'s, 'a> {
         let episodes = self.scenes[at].rows.get(&scene).map_or(0, Vec::len);
         let row = self.scenes.iter().find_map(|scenes| scenes.rows.get(&scene)?.first().copied())?;
         (episodes != 1).then(|| Gap {
-            experiment: block.experiment.to_owned(),
-            model: block.model.to_owned(),
-            condition: block.condition(),
+            key: block.key(),
             scene: self.study.scenes().and_then(|scenes| scenes.get(row)).unwrap_or_default().to_owned(),
             episodes,
         })

@@ -84,7 +84,7 @@ impl CellRow {
         let lost = lost.filter(|(key, _)| self.is_of(&key.experiment, &key.model, Some(&key.condition)));
         let lost: u64 = lost.map(|(_, count)| count).sum();
         let replies = replies.into_iter().flat_map(|replies| &replies.cells);
-        let replies = replies.filter(|it| self.is_of(&it.experiment, &it.model, it.condition.as_deref()));
+        let replies = replies.filter(|it| self.is_of(&it.key.experiment, &it.key.model, it.key.condition.as_deref()));
         let unusable: u64 = replies.map(|it| it.unusable).sum();
         (self.lost, self.unusable_replies) = ((lost > 0).then_some(lost), (unusable > 0).then_some(unusable));
     }

@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::statistics::losses::{LossCase, LossCases, Toward, settle};
-use crate::statistics::study::{Block, Experiment, Study, named};
+use crate::statistics::study::{Block, Experiment, RowKey, Study};
 use crate::statistics::units::{Units, too_few};
 use exact::moments::Moments;
 use exact::ratio::Ratio;
@@ -20,13 +20,8 @@ use statistics::units::rate_test;
 /// One rate against one level.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ChanceRow {
-    /// The experiment.
-    pub experiment: String,
-    /// The model.
-    pub model: String,
-    /// The condition, where there are several.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub condition: Option<String>,
+    #[serde(flatten)]
+    pub key: RowKey,
     /// The metric.
     pub metric: String,
     /// The role of the level.
@@ -61,6 +56,15 @@ pub enum Role {
     Chance,
     /// The result of some blind strategy, where no chance level applies.
     Reference,
+}
+
+impl Role {
+    pub(in crate::statistics) const fn name(self) -> &'static str {
+        match self {
+            Self::Chance => "chance",
+            Self::Reference => "reference",
+        }
+    }
 }
 
 /// The position of a rate relative to a level.
@@ -105,9 +109,7 @@ impl ChanceRow {
         settle(&mut tested.iter_mut().map(|tested| (tested.seen, &mut tested.losses)).collect::<Vec<_>>(), confidence);
         let adjusted = holm(&tested.iter().map(|tested| tested.test.p).collect::<Vec<_>>());
         let row = |(Tested { block, successes, n, test, units, losses, .. }, p_adjusted): (Tested, f64)| Self {
-            experiment: experiment.name.to_owned(),
-            model: block.model.to_owned(),
-            condition: block.condition(),
+            key: block.key(),
             metric: metric.to_owned(),
             role,
             level: chance,
@@ -149,11 +151,6 @@ impl ChanceRow {
         let is_hopeless = |row: &&Self| least_p(counted(row).n, row.level).is_none_or(|least| least > first_step);
         let most = family.iter().map(|row| counted(row)).max_by_key(|units| units.n)?;
         family.iter().all(is_hopeless).then_some(most)
-    }
-
-    /// The model's name in comparisons.
-    pub fn name(&self) -> String {
-        named(&self.model, self.condition.as_deref())
     }
 }
 
@@ -206,6 +203,14 @@ impl<'s, 'a> Tested<'s, 'a> {
 }
 
 impl Verdict {
+    pub(in crate::statistics) const fn name(self) -> &'static str {
+        match self {
+            Self::Above => "above",
+            Self::Below => "below",
+            Self::NotSeparated => "not told apart",
+        }
+    }
+
     pub(in crate::statistics) fn of(successes: u64, n: u64, level: Ratio, is_shown: bool) -> Self {
         let seen = i128::from(successes) * i128::from(level.denominator());
         let expected = i128::from(level.numerator()) * i128::from(n);

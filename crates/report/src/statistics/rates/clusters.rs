@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::statistics::study::{Block, Study};
+use crate::statistics::study::{Block, RowKey, Study};
 use exact::moments::Moments;
 use metric::catalog::{Kind, StandardError};
 use score::table::{EpisodeTable, MetricColumn};
@@ -14,13 +14,8 @@ use statistics::design::Cluster;
 /// The seeds of one cell.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ClusterRow {
-    /// The experiment.
-    pub experiment: String,
-    /// The model.
-    pub model: String,
-    /// The condition, where there are several.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub condition: Option<String>,
+    #[serde(flatten)]
+    pub key: RowKey,
     /// The metric.
     pub metric: String,
     /// The defined episodes.
@@ -58,9 +53,7 @@ impl ClusterRow {
         let (interval, withheld) =
             coverage::given(interval, seeds.len() as u64, coverage::CLUSTERS, found.is_some_and(|it| it.se > 0.0));
         Self {
-            experiment: block.experiment.to_owned(),
-            model: block.model.to_owned(),
-            condition: block.condition(),
+            key: block.key(),
             metric: column.name.clone(),
             n: whole.n,
             seeds: seeds.len(),

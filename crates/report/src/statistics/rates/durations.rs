@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::statistics::study::{Block, Experiment, Study};
+use crate::statistics::study::{Block, Experiment, RowKey, Study};
 use score::table::MetricColumn;
 use statistics::competing::{Ending, Incidence, Outcome};
 use statistics::coverage::{self, Withheld};
@@ -13,13 +13,8 @@ use statistics::survival::{MedianInterval, RestrictedMean, Survival, common_hori
 /// One duration of one experiment and model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct DurationRow {
-    /// The experiment.
-    pub experiment: String,
-    /// The model.
-    pub model: String,
-    /// The condition, where there are several.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub condition: Option<String>,
+    #[serde(flatten)]
+    pub key: RowKey,
     /// The metric.
     pub metric: String,
     /// The episodes with a duration.
@@ -126,9 +121,7 @@ impl DurationRow {
         });
         let median_interval = curve.as_ref().and_then(|curve| curve.median_interval(confidence));
         Self {
-            experiment: block.experiment.to_owned(),
-            model: block.model.to_owned(),
-            condition: block.condition(),
+            key: block.key(),
             metric: column.name.clone(),
             n,
             finished,

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::statistics::chance::levels;
 use crate::statistics::conclusions::headline;
 use crate::statistics::models::by_mean;
-use crate::statistics::study::{Block, Experiment, Study, Unit, named};
+use crate::statistics::study::{Block, Experiment, RowKey, Study, Unit};
 use crate::statistics::{Options, Role, Selection, Verdict};
 use exact::moments::{MomentOverflow, Moments};
 use exact::ratio::Ratio;
@@ -55,13 +55,8 @@ pub struct Sequential {
 /// One rate of one model in one experiment; of scenes, seeds or participants with several episodes, the first of each.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SequentialRate {
-    /// The experiment.
-    pub experiment: String,
-    /// The model.
-    pub model: String,
-    /// The condition, where there are several.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub condition: Option<String>,
+    #[serde(flatten)]
+    pub key: RowKey,
     /// The metric.
     pub metric: String,
     /// The successes.
@@ -77,13 +72,8 @@ pub struct SequentialRate {
 /// One rate against one level.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SequentialChance {
-    /// The experiment.
-    pub experiment: String,
-    /// The model.
-    pub model: String,
-    /// The condition, where there are several.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub condition: Option<String>,
+    #[serde(flatten)]
+    pub key: RowKey,
     /// The metric.
     pub metric: String,
     /// The role of the level.
@@ -162,11 +152,6 @@ fn headline_rates(study: &Study) -> Vec<String> {
 }
 
 impl SequentialRate {
-    /// The model's name in comparisons.
-    pub fn name(&self) -> String {
-        named(&self.model, self.condition.as_deref())
-    }
-
     fn all(study: &Study, confidence: f64) -> Vec<Self> {
         study.experiments.iter().flat_map(|experiment| of_experiment(study, experiment, confidence)).collect()
     }
@@ -180,9 +165,7 @@ fn of_experiment(study: &Study, experiment: &Experiment, confidence: f64) -> Vec
         let mut firsts = study.firsts(block, column).into_iter();
         let (successes, n) = firsts.try_fold(Moments::default(), |sum, (_, value)| sum.with(value)).ok()?.counts()?;
         Some(SequentialRate {
-            experiment: experiment.name.to_owned(),
-            model: block.model.to_owned(),
-            condition: block.condition(),
+            key: block.key(),
             metric: column.name.clone(),
             successes,
             n,
@@ -194,11 +177,6 @@ fn of_experiment(study: &Study, experiment: &Experiment, confidence: f64) -> Vec
 }
 
 impl SequentialChance {
-    /// The model's name in comparisons.
-    pub fn name(&self) -> String {
-        named(&self.model, self.condition.as_deref())
-    }
-
     /// Every rate against every level of its experiment.
     fn all(study: &Study, confidence: f64) -> Vec<Self> {
         let mut rows = Vec::new();
@@ -222,9 +200,7 @@ impl SequentialChance {
             let is_shown = level(confidence).is_some_and(|level| p_adjusted <= level);
             Self {
                 verdict: Verdict::of(rate.successes, rate.n, chance, is_shown),
-                experiment: rate.experiment,
-                model: rate.model,
-                condition: rate.condition,
+                key: rate.key,
                 metric: rate.metric,
                 role,
                 level: chance,

@@ -4,6 +4,7 @@
 
 pub mod pairs;
 pub mod sequential;
+mod sheet;
 mod tables;
 
 use super::{Answer, FEW, Statistics};

@@ -2,8 +2,8 @@
 //!
 //! Rule: texts that depend on the order of the two models are stored for both orders, so that nothing is recomputed.
 
-use super::super::{Comparison, OverallMethod, OverallRow, PairTest, Statistics};
-use super::tables::{held, method};
+use super::super::{Comparison, OverallRow, PairTest, Statistics};
+use super::tables::{held, method, overall_method};
 use exact::format::{UNDEFINED, fixed, p_value};
 use statistics::coverage::Withheld;
 use statistics::interval::Interval;
@@ -88,11 +88,7 @@ impl<'a> PairText<'a> {
     fn overall(row: &'a OverallRow) -> Self {
         let OverallRow { first, second, .. } = row;
         Self {
-            test: match row.method {
-                OverallMethod::MantelHaenszel => "exact conditional",
-                OverallMethod::PooledMcnemar => "McNemar, pooled",
-                OverallMethod::Units => "by scene or cluster",
-            },
+            test: overall_method(row.method),
             counts: [UNDEFINED, UNDEFINED].map(str::to_owned),
             differing: [UNDEFINED, UNDEFINED].map(str::to_owned),
             difference: difference(row.difference, RATE_PLACES),

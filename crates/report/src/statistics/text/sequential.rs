@@ -1,10 +1,12 @@
 //! Sequential statistics for people.
 
+use super::sheet::Sheet;
+use super::tables::{Shown, plain};
 use super::{departures, list, percent, section};
-use crate::statistics::{Role, Sequential, SequentialChance, SequentialPair, Verdict};
+use crate::statistics::{Sequential, SequentialPair, Verdict};
 use crate::tables::{Table, push_wrapped};
 use exact::escape::visible;
-use exact::format::{bounds, e_value, fixed, p_value};
+use exact::format::{e_value, fixed};
 
 /// The methods, with line breaks for a wide terminal.
 const METHODS: [&str; 5] = [
@@ -21,7 +23,7 @@ impl Sequential {
     /// Pairs of models that are not separated are counted.
     pub fn render(&self, metrics: &[String], width: Option<usize>) -> String {
         let sequential = self;
-        let shown = |metric: &String| metrics.contains(metric);
+        let shown = |metric: &str| metrics.iter().any(|name| name == metric);
         let percent = percent(sequential.confidence);
         let definitions = visible(&sequential.definitions);
         let opening = format!(
@@ -70,55 +72,37 @@ const PURPOSE: [&str; 2] = [
     "The price is width. Where the number of episodes was fixed beforehand, `stats` without --sequential shows more.",
 ];
 
-type Shown<'a> = &'a dyn Fn(&String) -> bool;
-
 fn rates(sequential: &Sequential, shown: Shown) -> Table {
-    let lines = sequential.rates.iter().filter(|row| shown(&row.metric)).map(|row| {
-        let names = [row.experiment.clone(), row.name(), row.metric.clone()];
-        let interval = bounds(row.interval.map(|interval| (interval.low, interval.high)), 3);
-        let count = format!("{}/{}", row.successes, row.n);
-        names.into_iter().chain([count, fixed(row.rate, 3), interval])
-    });
-    Table::plain(&["experiment", "model", "metric"], &["count", "rate", "sequence"]).with(lines)
+    Sheet::of(sequential.rates.iter().filter(|row| shown(&row.metric)))
+        .cell(|row| (&row.key, &row.metric))
+        .number("count", |row| format!("{}/{}", row.successes, row.n))
+        .number("rate", |row| fixed(row.rate, 3))
+        .number("sequence", |row| plain(row.interval, 3))
+        .table()
 }
 
 fn chance(sequential: &Sequential, shown: Shown) -> Table {
-    let line = |row: &SequentialChance| {
-        let role = match row.role {
-            Role::Chance => "chance",
-            Role::Reference => "reference",
-        };
-        let names = [row.experiment.clone(), row.name(), row.metric.clone(), format!("{role} {}", row.level)];
-        let count = format!("{}/{}", row.successes, row.n);
-        let numbers = [count, e_value(row.e), p_value(Some(row.p)), p_value(Some(row.p_adjusted))];
-        names.into_iter().chain(numbers).chain([word(row.verdict).to_owned()])
-    };
-    let lines = sequential.chance.iter().filter(|row| shown(&row.metric)).map(line);
-    let numbers = ["count", "e", "p", "p (Holm)", "verdict"];
-    Table::plain(&["experiment", "model", "metric", "level"], &numbers).with(lines)
-}
-
-fn word(verdict: Verdict) -> &'static str {
-    match verdict {
-        Verdict::Above => "above",
-        Verdict::Below => "below",
-        Verdict::NotSeparated => "not told apart",
-    }
+    Sheet::of(sequential.chance.iter().filter(|row| shown(&row.metric)))
+        .cell(|row| (&row.key, &row.metric))
+        .text("level", |row| format!("{} {}", row.role.name(), row.level))
+        .number("count", |row| format!("{}/{}", row.successes, row.n))
+        .number("e", |row| e_value(row.e))
+        .p_values(false, |row| [Some(row.p), None, Some(row.p_adjusted)])
+        .number("verdict", |row| row.verdict.name())
+        .table()
 }
 
 fn separated(pairs: &[&SequentialPair]) -> Table {
-    let told_apart = pairs.iter().filter(|pair| pair.verdict != Verdict::NotSeparated);
-    let lines = told_apart.map(|pair| {
-        let (mut models, mut only) = ([&pair.first, &pair.second], [pair.pairs.first_only, pair.pairs.second_only]);
-        if pair.verdict == Verdict::Below {
-            models.reverse();
-            only.reverse();
-        }
-        let [higher, lower] = models.map(Clone::clone);
-        let names = [pair.experiment.clone(), pair.metric.clone(), higher, lower];
-        let numbers = [e_value(pair.e), p_value(Some(pair.p)), p_value(Some(pair.p_adjusted))];
-        names.into_iter().chain([format!("{}:{}", only[0], only[1])]).chain(numbers)
-    });
-    let numbers = ["only one", "e", "p", "p (Holm)"];
-    Table::plain(&["experiment", "metric", "higher", "lower"], &numbers).with(lines)
+    let order = |pair: &SequentialPair| if pair.verdict == Verdict::Below { [1, 0] } else { [0, 1] };
+    let models = |pair: &SequentialPair| order(pair).map(|at| [&pair.first, &pair.second][at].clone());
+    let only = |pair: &SequentialPair| order(pair).map(|at| [pair.pairs.first_only, pair.pairs.second_only][at]);
+    Sheet::of(pairs.iter().filter(|pair| pair.verdict != Verdict::NotSeparated))
+        .text("experiment", |pair| pair.experiment.clone())
+        .text("metric", |pair| pair.metric.clone())
+        .text("higher", |pair| models(pair)[0].clone())
+        .text("lower", |pair| models(pair)[1].clone())
+        .number("only one", |pair| only(pair).map(|count| count.to_string()).join(":"))
+        .number("e", |pair| e_value(pair.e))
+        .p_values(false, |pair| [Some(pair.p), None, Some(pair.p_adjusted)])
+        .table()
 }

@@ -1,9 +1,10 @@
 //! The tables of `stats`, one function each: one line per row of the statistics whose metric is shown.
 
-use super::super::ranks::ALL;
-use super::super::study::named;
-use super::super::{
-    CellRow, Comparison, Intervals, LossCases, Method, OverallMethod, Role, Sign, Statistics, Units, Verdict,
+use super::sheet::Sheet;
+use crate::statistics::ranks::ALL;
+use crate::statistics::study::named;
+use crate::statistics::{
+    CellRow, Comparison, Intervals, LossCases, Method, OverallMethod, Sign, Statistics, Units, Verdict,
 };
 use crate::tables::Table;
 use exact::format::{UNDEFINED, bounds, fixed, p_value};
@@ -16,65 +17,58 @@ pub(super) type Shown<'a> = &'a dyn Fn(&str) -> bool;
 /// The mark of a conditional metric with few defined episodes.
 pub(super) const FEW_MARK: char = '†';
 
-/// The columns of lost episodes and replies without a decision; empty if no cell has any.
-fn left_out(cells: &[CellRow]) -> impl Fn(&CellRow) -> Vec<String> + use<> {
-    let names: Vec<&str> = names_of_left_out(cells).collect();
-    move |cell| {
-        let counts = [("lost", cell.lost), ("no decision", cell.unusable_replies)];
-        let counts = counts.into_iter().filter(|(name, _)| names.contains(name));
-        counts.map(|(_, count)| count.unwrap_or(0).to_string()).collect()
-    }
-}
-
-fn names_of_left_out(cells: &[CellRow]) -> impl Iterator<Item = &'static str> {
-    let lost = cells.iter().any(|cell| cell.lost.is_some()).then_some("lost");
-    let replies = cells.iter().any(|cell| cell.unusable_replies.is_some()).then_some("no decision");
-    lost.into_iter().chain(replies)
-}
+/// The verdict if no outcome of the few units, or of the lost episodes, could have given one.
+const CANNOT_SAY: &str = "cannot say";
 
 /// Rates with Wilson's interval; also the other two if `is_full`.
 pub(super) fn rates(statistics: &Statistics, shown: Shown, is_full: bool) -> Table {
-    let left_out = left_out(&statistics.cells);
-    let lines = statistics.cells.iter().filter(|cell| shown(&cell.metric)).filter_map(|cell| {
-        let Intervals::Rate { wilson, clopper_pearson, jeffreys } = cell.intervals else { return None };
-        let mut line = group(cell);
-        line.extend([format!("{}/{}{}", cell.sum, cell.n, mark(cell)), fixed(cell.mean, 3), plain(wilson, 3)]);
-        if is_full {
-            line.extend([plain(clopper_pearson, 3), plain(jeffreys, 3)]);
-        }
-        line.extend(left_out(cell));
-        Some(line)
-    });
-    let numbers = ["count", "rate", "Wilson", "Clopper-Pearson", "Jeffreys"];
-    let numbers = numbers[..if is_full { 5 } else { 3 }].iter().copied();
-    let numbers: Vec<&str> = numbers.chain(names_of_left_out(&statistics.cells)).collect();
-    Table::plain(&keys(statistics), &numbers).with(lines)
+    let of_rate = |intervals| match intervals {
+        Intervals::Rate { wilson, clopper_pearson, jeffreys } => Some([wilson, clopper_pearson, jeffreys]),
+        Intervals::Quantity { .. } => None,
+    };
+    Sheet::of_cells(statistics, shown, of_rate)
+        .number("count", |(cell, _)| format!("{}/{}{}", cell.sum, cell.n, mark(cell)))
+        .number("rate", |(cell, _)| fixed(cell.mean, 3))
+        .number("Wilson", |(_, found)| plain(found[0], 3))
+        .number_if(is_full, "Clopper-Pearson", |(_, found)| plain(found[1], 3))
+        .number_if(is_full, "Jeffreys", |(_, found)| plain(found[2], 3))
+        .left_out(statistics)
 }
 
 pub(super) fn quantities(statistics: &Statistics, shown: Shown) -> Table {
-    let left_out = left_out(&statistics.cells);
-    let lines = statistics.cells.iter().filter(|cell| shown(&cell.metric)).filter_map(|cell| {
-        let Intervals::Quantity { student_t, student_t_withheld, bootstrap, bootstrap_withheld } = cell.intervals
-        else {
-            return None;
-        };
-        let mut line = group(cell);
-        line.extend([format!("{}{}", cell.n, mark(cell)), fixed(cell.mean, 2), error(cell.se, 2)]);
-        line.extend([held(student_t, student_t_withheld, 2), held(bootstrap, bootstrap_withheld, 2)]);
-        line.extend(left_out(cell));
-        Some(line)
-    });
-    let numbers = ["n", "mean", "SE", "Student's t", "bootstrap"].into_iter();
-    let numbers: Vec<&str> = numbers.chain(names_of_left_out(&statistics.cells)).collect();
-    Table::plain(&keys(statistics), &numbers).with(lines)
+    let of_quantity = |intervals| match intervals {
+        Intervals::Quantity { student_t, student_t_withheld, bootstrap, bootstrap_withheld } => {
+            Some([(student_t, student_t_withheld), (bootstrap, bootstrap_withheld)])
+        }
+        Intervals::Rate { .. } => None,
+    };
+    Sheet::of_cells(statistics, shown, of_quantity)
+        .number("n", |(cell, _)| format!("{}{}", cell.n, mark(cell)))
+        .number("mean", |(cell, _)| fixed(cell.mean, 2))
+        .number("SE", |(cell, _)| error(cell.se, 2))
+        .number("Student's t", |(_, [(interval, withheld), _])| held(*interval, *withheld, 2))
+        .number("bootstrap", |(_, [_, (interval, withheld)])| held(*interval, *withheld, 2))
+        .left_out(statistics)
 }
 
-fn keys(statistics: &Statistics) -> Vec<String> {
-    statistics.by.iter().map(String::as_str).chain(["metric"]).map(str::to_owned).collect()
-}
+impl<'s, I> Sheet<(&'s CellRow, I)> {
+    /// The cells with such intervals, and the columns that they are grouped by.
+    fn of_cells(statistics: &'s Statistics, shown: Shown, intervals: impl Fn(Intervals) -> Option<I>) -> Self {
+        let cells = statistics.cells.iter().filter(|cell| shown(&cell.metric));
+        let sheet = Self::of(cells.filter_map(|cell| Some((cell, intervals(cell.intervals)?))));
+        let by = statistics.by.iter().enumerate();
+        by.fold(sheet, |sheet, (at, name)| sheet.text(name, |(cell, _)| cell.key[at].clone()))
+            .text("metric", |(cell, _)| cell.metric.clone())
+    }
 
-fn group(cell: &CellRow) -> Vec<String> {
-    cell.key.values().map(ToString::to_string).chain([cell.metric.clone()]).collect()
+    /// The table with the columns of lost episodes and of replies without a decision, if any cell has some.
+    fn left_out(self, statistics: &Statistics) -> Table {
+        let has_lost = statistics.cells.iter().any(|cell| cell.lost.is_some());
+        let has_unusable = statistics.cells.iter().any(|cell| cell.unusable_replies.is_some());
+        self.number_if(has_lost, "lost", |(cell, _)| cell.lost.unwrap_or(0))
+            .number_if(has_unusable, "no decision", |(cell, _)| cell.unusable_replies.unwrap_or(0))
+            .table()
+    }
 }
 
 fn mark(cell: &CellRow) -> String {
@@ -85,67 +79,17 @@ fn mark(cell: &CellRow) -> String {
 pub(super) fn chance(statistics: &Statistics, shown: Shown, is_full: bool) -> Table {
     let is_shown = |metric: &str| shown(metric) || statistics.relations.whole(metric).is_some_and(shown);
     let has_losses = statistics.chance.iter().any(|row| row.losses.is_some());
-    let columns = Columns { is_full, has_losses, has_repeats: false };
-    let line = |row: &super::super::ChanceRow| {
-        let role = match row.role {
-            Role::Chance => "chance",
-            Role::Reference => "reference",
-        };
-        let verdict = match row.verdict {
-            Verdict::Above => "above",
-            Verdict::Below => "below",
+    Sheet::of(statistics.chance.iter().filter(|row| is_shown(&row.metric)))
+        .cell(|row| (&row.key, &row.metric))
+        .text("level", |row| format!("{} {}", row.role.name(), row.level))
+        .number("count", |row| format!("{}/{}{}", row.successes, row.n, of_units(row.units.as_ref())))
+        .p_values(is_full, |row| [Some(row.p), Some(row.mid_p), Some(row.p_adjusted)])
+        .lost_if(has_losses, |row| row.losses.as_ref())
+        .number("verdict", |row| match row.verdict {
             Verdict::NotSeparated if row.unsaid(statistics.confidence).is_some() => CANNOT_SAY,
-            Verdict::NotSeparated => "not told apart",
-        };
-        let mut line = vec![row.experiment.clone(), row.name(), row.metric.clone(), format!("{role} {}", row.level)];
-        line.push(format!("{}/{}{}", row.successes, row.n, of_units(row.units.as_ref())));
-        line.extend(columns.p_values([Some(row.p), Some(row.mid_p), Some(row.p_adjusted)]));
-        line.extend(columns.lost(row.losses.as_ref()));
-        line.push(verdict.to_owned());
-        line
-    };
-    let rows = statistics.chance.iter().filter(|row| is_shown(&row.metric)).map(line);
-    let numbers = [&["count"], columns.names().as_slice(), &["verdict"]].concat();
-    Table::plain(&["experiment", "model", "metric", "level"], &numbers).with(rows)
-}
-
-/// The verdict if no outcome of the few units, or of the lost episodes, could have given one.
-const CANNOT_SAY: &str = "cannot say";
-
-/// The heading of the p values under both assumptions about lost episodes.
-const WITH_LOST: &str = "p with lost episodes";
-
-/// The p values of a table.
-#[derive(Clone, Copy)]
-struct Columns {
-    is_full: bool,
-    has_losses: bool,
-    has_repeats: bool,
-}
-
-impl Columns {
-    fn of<'c>(mut comparisons: impl Iterator<Item = &'c Comparison> + Clone, is_full: bool) -> Self {
-        let has_losses = comparisons.clone().any(|found| found.losses.is_some());
-        let has_repeats = comparisons.any(|found| found.repeat_se.is_some());
-        Self { is_full, has_losses, has_repeats }
-    }
-
-    fn names(self) -> Vec<&'static str> {
-        let all = if self.is_full { ["p", "mid-p", "p (Holm)"].as_slice() } else { &["p", "p (Holm)"] };
-        let lost = self.has_losses.then_some(WITH_LOST);
-        let noise = self.has_repeats.then_some("SE of repeats");
-        noise.into_iter().chain(all.iter().copied()).chain(lost).collect()
-    }
-
-    fn p_values(self, [p, mid_p, adjusted]: [Option<f64>; 3]) -> Vec<String> {
-        let shown = if self.is_full { vec![p, mid_p, adjusted] } else { vec![p, adjusted] };
-        shown.into_iter().map(p_value).collect()
-    }
-
-    fn lost(self, cases: Option<&LossCases>) -> Option<String> {
-        let both = |cases: &LossCases| format!("{}, {}", p_value(cases.lowest.p), p_value(cases.highest.p));
-        self.has_losses.then(|| cases.map_or_else(|| UNDEFINED.to_owned(), both))
-    }
+            verdict => verdict.name(),
+        })
+        .table()
 }
 
 /// The number of units beside the episodes.
@@ -153,70 +97,87 @@ fn of_units(units: Option<&Units>) -> String {
     units.map_or_else(String::new, |units| format!(" in {} {}", units.n, units.name))
 }
 
+impl<R> Sheet<R> {
+    /// The column of the p values under both assumptions about lost episodes.
+    fn lost_if(self, has_losses: bool, of: impl Fn(&R) -> Option<&LossCases>) -> Self {
+        let both = |cases: &LossCases| format!("{}, {}", p_value(cases.lowest.p), p_value(cases.highest.p));
+        self.number_if(has_losses, "p with lost episodes", |row| of(row).map_or_else(|| UNDEFINED.to_owned(), both))
+    }
+
+    /// The columns of a comparison. A column is left out if none of `all` comparisons, shown or not, has it.
+    fn comparison<'c>(
+        self,
+        mut all: impl Iterator<Item = &'c Comparison> + Clone,
+        is_full: bool,
+        of: impl Fn(&R) -> &Comparison,
+    ) -> Self {
+        let has_losses = all.clone().any(|found| found.losses.is_some());
+        let has_repeats = all.any(|found| found.repeat_se.is_some());
+        let places = |row: &R| method(of(row).method).1;
+        self.text("test", |row| method(of(row).method).0)
+            .number("counts", |row| counts(of(row)))
+            .number("difference", |row| fixed(of(row).difference, places(row)))
+            .number("interval", |row| held(of(row).interval, of(row).withheld, places(row)))
+            .number_if(has_repeats, "SE of repeats", |row| fixed(of(row).repeat_se, places(row)))
+            .p_values(is_full, |row| [of(row).p, of(row).mid_p, of(row).p_adjusted])
+            .lost_if(has_losses, |row| of(row).losses.as_ref())
+    }
+}
+
 pub(super) fn separated(statistics: &Statistics, shown: Shown, is_full: bool) -> Table {
-    let pairs = statistics.models.iter().flat_map(|family| &family.tests);
-    let columns = Columns::of(pairs.map(|test| &test.comparison), is_full);
-    let families = statistics.models.iter().filter(|family| shown(&family.metric));
-    let lines = families.flat_map(|family| {
-        family.tests.iter().filter(|test| test.comparison.separated).map(|test| {
-            let names = [&family.experiment, &family.metric, &test.first, &test.second].map(Clone::clone);
-            names.into_iter().chain(compared(&test.comparison, columns))
-        })
-    });
-    let texts = ["experiment", "metric", "better", "than", "test"];
-    let numbers = [&["counts", "difference", "interval"], columns.names().as_slice()].concat();
-    Table::plain(&texts, &numbers).with(lines)
+    let tests = statistics.models.iter().flat_map(|family| family.tests.iter().map(move |test| (family, test)));
+    let all = tests.clone().map(|(_, test)| &test.comparison);
+    Sheet::of(tests.filter(|(family, test)| shown(&family.metric) && test.comparison.separated))
+        .text("experiment", |(family, _)| family.experiment.clone())
+        .text("metric", |(family, _)| family.metric.clone())
+        .text("better", |(_, test)| test.first.clone())
+        .text("than", |(_, test)| test.second.clone())
+        .comparison(all, is_full, |(_, test)| &test.comparison)
+        .table()
 }
 
 pub(super) fn conditions(statistics: &Statistics, shown: Shown, is_full: bool) -> Table {
-    let columns = Columns::of(statistics.conditions.iter().map(|contrast| &contrast.comparison), is_full);
-    let lines = statistics.conditions.iter().filter(|contrast| shown(&contrast.metric)).map(|contrast| {
-        let pair = format!("{} - {}", contrast.baseline, contrast.against);
-        let names = [named(&contrast.model, contrast.condition.as_deref()), contrast.metric.clone(), pair];
-        let verdict = match contrast.comparison.sign() {
+    let all = statistics.conditions.iter().map(|contrast| &contrast.comparison);
+    Sheet::of(statistics.conditions.iter().filter(|contrast| shown(&contrast.metric)))
+        .text("model", |contrast| named(&contrast.model, contrast.condition.as_deref()))
+        .text("metric", |contrast| contrast.metric.clone())
+        .text("conditions", |contrast| format!("{} - {}", contrast.baseline, contrast.against))
+        .comparison(all, is_full, |contrast| &contrast.comparison)
+        .number("verdict", |contrast| match contrast.comparison.sign() {
             Some(Sign::Higher) => "higher",
             Some(Sign::Lower) => "lower",
             None if contrast.comparison.unsaid(statistics.confidence).is_some() => CANNOT_SAY,
             None if contrast.comparison.p.is_some() => "not told apart",
             None => UNDEFINED,
-        };
-        names.into_iter().chain(compared(&contrast.comparison, columns)).chain([verdict.to_owned()])
-    });
-    let numbers = [&["counts", "difference", "interval"], columns.names().as_slice(), &["verdict"]].concat();
-    Table::plain(&["model", "metric", "conditions", "test"], &numbers).with(lines)
+        })
+        .table()
 }
 
 pub(super) fn trends(statistics: &Statistics, shown: Shown) -> Table {
-    let lines = statistics.trends.iter().filter(|row| shown(&row.metric)).map(|row| {
-        let rates: Vec<String> =
-            row.doses.iter().map(|dose| format!("{}: {}/{}", dose.dose, dose.successes, dose.n)).collect();
-        let verdict = match (row.trend, row.too_few(), row.verdict) {
+    Sheet::of(statistics.trends.iter().filter(|row| shown(&row.metric)))
+        .text("factor", |row| row.factor.clone())
+        .text("metric", |row| row.metric.clone())
+        .text("model", |row| named(&row.model, row.condition.as_deref()))
+        .text("rates by dose", |row| {
+            let rates = row.doses.iter().map(|dose| format!("{}: {}/{}", dose.dose, dose.successes, dose.n));
+            rates.collect::<Vec<_>>().join(", ")
+        })
+        .number("compared within", |row| {
+            row.trend.map_or_else(|| UNDEFINED.to_owned(), |trend| format!("{} {}", trend.strata, row.units))
+        })
+        .number("z", |row| fixed(row.trend.map(|trend| trend.z), 2))
+        .number("p adjusted", |row| p_value(row.p_adjusted))
+        .number("verdict", |row| match (row.trend, row.too_few(), row.verdict) {
             (None, ..) => "not tested".to_owned(),
             (_, Some(units), _) => format!("cannot say: {units} {}", row.units),
             (.., Verdict::Above) => "rises".to_owned(),
             (.., Verdict::Below) => "falls".to_owned(),
             (.., Verdict::NotSeparated) => "no trend shown".to_owned(),
-        };
-        let z = row.trend.map_or_else(|| UNDEFINED.to_owned(), |trend| fixed(Some(trend.z), 2));
-        let strata = row.trend.map_or_else(|| UNDEFINED.to_owned(), |trend| format!("{} {}", trend.strata, row.units));
-        let p = p_value(row.p_adjusted);
-        [
-            row.factor.clone(),
-            row.metric.clone(),
-            named(&row.model, row.condition.as_deref()),
-            rates.join(", "),
-            strata,
-            z,
-            p,
-            verdict,
-        ]
-    });
-    Table::plain(&["factor", "metric", "model", "rates by dose"], &["compared within", "z", "p adjusted", "verdict"])
-        .with(lines)
+        })
+        .table()
 }
 
-fn compared(found: &Comparison, columns: Columns) -> Vec<String> {
-    let (test, places) = method(found.method);
+fn counts(found: &Comparison) -> String {
     let [m, n] = found.n;
     let counts = match (found.pairs, found.successes) {
         (Some(pairs), _) => format!("{}:{} of {m} pairs", pairs.first_only, pairs.second_only),
@@ -224,13 +185,7 @@ fn compared(found: &Comparison, columns: Columns) -> Vec<String> {
         _ if matches!(found.method, Method::RestrictedMeanPaired | Method::StudentPaired) => format!("{m} pairs"),
         _ => format!("{m}, {n}"),
     };
-    let counts = counts + &of_units(found.units.as_ref());
-    let mut line = vec![test.to_owned(), counts, fixed(found.difference, places)];
-    line.push(held(found.interval, found.withheld, places));
-    line.extend(columns.has_repeats.then(|| fixed(found.repeat_se, places)));
-    line.extend(columns.p_values([found.p, found.mid_p, found.p_adjusted]));
-    line.extend(columns.lost(found.losses.as_ref()));
-    line
+    counts + &of_units(found.units.as_ref())
 }
 
 pub(super) const fn method(method: Method) -> (&'static str, usize) {
@@ -245,153 +200,132 @@ pub(super) const fn method(method: Method) -> (&'static str, usize) {
     }
 }
 
+pub(super) const fn overall_method(method: OverallMethod) -> &'static str {
+    match method {
+        OverallMethod::MantelHaenszel => "exact conditional",
+        OverallMethod::PooledMcnemar => "McNemar, pooled",
+        OverallMethod::Units => "by scene or cluster",
+    }
+}
+
 /// Pairs of models over all experiments: all pairs if `is_full`, else only separated ones.
 pub(super) fn overall(statistics: &Statistics, shown: Shown, is_full: bool) -> Table {
     let rows = statistics.overall.iter().filter(|row| shown(&row.metric) && (is_full || row.separated));
-    let columns = Columns { is_full, has_losses: rows.clone().any(|row| row.losses.is_some()), has_repeats: false };
-    let lines = rows.map(|row| {
-        let test = match row.method {
-            OverallMethod::MantelHaenszel => "exact conditional",
-            OverallMethod::PooledMcnemar => "McNemar, pooled",
-            OverallMethod::Units => "by scene or cluster",
-        };
-        let is_unsettled = row.losses.is_some_and(|losses| !losses.agree);
-        let verdict = match (row.separated, is_unsettled) {
-            (true, _) => "better",
-            (false, true) => CANNOT_SAY,
-            (false, false) => "not told apart",
-        };
-        let mut line: Vec<String> = [&*row.metric, &row.first, &row.second, test].map(str::to_owned).to_vec();
-        line.extend([row.experiments.len().to_string(), fixed(row.difference, 3), plain(row.interval, 3)]);
-        let p_values = if is_full { vec![row.p, row.mid_p, row.p_adjusted] } else { vec![row.p, row.p_adjusted] };
-        line.extend(p_values.into_iter().map(p_value));
-        line.extend(columns.lost(row.losses.as_ref()));
-        line.push(verdict.to_owned());
-        line
-    });
-    let p_values = if is_full { ["p", "mid-p", "p (Holm)"].as_slice() } else { &["p", "p (Holm)"] };
-    let lost = columns.has_losses.then_some(WITH_LOST);
-    let numbers = ["experiments", "difference", "interval"].iter().chain(p_values).copied().chain(lost);
-    let numbers: Vec<&str> = numbers.chain(["verdict"]).collect();
-    Table::plain(&["metric", "first", "second", "test"], &numbers).with(lines)
+    let has_losses = rows.clone().any(|row| row.losses.is_some());
+    Sheet::of(rows)
+        .text("metric", |row| row.metric.clone())
+        .text("first", |row| row.first.clone())
+        .text("second", |row| row.second.clone())
+        .text("test", |row| overall_method(row.method))
+        .number("experiments", |row| row.experiments.len())
+        .number("difference", |row| fixed(row.difference, 3))
+        .number("interval", |row| plain(row.interval, 3))
+        .p_values(is_full, |row| [row.p, row.mid_p, row.p_adjusted])
+        .lost_if(has_losses, |row| row.losses.as_ref())
+        .number("verdict", |row| match row.losses {
+            _ if row.separated => "better",
+            Some(losses) if !losses.agree => CANNOT_SAY,
+            _ => "not told apart",
+        })
+        .table()
 }
 
 pub(super) fn ranks(statistics: &Statistics, shown: Shown) -> Table {
-    let lines = statistics.ranks.iter().filter(|row| shown(&row.metric)).map(|row| {
-        let experiment = row.experiment.as_deref().unwrap_or(ALL);
-        [experiment, &row.metric, &row.model].map(str::to_owned).into_iter().chain([row.interval()])
-    });
-    Table::plain(&["experiment", "metric", "model"], &["ranks"]).with(lines)
+    Sheet::of(statistics.ranks.iter().filter(|row| shown(&row.metric)))
+        .text("experiment", |row| row.experiment.clone().unwrap_or_else(|| ALL.to_owned()))
+        .text("metric", |row| row.metric.clone())
+        .text("model", |row| row.model.clone())
+        .number("ranks", |row| row.interval())
+        .table()
 }
 
 pub(super) fn improvements(statistics: &Statistics, shown: Shown) -> Table {
-    let lines = statistics.improvements.iter().filter(|row| shown(&row.metric)).map(|row| {
-        let names = [&row.metric, &row.first, &row.second].map(Clone::clone);
-        let found = row.improvement;
-        let numbers = [row.experiments.len().to_string(), fixed(Some(found.probability), 3), plain(found.interval, 3)];
-        names.into_iter().chain(numbers)
-    });
-    Table::plain(&["metric", "earlier", "than"], &["experiments", "probability", "interval"]).with(lines)
+    Sheet::of(statistics.improvements.iter().filter(|row| shown(&row.metric)))
+        .text("metric", |row| row.metric.clone())
+        .text("earlier", |row| row.first.clone())
+        .text("than", |row| row.second.clone())
+        .number("experiments", |row| row.experiments.len())
+        .number("probability", |row| fixed(Some(row.improvement.probability), 3))
+        .number("interval", |row| plain(row.improvement.interval, 3))
+        .table()
 }
 
 pub(super) fn clusters(statistics: &Statistics, shown: Shown) -> Table {
     let kind = |metric: &str| statistics.cells.iter().find(|cell| cell.metric == metric).map(|cell| cell.kind);
-    let lines = statistics.clusters.iter().filter(|row| shown(&row.metric)).map(|row| {
-        let places = if kind(&row.metric) == Some(Kind::Rate) { 3 } else { 2 };
-        let by_seed = row.by_seed;
-        let numbers = [
-            row.seeds.to_string(),
-            row.n.to_string(),
-            fixed(row.mean, places),
-            error(row.se, places),
-            error(by_seed.map(|by_seed| by_seed.se), places),
-            held(by_seed.and_then(|by_seed| by_seed.interval), row.withheld, places),
-            fixed(by_seed.and_then(|by_seed| by_seed.icc), 2),
-            fixed(by_seed.and_then(|by_seed| by_seed.design_effect), 2),
-        ];
-        let model = named(&row.model, row.condition.as_deref());
-        [row.experiment.clone(), model, row.metric.clone()].into_iter().chain(numbers)
-    });
-    let numbers = ["seeds", "n", "mean", "SE", "SE by seed", "interval by seed", "ICC", "design effect"];
-    Table::plain(&["experiment", "model", "metric"], &numbers).with(lines)
+    let rows = statistics.clusters.iter().filter(|row| shown(&row.metric));
+    Sheet::of(rows.map(|row| (row, if kind(&row.metric) == Some(Kind::Rate) { 3 } else { 2 })))
+        .cell(|(row, _)| (&row.key, &row.metric))
+        .number("seeds", |(row, _)| row.seeds)
+        .number("n", |(row, _)| row.n)
+        .number("mean", |(row, places)| fixed(row.mean, *places))
+        .number("SE", |(row, places)| error(row.se, *places))
+        .number("SE by seed", |(row, places)| error(row.by_seed.map(|found| found.se), *places))
+        .number("interval by seed", |(row, places)| {
+            held(row.by_seed.and_then(|found| found.interval), row.withheld, *places)
+        })
+        .number("ICC", |(row, _)| fixed(row.by_seed.and_then(|found| found.icc), 2))
+        .number("design effect", |(row, _)| fixed(row.by_seed.and_then(|found| found.design_effect), 2))
+        .table()
 }
 
 pub(super) fn durations(statistics: &Statistics, shown: Shown) -> Table {
-    let lines = statistics.durations.iter().filter(|row| shown(&row.metric)).map(|row| {
-        let restricted = row.restricted;
-        let median_interval = row.median_interval.map(|found| match found.high {
-            Some(high) => format!("[{}, {high}]", found.low),
-            None => format!("[{}, open)", found.low),
-        });
-        let numbers = [
-            format!("{}/{}", row.finished, row.n),
-            reached(row.median),
-            median_interval.unwrap_or_else(|| UNDEFINED.to_owned()),
-            fixed(restricted.map(|restricted| restricted.mean), 2),
-            held(restricted.and_then(|restricted| restricted.interval), row.withheld, 2),
-            restricted.map_or_else(|| UNDEFINED.to_owned(), |restricted| restricted.horizon.to_string()),
-        ];
-        let model = named(&row.model, row.condition.as_deref());
-        [row.experiment.clone(), model, row.metric.clone()].into_iter().chain(numbers)
-    });
-    let numbers = ["finished", "median", "interval", "restricted mean", "interval", "up to"];
-    Table::plain(&["experiment", "model", "metric"], &numbers).with(lines)
+    Sheet::of(statistics.durations.iter().filter(|row| shown(&row.metric)))
+        .cell(|row| (&row.key, &row.metric))
+        .number("finished", |row| format!("{}/{}", row.finished, row.n))
+        .number("median", |row| reached(row.median))
+        .number("interval", |row| match row.median_interval.map(|found| (found.low, found.high)) {
+            Some((low, Some(high))) => format!("[{low}, {high}]"),
+            Some((low, None)) => format!("[{low}, open)"),
+            None => UNDEFINED.to_owned(),
+        })
+        .number("restricted mean", |row| fixed(row.restricted.map(|found| found.mean), 2))
+        .number("interval", |row| held(row.restricted.and_then(|found| found.interval), row.withheld, 2))
+        .number("up to", |row| row.restricted.map_or_else(|| UNDEFINED.to_owned(), |found| found.horizon.to_string()))
+        .table()
 }
 
 pub(super) fn correct(statistics: &Statistics, shown: Shown) -> Table {
     let rows = statistics.durations.iter().filter(|row| shown(&row.metric));
-    let lines = rows.filter_map(|row| {
-        let correct = row.correct.as_ref()?;
-        let numbers = [
-            fixed(Some(correct.correct), 3),
-            fixed(Some(correct.wrong), 3),
-            reached(correct.median),
-            fixed(Some(correct.restricted.mean), 2),
-            held(correct.restricted.interval, correct.withheld, 2),
-            correct.restricted.horizon.to_string(),
-        ];
-        let model = named(&row.model, row.condition.as_deref());
-        Some([row.experiment.clone(), model, row.metric.clone()].into_iter().chain(numbers))
-    });
-    let numbers = ["correct", "wrong", "half correct", "restricted mean", "interval", "up to"];
-    Table::plain(&["experiment", "model", "metric"], &numbers).with(lines)
+    Sheet::of(rows.filter_map(|row| Some((row, row.correct.as_ref()?))))
+        .cell(|(row, _)| (&row.key, &row.metric))
+        .number("correct", |(_, found)| fixed(Some(found.correct), 3))
+        .number("wrong", |(_, found)| fixed(Some(found.wrong), 3))
+        .number("half correct", |(_, found)| reached(found.median))
+        .number("restricted mean", |(_, found)| fixed(Some(found.restricted.mean), 2))
+        .number("interval", |(_, found)| held(found.restricted.interval, found.withheld, 2))
+        .number("up to", |(_, found)| found.restricted.horizon)
+        .table()
 }
 
 pub(super) fn retests(statistics: &Statistics, shown: Shown) -> Table {
-    let lines = statistics.retests.iter().filter(|row| shown(&row.metric)).map(|row| {
-        let numbers = [
-            row.scenes.to_string(),
-            row.episodes.to_string(),
-            format!("{}/{}", row.unstable, row.scenes),
-            fixed(Some(row.flipped), 3),
-            fixed(row.between_scenes, 3),
-            fixed(row.within_scenes, 3),
-        ];
-        let names = [row.experiment.clone(), named(&row.model, row.condition.as_deref()), row.metric.clone()];
-        names.into_iter().chain(numbers)
-    });
-    let flipped = "flipped from one time to the next";
-    let numbers = ["scenes", "episodes", "not always the same", flipped, "variance by scene", "by repeat"];
-    Table::plain(&["experiment", "model", "metric"], &numbers).with(lines)
+    Sheet::of(statistics.retests.iter().filter(|row| shown(&row.metric)))
+        .text("experiment", |row| row.experiment.clone())
+        .text("model", |row| named(&row.model, row.condition.as_deref()))
+        .text("metric", |row| row.metric.clone())
+        .number("scenes", |row| row.scenes)
+        .number("episodes", |row| row.episodes)
+        .number("not always the same", |row| format!("{}/{}", row.unstable, row.scenes))
+        .number("flipped from one time to the next", |row| fixed(Some(row.flipped), 3))
+        .number("variance by scene", |row| fixed(row.between_scenes, 3))
+        .number("by repeat", |row| fixed(row.within_scenes, 3))
+        .table()
 }
 
 pub(super) fn losses(statistics: &Statistics, shown: Shown) -> Table {
-    let lines = statistics.losses.rows.iter().filter(|row| shown(&row.metric)).map(|row| {
-        let lossy = row.lossy;
-        let (count, lost) = (format!("{}/{}", lossy.successes, lossy.n), lossy.lost.to_string());
-        let bounds = [lossy.bounds, lossy.interval].map(|interval| plain(Some(interval), 3));
-        let names = [row.experiment.clone(), named(&row.model, row.condition.as_deref()), row.metric.clone()];
-        names.into_iter().chain([count, lost]).chain(bounds)
-    });
-    let numbers = ["without them", "lost", "bounds", "interval around the bounds"];
-    Table::plain(&["experiment", "model", "metric"], &numbers).with(lines)
+    Sheet::of(statistics.losses.rows.iter().filter(|row| shown(&row.metric)))
+        .cell(|row| (&row.key, &row.metric))
+        .number("without them", |row| format!("{}/{}", row.lossy.successes, row.lossy.n))
+        .number("lost", |row| row.lossy.lost)
+        .number("bounds", |row| plain(Some(row.lossy.bounds), 3))
+        .number("interval around the bounds", |row| plain(Some(row.lossy.interval), 3))
+        .table()
 }
 
 fn reached(median: Option<i64>) -> String {
     median.map_or_else(|| "not reached".to_owned(), |median| median.to_string())
 }
 
-fn plain(interval: Option<Interval>, places: usize) -> String {
+pub(super) fn plain(interval: Option<Interval>, places: usize) -> String {
     bounds(interval.map(|interval| (interval.low, interval.high)), places)
 }
 

@@ -3,8 +3,7 @@
 use std::collections::BTreeMap;
 #[cfg(feature = "view")]
 use std::collections::BTreeSet;
-use std::fs::File;
-use std::io::{BufReader, BufWriter, Seek, Write};
+use std::io::{BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
 
 use mcap::records::Metadata;
@@ -13,7 +12,7 @@ use serde_json::Value;
 
 use super::error::LogError;
 use super::message::EpisodeMessage;
-use super::messages::Messages;
+use super::read::Messages;
 use super::{METADATA, METADATA_KEY, topic};
 use crate::episode::Episode;
 use exact::replace::NewFile;
@@ -36,15 +35,10 @@ pub(super) fn writer<W: Write + Seek>(out: W) -> mcap::McapResult<Writer<W>> {
         .create(out)
 }
 
-pub(super) fn write_recording<W: Write + Seek>(out: &mut Writer<W>, recording: &Value) -> mcap::McapResult<()> {
-    let metadata = BTreeMap::from([(METADATA_KEY.to_owned(), recording.to_string())]);
-    out.write_metadata(&Metadata { name: METADATA.to_owned(), metadata })
-}
-
 /// Merges these logs of one episode each into the log at `out`, which is replaced in one step.
 pub fn write(out: &Path, parts: &[(Place, PathBuf)], recording: &Value) -> Result<(), LogError> {
     let file = NewFile::create(out).map_err(LogError::io("write", out))?;
-    join(file, None, out, parts, recording)
+    replaced(file, out, recording, |log| copy_all(log, None, out, parts))
 }
 
 /// Merges the log `before`, if any, with these logs of one episode each. The result replaces `out` in one step; it is
@@ -58,7 +52,8 @@ pub fn assemble(
     scratch: &Path,
 ) -> Result<(), LogError> {
     let file = NewFile::create_in(scratch, out).map_err(LogError::io("write", out))?;
-    join(file, before.map(Source::open).transpose()?, out, parts, recording)
+    let before = before.map(Source::open).transpose()?;
+    replaced(file, out, recording, |log| copy_all(log, before, out, parts))
 }
 
 /// Rewrites the log at `path` without the episodes of these ids.
@@ -66,32 +61,32 @@ pub fn assemble(
 pub fn without(path: &Path, ids: &BTreeSet<String>, recording: &Value) -> Result<(), LogError> {
     let mut source = Source::open(path)?;
     let file = NewFile::create(path).map_err(LogError::io("write", path))?;
-    let mut log = writer(BufWriter::new(file)).map_err(LogError::writing(path))?;
-    write_recording(&mut log, recording).map_err(LogError::writing(path))?;
-    while let Some((head, _)) = &source.begin {
-        if ids.contains(&head.episode_id) {
-            // Skip to the next begin.
-            source.begin = None;
-            source.advance()?;
-        } else {
-            source.copy_episode(&mut log, path)?;
+    replaced(file, path, recording, |log| {
+        while let Some((head, _)) = &source.begin {
+            if ids.contains(&head.episode_id) {
+                // Skip to the next begin.
+                source.begin = None;
+                source.advance()?;
+            } else {
+                source.copy_episode(log, path)?;
+            }
         }
-    }
-    log.finish().map_err(LogError::writing(path))?;
-    let file = log.into_inner().into_inner().map_err(|error| LogError::io("write", path)(error.into_error()))?;
-    file.commit().map_err(LogError::io("write", path))
+        Ok(())
+    })
 }
 
-fn join(
+/// Replaces the log at `out` by one with this recording and the episodes that `add` writes.
+fn replaced(
     file: NewFile,
-    before: Option<Source>,
     out: &Path,
-    parts: &[(Place, PathBuf)],
     recording: &Value,
+    add: impl FnOnce(&mut Writer<BufWriter<NewFile>>) -> Result<(), LogError>,
 ) -> Result<(), LogError> {
     let mut log = writer(BufWriter::new(file)).map_err(LogError::writing(out))?;
-    write_recording(&mut log, recording).map_err(LogError::writing(out))?;
-    copy_all(&mut log, before, out, parts)?;
+    let metadata = BTreeMap::from([(METADATA_KEY.to_owned(), recording.to_string())]);
+    let metadata = Metadata { name: METADATA.to_owned(), metadata };
+    log.write_metadata(&metadata).map_err(LogError::writing(out))?;
+    add(&mut log)?;
     log.finish().map_err(LogError::writing(out))?;
     let file = log.into_inner().into_inner().map_err(|error| LogError::io("write", out)(error.into_error()))?;
     file.commit().map_err(LogError::io("write", out))
@@ -114,9 +109,9 @@ fn copy_all<W: Write + Seek>(
                 break;
             }
         }
-        if !is_written(before.as_ref(), *place) {
-            let mut source = Source::open(part)?;
-            source.copy_episode(log, out)?;
+        let is_written = before.as_ref().is_some_and(|source| source.last == Some(*place));
+        if !is_written {
+            Source::open(part)?.copy_episode(log, out)?;
         }
     }
     while let Some(source) = before.as_mut().filter(|source| source.place().is_some()) {
@@ -125,14 +120,10 @@ fn copy_all<W: Write + Seek>(
     Ok(())
 }
 
-fn is_written(before: Option<&Source>, place: Place) -> bool {
-    before.is_some_and(|source| source.last == Some(place))
-}
-
 /// A log that is copied episode by episode.
 struct Source {
     path: PathBuf,
-    messages: Messages<BufReader<File>>,
+    messages: Messages,
     begin: Option<(Episode, Message<'static>)>,
     last: Option<Place>,
 }

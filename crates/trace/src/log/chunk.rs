@@ -1,4 +1,7 @@
-//! Unpacks the contents of a chunk within a budget.
+//! Parses records, and unpacks the contents of a chunk within a budget.
+//!
+//! Rule: every length is first compared with the rest of the record, since the library allocates memory for a text
+//! before it knows that the text is there.
 //!
 //! Rule: a chunk states its unpacked size and is never unpacked beyond that. Before unpacking, the stated size is
 //! compared with the chunk's own bytes and counted against the whole log's budget.
@@ -8,8 +11,13 @@ use std::sync::Arc;
 use mcap::records::{Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
-use super::parse::{FRAME, LONGEST, parsed};
 use exact::budget::{Budget, Exceeded, Limit};
+
+/// The longest record of a log, chunks included; longer ones are damage.
+pub(super) const LONGEST: usize = 1 << 30;
+
+/// The size of an opcode and a length.
+pub(super) const FRAME: usize = 9;
 
 /// The budgets for unpacking a log, and for searching it for chunks after damage.
 ///
@@ -154,6 +162,44 @@ fn size_unpacked(chunk: &[u8]) -> usize {
     let size = chunk.get(FRAME + 16..FRAME + 24).and_then(|bytes| bytes.try_into().ok()).map(u64::from_le_bytes);
     // The library compares the header of the chunk with the same limit.
     size.and_then(|size| usize::try_from(size).ok()).map_or(LONGEST, |size| size.clamp(1 << 16, LONGEST))
+}
+
+pub(super) fn parsed(opcode: u8, body: &[u8]) -> Result<Record<'_>, String> {
+    check_texts(opcode, body).ok_or("a text or a map in it is longer than the record")?;
+    mcap::parse_record(opcode, body).map_err(|fault| fault.to_string())
+}
+
+/// Checks the lengths of the texts of a record; `None` if one of them exceeds the rest.
+fn check_texts(opcode: u8, body: &[u8]) -> Option<()> {
+    // The number of bytes before each text. The map in a chunk index starts with its length, like a text.
+    let gaps: &[usize] = match opcode {
+        op::HEADER => &[0, 0],
+        op::SCHEMA => &[2, 0],
+        op::CHANNEL => &[4, 0],
+        op::CHUNK => &[28],
+        op::CHUNK_INDEX => &[32, 8],
+        op::ATTACHMENT_INDEX => &[40, 0],
+        op::METADATA => &[0],
+        op::METADATA_INDEX => &[16],
+        _ => &[],
+    };
+    let mut rest = body;
+    for gap in gaps {
+        (_, rest) = text(rest.get(*gap..)?)?;
+    }
+    if matches!(opcode, op::CHANNEL | op::METADATA) {
+        // A map of consecutive texts.
+        let (mut texts, _) = text(rest)?;
+        while !texts.is_empty() {
+            (_, texts) = text(texts)?;
+        }
+    }
+    Some(())
+}
+
+fn text(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
+    let (length, rest) = bytes.split_first_chunk::<4>()?;
+    rest.split_at_checked(usize::try_from(u32::from_le_bytes(*length)).ok()?)
 }
 
 #[cfg(test)]

@@ -18,7 +18,6 @@ use super::read::{Event, event, png};
 use super::records::{Piece, Records};
 use super::topic;
 use crate::episode::{Episode, Step};
-use exact::input;
 
 /// The positions of a log's steps.
 #[derive(Debug)]
@@ -67,7 +66,7 @@ pub struct Unfinished {
 impl LogIndex {
     /// Reads the index of a log; `None` for an unfinished log, which has none.
     pub fn open(path: &Path) -> Result<Option<Self>, LogError> {
-        let mut records = records(path)?;
+        let mut records = Records::open(path)?;
         let (mut topics, mut chunks) = (BTreeMap::new(), Vec::new());
         for record in records.summary().map_err(LogError::io("read", path))? {
             match record {
@@ -87,10 +86,10 @@ impl LogIndex {
 
     /// The log's record of an episode's step at this time, ns; `None` if it has none.
     pub fn step(&self, episode_id: &str, time: u64) -> Result<Option<Moment>, LogError> {
-        let mut records = records(&self.path)?;
+        let mut records = Records::open(&self.path)?;
         for chunk in self.chunks.iter().filter(|chunk| (chunk.first..=chunk.last).contains(&time)) {
-            let messages = self.messages(&mut records, chunk, episode_id, |header| header.log_time == time)?;
-            if let Some(moment) = moment(messages, &self.topics, time) {
+            let mut moments = self.moments(&mut records, chunk, episode_id, |header| header.log_time == time)?;
+            if let Some(moment) = moments.remove(&time) {
                 return Ok(Some(moment));
             }
         }
@@ -106,7 +105,7 @@ impl LogIndex {
         give: &mut dyn FnMut(u64, Vec<Shape>),
     ) -> Result<(), LogError> {
         let (Some(first), Some(last)) = (times.first(), times.last()) else { return Ok(()) };
-        let mut records = records(&self.path)?;
+        let mut records = Records::open(&self.path)?;
         let is_wanted =
             |header: &MessageHeader| times.contains(&header.log_time) && self.is_of(header.channel_id, topic::SCENE);
         for chunk in self.chunks.iter().filter(|chunk| chunk.first <= *last && chunk.last >= *first) {
@@ -127,23 +126,34 @@ impl LogIndex {
         give: &mut dyn FnMut(u64, Moment),
     ) -> Result<(), LogError> {
         let (Some(first), Some(last)) = (times.first(), times.last()) else { return Ok(()) };
-        let mut records = records(&self.path)?;
+        let mut records = Records::open(&self.path)?;
         for chunk in self.chunks.iter().filter(|chunk| chunk.first <= *last && chunk.last >= *first) {
-            let mut moments: BTreeMap<u64, Moment> = BTreeMap::new();
-            let is_wanted = |header: &MessageHeader| times.contains(&header.log_time);
-            for record in self.messages(&mut records, chunk, episode_id, is_wanted)? {
-                if let Record::Message { header, data } = record
-                    && let Some(topic) = self.topics.get(&header.channel_id)
-                    && topic != topic::EPISODE
-                {
-                    add(moments.entry(header.log_time).or_default(), topic, &data);
-                }
-            }
+            let moments = self.moments(&mut records, chunk, episode_id, |header| times.contains(&header.log_time))?;
             for (time, moment) in moments {
                 give(time, moment);
             }
         }
         Ok(())
+    }
+
+    /// The wanted steps of a chunk by time, ns.
+    fn moments(
+        &self,
+        records: &mut Records<BufReader<File>>,
+        chunk: &Chunk,
+        episode_id: &str,
+        is_wanted: impl Fn(&MessageHeader) -> bool,
+    ) -> Result<BTreeMap<u64, Moment>, LogError> {
+        let mut moments: BTreeMap<u64, Moment> = BTreeMap::new();
+        for record in self.messages(records, chunk, episode_id, is_wanted)? {
+            if let Record::Message { header, data } = record
+                && let Some(topic) = self.topics.get(&header.channel_id)
+                && topic != topic::EPISODE
+            {
+                add(moments.entry(header.log_time).or_default(), topic, &data);
+            }
+        }
+        Ok(moments)
     }
 
     /// The wanted messages of a chunk; frames, which are most of its bytes, are not kept unless wanted.
@@ -221,17 +231,11 @@ pub fn each_unfinished_shapes(path: &Path, give: &mut dyn FnMut(u64, Vec<Shape>)
 }
 
 pub fn is_log(path: &Path) -> bool {
-    records(path).is_ok()
-}
-
-fn records(path: &Path) -> Result<Records<BufReader<File>>, LogError> {
-    let file = input::open(path).map_err(LogError::io("open", path))?;
-    let records = Records::new(BufReader::new(file)).map_err(LogError::io("read", path))?;
-    records.ok_or_else(|| LogError::no_log(path))
+    Records::open(path).is_ok()
 }
 
 fn each_message(path: &Path, mut give: impl FnMut(&str, u64, &[u8])) -> Result<(), LogError> {
-    let mut records = records(path)?;
+    let mut records = Records::open(path)?;
     let mut topics = BTreeMap::new();
     while let Some(piece) = records.next().map_err(LogError::io("read", path))? {
         let messages = match piece {
@@ -254,24 +258,6 @@ fn each_message(path: &Path, mut give: impl FnMut(&str, u64, &[u8])) -> Result<(
         }
     }
     Ok(())
-}
-
-fn moment(
-    messages: impl IntoIterator<Item = Record<'static>>,
-    topics: &BTreeMap<u16, String>,
-    time: u64,
-) -> Option<Moment> {
-    let mut found: Option<Moment> = None;
-    for record in messages {
-        if let Record::Message { header, data } = record
-            && header.log_time == time
-            && let Some(topic) = topics.get(&header.channel_id)
-            && topic != topic::EPISODE
-        {
-            add(found.get_or_insert_default(), topic, &data);
-        }
-    }
-    found
 }
 
 fn add(moment: &mut Moment, topic: &str, data: &[u8]) {

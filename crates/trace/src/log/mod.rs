@@ -25,8 +25,6 @@ mod error;
 #[cfg(feature = "view")]
 pub mod frames;
 pub mod message;
-mod messages;
-mod parse;
 pub mod read;
 mod records;
 pub mod recover;

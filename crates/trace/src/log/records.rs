@@ -3,13 +3,16 @@
 //! Rule: an impossible length does not end reading: it continues at the next chunk or at the end of the data. Checksums
 //! are computed along the way, so that damage is noticed even if it still reads as records.
 
-use std::io::{self, Read, Seek, SeekFrom};
+use std::fs::File;
+use std::io::{self, BufReader, Read, Seek, SeekFrom};
+use std::path::Path;
 
 use mcap::MAGIC;
 use mcap::records::{Record, op};
 
-use super::chunk::{Budgets, inside};
-use super::parse::{FRAME, LONGEST, parsed};
+use super::chunk::{Budgets, FRAME, LONGEST, inside, parsed};
+use super::error::LogError;
+use exact::input;
 
 /// The header of a chunk without the name of its compression.
 const CHUNK_HEADER: usize = 8 + 8 + 8 + 4 + 4 + 8;
@@ -58,9 +61,21 @@ impl Frame {
     }
 }
 
+impl Records<BufReader<File>> {
+    pub(super) fn open(path: &Path) -> Result<Self, LogError> {
+        let file = input::open(path).map_err(LogError::io("open", path))?;
+        Self::of(path, BufReader::new(file))
+    }
+}
+
 impl<R: Read + Seek> Records<R> {
+    /// The records of a log in these bytes; `path` is for error messages.
+    pub(super) fn of(path: &Path, bytes: R) -> Result<Self, LogError> {
+        Self::new(bytes).map_err(LogError::io("read", path))?.ok_or_else(|| LogError::no_log(path))
+    }
+
     /// The records after the first magic bytes; `None` if the file does not start with them.
-    pub(super) fn new(mut bytes: R) -> io::Result<Option<Self>> {
+    fn new(mut bytes: R) -> io::Result<Option<Self>> {
         let end = bytes.seek(SeekFrom::End(0))?;
         let mut records = Self {
             bytes,

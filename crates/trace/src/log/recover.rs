@@ -82,8 +82,7 @@ pub fn recover(path: &Path) -> Result<Recovered, LogError> {
 
 /// Recovers the readable part of a log in these bytes; `path` is for error messages.
 pub fn recover_from(path: &Path, bytes: impl Read + Seek) -> Result<Recovered, LogError> {
-    let records = Records::new(bytes).map_err(LogError::io("read", path))?;
-    let mut records = records.ok_or_else(|| LogError::no_log(path))?;
+    let mut records = Records::of(path, bytes)?;
     let salvage = Salvage::of(&mut records).map_err(LogError::io("read", path))?;
     let is_ours = salvage.channels.values().any(|found| found == topic::EPISODE);
     if !is_ours && !salvage.result.losses.is_any() {
@@ -95,44 +94,23 @@ pub fn recover_from(path: &Path, bytes: impl Read + Seek) -> Result<Recovered, L
 
 /// The limit of rows in memory, where saved rows are kept. A row takes far more memory than a row of few words in a
 /// chunk. Logs in use have some hundred bytes per row, without its frame.
-#[derive(Debug)]
-struct Rows(Budget, Limit);
-
-impl Default for Rows {
-    fn default() -> Self {
-        Self::of(0)
-    }
+fn most_rows(bytes: u64) -> Limit {
+    Limit::new("rows in a log of its size", 200_000 + bytes / 8)
 }
 
-impl Rows {
-    fn of(bytes: u64) -> Self {
-        let limit = Limit::new("rows in a log of its size", 200_000 + bytes / 8);
-        Self(Budget::new(limit), limit)
-    }
-
-    fn take(&self) -> bool {
-        self.0.spend(1).is_ok()
-    }
-
-    fn words(&self) -> String {
-        self.1.check(u64::MAX).map_or_else(|exceeded| exceeded.to_string(), |()| String::new())
-    }
-}
-
-#[derive(Default)]
 struct Salvage {
     channels: BTreeMap<u16, String>,
     open: Option<(Episode, Vec<Step>, Option<String>)>,
-    rows: Rows,
+    rows: Budget,
     result: Recovered,
 }
 
 impl Salvage {
     fn of(records: &mut Records<impl Read + Seek>) -> io::Result<Self> {
-        let mut salvage = Self { rows: Rows::of(records.bytes()), ..Self::default() };
         // A chunk does not repeat the channels of earlier chunks, which may be damaged; the summary does.
-        let channels = records.of_summary()?;
-        salvage.channels.extend(channels.into_iter().map(|channel| (channel.id, channel.topic)));
+        let channels = records.of_summary()?.into_iter().map(|channel| (channel.id, channel.topic)).collect();
+        let rows = Budget::new(most_rows(records.bytes()));
+        let mut salvage = Self { channels, open: None, rows, result: Recovered::default() };
         let mut is_open = true;
         while let Some(piece) = records.next()? {
             match piece {
@@ -224,7 +202,7 @@ impl Salvage {
                         (Ok(Event::Episode(EpisodeMessage::Begin(head))), open) => {
                             *open = Some((*head, Vec::new(), None));
                         }
-                        (Ok(Event::Decision(row)), Some((_, rows, _))) if self.rows.take() => {
+                        (Ok(Event::Decision(row)), Some((_, rows, _))) if self.rows.spend(1).is_ok() => {
                             rows.extend(row.into_step());
                         }
                         _ => {}
@@ -264,9 +242,9 @@ impl Salvage {
                 if usize::try_from(row.t) != Ok(expected) {
                     fault.get_or_insert(format!("expected the row of step {expected}, found that of step {}", row.t));
                 }
-                match row.into_step() {
-                    Ok(step) if self.rows.take() => rows.push(step),
-                    Ok(_) => drop(fault.get_or_insert_with(|| self.rows.words())),
+                match row.into_step().map(|step| self.rows.spend(1).map(|()| rows.push(step))) {
+                    Ok(Ok(())) => {}
+                    Ok(Err(exceeded)) => drop(fault.get_or_insert(exceeded.to_string())),
                     Err(error) => drop(fault.get_or_insert(error.to_string())),
                 }
             }

@@ -245,6 +245,10 @@ impl Finding {
         }
     }
 
+    pub(crate) fn unreadable(file: &str, found: &impl ToString) -> Box<Self> {
+        Box::new(Self::new(Code::Unreadable, file, "a file that can be read", found.to_string()))
+    }
+
     pub(crate) fn over_budget(file: &str, exceeded: &Exceeded) -> Self {
         Self::new(Code::OverBudget, file, exceeded.expected(), "more")
     }

@@ -44,9 +44,13 @@ impl TraceError {
     #[must_use]
     pub fn writing(self, path: &Path) -> Self {
         match self {
-            Self::Write { source, .. } => Self::Write { file: path.display().to_string(), source },
+            Self::Write { source, .. } => Self::write(path, source),
             other => other,
         }
+    }
+
+    pub(crate) fn write(file: impl AsRef<Path>, source: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Self {
+        Self::Write { file: file.as_ref().display().to_string(), source: source.into() }
     }
 
     pub fn of(findings: Vec<Finding>) -> Option<Self> {

@@ -10,7 +10,7 @@ use parquet::file::metadata::RowGroupMetaData;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::diagnostic::{Code, Finding, Severity};
+use super::diagnostic::{Code, Finding};
 use super::error::TraceError;
 use super::inputs::Input;
 use super::open::{TraceFile, TraceSet};
@@ -76,8 +76,7 @@ pub fn seal(input: &Input, out: &Path, threads: NonZeroUsize) -> Result<SealAnsw
 fn sound(input: &Input, threads: NonZeroUsize) -> Result<(u64, u64), TraceError> {
     let checked = validate(slice::from_ref(input), None, threads)?;
     let counts = checked.files.first().map_or((0, 0), |file| (file.episodes, file.steps));
-    let errors = checked.findings.into_iter().filter(|finding| finding.severity == Severity::Error).collect();
-    TraceError::of(errors).map_or(Ok(counts), Err)
+    checked.errors().map(|()| counts)
 }
 
 /// Compares the bytes of each column.

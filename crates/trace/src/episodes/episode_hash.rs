@@ -91,7 +91,8 @@ impl Form {
     }
 }
 
-fn same(a: Option<Value<'_>>, b: Option<Value<'_>>) -> bool {
+/// Returns true if two values have the same bits.
+pub(crate) fn same(a: Option<Value<'_>>, b: Option<Value<'_>>) -> bool {
     match (a, b) {
         (Some(Value::Float(a)), Some(Value::Float(b))) => a.to_bits() == b.to_bits(),
         _ => a == b,

@@ -5,8 +5,8 @@
 
 use indexmap::IndexMap;
 
-use super::fault::{Fault, Place};
-use super::limits::Limits;
+use super::Limits;
+use super::error::{Fault, Place};
 use super::line::{Members, Value};
 use crate::schema::rules::{Known, Requirement, Rule, rules_of};
 use crate::schema::{COLUMNS, Column, Kind, Stored};

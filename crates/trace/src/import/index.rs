@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::fault::{Fault, Place};
+use super::error::{Fault, Place};
 use super::line::{Members, Value};
 use super::text::{Line, Text};
 use crate::schema::{COLUMNS, Column};

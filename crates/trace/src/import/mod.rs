@@ -13,37 +13,75 @@
 
 mod columns;
 mod error;
-mod fault;
 mod format;
 mod index;
-mod limits;
 mod line;
 mod mapping;
-mod rows;
 pub mod schema;
 mod text;
 
 use std::num::NonZeroUsize;
 use std::path::Path;
 
-pub use columns::Own;
-pub use error::ImportError;
-pub use fault::Fault;
-pub use format::Format;
-pub use limits::Limits;
-pub use mapping::{Mapping, MappingError};
+use arrow::datatypes::{DataType, Field};
 use parquet::errors::ParquetError;
+use serde_json::json;
+
+pub use columns::Own;
+pub use error::{Fault, ImportError};
+pub use format::Format;
+pub use mapping::{Mapping, MappingError};
 pub use text::Text;
 
-use super::diagnostic::Severity;
+use super::declared::{Cluster, Origin};
 use super::error::TraceError;
 use super::inputs::Input;
+use super::schema::colors::palette::Palette;
+use super::schema::{Kind, Value};
 use super::validate::{Expected, validate_as};
-use super::write::unwritable;
+use super::write::row_groups::{Gathered, RowGroups, field};
 use columns::Columns;
 use error::Faults;
 use exact::replace::NewFile;
 use index::Index;
+use line::Members;
+
+/// Limits on the values of steps beyond the schema, and the trace's declarations about them.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Limits<'a> {
+    /// The known experiments, the domain, and its declared columns.
+    pub expected: Expected<'a>,
+    /// The name of the domain; the mirror if `None`.
+    pub domain: Option<&'a str>,
+    /// The known colours, which the trace then declares; any if `None`.
+    pub palette: Option<&'a Palette>,
+    pub cluster: Option<Cluster>,
+    /// True if the steps were rebuilt from published numbers, so that other values in them are arbitrary.
+    pub is_reconstruction: bool,
+}
+
+impl Limits<'_> {
+    fn recording(&self, texts: &mut [Text]) -> Result<serde_json::Value, ImportError> {
+        let sources = texts.iter_mut().map(Text::hash).collect::<Result<Vec<_>, _>>()?;
+        let origin = if self.is_reconstruction { Origin::Reconstruction } else { Origin::Import };
+        let mut recording = json!({ "kind": origin.name(), "sources": sources });
+        if let Some(domain) = self.domain {
+            recording["domain"] = json!(domain);
+        }
+        if let Some(palette) = self.palette {
+            recording["palette"] = json!(palette.names());
+        }
+        if let Some(cluster) = self.cluster {
+            recording["design"] = json!({ "cluster": cluster });
+        }
+        if let Some(source) = texts.iter().find_map(Text::source) {
+            recording["mapping"] = source.mapping.clone();
+            let format = |text: &Text| text.source().map_or(Format::JsonLines, |source| source.format).name();
+            recording["formats"] = texts.iter().map(format).collect();
+        }
+        Ok(recording)
+    }
+}
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Imported {
@@ -69,7 +107,7 @@ pub fn import(texts: &mut [Text], out: &Path, limits: Limits<'_>) -> Result<Impo
     faults.none()?;
     let file = write(texts, &columns, &steps, out, limits)?;
     check(&file, out, limits.expected)?;
-    file.commit().map_err(|error| unwritable(out, error))?;
+    file.commit().map_err(|error| TraceError::write(out, error))?;
     Ok(Imported {
         episodes: steps.chunk_by(|a, b| a.episode == b.episode).count(),
         steps: steps.len(),
@@ -123,24 +161,53 @@ fn write(
     limits: Limits<'_>,
 ) -> Result<NewFile, ImportError> {
     let recording = limits.recording(texts)?;
-    let file = NewFile::create(out).map_err(|error| unwritable(out, error))?;
-    let failed = |error: ParquetError| TraceError::Write { file: out.display().to_string(), source: Box::new(error) };
-    let mut rows = rows::Rows::new(file, columns, &recording).map_err(failed)?;
+    let file = NewFile::create(out).map_err(|error| TraceError::write(out, error))?;
+    let failed = |error: ParquetError| TraceError::write(out, error);
+    let known = columns.known().map(|column| (field(column), Some(column.stored.kind())));
+    let own = columns.own().into_iter().map(|own| {
+        // A column of nulls is compatible with any type in other files.
+        let stored = own.kind.map_or(DataType::Null, Kind::data_type);
+        (Field::new(&own.name, stored, true), own.kind)
+    });
+    let mut rows = Gathered::new(known.chain(own));
+    let mut file = RowGroups::new(file, &rows.layout, Some(&recording)).map_err(failed)?;
     for episode in steps.chunk_by(|a, b| a.episode == b.episode) {
         for step in episode {
             let text = &mut texts[step.text];
             let bytes = text.line_at(step.offset)?;
             let members = text.members(&bytes, true).map_err(|_| ImportError::changed(text.name()))?;
-            rows.add(&members).map_err(|()| ImportError::changed(text.name()))?;
+            add(&mut rows, &members).map_err(|()| ImportError::changed(text.name()))?;
         }
-        rows.end_episode().map_err(failed)?;
+        file.end_episode(&mut rows).map_err(failed)?;
     }
-    Ok(rows.finish().map_err(failed)?)
+    Ok(file.finish(Some(rows)).map_err(failed)?)
+}
+
+/// Puts the values of a line into the columns of a trace.
+fn add(rows: &mut Gathered, members: &Members) -> Result<(), ()> {
+    for (field, values) in rows.layout.fields().iter().zip(&mut rows.columns) {
+        let value = members.iter().find(|(key, _)| key == field.name()).map(|(_, value)| value);
+        values.push(plain(value, field.data_type())?)?;
+    }
+    rows.rows += 1;
+    Ok(())
+}
+
+#[expect(clippy::cast_precision_loss, reason = "the first pass refused what would lose anything in an own column")]
+fn plain<'a>(value: Option<&'a line::Value>, stored: &DataType) -> Result<Option<Value<'a>>, ()> {
+    Ok(Some(match value {
+        None | Some(line::Value::Null) => return Ok(None),
+        Some(line::Value::Bool(value)) => Value::Bool(*value),
+        Some(line::Value::Int(value)) if stored.is_floating() => Value::Float(*value as f64),
+        Some(line::Value::Int(value)) => Value::Int(*value),
+        Some(line::Value::LargeInt(value)) if stored.is_floating() => Value::Float(*value as f64),
+        Some(line::Value::Float(value)) => Value::Float(*value),
+        Some(line::Value::Text(text)) => Value::Text(text),
+        Some(_) => return Err(()),
+    }))
 }
 
 fn check(file: &NewFile, out: &Path, expected: Expected<'_>) -> Result<(), ImportError> {
     let input = Input { name: Input::new(out).name, path: file.temporary_path().to_owned() };
-    let report = validate_as(&[input], Expected { errors_alone: true, ..expected }, NonZeroUsize::MIN)?;
-    let errors = report.findings.into_iter().filter(|finding| finding.severity == Severity::Error).collect();
-    TraceError::of(errors).map_or(Ok(()), |error| Err(error.into()))
+    Ok(validate_as(&[input], Expected { errors_alone: true, ..expected }, NonZeroUsize::MIN)?.errors()?)
 }

@@ -10,8 +10,7 @@ use std::sync::Arc;
 
 use serde_json::Value;
 
-use super::error::ImportError;
-use super::fault::{Fault, Place};
+use super::error::{Fault, ImportError, Place};
 use super::format::lerobot::data_set;
 use super::format::{Format, Rows};
 use super::line::{self, BYTE_ORDER_MARK, Members};

@@ -13,11 +13,11 @@ use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ParquetRecordBatchReader
 use parquet::basic::Type as Physical;
 
 use super::budget::check_names;
-use super::damaged::damaged;
 use super::footer::plain;
 use super::footer::trace_file::{Readable, TraceFile};
 use super::projection::{EPISODE_ID, Layout, LayoutColumn, T};
 use super::statistics::{Chunk, Seen};
+use super::verify::damaged;
 use crate::catch_panic::contained;
 use crate::diagnostic::{Code, Finding};
 use crate::schema::Kind;
@@ -123,7 +123,7 @@ impl<'a> RowGroup<'a> {
         row_group: usize,
         ids: Option<Ids>,
     ) -> Result<Self, Box<Finding>> {
-        let store = store(file)?;
+        let store = file.store()?;
         let readable = file.footer()?;
         let roots = (0..layout.columns.len()).filter_map(|at| root(file, layout, at));
         let text = roots.filter_map(|root| text_bytes(&readable.footer, root, row_group)).max().unwrap_or(0);
@@ -157,7 +157,7 @@ impl<'a> RowGroup<'a> {
     }
 
     fn library(&self, at: usize, root: usize) -> Result<Source, Box<Finding>> {
-        let (store, slot) = (store(self.file)?, FaultSlot::default());
+        let (store, slot) = (self.file.store()?, FaultSlot::default());
         let made = contained(|| self.reader(store, root, self.first, &slot));
         match made.and_then(|reader| reader.map_err(|error| plain(&error))) {
             Ok(reader) => Ok(Source::Library(Box::new(Library { reader, held: Vec::new(), slot }))),
@@ -302,7 +302,7 @@ impl<'a> RowGroup<'a> {
 
     fn anew(&self, at: usize, first: usize) -> Option<Column> {
         let root = root(self.file, self.layout, at)?;
-        let (store, slot) = (store(self.file).ok()?, FaultSlot::default());
+        let (store, slot) = (self.file.store().ok()?, FaultSlot::default());
         let read = || self.reader(store, root, first, &slot).ok()?.next()?.ok();
         let decoded = contained(read).ok()?;
         normal_column(decoded?.column(0), &held_as(self.layout.columns[at].kind)).ok().map(Column::Flat)
@@ -348,16 +348,10 @@ impl Iterator for RowGroup<'_> {
 
 pub(crate) fn ids(file: &TraceFile, layout: &Layout, row_group: usize) -> Option<Column> {
     let root = root(file, layout, EPISODE_ID)?;
-    let (store, readable) = (store(file).ok()?, file.footer().ok()?);
+    let (store, readable) = (file.store().ok()?, file.footer().ok()?);
     let read = || cursor(&readable, &store, root, row_group, Form::Runs)?.read(file.row_group_rows(row_group));
     // The reader of the other columns reports what is wrong with them.
     contained(read).ok()?.ok().filter(|ids| check_names(ids).is_ok())
-}
-
-fn store(file: &TraceFile) -> Result<Store, Box<Finding>> {
-    file.store().map_err(|error| {
-        Box::new(Finding::new(Code::Unreadable, file.name(), "a file that can be read", error.to_string()))
-    })
 }
 
 fn root(file: &TraceFile, layout: &Layout, at: usize) -> Option<usize> {
@@ -408,13 +402,7 @@ fn corrupt(file: &TraceFile, row_group: usize, found: &str) -> Box<Finding> {
 }
 
 pub(crate) fn held_as(kind: Kind) -> DataType {
-    match kind {
-        Kind::Bool => DataType::Boolean,
-        Kind::Int => DataType::Int64,
-        Kind::Float => DataType::Float64,
-        Kind::String => text_type(),
-        Kind::Unsupported => DataType::Null,
-    }
+    if kind == Kind::String { text_type() } else { kind.data_type() }
 }
 
 #[cfg(test)]

@@ -9,9 +9,9 @@ use parquet::arrow::arrow_reader::ParquetRecordBatchReader;
 use parquet::file::metadata::ParquetMetaData;
 
 use super::budget::MOST_COLUMNS;
-use super::damaged::damaged;
 use super::footer::trace_file::is_nested;
 use super::footer::{bounds, plain};
+use super::verify::damaged;
 use crate::diagnostic::{Code, Finding};
 use parquet_pages::checksums::ChunkChecksums;
 use parquet_pages::{Expansion, FaultSlot, Library, Store};

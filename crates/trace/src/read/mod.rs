@@ -13,5 +13,5 @@ pub(crate) mod projection;
 pub mod search;
 pub mod steps;
 
+pub(crate) use checks::statistics;
 pub use checks::verify;
-pub(crate) use checks::{damaged, statistics};

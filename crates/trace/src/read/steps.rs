@@ -2,7 +2,6 @@
 //! columns that it does not have.
 
 use std::collections::{BTreeSet, VecDeque};
-use std::io;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -16,11 +15,11 @@ use arrow::datatypes::{DataType, Field, Fields, Schema, SchemaRef};
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReader;
 
-use super::damaged::damaged;
 use super::footer::plain;
 use super::footer::trace_file::{Readable, TraceFile};
 use super::open::TraceSet;
 use super::projection::Layout;
+use super::verify::damaged;
 use crate::catch_panic::contained;
 use crate::diagnostic::{Code, Finding};
 use crate::error::TraceError;
@@ -169,15 +168,7 @@ fn is_readable(set: &TraceSet, name: &str) -> bool {
 /// The type of a column: the schema's, or the widest of its kind for columns outside the schema.
 fn data_type(set: &TraceSet, name: &str, kind: Kind) -> DataType {
     let known = set.domain().column(name).filter(|column| column.stored.kind() == kind).map(|column| column.stored);
-    match (known, kind) {
-        (Some(Stored::Bool), _) | (None, Kind::Bool) => DataType::Boolean,
-        (Some(Stored::Int8), _) => DataType::Int8,
-        (Some(Stored::Int32), _) => DataType::Int32,
-        (Some(Stored::Int64), _) | (None, Kind::Int) => DataType::Int64,
-        (Some(Stored::Float32), _) => DataType::Float32,
-        (Some(Stored::Float64), _) | (None, Kind::Float) => DataType::Float64,
-        (Some(Stored::String), _) | (None, Kind::String | Kind::Unsupported) => DataType::Utf8,
-    }
+    known.map_or(kind.data_type(), Stored::data_type)
 }
 
 /// The fields with `Utf8View` for each kind of text.
@@ -232,10 +223,8 @@ impl Part {
 
     fn reader(self, schema: &Schema) -> Result<Reader, Box<Finding>> {
         let Self { name, path, readable, expansion, row_group } = self;
-        let unreadable = |error: io::Error| {
-            Box::new(Finding::new(Code::Unreadable, &name, "a file that can be read", error.to_string()))
-        };
-        let store = Store::new(input::open(&path).map_err(unreadable)?, expansion);
+        let file = input::open(&path).map_err(|error| Finding::unreadable(&name, &error))?;
+        let store = Store::new(file, expansion);
         let metadata = Arc::clone(readable.footer.metadata());
         let (checksums, slot) = (readable.chunks.clone(), FaultSlot::default());
         let described = metadata.file_metadata().schema_descr();

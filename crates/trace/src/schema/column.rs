@@ -1,5 +1,6 @@
 //! A column: its name, its type, its meaning, and the field behind it.
 
+use arrow::datatypes::DataType;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -111,7 +112,29 @@ exact::names!(Stored {
     String: "string",
 });
 
+impl Kind {
+    /// The widest type of its values, as writers and checks hold them.
+    pub(crate) const fn data_type(self) -> DataType {
+        match self {
+            Self::Bool => DataType::Boolean,
+            Self::Int => DataType::Int64,
+            Self::Float => DataType::Float64,
+            Self::String => DataType::Utf8,
+            Self::Unsupported => DataType::Null,
+        }
+    }
+}
+
 impl Stored {
+    pub(crate) const fn data_type(self) -> DataType {
+        match self {
+            Self::Int8 => DataType::Int8,
+            Self::Int32 => DataType::Int32,
+            Self::Float32 => DataType::Float32,
+            Self::Bool | Self::Int64 | Self::Float64 | Self::String => self.kind().data_type(),
+        }
+    }
+
     pub const fn kind(self) -> Kind {
         match self {
             Self::Bool => Kind::Bool,

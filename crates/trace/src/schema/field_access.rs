@@ -1,5 +1,8 @@
 //! Reads and sets the field of an [`Episode`] behind a column, as a [`Value`].
 
+use arrow::array::{Array as _, ArrayRef, AsArray as _};
+use arrow::datatypes::{DataType, Float64Type, Int32Type, Int64Type};
+
 use crate::episode::{Action, Episode};
 
 /// A value of a column in one of the four types that readers see.
@@ -9,6 +12,20 @@ pub enum Value<'a> {
     Int(i64),
     Float(f64),
     Text(&'a str),
+}
+
+/// The value at a row of an array of 64-bit numbers, truth values or texts; `None` for null.
+pub(crate) fn value_at(values: &ArrayRef, row: usize) -> Option<Value<'_>> {
+    values.is_valid(row).then(|| match values.data_type() {
+        DataType::Boolean => Value::Bool(values.as_boolean().value(row)),
+        DataType::Int64 => Value::Int(values.as_primitive::<Int64Type>().value(row)),
+        DataType::Float64 => Value::Float(values.as_primitive::<Float64Type>().value(row)),
+        DataType::Utf8 => Value::Text(values.as_string::<i32>().value(row)),
+        _ => {
+            let texts = values.as_dictionary::<Int32Type>();
+            Value::Text(texts.values().as_string::<i32>().value(texts.key(row).unwrap_or_default()))
+        }
+    })
 }
 
 /// The field behind a column at a step index (0-based); a field of the episode is the same at all steps.

@@ -16,6 +16,7 @@ use serde::Serialize;
 pub use column::{Column, Kind, Stored};
 pub use domain::{COLUMNS, DeclaredColumn, Domain, column};
 pub use field_access::Value;
+pub(crate) use field_access::value_at;
 
 /// The newest schema version. A trace is written with the oldest version that has its columns.
 pub const SCHEMA_VERSION: u32 = 2;

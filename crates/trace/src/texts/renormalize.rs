@@ -13,7 +13,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-use crate::diagnostic::{Code, Finding, Severity};
+use crate::diagnostic::{Code, Finding};
 use crate::error::TraceError;
 use crate::identification::{VERSION, normal_form};
 use crate::inputs::Input;
@@ -101,8 +101,7 @@ pub fn renormalize(
 ) -> Result<RenormalizeAnswer, RenormalizeError> {
     let targets = folder.map(|folder| targets(inputs, folder)).transpose()?;
     let old = inputs.iter().map(Old::open).collect::<Result<Vec<_>, _>>()?;
-    let errors = validate(inputs, None, threads)?.findings.into_iter();
-    TraceError::of(errors.filter(|finding| finding.severity == Severity::Error).collect()).map_or(Ok(()), Err)?;
+    validate(inputs, None, threads)?.errors()?;
     let mut answer = RenormalizeAnswer {
         identification_version: VERSION.to_owned(),
         written: folder.is_some(),

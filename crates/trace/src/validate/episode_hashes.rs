@@ -1,7 +1,6 @@
 //! Checks each episode's hash against its rows.
 
-use arrow::array::{Array as _, ArrayRef, AsArray as _};
-use arrow::datatypes::{DataType, Float64Type, Int32Type, Int64Type};
+use arrow::array::{Array as _, ArrayRef};
 
 use super::rules::Located;
 use crate::answers;
@@ -10,7 +9,7 @@ use crate::episode_hash::{EPISODE_HASH, Form, IDENTIFICATION, SELF_COLOR, column
 use crate::read::open::TraceFile;
 use crate::read::parallel_scan::Episodes;
 use crate::read::projection::Layout;
-use crate::schema::Value;
+use crate::schema::value_at;
 
 const HELP: &str =
     "the rows were changed: restore the file from its source; where the change is meant, leave the column out";
@@ -60,20 +59,7 @@ fn hash(held: &[(&str, ArrayRef)], rows: std::ops::Range<usize>) -> String {
     let mut form = Form::new();
     for (name, values) in held {
         let derived = |row: usize| *name == SELF_COLOR && identification.is_some_and(|texts| texts.is_valid(row));
-        form.add(name, rows.clone().map(|row| value(values, row).filter(|_| !derived(row))));
+        form.add(name, rows.clone().map(|row| value_at(values, row).filter(|_| !derived(row))));
     }
     form.finish()
-}
-
-fn value(values: &ArrayRef, row: usize) -> Option<Value<'_>> {
-    values.is_valid(row).then(|| match values.data_type() {
-        DataType::Boolean => Value::Bool(values.as_boolean().value(row)),
-        DataType::Int64 => Value::Int(values.as_primitive::<Int64Type>().value(row)),
-        DataType::Float64 => Value::Float(values.as_primitive::<Float64Type>().value(row)),
-        DataType::Utf8 => Value::Text(values.as_string::<i32>().value(row)),
-        _ => {
-            let texts = values.as_dictionary::<Int32Type>();
-            Value::Text(texts.values().as_string::<i32>().value(texts.key(row).unwrap_or_default()))
-        }
-    })
 }

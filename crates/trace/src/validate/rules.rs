@@ -3,15 +3,16 @@
 //!
 //! Rule: a rule gives one finding per episode and column, at the first row that breaks it, with the number of others.
 
-use arrow::array::{Array as _, ArrayRef, AsArray as _, BooleanArray, Float64Array, Int64Array};
+use arrow::array::{Array as _, ArrayRef, AsArray as _, Int64Array};
 use arrow::datatypes::{Float64Type, Int32Type, Int64Type};
 
 use crate::diagnostic::{Code, Finding};
+use crate::episode_hash::same;
 use crate::read::open::TraceFile;
 use crate::read::parallel_scan::Episodes;
 use crate::read::projection::{BODY_COLOR, EPISODE_ID, Layout, LayoutColumn, T};
-use crate::schema::Kind;
 use crate::schema::rules::{Known, Requirement, Rule, rules_of};
+use crate::schema::{Kind, Value, value_at};
 use exact::escape::exact;
 use exact::suggest::nearest;
 use parquet_pages::{Column as Held, text_at};
@@ -211,7 +212,7 @@ impl Look<'_> {
         for ends in self.episodes.offsets.windows(2) {
             let mut rows = (ends[0]..ends[1]).filter(|row| !skip_nulls || values.is_valid(*row));
             let Some(first) = rows.next() else { continue };
-            let mut others = rows.filter(|row| !same(values, first, *row));
+            let mut others = rows.filter(|row| !same(value_at(values, first), value_at(values, *row)));
             let Some(row) = others.next() else { continue };
             let expected = format!("{}, as in the episode's first row", shown(values, first));
             let found = match others.count() {
@@ -256,32 +257,12 @@ fn valid(values: &Int64Array, row: usize) -> Option<i64> {
     values.is_valid(row).then(|| values.value(row))
 }
 
-fn same(values: &ArrayRef, one: usize, other: usize) -> bool {
-    if values.is_null(one) || values.is_null(other) {
-        return values.is_null(one) && values.is_null(other);
-    }
-    if values.as_dictionary_opt::<Int32Type>().is_some() {
-        return text_at(values, one) == text_at(values, other);
-    }
-    if let Some(ints) = values.as_primitive_opt::<Int64Type>() {
-        return ints.value(one) == ints.value(other);
-    }
-    if let Some(floats) = values.as_primitive_opt::<Float64Type>() {
-        return floats.value(one).to_bits() == floats.value(other).to_bits();
-    }
-    values.as_boolean_opt().is_some_and(|bools| bools.value(one) == bools.value(other))
-}
-
 fn shown(values: &ArrayRef, row: usize) -> String {
-    if values.is_null(row) {
-        return "null".into();
+    match value_at(values, row) {
+        None => "null".into(),
+        Some(Value::Bool(truth)) => truth.to_string(),
+        Some(Value::Int(number)) => number.to_string(),
+        Some(Value::Float(number)) => number.to_string(),
+        Some(Value::Text(text)) => format!("`{}`", exact(text)),
     }
-    if values.as_dictionary_opt::<Int32Type>().is_some() {
-        return format!("`{}`", exact(text_at(values, row).unwrap_or_default()));
-    }
-    let any = values.as_any();
-    let number = any.downcast_ref::<Int64Array>().map(|ints| ints.value(row).to_string());
-    let number = number.or_else(|| any.downcast_ref::<Float64Array>().map(|floats| floats.value(row).to_string()));
-    let shown = number.or_else(|| any.downcast_ref::<BooleanArray>().map(|bools| bools.value(row).to_string()));
-    shown.unwrap_or_else(|| "another value".into())
 }

@@ -2,15 +2,14 @@
 //!
 //! Columns of the schema that the file does not have are absent; columns outside the schema are not read.
 
-use arrow::array::{Array as _, ArrayRef, AsArray as _, RecordBatch};
+use arrow::array::{Array as _, ArrayRef, RecordBatch};
 use arrow::compute::cast;
-use arrow::datatypes::{DataType, Float64Type, Int64Type};
+use arrow::datatypes::DataType;
 
 use crate::answers::{self, Answered};
 use crate::episode::{Episode, Step};
 use crate::schema::domain::is_identity;
-use crate::schema::{COLUMNS, Column, Kind, Value};
-use crate::write::row_groups::data_type;
+use crate::schema::{COLUMNS, Column, Kind, Value, value_at};
 
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("column `{column}`: expected {expected}, found {found}")]
@@ -86,12 +85,7 @@ pub(crate) fn own_columns(rows: &RecordBatch) -> Vec<OwnColumn> {
 }
 
 fn fill(episode: &mut Episode, column: &Column, values: &ArrayRef) -> Result<(), NotAnEpisode> {
-    let held = match column.stored.kind() {
-        Kind::Int => DataType::Int64,
-        Kind::Float => DataType::Float64,
-        _ => data_type(column.stored),
-    };
-    let stored = data_type(column.stored);
+    let (stored, held) = (column.stored.data_type(), column.stored.kind().data_type());
     let values = cast(values, &stored).and_then(|values| cast(&values, &held));
     let values = values.map_err(|error| fault(column, &stored.to_string(), &error.to_string()))?;
     let rows = if column.constant { values.len().min(1) } else { values.len() };
@@ -102,15 +96,6 @@ fn fill(episode: &mut Episode, column: &Column, values: &ArrayRef) -> Result<(),
         }
     }
     Ok(())
-}
-
-fn value_at(values: &ArrayRef, row: usize) -> Option<Value<'_>> {
-    values.is_valid(row).then(|| match values.data_type() {
-        DataType::Boolean => Value::Bool(values.as_boolean().value(row)),
-        DataType::Int64 => Value::Int(values.as_primitive::<Int64Type>().value(row)),
-        DataType::Float64 => Value::Float(values.as_primitive::<Float64Type>().value(row)),
-        _ => Value::Text(values.as_string::<i32>().value(row)),
-    })
 }
 
 fn misfit(column: &Column, value: Option<Value<'_>>) -> NotAnEpisode {

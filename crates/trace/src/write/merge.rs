@@ -3,6 +3,7 @@
 //! Rule: the same episodes in the same order give the same bytes, whatever their files.
 
 use std::borrow::Cow;
+use std::fs::File;
 use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
@@ -22,9 +23,9 @@ use crate::episode_hash::{self, EPISODE_HASH};
 use crate::error::TraceError;
 use crate::inputs::Input;
 use crate::read::budget::{most_shown, most_values};
-use crate::read::damaged::damaged;
 use crate::read::footer::trace_file::is_nested;
 use crate::read::footer::{Extent, Footer, bounds, footer, plain};
+use crate::read::verify::damaged;
 use crate::schema::{self, COLUMNS};
 use crate::write::row_groups::{Gathered, RowGroups, field};
 use crate::write::{self, OptionalColumns};
@@ -109,13 +110,14 @@ impl EpisodeRows {
 
 pub fn read(path: &Path) -> Result<Vec<EpisodeRows>, TraceError> {
     let name = path.display().to_string();
-    let damaged = |finding: Finding| unreadable(&name, finding.to_string().into());
-    let file = input::open(path).map_err(|error| unreadable(&name, error.into()))?;
-    let footer = footer(&Input::new(path), Extent::Pages).map_err(|finding| damaged(*finding))?;
+    let (file, footer) = opened(&name, &Input::new(path))?;
     match bounds::fault(&name, footer.bytes, &footer.metadata) {
         // Callers that merge traces accept one without rows.
-        Some(fault) if fault.code != Code::NoEpisodes => Err(damaged(fault)),
-        _ => decode(&name, Store::new(file, Arc::new(Expansion::new(footer.bytes))), footer),
+        Some(fault) if fault.code != Code::NoEpisodes => Err(damaged_file(&name, &fault)),
+        _ => {
+            let row_groups = (0..footer.metadata.num_row_groups()).collect();
+            decode(&name, file, footer, row_groups, None)
+        }
     }
 }
 
@@ -123,11 +125,9 @@ pub fn read(path: &Path) -> Result<Vec<EpisodeRows>, TraceError> {
 /// Values are held row by row, so their number is limited.
 pub fn read_rows(of: &Input, rows: Range<usize>) -> Result<Vec<EpisodeRows>, TraceError> {
     let name = &of.name;
-    let damaged = |finding: Finding| unreadable(name, finding.to_string().into());
-    let file = input::open(&of.path).map_err(|error| unreadable(name, error.into()))?;
-    let footer = footer(of, Extent::Pages).map_err(|finding| damaged(*finding))?;
+    let (file, footer) = opened(name, of)?;
     if let Some(fault) = bounds::fault(name, footer.bytes, &footer.metadata) {
-        return Err(damaged(fault));
+        return Err(damaged_file(name, &fault));
     }
     let over = |exceeded: Exceeded| TraceError::from(Finding::over_budget(name, &exceeded));
     let columns = footer.metadata.file_metadata().schema_descr().num_columns();
@@ -144,20 +144,24 @@ pub fn read_rows(of: &Input, rows: Range<usize>) -> Result<Vec<EpisodeRows>, Tra
     }
     let skipped = skipped.unwrap_or_default();
     let selection = vec![RowSelector::skip(skipped), RowSelector::select(rows.len())];
-    let store = Store::new(file, Arc::new(Expansion::new(footer.bytes)));
     let most = most_shown(footer.bytes);
-    decode_some(name, store, footer, groups, Some((selection.into(), most)))
+    decode(name, file, footer, groups, Some((selection.into(), most)))
 }
 
-fn decode(name: &str, store: Store, footer: Footer) -> Result<Vec<EpisodeRows>, TraceError> {
-    let row_groups = (0..footer.metadata.num_row_groups()).collect();
-    decode_some(name, store, footer, row_groups, None)
+fn opened(name: &str, of: &Input) -> Result<(File, Footer), TraceError> {
+    let file = input::open(&of.path).map_err(|error| unreadable(name, error.into()))?;
+    let footer = footer(of, Extent::Pages).map_err(|finding| damaged_file(name, &finding))?;
+    Ok((file, footer))
 }
 
-fn decode_some(
+fn damaged_file(name: &str, finding: &Finding) -> TraceError {
+    unreadable(name, finding.to_string().into())
+}
+
+fn decode(
     name: &str,
-    store: Store,
-    Footer { metadata, chunks, .. }: Footer,
+    file: File,
+    Footer { bytes, metadata, chunks, .. }: Footer,
     row_groups: Vec<usize>,
     selection: Option<(RowSelection, Limit)>,
 ) -> Result<Vec<EpisodeRows>, TraceError> {
@@ -167,6 +171,7 @@ fn decode_some(
         return Err(failed(is_nested(name, &nested.path().parts()[0]).to_string().into()));
     }
     contained(|| {
+        let store = Store::new(file, Arc::new(Expansion::new(bytes)));
         let slot = FaultSlot::default();
         let (metadata, kept) = (Arc::new(metadata), Arc::clone(&slot));
         let library = Library { store, metadata, checksums: chunks, row_groups, slot: kept, writes_out: true };
@@ -246,10 +251,7 @@ pub fn write_in(
     recording: Option<&serde_json::Value>,
     episodes: &[EpisodeRows],
 ) -> Result<(), TraceError> {
-    let failed = |source: Box<dyn std::error::Error + Send + Sync>| TraceError::Write {
-        file: path.display().to_string(),
-        source,
-    };
+    let failed = |source: Box<dyn std::error::Error + Send + Sync>| TraceError::write(path, source);
     let episodes = alike(episodes)?;
     let Some(first) = episodes.first() else { return Err(failed("there is no episode to write".into())) };
     let schema = first.rows.schema();
@@ -257,7 +259,11 @@ pub fn write_in(
         return Err(failed(format!("`{}` has other columns than `{}`", other.episode_id, first.episode_id).into()));
     }
     let file = NewFile::create_in(scratch, path).map_err(|error| failed(error.into()))?;
-    let file = encode(file, &schema, recording, &episodes).map_err(|error| failed(error.into()))?;
+    let encoded = RowGroups::new(file, &schema, recording).and_then(|mut row_groups| {
+        episodes.iter().try_for_each(|episode| row_groups.write(&episode.rows))?;
+        row_groups.finish(None)
+    });
+    let file = encoded.map_err(|error| failed(error.into()))?;
     file.commit().map_err(|error| failed(error.into()))
 }
 
@@ -274,15 +280,4 @@ fn same_columns(a: &SchemaRef, b: &SchemaRef) -> bool {
         schema.fields().iter().map(|field| (field.name().clone(), field.data_type().clone())).collect::<Vec<_>>()
     };
     columns(a) == columns(b)
-}
-
-fn encode(
-    file: NewFile,
-    schema: &SchemaRef,
-    recording: Option<&serde_json::Value>,
-    episodes: &[EpisodeRows],
-) -> parquet::errors::Result<NewFile> {
-    let mut row_groups = RowGroups::new(file, schema, recording)?;
-    episodes.iter().try_for_each(|episode| row_groups.write(&episode.rows))?;
-    row_groups.finish(None)
 }

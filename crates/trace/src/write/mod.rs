@@ -11,7 +11,7 @@ pub(super) mod rewrite;
 pub(super) mod row_groups;
 
 use std::collections::{BTreeMap, HashSet};
-use std::io::{self, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use arrow::datatypes::SchemaRef;
@@ -274,7 +274,7 @@ fn refused(episode: &Episode, expected: String, found: String) -> Result<(), Tra
 }
 
 pub(super) fn failed(error: ParquetError) -> TraceError {
-    TraceError::Write { file: "stream".into(), source: Box::new(error) }
+    TraceError::write("stream", error)
 }
 
 /// Writes a trace file, which appears under its name when [`finish`](Self::finish) returns.
@@ -286,7 +286,7 @@ pub struct TraceWriter {
 impl TraceWriter {
     /// Starts the trace for `path`, replacing an existing one; its folder must exist.
     pub fn create(path: &Path, metadata: &TraceMetadata) -> Result<Self, TraceError> {
-        let file = NewFile::create(path).map_err(|source| unwritable(path, source))?;
+        let file = NewFile::create(path).map_err(|source| TraceError::write(path, source))?;
         let encoder = TraceEncoder::new(file, metadata).map_err(|error| error.writing(path))?;
         Ok(Self { encoder, path: path.to_owned() })
     }
@@ -299,7 +299,7 @@ impl TraceWriter {
     pub fn finish(self) -> Result<(), TraceError> {
         let Self { encoder, path } = self;
         let file = encoder.finish().map_err(|error| error.writing(&path))?;
-        file.commit().map_err(|source| unwritable(&path, source))
+        file.commit().map_err(|source| TraceError::write(path, source))
     }
 }
 
@@ -315,8 +315,4 @@ pub fn write_episodes(
         writer.write(episode)?;
     }
     writer.finish()
-}
-
-pub(super) fn unwritable(path: &Path, source: io::Error) -> TraceError {
-    TraceError::Write { file: path.display().to_string(), source: Box::new(source) }
 }

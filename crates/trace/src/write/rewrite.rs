@@ -56,10 +56,10 @@ fn copied<W: Write + Send>(
     anew: Option<(&str, &serde_json::Value)>,
     mut write: impl FnMut(&mut SerializedRowGroupWriter<'_, Held<W>>, &TraceFile, usize) -> Result<(), TraceError>,
 ) -> Result<W, TraceError> {
-    let [file] = set.files() else { return Err(unwritable("the trace", "there is not exactly one".into())) };
+    let [file] = set.files() else { return Err(TraceError::write("the trace", "there is not exactly one")) };
     // Copied columns get new checksums, which must not hide damaged bytes.
     verify_pages(set)?;
-    let failed = |error: ParquetError| unwritable(file.name(), error.into());
+    let failed = |error: ParquetError| TraceError::write(file.name(), error);
     let metadata = file.footer_again(Extent::Whole)?.metadata;
     let old = metadata.file_metadata().schema_descr();
     let (schema, pairs) = match anew {
@@ -112,7 +112,7 @@ fn write_texts<W: Write + Send>(
     columns: [&str; 2],
     change: &mut impl FnMut(Before<'_>) -> Result<Option<String>, TraceError>,
 ) -> Result<(), TraceError> {
-    let failed = |error: ParquetError| unwritable(file.name(), error.into());
+    let failed = |error: ParquetError| TraceError::write(file.name(), error);
     let [source, target] = columns.map(|name| layout.position(name).expect("the layout was made with it"));
     let missing = || failed(ParquetError::General("the row group has no column left".into()));
     let mut column = group.next_column().map_err(failed)?.ok_or_else(missing)?;
@@ -177,8 +177,4 @@ fn properties(pairs: Vec<KeyValue>) -> WriterPropertiesPtr {
         .set_statistics_enabled(EnabledStatistics::Chunk)
         .set_offset_index_disabled(true);
     Arc::new(properties.build())
-}
-
-fn unwritable(file: &str, source: Box<dyn std::error::Error + Send + Sync>) -> TraceError {
-    TraceError::Write { file: file.to_owned(), source }
 }

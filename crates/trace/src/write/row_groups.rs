@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use arrow::array::{ArrayRef, BooleanBuilder, Float64Builder, Int64Builder, NullArray, RecordBatch, StringBuilder};
 use arrow::compute::cast;
-use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
+use arrow::datatypes::{Field, Schema, SchemaRef};
 use arrow::error::ArrowError;
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_writer::ArrowWriterOptions;
@@ -16,7 +16,7 @@ use parquet::errors::Result;
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::{WriterProperties, WriterPropertiesBuilder};
 
-use crate::schema::{self, Column, Kind, Stored, Value};
+use crate::schema::{self, Column, Kind, Value};
 use parquet_pages::checksums::{self, CREATED_BY, Held};
 
 /// The number of rows after which a row group is closed, at the next end of an episode.
@@ -170,17 +170,5 @@ impl Values {
 }
 
 pub(crate) fn field(column: &Column) -> Field {
-    Field::new(column.name, data_type(column.stored), column.nullable)
-}
-
-pub(super) fn data_type(stored: Stored) -> DataType {
-    match stored {
-        Stored::Bool => DataType::Boolean,
-        Stored::Int8 => DataType::Int8,
-        Stored::Int32 => DataType::Int32,
-        Stored::Int64 => DataType::Int64,
-        Stored::Float32 => DataType::Float32,
-        Stored::Float64 => DataType::Float64,
-        Stored::String => DataType::Utf8,
-    }
+    Field::new(column.name, column.stored.data_type(), column.nullable)
 }

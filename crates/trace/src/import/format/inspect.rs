@@ -3,18 +3,24 @@
 //! A `.eval` log is an archive with one member per sample, or a folder of chunks; a `.json` log is one object. Scalars
 //! of `eval`, `sample` and `event` without a column are available to `--map`.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::fs::File;
-use std::io::{self, Read as _, Seek as _};
+use std::io::{self, BufReader, Read as _, Seek as _};
 
+use serde::de::DeserializeOwned;
 use serde_json::{Map, Value, json};
+use zip::{CompressionMethod, ZipArchive};
 
 use super::Rows;
-use super::eval_archive::EvalArchive;
+use super::json::from_slice;
 use crate::import::error::ImportError;
+use exact::budget::Limit;
+use exact::input;
 
 const ARCHIVE: &[u8; 4] = b"PK\x03\x04";
 const ATTACHMENT: &str = "attachment://";
+/// A sample with all its events.
+const LARGEST: Limit = Limit::new("bytes of a member of a log", 2 << 30);
 
 pub(super) fn is_archive(file: &mut File) -> io::Result<bool> {
     let mut start = [0; 4];
@@ -26,12 +32,12 @@ pub(super) fn read_archive(file: File, rows: &mut Rows<'_>) -> Result<(), Import
     let help = "copy the log again; `inspect log recover` mends one whose writer was ended";
     let expected = "a log of Inspect, an archive with a directory at its end";
     let mut archive = EvalArchive::open(file).map_err(|found| rows.fault("", expected, found, help))?;
-    let header = ["header.json", "_journal/start.json"].into_iter().find(|name| archive.names().contains(*name));
+    let header = ["header.json", "_journal/start.json"].into_iter().find(|name| archive.names.contains(*name));
     let header = header.ok_or_else(|| rows.fault("", expected, "neither `header.json` nor a journal", help))?;
     let damaged = |rows: &Rows<'_>, name: &str, found| rows.fault(name, "JSON of Inspect", found, help);
     let head: Value = archive.json(header).map_err(|found| damaged(rows, header, found))?;
     let mut log = Log::new(head["eval"].clone());
-    for name in archive.names().clone() {
+    for name in archive.names.clone() {
         let Some(path) = name.strip_prefix("samples/") else { continue };
         let sample = match path.strip_suffix("/sample.json") {
             Some(_) => chunked(&mut archive, name.trim_end_matches("sample.json")),
@@ -44,15 +50,53 @@ pub(super) fn read_archive(file: File, rows: &mut Rows<'_>) -> Result<(), Import
     Ok(())
 }
 
+/// Members of a zip archive: stored, deflated, or method 93 (zstd with any number of frames). The last of several
+/// members with one name counts.
+struct EvalArchive {
+    zip: ZipArchive<BufReader<File>>,
+    names: BTreeSet<String>,
+}
+
+impl EvalArchive {
+    fn open(file: File) -> Result<Self, String> {
+        let zip = ZipArchive::new(BufReader::new(file)).map_err(|error| error.to_string())?;
+        let names = zip.file_names().map(str::to_owned).collect();
+        Ok(Self { zip, names })
+    }
+
+    /// Parses a member; the error says why it cannot be read.
+    fn json<T: DeserializeOwned>(&mut self, name: &str) -> Result<T, String> {
+        let bytes = self.bytes(name).map_err(|error| error.to_string())?;
+        from_slice(&bytes).map_err(|error| error.to_string())
+    }
+
+    fn bytes(&mut self, name: &str) -> io::Result<Vec<u8>> {
+        let index = self.zip.index_for_name(name).ok_or(io::ErrorKind::NotFound)?;
+        let raw = self.zip.by_index_raw(index)?;
+        if raw.compression() != CompressionMethod::ZSTD {
+            drop(raw);
+            return input::bytes_of(self.zip.by_index(index)?, LARGEST);
+        }
+        let crc = raw.crc32();
+        let bytes = input::bytes_of(zstd::Decoder::new(raw)?, LARGEST)?;
+        let found = crc32fast::hash(&bytes);
+        if found == crc {
+            Ok(bytes)
+        } else {
+            Err(io::Error::other(format!("checksum {found:08x} instead of {crc:08x}")))
+        }
+    }
+}
+
 fn chunked(archive: &mut EvalArchive, folder: &str) -> Result<Map<String, Value>, String> {
     let mut sample: Map<String, Value> = archive.json(&format!("{folder}sample.json"))?;
     let metadata = format!("{folder}metadata.json");
-    if archive.names().contains(&metadata) {
+    if archive.names.contains(&metadata) {
         sample.insert("metadata".to_owned(), archive.json(&metadata)?);
     }
     let mut sequence = |name: &str| -> Result<Value, String> {
         let prefix = format!("{folder}{name}/");
-        let members = archive.names().range(prefix.clone()..).take_while(|member| member.starts_with(&prefix));
+        let members = archive.names.range(prefix.clone()..).take_while(|member| member.starts_with(&prefix));
         let start = |member: &String| member[prefix.len()..].strip_suffix(".json")?.parse::<u64>().ok();
         let mut chunks: Vec<_> = members.filter_map(|member| Some((start(member)?, member.clone()))).collect();
         chunks.sort_unstable();

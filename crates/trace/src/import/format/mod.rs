@@ -3,7 +3,6 @@
 //! Rule: keys that a format does not give are absent or null. Records that are not steps are counted and named.
 
 mod csv;
-mod eval_archive;
 mod inspect;
 mod inspect_robots;
 mod json;
@@ -17,8 +16,7 @@ use std::path::Path;
 
 use serde_json::{Map, Value};
 
-use super::error::ImportError;
-use super::fault::Fault;
+use super::error::{Fault, ImportError};
 use super::line::{self, BYTE_ORDER_MARK};
 use super::mapping::{Mapping, Row};
 use exact::input;

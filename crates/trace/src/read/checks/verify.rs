@@ -1,14 +1,11 @@
 //! Checks the stored pages of traces for engines that read files themselves.
 
-use std::io;
-
-use super::super::damaged::damaged;
 use super::super::footer::plain;
 use super::super::open::{TraceFile, TraceSet};
 use crate::catch_panic::contained;
 use crate::diagnostic::{Code, Finding};
 use crate::error::TraceError;
-use parquet_pages::{FaultSlot, Place, verify};
+use parquet_pages::{FaultKind, FaultSlot, PageFault, Place, verify};
 
 /// Reads all pages of all files and checks their headers and, if present, their checksums, without decoding them.
 pub fn verify_pages(set: &TraceSet) -> Result<(), TraceError> {
@@ -17,10 +14,7 @@ pub fn verify_pages(set: &TraceSet) -> Result<(), TraceError> {
 
 pub(crate) fn verify_columns(file: &TraceFile, is_wanted: impl Fn(&str) -> bool) -> Result<(), Box<Finding>> {
     let readable = file.footer()?;
-    let unreadable = |error: io::Error| {
-        Box::new(Finding::new(Code::Unreadable, file.name(), "a file that can be read", error.to_string()))
-    };
-    let store = file.store().map_err(unreadable)?;
+    let store = file.store()?;
     let (metadata, checksums) = (readable.footer.metadata(), &readable.chunks);
     for (row_group, group) in metadata.row_groups().iter().enumerate() {
         let wanted = |column: &usize| is_wanted(&group.column(*column).column_path().parts()[0]);
@@ -33,4 +27,19 @@ pub(crate) fn verify_columns(file: &TraceFile, is_wanted: impl Fn(&str) -> bool)
         }
     }
     Ok(())
+}
+
+/// The finding about a column that could not be decoded.
+pub(crate) fn damaged(file: &str, slot: &FaultSlot, error: &str) -> Finding {
+    if let Some(PageFault { kind, row_group, column, part, expected, found }) = slot.get() {
+        let code = match kind {
+            FaultKind::Corrupt => Code::CorruptData,
+            FaultKind::OverBudget => Code::OverBudget,
+        };
+        let expected = format!("{expected} in {part}");
+        Finding::new(code, file, expected, found).in_row_group(*row_group).in_column(column)
+    } else {
+        let found = error.split_whitespace().collect::<Vec<_>>().join(" ");
+        Finding::new(Code::CorruptData, file, "data that decodes", found)
+    }
 }

@@ -52,7 +52,7 @@ pub(crate) struct Footer {
 
 pub(crate) fn footer(input: &Input, extent: Extent) -> Result<Footer, Box<Finding>> {
     let finding = |code, expected: &str, found: String| Box::new(Finding::new(code, &input.name, expected, found));
-    let unreadable = |error: io::Error| finding(Code::Unreadable, "a file that can be read", error.to_string());
+    let unreadable = |error: io::Error| Finding::unreadable(&input.name, &error);
     let mut file = input::open(&input.path).map_err(unreadable)?;
     let about = file.metadata().map_err(unreadable)?;
     if about.is_dir() {
@@ -106,7 +106,7 @@ fn verified(
                 let expected = format!("a footer with the CRC-32 {expected:08x}");
                 finding(Code::CorruptFooter, expected, format!("{found:08x}"))
             }
-            Fault::Unreadable(why) => finding(Code::Unreadable, "a file that can be read".to_owned(), why),
+            Fault::Unreadable(why) => Finding::unreadable(&input.name, &why),
         }
     })
 }

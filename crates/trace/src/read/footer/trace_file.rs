@@ -116,8 +116,9 @@ impl TraceFile {
         input::open(&self.input.path)
     }
 
-    pub(crate) fn store(&self) -> io::Result<Store> {
-        self.reader().map(|file| Store::new(file, Arc::clone(&self.expansion)))
+    pub(crate) fn store(&self) -> Result<Store, Box<Finding>> {
+        let file = self.reader().map_err(|error| Finding::unreadable(self.name(), &error))?;
+        Ok(Store::new(file, Arc::clone(&self.expansion)))
     }
 
     pub(crate) fn expansion(&self) -> &Arc<Expansion> {

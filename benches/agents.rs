@@ -177,9 +177,9 @@ fn answer(stream: &TcpStream) -> Option<()> {
 struct Quiet;
 
 impl Progress for Quiet {
-    fn step(&self, _: Key, _: i32, _: &Step) {}
+    fn step(&self, _: &Key, _: i32, _: &Step) {}
 
-    fn episode(&self, _: Key, _: &str, _: usize) {}
+    fn episode(&self, _: &Key, _: &str, _: usize) {}
 
     fn model_changed(&self, _: &str, _: i32, _: &str, _: &str) {}
 
@@ -187,7 +187,7 @@ impl Progress for Quiet {
         eprintln!("lost {id}: {reason}");
     }
 
-    fn waiting(&self, _: &str, _: Held) {}
+    fn waiting(&self, _: &str, _: &Held) {}
 }
 
 /// Steps per second of a recording, and where its time went.

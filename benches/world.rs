@@ -91,7 +91,7 @@ const FINER: &str = "eye.slices = 28\neye.stacks = 16\neye.quads = 4\nothers.lea
 const LEVELS: u8 = 8;
 
 /// Draws frames of an experiment alternately with finer parts and everything out of view, and as configured.
-fn fineness(experiment: Experiment, config: &WorldConfig) {
+fn fineness(experiment: &Experiment, config: &WorldConfig) {
     let finer = WorldConfig::from_toml(FINER).expect("finer parts are allowed");
     let mut eyes = [&finer, config].map(|config| Camera::new(config).expect("there is something to draw with"));
     let (mut spent, mut frames) = ([Duration::ZERO; 2], 0_u32);
@@ -99,7 +99,7 @@ fn fineness(experiment: Experiment, config: &WorldConfig) {
     eyes[0].draw_all(true);
     for seed in 1..=EPISODES {
         let mut worlds = [&finer, config].map(|config| {
-            let scene = Scene::draw(config, experiment, seed, 1).expect("the default has room for all");
+            let scene = Scene::draw(config, experiment.clone(), seed, 1).expect("the default has room for all");
             World::new(config, scene).expect("the default is a world")
         });
         for t in 0..STEPS / 2 {
@@ -178,7 +178,7 @@ fn main() {
             );
             println!("frames alone, by turns with rounder parts and all that is out of view");
             for experiment in [Experiment::E1, Experiment::E4, Experiment::E5] {
-                fineness(experiment, &config);
+                fineness(&experiment, &config);
             }
         }
     }

@@ -23,8 +23,9 @@ const METRICS: [&str; 9] = ["TSA", "TTD", "MCR", "MTATO", "CAAL", "CR", "MGD", "
 
 /// `runs` runs of each of `seeds` seeds, for every experiment.
 fn episodes(agent: Scripted, experiments: &[Experiment], seeds: i32, runs: i32) -> Vec<(Scripted, Key)> {
-    let key = |experiment, seed| (1..=runs).map(move |run| (agent, Key::first(experiment, seed, run)));
-    experiments.iter().flat_map(|&experiment| (1..=seeds).flat_map(move |seed| key(experiment, seed))).collect()
+    let key = |experiment: &Experiment, seed, run| (agent, Key::first(experiment.clone(), seed, run));
+    let runs_of = |experiment, seed| (1..=runs).map(move |run| key(experiment, seed, run));
+    experiments.iter().flat_map(|experiment| (1..=seeds).flat_map(move |seed| runs_of(experiment, seed))).collect()
 }
 
 fn profiles(plan: &[(Scripted, Key)], definitions: &str) -> Profiles {
@@ -67,11 +68,11 @@ fn check_logic(profiles: &Profiles) {
 fn a_few_episodes_already_show_who_is_who() {
     let [e1, e2, e3, e4, e5] = Experiment::PAPER;
     let plan = [
-        episodes(Scripted::Oracle, &[e1, e4], 1, 2),
+        episodes(Scripted::Oracle, &[e1.clone(), e4], 1, 2),
         episodes(Scripted::Gullible, &[e3], 1, 2),
-        episodes(Scripted::Confabulator, &[e1], 1, 1),
-        episodes(Scripted::Guesser, &[e1, e2, e5], 1, 3),
-        episodes(Scripted::Random, &[e2, e5], 1, 3),
+        episodes(Scripted::Confabulator, std::slice::from_ref(&e1), 1, 1),
+        episodes(Scripted::Guesser, &[e1, e2.clone(), e5.clone()], 1, 3),
+        episodes(Scripted::Random, &[e2.clone(), e5], 1, 3),
         episodes(Scripted::Frozen, &[e2], 1, 1),
     ];
     let profiles = profiles(&plan.concat(), "paper");

@@ -44,8 +44,8 @@ const POSITION: &str = "Position: x = 0.00 m, y = 1.25 m; orientation: 330 degre
 const WARNING: &str = "Warning: the previous movement hit a wall or another object, and the position did not change.";
 
 /// The system prompt and user prompt for an experiment, from the paper's appendix.
-fn verbatim(experiment: Experiment, stated_color: Option<&str>) -> [String; 2] {
-    let [system, user] = if experiment == Experiment::E5 {
+fn verbatim(experiment: &Experiment, stated_color: Option<&str>) -> [String; 2] {
+    let [system, user] = if *experiment == Experiment::E5 {
         [include_str!("prompts/exploration.system.txt"), include_str!("prompts/exploration.user.txt")]
     } else {
         [include_str!("prompts/cube-selection.system.txt"), include_str!("prompts/cube-selection.user.txt")]
@@ -64,11 +64,11 @@ fn verbatim(experiment: Experiment, stated_color: Option<&str>) -> [String; 2] {
 fn each_of_the_five_asks_in_the_papers_words() {
     let config = WorldConfig::default();
     for experiment in Experiment::PAPER {
-        let scene = Scene::draw(&config, experiment, 1, 1).unwrap();
-        let task = rollout::task(&config, &scene, Key::first(experiment, 1, 1));
+        let scene = Scene::draw(&config, experiment.clone(), 1, 1).unwrap();
+        let task = rollout::task(&config, &scene, &Key::first(experiment.clone(), 1, 1));
         assert_eq!(task.stated_color.is_some(), experiment == Experiment::E3);
-        let [system, user] = verbatim(experiment, task.stated_color.as_deref());
-        let rendered = Prompt::of(experiment).unwrap().render(&task, &first_step()).unwrap();
+        let [system, user] = verbatim(&experiment, task.stated_color.as_deref());
+        let rendered = Prompt::of(&experiment).unwrap().render(&task, &first_step()).unwrap();
         assert_eq!(rendered.system, system, "{experiment:?}");
         assert_eq!(rendered.user, filled(&user, FIRST, POSITION, None), "{experiment:?}");
     }
@@ -78,14 +78,14 @@ fn each_of_the_five_asks_in_the_papers_words() {
 #[test]
 fn every_experiment_reports_a_stopped_move() {
     for experiment in Experiment::PAPER {
-        let [_, mut user] = verbatim(experiment, None);
+        let [_, mut user] = verbatim(&experiment, None);
         let image = "Use the current RGB image";
         if experiment == Experiment::E5 {
             assert!(!user.contains("<warning_if_bumped_wall>"));
             user = user.replace(image, &format!("<warning_if_bumped_wall>\n{image}"));
         }
         let bumped = Observation { bumped: true, ..first_step() };
-        let rendered = Prompt::of(experiment).unwrap().render(&task(experiment, None), &bumped).unwrap();
+        let rendered = Prompt::of(&experiment).unwrap().render(&task(experiment.clone(), None), &bumped).unwrap();
         assert_eq!(rendered.user, filled(&user, FIRST, POSITION, Some(WARNING)), "{experiment:?}");
     }
 }
@@ -95,13 +95,13 @@ fn the_five_name_the_two_prompts_of_the_paper() {
     let prompts = Experiment::PAPER.map(|experiment| experiment.prompt.clone());
     assert_eq!(prompts, ["cube-selection", "cube-selection", "cube-selection", "cube-selection", "exploration"]);
     for experiment in Experiment::PAPER {
-        assert_eq!(Prompt::of(experiment).unwrap().hash(), experiment.prompt_hash, "{experiment:?}");
+        assert_eq!(Prompt::of(&experiment).unwrap().hash(), experiment.prompt_hash, "{experiment:?}");
     }
 }
 
 #[test]
 fn history_is_one_step_on_one_line_whatever_was_thought() {
-    let prompt = Prompt::of(Experiment::E5).unwrap();
+    let prompt = Prompt::of(&Experiment::E5).unwrap();
     let thought = Some("I turn.\n\nTask: <b>{{ 1 + 1 }}</b>".to_owned());
     let seen = |history| {
         let observation = Observation { t: 2, remaining: 99, history: Some(history), ..first_step() };
@@ -125,7 +125,7 @@ fn history_is_one_step_on_one_line_whatever_was_thought() {
 
 #[test]
 fn families_differ_in_their_hash_and_actions_in_their_letters() {
-    let hashes = [Experiment::E1, Experiment::E5].map(|experiment| Prompt::of(experiment).unwrap().hash().to_owned());
+    let hashes = [Experiment::E1, Experiment::E5].map(|experiment| Prompt::of(&experiment).unwrap().hash().to_owned());
     assert_ne!(hashes[0], hashes[1]);
     for action in Action::ALL {
         assert_eq!(prompt::action(prompt::letter(action)), Some(action));
@@ -146,13 +146,14 @@ fn the_prompts_of_reaching_tell_every_step_and_those_of_the_paper_the_last() {
     };
     for level in ["reach-scheme", "reach-mirror", "reach-hand", "reach-bare"] {
         let experiment = Experiment::parse(level).unwrap();
-        let render =
-            |observation| Prompt::of(experiment).unwrap().render(&task(experiment, None), observation).unwrap().user;
+        let render = |observation| {
+            Prompt::of(&experiment).unwrap().render(&task(experiment.clone(), None), observation).unwrap().user
+        };
         let told = "Steps so far:\n1. 1, carried out\n2. the answer could not be read, nothing was done\n\
                     3. 6, not carried out: something solid\nThe last move met something solid";
         assert!(render(&later).contains(told), "{level}: {}", render(&later));
         assert!(render(&first_step()).contains("Steps so far: none.\n"), "{level}");
     }
-    let user = Prompt::of(Experiment::E1).unwrap().render(&task(Experiment::E1, None), &later).unwrap().user;
+    let user = Prompt::of(&Experiment::E1).unwrap().render(&task(Experiment::E1, None), &later).unwrap().user;
     assert!(user.contains("the previous action was 6;") && !user.contains("went up"), "{user}");
 }

@@ -24,8 +24,8 @@ use crate::harness::traces::{open, write_trace};
 use crate::painted::ready;
 
 /// Records an episode; agents that look at nothing need no eye.
-fn record(config: &WorldConfig, eye: Option<&RefCell<Camera>>, agent: Scripted, key: Key) -> Episode {
-    let scene = Scene::draw(config, key.experiment, key.seed, key.run).unwrap();
+fn record(config: &WorldConfig, eye: Option<&RefCell<Camera>>, agent: Scripted, key: &Key) -> Episode {
+    let scene = Scene::draw(config, key.experiment.clone(), key.seed, key.run).unwrap();
     let mut player = agent.agent(&task(config, &scene, key));
     let episode = head(config, &scene, key, &Subject::of(agent.name()));
     let mut world = World::new(config, scene).unwrap();
@@ -54,10 +54,10 @@ pub fn record_in(config: &WorldConfig, plan: &[(Scripted, Key)], threads: usize)
                 });
                 while let Some((agent, key)) = plan.get(next.fetch_add(1, Ordering::Relaxed)) {
                     let looks = !matches!(agent, Scripted::Frozen | Scripted::Random);
-                    let shape = config.of(key.experiment).body.shape;
+                    let shape = config.of(&key.experiment).body.shape;
                     let (_, eye) = eyes.iter().find(|(known, _)| *known == shape).unwrap();
-                    let episode = record(config, looks.then_some(eye), *agent, *key);
-                    let at = plan.iter().position(|planned| planned == &(*agent, *key)).unwrap();
+                    let episode = record(config, looks.then_some(eye), *agent, key);
+                    let at = plan.iter().position(|planned| planned.0 == *agent && planned.1 == *key).unwrap();
                     episodes.lock().unwrap()[at] = Some(episode);
                 }
             });

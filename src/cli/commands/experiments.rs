@@ -6,8 +6,7 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::{experiments, output};
+use crate::cli::{Failure, Outcome, experiments, output};
 use exact::escape::visible;
 use exact::suggest::hint;
 use world::experiment::explain::explained;
@@ -80,20 +79,20 @@ fn placed(file: &Path) -> Result<Vec<Loaded>, Failure> {
 fn check(file: &Path, json: bool) -> Result<Outcome, Failure> {
     let loaded = placed(file)?;
     if json {
-        return answer(loaded.iter().map(|one| one.experiment));
+        return answer(loaded.iter().map(|one| &one.experiment));
     }
     let mut out = io::stdout().lock();
     writeln!(out, "{}: no fault", visible(&file.display().to_string()))?;
     for one in &loaded {
-        let (experiment, templates) = (one.experiment, one.experiment.templates());
+        let (experiment, templates) = (&one.experiment, one.experiment.templates());
         writeln!(out, "  {}: {}", experiment.name(), visible(&experiment.title))?;
         writeln!(out, "    prompt {}, sha256 {}", visible(&experiment.prompt), templates.hash())?;
     }
     Ok(Outcome::Done)
 }
 
-fn answer(experiments: impl Iterator<Item = Experiment>) -> Result<Outcome, Failure> {
-    output::print_json(&ExperimentsAnswer { experiments: experiments.map(|one| (*one).clone()).collect() })
+fn answer<'a>(experiments: impl Iterator<Item = &'a Experiment>) -> Result<Outcome, Failure> {
+    output::print_json(&ExperimentsAnswer { experiments: experiments.map(|one| (**one).clone()).collect() })
 }
 
 fn explain(path: &Path, json: bool) -> Result<Outcome, Failure> {
@@ -105,11 +104,10 @@ fn explain(path: &Path, json: bool) -> Result<Outcome, Failure> {
         Err(unknown) => return Err(unknown_name(&unknown)),
     };
     if json {
-        return answer(experiments.into_iter());
+        return answer(experiments.iter());
     }
-    let texts: Vec<String> = experiments.into_iter().map(explained).collect();
-    writeln!(io::stdout().lock(), "{}", texts.join("\n"))?;
-    Ok(Outcome::Done)
+    let texts: Vec<String> = experiments.iter().map(explained).collect();
+    output::plain(texts.join("\n") + "\n")
 }
 
 fn show(name: Option<&str>) -> Result<Outcome, Failure> {

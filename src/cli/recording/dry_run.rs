@@ -62,7 +62,6 @@ pub struct RequestForecast {
 }
 
 impl ForecastAnswer {
-    /// The forecast for the remaining episodes.
     pub fn of(
         subject: &Subject,
         asked: usize,
@@ -75,7 +74,7 @@ impl ForecastAnswer {
             asked,
             found: asked - todo.len(),
             episodes: todo.iter().map(|key| key.episode_id(subject)).collect(),
-            steps_at_most: todo.iter().map(|key| u64::from(config.of(key.experiment).episode.steps)).sum(),
+            steps_at_most: todo.iter().map(|key| u64::from(config.of(&key.experiment).episode.steps)).sum(),
             requests,
         }
     }
@@ -97,10 +96,10 @@ impl RequestForecast {
         let mut forecast = Self::default();
         for key in todo {
             let answered = vlm.answered(&key.file_stem(subject))?;
-            let left = u64::from(config.of(key.experiment).episode.steps).saturating_sub(answered);
+            let left = u64::from(config.of(&key.experiment).episode.steps).saturating_sub(answered);
             forecast.answered += answered;
             forecast.at_most += left;
-            forecast.prompt_tokens += left * estimate::prompt_tokens(vlm.choice(), key.experiment, view)?;
+            forecast.prompt_tokens += left * estimate::prompt_tokens(vlm.choice(), &key.experiment, view)?;
             forecast.typical_requests +=
                 typical.map_or(left, |typical| left.min(rounded(typical.steps).saturating_sub(answered)));
         }
@@ -154,7 +153,6 @@ pub(crate) fn tell_all(out: &mut impl io::Write, answers: &[ForecastAnswer]) -> 
     writeln!(out, "; about {}, one model after the other", time(requests.iter().map(|requests| requests.seconds).sum()))
 }
 
-/// Prints a forecast for people.
 pub(crate) fn tell(out: &mut impl io::Write, answer: &ForecastAnswer) -> io::Result<()> {
     let (to_do, steps) = (counted(answer.episodes.len() as u64, "episode"), counted(answer.steps_at_most, "step"));
     write!(out, "{}: would record {to_do}, at most {steps}", visible(&answer.model))?;

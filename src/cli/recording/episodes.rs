@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::cli::outcome::Failure;
+use crate::cli::Failure;
 use world::agent::Planned;
 use world::experiment::Experiment;
 use world::record::error::StoreError;
@@ -18,22 +18,21 @@ pub struct Episodes {
 impl Episodes {
     pub fn of(
         plan: &Plan,
-        recorded: impl Fn(Experiment) -> Result<BTreeSet<Place>, StoreError>,
+        recorded: impl Fn(&Experiment) -> Result<BTreeSet<Place>, StoreError>,
     ) -> Result<Self, Failure> {
         let planned = plan.keys();
         let mut todo = Vec::with_capacity(planned.len());
         for experiment in &plan.experiments {
-            let done = recorded(*experiment).map_err(Failure::input)?;
+            let done = recorded(experiment).map_err(Failure::input)?;
             let own = planned.iter().filter(|key| key.experiment == *experiment);
-            todo.extend(own.filter(|key| !done.contains(&(key.seed, key.run, key.repetition))));
+            todo.extend(own.filter(|key| !done.contains(&(key.seed, key.run, key.repetition))).cloned());
         }
         Ok(Self { planned, todo })
     }
 
-    /// The planned episodes that are already recorded.
     pub fn found(&self) -> Vec<Key> {
         let todo: BTreeSet<&Key> = self.todo.iter().collect();
-        self.planned.iter().copied().filter(|key| !todo.contains(key)).collect()
+        self.planned.iter().filter(|key| !todo.contains(key)).cloned().collect()
     }
 
     /// All planned episodes, in the form for players.

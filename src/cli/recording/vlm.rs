@@ -7,8 +7,7 @@ use std::time::Duration;
 
 use tokio::runtime::Runtime;
 
-use crate::cli::outcome::Failure;
-use crate::cli::output;
+use crate::cli::{Failure, output};
 use exact::escape::visible;
 use trace::model_id::OWN_SERVER;
 use world::agent::vlm::limits::{Account, Limits, Spend};
@@ -19,7 +18,7 @@ use world::agent::vlm::secrets::Secret;
 use world::agent::vlm::wire_format::{Dialect, Effort};
 use world::agent::vlm::{OnOutage, Tier, Vlm};
 use world::agent::{Agent, Lost, Player, Task};
-use world::experiment::Experiment;
+use world::experiment::Spec;
 use world::record::plan::slug;
 
 /// A model, who serves it, and what a recording with it may spend.
@@ -89,13 +88,11 @@ pub struct VlmArgs {
     cassette: Option<PathBuf>,
 }
 
-/// The folder of journals inside a recording's folder.
 const JOURNALS: &str = "journal";
 /// The folder of spending records, beside it.
 const LEDGERS: &str = "ledger";
 
 impl VlmArgs {
-    /// The typed name.
     pub fn name(&self) -> Option<&str> {
         self.model.first().map(String::as_str)
     }
@@ -149,13 +146,12 @@ impl VlmArgs {
     }
 
     /// Asks what the model supports, with the schema of an experiment and a frame of this size.
-    pub fn probe(&self, experiment: Experiment, view: [u32; 2]) -> Result<ProbeAnswer, Failure> {
+    pub fn probe(&self, experiment: &Spec, view: [u32; 2]) -> Result<ProbeAnswer, Failure> {
         let choice = self.choice()?;
         let provider = self.provider(&choice)?;
         Ok(network()?.block_on(probe(choice, &provider, experiment, view)))
     }
 
-    /// The requests per minute, if the user sets a limit.
     pub fn requests_per_minute(&self) -> Option<u32> {
         self.requests_per_minute
     }

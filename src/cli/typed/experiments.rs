@@ -5,7 +5,7 @@ use std::path::Path;
 #[cfg(feature = "sim")]
 use clap::builder::{OsStringValueParser, TypedValueParser};
 
-use crate::cli::outcome::Failure;
+use crate::cli::Failure;
 use world::experiment::load::{self, FileError, Loaded};
 #[cfg(feature = "sim")]
 use {
@@ -21,11 +21,10 @@ pub fn parser() -> impl TypedValueParser<Value = Experiments> {
     OsStringValueParser::new().try_map(|typed| Experiments::of(&typed))
 }
 
-/// The experiments of a file.
 pub fn load(path: &Path) -> Result<Vec<Loaded>, Failure> {
     load::load(path).map_err(|error| match error {
-        FileError::Faults(faults) => Failure::of_faults(&faults),
-        other => Failure::input(other),
+        FileError::Faults(faults) => Failure::Faults(faults),
+        unreadable @ FileError::Unreadable { .. } => Failure::input(unreadable),
     })
 }
 
@@ -36,12 +35,12 @@ pub fn placed(path: &Path, config: &WorldConfig) -> Result<Vec<Loaded>, Failure>
     let faults: Vec<Fault> = loaded
         .iter()
         .filter_map(|one| {
-            let crowded = placement::crowded(config, one.experiment)?;
+            let crowded = placement::crowded(config, &one.experiment)?;
             let place = crowded.mirror.and_then(|at| one.mirrors.get(at)).unwrap_or(&one.cubes);
             Some(Fault::new(place.clone(), crowded.what).help(crowded.help))
         })
         .collect();
-    if faults.is_empty() { Ok(loaded) } else { Err(Failure::of_faults(&Faults(faults))) }
+    if faults.is_empty() { Ok(loaded) } else { Err(Failure::Faults(Faults(faults))) }
 }
 
 /// The requested experiments, in order, each once.
@@ -50,18 +49,19 @@ pub fn asked(asked: &Experiments, config: &WorldConfig) -> Result<Vec<Experiment
     let mut all: Vec<Experiment> = Vec::new();
     for named in &asked.0 {
         let found = match named {
-            Named::BuiltIn(experiment) => vec![*experiment],
+            Named::BuiltIn(experiment) => vec![experiment.clone()],
             Named::File(path) => placed(path, config)?.into_iter().map(|one| one.experiment).collect(),
         };
         for experiment in found {
-            if all.iter().any(|other| *other != experiment && other.name() == experiment.name()) {
-                let name = experiment.name();
-                return Err(Failure::input(format!(
-                    "two different experiments are called `{name}`; give one another name"
-                )));
-            }
-            if !all.contains(&experiment) {
-                all.push(experiment);
+            let name = experiment.name();
+            match all.iter().find(|other| other.name() == name) {
+                None => all.push(experiment.at_place(all.len())),
+                Some(same) if **same == *experiment => {}
+                Some(_) => {
+                    return Err(Failure::input(format!(
+                        "two different experiments are called `{name}`; give one another name"
+                    )));
+                }
             }
         }
     }

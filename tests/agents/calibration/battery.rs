@@ -117,9 +117,9 @@ fn check_frozen_and_guesser(shown: &Shown<'_>) {
 fn a_few_episodes_of_the_battery_already_show_who_is_who() {
     let [delayed, decoy, window, mark] = experiments(["delayed", "decoy", "window", "mark"]);
     let plan = [
-        episodes(Scripted::Oracle, &[delayed, decoy, window, mark], 1, 1),
-        episodes(Scripted::Mimic, &[decoy, window], 1, 1),
-        episodes(Scripted::Guesser, &[mark], 1, 2),
+        episodes(Scripted::Oracle, &[delayed, decoy.clone(), window.clone(), mark.clone()], 1, 1),
+        episodes(Scripted::Mimic, &[decoy, window.clone()], 1, 1),
+        episodes(Scripted::Guesser, std::slice::from_ref(&mark), 1, 2),
         episodes(Scripted::Frozen, &[mark, window], 1, 1),
     ];
     let profiles = profiles(&plan.concat(), "battery");

@@ -68,12 +68,12 @@ fn built_in() -> Vec<Experiment> {
 }
 
 /// The body of an episode's first request, and the rendered prompt.
-fn body(dialect: Dialect, experiment: Experiment) -> (Value, Rendered) {
+fn body(dialect: Dialect, experiment: &Experiment) -> (Value, Rendered) {
     let server = Server::start(move |_, _| whole(dialect, &decision("w")));
     let bench = Bench::new(Limits::default());
     let vlm = bench.vlm(&server, dialect, OnOutage::Lose);
-    Bench::play_task(&vlm, task(experiment), "episode", 1).remove(0).unwrap();
-    let words = Prompt::of(experiment).unwrap().render(&task(experiment), &observation(1)).unwrap();
+    Bench::play_task(&vlm, task(experiment.clone()), "episode", 1).remove(0).unwrap();
+    let words = Prompt::of(experiment).unwrap().render(&task(experiment.clone()), &observation(1)).unwrap();
     (server.requests().remove(0).json(), words)
 }
 
@@ -103,7 +103,7 @@ fn strings(value: &Value) -> Vec<&str> {
 fn the_frame_comes_before_the_words_with_every_provider() {
     for dialect in PROVIDERS {
         for experiment in built_in() {
-            let (body, words) = body(dialect, experiment);
+            let (body, words) = body(dialect, &experiment);
             let [image, text] = parts(dialect, &body) else { panic!("{dialect:?}: {body}") };
             assert_eq!(text["text"], words.user.as_str(), "{dialect:?}");
             let is_frame = |text: &&str| text.contains("iVBORw0KGgo");
@@ -116,7 +116,7 @@ fn the_frame_comes_before_the_words_with_every_provider() {
 fn no_word_about_the_task_is_sent_but_the_prompt_and_the_keys_of_the_reply() {
     for dialect in PROVIDERS {
         for experiment in built_in() {
-            let (body, words) = body(dialect, experiment);
+            let (body, words) = body(dialect, &experiment);
             let structure = reply::structure(&experiment);
             let keys: BTreeSet<&str> =
                 structure["properties"].as_object().unwrap().keys().map(String::as_str).collect();

@@ -91,7 +91,7 @@ fn a_body_is_within_its_cylinder_at_every_stride() {
 fn everything_is_in_the_room() {
     let mut chance = Rng::of(8, 8, 8);
     for (at, experiment) in Experiment::PAPER.into_iter().cycle().take(25).enumerate() {
-        let mut world = world(experiment, i32::try_from(at).unwrap());
+        let mut world = world(experiment.clone(), i32::try_from(at).unwrap());
         for _ in 0..20 {
             scatter(&mut world, &mut chance);
             let half = world.config().room.size / 2.0 - world.config().mirror.gap;

@@ -76,7 +76,7 @@ fn kind(name: &str) -> Experiment {
     let source = Source { name: "kinds".to_owned(), text: KINDS.to_owned() };
     let entries = file::read(source, None, &[]).unwrap();
     let entry = entries.into_iter().find(|entry| entry.known.spec.name == name).unwrap();
-    Experiment::register(entry.known).unwrap()
+    Experiment::of_file(0, entry.known)
 }
 
 /// Mannequins: the limbs of humanoids are a few pixels wide, and `truth` has bounds of their own for them.
@@ -127,7 +127,7 @@ fn holds_against_pictures(name: &str) {
     let mut chance = Rng::of(77, 1, 2);
     let mut overlaps: Vec<(f64, Shown)> = Vec::new();
     for seed in 0..POSES / 20 {
-        let mut world = world(experiment, 1 + seed);
+        let mut world = world(experiment.clone(), 1 + seed);
         for _ in 0..20 {
             wander(&mut world, &mut chance);
             let (cast, drawn) = (world.labels().clone(), eye.labels(&world).unwrap());
@@ -163,12 +163,12 @@ fn a_textured_room_shows_the_same_otherwise() {
     need::drawing();
     let [textured, plain] = ["textured", "mirrors"].map(kind);
     let config = config();
-    let scene = Scene::draw(&config, textured, 1, 1).unwrap();
-    let mut looks = [textured, plain].map(|experiment| {
-        let scene = Scene { experiment, ..scene.clone() };
+    let scene = Scene::draw(&config, textured.clone(), 1, 1).unwrap();
+    let mut looks = [&textured, &plain].map(|experiment| {
+        let scene = Scene { experiment: experiment.clone(), ..scene.clone() };
         World::new(&config, scene).unwrap()
     });
-    let mut eyes = [textured, plain].map(|experiment| Camera::new(&config.of(experiment)).unwrap());
+    let mut eyes = [textured, plain].map(|experiment| Camera::new(&config.of(&experiment)).unwrap());
     let mut differs = 0;
     for heading in 0..12 {
         let pose = Pose { heading: Heading::new(heading), ..looks[0].pose() };
@@ -394,7 +394,7 @@ fn the_mark_of_the_mark_test_can_be_seen_well_from_somewhere() {
     let config = config();
     let experiment = Experiment::parse("mark").unwrap();
     for (seed, run) in (1..=3).flat_map(|seed| (1..=7).map(move |run| (seed, run))) {
-        let mut world = World::new(&config, Scene::draw(&config, experiment, seed, run).unwrap()).unwrap();
+        let mut world = World::new(&config, Scene::draw(&config, experiment.clone(), seed, run).unwrap()).unwrap();
         let mirror = world.scene().mirror;
         let [x, y] = mirror.center(&config);
         let heading = mirror.heading();

@@ -78,7 +78,7 @@ fn no_body_has_the_colour_of_the_mark_or_of_the_hand() {
 #[test]
 fn visibility_of_hands_agrees_with_pictures_and_mujocos_rays() {
     need::drawing();
-    let config = WorldConfig::default().of(named("reach-mirror"));
+    let config = WorldConfig::default().of(&named("reach-mirror"));
     let mut eye = LabelCamera::new(&config, 640, 480).unwrap();
     for run in 1..=2 {
         let mut world = world("reach-mirror", 1, run);
@@ -185,8 +185,7 @@ fn a_hand_that_has_no_place_so_far_from_the_mark_is_a_fault_of_its_file() {
             .replace("least = 6", &format!("least = {least}"))
             .replace("prompt = \"far\"", "prompt = \"reach-scheme\"");
         std::fs::write(&path, text).unwrap();
-        let experiment = load::load(&path).unwrap()[0].experiment;
-        placement::crowded(&WorldConfig::default(), experiment)
+        placement::crowded(&WorldConfig::default(), &load::load(&path).unwrap()[0].experiment)
     };
     assert_eq!(read(8), None);
     let fault = read(20).unwrap();

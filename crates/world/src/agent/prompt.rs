@@ -12,7 +12,7 @@ use trace::episode::Action;
 
 #[derive(Debug)]
 pub struct Prompt {
-    environment: Environment<'static>,
+    experiment: Experiment,
     hash: String,
 }
 
@@ -25,14 +25,20 @@ pub struct Rendered {
 }
 
 impl Prompt {
-    pub fn of(experiment: Experiment) -> Result<Self, Error> {
+    pub fn of(experiment: &Experiment) -> Result<Self, Error> {
+        let prompt = Self { experiment: experiment.clone(), hash: experiment.templates().hash() };
+        prompt.environment()?;
+        Ok(prompt)
+    }
+
+    /// The parsed templates; parsing them for each step is cheap beside waiting for an answer.
+    fn environment(&self) -> Result<Environment<'_>, Error> {
         let mut environment = Environment::new();
         environment.set_undefined_behavior(UndefinedBehavior::Strict);
-        let templates = experiment.templates();
-        for (name, source) in &templates.all {
+        for (name, source) in &self.experiment.templates().all {
             environment.add_template(name, source)?;
         }
-        Ok(Self { environment, hash: templates.hash() })
+        Ok(environment)
     }
 
     /// SHA-256 of the templates, 64 hexadecimal digits.
@@ -41,7 +47,11 @@ impl Prompt {
     }
 
     pub fn render(&self, task: &Task, observation: &Observation) -> Result<Rendered, Error> {
-        let system = self.fill(
+        let environment = self.environment()?;
+        let fill = |name: &str, values: Value| -> Result<String, Error> {
+            environment.get_template(name)?.render(values).map(|text| text.trim_end().to_owned())
+        };
+        let system = fill(
             "system",
             context! {
                 stated_color => task.stated_color.as_deref(),
@@ -50,7 +60,7 @@ impl Prompt {
             },
         )?;
         let history = observation.history.as_ref();
-        let history_text = self.fill(
+        let history_text = fill(
             "history",
             context! {
                 first => history.is_none(),
@@ -59,7 +69,7 @@ impl Prompt {
                 steps => observation.past.iter().map(step).collect::<Vec<_>>(),
             },
         )?;
-        let position_text = self.fill(
+        let position_text = fill(
             "position",
             context! {
                 x => rounded(observation.x, 2),
@@ -69,8 +79,8 @@ impl Prompt {
                 budget => task.step_budget,
             },
         )?;
-        let warning = self.fill("warning", context! {})?;
-        let user = self.fill(
+        let warning = fill("warning", context! {})?;
+        let user = fill(
             "user",
             context! {
                 history_text,
@@ -82,10 +92,6 @@ impl Prompt {
             },
         )?;
         Ok(Rendered { system, user })
-    }
-
-    fn fill(&self, name: &str, values: Value) -> Result<String, Error> {
-        self.environment.get_template(name)?.render(values).map(|text| text.trim_end().to_owned())
     }
 }
 

@@ -10,7 +10,7 @@ use super::spec::{
 use exact::escape::visible;
 
 /// The output of `explain`: what an experiment shows, asks and decides.
-pub fn explained(experiment: Experiment) -> String {
+pub fn explained(experiment: &Experiment) -> String {
     let mut text = format!("{}: {}\n", experiment.name(), visible(&experiment.title));
     let mut line = |name: &str, words: String| {
         let _ = writeln!(text, "  {name:<10}{words}");
@@ -104,7 +104,7 @@ pub fn explained(experiment: Experiment) -> String {
     text
 }
 
-fn body(experiment: Experiment) -> String {
+fn body(experiment: &Experiment) -> String {
     let layout = &experiment.layout;
     let colors: Vec<&str> = layout.palette.iter().map(|color| color.name()).collect();
     let drawn = match layout.colors {
@@ -135,7 +135,7 @@ fn cubes(cubes: Cubes) -> String {
 
 /// The occlusion in scenes of the built-in world.
 #[cfg(feature = "sim")]
-fn occlusion(experiment: Experiment) -> Option<String> {
+fn occlusion(experiment: &Experiment) -> Option<String> {
     use crate::sim::{config::WorldConfig, placement::Occlusion};
     let has_clutter = matches!(experiment.layout.cubes, Cubes::Clutter { .. });
     let found = has_clutter.then(|| Occlusion::of(&WorldConfig::default(), experiment)).flatten()?;
@@ -150,7 +150,7 @@ fn occlusion(experiment: Experiment) -> Option<String> {
 
 /// A build without the world cannot draw scenes.
 #[cfg(not(feature = "sim"))]
-const fn occlusion(_: Experiment) -> Option<String> {
+const fn occlusion(_: &Experiment) -> Option<String> {
     None
 }
 

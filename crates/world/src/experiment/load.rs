@@ -1,11 +1,11 @@
-//! Loads experiment files and registers their experiments.
+//! Loads experiment files.
 
 use std::io;
 use std::path::{Path, PathBuf};
 
 use super::file;
 use super::table::Entry;
-use super::{Experiment, TooMany, built_in_specs};
+use super::{Experiment, built_in_specs};
 use exact::budget::Limit;
 use exact::input;
 use toml_spec::{Faults, Place, Source};
@@ -24,11 +24,9 @@ pub enum FileError {
     Unreadable { path: PathBuf, source: io::Error },
     #[error(transparent)]
     Faults(#[from] Faults),
-    #[error(transparent)]
-    TooMany(#[from] TooMany),
 }
 
-/// A registered experiment, and its locations in its file.
+/// An experiment of a file, and its locations there.
 #[derive(Clone, Debug)]
 pub struct Loaded {
     pub experiment: Experiment,
@@ -39,16 +37,17 @@ pub struct Loaded {
     pub name: Place,
 }
 
-/// Loads the experiments of a file and registers them, in order.
+/// Loads the experiments of a file, in order.
 pub fn load(path: &Path) -> Result<Vec<Loaded>, FileError> {
     let text = input::text(path, LARGEST).map_err(|source| FileError::Unreadable { path: path.to_owned(), source })?;
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let source = Source { name: path.display().to_string(), text };
     let entries = file::read(source, Some(folder), &built_in_specs())?;
-    entries
-        .into_iter()
-        .map(|Entry { known, name, cubes, mirrors }| {
-            Ok(Loaded { experiment: Experiment::register(known)?, cubes, mirrors, name })
-        })
-        .collect()
+    let loaded = entries.into_iter().enumerate().map(|(place, Entry { known, name, cubes, mirrors })| Loaded {
+        experiment: Experiment::of_file(place, known),
+        cubes,
+        mirrors,
+        name,
+    });
+    Ok(loaded.collect())
 }

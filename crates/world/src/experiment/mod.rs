@@ -1,7 +1,7 @@
 //! Experiments as data: the world, the prompt, and the decision.
 //!
 //! ```text
-//! assets/experiments/*.toml, a lab's own file ──► file (every fault underlined) ──► Spec ──► Experiment (a handle)
+//! assets/experiments/*.toml, a lab's own file ──► file (every fault underlined) ──► Spec ──► Experiment
 //!                                                   └── prompt (a folder of templates, hashed)
 //! ```
 //!
@@ -23,9 +23,11 @@ pub mod schema;
 pub mod spec;
 mod table;
 
+use std::cmp::Ordering;
 use std::fmt;
+use std::hash::{Hash, Hasher};
 use std::ops::Deref;
-use std::sync::{LazyLock, PoisonError, RwLock};
+use std::sync::{Arc, LazyLock};
 
 use serde::{Serialize, Serializer};
 
@@ -33,16 +35,24 @@ pub use built_in::{built_in, built_in_names};
 use prompt::Templates;
 pub use spec::Spec;
 
-/// The maximum number of experiments in a process: hostile files must not fill its memory.
-const MOST: usize = 4096;
-
-/// A registered experiment: a handle to its [`Spec`], as cheap as a number.
+/// An experiment: its [`Spec`] and its prompt. A clone shares both.
 ///
-/// Experiments are ordered by registration: the paper's five first, then those of files.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct Experiment(u16);
+/// Experiments are equal if their [`Spec`]s and places are. The built-in ones are first, in their order, then those of
+/// files, by place.
+#[derive(Clone)]
+pub struct Experiment(Origin);
 
-/// A registered experiment.
+#[derive(Clone)]
+enum Origin {
+    /// The index in [`BUILT_IN`].
+    BuiltIn(usize),
+    File {
+        place: usize,
+        known: Arc<Known>,
+    },
+}
+
+/// The content of an experiment.
 #[derive(Debug)]
 pub struct Known {
     pub spec: Spec,
@@ -50,11 +60,8 @@ pub struct Known {
     pub templates: Templates,
 }
 
-/// Every experiment of this process. The list only grows, by distinct experiments: reading a file twice adds nothing.
-static KNOWN: LazyLock<RwLock<Vec<&'static Known>>> = LazyLock::new(|| {
-    let all = built_in::all().into_iter().map(|known| -> &'static Known { Box::leak(Box::new(known)) });
-    RwLock::new(all.collect())
-});
+/// The built-in experiments, parsed once.
+static BUILT_IN: LazyLock<Vec<Known>> = LazyLock::new(built_in::all);
 
 /// An unknown experiment name.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -64,84 +71,85 @@ pub struct UnknownExperiment {
     pub name: String,
 }
 
-/// Too many experiments for a process.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("more than {MOST} experiments in one process: use fewer files at once")]
-pub struct TooMany;
-
 impl Experiment {
     /// A mirror and three cubes.
-    pub const E1: Self = Self(0);
+    pub const E1: Self = Self(Origin::BuiltIn(0));
     /// As E1 without the mirror.
-    pub const E2: Self = Self(1);
+    pub const E2: Self = Self(Origin::BuiltIn(1));
     /// As E1 with a false colour stated.
-    pub const E3: Self = Self(2);
+    pub const E3: Self = Self(Origin::BuiltIn(2));
     /// A mirror, three cubes and one to six others.
-    pub const E4: Self = Self(3);
+    pub const E4: Self = Self(Origin::BuiltIn(3));
     /// A mirror, one to six others and clutter; no cube to select.
-    pub const E5: Self = Self(4);
+    pub const E5: Self = Self(Origin::BuiltIn(4));
 
     pub const PAPER: [Self; 5] = [Self::E1, Self::E2, Self::E3, Self::E4, Self::E5];
 
     /// The built-in experiment of this name.
     pub fn parse(name: &str) -> Result<Self, UnknownExperiment> {
         let at = built_in_names().iter().position(|known| *known == name);
-        at.and_then(|at| u16::try_from(at).ok()).map(Self).ok_or_else(|| UnknownExperiment { name: name.to_owned() })
+        at.map(|at| Self(Origin::BuiltIn(at))).ok_or_else(|| UnknownExperiment { name: name.to_owned() })
     }
 
-    /// Registers an experiment; returns the existing one if it is equal.
-    pub fn register(known: Known) -> Result<Self, TooMany> {
-        let mut all = KNOWN.write().unwrap_or_else(PoisonError::into_inner);
-        let same = |other: &&Known| other.spec == known.spec && other.templates == known.templates;
-        let at = match all.iter().position(same) {
-            Some(at) => at,
-            None if all.len() >= MOST => return Err(TooMany),
-            None => {
-                all.push(Box::leak(Box::new(known)));
-                all.len() - 1
-            }
-        };
-        u16::try_from(at).map(Self).map_err(|_| TooMany)
+    /// An experiment of a file, at this place among the others of files.
+    pub fn of_file(place: usize, known: Known) -> Self {
+        Self(Origin::File { place, known: Arc::new(known) })
     }
 
-    /// The experiment that a trace's footer declares: the equal registered one, or one without a prompt.
-    pub fn of_footer(spec: Spec) -> Result<Self, TooMany> {
+    /// The experiment that a trace's footer declares: the equal built-in one, or one without a prompt.
+    pub fn of_footer(spec: Spec) -> Self {
         // Older footers, which lack the definitions, differ in nothing else.
         let unnamed = |known: &Spec| spec.definitions.is_none() && Spec { definitions: None, ..known.clone() } == spec;
-        let same = {
-            let all = KNOWN.read().unwrap_or_else(PoisonError::into_inner);
-            all.iter()
-                .position(|known| known.spec == spec || unnamed(&known.spec))
-                .and_then(|at| u16::try_from(at).ok())
-        };
-        same.map_or_else(|| Self::register(Known { spec, templates: Templates::default() }), |at| Ok(Self(at)))
+        match BUILT_IN.iter().position(|known| known.spec == spec || unnamed(&known.spec)) {
+            Some(at) => Self(Origin::BuiltIn(at)),
+            None => Self::of_file(0, Known { spec, templates: Templates::default() }),
+        }
     }
 
-    fn known(self) -> &'static Known {
-        KNOWN.read().unwrap_or_else(PoisonError::into_inner)[usize::from(self.0)]
+    /// The same experiment; one of a file gets this place.
+    #[must_use]
+    pub fn at_place(self, place: usize) -> Self {
+        match self.0 {
+            Origin::File { known, .. } => Self(Origin::File { place, known }),
+            Origin::BuiltIn(_) => self,
+        }
+    }
+
+    fn known(&self) -> &Known {
+        match &self.0 {
+            Origin::BuiltIn(at) => &BUILT_IN[*at],
+            Origin::File { known, .. } => known,
+        }
+    }
+
+    /// The built-in index, or the place after all built-in ones.
+    fn place(&self) -> usize {
+        match self.0 {
+            Origin::BuiltIn(at) => at,
+            Origin::File { place, .. } => BUILT_IN.len() + place,
+        }
     }
 
     /// Its name in traces and files.
-    pub fn name(self) -> &'static str {
+    pub fn name(&self) -> &str {
         &self.known().spec.name
     }
 
-    pub fn templates(self) -> &'static Templates {
+    pub fn templates(&self) -> &Templates {
         &self.known().templates
     }
 
     /// A number for an agent's randomness: differs between experiments.
-    pub fn number(self) -> u64 {
-        match self {
-            Self(at @ 0..5) => u64::from(at) + 1,
+    pub fn number(&self) -> u64 {
+        match self.0 {
+            Origin::BuiltIn(at @ 0..5) => at as u64 + 1,
             _ => number_of(self.name()) >> 8,
         }
     }
 }
 
 fn built_in_specs() -> Vec<&'static Spec> {
-    let names = built_in_names().into_iter();
-    names.filter_map(|name| Experiment::parse(name).ok()).map(|experiment| &experiment.known().spec).collect()
+    BUILT_IN.iter().map(|known| &known.spec).collect()
 }
 
 /// A number derived from a name: the beginning of its SHA-256.
@@ -158,6 +166,35 @@ impl Deref for Experiment {
     }
 }
 
+impl Ord for Experiment {
+    fn cmp(&self, other: &Self) -> Ordering {
+        let is_same = std::ptr::eq(self.known(), other.known());
+        let text = |one: &Self| serde_json::to_string(&**one).unwrap_or_default();
+        let by_text = || if is_same { Ordering::Equal } else { text(self).cmp(&text(other)) };
+        self.place().cmp(&other.place()).then_with(by_text)
+    }
+}
+
+impl PartialOrd for Experiment {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Experiment {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Experiment {}
+
+impl Hash for Experiment {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        self.place().hash(state);
+    }
+}
+
 impl fmt::Debug for Experiment {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())
@@ -167,14 +204,6 @@ impl fmt::Debug for Experiment {
 impl Serialize for Experiment {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_str(self.name())
-    }
-}
-
-impl std::str::FromStr for Experiment {
-    type Err = UnknownExperiment;
-
-    fn from_str(name: &str) -> Result<Self, Self::Err> {
-        Self::parse(name)
     }
 }
 

@@ -2,8 +2,8 @@
 
 use std::cell::RefCell;
 
-use crate::experiment::Experiment;
 use crate::experiment::spec::{Body, Look};
+use crate::experiment::{Experiment, Spec};
 use crate::sim::camera::{Camera, CameraError};
 use crate::sim::config::WorldConfig;
 
@@ -12,7 +12,7 @@ pub(super) struct Eyes(Vec<(Kind, RefCell<Camera>)>);
 
 type Kind = ([u32; 2], Look, Body);
 
-fn kind(config: &WorldConfig, experiment: Experiment) -> Kind {
+fn kind(config: &WorldConfig, experiment: &Spec) -> Kind {
     let WorldConfig { eye, look, body, .. } = config.of(experiment);
     ([eye.width, eye.height_px], look, body.shape)
 }
@@ -24,15 +24,15 @@ impl Eyes {
     ) -> Result<Self, CameraError> {
         let mut eyes: Vec<(Kind, RefCell<Camera>)> = Vec::new();
         for experiment in experiments {
-            let kind = kind(config, experiment);
+            let kind = kind(config, &experiment);
             if eyes.iter().all(|(known, _)| *known != kind) {
-                eyes.push((kind, RefCell::new(Camera::new(&config.of(experiment))?)));
+                eyes.push((kind, RefCell::new(Camera::new(&config.of(&experiment))?)));
             }
         }
         Ok(Self(eyes))
     }
 
-    pub(super) fn eye(&self, config: &WorldConfig, experiment: Experiment) -> &RefCell<Camera> {
+    pub(super) fn eye(&self, config: &WorldConfig, experiment: &Spec) -> &RefCell<Camera> {
         let kind = kind(config, experiment);
         let found = self.0.iter().find(|(known, _)| *known == kind);
         &found.expect("there is an eye for each experiment of the recording").1

@@ -36,13 +36,13 @@ impl Recordings {
         condition: Option<&str>,
         registration: Option<&Registration>,
     ) -> Self {
-        let of = |experiment: &Experiment| recording(*experiment, config, player, condition, registration);
-        Self(experiments.iter().map(|experiment| (*experiment, of(experiment))).collect())
+        let of = |experiment: &Experiment| recording(experiment, config, player, condition, registration);
+        Self(experiments.iter().map(|experiment| (experiment.clone(), of(experiment))).collect())
     }
 
     /// The metadata of an experiment; null if it is not recorded.
-    pub fn of(&self, experiment: Experiment) -> &Value {
-        self.0.get(&experiment).unwrap_or(&Value::Null)
+    pub fn of(&self, experiment: &Experiment) -> &Value {
+        self.0.get(experiment).unwrap_or(&Value::Null)
     }
 }
 
@@ -50,22 +50,21 @@ impl Recordings {
 ///
 /// Episodes with equal scenes are pairs. A seed is no cluster: each of its runs has a separate room.
 fn recording(
-    experiment: Experiment,
+    experiment: &Spec,
     config: &WorldConfig,
     player: &dyn Player,
     condition: Option<&str>,
     registration: Option<&Registration>,
 ) -> Value {
     let config = &config.of(experiment);
-    let spec: &Spec = &experiment;
     let mut recording = json!({
         VERSION_KEY: VERSION,
         "kind": "recording",
         "design": { "pairs": "scene", "cluster": null },
         "condition": condition.unwrap_or("default"),
         "scene_version": scene_version(config),
-        "experiment": spec,
-        "reply_schema_hash": reply::structure_hash(&experiment),
+        "experiment": experiment,
+        "reply_schema_hash": reply::structure_hash(experiment),
         "palette": Color::ALL.map(Color::name),
         "agent": player.description(),
         "view": { "width": config.eye.width, "height": config.eye.height_px, "fov_y": config.eye.fovy },

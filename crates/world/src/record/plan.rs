@@ -26,7 +26,7 @@ pub struct Plan {
 }
 
 /// The key of an episode within a model's recordings.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Key {
     pub experiment: Experiment,
     pub seed: i32,
@@ -66,19 +66,19 @@ impl Key {
     }
 
     /// The episode's id: `E1/oracle/s1/r3`, with a condition `E1/oracle@near/s1/r3`, repeated `E1/oracle/s1/r3/x2`.
-    pub fn episode_id(self, subject: &Subject) -> String {
+    pub fn episode_id(&self, subject: &Subject) -> String {
         let Self { experiment, seed, run, repetition } = self;
-        let again = if repetition > FIRST { format!("/x{repetition}") } else { String::new() };
+        let again = if *repetition > FIRST { format!("/x{repetition}") } else { String::new() };
         format!("{}/{}/s{seed}/r{run}{again}", experiment.name(), subject.slug())
     }
 
     /// The stem of the episode's file names: `E1-oracle-s1-r3`.
-    pub fn file_stem(self, subject: &Subject) -> String {
+    pub fn file_stem(&self, subject: &Subject) -> String {
         self.episode_id(subject).replace('/', "-")
     }
 
     /// The seed of the agent's randomness: differs between episodes, and from the world's seeds.
-    pub fn agent_seed(self) -> u64 {
+    pub fn agent_seed(&self) -> u64 {
         let part = |value: i32| u64::from(value.unsigned_abs());
         // Rotated, not shifted: the number of a user's own experiment has all bits.
         let experiment = self.experiment.number().rotate_left(56);
@@ -108,7 +108,7 @@ impl Plan {
         let all = self.experiments.iter().flat_map(move |experiment| {
             let scenes = (FIRST..=seeds).flat_map(move |seed| (FIRST..=runs).map(move |run| (seed, run)));
             scenes.flat_map(move |(seed, run)| {
-                (FIRST..=repeats).map(move |repetition| Key { experiment: *experiment, seed, run, repetition })
+                (FIRST..=repeats).map(move |repetition| Key { experiment: experiment.clone(), seed, run, repetition })
             })
         });
         all.enumerate().filter(|(at, _)| self.shard.has(*at)).map(|(_, key)| key).collect()
@@ -206,9 +206,9 @@ impl FromStr for Experiments {
                     found.insert(Named::BuiltIn(experiment(part)?));
                 }
                 Some((first, last)) => {
-                    let (first, last) = (experiment(first)?, experiment(last)?);
-                    let known: Vec<Experiment> = built_in_names().iter().copied().flat_map(Experiment::parse).collect();
-                    let range: Vec<Experiment> = known.into_iter().filter(|one| (first..=last).contains(one)).collect();
+                    let range = experiment(first)?..=experiment(last)?;
+                    let known = built_in_names().into_iter().flat_map(Experiment::parse);
+                    let range: Vec<Experiment> = known.filter(|one| range.contains(one)).collect();
                     if range.is_empty() {
                         return Err(fault());
                     }
@@ -259,7 +259,7 @@ mod tests {
     #[test]
     fn the_first_time_has_the_name_and_the_chances_that_it_always_had() {
         let first = Key::first(E1, 1, 3);
-        let again = Key { repetition: 2, ..first };
+        let again = Key { repetition: 2, ..first.clone() };
         let subject = Subject::of("oracle");
         assert_eq!(
             (first.episode_id(&subject), again.episode_id(&subject)),
@@ -267,7 +267,7 @@ mod tests {
         );
         assert_eq!(first.agent_seed(), (1 << 56) ^ (1 << 24) ^ 3 ^ 0x6d69_7272_6f72);
         let keys = Plan { experiments: vec![E1], seeds: 2, runs: 999, repeats: 99, shard: Shard::WHOLE }.keys();
-        let mut seeds: Vec<u64> = keys.iter().map(|key| key.agent_seed()).collect();
+        let mut seeds: Vec<u64> = keys.iter().map(Key::agent_seed).collect();
         seeds.sort_unstable();
         seeds.dedup();
         assert_eq!(seeds.len(), keys.len());

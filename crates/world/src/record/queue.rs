@@ -52,21 +52,21 @@ pub struct Complete {
 }
 
 impl Waiting {
-    fn end(&mut self, key: Key, lost: Option<LostEpisode>) {
-        let outcomes = self.experiments.entry(key.experiment).or_default();
+    fn end(&mut self, key: &Key, lost: Option<LostEpisode>) {
+        let outcomes = self.experiments.entry(key.experiment.clone()).or_default();
         match lost {
-            Some(lost) => outcomes.lost.push((key, lost)),
-            None => outcomes.recorded.push(key),
+            Some(lost) => outcomes.lost.push((key.clone(), lost)),
+            None => outcomes.recorded.push(key.clone()),
         }
-        self.count(key);
+        self.count(&key.experiment);
     }
 
-    fn count(&mut self, key: Key) {
-        let outcomes = self.experiments.entry(key.experiment).or_default();
+    fn count(&mut self, experiment: &Experiment) {
+        let outcomes = self.experiments.entry(experiment.clone()).or_default();
         outcomes.left = outcomes.left.saturating_sub(1);
         if outcomes.left == 0 {
             let Outcomes { recorded, lost, .. } = std::mem::take(outcomes);
-            self.complete.push(Complete { experiment: key.experiment, recorded, lost });
+            self.complete.push(Complete { experiment: experiment.clone(), recorded, lost });
         }
     }
 }
@@ -84,7 +84,7 @@ pub enum Next {
 }
 
 /// Episodes held by other processes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Held {
     /// One of them.
     pub key: Key,
@@ -98,25 +98,25 @@ impl<'a> Queue<'a> {
     pub fn new(store: &'a Store, keys: &[Key]) -> Self {
         let mut experiments = BTreeMap::<Experiment, Outcomes>::new();
         for key in keys {
-            experiments.entry(key.experiment).or_default().left += 1;
+            experiments.entry(key.experiment.clone()).or_default().left += 1;
         }
         let (elsewhere, complete) = (Vec::new(), Vec::new());
-        let keys = keys.iter().copied().collect();
+        let keys = keys.iter().cloned().collect();
         let waiting = Waiting { keys, elsewhere, left_out: 0, experiments, complete };
         Self { store, waiting: Mutex::new(waiting) }
     }
 
     pub(super) fn experiments(&self) -> Vec<Experiment> {
-        self.waiting().experiments.keys().copied().collect()
+        self.waiting().experiments.keys().cloned().collect()
     }
 
     /// The next playable episode, with its lock.
-    pub fn next(&self, turn: impl Fn(Key) -> Turn) -> Result<Next, StoreError> {
+    pub fn next(&self, turn: impl Fn(&Key) -> Turn) -> Result<Next, StoreError> {
         let mut waiting = self.waiting();
         let (mut held, mut at, mut is_later) = (None, 0, false);
         for _ in 0..waiting.keys.len() {
-            let Some(key) = waiting.keys.get(at).copied() else { break };
-            match turn(key) {
+            let Some(key) = waiting.keys.get(at).cloned() else { break };
+            match turn(&key) {
                 Turn::Now => waiting.keys.remove(at),
                 Turn::Later => {
                     (at, is_later) = (at + 1, true);
@@ -125,19 +125,19 @@ impl<'a> Queue<'a> {
                 Turn::Never => {
                     waiting.keys.remove(at);
                     waiting.left_out += 1;
-                    waiting.count(key);
+                    waiting.count(&key.experiment);
                     continue;
                 }
             };
-            match self.store.turn(key)? {
+            match self.store.turn(&key)? {
                 Claim::Ours(lock) => return Ok(Next::Play(key, lock)),
                 Claim::Recorded => {
+                    waiting.end(&key, None);
                     waiting.elsewhere.push(key);
-                    waiting.end(key, None);
                 }
                 Claim::Theirs(process) => {
+                    held = held.or_else(|| Some((key.clone(), process)));
                     waiting.keys.push_back(key);
-                    held = held.or(Some((key, process)));
                 }
             }
         }
@@ -157,7 +157,7 @@ impl<'a> Queue<'a> {
     }
 
     /// Notes that a taken episode is recorded or lost.
-    pub fn ended(&self, key: Key, lost: Option<LostEpisode>) {
+    pub fn ended(&self, key: &Key, lost: Option<LostEpisode>) {
         self.waiting().end(key, lost);
     }
 

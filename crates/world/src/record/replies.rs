@@ -50,17 +50,17 @@ pub struct UnreadableReply {
 
 impl Replies {
     /// Adds the reply of a step. Returns it if it is the first to arrive without a decision.
-    pub fn add(&self, subject: &Subject, key: Key, step: i32, row: &Step) -> Option<UnreadableReply> {
+    pub fn add(&self, subject: &Subject, key: &Key, step: i32, row: &Step) -> Option<UnreadableReply> {
         let status = row.extra.reply_status.as_deref()?;
         let mut found = self.found();
         found.counts.add(status, 1);
-        let comes_before = |(first, at, _): &(Key, i32, UnreadableReply)| (key, step) < (*first, *at);
+        let comes_before = |(first, at, _): &(Key, i32, UnreadableReply)| (key, step) < (first, *at);
         if ReplyCounts::is_read(status) || !found.first.as_ref().is_none_or(comes_before) {
             return None;
         }
         let is_first_in_time = found.first.is_none();
         let reply = UnreadableReply::of(subject, key, step, row, status);
-        found.first = Some((key, step, reply.clone()));
+        found.first = Some((key.clone(), step, reply.clone()));
         is_first_in_time.then_some(reply)
     }
 
@@ -84,7 +84,7 @@ impl Replies {
 }
 
 impl UnreadableReply {
-    pub(super) fn of(subject: &Subject, key: Key, step: i32, row: &Step, status: &str) -> Self {
+    pub(super) fn of(subject: &Subject, key: &Key, step: i32, row: &Step, status: &str) -> Self {
         let text = row.extra.reply.as_deref().filter(|text| !text.trim().is_empty()).map(beginning);
         let fault = row.extra.reply_fault.as_deref().map(beginning);
         Self { episode_id: key.episode_id(subject), step, status: status.to_owned(), text, fault }
@@ -128,12 +128,12 @@ mod tests {
     fn the_first_unusable_reply_is_the_first_by_place_and_printed_once() {
         let replies = Replies::default();
         let key = |run| Key::first(Experiment::E1, 1, run);
-        assert_eq!(replies.add(&Subject::of("m"), key(2), 1, &row("ok", None)), None);
+        assert_eq!(replies.add(&Subject::of("m"), &key(2), 1, &row("ok", None)), None);
         assert_eq!(replies.answer().first_unreadable, None);
-        let told = replies.add(&Subject::of("m"), key(2), 3, &row("parse_failed", Some("later"))).unwrap();
+        let told = replies.add(&Subject::of("m"), &key(2), 3, &row("parse_failed", Some("later"))).unwrap();
         assert_eq!((told.step, told.text.as_deref()), (3, Some("later")));
-        assert_eq!(replies.add(&Subject::of("m"), key(1), 9, &row("refusal", Some(" \n"))), None);
-        assert_eq!(replies.add(&Subject::of("m"), key(1), 10, &row("parse_failed", None)), None);
+        assert_eq!(replies.add(&Subject::of("m"), &key(1), 9, &row("refusal", Some(" \n"))), None);
+        assert_eq!(replies.add(&Subject::of("m"), &key(1), 10, &row("parse_failed", None)), None);
         let answer = replies.answer();
         let first = answer.first_unreadable.unwrap();
         assert_eq!((first.episode_id.as_str(), first.step, first.text), ("E1/m/s1/r1", 9, None));

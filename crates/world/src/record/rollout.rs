@@ -67,9 +67,9 @@ impl Stage<'_> {
 }
 
 /// The task for the agent of a scene.
-pub fn task(config: &WorldConfig, scene: &Scene, key: Key) -> Task {
+pub fn task(config: &WorldConfig, scene: &Scene, key: &Key) -> Task {
     Task {
-        experiment: scene.experiment,
+        experiment: scene.experiment.clone(),
         stated_color: scene.stated_color.map(|color| color.name().to_owned()),
         step_budget: i32::try_from(scene.budget(config)).unwrap_or(i32::MAX),
         seed: key.agent_seed(),
@@ -77,7 +77,7 @@ pub fn task(config: &WorldConfig, scene: &Scene, key: Key) -> Task {
 }
 
 /// The episode of a key at its start: its constants, without steps.
-pub fn head(config: &WorldConfig, scene: &Scene, key: Key, subject: &Subject) -> Episode {
+pub fn head(config: &WorldConfig, scene: &Scene, key: &Key, subject: &Subject) -> Episode {
     Episode {
         episode_id: key.episode_id(subject),
         model: subject.model.clone(),
@@ -114,7 +114,7 @@ pub async fn play(
     stage: &Stage<'_>,
     world: &mut World,
     agent: &mut dyn Agent,
-    key: Key,
+    key: &Key,
     mut episode: Episode,
     observer: &mut dyn Observer,
 ) -> Result<Played, RecordError> {
@@ -192,7 +192,7 @@ fn nothing() -> Arc<Frame> {
 }
 
 /// The row of a step, without `bumped`.
-fn row(world: &World, key: Key, t: i32, visibility: &Visibility, reply: Reply) -> Step {
+fn row(world: &World, key: &Key, t: i32, visibility: &Visibility, reply: Reply) -> Step {
     let counts = columns::by_column(world, visibility);
     let px = |column: &str| counts.iter().find(|(name, _)| *name == column).map(|(_, px)| *px);
     let cube = reply.selected_cube.as_deref().and_then(Color::named);

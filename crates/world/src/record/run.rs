@@ -35,12 +35,12 @@ use trace::episode_hash;
 /// Events of a running recording, reported by its threads.
 pub trait Progress: Sync {
     /// Receives a played step of an episode: its number, from 1, and its row.
-    fn step(&self, episode: Key, t: i32, row: &Step);
-    fn episode(&self, key: Key, id: &str, steps: usize);
+    fn step(&self, episode: &Key, t: i32, row: &Step);
+    fn episode(&self, key: &Key, id: &str, steps: usize);
     fn model_changed(&self, id: &str, t: i32, before: &str, after: &str);
     fn lost(&self, id: &str, reason: &str);
     /// Only episodes held by other processes remain; this is one of them. Called repeatedly.
-    fn waiting(&self, id: &str, held: Held);
+    fn waiting(&self, id: &str, held: &Held);
 }
 
 /// The seed of practice episodes; those of recordings are smaller.
@@ -50,7 +50,7 @@ const PRACTICE_SEED: i32 = 9_000;
 const AGAIN: Duration = Duration::from_millis(50);
 
 /// The handling of episodes that a thread could not take: ask again, or not.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 enum Wait {
     No,
     Later,
@@ -156,7 +156,7 @@ impl Recording<'_> {
             tally.stopped |= part.stopped;
         }
         tally.recorded.sort_unstable();
-        tally.lost.sort_by_key(|(key, _)| *key);
+        tally.lost.sort_by(|(key, _), (other, _)| key.cmp(other));
         tally.under_way.sort_unstable();
         Ok(tally)
     }
@@ -182,8 +182,11 @@ impl Recording<'_> {
         let mut tally = Tally::default();
         runtime.block_on(async {
             let play = |key: Key, lock| {
-                let eye = eyes.as_ref().map(|eyes| eyes.eye(self.config, key.experiment));
-                async move { (key, self.episode(key, lock, eye, unusable).await) }
+                let eye = eyes.as_ref().map(|eyes| eyes.eye(self.config, &key.experiment));
+                async move {
+                    let result = self.episode(&key, lock, eye, unusable).await;
+                    (key, result)
+                }
             };
             let mut under_way = FuturesUnordered::new();
             loop {
@@ -191,7 +194,7 @@ impl Recording<'_> {
                 self.assemble(queue);
                 let ended = match wait {
                     Wait::No => under_way.next().await,
-                    _ if under_way.is_empty() => self.wait(wait).await,
+                    _ if under_way.is_empty() => self.wait(&wait).await,
                     _ => tokio::time::timeout(AGAIN, under_way.next()).await.unwrap_or_default(),
                 };
                 match ended {
@@ -210,7 +213,7 @@ impl Recording<'_> {
         for Complete { experiment, recorded, lost } in queue.complete() {
             // Failures here are retried and reported at the end of the recording; no episode need be lost.
             let _ = self.store.note_lost(&recorded, lost);
-            let _ = self.store.assemble(experiment);
+            let _ = self.store.assemble(&experiment);
         }
     }
 
@@ -222,7 +225,7 @@ impl Recording<'_> {
         under_way: &mut FuturesUnordered<F>,
         play: impl Fn(Key, EpisodeLock) -> F,
     ) -> Result<Wait, RecordError> {
-        let turn = |key: Key| self.player.turn(&key.episode_id(self.subject));
+        let turn = |key: &Key| self.player.turn(&key.episode_id(self.subject));
         while under_way.len() < each && !self.stop.load(Ordering::Relaxed) {
             match queue.next(turn).map_err(RecordError::fatal)? {
                 Next::Play(key, lock) => under_way.push(play(key, lock)),
@@ -234,7 +237,7 @@ impl Recording<'_> {
         Ok(Wait::No)
     }
 
-    async fn wait<T>(&self, wait: Wait) -> Option<T> {
+    async fn wait<T>(&self, wait: &Wait) -> Option<T> {
         if let Wait::Held(held) = wait {
             self.progress.waiting(&held.key.episode_id(self.subject), held);
         }
@@ -244,13 +247,13 @@ impl Recording<'_> {
 
     async fn episode(
         &self,
-        key: Key,
+        key: &Key,
         _lock: EpisodeLock,
         eye: Option<&RefCell<Camera>>,
         unusable: &Unusable,
     ) -> Result<usize, RecordError> {
         let start = Instant::now();
-        let scene = Scene::draw(self.config, key.experiment, key.seed, key.run).map_err(RecordError::fatal)?;
+        let scene = Scene::draw(self.config, key.experiment.clone(), key.seed, key.run).map_err(RecordError::fatal)?;
         let mut episode = rollout::head(self.config, &scene, key, self.subject);
         let task = rollout::task(self.config, &scene, key);
         let mut world = World::new(self.config, scene).map_err(RecordError::fatal)?;
@@ -280,9 +283,9 @@ impl Recording<'_> {
         committed.and(played).map(|played| played.episode.steps.len())
     }
 
-    async fn practise(&self, stage: &Stage<'_>, agent: &mut dyn Agent, key: Key) -> Result<(), RecordError> {
-        let key = Key::first(key.experiment, PRACTICE_SEED, 1);
-        let scene = Scene::draw(self.config, key.experiment, key.seed, key.run).map_err(RecordError::fatal)?;
+    async fn practise(&self, stage: &Stage<'_>, agent: &mut dyn Agent, key: &Key) -> Result<(), RecordError> {
+        let key = &Key::first(key.experiment.clone(), PRACTICE_SEED, 1);
+        let scene = Scene::draw(self.config, key.experiment.clone(), key.seed, key.run).map_err(RecordError::fatal)?;
         let head = rollout::head(self.config, &scene, key, self.subject);
         agent.practise(Some(rollout::task(self.config, &scene, key)));
         let mut world = World::new(self.config, scene).map_err(RecordError::fatal)?;
@@ -291,7 +294,7 @@ impl Recording<'_> {
         Ok(())
     }
 
-    fn commit(&self, stage: &Stage<'_>, key: Key, played: &Played, log: Option<Log>) -> Result<(), RecordError> {
+    fn commit(&self, stage: &Stage<'_>, key: &Key, played: &Played, log: Option<Log>) -> Result<(), RecordError> {
         let start = Instant::now();
         let fingerprint = self.store.fingerprint(key, played.model.as_deref(), stage.renderer().as_ref());
         let episode = Episode { fingerprint: Some(fingerprint.id.clone()), ..played.episode.clone() };
@@ -317,10 +320,10 @@ impl Recording<'_> {
         let id = key.episode_id(self.subject);
         match result {
             Ok(steps) => {
+                self.progress.episode(&key, &id, steps);
+                queue.ended(&key, None);
                 tally.recorded.push(key);
                 tally.steps += steps as u64;
-                self.progress.episode(key, &id, steps);
-                queue.ended(key, None);
             }
             Err(RecordError::Stopped) => {
                 tally.under_way.push(key);
@@ -335,8 +338,8 @@ impl Recording<'_> {
             }
             Err(RecordError::Lost { step, lost }) => {
                 self.progress.lost(&id, &lost.cause);
-                let lost = lost_episode(key, self.subject, step, lost);
-                queue.ended(key, Some(lost.clone()));
+                let lost = lost_episode(&key, self.subject, step, lost);
+                queue.ended(&key, Some(lost.clone()));
                 tally.lost.push((key, lost));
                 if self.player.stopped().is_some() {
                     self.stop.store(true, Ordering::Relaxed);
@@ -365,7 +368,7 @@ fn panicked() -> RecordError {
 
 /// Counts steps and unusable replies, and writes the log if there is one.
 struct Observers<'a> {
-    key: Key,
+    key: &'a Key,
     recording: &'a Recording<'a>,
     unusable: &'a Unusable,
     in_a_row: u32,

@@ -60,7 +60,7 @@ impl Unusable {
 
     /// Counts the reply of a step; `in_episode` is the number of consecutive ones of its episode before it. Returns
     /// true if the recording is to stop.
-    pub(super) fn add(&self, subject: &Subject, key: Key, t: i32, row: &Step, in_episode: &mut u32) -> bool {
+    pub(super) fn add(&self, subject: &Subject, key: &Key, t: i32, row: &Step, in_episode: &mut u32) -> bool {
         let Some(status) = row.extra.reply_status.as_deref() else { return false };
         let mut found = self.found.lock().unwrap_or_else(PoisonError::into_inner);
         if ReplyCounts::is_read(status) {
@@ -103,7 +103,7 @@ mod tests {
         let mut in_episodes = [0; 4];
         let add = |(run, status): &(i32, &str)| {
             let key = Key::first(Experiment::E1, 1, *run);
-            unusable.add(&Subject::of("m"), key, 7, &row(status), &mut in_episodes[usize::try_from(*run).unwrap()])
+            unusable.add(&Subject::of("m"), &key, 7, &row(status), &mut in_episodes[usize::try_from(*run).unwrap()])
         };
         let at = replies.iter().position(add);
         (at.map(|at| at + 1), unusable)

@@ -48,9 +48,8 @@ impl Recipe {
         let spec = recording.get("experiment").ok_or(ReplayError::NoRecipe)?;
         let spec: Spec =
             serde_json::from_value(spec.clone()).map_err(|fault| ReplayError::Recipe(fault.to_string()))?;
-        let experiment = Experiment::of_footer(spec).map_err(ReplayError::other)?;
         let eye = counted_with(&config, recording);
-        Ok(Self { experiment, config, eye })
+        Ok(Self { experiment: Experiment::of_footer(spec), config, eye })
     }
 
     /// The world of an episode at its start, with this configuration of the eye.
@@ -63,7 +62,7 @@ impl Recipe {
                 episode.experiment
             )));
         }
-        let scene = Scene::draw(&self.config, self.experiment, episode.seed, episode.run)
+        let scene = Scene::draw(&self.config, self.experiment.clone(), episode.seed, episode.run)
             .map_err(|error| fault(error.to_string()))?;
         World::new(eye, scene).map_err(|error| fault(error.to_string()))
     }

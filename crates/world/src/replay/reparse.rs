@@ -141,8 +141,7 @@ fn recipe(input: &Input) -> Result<(Value, Experiment), ReparseError> {
         file.metadata_value(RECORDING_KEY).and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default();
     let spec =
         serde_json::from_value::<Spec>(recording["experiment"].clone()).map_err(|fault| none(&fault.to_string()))?;
-    let experiment = Experiment::of_footer(spec).map_err(|fault| none(&fault.to_string()))?;
-    Ok((recording, experiment))
+    Ok((recording, Experiment::of_footer(spec)))
 }
 
 fn read_again(step: &Step, experiment: &Spec) -> Option<Reply> {

@@ -17,7 +17,7 @@ use super::floor::{FloorPlan, distance};
 use super::rng::Rng;
 use super::scene::{BEFORE_MIRROR, Cube, MOST_CUBES, MirrorPlace, Other, Scene, floor_plan};
 use crate::experiment::spec::{Colors, Cubes, Hand, Layout, Occluders, Paint, Start, Wall};
-use crate::experiment::{balance, number_of};
+use crate::experiment::{Spec, balance, number_of};
 use trace::palette::Color;
 
 /// The maximum number of draws for one thing before everything restarts.
@@ -42,15 +42,15 @@ pub struct Crowded {
 impl Scene {
     /// Draws the scene of one episode. The experiment's lengths and counts override the configuration.
     pub fn draw(config: &WorldConfig, experiment: Experiment, seed: i32, run: i32) -> Result<Self, Crowded> {
-        let config = &config.of(experiment);
-        let purpose = purpose(experiment);
-        let body_color = body_color(experiment, purpose, seed, run);
+        let config = &config.of(&experiment);
+        let purpose = purpose(&experiment);
+        let body_color = body_color(&experiment, purpose, seed, run);
         let mut chance = Rng::of(purpose, seed, run);
-        let drawn = (0..DRAWINGS).find_map(|_| Drawing { config, chance: &mut chance }.scene(experiment, body_color));
-        let scene = drawn.ok_or(Crowded { experiment, seed, run })?;
+        let drawn = (0..DRAWINGS).find_map(|_| Drawing { config, chance: &mut chance }.scene(&experiment, body_color));
+        let Some(scene) = drawn else { return Err(Crowded { experiment, seed, run }) };
         let layout = panes::Layout {
             config,
-            experiment,
+            experiment: &experiment,
             mirror: scene.mirror,
             body_color,
             cubes: &scene.cubes,
@@ -75,7 +75,7 @@ pub struct DoesNotFit {
 }
 
 /// The reason why an experiment does not fit into a room, found by drawing a study of it; `None` if it fits.
-pub fn crowded(config: &WorldConfig, experiment: Experiment) -> Option<DoesNotFit> {
+pub fn crowded(config: &WorldConfig, experiment: &Experiment) -> Option<DoesNotFit> {
     let world = config.of(experiment);
     let widest = world.room.size - 2.0 * world.placement.wall_margin;
     let widths = experiment.panes.iter().map(|pane| pane.width_mm.map_or(world.mirror.width, metres));
@@ -86,7 +86,7 @@ pub fn crowded(config: &WorldConfig, experiment: Experiment) -> Option<DoesNotFi
             mirror: Some(at),
         });
     }
-    let crowded = study().find_map(|(seed, run)| Scene::draw(config, experiment, seed, run).err())?;
+    let crowded = study().find_map(|(seed, run)| Scene::draw(config, experiment.clone(), seed, run).err())?;
     if let Some(Hand { least, most, step_mm, .. }) = experiment.hand {
         return Some(DoesNotFit {
             what: format!(
@@ -133,9 +133,9 @@ impl Occlusion {
     }
 
     /// The occlusion of an experiment; `None` if its scenes do not fit into the room.
-    pub fn of(config: &WorldConfig, experiment: Experiment) -> Option<Self> {
+    pub fn of(config: &WorldConfig, experiment: &Experiment) -> Option<Self> {
         study().try_fold(Self::default(), |sum, (seed, run)| {
-            let scene = Scene::draw(config, experiment, seed, run).ok()?;
+            let scene = Scene::draw(config, experiment.clone(), seed, run).ok()?;
             let found = reach::occlusion(&config.of(experiment), &scene);
             Some(Self {
                 places: sum.places + found.places,
@@ -146,14 +146,14 @@ impl Occlusion {
     }
 }
 
-fn purpose(experiment: Experiment) -> u64 {
+fn purpose(experiment: &Spec) -> u64 {
     static NUMBERED: LazyLock<BTreeMap<String, u64>> = LazyLock::new(|| {
         toml::from_str(include_str!("../../../../assets/world/streams.toml")).expect("the file comes with the program")
     });
     NUMBERED.get(&experiment.scenes).copied().unwrap_or_else(|| number_of(&experiment.scenes))
 }
 
-fn body_color(experiment: Experiment, purpose: u64, seed: i32, run: i32) -> Color {
+fn body_color(experiment: &Spec, purpose: u64, seed: i32, run: i32) -> Color {
     let mut palette = experiment.layout.palette.clone();
     match experiment.layout.colors {
         Colors::Random => Rng::of(!purpose, seed, run).one_of(&palette),
@@ -179,7 +179,7 @@ struct Drawing<'a> {
 
 impl Drawing<'_> {
     /// A layout without seed and run; `None` if a place was not found.
-    fn scene(&mut self, experiment: Experiment, body_color: Color) -> Option<Scene> {
+    fn scene(&mut self, experiment: &Experiment, body_color: Color) -> Option<Scene> {
         let layout = &experiment.layout;
         let mirror = self.mirror(layout.wall);
         let cubes = match layout.cubes {
@@ -191,7 +191,7 @@ impl Drawing<'_> {
         let start = self.start(mirror, &plan, layout.start)?;
         let others = self.others(&plan, start, body_color, layout)?;
         let scene = Scene {
-            experiment,
+            experiment: experiment.clone(),
             seed: 0,
             run: 0,
             body_color,

@@ -47,7 +47,7 @@ pub struct World {
 impl World {
     /// The world of a scene at its start. The experiment's lengths and counts override the configuration.
     pub fn new(config: &WorldConfig, scene: Scene) -> Result<Self, ModelError> {
-        let config = config.of(scene.experiment);
+        let config = config.of(&scene.experiment);
         let (stage, beyond) = Stage::all(&config, Paint::Lit, &scene)?;
         let mut world = Self {
             plan: scene.floor_plan(&config),

@@ -5,7 +5,7 @@ use std::num::{NonZeroU32, NonZeroUsize};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use serde::Serialize;
 
@@ -13,16 +13,16 @@ use super::configured;
 use crate::cli::args::ThreadArgs;
 use crate::cli::dry_run::{self, ForecastAnswer, RequestForecast};
 use crate::cli::exec::ExecArgs;
-use crate::cli::experiments;
+use crate::cli::{Failure, Outcome, experiments, options_of, output};
 #[cfg(feature = "view")]
 use crate::cli::human::HumanArgs;
-use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::recording::episodes::Episodes;
 use crate::cli::recording::interrupt::{Playing, stop_at_interrupt};
-use crate::cli::recording::{self, Bar, RecordAnswer, probe, several};
+pub use crate::cli::recording::Recorded;
+use crate::cli::recording::progress::Bar;
+use crate::cli::recording::{self, RecordAnswer, probe, several};
 use crate::cli::registration::registration;
 use crate::cli::vlm::VlmArgs;
-use crate::cli::{options_of, output};
 use exact::escape::visible;
 use exact::suggest::hint;
 use world::agent::Player;
@@ -32,12 +32,11 @@ use world::record::index::RecordingIndex;
 use world::record::metadata::Recordings;
 use world::record::plan::{Experiments, Key, Named, Plan, Shard, Subject};
 use world::record::run::{Recording, Settings, Tally};
-use world::record::shares::{Shares, Spent};
+use world::record::shares::Shares;
 use world::record::store::Store;
 use world::sim::Experiment;
 use world::sim::config::WorldConfig;
 
-/// The name of the agent for people.
 const HUMAN: &str = "human";
 
 /// Record episodes of an agent in the mirror world: step traces for `report`, logs with the frames
@@ -180,7 +179,7 @@ impl RecordArgs {
             let one = |vlm| Self { vlm, ..self.clone() };
             return Ok(self.vlm.each().into_iter().map(one).collect());
         };
-        let options = several::recordings(file)?;
+        let options = several::recordings::<Self>(file)?;
         let parsed = options.iter().map(|options| options_of::<Self>("record", options));
         let in_file = |failure: Failure| Failure::input(format!("in the study `{}`: {failure}", file.display()));
         parsed.map(|args| args.map_err(in_file)).collect()
@@ -190,8 +189,7 @@ impl RecordArgs {
         let player = self.player()?;
         *playing.lock().unwrap_or_else(PoisonError::into_inner) = Some(Arc::clone(&player));
         let recorded = self.record(player.as_ref(), stop)?;
-        let places = (self.out.as_path(), recorded.lost_list.as_path());
-        recording::say(&recorded.answer, places, &self.files(), recorded.elapsed, recorded.times)?;
+        recording::say(&recorded, &self.out, &self.files())?;
         Ok(recorded)
     }
 
@@ -226,7 +224,7 @@ impl RecordArgs {
         let config = configured(self.config.as_ref())?;
         let experiments = experiments::asked(&self.experiment, &config)?;
         let first = experiments.first().ok_or_else(|| Failure::input("--probe needs an experiment"))?;
-        self.vlm.probe(*first, [config.eye.width, config.eye.height_px])
+        self.vlm.probe(first, [config.eye.width, config.eye.height_px])
     }
 
     fn files(&self) -> Vec<&Path> {
@@ -263,7 +261,6 @@ impl RecordArgs {
         }
     }
 
-    /// The folder for traces and logs.
     pub fn out(&self) -> &Path {
         &self.out
     }
@@ -332,7 +329,7 @@ impl RecordArgs {
         let recording = Recording { config, player, subject, store, progress, stop, shares: &shares, settings };
         let outcome = recording.run(todo);
         // Complete episodes are assembled, however the recording ended.
-        let assembled = plan.experiments.iter().try_for_each(|experiment| store.assemble(*experiment));
+        let assembled = plan.experiments.iter().try_for_each(|experiment| store.assemble(experiment));
         let deleted = player.deleted();
         bar.clear();
         player.ended(outcome.as_ref().is_ok_and(|tally| !tally.stopped));
@@ -390,20 +387,8 @@ impl RecordArgs {
     }
 }
 
-/// The result of a recording that reached its end or was stopped.
-#[derive(Debug)]
-pub struct Recorded {
-    /// The outcomes of the episodes.
-    pub answer: RecordAnswer,
-    /// The reason why the agent could not continue, if so.
-    pub gave_up: Option<String>,
-    lost_list: PathBuf,
-    elapsed: Duration,
-    times: Spent,
-}
-
-fn files(plan: &Plan, path: impl Fn(Experiment) -> PathBuf) -> Vec<String> {
-    let paths = plan.experiments.iter().map(|experiment| path(*experiment));
+fn files(plan: &Plan, path: impl Fn(&Experiment) -> PathBuf) -> Vec<String> {
+    let paths = plan.experiments.iter().map(path);
     paths.filter(|path| path.exists()).map(|path| path.display().to_string()).collect()
 }
 

@@ -13,30 +13,31 @@ use crate::agent::reply::{self, Ending};
 use crate::agent::{Lost, Observation, Reply, Task, Usage};
 use exact::replace::TemporaryFolder;
 
-/// The prefix of the temporary folder for an episode's frames.
-const FRAMES: &str = "frames";
-
 #[derive(Debug)]
-pub(in crate::agent) struct Conversation {
+pub(crate) struct Conversation {
     task: Task,
     episode_id: String,
     prompt: Prompt,
-    frames: Option<Frames>,
+    /// The folder of the frames, if they are files.
+    frames: Option<TemporaryFolder>,
 }
 
 impl Conversation {
     /// The conversation of an episode; frame files are below `scratch`.
-    pub(in crate::agent) fn new(task: Task, episode_id: &str, images: Images, scratch: &Path) -> Result<Self, Lost> {
-        let prompt = Prompt::of(task.experiment).map_err(unusable)?;
+    pub(crate) fn new(task: Task, episode_id: &str, images: Images, scratch: &Path) -> Result<Self, Lost> {
+        let prompt = Prompt::of(&task.experiment).map_err(unusable)?;
         let frames = match images {
-            Images::Path => Some(Frames::new(scratch)?),
+            Images::Path => {
+                let made = std::path::absolute(scratch).and_then(|folder| TemporaryFolder::create(&folder, "frames"));
+                Some(made.map_err(unusable)?)
+            }
             Images::Base64 => None,
         };
         Ok(Self { task, episode_id: episode_id.to_owned(), prompt, frames })
     }
 
     /// The task, only before the first observation, and the observation.
-    pub(in crate::agent) fn messages(&self, observation: &Observation) -> Result<(Option<Message>, Message), Lost> {
+    pub(crate) fn messages(&self, observation: &Observation) -> Result<(Option<Message>, Message), Lost> {
         let Rendered { system, user } = self.prompt.render(&self.task, observation).map_err(unusable)?;
         let task = (observation.t == 1).then(|| self.task_message(system));
         Ok((task, self.observation_message(observation, user)?))
@@ -60,7 +61,7 @@ impl Conversation {
     fn observation_message(&self, observation: &Observation, user_prompt: String) -> Result<Message, Lost> {
         let png = observation.frame.to_png().map_err(unusable)?;
         let image = match &self.frames {
-            Some(frames) => Image::Path(frames.keep(observation.t, png)?),
+            Some(folder) => Image::Path(kept(folder.path(), observation.t, png)?),
             None => Image::Base64(STANDARD.encode(png)),
         };
         let (last_action, last_thought) = observation.history.clone().unwrap_or_default();
@@ -77,7 +78,7 @@ impl Conversation {
         }))
     }
 
-    pub(in crate::agent) fn read(&self, text: String, usage: Usage) -> Reply {
+    pub(crate) fn read(&self, text: String, usage: Usage) -> Reply {
         reply::read(&text, &self.task.experiment, Ending::Whole).with_text(text, usage)
     }
 }
@@ -86,22 +87,11 @@ pub(super) fn unusable(fault: impl fmt::Display) -> Lost {
     Lost::because(format!("the observation cannot be made: {fault}"))
 }
 
-#[derive(Debug)]
-struct Frames(TemporaryFolder);
-
-impl Frames {
-    fn new(scratch: &Path) -> Result<Self, Lost> {
-        let made = std::path::absolute(scratch).and_then(|folder| TemporaryFolder::create(&folder, FRAMES));
-        made.map(Self).map_err(unusable)
-    }
-
-    fn keep(&self, t: i32, png: &[u8]) -> Result<String, Lost> {
-        let path = self.0.path().join(format!("{t:03}.png"));
-        std::fs::write(&path, png).map_err(unusable)?;
-        path.into_os_string().into_string().map_err(|_| {
-            unusable(
-                "the folder's name is not UTF-8, which JSON cannot hold\n  help: --exec-images base64 needs no file",
-            )
-        })
-    }
+/// Writes a frame as a file; returns its path.
+fn kept(folder: &Path, t: i32, png: &[u8]) -> Result<String, Lost> {
+    let path = folder.join(format!("{t:03}.png"));
+    std::fs::write(&path, png).map_err(unusable)?;
+    path.into_os_string().into_string().map_err(|_| {
+        unusable("the folder's name is not UTF-8, which JSON cannot hold\n  help: --exec-images base64 needs no file")
+    })
 }

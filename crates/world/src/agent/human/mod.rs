@@ -45,7 +45,7 @@ pub struct Human {
 
 impl Human {
     pub fn new(model: &str, hub: Arc<Hub>, server: Option<Server>) -> Self {
-        let consent = hub.terms().consent.as_deref().map(|words| hash::of_bytes(words.as_bytes()));
+        let consent = hub.terms.consent.as_deref().map(|words| hash::of_bytes(words.as_bytes()));
         Self { model: model.to_owned(), consent, hub, server: Mutex::new(server) }
     }
 }
@@ -56,7 +56,7 @@ impl Player for Human {
     }
 
     fn description(&self) -> Value {
-        let schedule = self.hub.schedule();
+        let schedule = &self.hub.schedule;
         json!({
             "human": self.model,
             "protocol": PROTOCOL,
@@ -69,7 +69,7 @@ impl Player for Human {
             },
             "reply": "the keys of a model's reply: actions by keys or buttons, colours from a list, free text; all but the \
                       action may stay empty",
-            "prefilled_identification": self.hub.terms().prefills,
+            "prefilled_identification": self.hub.terms.prefills,
             "practice": "one episode of another scene before the first, not recorded; its end is announced",
             "begin": "each episode begins when the person says so",
             "clock": "breaks and times of more than 10 s without the page do not count",
@@ -82,7 +82,7 @@ impl Player for Human {
     }
 
     fn agent(&self, task: Task, episode_id: &str) -> Result<Box<dyn Agent>, Lost> {
-        let prompt = Prompt::of(task.experiment).map_err(|fault| Lost::because(fault.to_string()))?;
+        let prompt = Prompt::of(&task.experiment).map_err(|fault| Lost::because(fault.to_string()))?;
         let seat = self.hub.sit(episode_id).ok_or_else(Lost::by_leaving)?;
         let code = self.hub.code(seat);
         let hub = Arc::clone(&self.hub);
@@ -187,7 +187,7 @@ impl HumanAgent {
             user,
             t: observation.t,
             is_practice,
-            experiment: task.experiment,
+            experiment: task.experiment.clone(),
             actions: prompt::actions(task.experiment.actions).iter().map(|action| prompt::letter(*action)).collect(),
         };
         let given = self.hub.ask(self.seat, question).await;

@@ -1,4 +1,4 @@
-//! Scripted agents: seven agents of known behaviour that calibrate the benchmark.
+//! Scripted agents: seven agents of known behaviour that calibrate the benchmark, one file of `minds` each.
 //!
 //! Each has a metric profile that its name predicts. Its module states the profile, and a test records and checks it. A
 //! deviation reveals an error in the world or in a metric.
@@ -17,9 +17,7 @@
 pub mod chance;
 pub mod hand_view;
 pub mod knowledge;
-pub mod landmarks;
 pub mod lookout;
-mod minds;
 pub mod policy;
 pub mod reflection;
 pub mod room;
@@ -27,13 +25,26 @@ pub mod route;
 pub mod seeker;
 pub mod words;
 
-pub use minds::{answering, chaser, confabulator, frozen, guesser, gullible, mimic, oracle, random, reacher};
+mod minds {
+    pub mod answering;
+    pub mod chaser;
+    pub mod confabulator;
+    pub mod frozen;
+    pub mod guesser;
+    pub mod gullible;
+    pub mod mimic;
+    pub mod oracle;
+    pub mod random;
+    pub mod reacher;
+}
 
 use crate::agent::{Agent, Answers, Decision, Lost, Observation, Player, Reply, Status, Task, Words};
 use crate::experiment::Experiment;
 use exact::names;
 use trace::episode::Action;
 use trace::palette::Color;
+
+use minds::{answering, chaser, confabulator, frozen, guesser, gullible, mimic, oracle, random, reacher};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[expect(missing_docs, reason = "each is described in the module of its name")]
@@ -58,18 +69,6 @@ names!(Scripted {
 });
 
 impl Scripted {
-    pub const fn title(self) -> &'static str {
-        match self {
-            Self::Oracle => "finds the mirror, recognises itself, acts on it",
-            Self::Random => "leaves everything to chance",
-            Self::Guesser => "takes any cube at once, without looking into the mirror",
-            Self::Gullible => "believes the colour that the prompt states",
-            Self::Confabulator => "claims a colour at once, corrects itself before the mirror",
-            Self::Frozen => "does nothing until the budget ends",
-            Self::Mimic => "takes the first body that it sees for itself",
-        }
-    }
-
     /// The version of its behaviour: increases whenever the same seed and frames give other decisions.
     pub const fn version(self) -> u32 {
         match self {
@@ -96,7 +95,7 @@ impl Scripted {
             Self::Frozen => Box::new(frozen::Frozen),
             Self::Mimic => Box::new(seeker::Seeker::new(task, mimic::Mimic::default())),
         };
-        Box::new(Puppet { script, experiment: task.experiment })
+        Box::new(Puppet { script, experiment: task.experiment.clone() })
     }
 }
 

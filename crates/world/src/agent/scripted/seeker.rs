@@ -17,8 +17,7 @@ use trace::episode::Action;
 use trace::palette::Color;
 
 use super::chance::Chance;
-use super::knowledge::Knowledge;
-use super::landmarks::Landmark;
+use super::knowledge::{Knowledge, Landmark};
 use super::lookout::Lookouts;
 use super::policy::{Belief, Policy};
 use super::room::Side;
@@ -39,7 +38,6 @@ const BEFORE_MIRROR: (f64, f64) = (0.9, 2.8);
 /// The distance between places for looking into the mirror, m.
 const APART: f64 = 0.3;
 
-/// An agent that looks around, finds the mirror, and acts on its belief.
 pub struct Seeker<C> {
     policy: C,
     task: Task,
@@ -78,7 +76,9 @@ impl<C: Policy> Seeker<C> {
             None => (self.look_for_mirror(known), None),
             Some(color) => match known.cube(color) {
                 None => (self.look_around(known), None),
-                Some(cube) if self.has_claimed && is_near(known, cube) => (Action::Done, Some(color)),
+                Some(cube) if self.has_claimed && known.pose.place.distance(cube.place) <= NEAR => {
+                    (Action::Done, Some(color))
+                }
                 Some(cube) => (self.approach(known, cube), None),
             },
         }
@@ -161,7 +161,7 @@ impl<C: Policy> Script for Seeker<C> {
         known.see(observation);
         self.turns = if known.pose.place == before { self.turns + 1 } else { 0 };
         let belief = self.policy.belief(&known);
-        let experiment = self.task.experiment;
+        let experiment = &self.task.experiment;
         let mark = experiment.asks_for_mark().then(|| self.policy.mark(&known)).flatten();
         let answers = answering::by_evidence(experiment, &known, &mut self.policy, (belief, mark));
         let is_open = experiment.asks_for_mark() && mark.is_none() || answering::may_come(experiment, &answers);
@@ -191,10 +191,6 @@ fn turns_to_mirror(known: &Knowledge, pose: Pose) -> Option<i32> {
 fn metres_to_mirror(known: &Knowledge, place: Place) -> f64 {
     let away = |side: Side| known.room.wall(side).map(|wall| wall - side.out(place));
     known.room.mirrors().filter_map(away).fold(f64::INFINITY, f64::min).min(1e3)
-}
-
-fn is_near(known: &Knowledge, cube: Landmark) -> bool {
-    known.pose.place.distance(cube.place) <= NEAR
 }
 
 fn go(

@@ -15,7 +15,7 @@ use super::provider::rate_limit::RateLimit;
 use super::provider::{Mend, Provider, Received, Waiting, refused};
 use crate::agent::prompt::Rendered;
 use crate::agent::{Status, reply};
-use crate::experiment::Experiment;
+use crate::experiment::Spec;
 use trace::frame::Frame;
 
 /// The answer of `record --probe --json`, for one model.
@@ -84,12 +84,12 @@ impl ProbeAnswer {
         Self { model: choice.name.clone(), id: model.id.clone(), is_model: true, parameters, ..Self::default() }
     }
 
-    fn note_answer(&mut self, received: Received, choice: &Choice, experiment: Experiment) {
+    fn note_answer(&mut self, received: Received, choice: &Choice, experiment: &Spec) {
         let Received { answer, latency, rate_limits, .. } = received;
         for parameter in &mut self.parameters {
             parameter.taken.get_or_insert(true);
         }
-        self.enforces_schema = match reply::read(&answer.text, &experiment, answer.ending).status {
+        self.enforces_schema = match reply::read(&answer.text, experiment, answer.ending).status {
             _ if choice.model.contract == Contract::Prompt => None,
             Status::Ok | Status::Repaired => Some(true),
             Status::ParseFailed | Status::SchemaInvalid => Some(false),
@@ -111,8 +111,8 @@ impl ProbeAnswer {
 }
 
 /// Asks a model once, with a frame of this width and height and the schema of an experiment.
-pub async fn probe(mut choice: Choice, provider: &Provider, experiment: Experiment, view: [u32; 2]) -> ProbeAnswer {
-    let schema = reply::structure(&experiment);
+pub async fn probe(mut choice: Choice, provider: &Provider, experiment: &Spec, view: [u32; 2]) -> ProbeAnswer {
+    let schema = reply::structure(experiment);
     let words = Rendered {
         system: "You test a connection.".to_owned(),
         user: "The image is a test. Reply with the single word ready, and with no JSON.".to_owned(),

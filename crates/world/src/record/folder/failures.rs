@@ -16,7 +16,7 @@ use exact::replace::NewFile;
 pub use trace::lost::{LostEpisode, list_of};
 
 /// The entry of a key's episode, lost at this step.
-pub fn lost_episode(key: Key, subject: &Subject, step: Option<i32>, lost: Lost) -> LostEpisode {
+pub fn lost_episode(key: &Key, subject: &Subject, step: Option<i32>, lost: Lost) -> LostEpisode {
     LostEpisode {
         episode_id: key.episode_id(subject),
         model: subject.model.clone(),
@@ -79,7 +79,7 @@ mod tests {
 
     fn lost(model: &str, run: i32, cause: &str) -> LostEpisode {
         let key = Key::first(Experiment::E1, 1, run);
-        lost_episode(key, &Subject::of(model), Some(4), Lost::counted_as(Status::Timeout, cause))
+        lost_episode(&key, &Subject::of(model), Some(4), Lost::counted_as(Status::Timeout, cause))
     }
 
     #[test]

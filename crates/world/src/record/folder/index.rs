@@ -54,28 +54,28 @@ impl RecordingIndex {
         &self.subject
     }
 
-    pub(in crate::record) fn recording(&self, experiment: Experiment) -> &Value {
+    pub(in crate::record) fn recording(&self, experiment: &Experiment) -> &Value {
         self.recordings.of(experiment)
     }
 
     /// The trace of an experiment.
-    pub fn trace(&self, experiment: Experiment) -> PathBuf {
+    pub fn trace(&self, experiment: &Experiment) -> PathBuf {
         self.folder.join(format!("{}-{}.parquet", experiment.name(), self.subject.slug()))
     }
 
     /// The log of an experiment.
-    pub fn log(&self, experiment: Experiment) -> PathBuf {
+    pub fn log(&self, experiment: &Experiment) -> PathBuf {
         self.trace(experiment).with_extension("mcap")
     }
 
     /// The recorded episodes of an experiment, in the trace or as parts.
-    pub fn recorded(&self, experiment: Experiment) -> Result<BTreeSet<Place>, StoreError> {
+    pub fn recorded(&self, experiment: &Experiment) -> Result<BTreeSet<Place>, StoreError> {
         let episodes = self.episodes(experiment)?;
         self.check_log(experiment, &episodes)?;
         Ok(places(&episodes))
     }
 
-    pub(in crate::record) fn episodes(&self, experiment: Experiment) -> Result<Vec<EpisodeRows>, StoreError> {
+    pub(in crate::record) fn episodes(&self, experiment: &Experiment) -> Result<Vec<EpisodeRows>, StoreError> {
         let trace = self.trace(experiment);
         let parts = self.parts_of(experiment)?;
         let mut episodes = Vec::new();
@@ -91,10 +91,10 @@ impl RecordingIndex {
     }
 
     /// The episodes in the trace of an experiment, read again only if the trace was replaced.
-    pub(in crate::record) fn in_trace(&self, experiment: Experiment) -> Result<Places, StoreError> {
+    pub(in crate::record) fn in_trace(&self, experiment: &Experiment) -> Result<Places, StoreError> {
         let path = self.trace(experiment);
         let mut traces = self.traces.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(known) = traces.get(&experiment).filter(|known| is_at(&known.file, &path)) {
+        if let Some(known) = traces.get(experiment).filter(|known| is_at(&known.file, &path)) {
             return Ok(Arc::clone(&known.places));
         }
         let file = match File::open(&path) {
@@ -103,24 +103,24 @@ impl RecordingIndex {
         };
         self.check(experiment, &path)?;
         let places = Arc::new(places(&merge::read(&path)?));
-        traces.insert(experiment, InTrace { file, places: Arc::clone(&places) });
+        traces.insert(experiment.clone(), InTrace { file, places: Arc::clone(&places) });
         Ok(places)
     }
 
     pub(in crate::record) fn check_log(
         &self,
-        experiment: Experiment,
+        experiment: &Experiment,
         episodes: &[EpisodeRows],
     ) -> Result<(), StoreError> {
         continued::check(&self.log(experiment), &self.trace(experiment), self.recording(experiment), episodes)
     }
 
-    pub(in crate::record) fn check(&self, experiment: Experiment, path: &Path) -> Result<(), StoreError> {
+    pub(in crate::record) fn check(&self, experiment: &Experiment, path: &Path) -> Result<(), StoreError> {
         let difference = difference(self.recording(experiment), &recording_of(path)?);
         difference.map_or(Ok(()), |difference| Err(StoreError::different(path, difference)))
     }
 
-    pub(in crate::record) fn parts_of(&self, experiment: Experiment) -> Result<Vec<PathBuf>, StoreError> {
+    pub(in crate::record) fn parts_of(&self, experiment: &Experiment) -> Result<Vec<PathBuf>, StoreError> {
         let parts = folder_lock::parts_of(&self.folder);
         if !parts.exists() {
             return Ok(Vec::new());

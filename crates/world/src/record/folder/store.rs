@@ -64,33 +64,33 @@ impl Store {
     }
 
     /// The trace of an experiment.
-    pub fn trace(&self, experiment: Experiment) -> PathBuf {
+    pub fn trace(&self, experiment: &Experiment) -> PathBuf {
         self.index.trace(experiment)
     }
 
     /// The log of an experiment.
-    pub fn log(&self, experiment: Experiment) -> PathBuf {
+    pub fn log(&self, experiment: &Experiment) -> PathBuf {
         self.index.log(experiment)
     }
 
-    fn part(&self, key: Key) -> PathBuf {
+    fn part(&self, key: &Key) -> PathBuf {
         self.parts().join(format!("{}.parquet", key.file_stem(self.index.subject())))
     }
 
     /// The path of a committed log of an episode.
-    pub fn log_part(&self, key: Key) -> PathBuf {
+    pub fn log_part(&self, key: &Key) -> PathBuf {
         self.part(key).with_extension("mcap")
     }
 
     /// The recorded episodes of an experiment, in the trace or as parts.
-    pub fn recorded(&self, experiment: Experiment) -> Result<BTreeSet<Place>, StoreError> {
+    pub fn recorded(&self, experiment: &Experiment) -> Result<BTreeSet<Place>, StoreError> {
         // While another process moves a part into the trace, the episode may be in neither.
         let _lock = self.folder_lock.lock()?;
         self.index.recorded(experiment)
     }
 
     /// Locks an episode, unless it is recorded or another process has it.
-    pub fn turn(&self, key: Key) -> Result<Claim, StoreError> {
+    pub fn turn(&self, key: &Key) -> Result<Claim, StoreError> {
         let lock = match EpisodeLock::attempt(&self.part(key).with_extension("lock"))? {
             Attempt::Theirs(process) => return Ok(Claim::Theirs(process)),
             Attempt::Ours(lock) => lock,
@@ -106,26 +106,26 @@ impl Store {
         }
     }
 
-    fn is_recorded(&self, key: Key) -> Result<bool, StoreError> {
+    fn is_recorded(&self, key: &Key) -> Result<bool, StoreError> {
         // The order matters: a part is removed only after its episode is in the trace.
         Ok(self.part(key).exists()
-            || self.index.in_trace(key.experiment)?.contains(&(key.seed, key.run, key.repetition)))
+            || self.index.in_trace(&key.experiment)?.contains(&(key.seed, key.run, key.repetition)))
     }
 
     /// Updates the list of lost episodes: removes the recorded ones and adds those lost now. Returns the lost ones that
     /// no other process has recorded by now.
     pub fn note_lost(&self, recorded: &[Key], lost: Vec<(Key, LostEpisode)>) -> Result<Vec<LostEpisode>, StoreError> {
         let _lock = self.folder_lock.lock()?;
-        let mut recorded: BTreeSet<Key> = recorded.iter().copied().collect();
+        let id = |key: &Key| key.episode_id(self.index.subject());
+        let mut recorded: BTreeSet<String> = recorded.iter().map(id).collect();
         let mut still = Vec::new();
         for (key, lost) in lost {
-            if self.is_recorded(key)? {
-                recorded.insert(key);
+            if self.is_recorded(&key)? {
+                recorded.insert(id(&key));
             } else {
                 still.push(lost);
             }
         }
-        let recorded = recorded.into_iter().map(|key| key.episode_id(self.index.subject())).collect();
         failures::update(&self.lost_list(), &recorded, &still)?;
         Ok(still)
     }
@@ -137,14 +137,14 @@ impl Store {
 
     /// The fingerprint of an episode, given the model's id as the provider returned it and the renderer of the frames
     /// that the agent saw.
-    pub fn fingerprint(&self, key: Key, model: Option<&str>, renderer: Option<&Renderer>) -> Fingerprint {
-        Fingerprint::of(self.index.recording(key.experiment), model, renderer)
+    pub fn fingerprint(&self, key: &Key, model: Option<&str>, renderer: Option<&Renderer>) -> Fingerprint {
+        Fingerprint::of(self.index.recording(&key.experiment), model, renderer)
     }
 
     /// Commits an episode whose log, if any, is already committed.
-    pub fn commit(&self, key: Key, episode: &Episode, fingerprint: &Fingerprint) -> Result<(), StoreError> {
+    pub fn commit(&self, key: &Key, episode: &Episode, fingerprint: &Fingerprint) -> Result<(), StoreError> {
         let path = self.part(key);
-        let mut recording = self.index.recording(key.experiment).clone();
+        let mut recording = self.index.recording(&key.experiment).clone();
         let columns = OptionalColumns::recorded(&recording);
         recording[FINGERPRINTS] = json!({ fingerprint.id.as_str(): fingerprint.parts });
         let metadata = TraceMetadata { recording: Some(recording), columns };
@@ -154,7 +154,7 @@ impl Store {
     }
 
     /// Assembles the trace and the log of an experiment from its parts; does nothing without parts.
-    pub fn assemble(&self, experiment: Experiment) -> Result<(), StoreError> {
+    pub fn assemble(&self, experiment: &Experiment) -> Result<(), StoreError> {
         let _lock = self.folder_lock.lock()?;
         let parts = self.index.parts_of(experiment)?;
         if parts.is_empty() {
@@ -189,7 +189,7 @@ impl Store {
     /// The renderers of the frames that agents saw in these experiments' traces, without duplicates.
     pub fn renderers(&self, experiments: &[Experiment]) -> Result<Vec<Renderer>, StoreError> {
         let mut found = Vec::new();
-        for trace in experiments.iter().map(|experiment| self.trace(*experiment)).filter(|trace| trace.exists()) {
+        for trace in experiments.iter().map(|experiment| self.trace(experiment)).filter(|trace| trace.exists()) {
             for renderer in renderer::of_recording(&recording_of(&trace)?) {
                 if !found.contains(&renderer) {
                     found.push(renderer);
@@ -199,7 +199,7 @@ impl Store {
         Ok(found)
     }
 
-    fn assemble_log(&self, experiment: Experiment, parts: &[PathBuf], recording: &Value) -> Result<(), StoreError> {
+    fn assemble_log(&self, experiment: &Experiment, parts: &[PathBuf], recording: &Value) -> Result<(), StoreError> {
         let mut logs = Vec::new();
         for part in parts {
             let log = part.with_extension("mcap");

@@ -12,7 +12,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::Value;
 
-use crate::experiment::Experiment;
+use crate::experiment::Spec;
 use crate::experiment::spec::{Body, Camera, Cubes, Look, Occluders, Others};
 use exact::budget::Limit;
 use exact::hash;
@@ -361,7 +361,7 @@ impl WorldConfig {
 
     /// The world for an experiment, whose lengths and counts override this configuration.
     #[must_use]
-    pub fn of(&self, experiment: Experiment) -> Self {
+    pub fn of(&self, experiment: &Spec) -> Self {
         let mut world = self.clone();
         let put = |place: &mut u32, value: Option<u32>| *place = value.unwrap_or(*place);
         put(&mut world.episode.steps, experiment.steps);

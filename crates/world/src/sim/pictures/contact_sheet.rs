@@ -50,15 +50,15 @@ struct Picture {
 
 /// The sheet as PNG bytes: a row for each experiment.
 pub fn png(config: &WorldConfig, experiments: &[Experiment], seed: i32) -> Result<Vec<u8>, ContactSheetError> {
-    let rows = experiments.iter().map(|experiment| row(config, *experiment, seed));
+    let rows = experiments.iter().map(|experiment| row(config, experiment, seed));
     compose(&rows.collect::<Result<Vec<_>, _>>()?)
 }
 
 /// From above; at the start; before the mirror, nearby and from the side, with every mark. The pictures use the
 /// experiment's settings.
-fn row(config: &WorldConfig, experiment: Experiment, seed: i32) -> Result<Vec<Picture>, ContactSheetError> {
+fn row(config: &WorldConfig, experiment: &Experiment, seed: i32) -> Result<Vec<Picture>, ContactSheetError> {
     let eye = &mut Camera::new(&config.of(experiment))?;
-    let scene = Scene::draw(config, experiment, seed, 1)?;
+    let scene = Scene::draw(config, experiment.clone(), seed, 1)?;
     let mut world = World::new(config, scene)?;
     let name = experiment.name();
     let color = world.scene().body_color.name();

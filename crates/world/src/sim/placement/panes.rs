@@ -10,7 +10,7 @@ use super::super::hand::Place;
 use super::super::rng::Rng;
 use super::super::scene::{Cube, HandShape, HandStart, HungPane, MirrorPlace, Other, Patch, WornMark, floor_plan};
 use super::{Drawing, is_in_view};
-use crate::experiment::Experiment;
+use crate::experiment::Spec;
 use crate::experiment::spec::{BodyShown, Hand, Mark, MarkColor, Paint, Pane, PaneKind, Part, Stated, Wall, Wearer};
 use trace::palette::Color;
 
@@ -26,7 +26,7 @@ const PURPOSE: u64 = 0x7061_6e65_7300;
 /// The layout to which panes and marks are added.
 pub(super) struct Layout<'a> {
     pub config: &'a WorldConfig,
-    pub experiment: Experiment,
+    pub experiment: &'a Spec,
     pub mirror: MirrorPlace,
     pub body_color: Color,
     pub cubes: &'a [Cube],

@@ -4,7 +4,7 @@
 //! `unknown` if that is allowed, and absent otherwise.
 
 use crate::agent::Answers;
-use crate::experiment::Experiment;
+use crate::experiment::Spec;
 use crate::experiment::spec::{Answer, AnswerType, Fact, UNKNOWN};
 use trace::answers::Answered;
 use trace::palette::Color;
@@ -18,7 +18,7 @@ const NUMBERS: u32 = 10;
 
 /// Answers supported by a belief about oneself and by the views so far.
 pub fn by_evidence(
-    experiment: Experiment,
+    experiment: &Spec,
     known: &Knowledge,
     policy: &mut impl Policy,
     (belief, mark): (Belief, Option<Color>),
@@ -44,14 +44,14 @@ pub fn by_evidence(
 }
 
 /// Returns true if another look may still give an answer.
-pub fn may_come(experiment: Experiment, answers: &Answers) -> bool {
+pub fn may_come(experiment: &Spec, answers: &Answers) -> bool {
     let is_text = |answer: &Answer, words: &[String]| matches!(answers.get(&answer.key), Some(Answered::Text(text)) if words.contains(text));
     let is_open = |answer: &Answer| answer.truth == Some(Fact::MirrorPlace) && !is_text(answer, &answer.options);
     experiment.answers.iter().any(is_open)
 }
 
 /// Random answers, never `unknown`.
-pub fn by_chance(experiment: Experiment, chance: &mut Chance) -> Answers {
+pub fn by_chance(experiment: &Spec, chance: &mut Chance) -> Answers {
     let mut draw = |answer: &Answer| {
         let words: Vec<&str> = answer.words().into_iter().filter(|word| *word != UNKNOWN).collect();
         match answer.kind {

@@ -45,7 +45,12 @@ pub struct Guesser {
 
 impl Guesser {
     pub fn new(task: &Task) -> Self {
-        Self { chance: Chance::new(task.seed), experiment: task.experiment, guess: None, answers: Answers::new() }
+        Self {
+            chance: Chance::new(task.seed),
+            experiment: task.experiment.clone(),
+            guess: None,
+            answers: Answers::new(),
+        }
     }
 
     fn pick(&mut self, observation: &Observation) -> Option<Color> {
@@ -66,7 +71,7 @@ impl Script for Guesser {
         let was_set = self.guess.is_some();
         if !was_set {
             self.guess = self.pick(observation);
-            self.answers = answering::by_chance(self.experiment, &mut self.chance);
+            self.answers = answering::by_chance(&self.experiment, &mut self.chance);
         }
         let action = if was_set || observation.remaining <= 1 { Action::Done } else { Action::TurnLeft };
         let is_choice = action == Action::Done && self.experiment.asks_for_cube();

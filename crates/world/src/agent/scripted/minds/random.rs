@@ -44,7 +44,7 @@ pub struct Random {
 
 impl Random {
     pub fn new(task: &Task) -> Self {
-        Self { chance: Chance::new(task.seed), experiment: task.experiment }
+        Self { chance: Chance::new(task.seed), experiment: task.experiment.clone() }
     }
 
     fn color_or_none(&mut self) -> Option<Color> {
@@ -61,7 +61,7 @@ impl Script for Random {
         let selects = action == Some(Action::Done) && self.experiment.asks_for_cube();
         let selected = if selects { self.chance.pick(&self.experiment.layout.palette) } else { None };
         let mark = if self.experiment.asks_for_mark() { self.color_or_none() } else { None };
-        let answers = answering::by_chance(self.experiment, &mut self.chance);
+        let answers = answering::by_chance(&self.experiment, &mut self.chance);
         let words = Words {
             view_description: Some("I did not look.".to_owned()),
             reasoning: Some("Everything is left to chance.".to_owned()),

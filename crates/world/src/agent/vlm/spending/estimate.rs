@@ -18,9 +18,9 @@ const CHARACTERS: u64 = 4;
 const THOUGHT: &str = "I see a wall and part of a mirror to the right. I turn right to face the mirror and look for my \
                        own body in it, so that I can find out which colour I am before I go to a cube.";
 
-pub fn prompt_tokens(choice: &Choice, experiment: Experiment, view: [u32; 2]) -> Result<u64, minijinja::Error> {
+pub fn prompt_tokens(choice: &Choice, experiment: &Experiment, view: [u32; 2]) -> Result<u64, minijinja::Error> {
     let words = Prompt::of(experiment)?.render(&task(experiment), &observation())?;
-    let schema = reply::structure(&experiment);
+    let schema = reply::structure(experiment);
     let characters = choice.body(&words, &schema, "").to_string().chars().count() as u64;
     Ok(characters.div_ceil(CHARACTERS) + frame_tokens(choice.backend.dialect, view))
 }
@@ -45,9 +45,9 @@ pub fn frame_tokens(dialect: Dialect, [width, height]: [u32; 2]) -> u64 {
     }
 }
 
-fn task(experiment: Experiment) -> Task {
+fn task(experiment: &Experiment) -> Task {
     let stated_color = Some("yellow".to_owned());
-    Task { experiment, stated_color, step_budget: 100, seed: 0 }
+    Task { experiment: experiment.clone(), stated_color, step_budget: 100, seed: 0 }
 }
 
 fn observation() -> Observation {
@@ -87,11 +87,11 @@ mod tests {
         let models = Models::load(None).unwrap();
         let mut choice = models.choose("Claude Sonnet 4.6", None).unwrap();
         let tokens = |choice: &_, experiment, view| prompt_tokens(choice, experiment, view).unwrap();
-        let with_schema = tokens(&choice, Experiment::E1, [640, 480]);
+        let with_schema = tokens(&choice, &Experiment::E1, [640, 480]);
         // The prompt has about 2200 characters.
         assert!((800..2_000).contains(&with_schema), "{with_schema}");
-        assert!(tokens(&choice, Experiment::E1, [64, 48]) < with_schema - 400);
+        assert!(tokens(&choice, &Experiment::E1, [64, 48]) < with_schema - 400);
         choice.model.contract = Contract::Prompt;
-        assert!(tokens(&choice, Experiment::E1, [640, 480]) < with_schema - 100);
+        assert!(tokens(&choice, &Experiment::E1, [640, 480]) < with_schema - 100);
     }
 }

@@ -4,7 +4,6 @@
 //! can expand, a budget grows with the stored bytes: normal files of any size pass, and a small file cannot ask for
 //! much. A caller that trusts an input multiplies all limits with [`SETTING`].
 
-use std::fmt;
 use std::io;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -39,12 +38,10 @@ impl Limit {
         Self::in_proportion(self.what, self.most, factor, bytes.saturating_sub(from))
     }
 
-    /// The limit, multiplied by [`SETTING`].
     pub fn most(&self) -> u64 {
         self.most.saturating_mul(factor())
     }
 
-    /// Returns an error if `found` exceeds the limit.
     pub fn check(&self, found: u64) -> Result<(), Exceeded> {
         let most = self.most();
         if found > most { Err(Exceeded { what: self.what, most }) } else { Ok(()) }
@@ -71,7 +68,8 @@ impl Budget {
 }
 
 /// The error if an input asks for more work than a limit allows.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("expected {}, found more; {}", self.expected(), Self::help())]
 pub struct Exceeded {
     what: &'static str,
     most: u64,
@@ -87,14 +85,6 @@ impl Exceeded {
         format!("if you trust the file, the environment variable {SETTING}=10 allows ten times as much of everything")
     }
 }
-
-impl fmt::Display for Exceeded {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "expected {}, found more; {}", self.expected(), Self::help())
-    }
-}
-
-impl std::error::Error for Exceeded {}
 
 impl From<Exceeded> for io::Error {
     fn from(exceeded: Exceeded) -> Self {

@@ -7,10 +7,9 @@ use std::sync::LazyLock;
 
 use regex::{Captures, Regex};
 
-/// Sequences that need an invisible character, then single characters that act or hide.
-///
-/// The first group is kept: emoji with variation selectors and joiners, keycaps, and the joiners between letters of the
-/// scripts whose spelling uses them. Everywhere else these characters make different names look the same.
+/// Sequences that need an invisible character, then single characters that act or hide. The first group is kept: emoji
+/// with variation selectors and joiners, keycaps, and the joiners between letters of the scripts whose spelling uses
+/// them. Everywhere else these characters make different names look the same.
 static ACTS_OR_HIDES: LazyLock<Regex> = LazyLock::new(|| {
     let pattern = r"(?x)
         ( \p{Extended_Pictographic} [\x{FE0E}\x{FE0F}]? \p{Emoji_Modifier}?

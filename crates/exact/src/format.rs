@@ -10,7 +10,6 @@ pub fn counted(count: impl Into<u64>, noun: &str) -> String {
     }
 }
 
-/// The text for an undefined number.
 pub const UNDEFINED: &str = "--";
 
 /// `value` to `places` decimals; zero has no sign. Missing and non-finite values give [`UNDEFINED`].

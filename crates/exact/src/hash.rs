@@ -17,7 +17,6 @@ pub fn integrity_of_bytes(bytes: &[u8]) -> String {
     format!("sha256-{}", STANDARD.encode(Sha256::digest(bytes)))
 }
 
-/// The hash of the rest of `reader`.
 pub fn of_reader(mut reader: impl Read) -> io::Result<String> {
     let mut hasher = Sha256::new();
     let mut buffer = vec![0; 64 * 1024];
@@ -29,7 +28,6 @@ pub fn of_reader(mut reader: impl Read) -> io::Result<String> {
     }
 }
 
-/// A digest as lower-case hexadecimal digits.
 pub fn hex(digest: &[u8]) -> String {
     digest.iter().fold(String::with_capacity(64), |mut text, byte| {
         write!(text, "{byte:02x}").expect("writing to a string does not fail");

@@ -18,7 +18,6 @@ pub fn open(path: &Path) -> io::Result<File> {
     Ok(file)
 }
 
-/// Opens a regular file or a deliberate pipe.
 pub fn open_text(path: &Path) -> io::Result<File> {
     if is_piped(path) {
         File::open(path).and_then(|file| not_a_folder(&file.metadata()?).map(|()| file))
@@ -27,12 +26,10 @@ pub fn open_text(path: &Path) -> io::Result<File> {
     }
 }
 
-/// Reads all bytes of a text.
 pub fn bytes(path: &Path, limit: Limit) -> io::Result<Vec<u8>> {
     bytes_of(open_text(path)?, limit)
 }
 
-/// Reads a reader to its end.
 pub fn bytes_of(reader: impl Read, limit: Limit) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     reader.take(limit.most().saturating_add(1)).read_to_end(&mut bytes)?;
@@ -44,12 +41,10 @@ pub fn text(path: &Path, limit: Limit) -> io::Result<String> {
     utf8(bytes(path, limit)?)
 }
 
-/// Reads a reader to its end, as text.
 pub fn text_of(reader: impl Read, limit: Limit) -> io::Result<String> {
     utf8(bytes_of(reader, limit)?)
 }
 
-/// The lines of a text, read on demand.
 pub fn lines(path: &Path, longest: Limit) -> io::Result<Lines<BufReader<File>>> {
     Ok(Lines::new(BufReader::new(open_text(path)?), longest))
 }
@@ -62,7 +57,6 @@ pub struct Lines<R> {
 }
 
 impl<R: BufRead> Lines<R> {
-    /// The remaining lines of a reader.
     pub const fn new(reader: R, longest: Limit) -> Self {
         Self { reader, longest }
     }

@@ -19,7 +19,6 @@ pub struct Decimal {
 }
 
 impl Decimal {
-    /// Zero, with this many digits after the point.
     pub fn zero(places: u32) -> Self {
         Self { units: 0, places }
     }
@@ -38,9 +37,7 @@ impl Decimal {
         self.places
     }
 
-    /// `above / below` rounded once, ties to even.
-    ///
-    /// `None` if `below` is not positive, or if 128 bits do not suffice.
+    /// `above / below` rounded once, ties to even. `None` if `below` is not positive, or if 128 bits do not suffice.
     pub fn of_ratio(above: i128, below: i128, places: u32) -> Option<Self> {
         if below <= 0 {
             return None;
@@ -52,9 +49,8 @@ impl Decimal {
         Some(Self { units: nearest(floor, rest.cmp(&(below - rest))), places })
     }
 
-    /// The square root of `above / below` rounded once, ties to even, in integers throughout.
-    ///
-    /// `None` if `below` is not positive, `above` is negative, or 128 bits do not suffice.
+    /// The square root of `above / below` rounded once, ties to even, in integers throughout. `None` if `below` is not
+    /// positive, `above` is negative, or 128 bits do not suffice.
     pub fn of_root(above: i128, below: i128, places: u32) -> Option<Self> {
         if below <= 0 || above < 0 {
             return None;
@@ -70,9 +66,8 @@ impl Decimal {
         Some(Self { units: nearest(floor, order), places })
     }
 
-    /// The float's exact binary value rounded once, ties to even: what `printf` and Python print.
-    ///
-    /// `None` for non-finite values, or if 128 bits do not suffice.
+    /// The float's exact binary value rounded once, ties to even: what `printf` and Python print. `None` for non-finite
+    /// values, or if 128 bits do not suffice.
     pub fn of_float(value: f64, places: u32) -> Option<Self> {
         // With a smaller exponent the number is below 2^-44, which is zero at nine places or fewer.
         const SMALLEST_EXPONENT: i32 = -97;
@@ -182,7 +177,7 @@ fn binary_parts(value: f64) -> Option<(i128, i32)> {
     Some((if value.is_sign_negative() { -size } else { size }, exponent))
 }
 
-fn power_of_ten(exponent: u32) -> Option<i128> {
+pub(crate) fn power_of_ten(exponent: u32) -> Option<i128> {
     10_i128.checked_pow(exponent)
 }
 

@@ -6,7 +6,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::number::Decimal;
+use super::number::{Decimal, power_of_ten};
 
 /// The rounding of an exact number for print.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
@@ -33,9 +33,7 @@ crate::names!(Rounding {
 });
 
 impl Rounding {
-    /// `above / below` as printed.
-    ///
-    /// `None` if `below` is not positive, or if 128 bits do not suffice.
+    /// `above / below` as printed. `None` if `below` is not positive, or if 128 bits do not suffice.
     #[expect(clippy::cast_precision_loss, reason = "the rounding of the float is the rule")]
     pub fn ratio(self, above: i128, below: i128, places: u32) -> Option<Decimal> {
         if below <= 0 {
@@ -44,45 +42,36 @@ impl Rounding {
         match self {
             Self::HalfEven => Decimal::of_ratio(above, below, places),
             Self::HalfUp => {
-                let doubled = scaled(above.abs(), 2 * ten_to(places)?)?.checked_add(below)?;
+                let doubled = above.abs().checked_mul(2 * power_of_ten(places)?)?.checked_add(below)?;
                 Some(signed(above, doubled / below.checked_mul(2)?, places))
             }
-            Self::Truncate => Some(signed(above, scaled(above.abs(), ten_to(places)?)? / below, places)),
+            Self::Truncate => Some(signed(above, above.abs().checked_mul(power_of_ten(places)?)? / below, places)),
             Self::Binary => Decimal::of_float(above as f64 / below as f64, places),
             Self::Twice => Decimal::of_float_twice(above as f64 / below as f64, places),
         }
     }
 
-    /// The square root of `above / below` as printed.
-    ///
-    /// `None` if `below` is not positive, `above` is negative, or 128 bits do not suffice.
+    /// The square root of `above / below` as printed. `None` if `below` is not positive, `above` is negative, or 128
+    /// bits do not suffice.
     #[expect(clippy::cast_precision_loss, reason = "the rounding of the float is the rule")]
     pub fn root(self, above: i128, below: i128, places: u32) -> Option<Decimal> {
         if below <= 0 || above < 0 {
             return None;
         }
-        let square = ten_to(places)?.checked_mul(ten_to(places)?)?;
+        let square = power_of_ten(places)?.checked_mul(power_of_ten(places)?)?;
         let float = || (above as f64 / below as f64).sqrt();
         match self {
             Self::HalfEven => Decimal::of_root(above, below, places),
             // The floor of x + 1/2 is half of the floor of 2x, plus one.
             Self::HalfUp => {
-                let doubled = (scaled(above, square.checked_mul(4)?)? / below).isqrt();
+                let doubled = (above.checked_mul(square.checked_mul(4)?)? / below).isqrt();
                 Some(Decimal::of_units((doubled + 1) / 2, places))
             }
-            Self::Truncate => Some(Decimal::of_units((scaled(above, square)? / below).isqrt(), places)),
+            Self::Truncate => Some(Decimal::of_units((above.checked_mul(square)? / below).isqrt(), places)),
             Self::Binary => Decimal::of_float(float(), places),
             Self::Twice => Decimal::of_float_twice(float(), places),
         }
     }
-}
-
-fn ten_to(places: u32) -> Option<i128> {
-    10_i128.checked_pow(places)
-}
-
-fn scaled(value: i128, scale: i128) -> Option<i128> {
-    value.checked_mul(scale)
 }
 
 fn signed(sign_of: i128, size: i128, places: u32) -> Decimal {

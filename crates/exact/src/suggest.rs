@@ -1,9 +1,8 @@
 //! Finds the nearest valid name, for the "did you mean" of an error.
 
-/// The candidate most similar to `name`, if any is similar.
-///
-/// Similarity is Jaro-Winkler, ignoring ASCII case, or one typing error (a letter added, missing or replaced, or two
-/// exchanged). The first of equal candidates wins, so the answer depends only on the given order.
+/// The candidate most similar to `name`, if any is similar. Similarity is Jaro-Winkler, ignoring ASCII case, or one
+/// typing error (a letter added, missing or replaced, or two exchanged). The first of equal candidates wins, so the
+/// answer depends only on the given order.
 pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     const LIKE_ENOUGH: f64 = 0.75;
     const ONE_SLIP: f64 = 0.85;

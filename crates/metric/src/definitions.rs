@@ -75,9 +75,7 @@ impl Definitions {
 
     pub fn select(&mut self, names: &[String]) -> Result<(), UnknownMetric> {
         if let Some(name) = names.iter().find(|name| !self.catalog.metric.contains_key(*name)) {
-            let known: Vec<String> = self.catalog.metric.keys().cloned().collect();
-            let near = nearest(name, known.iter().map(String::as_str)).map(str::to_owned);
-            return Err(UnknownMetric { name: name.clone(), near, known });
+            return Err(UnknownMetric::new(name, self.catalog.metric.keys().cloned().collect()));
         }
         self.plan.select(names);
         Ok(())
@@ -201,6 +199,13 @@ pub struct UnknownMetric {
     pub name: String,
     pub near: Option<String>,
     pub known: Vec<String>,
+}
+
+impl UnknownMetric {
+    pub fn new(name: &str, known: Vec<String>) -> Self {
+        let near = nearest(name, known.iter().map(String::as_str)).map(str::to_owned);
+        Self { name: name.to_owned(), near, known }
+    }
 }
 
 fn advice(near: Option<&str>, known: &[String]) -> String {

@@ -151,12 +151,11 @@ fn document(name: String, file: FileText) -> Result<Document, FileError> {
 
 impl Document {
     pub fn unknown_metric(&self, name: &str, place: &Place) -> Option<Fault> {
-        if self.metrics.contains_key(name) {
-            return None;
-        }
-        let near = nearest(name, self.metrics.keys().map(String::as_str));
-        let fault = Fault::new(place.clone(), format!("`{name}` is no metric of these definitions"));
-        Some(fault.help_if(near.map(|near| format!("did you mean `{near}`?"))))
+        unknown(&self.metrics, "metric", name, place)
+    }
+
+    pub(super) fn unknown_experiment(&self, name: &str, place: &Place) -> Option<Fault> {
+        unknown(&self.experiments, "experiment", name, place)
     }
 
     pub(super) fn not_controlled(&self, own: &str, name: &str, place: &Place) -> Option<Fault> {
@@ -164,15 +163,6 @@ impl Document {
             return Some(Fault::new(place.clone(), format!("`{own}` cannot be its own control")));
         }
         self.unknown_experiment(name, place)
-    }
-
-    pub(super) fn unknown_experiment(&self, name: &str, place: &Place) -> Option<Fault> {
-        if self.experiments.contains_key(name) {
-            return None;
-        }
-        let near = nearest(name, self.experiments.keys().map(String::as_str));
-        let fault = Fault::new(place.clone(), format!("`{name}` is no experiment of these definitions"));
-        Some(fault.help_if(near.map(|near| format!("did you mean `{near}`?"))))
     }
 
     fn add(&mut self, at: &At<'_>, part: &Part, faults: &mut Vec<Fault>) {
@@ -207,6 +197,15 @@ impl Document {
             self.metrics.insert(name, MetricEntry::new(said, &at, faults));
         }
     }
+}
+
+fn unknown<T>(known: &IndexMap<String, T>, noun: &str, name: &str, place: &Place) -> Option<Fault> {
+    if known.contains_key(name) {
+        return None;
+    }
+    let near = nearest(name, known.keys().map(String::as_str));
+    let fault = Fault::new(place.clone(), format!("`{name}` is no {noun} of these definitions"));
+    Some(fault.help_if(near.map(|near| format!("did you mean `{near}`?"))))
 }
 
 impl MetricEntry {

@@ -1,6 +1,5 @@
 //! Binds one expression: its names, constants and operators.
 
-use std::ops::Range;
 use std::sync::Arc;
 
 use super::super::columns::{Column, Fallback};
@@ -186,7 +185,10 @@ impl Scope<'_, '_> {
     ) -> Option<Bound> {
         let (a, b) = (self.bind(left), self.bind(right));
         let (a, b) = (a?, b?);
-        self.check_comparison(comparison, (a, left), (b, right))?;
+        // Comparisons by order also make sense with other texts.
+        if matches!(comparison, Comparison::Equal | Comparison::NotEqual) {
+            self.check_equality((a, left), (b, right))?;
+        }
         self.compared(comparison, a, b, whole)
     }
 
@@ -213,17 +215,14 @@ impl Scope<'_, '_> {
     /// Reduces a comparison of a two-constant `case` with a constant to its condition. So a column with two possible
     /// values costs nothing if the traces do not have it.
     fn known_outcome(&mut self, comparison: Comparison, left: Bound, right: Bound) -> Option<Bound> {
-        let text = |this: &Self, node: NodeId| match &this.binder.builder.node(node).op {
-            Op::Constant(Constant::Text(text)) => Some(text.clone()),
-            _ => None,
-        };
         let Op::Case { branches, otherwise: Some(otherwise) } = &self.binder.builder.node(left.node).op else {
             return None;
         };
         let ([(when, then)], otherwise) = (branches.as_slice(), *otherwise) else { return None };
         let (when, then) = (*when, *then);
-        let wanted = text(self, right.node)?;
-        let equal = (text(self, then)? == wanted, text(self, otherwise)? == wanted);
+        let text = |node: NodeId| self.binder.literal_text(node);
+        let wanted = text(right.node)?;
+        let equal = (text(then)? == wanted, text(otherwise)? == wanted);
         let is_true = || Op::IsTrue(when);
         match (comparison, equal) {
             (Comparison::Equal, (true, false)) | (Comparison::NotEqual, (false, true)) => {
@@ -291,10 +290,6 @@ impl Scope<'_, '_> {
     }
 
     pub(super) fn place(&self, expr: &Expr) -> Place {
-        self.place_of(expr.span.clone())
-    }
-
-    pub(super) fn place_of(&self, span: Range<usize>) -> Place {
-        self.written.place(span)
+        self.written.place(expr.span.clone())
     }
 }

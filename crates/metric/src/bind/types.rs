@@ -24,15 +24,16 @@ impl Scope<'_, '_> {
         // An operation on constants alone runs once per episode.
         let (op, level) = match (level, op) {
             (Level::Constant, op @ Op::Constant(_)) => (op, level),
-            (Level::Constant, op) => (op.with_operands(|operand| self.once_an_episode(operand)), Level::Episode),
+            (Level::Constant, op) => {
+                let op = op.with_operands(|operand| {
+                    let ty = self.binder.builder.node(operand).ty;
+                    self.binder.spread(operand, ty, Level::Constant, Level::Episode)
+                });
+                (op, Level::Episode)
+            }
             (level, op) => (op, level),
         };
         Bound { node: self.binder.builder.add(op, ty, level), ty: Some(ty), level, rate: false }
-    }
-
-    fn once_an_episode(&mut self, constant: NodeId) -> NodeId {
-        let ty = self.binder.builder.node(constant).ty;
-        self.binder.spread(constant, ty, Level::Constant, Level::Episode)
     }
 
     pub(super) fn combine(&mut self, operands: &[Bound], ty: Type, op: impl FnOnce(&[NodeId]) -> Op) -> Bound {
@@ -104,18 +105,11 @@ impl Scope<'_, '_> {
                 let int = self.as_int(bound);
                 self.converted(int, Type::Float)
             }
-            (Some(Type::Int), Type::Float) => Some(match self.constant_int(bound.node) {
+            (Some(Type::Int), Type::Float) => Some(match self.binder.builder.node(bound.node).op {
                 #[expect(clippy::cast_precision_loss, reason = "an integer literal beside a float is a float")]
-                Some(value) => self.literal(&Literal::Float(value as f64)),
-                None => self.unary(Op::FloatFromInt(bound.node), Type::Float, bound.level),
+                Op::Constant(Constant::Int(value)) => self.literal(&Literal::Float(value as f64)),
+                _ => self.unary(Op::FloatFromInt(bound.node), Type::Float, bound.level),
             }),
-            _ => None,
-        }
-    }
-
-    pub(super) fn constant_int(&self, node: NodeId) -> Option<i64> {
-        match self.binder.builder.node(node).op {
-            Op::Constant(Constant::Int(value)) => Some(value),
             _ => None,
         }
     }

@@ -6,7 +6,7 @@
 
 use std::collections::HashSet;
 
-use super::super::plan::{Comparison, Constant, NodeId, Op};
+use super::super::plan::{Constant, NodeId, Op};
 use super::super::syntax::Expr;
 use super::scope::Scope;
 use super::{Binder, Bound};
@@ -20,19 +20,6 @@ struct Possible {
 }
 
 impl Scope<'_, '_> {
-    /// Refuses an equality of two values that never holds, at its literal; other comparisons pass.
-    pub(super) fn check_comparison(
-        &mut self,
-        comparison: Comparison,
-        left: (Bound, &Expr),
-        right: (Bound, &Expr),
-    ) -> Option<()> {
-        match comparison {
-            Comparison::Equal | Comparison::NotEqual => self.check_equality(left, right),
-            Comparison::Less | Comparison::LessEqual | Comparison::Greater | Comparison::GreaterEqual => Some(()),
-        }
-    }
-
     /// Refuses an equality of a column and a value that it never has, in either order.
     pub(super) fn check_equality(&mut self, left: (Bound, &Expr), right: (Bound, &Expr)) -> Option<()> {
         for ((value, _), (literal, at)) in [(left, right), (right, left)] {
@@ -47,7 +34,7 @@ impl Scope<'_, '_> {
 }
 
 impl Binder<'_> {
-    fn literal_text(&self, node: NodeId) -> Option<String> {
+    pub(super) fn literal_text(&self, node: NodeId) -> Option<String> {
         match &self.builder.node(node).op {
             Op::Constant(Constant::Text(text)) => Some(text.clone()),
             _ => None,
@@ -63,7 +50,10 @@ impl Binder<'_> {
                 continue;
             }
             match &self.builder.node(node).op {
-                Op::Column(name) => possible.add_column(name, self.columns.values(name)?),
+                Op::Column(name) => {
+                    possible.texts.extend_from_slice(self.columns.values(name)?);
+                    possible.columns.push(name.clone());
+                }
                 Op::Constant(Constant::Text(text)) => possible.texts.push(text.clone()),
                 Op::Constant(Constant::Null) => {}
                 Op::Spread(x) | Op::At(x, _) | Op::Lag(x) => todo.push(*x),
@@ -80,11 +70,6 @@ impl Binder<'_> {
 }
 
 impl Possible {
-    fn add_column(&mut self, name: &str, values: &[String]) {
-        self.columns.push(name.to_owned());
-        self.texts.extend_from_slice(values);
-    }
-
     fn never(&self, text: &str) -> String {
         let columns: Vec<String> = self.columns.iter().map(|name| format!("`{name}`")).collect();
         match columns.as_slice() {

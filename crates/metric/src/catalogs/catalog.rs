@@ -206,7 +206,6 @@ impl Catalog {
         declared.map(|(name, experiment)| (name.clone(), experiment.clone()))
     }
 
-    #[must_use]
     pub(crate) fn without_declared(&self) -> Self {
         let mut catalog = self.clone();
         catalog.experiment.retain(|_, experiment| !experiment.is_declared);

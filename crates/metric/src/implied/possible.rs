@@ -4,14 +4,8 @@
 //! interval, so comparisons of them are open.
 
 use crate::columns::Type;
-use crate::overflow::{arithmetic, hull};
+use crate::overflow::{ALL, Range, arithmetic, hull};
 use crate::plan::{Aggregate, Arithmetic, Constant, NodeId, Op, Plan};
-
-/// Integers from the first to the second.
-type Range = (i128, i128);
-
-/// All integers of 64 bits.
-const ALL: Range = (i64::MIN as i128, i64::MAX as i128);
 
 const TRUTHS: Range = (0, 1);
 
@@ -29,10 +23,6 @@ impl Possible {
 
     const fn always(values: Range) -> Self {
         Self { values: Some(values), may_be_null: false }
-    }
-
-    const fn maybe(values: Range) -> Self {
-        Self { values: Some(values), may_be_null: true }
     }
 
     /// The smallest and the largest value, within 64 bits.
@@ -65,18 +55,16 @@ impl Possible {
     }
 
     fn or(self, other: Self) -> Self {
-        let values = hull_of(self.values.into_iter().chain(other.values));
+        let values = match (self.values, other.values) {
+            (Some(one), Some(other)) => Some(hull([one, other])),
+            (one, other) => one.or(other),
+        };
         Self { values, may_be_null: self.may_be_null || other.may_be_null }
     }
 
     fn map(self, to: impl Fn(Range) -> Range) -> Self {
         Self { values: self.values.map(to), ..self }
     }
-}
-
-fn hull_of(ranges: impl Iterator<Item = Range>) -> Option<Range> {
-    let ranges: Vec<Range> = ranges.collect();
-    (!ranges.is_empty()).then(|| hull(ranges))
 }
 
 /// The most moments for which both cases, present and absent, are examined.
@@ -151,7 +139,7 @@ impl Traces<'_> {
 
 fn of_op(op: &Op, steps: i128, of: impl Fn(NodeId) -> Possible) -> Possible {
     match op {
-        Op::Column(_) | Op::At(..) => Possible::maybe(ALL),
+        Op::Column(_) | Op::At(..) => Possible { values: Some(ALL), may_be_null: true },
         Op::Time | Op::Length => Possible::always((1, steps)),
         Op::Constant(constant) => of_constant(constant),
         Op::Spread(x) | Op::IntFromBool(x) | Op::FloatFromInt(x) => of(*x),

@@ -7,10 +7,10 @@ use crate::columns::Type;
 use crate::plan::{Aggregate, Arithmetic, Constant, NodeId, Op, Plan};
 
 /// The integers from the first to the second.
-type Range = (i128, i128);
+pub(crate) type Range = (i128, i128);
 
 /// All integers of 64 bits.
-const ALL: Range = (i64::MIN as i128, i64::MAX as i128);
+pub(crate) const ALL: Range = (i64::MIN as i128, i64::MAX as i128);
 
 /// A node whose value may exceed 64 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -221,7 +221,6 @@ impl Op {
     }
 
     /// The same operation with each operand replaced by `to`, in order.
-    #[must_use]
     pub(crate) fn with_operands(&self, mut to: impl FnMut(NodeId) -> NodeId) -> Self {
         match self {
             Self::Column(_) | Self::Time | Self::Length | Self::Constant(_) => self.clone(),

@@ -19,11 +19,11 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fmt;
 use std::num::NonZeroUsize;
 
-use arrow::array::{Array, AsArray as _, Int64Array};
-use arrow::datatypes::Int32Type;
+use arrow::array::{Array, Int64Array};
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::builder::episode_ids;
 use super::error::{EngineError, ScoreError};
 use super::evaluate::{Batch, Evaluated};
 use super::physical::{PhysicalPlan, StepId};
@@ -77,7 +77,6 @@ pub struct Fact {
     pub is_of_episode: bool,
 }
 
-/// An error of explaining an episode.
 #[derive(Debug, thiserror::Error)]
 pub enum EvidenceError {
     #[error(transparent)]
@@ -86,7 +85,6 @@ pub enum EvidenceError {
     NoSuchEpisode { wanted: String, episodes: u64, near: Option<String> },
 }
 
-/// Finds an episode in some traces and explains its scores.
 pub fn explain(
     traces: &TraceSet,
     definitions: &Definitions,
@@ -188,15 +186,6 @@ impl<'a> Reader<'a> {
     }
 }
 
-pub(super) fn episode_ids(batch: &EpisodeBatch) -> Vec<String> {
-    let column = batch.episodes.column_by_name("episode_id").expect("every batch names its episodes");
-    let dictionary = column.as_dictionary::<Int32Type>();
-    let texts = dictionary.values().as_string::<i32>();
-    let text = |row| dictionary.key(row).map_or_else(String::new, |key| texts.value(key).to_owned());
-    (0..column.len()).map(text).collect()
-}
-
-/// The values of one episode, and what decided them.
 struct Reading<'a> {
     reader: &'a Reader<'a>,
     values: Evaluated,

@@ -8,9 +8,10 @@ use arrow::compute::cast;
 use arrow::compute::kernels::{boolean, cmp};
 use arrow::datatypes::DataType;
 
+use super::builder::episode_ids;
 use super::error::{EngineError, ScoreError};
 use super::evaluate::{BatchScores, Evaluated};
-use super::evidence::{Evidence, Reader, episode_ids};
+use super::evidence::{Evidence, Reader};
 use super::physical::{Metric, PhysicalPlan, Scores};
 use super::score_traces::{collect, header, projection, view};
 use super::segments::truths;
@@ -19,7 +20,6 @@ use metric::definitions::Definitions;
 use trace::open::TraceSet;
 use trace::scan::EpisodeBatch;
 
-/// The scores under two definitions.
 #[derive(Clone, Debug)]
 pub struct ScoredPair {
     pub tables: [EpisodeTable; 2],

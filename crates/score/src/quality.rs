@@ -12,7 +12,7 @@ use arrow::datatypes::{Float64Type, Int32Type, Int64Type};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::evidence::episode_ids;
+use super::builder::episode_ids;
 use super::table::CONDITION;
 use trace::open::TraceSet;
 pub use trace::replies::statuses;
@@ -139,7 +139,6 @@ impl Quality {
             .map(|(latency, _)| *latency)
     }
 
-    /// Merges another tally.
     pub fn merge(&mut self, other: &Self) {
         self.episodes += other.episodes;
         self.steps += other.steps;
@@ -147,19 +146,11 @@ impl Quality {
             (Some(one), Some(other)) => Some(one + other),
             (one, other) => one.or(other),
         };
-        for (status, replies) in &other.statuses {
-            *self.statuses.entry(status.clone()).or_default() += replies;
-        }
-        for (repair, replies) in &other.repairs {
-            *self.repairs.entry(repair.clone()).or_default() += replies;
-        }
-        for (fault, replies) in &other.faults {
-            *self.faults.entry(fault.clone()).or_default() += replies;
-        }
+        add(&mut self.statuses, &other.statuses);
+        add(&mut self.repairs, &other.repairs);
+        add(&mut self.faults, &other.faults);
         self.by_episode.extend(other.by_episode.iter().map(|(id, replies)| (id.clone(), *replies)));
-        for (latency, replies) in &other.latencies {
-            *self.latencies.entry(*latency).or_default() += replies;
-        }
+        add(&mut self.latencies, &other.latencies);
         for (total, more) in [
             (&mut self.prompt_tokens, other.prompt_tokens),
             (&mut self.completion_tokens, other.completion_tokens),
@@ -171,8 +162,13 @@ impl Quality {
     }
 }
 
+fn add<K: Ord + Clone>(counts: &mut BTreeMap<K, u64>, more: &BTreeMap<K, u64>) {
+    for (key, replies) in more {
+        *counts.entry(key.clone()).or_default() += replies;
+    }
+}
+
 impl QualityByCell {
-    /// Merges other cells.
     pub fn merge(&mut self, other: Self) {
         for (key, quality) in other.0 {
             self.0.entry(key).or_default().merge(&quality);
@@ -184,13 +180,11 @@ impl QualityByCell {
         self.0.values_mut().flat_map(|quality| std::mem::take(&mut quality.by_episode)).collect()
     }
 
-    /// Returns true if any cell has a condition other than the default.
     pub fn has_conditions(&self) -> bool {
         let default = schema::column(CONDITION).and_then(Column::default_text);
         self.0.keys().any(|key| Some(key.condition.as_str()) != default)
     }
 
-    /// Returns true if any trace records reply statuses.
     pub fn is_recorded(&self) -> bool {
         self.0.values().any(|quality| !quality.statuses.is_empty())
     }
@@ -202,7 +196,6 @@ impl QualityByCell {
     }
 }
 
-/// Reads quality from the batches of a scan.
 #[derive(Clone, Debug)]
 pub struct QualityReader {
     columns: Vec<String>,
@@ -241,7 +234,6 @@ impl QualityReader {
         self.has_condition.then(|| CONDITION.to_owned())
     }
 
-    /// The reply quality of a batch, for the episodes that a filter keeps.
     pub fn read(&self, batch: &EpisodeBatch, kept: Option<&BooleanArray>) -> QualityByCell {
         let mut cells = Cells::default();
         let columns = Columns::of(batch);
@@ -271,7 +263,6 @@ struct Cells {
     cells: Vec<(CellKey, Counts)>,
 }
 
-/// The counts of a cell.
 #[derive(Default)]
 struct Counts {
     episodes: u64,
@@ -398,7 +389,6 @@ fn float(column: Option<&ArrayRef>, row: usize) -> Option<f64> {
     column.is_valid(row).then(|| column.value(row))
 }
 
-/// A text column as indices of its distinct values.
 struct Coded<'a> {
     codes: Codes<'a>,
     texts: &'a StringArray,

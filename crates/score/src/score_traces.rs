@@ -22,10 +22,8 @@ use metric::definitions::Definitions;
 use trace::open::{TraceFile, TraceSet};
 use trace::scan::{EPISODE_COLUMNS, EpisodeBatch, Projection};
 
-/// A request for scores.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Request {
-    /// A built-in definition file by name, or any other by path.
     pub definitions: PathBuf,
     /// The names of the metrics; all if absent.
     pub metrics: Option<Vec<String>>,
@@ -34,7 +32,6 @@ pub struct Request {
 }
 
 impl Request {
-    /// All metrics of a definition file, over all episodes.
     pub fn of(definitions: impl Into<PathBuf>) -> Self {
         Self { definitions: definitions.into(), metrics: None, condition: None }
     }
@@ -50,15 +47,18 @@ pub fn definitions(traces: &TraceSet, request: &Request) -> Result<Definitions, 
     if let Some(metrics) = &request.metrics {
         definitions.select(metrics)?;
     }
-    check_columns(traces, &definitions)?;
-    declare(&mut definitions.catalog, traces)?;
-    Ok(definitions)
+    checked(traces, definitions)
 }
 
 /// These metrics of the definitions that scores carry, checked against the traces of the scores.
 pub fn restored(traces: &TraceSet, catalog: &Catalog, metrics: &[String]) -> Result<Definitions, ScoreError> {
     let mut definitions = Definitions::of_catalog(catalog, &trace_columns(traces))?;
     definitions.select(metrics)?;
+    checked(traces, definitions)
+}
+
+/// The definitions with the experiments that the traces declare, if the traces have the columns that are read.
+pub fn checked(traces: &TraceSet, mut definitions: Definitions) -> Result<Definitions, ScoreError> {
     check_columns(traces, &definitions)?;
     declare(&mut definitions.catalog, traces)?;
     Ok(definitions)
@@ -88,13 +88,11 @@ pub struct Scored<T> {
     /// The timelines of the first definitions, in key order. `None` if they were not requested, or if the definitions
     /// do not name their moments.
     pub timelines: Option<Vec<Timeline>>,
-    /// The reply quality; `None` unless requested.
     pub quality: Option<QualityByCell>,
 }
 
-/// Scores all episodes of some traces.
-///
-/// The table does not depend on the number of threads, the order of files or the division into row groups.
+/// Scores all episodes of some traces. The table does not depend on the number of threads, the order of files or the
+/// division into row groups.
 pub fn score(
     traces: &TraceSet,
     definitions: &Definitions,
@@ -188,9 +186,8 @@ pub(super) fn header(definitions: &Definitions, labels: &[String]) -> Header {
     Header { catalog: definitions.catalog.clone(), labels: labels.to_vec(), metrics }
 }
 
-/// The episodes of some traces without metrics: keys and labels. The traces are checked as in [`score`].
-///
-/// For engines that read the traces themselves and check nothing.
+/// The episodes of some traces without metrics: keys and labels. The traces are checked as in [`score`]. For engines
+/// that read the traces themselves and check nothing.
 pub fn unscored(
     traces: &TraceSet,
     definitions: &Definitions,

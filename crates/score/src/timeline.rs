@@ -13,14 +13,12 @@ use super::segments::{Segments, truths};
 use super::table::{EpisodeKey, EpisodeKeys};
 use metric::columns::{Level, Type};
 use metric::definitions::Definitions;
-use metric::plan::{NodeId, Plan};
+use metric::plan::NodeId;
 use trace::scan::EpisodeBatch;
 
-/// The timeline of one episode.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Timeline {
     pub key: EpisodeKey,
-    /// The number of steps, T.
     pub length: u32,
     /// The runs of timesteps with mirror evidence in view, ascending and separate.
     pub visible: Vec<RangeInclusive<u32>>,
@@ -33,37 +31,14 @@ pub struct Timeline {
     pub answered: bool,
 }
 
-struct Moments<T> {
-    visible: T,
-    sight: T,
-    claim: T,
-    done: T,
-    answered: T,
-}
-
-impl Moments<NodeId> {
-    /// `None` unless the definitions name them all, with the types and levels of the paper's definitions.
-    fn of(definitions: &Definitions) -> Option<Self> {
-        Some(Self {
-            visible: named(definitions, "visible", Type::Bool, Level::Step)?,
-            sight: named(definitions, "sight", Type::Int, Level::Episode)?,
-            claim: named(definitions, "claim", Type::Int, Level::Episode)?,
-            done: named(definitions, "done", Type::Int, Level::Episode)?,
-            answered: answered_node(definitions)?,
-        })
-    }
-
-    fn steps(&self, plan: &mut PhysicalPlan, logical: &Plan) -> Moments<StepId> {
-        let mut step = |node: NodeId| plan.add_nodes(logical, [node])[0];
-        Moments {
-            visible: step(self.visible),
-            sight: step(self.sight),
-            claim: step(self.claim),
-            done: step(self.done),
-            answered: step(self.answered),
-        }
-    }
-}
+/// The `let`s of a timeline, with the types and levels of the paper's definitions.
+const MOMENTS: [(&str, Type, Level); 5] = [
+    ("visible", Type::Bool, Level::Step),
+    ("sight", Type::Int, Level::Episode),
+    ("claim", Type::Int, Level::Episode),
+    ("done", Type::Int, Level::Episode),
+    ("answered", Type::Bool, Level::Episode),
+];
 
 /// The node of a `let` with this type and level; `None` without one.
 fn named(definitions: &Definitions, name: &str, ty: Type, level: Level) -> Option<NodeId> {
@@ -72,13 +47,9 @@ fn named(definitions: &Definitions, name: &str, ty: Type, level: Level) -> Optio
     (plan.node(*node).ty == ty && plan.node(*node).level == level).then_some(*node)
 }
 
-fn answered_node(definitions: &Definitions) -> Option<NodeId> {
-    named(definitions, "answered", Type::Bool, Level::Episode)
-}
-
-/// Reads timelines from the vectors of a plan.
 pub(super) struct TimelineReader {
-    moments: Moments<StepId>,
+    /// The steps of [`MOMENTS`].
+    moments: [StepId; 5],
     filter: Option<StepId>,
 }
 
@@ -86,7 +57,9 @@ impl TimelineReader {
     /// Adds the inputs of timelines to a plan; `None` if the definitions do not name them.
     pub(super) fn of(plan: &mut PhysicalPlan, definitions: &Definitions) -> Option<Self> {
         let logical = &definitions.plan;
-        let moments = Moments::of(definitions)?.steps(plan, logical);
+        let nodes = MOMENTS.iter().map(|(name, ty, level)| named(definitions, name, *ty, *level));
+        let nodes: Vec<NodeId> = nodes.collect::<Option<_>>()?;
+        let moments = plan.add_nodes(logical, nodes).try_into().expect("a step per node");
         Some(Self { moments, filter: plan.add_nodes(logical, logical.filter).pop() })
     }
 
@@ -95,19 +68,11 @@ impl TimelineReader {
         let kept = self.filter.map(|step| truths(values.of(step).bools()));
         let episodes = (0..keys.len()).filter(|episode| kept.as_ref().is_none_or(|kept| kept.value(*episode)));
         let segments = Segments::new(&batch.offsets);
-        let timeline = |episode| self.moments.timeline(values, segments, episode, keys.get(episode).to_owned());
-        episodes.map(timeline).collect()
+        episodes.map(|episode| self.timeline(values, segments, episode, keys.get(episode).to_owned())).collect()
     }
-}
 
-/// Timelines in key order.
-pub(super) fn in_key_order(mut timelines: Vec<Timeline>) -> Vec<Timeline> {
-    timelines.sort_by(|a, b| a.key.cmp(&b.key));
-    timelines
-}
-
-impl Moments<StepId> {
     fn timeline(&self, values: &Evaluated, segments: Segments<'_>, episode: usize, key: EpisodeKey) -> Timeline {
+        let [visible, sight, claim, done, answered] = self.moments;
         let moment = |step: StepId| {
             let ints = values.of(step).ints();
             ints.is_valid(episode).then(|| as_step(ints.value(episode)))
@@ -115,13 +80,18 @@ impl Moments<StepId> {
         Timeline {
             key,
             length: as_step(segments.length(episode)),
-            visible: runs(&segments.timesteps(episode, values.of(self.visible).bools())),
-            first_sight: moment(self.sight),
-            claim: moment(self.claim),
-            decision: moment(self.done),
-            answered: truths(values.of(self.answered).bools()).value(episode),
+            visible: runs(&segments.timesteps(episode, values.of(visible).bools())),
+            first_sight: moment(sight),
+            claim: moment(claim),
+            decision: moment(done),
+            answered: truths(values.of(answered).bools()).value(episode),
         }
     }
+}
+
+pub(super) fn in_key_order(mut timelines: Vec<Timeline>) -> Vec<Timeline> {
+    timelines.sort_by(|a, b| a.key.cmp(&b.key));
+    timelines
 }
 
 fn runs(timesteps: &[i64]) -> Vec<RangeInclusive<u32>> {

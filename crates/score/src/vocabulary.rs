@@ -102,7 +102,6 @@ fn column_problem(traces: &TraceSet, column: &str) -> Option<(String, String)> {
     found.missing_from.filter(|_| !has_default).map(|file| (format!("`{file}` has no such column"), absent()))
 }
 
-/// The own columns that definitions declare.
 pub fn declared_columns(definitions: &Definitions) -> Vec<DeclaredColumn> {
     let own = |(name, entry): (&str, &ColumnEntry)| DeclaredColumn {
         name: name.to_owned(),

@@ -30,20 +30,16 @@ use trace::catch_panic::contained;
 use trace::schema::COLUMNS;
 use trace::{FlatRows, TableFile};
 
-/// The footer key that distinguishes scores from traces.
 pub const KIND_KEY: &str = "mirrorstats.kind";
-/// The value of [`KIND_KEY`] for scores.
 pub const SCORES_KIND: &str = "scores";
 /// The footer key of the definitions, as JSON (a `Catalog`).
 pub const DEFINITIONS_KEY: &str = "mirrorstats.definitions";
-/// The footer key of the definitions' hash.
 pub const HASH_KEY: &str = "mirrorstats.definitions_hash";
 
 /// The footer key of the traces' declarations about their recording, as JSON (a `Declared`).
 pub(crate) const DECLARED_KEY: &str = "mirrorstats.declared";
 
 /// Returns true if a file is Parquet with scores: its footer says so, or it has their key columns and no timestep.
-///
 /// `folders` are the columns in the names of the file's folders.
 pub fn holds_scores(file: &impl ChunkReader, folders: &[(String, Option<String>)]) -> bool {
     let Some(metadata) = metadata(file) else { return false };
@@ -59,7 +55,6 @@ pub fn holds_scores(file: &impl ChunkReader, folders: &[(String, Option<String>)
     !names.iter().any(|name| is_of_steps(name)) && KEYS.iter().all(|key| names.contains(key))
 }
 
-/// Returns true if a file of scores carries its definitions.
 pub fn holds_definitions(file: &impl ChunkReader) -> bool {
     metadata(file).is_some_and(|metadata| footer::value(metadata.file_metadata(), DEFINITIONS_KEY).is_some())
 }
@@ -76,14 +71,12 @@ const GATHERED_ROWS: usize = 4 * 1024;
 /// Bytes of a column's texts encoded at a time, or one text: a page holds 2 GiB.
 const GATHERED_TEXT: usize = 256 << 20;
 
-/// A column of a row group to encode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Job {
     group: usize,
     column: usize,
 }
 
-/// Encodes a table; its jobs can run on any thread.
 pub struct Encoder<'a> {
     table: &'a EpisodeTable,
     schema: Arc<Schema>,
@@ -99,7 +92,6 @@ pub struct Writer<W: Write + Send> {
     group: Vec<ArrowColumnChunk>,
 }
 
-/// The encoder of a table, with its writer.
 pub fn encoder<W: Write + Send>(table: &EpisodeTable, out: W) -> Result<(Encoder<'_>, Writer<W>), FormatError> {
     let header = table.header();
     let schema = Arc::new(columns::schema(&header));
@@ -118,7 +110,6 @@ impl Encoder<'_> {
         (0..self.groups.len()).flat_map(move |group| (0..columns).map(move |column| Job { group, column }))
     }
 
-    /// Encodes one column of one row group.
     pub fn encode(&self, job: Job) -> Result<ArrowColumnChunk, FormatError> {
         let mut writer = self.writer(job)?;
         let field = self.schema.field(job.column);

@@ -11,7 +11,6 @@ use super::csv::KEYS;
 use metric::catalog::Catalog;
 use metric::sql::Dialect;
 
-/// The parts of a score file that are stored elsewhere.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Partition<'a> {
     /// Columns in its folder names, as Spark partitions a table; `None` for null. The file's own columns take

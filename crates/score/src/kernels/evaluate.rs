@@ -22,17 +22,14 @@ use trace::scan::Texts;
 /// Whole episodes as columns: one batch with a row per timestep, one with a row per episode.
 #[derive(Clone, Copy, Debug)]
 pub struct Batch<'a> {
-    /// The boundaries of the episodes in the timesteps.
     pub segments: Segments<'a>,
     /// Columns per timestep, by name: booleans, 64-bit integers, doubles, dictionaries of text with 32-bit keys.
     pub steps: &'a RecordBatch,
     /// Text columns per timestep that are not in `steps`.
     pub texts: &'a [Texts],
-    /// Columns per episode, of the same types.
     pub episodes: &'a RecordBatch,
 }
 
-/// The scores of a batch.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BatchScores {
     /// The episodes that the filter keeps; all if absent.
@@ -43,7 +40,6 @@ pub struct BatchScores {
 }
 
 impl PhysicalPlan {
-    /// Evaluates all steps over a batch.
     pub fn evaluate(&self, batch: &Batch) -> Result<Evaluated, EngineError> {
         self.check_batch(batch.segments.rows(), batch.segments.len())?;
         let vectors = Vec::with_capacity(self.steps().len());
@@ -66,7 +62,6 @@ impl PhysicalPlan {
     }
 }
 
-/// The vectors of all steps.
 #[derive(Debug)]
 pub struct Evaluated {
     vectors: Vec<Vector>,
@@ -74,7 +69,6 @@ pub struct Evaluated {
 }
 
 impl Evaluated {
-    /// The scores of one set of definitions.
     pub fn scores(&self, scores: &Scores) -> Result<BatchScores, EngineError> {
         let kept = scores.filter.map(|step| BooleanArray::new(truths(self.of(step).bools()), None));
         let metrics = scores.metrics.iter().map(|metric| self.metric(metric, kept.as_ref()));
@@ -104,7 +98,6 @@ impl Evaluated {
     }
 }
 
-/// A plan and a batch during evaluation.
 struct Evaluation<'e> {
     plan: &'e PhysicalPlan,
     batch: &'e Batch<'e>,
@@ -112,7 +105,6 @@ struct Evaluation<'e> {
     vectors: Vec<Vector>,
 }
 
-/// An operand of an Arrow kernel.
 struct Operand<'a> {
     array: &'a dyn Array,
     is_one: bool,

@@ -14,7 +14,6 @@ use arrow::error::ArrowError;
 use metric::plan::{Aggregate, Comparison};
 use parquet_pages::bits::{self, Bits};
 
-/// The boundaries of the episodes in the rows of a batch.
 #[derive(Clone, Copy, Debug)]
 pub struct Segments<'a> {
     offsets: &'a [usize],
@@ -30,7 +29,6 @@ impl<'a> Segments<'a> {
         self.offsets.len().saturating_sub(1)
     }
 
-    /// Returns true if there are no episodes.
     pub fn is_empty(self) -> bool {
         self.len() == 0
     }
@@ -94,7 +92,6 @@ impl<'a> Segments<'a> {
     }
 
     /// The timesteps that satisfy the comparison with a moment: one window per episode. Null if the moment is null.
-    ///
     /// Timesteps are not materialised: a window is a run of set bits.
     pub(crate) fn window(self, comparison: Comparison, moments: &Int64Array) -> BooleanArray {
         let mut rows = Bits::with_capacity(self.rows());
@@ -129,10 +126,8 @@ impl<'a> Segments<'a> {
         stretches
     }
 
-    /// An aggregate of a predicate over some rows of each episode.
-    ///
-    /// First, last and count return a timestep or a number of steps; other aggregates return true if the predicate
-    /// holds at some row.
+    /// An aggregate of a predicate over some rows of each episode. First, last and count return a timestep or a number
+    /// of steps; other aggregates return true if the predicate holds at some row.
     pub(crate) fn search(
         aggregate: Aggregate,
         predicate: &BooleanArray,

@@ -23,9 +23,7 @@ pub(crate) enum Vector {
     /// Truth values, integers, floats, or text symbols ([`Symbols`]): one per timestep, one per episode, or one that
     /// represents all.
     Array(ArrayRef),
-    /// A column of texts as stored in the trace.
     Keyed(Arc<Keyed>),
-    /// Some rows of each episode.
     Rows(Rc<Vec<Stretch>>),
 }
 

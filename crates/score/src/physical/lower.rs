@@ -7,7 +7,6 @@ use super::{Kernel, PhysicalPlan, Shape, StepId};
 use metric::columns::{Level, Type};
 use metric::plan::{Aggregate, Arithmetic, Comparison, Constant, NodeId, Op, Plan};
 
-/// Adds nodes of one logical plan to a physical one.
 pub(super) struct Lowering<'a> {
     physical: &'a mut PhysicalPlan,
     plan: &'a Plan,

@@ -18,7 +18,6 @@ use metric::catalog::Kind;
 use metric::columns::Type;
 use metric::plan::{Aggregate, Arithmetic, Comparison, Constant, NodeId, Plan};
 
-/// The position of a step in its physical plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct StepId(pub(super) usize);
 
@@ -28,18 +27,13 @@ impl StepId {
     }
 }
 
-/// The number of values of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Shape {
-    /// One value that represents all.
     One,
-    /// One value per episode.
     Episodes,
-    /// One value per timestep.
     Timesteps,
 }
 
-/// One kernel and its operands, which are earlier steps.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Step {
     pub kernel: Kernel,
@@ -47,25 +41,22 @@ pub struct Step {
     pub shape: Shape,
 }
 
-/// The kernels. By default a null operand gives null, and operands have the shape of the result or [`Shape::One`].
-/// Texts are symbols (integers that represent texts), except where a kernel takes keys.
+/// The kernels. One that is named like an operation of [`metric::plan::Op`] computes the same. By default a null operand
+/// gives null, and operands have the shape of the result or [`Shape::One`]. No operand of `And`, `Or`, `Divide`,
+/// `Coalesce` and `Lag` is a constant. Texts are symbols (integers that represent texts), except where a kernel takes
+/// keys.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Kernel {
     /// A column of the batch; a text column gives keys into its dictionary.
     Column(String),
     Constant(Constant),
-    /// The timestep of each row.
     Times,
-    /// The length of each episode.
     Lengths,
     Repeat(StepId),
-    /// A value per episode, repeated for each timestep.
     Spread(StepId),
     Symbols(StepId),
     Not(StepId),
-    /// Kleene's conjunction; no operand is a constant.
     And(StepId, StepId),
-    /// Kleene's disjunction; no operand is a constant.
     Or(StepId, StepId),
     /// A comparison by value; of symbols, for equality only.
     Compare(Comparison, StepId, StepId),
@@ -85,35 +76,26 @@ pub enum Kernel {
     },
     /// True where the timestep satisfies the comparison with a moment of its episode; timesteps are not materialised.
     Window(Comparison, StepId),
-    /// True where two values differ, with null as an ordinary value; never null.
     Distinct(StepId, StepId),
-    /// True where the value is null; never null. Takes keys.
+    /// Takes keys.
     IsNull(StepId),
-    /// True where a truth value is true; never null.
     IsTrue(StepId),
-    /// True where a truth value is false; never null.
     IsFalse(StepId),
-    /// Sum, difference or product; an error beyond 64 bits.
     Arithmetic(Arithmetic, StepId, StepId),
-    /// Quotient or remainder of two integers, null where the divisor is 0; no operand is a constant.
+    /// Quotient or remainder of two integers, null where the divisor is 0.
     Divide(Arithmetic, StepId, StepId),
-    /// The negated value.
     Negate(StepId),
-    /// The value of the first branch whose condition is true, else the last value. Values of branches may be constants.
+    /// Values of branches may be constants.
     Case {
-        /// Conditions and values, in order.
         branches: Vec<(StepId, StepId)>,
         otherwise: StepId,
     },
-    /// The first value that is not null; no operand is a constant.
     Coalesce(Vec<StepId>),
     /// True where the text of a key contains a match of a pattern.
     KeysMatch(StepId, String),
     /// True where the text of a symbol contains a match of a pattern.
     SymbolsMatch(StepId, String),
-    /// 1 for true, 0 for false.
     IntFromBool(StepId),
-    /// The same number as a float.
     FloatFromInt(StepId),
     /// The rows of each episode that are in all these windows, which compare the timestep with moments; empty if a
     /// moment is null. Gives ranges of rows, not values.
@@ -127,12 +109,12 @@ pub enum Kernel {
     },
     /// `all`, `min`, `max` or `sum` of a value per timestep.
     Fold(Aggregate, StepId),
-    /// The value at a timestep of each episode; null where there is no such timestep. Takes values or keys.
+    /// Takes values or keys.
     At {
         values: StepId,
         moments: StepId,
     },
-    /// The value at the previous timestep, null at the first one; not a constant. Takes values.
+    /// Takes values.
     Lag(StepId),
     /// Values per episode, null where the episode has no such timestep.
     NullWhereAbsent {
@@ -142,7 +124,6 @@ pub enum Kernel {
 }
 
 impl Kernel {
-    /// The operands of this step.
     pub fn operands(&self) -> Vec<StepId> {
         match self {
             Self::Column(_) | Self::Constant(_) | Self::Times | Self::Lengths => vec![],
@@ -182,20 +163,15 @@ impl Kernel {
     }
 }
 
-/// A metric and the step that computes it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Metric {
     pub name: String,
-    /// A rate or a quantity.
     pub kind: Kind,
-    /// Its values: truth values or integers, per episode.
     pub step: StepId,
 }
 
-/// The outputs of one set of definitions.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Scores {
-    /// The metrics, in the order of the definitions.
     pub metrics: Vec<Metric>,
     /// The filter, one truth value per episode; all episodes count if absent.
     pub filter: Option<StepId>,
@@ -221,7 +197,6 @@ impl PhysicalPlan {
         physical
     }
 
-    /// Adds the metrics and the filter of some definitions.
     pub(crate) fn add_scores(&mut self, plan: &Plan) {
         let mut lowering = lower::Lowering::new(self, plan);
         let metrics = plan.outputs.iter().map(|output| Metric {
@@ -245,7 +220,6 @@ impl PhysicalPlan {
         &self.scores
     }
 
-    /// The steps, operands before their users.
     pub fn steps(&self) -> &[Step] {
         &self.steps
     }

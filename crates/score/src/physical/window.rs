@@ -26,10 +26,9 @@ pub(super) fn beside_its_episode(plan: &Plan, op: &Op) -> Option<(NodeId, NodeId
     pair(*x, *y).or_else(|| pair(*y, *x))
 }
 
-/// Splits the windows from a condition; returns the rest of the condition and the windows.
-///
-/// `first`, `last`, `any` and `count` search for the rest between the ends of the windows. A window with a null end is
-/// empty, which agrees with how these aggregates treat null.
+/// Splits the windows from a condition; returns the rest of the condition and the windows. `first`, `last`, `any` and
+/// `count` search for the rest between the ends of the windows. A window with a null end is empty, which agrees with
+/// how these aggregates treat null.
 pub(super) fn split(plan: &Plan, condition: NodeId) -> (NodeId, Vec<(Comparison, NodeId)>) {
     let part =
         |id: NodeId| window(plan, &plan.node(id).op).filter(|(comparison, _)| *comparison != Comparison::NotEqual);

@@ -47,7 +47,6 @@ impl PhysicalPlan {
     }
 }
 
-/// The bits of a value and of its validity.
 fn bits_of(step: &Step) -> u64 {
     match (&step.kernel, step.shape, step.ty) {
         (_, Shape::One, _) => 0,

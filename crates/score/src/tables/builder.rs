@@ -17,10 +17,9 @@ use crate::table::{
     EpisodeKey, EpisodeKeys, EpisodeTable, Header, KeyRef, LabelColumn, MetricColumn, MetricValues, TextColumn, narrow,
 };
 use trace::declared::Declared;
-use trace::scan::EPISODE_COLUMNS;
+use trace::scan::{EPISODE_COLUMNS, EpisodeBatch};
 use trace::schema::{self, Column};
 
-/// A table under construction.
 #[derive(Debug)]
 pub struct TableBuilder {
     header: Header,
@@ -30,14 +29,12 @@ pub struct TableBuilder {
 }
 
 impl TableBuilder {
-    /// A table without rows.
     pub fn new(header: Header) -> Self {
         let labels = header.labels.iter().map(|_| TextBuilder::default()).collect();
         let metrics = header.metrics.iter().map(|_| MetricBuilder::default()).collect();
         Self { header, keys: KeyBuilder::default(), labels, metrics }
     }
 
-    /// The names of the columns.
     pub fn header(&self) -> &Header {
         &self.header
     }
@@ -131,7 +128,6 @@ impl KeyBuilder {
 }
 
 impl EpisodeKeys {
-    /// The keys of the episodes of a batch, in order.
     pub(crate) fn of_batch(episodes: &RecordBatch) -> Self {
         let mut keys = KeyBuilder::default();
         keys.extend(episodes);
@@ -139,7 +135,6 @@ impl EpisodeKeys {
     }
 }
 
-/// A text column under construction; each text is stored once.
 #[derive(Debug, Default)]
 pub(crate) struct TextBuilder {
     codes: UInt32Builder,
@@ -194,6 +189,13 @@ impl TextBuilder {
 
 fn column<'a>(episodes: &'a RecordBatch, name: &str) -> &'a ArrayRef {
     episodes.column_by_name(name).expect("the projection asks for this column")
+}
+
+pub(crate) fn episode_ids(batch: &EpisodeBatch) -> Vec<String> {
+    let dictionary = column(&batch.episodes, "episode_id").as_dictionary::<Int32Type>();
+    let texts = dictionary.values().as_string::<i32>();
+    let text = |row| dictionary.key(row).map_or_else(String::new, |key| texts.value(key).to_owned());
+    (0..dictionary.len()).map(text).collect()
 }
 
 pub(crate) fn default_text(name: &str) -> Option<&'static str> {

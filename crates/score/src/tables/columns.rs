@@ -10,7 +10,6 @@ use arrow::error::ArrowError;
 
 use crate::table::{EpisodeTable, Header, TextColumn};
 
-/// The key columns, in order.
 pub const KEYS: [&str; 5] = ["episode_id", "model", "experiment", "seed", "run"];
 
 /// One row per episode, as `score` writes it: `episode_id`, `model`, `experiment` (text), `seed`, `run` (int32),

@@ -4,17 +4,14 @@ use std::collections::BTreeMap;
 
 use crate::quality::CellKey;
 
-/// The number of lost episodes by experiment, model and condition.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LostCounts(BTreeMap<CellKey, u64>);
 
 impl LostCounts {
-    /// Adds one lost episode of a cell.
     pub fn add(&mut self, key: CellKey) {
         *self.0.entry(key).or_default() += 1;
     }
 
-    /// The cells with lost episodes, and their counts.
     pub fn iter(&self) -> impl Iterator<Item = (&CellKey, &u64)> {
         self.0.iter()
     }

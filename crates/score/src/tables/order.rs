@@ -69,7 +69,6 @@ fn by_id(keys: &EpisodeKeys, a: u32, b: u32) -> Ordering {
 /// The packing of rows' keys into numbers: experiment, model, seed, run, row, each in as few bits as it needs.
 struct Rows<'a> {
     keys: &'a EpisodeKeys,
-    /// The rank of each text, by code.
     experiments: Vec<u32>,
     models: Vec<u32>,
     seed: Span,
@@ -100,7 +99,6 @@ impl<'a> Rows<'a> {
     }
 }
 
-/// The range of some integers.
 struct Span {
     smallest: i32,
     bits: u32,

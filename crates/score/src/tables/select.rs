@@ -14,14 +14,12 @@ use crate::evaluate::Batch;
 use crate::physical::PhysicalPlan;
 use crate::segments::Segments;
 use crate::table::{EpisodeTable, LabelColumn};
-use exact::suggest::nearest;
 use metric::columns::{Column, Columns, Level, Type};
 use metric::definitions::{Definitions, UnknownMetric};
 use metric::file::FileError;
 use toml_spec::Faults;
 use trace::labels;
 
-/// An error of selecting part of a table.
 #[derive(Debug, thiserror::Error)]
 pub enum SelectError {
     #[error(transparent)]
@@ -47,8 +45,7 @@ pub fn select(
     if let Some(names) = metrics {
         let known: Vec<String> = table.metrics.iter().map(|metric| metric.name.clone()).collect();
         if let Some(name) = names.iter().find(|name| !known.contains(name)) {
-            let near = nearest(name, known.iter().map(String::as_str)).map(str::to_owned);
-            return Err(UnknownMetric { name: name.clone(), near, known }.into());
+            return Err(UnknownMetric::new(name, known).into());
         }
         table.metrics.retain(|metric| names.contains(&metric.name));
     }
@@ -56,7 +53,10 @@ pub fn select(
 }
 
 fn filtered(table: &EpisodeTable, condition: &str) -> Result<EpisodeTable, SelectError> {
-    let columns = columns(table);
+    let values = columns(table);
+    let columns: Columns =
+        values.iter().map(|(name, ty, _)| (*name, Column { ty: *ty, level: Level::Episode })).collect();
+    let columns = columns.with_help("scores have their keys and metrics alone; a condition on steps needs the traces");
     let none = match Definitions::from_toml("scores", "", &columns) {
         Ok(none) => none,
         Err(FileError::Faults(faults)) => return Err(faults.into()),
@@ -64,7 +64,9 @@ fn filtered(table: &EpisodeTable, condition: &str) -> Result<EpisodeTable, Selec
     };
     let definitions = none.filtered("--where", condition, &columns)?;
     let offsets: Vec<usize> = (0..=table.len()).collect();
-    let episodes = rows(table)?;
+    let fields = values.iter().map(|(name, _, array)| Field::new(*name, array.data_type().clone(), true));
+    let schema = Arc::new(Schema::new(fields.collect::<Vec<_>>()));
+    let episodes = RecordBatch::try_new(schema, values.into_iter().map(|(.., array)| array).collect())?;
     let steps = RecordBatch::try_new_with_options(
         Arc::new(Schema::empty()),
         vec![],
@@ -77,34 +79,21 @@ fn filtered(table: &EpisodeTable, condition: &str) -> Result<EpisodeTable, Selec
     Ok(table.taken(&kept))
 }
 
-fn columns(table: &EpisodeTable) -> Columns {
-    let column = |ty| Column { ty, level: Level::Episode };
-    let texts = ["episode_id", "model", "experiment"].map(|name| (name.to_owned(), column(Type::Text)));
-    let ints = ["seed", "run"].map(|name| (name.to_owned(), column(Type::Int)));
-    let labels = table.labels.iter().map(|label| {
-        let ty = if is_of_coders(label) { Type::Bool } else { Type::Text };
-        (label.name.clone(), column(ty))
-    });
-    let metrics = table.metrics.iter().map(|metric| (metric.name.clone(), column(Type::Int)));
-    let columns: Columns = texts.into_iter().chain(ints).chain(labels).chain(metrics).collect();
-    columns.with_help("scores have their keys and metrics alone; a condition on steps needs the traces")
-}
-
 /// Returns true if a column holds coders' labels, as true and false.
 pub fn is_of_coders(label: &LabelColumn) -> bool {
     label.name.starts_with(labels::PREFIX) && label.values.iter().flatten().all(|text| matches!(text, "true" | "false"))
 }
 
-/// The values of a label column.
 pub fn truths_of(label: &LabelColumn) -> impl Iterator<Item = Option<bool>> + '_ {
     label.values.iter().map(|text| text.map(|text| text == "true"))
 }
 
-/// The table as columns for the engine.
-fn rows(table: &EpisodeTable) -> Result<RecordBatch, ArrowError> {
-    let text =
-        |values: Vec<Option<&str>>| Arc::new(values.into_iter().collect::<DictionaryArray<Int32Type>>()) as ArrayRef;
-    let int = |values: Vec<Option<i64>>| Arc::new(Int64Array::from(values)) as ArrayRef;
+/// The table as typed columns for the engine.
+fn columns(table: &EpisodeTable) -> Vec<(&str, Type, ArrayRef)> {
+    let text = |values: Vec<Option<&str>>| {
+        (Type::Text, Arc::new(values.into_iter().collect::<DictionaryArray<Int32Type>>()) as ArrayRef)
+    };
+    let int = |values: Vec<Option<i64>>| (Type::Int, Arc::new(Int64Array::from(values)) as ArrayRef);
     let keys = || table.keys.iter();
     let mut columns = vec![
         ("episode_id", text(keys().map(|key| Some(key.episode_id)).collect())),
@@ -115,14 +104,12 @@ fn rows(table: &EpisodeTable) -> Result<RecordBatch, ArrowError> {
     ];
     columns.extend(table.labels.iter().map(|label| {
         let values = if is_of_coders(label) {
-            Arc::new(truths_of(label).collect::<BooleanArray>()) as ArrayRef
+            (Type::Bool, Arc::new(truths_of(label).collect::<BooleanArray>()) as ArrayRef)
         } else {
             text(label.values.iter().collect())
         };
         (label.name.as_str(), values)
     }));
     columns.extend(table.metrics.iter().map(|metric| (metric.name.as_str(), int(metric.iter().collect()))));
-    let fields: Vec<Field> =
-        columns.iter().map(|(name, array)| Field::new(*name, array.data_type().clone(), true)).collect();
-    RecordBatch::try_new(Arc::new(Schema::new(fields)), columns.into_iter().map(|(_, array)| array).collect())
+    columns.into_iter().map(|(name, (ty, values))| (name, ty, values)).collect()
 }

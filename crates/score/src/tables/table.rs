@@ -27,7 +27,6 @@ pub struct EpisodeTable {
     pub declared: Declared,
 }
 
-/// The key columns of a table.
 #[derive(Clone, Debug)]
 pub struct EpisodeKeys {
     pub(crate) experiment: TextColumn,
@@ -81,7 +80,6 @@ pub struct TextColumn {
 /// A further key column: text, null if the trace has null.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LabelColumn {
-    /// The column's name in the trace.
     pub name: String,
     pub values: TextColumn,
 }
@@ -101,18 +99,14 @@ pub(crate) enum MetricValues {
     Ints(Int64Array),
 }
 
-/// The names of a table's columns.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Header {
-    /// The definitions that gave the values.
     pub catalog: Catalog,
-    /// The names of the further key columns.
     pub labels: Vec<String>,
     /// The names of the metrics, in their order.
     pub metrics: Vec<String>,
 }
 
-/// An error of joining two tables.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum JoinError {
     #[error("expected scores under one set of definitions, found `{0}` and another `{1}`; score the traces again")]
@@ -187,10 +181,6 @@ impl EpisodeKeys {
         self.len() == 0
     }
 
-    /// The key of a row.
-    ///
-    /// # Panics
-    /// If the row does not exist.
     pub fn get(&self, row: usize) -> KeyRef<'_> {
         KeyRef {
             experiment: self.experiment.get(row).unwrap_or_default(),
@@ -214,33 +204,22 @@ impl EpisodeKeys {
             && is_same(|keys| &keys.episode_id)
     }
 
-    /// The experiment of each row.
     pub fn experiments(&self) -> &TextColumn {
         &self.experiment
     }
 
-    /// The model of each row.
     pub fn models(&self) -> &TextColumn {
         &self.model
     }
 
-    /// The id of each row.
     pub fn episode_ids(&self) -> &TextColumn {
         &self.episode_id
     }
 
-    /// The seed of a row.
-    ///
-    /// # Panics
-    /// If the row does not exist.
     pub fn seed(&self, row: usize) -> i32 {
         self.seed.value(row)
     }
 
-    /// The run of a row.
-    ///
-    /// # Panics
-    /// If the row does not exist.
     pub fn run(&self, row: usize) -> i32 {
         self.run.value(row)
     }
@@ -272,7 +251,6 @@ impl PartialEq for EpisodeKeys {
 }
 
 impl KeyRef<'_> {
-    /// The same key as an owned value.
     pub fn to_owned(&self) -> EpisodeKey {
         EpisodeKey {
             experiment: self.experiment.to_owned(),
@@ -296,24 +274,17 @@ impl TextColumn {
         self.codes.len()
     }
 
-    /// Returns true if there are no rows.
     pub fn is_empty(&self) -> bool {
         self.codes.is_empty()
     }
 
     /// The text of a row; `None` for null.
-    ///
-    /// # Panics
-    /// If the row does not exist.
     pub fn get(&self, row: usize) -> Option<&str> {
         self.codes.is_valid(row).then(|| self.texts.value(self.codes.value(row) as usize))
     }
 
     /// A number that represents the text of a row; `None` for null. Equal texts have equal numbers, except episode ids:
     /// each row has its own.
-    ///
-    /// # Panics
-    /// If the row does not exist.
     pub fn code(&self, row: usize) -> Option<usize> {
         self.codes.is_valid(row).then(|| self.codes.value(row) as usize)
     }
@@ -325,7 +296,6 @@ impl TextColumn {
         usize::try_from(longest).unwrap_or_default()
     }
 
-    /// The texts of all rows.
     pub fn iter(&self) -> impl Iterator<Item = Option<&str>> {
         (0..self.len()).map(|row| self.get(row))
     }
@@ -372,16 +342,6 @@ impl MetricColumn {
         }
     }
 
-    /// The numbers of zeros and ones in these rows; `None` if there is any other value.
-    ///
-    /// # Panics
-    /// If a row does not exist.
-    pub(crate) fn count_truths(&self, rows: Range<usize>) -> Option<(usize, usize)> {
-        let MetricValues::Bools(bools) = &self.values else { return None };
-        let some = bools.slice(rows.start, rows.len());
-        Some((some.false_count(), some.true_count()))
-    }
-
     /// Adds the defined values of some rows to `moments`.
     ///
     /// # Errors
@@ -390,11 +350,13 @@ impl MetricColumn {
     /// # Panics
     /// If a row is out of range.
     pub fn add_moments(&self, moments: Moments, rows: Range<usize>) -> Result<Moments, MomentOverflow> {
-        // For a few rows, single values are faster than a slice of bits.
-        let counts = if rows.len() < 16 { None } else { self.count_truths(rows.clone()) };
-        match counts {
-            Some((zeros, ones)) => moments.with_truths(zeros, ones),
-            None => rows.filter_map(|row| self.get(row)).try_fold(moments, Moments::with),
+        match &self.values {
+            // For a few rows, single values are faster than a slice of bits.
+            MetricValues::Bools(bools) if rows.len() >= 16 => {
+                let some = bools.slice(rows.start, rows.len());
+                moments.with_truths(some.false_count(), some.true_count())
+            }
+            _ => rows.filter_map(|row| self.get(row)).try_fold(moments, Moments::with),
         }
     }
 

@@ -28,17 +28,15 @@ mod output;
 #[cfg(feature = "polars")]
 mod query;
 mod read;
-mod size;
-mod top;
 
 pub use output::verify;
 use output::{agreement, audit, figure_inputs, overview, provenance, quality_check, report};
 
-use compare::{design, diff, gate, pooled, sensitivity};
+use compare::{diff, gate, pooled, sensitivity};
 
-use definitions::{own_definitions, question, rescore, scored_alike};
+use definitions::{own_definitions, question, rescore};
 
-use read::{expected, experiment_findings, findings, import, input_hashes, inputs, results, scan, scores};
+use read::{experiment_findings, findings, import, inputs, results, scan, scores};
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsString;
@@ -60,6 +58,7 @@ use ::report::statistics::{Options, Ranks, Replies};
 use ::report::style::Style;
 use ::report::tables::ListTable;
 use exact::replace;
+use metric::definitions::Definitions;
 use metric::file;
 use score::evidence::{self, Evidence};
 use score::lost_counts::LostCounts;
@@ -82,20 +81,19 @@ pub use import::{ImportAnswer, ImportRequest, OwnColumn, import};
 pub use inputs::{ScoreFile, Source, resolve};
 pub use losses::LostAs;
 pub use overview::{Overview, Part};
+pub use own_definitions::ScoredAlike;
 pub use provenance::ProvenanceError;
 pub use quality_check::{CellAnswer, NotRecorded, QualityCheckAnswer, QualityLimits, Violation};
 use question::DEFAULT_DEFINITIONS;
 pub use question::Question;
 pub use report::{Report, ReportOptions, WrittenReport};
 pub use rescore::{RescoreRequest, Rescored, folder_of_rescored, traces_of};
-pub use results::{Outputs, Results};
-pub use scored_alike::ScoredAlike;
+pub use results::{ModelMean, Outputs, Results, model_means};
 pub use scores::write as write_scores;
 pub use sensitivity::{DEFAULT_THRESHOLDS, SensitivityReport, Thresholds, ThresholdsError};
-pub use top::{ModelMean, model_means};
 
-use design::design_of;
 use inputs::{Stamp, labelled};
+use output::statistics::{check_comparisons, design_of};
 
 /// Open inputs, and the question about them.
 #[derive(Debug)]
@@ -111,19 +109,14 @@ pub struct Study {
 }
 
 impl Study {
-    /// Opens traces, files of scores or folders of either: paths, folders, globs.
-    ///
-    /// # Errors
-    /// An argument that names no file, the first fault of a footer, traces and scores mixed.
+    /// Opens traces, files of scores or folders of either: paths, folders, globs. Errors: an argument that names no
+    /// file, the first fault of a footer, traces and scores mixed.
     pub fn open<T: Into<OsString>>(arguments: impl IntoIterator<Item = T>) -> Result<Self, StudyError> {
         let arguments: Vec<OsString> = arguments.into_iter().map(Into::into).collect();
         Self::of(resolve(&arguments, std::io::empty())?)
     }
 
-    /// Opens these files.
-    ///
-    /// # Errors
-    /// The first fault of a footer, traces and scores mixed, no file at all.
+    /// Opens these files. Errors: the first fault of a footer, traces and scores mixed, no file at all.
     pub fn of(inputs: Vec<Input>) -> Result<Self, StudyError> {
         let stamps = inputs.iter().map(Stamp::of).collect::<Result<_, _>>()?;
         let source = Source::open(&inputs)?;
@@ -136,28 +129,21 @@ impl Study {
         Ok(Self { inputs, stamps, source, question, backend: Backend::Native, threads, plan: None })
     }
 
-    /// Sets the definitions: `paper`, `extended`, or the path of a TOML file.
-    ///
-    /// # Errors
-    /// A file that cannot be read; every fault in it.
+    /// Sets the definitions: `paper`, `extended`, or the path of a TOML file. Errors: a file that cannot be read; every
+    /// fault in it.
     pub fn definitions(mut self, name: impl Into<PathBuf>) -> Result<Self, StudyError> {
         self.question.definitions = Some(name.into());
         self.checked()
     }
 
     /// Keeps the episodes that satisfy a condition in the language of definitions, such as `seed = 1 and TSA = 1`.
-    ///
-    /// # Errors
-    /// Every fault of the condition.
+    /// Errors: every fault of the condition.
     pub fn filter(mut self, condition: &str) -> Result<Self, StudyError> {
         self.question.filter = Some(condition.to_owned());
         self.checked()
     }
 
-    /// Computes only these metrics.
-    ///
-    /// # Errors
-    /// A metric that the definitions lack.
+    /// Computes only these metrics. Errors: a metric that the definitions lack.
     pub fn metrics<T: Into<String>>(mut self, names: impl IntoIterator<Item = T>) -> Result<Self, StudyError> {
         self.question.metrics = Some(names.into_iter().map(Into::into).collect());
         self.checked()
@@ -204,10 +190,8 @@ impl Study {
         self
     }
 
-    /// Sets a whole question at once.
-    ///
-    /// # Errors
-    /// Every fault of the definitions and the condition; a metric that the definitions lack.
+    /// Sets a whole question at once. Errors: every fault of the definitions and the condition; a metric that the
+    /// definitions lack.
     pub fn asked(mut self, question: Question) -> Result<Self, StudyError> {
         self.question = question;
         self.checked()
@@ -223,19 +207,14 @@ impl Study {
         Ok(self)
     }
 
-    /// The traces, for an answer that needs steps.
-    ///
-    /// # Errors
-    /// Scores, which have no steps.
+    /// The traces, for an answer that needs steps. Errors: scores, which have no steps.
     pub fn traces(&self) -> Result<&TraceSet, StudyError> {
         self.source.traces()
     }
 
     /// The steps of the episodes that the filter keeps, with these columns in this order; all columns if absent.
-    ///
-    /// # Errors
-    /// Scores, which have no steps; a column that no trace has, or that traces have with different types; with a
-    /// filter, as [`Study::score`].
+    /// Errors: scores, which have no steps; a column that no trace has, or that traces have with different types; with
+    /// a filter, as [`Study::score`].
     pub fn steps(&self, columns: Option<&[String]>) -> Result<Steps, StudyError> {
         let traces = self.source.traces()?;
         if self.question.filter.is_none() {
@@ -245,33 +224,26 @@ impl Study {
         Ok(Steps::new(traces, columns, Some(kept), self.threads)?)
     }
 
-    /// The episode table.
-    ///
-    /// # Errors
-    /// Faults of the traces or the scores; numbers beyond 64 bits.
+    /// The episode table. Errors: faults of the traces or the scores; numbers beyond 64 bits.
     pub fn score(&self) -> Result<Results, StudyError> {
         self.scan(Outputs { losses: true, ..Outputs::default() })
     }
 
-    /// The cells: exact moments of every metric in every group.
-    ///
-    /// # Errors
-    /// As [`Study::score`]; a column to group by that the episodes lack.
+    /// The cells: exact moments of every metric in every group. Errors: as [`Study::score`]; a column to group by that
+    /// the episodes lack.
     pub fn cells(&self) -> Result<Cells, StudyError> {
         let counted = self.counted(self.score()?);
         self.cells_of(&counted.results.episodes)
     }
 
-    /// The cells of these episodes, as [`Study::cells`].
-    ///
-    /// # Errors
-    /// A column to group by that the episodes lack; a cell that mixes episodes recorded differently.
+    /// The cells of these episodes, as [`Study::cells`]. Errors: a column to group by that the episodes lack; a cell
+    /// that mixes episodes recorded differently.
     pub(crate) fn cells_of(&self, episodes: &EpisodeTable) -> Result<Cells, StudyError> {
         let by = self.question.by_over(episodes);
         if !self.question.pool {
             pooled::check(episodes, &by)?;
         }
-        size::check_comparisons(episodes)?;
+        check_comparisons(episodes)?;
         Ok(group(episodes, &by)?)
     }
 
@@ -305,11 +277,8 @@ impl Study {
         self.source.traces().ok().and_then(|traces| stale_note(traces.files()))
     }
 
-    /// One figure, with the models in the order of a style.
-    ///
-    /// # Errors
-    /// As [`Study::score`]; inputs that lack data for the figure; a wrong number of metrics; a width that its text does
-    /// not fit in at 6 pt.
+    /// One figure, with the models in the order of a style. Errors: as [`Study::score`]; inputs that lack data for the
+    /// figure; a wrong number of metrics; a width that its text does not fit in at 6 pt.
     pub fn figure(&self, name: FigureName, options: &FigureOptions) -> Result<Figure, StudyError> {
         let mut style = Style::load(&options.style)?;
         if let Some(metrics) = &options.metrics {
@@ -330,10 +299,8 @@ impl Study {
         Ok(FigureInputs::of(&results, &style)?.with(options.clone()).draw(name)?)
     }
 
-    /// The scores of one episode, and the timesteps that decided them.
-    ///
-    /// # Errors
-    /// As [`Study::score`]; scores in the place of traces; an unknown episode.
+    /// The scores of one episode, and the timesteps that decided them. Errors: as [`Study::score`]; scores in the place
+    /// of traces; an unknown episode.
     pub fn explain(&self, episode_id: &str) -> Result<Evidence, StudyError> {
         let traces = self.source.traces()?;
         let definitions = self.question.bind(traces)?;
@@ -349,9 +316,7 @@ impl Study {
 
     /// Like [`Study::explain`], for an episode that is known to be in this input: reads no other input.
     pub fn explain_in(&self, input: &Input, episode_id: &str) -> Result<Evidence, StudyError> {
-        // Bound to its own columns: a trace beside other tasks may lack their columns.
-        let one = labelled(std::slice::from_ref(input))?;
-        let definitions = Question { filter: None, ..self.question.clone() }.bind(&one)?;
+        let (one, definitions) = self.alone(input)?;
         Ok(evidence::explain(&one, &definitions, episode_id, self.threads)?)
     }
 
@@ -361,16 +326,20 @@ impl Study {
         input: &Input,
         ids: &BTreeSet<String>,
     ) -> Result<BTreeMap<String, Evidence>, StudyError> {
-        let one = labelled(std::slice::from_ref(input))?;
-        let definitions = Question { filter: None, ..self.question.clone() }.bind(&one)?;
+        let (one, definitions) = self.alone(input)?;
         Ok(evidence::explain_each(&one, &definitions, ids, self.threads)?)
     }
 
+    /// One input, with definitions bound to its own columns: a trace beside other tasks may lack their columns.
+    fn alone(&self, input: &Input) -> Result<(TraceSet, Definitions), StudyError> {
+        let one = labelled(std::slice::from_ref(input))?;
+        let definitions = Question { filter: None, ..self.question.clone() }.bind(&one)?;
+        Ok((one, definitions))
+    }
+
     /// Compares a table of the study with a published one, cell by cell. `table` names it; the default is the first
-    /// table that has all the published metrics.
-    ///
-    /// # Errors
-    /// Faults of the published table, the style or the inputs; an unknown table.
+    /// table that has all the published metrics. Errors: faults of the published table, the style or the inputs; an
+    /// unknown table.
     pub fn compare(
         &self,
         published: &Path,
@@ -396,10 +365,8 @@ impl Study {
         self.inputs.iter().map(|input| input.path.clone()).chain(named).collect()
     }
 
-    /// Refuses a folder for outputs that contains an input: both would be read together later.
-    ///
-    /// # Errors
-    /// An input in the folder.
+    /// Refuses a folder for outputs that contains an input: both would be read together later. Errors: an input in the
+    /// folder.
     pub fn check_out(&self, out: &Path) -> Result<(), StudyError> {
         let inputs = self.inputs.iter().map(|input| &input.path);
         Ok(replace::check_folder(out, inputs).map_err(BundleError::from)?)

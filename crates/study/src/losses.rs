@@ -39,6 +39,12 @@ pub(super) struct Counted {
     pub lost: LostCounts,
 }
 
+impl Counted {
+    pub(super) fn replies(&self) -> Option<Replies> {
+        Replies::of(self.all.as_ref().unwrap_or(&self.results.episodes))
+    }
+}
+
 pub(super) fn unrecorded(inputs: &[Input], table: &EpisodeTable) -> Result<Vec<LostEpisode>, StudyError> {
     let mut listed = lost::beside(inputs)?;
     if listed.is_empty() {
@@ -103,7 +109,7 @@ pub(super) fn beside_cells(lost: &LostCounts, replies: Option<&Replies>) -> Opti
         cells.entry([&key.experiment, &key.model]).or_default()[0] += count;
     }
     for it in replies.into_iter().flat_map(|replies| &replies.cells) {
-        let counts = cells.entry([&it.experiment, &it.model]).or_default();
+        let counts = cells.entry([&it.key.experiment, &it.key.model]).or_default();
         (counts[1], counts[2]) = (counts[1] + it.unusable, counts[2] + it.replies);
     }
     let told = |([experiment, model], [lost, unusable, replies]): (&[&str; 2], &[u64; 3])| {

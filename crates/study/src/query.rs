@@ -36,10 +36,7 @@ impl Study {
         Ok((plan(query, loaded)?, note))
     }
 
-    /// The rows of a query as a Parquet file in memory.
-    ///
-    /// # Errors
-    /// A query that cannot be run; faults of the inputs.
+    /// The rows of a query as a Parquet file in memory. Errors: a query that cannot be run; faults of the inputs.
     pub fn query_parquet(&self, sql: &str) -> Result<Vec<u8>, StudyError> {
         let (frame, _) = self.query(&statement::check(sql)?)?;
         Ok(in_memory(frame, Format::Parquet)?)

@@ -9,7 +9,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use polars::prelude::{
     AnyValue, Column, CsvWriter, DataFrame, DataType, Engine, IntoLazy as _, JsonFormat, JsonWriter, LazyFrame,
-    ParquetWriter, PlanCallback, PolarsError as Inner, PolarsResult, Schema, SerWriter as _,
+    ParquetWriter, PlanCallback, PolarsError as Inner, PolarsResult, SerWriter as _,
 };
 use polars::sql::SQLContext;
 
@@ -177,13 +177,10 @@ pub fn excerpt(frame: LazyFrame, most: Option<usize>) -> Result<Excerpt, PolarsE
     let mut frame = frame;
     let schema = frame.collect_schema()?;
     let (head, tail) = most.map_or((usize::MAX, 0), |most| (most.div_ceil(2), most / 2));
-    let empty = Excerpt { columns: columns(&schema), ..Excerpt::default() };
+    let columns = schema.iter().map(|(name, ty)| (name.to_string(), ty.to_string())).collect();
+    let empty = Excerpt { columns, ..Excerpt::default() };
     let filled = each(frame, empty, move |excerpt, batch| excerpt.add(&batch, head, tail))?;
     with(filled, Ok)
-}
-
-fn columns(schema: &Schema) -> Vec<(String, String)> {
-    schema.iter().map(|(name, ty)| (name.to_string(), ty.to_string())).collect()
 }
 
 impl Excerpt {

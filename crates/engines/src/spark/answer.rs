@@ -57,17 +57,16 @@ impl Refused {
                 expected: cause::kind(&expected).to_owned(),
                 found: found.map_or_else(|| "no such column".to_owned(), |found| format!("the type `{found}`")),
             },
-            Self::Rule { fault: None, .. } => SparkError::Rule { finding: Box::new(no_episodes(job)), more: 0 },
+            Self::Rule { fault: None, .. } => {
+                let finding = Finding::new(Code::NoEpisodes, job.sources.name(), "at least one row", "none");
+                SparkError::Rule { finding: Box::new(finding), more: 0 }
+            }
             Self::Rule { fault: Some(fault), faults } => match finding(fault, job) {
                 Some(finding) => SparkError::Rule { finding: Box::new(finding), more: faults.saturating_sub(1) },
                 None => SparkError::Answer { words: "a rule that was not asked for".into() },
             },
         }
     }
-}
-
-fn no_episodes(job: Job<'_>) -> Finding {
-    Finding::new(Code::NoEpisodes, job.sources.name(), "at least one row", "none")
 }
 
 fn finding(fault: Fault, job: Job<'_>) -> Option<Finding> {

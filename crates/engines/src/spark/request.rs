@@ -1,11 +1,14 @@
-//! The driver's request: all of its input in one JSON file.
+//! The driver's request: all of its input in one JSON file, in a private folder.
+
+use std::fs;
+use std::path::PathBuf;
 
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-use super::place::Place;
 use super::source::{Group, Sources};
 use super::{Cluster, Job, SparkError, check};
+use exact::replace::TemporaryFolder;
 use metric::columns::Type;
 use metric::plan::{Op, Plan};
 use metric::sql::{Dialect, lower};
@@ -14,6 +17,37 @@ use trace::schema;
 
 const KEYS: [(&str, &str); 5] =
     [("episode_id", "string"), ("model", "string"), ("experiment", "string"), ("seed", "int"), ("run", "int")];
+
+/// The private folder of one submission: its request and the driver's answer.
+pub(super) struct Place(TemporaryFolder);
+
+impl Place {
+    pub(super) fn new() -> Result<Self, SparkError> {
+        // The request may hold secrets.
+        let made = TemporaryFolder::private("spark");
+        made.map(Self).map_err(|source| SparkError::System { what: "make a temporary folder".into(), source })
+    }
+
+    pub(super) fn table(&self) -> PathBuf {
+        self.0.path().join("table.jsonl")
+    }
+
+    pub(super) fn answer(&self) -> PathBuf {
+        self.0.path().join("answer.json")
+    }
+
+    /// The default path of Spark's log.
+    pub(super) fn log(&self) -> PathBuf {
+        self.0.path().join("log")
+    }
+
+    pub(super) fn file(&self, name: &str, bytes: &[u8]) -> Result<PathBuf, SparkError> {
+        let path = self.0.path().join(name);
+        fs::write(&path, bytes)
+            .map_err(|source| SparkError::System { what: "write a temporary file".into(), source })?;
+        Ok(path)
+    }
+}
 
 #[derive(Debug, Serialize)]
 pub(super) struct Request {

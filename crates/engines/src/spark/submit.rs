@@ -11,8 +11,7 @@ use std::time::Duration;
 
 use super::answer::Answer;
 use super::locate::{Spark, locate};
-use super::place::Place;
-use super::request::Request;
+use super::request::{Place, Request};
 use super::{Cluster, SparkError, cause};
 
 const DRIVER: &str = include_str!("../../../../assets/spark/driver.py");

@@ -12,7 +12,6 @@ use std::path::{Path, PathBuf};
 use crate::error::StudyError;
 use crate::inputs::{ScoreFile, Source, Stamp};
 use crate::{LostAs, Question, Study, own_definitions, scores};
-use exact::suggest::nearest;
 use metric::definitions::{Definitions, UnknownMetric};
 use report::cells::diff::{Changes, Flip, Overlap};
 use report::cells::group::DEFAULT_BY;
@@ -91,14 +90,14 @@ pub fn diff(old: &Side, new: &Side, traces: &[Input], request: &DiffRequest) -> 
     let inputs = traces;
     let style = Style::load("default")?;
     let stamps = traces.iter().map(Stamp::of).collect::<Result<Vec<_>, _>>()?;
-    let traces = if traces.is_empty() { None } else { Some(Source::open(traces)?.into_traces()?) };
-    let pair = Pair::score(old, new, traces.as_ref(), request)?;
+    let source = if traces.is_empty() { None } else { Some(Source::open(traces)?) };
+    let traces = source.as_ref().map(Source::traces).transpose()?;
+    let pair = Pair::score(old, new, traces, request)?;
     if pair.before.table.is_empty() && pair.after.table.is_empty() {
         new.study(inputs, request)?.check_filter(0)?;
     }
-    let mut changes = pair.changes(&request.by)?;
-    TableOrder { catalog: &pair.after.table.catalog, style: &style }.sort(&mut changes);
-    let notes = match &traces {
+    let mut changes = pair.changes(&request.by, &style)?;
+    let notes = match traces {
         Some(traces) => {
             let mut notes = pair.explain(&mut changes, traces, request.threads)?;
             notes.extend([&pair.before, &pair.after].into_iter().filter_map(|side| side.unscored(traces)));
@@ -110,11 +109,40 @@ pub fn diff(old: &Side, new: &Side, traces: &[Input], request: &DiffRequest) -> 
     Ok(Diff { changes, notes })
 }
 
+impl Study {
+    /// The changes from this study to another: cells, and episodes by their ids. Two studies of the same traces under
+    /// one filter are scored in one scan, which gives the timesteps that decided each difference. Other studies lack
+    /// these timesteps, and a note says so. Errors: as [`Study::score`] for either study; sums of squares beyond 128
+    /// bits.
+    pub fn diff(&self, other: &Self) -> Result<Diff, StudyError> {
+        let by = self.question.by.clone().unwrap_or_else(|| DEFAULT_BY.map(str::to_owned).to_vec());
+        if self.differs_in_definitions_alone(other) {
+            let side = |study: &Self| Side::Definitions(study.question.definitions_name().to_owned());
+            let (metrics, filter) = (self.question.metrics.clone(), self.question.filter.clone());
+            let request = DiffRequest { metrics, filter, by, threads: self.threads, ..DiffRequest::default() };
+            return diff(&side(self), &side(other), &self.inputs, &request);
+        }
+        let style = Style::load("default")?;
+        let [before, after] = [self.score()?, other.score()?].map(|results| Scored::of(results.episodes, None));
+        let changes = Pair { before, after, evidence: None }.of_common_metrics().changes(&by, &style)?;
+        let notes = if changes.flips.is_empty() {
+            Vec::new()
+        } else {
+            let why = "the two studies are not of the same traces under one filter";
+            vec![format!("the timesteps that decided are not known: {why}")]
+        };
+        Ok(Diff { changes, notes })
+    }
+
+    fn differs_in_definitions_alone(&self, other: &Self) -> bool {
+        let question = |study: &Self| Question { definitions: None, ..study.question.clone() };
+        let are_traces = [self, other].iter().all(|study| matches!(study.source, Source::Traces(_)));
+        are_traces && self.stamps == other.stamps && question(self) == question(other)
+    }
+}
+
 impl Side {
-    /// The side that an argument names.
-    ///
-    /// # Errors
-    /// A folder or a Parquet file without scores.
+    /// The side that an argument names. Errors: a folder or a Parquet file without scores.
     pub fn of(argument: impl AsRef<Path>) -> Result<Self, StudyError> {
         let path = argument.as_ref();
         let inside = path.join("episodes.parquet");
@@ -196,6 +224,15 @@ impl Side {
 }
 
 impl Pair {
+    fn of_common_metrics(mut self) -> Self {
+        let common: Vec<String> =
+            self.after.metrics.iter().filter(|name| self.before.metrics.contains(name)).cloned().collect();
+        for side in [&mut self.before, &mut self.after] {
+            side.table.metrics.retain(|metric| common.contains(&metric.name));
+        }
+        self
+    }
+
     fn score(old: &Side, new: &Side, traces: Option<&TraceSet>, request: &DiffRequest) -> Result<Self, StudyError> {
         let (old_metrics, old_table) = old.read(traces, request)?;
         let (new_metrics, new_table) = new.read(traces, request)?;
@@ -221,9 +258,11 @@ impl Pair {
         })
     }
 
-    pub(crate) fn changes(&self, by: &[String]) -> Result<Changes, StudyError> {
+    /// The changes of the requested metrics, in table order.
+    pub(crate) fn changes(&self, by: &[String], style: &Style) -> Result<Changes, StudyError> {
         let mut changes = Changes::of(&self.before.table, &self.after.table, by)?;
         changes.metrics = Overlap::of(&self.before.metrics, &self.after.metrics);
+        TableOrder { catalog: &self.after.table.catalog, style }.sort(&mut changes);
         Ok(changes)
     }
 
@@ -264,6 +303,11 @@ impl Pair {
 }
 
 impl Scored {
+    pub(crate) fn of(table: EpisodeTable, definitions: Option<Definitions>) -> Self {
+        let metrics = table.metrics.iter().map(|metric| metric.name.clone()).collect();
+        Self { table, metrics, definitions }
+    }
+
     fn unscored(&self, traces: &TraceSet) -> Option<String> {
         let is_kept = |name: &str| self.table.keys.iter().any(|key| key.experiment == name);
         match own_definitions::unscored(self.definitions.as_ref()?, traces, is_kept)? {
@@ -312,10 +356,7 @@ fn check_known(asked: Option<&[String]>, old: &[String], new: &[String]) -> Resu
     let known = || new.iter().chain(old.iter().filter(|name| !new.contains(name)));
     match asked.unwrap_or_default().iter().find(|name| !known().any(|known| known == *name)) {
         None => Ok(()),
-        Some(name) => {
-            let near = nearest(name, known().map(String::as_str)).map(str::to_owned);
-            Err(UnknownMetric { name: name.clone(), near, known: known().cloned().collect() })
-        }
+        Some(name) => Err(UnknownMetric::new(name, known().cloned().collect())),
     }
 }
 

@@ -7,10 +7,9 @@ use std::slice;
 
 use serde_json::Value;
 
-use crate::design::design_of;
 use crate::error::StudyError;
 use crate::inputs::Source;
-use crate::results::Outputs;
+use crate::output::statistics::design_of;
 use crate::{Study, pooled};
 use metric::catalog::{Better, Metric};
 use metric::definitions::UnknownMetric;
@@ -25,10 +24,8 @@ const PAGE: [&str; 2] = ["assets/view.js", "data/list.js"];
 
 impl Study {
     /// The verdicts on this (later) study against an earlier one: improved, held, regressed, or why there is none.
-    ///
-    /// # Errors
-    /// As [`Study::score`] for either study; a metric that a side lacks, or without a better direction; a cell that
-    /// mixes episodes recorded differently; sums of squares beyond 128 bits.
+    /// Errors: as [`Study::score`] for either study; a metric that a side lacks, or without a better direction; a cell
+    /// that mixes episodes recorded differently; sums of squares beyond 128 bits.
     pub fn gate(&self, base: &Self, options: &GateOptions) -> Result<Gate, StudyError> {
         let (old, new) = (base.gated(options)?, self.gated(options)?);
         let design = design_of(&old.declared.clone().joined(new.declared.clone()));
@@ -54,7 +51,7 @@ impl Study {
             gate.cells.iter().flat_map(|cell| &cell.flips).any(|flip| of(flip).timesteps.is_none())
         };
         let sides = [("base", base, unshown(|flip| &flip.base)), ("new", self, unshown(|flip| &flip.new))];
-        for (side, ..) in sides.into_iter().filter(|(_, study, is_unshown)| *is_unshown && !study.has_steps()) {
+        for (side, ..) in sides.into_iter().filter(|(_, study, is_unshown)| *is_unshown && study.traces().is_err()) {
             gate.caveats.push(format!(
                 "{side}: scores do not say which steps decided a flip; traces in their folder do, if they give the same value."
             ));
@@ -62,10 +59,7 @@ impl Study {
         Ok(gate)
     }
 
-    /// The first metric with a better direction.
-    ///
-    /// # Errors
-    /// As [`Study::score`]; definitions without such a metric.
+    /// The first metric with a better direction. Errors: as [`Study::score`]; definitions without such a metric.
     pub fn leading_metric(&self) -> Result<String, StudyError> {
         let catalog = match &self.source {
             Source::Traces(traces) => self.question.bind(traces)?.catalog,
@@ -78,7 +72,7 @@ impl Study {
     }
 
     fn gated(&self, options: &GateOptions) -> Result<EpisodeTable, StudyError> {
-        let table = self.scan(Outputs { losses: true, ..Outputs::default() })?.episodes;
+        let table = self.score()?.episodes;
         self.check_filter(table.len())?;
         if check_metric(&table, &options.metric)?.better == Better::Neither {
             return Err(StudyError::NoDirection { metric: options.metric.clone() });
@@ -98,10 +92,6 @@ impl Study {
                 Ok(self.traces_beside().and_then(|traces| self.shown_by(&traces, ids, metric).ok()).unwrap_or_default())
             }
         }
-    }
-
-    fn has_steps(&self) -> bool {
-        matches!(self.source, Source::Traces(_))
     }
 
     fn folders(&self) -> BTreeSet<PathBuf> {
@@ -133,9 +123,7 @@ impl Study {
 pub(crate) fn check_metric<'t>(table: &'t EpisodeTable, name: &str) -> Result<&'t Metric, StudyError> {
     let found = table.catalog.metric.get(name).filter(|_| table.metric(name).is_some());
     found.ok_or_else(|| {
-        let names = || table.metrics.iter().map(|column| column.name.as_str());
-        let near = exact::suggest::nearest(name, names()).map(str::to_owned);
-        UnknownMetric { name: name.to_owned(), near, known: names().map(str::to_owned).collect() }.into()
+        UnknownMetric::new(name, table.metrics.iter().map(|column| column.name.clone()).collect()).into()
     })
 }
 

@@ -1,7 +1,5 @@
 //! Differences between studies: pairs of episodes, the gate, thresholds.
 
-pub(crate) mod between;
-pub(crate) mod design;
 pub(crate) mod diff;
 pub(crate) mod gate;
 pub(crate) mod pooled;

@@ -21,7 +21,6 @@ use report::figures::sensitivity::{self as drawing, Stage};
 use report::sensitivity::{Level, Reference, Sensitivity};
 use report::statistics::Options;
 use report::style::Style;
-use score::declared_experiments::declare;
 use score::physical::PhysicalPlan;
 use score::score_traces::{self, Outputs};
 use score::table::EpisodeTable;
@@ -72,10 +71,9 @@ pub struct SensitivityReport {
 
 impl Study {
     /// Scores the study under each threshold of mirror evidence and under the unchanged definitions, in one scan.
-    ///
-    /// # Errors
-    /// As [`Study::statistics`]; scores, or traces that do not record `mirror_self_px` at every step; definitions
-    /// without a `let` named `visible` that is true or false at each step; metrics that do not depend on it.
+    /// Errors: as [`Study::statistics`]; scores, or traces that do not record `mirror_self_px` at every step;
+    /// definitions without a `let` named `visible` that is true or false at each step; metrics that do not depend on
+    /// it.
     pub fn sensitivity(&self, thresholds: &Thresholds) -> Result<SensitivityReport, StudyError> {
         let traces = self.source.traces()?;
         check_pixels(traces)?;
@@ -174,10 +172,7 @@ impl Trial {
         }
         let mut definitions = vec![as_is];
         for px in &thresholds.0 {
-            let mut bound = bound(*px)?;
-            vocabulary::check_columns(traces, &bound)?;
-            declare(&mut bound.catalog, traces)?;
-            definitions.push(bound);
+            definitions.push(score_traces::checked(traces, bound(*px)?)?);
         }
         let is_recorded = definitions[0].catalog.lets.get(EVIDENCE).is_some_and(|text| text.trim() == GROUND_TRUTH);
         let count = format!("open = true\n[metric.MISSING]\nvalue = \"count({PIXELS} is null)\"\n");
@@ -215,17 +210,11 @@ fn under(question: &Question, px: u32, columns: &Columns) -> Result<Definitions,
     let as_is = question.load(columns)?;
     let shown = format!("the threshold of {px} px");
     let replaced = as_is.with_condition_let(EVIDENCE, &shown, &format!("{PIXELS} >= {px}"), columns);
-    let mut definitions = replaced.map_err(|source| match source {
+    let definitions = replaced.map_err(|source| match source {
         ReplaceError::Faults(faults) => StudyError::Filter(faults),
         source => StudyError::EvidenceLet { definitions: question.definitions_name().display().to_string(), source },
     })?;
-    if let Some(filter) = &question.filter {
-        definitions = definitions.filtered("--where", filter, columns)?;
-    }
-    if let Some(metrics) = &question.metrics {
-        definitions.select(metrics)?;
-    }
-    Ok(definitions)
+    question.applied(definitions, columns)
 }
 
 /// The metrics and columns that depend on the evidence, found from two definitions that differ only in it.

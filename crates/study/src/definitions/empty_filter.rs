@@ -27,10 +27,8 @@ impl Study {
         }
     }
 
-    /// The explanation of a filter that keeps no episode; `None` if there are episodes or there is no filter.
-    ///
-    /// # Errors
-    /// Faults of the inputs without the filter.
+    /// The explanation of a filter that keeps no episode; `None` if there are episodes or there is no filter. Errors:
+    /// faults of the inputs without the filter.
     pub fn empty_filter(&self, episodes: usize) -> Result<Option<String>, StudyError> {
         let Some(filter) = self.question.filter.as_deref().filter(|_| episodes == 0) else { return Ok(None) };
         let names = mentioned(filter);

@@ -4,4 +4,3 @@ pub(crate) mod empty_filter;
 pub(crate) mod own_definitions;
 pub(crate) mod question;
 pub(crate) mod rescore;
-pub(crate) mod scored_alike;

@@ -7,7 +7,6 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use crate::error::StudyError;
-use crate::scored_alike::ScoredAlike;
 use crate::{DEFAULT_DEFINITIONS, Question, Study};
 use metric::columns::Columns;
 use metric::definitions::Definitions;
@@ -16,6 +15,25 @@ use score::table::EpisodeTable;
 use trace::declared_experiment::DeclaredExperiment;
 use trace::open::{TraceFile, TraceSet};
 use trace::schema::Domain;
+
+/// Experiments that the same definitions score.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ScoredAlike {
+    /// The definitions, by name or by the original path of their file.
+    pub definitions: String,
+    /// SHA-256 of a definition file that is not built in.
+    pub hash: Option<String>,
+    /// The experiments by name, without those that no footer names.
+    pub experiments: BTreeSet<String>,
+    /// A condition that keeps only their episodes.
+    pub condition: String,
+}
+
+impl ScoredAlike {
+    pub(crate) fn is_built_in(&self) -> bool {
+        self.hash.is_none() && file::built_in(&self.definitions).is_some()
+    }
+}
 
 /// The definitions of reaching, whose traces have no colours.
 const WITHOUT_COLORS: &str = "reach";
@@ -165,11 +183,13 @@ impl Study {
     }
 
     /// The definitions that score all experiments of the traces, named by their footers; `None` for the default ones.
-    ///
-    /// # Errors
-    /// Scores in the place of traces; experiments that need different definitions; definitions in a file of the
+    /// Errors: scores in the place of traces; experiments that need different definitions; definitions in a file of the
     /// recorder's.
     pub fn own_definitions(&self) -> Result<Option<PathBuf>, StudyError> {
         chosen(self.traces()?)
+    }
+
+    pub fn definitions_name(&self) -> &Path {
+        self.question.definitions_name()
     }
 }

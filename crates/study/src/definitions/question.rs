@@ -5,14 +5,13 @@ use std::path::{Path, PathBuf};
 use ::report::cells::group::{CONDITION, DEFAULT_BY, KEY_COLUMNS};
 use metric::columns::Columns;
 use metric::definitions::Definitions;
-use score::declared_experiments::declare;
 use score::table::EpisodeTable;
-use score::vocabulary;
+use score::{score_traces, vocabulary};
 use trace::open::TraceSet;
 
 use crate::StudyError;
 use crate::losses::LostAs;
-use crate::scored_alike::ScoredAlike;
+use crate::own_definitions::ScoredAlike;
 
 /// Labels of each episode's recording that scores carry if the traces have them.
 pub(crate) const STANDING_LABELS: [&str; 4] = [CONDITION, "scene", "fingerprint", "participant"];
@@ -68,14 +67,15 @@ impl Question {
 
     pub(crate) fn bind(&self, traces: &TraceSet) -> Result<Definitions, StudyError> {
         let asked = self.clone().resolved(traces)?;
-        let mut definitions = asked.bind_to(&vocabulary::trace_columns(traces))?;
-        vocabulary::check_columns(traces, &definitions)?;
-        declare(&mut definitions.catalog, traces)?;
-        Ok(definitions)
+        Ok(score_traces::checked(traces, asked.bind_to(&vocabulary::trace_columns(traces))?)?)
     }
 
     pub fn bind_to(&self, columns: &Columns) -> Result<Definitions, StudyError> {
-        let mut definitions = self.load(columns)?;
+        self.applied(self.load(columns)?, columns)
+    }
+
+    /// The definitions with the filter and the metrics of the question.
+    pub(crate) fn applied(&self, mut definitions: Definitions, columns: &Columns) -> Result<Definitions, StudyError> {
         if let Some(filter) = &self.filter {
             definitions = definitions.filtered("--where", filter, columns)?;
         }

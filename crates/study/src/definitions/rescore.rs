@@ -12,7 +12,6 @@ use crate::report::{Report, ReportOptions};
 use crate::{LostAs, Question, Study, provenance};
 use exact::input;
 use report::bundle::Manifest;
-use report::layout::TableOrder;
 use report::style::Style;
 use score::format::{self, Partition};
 use score::table::EpisodeTable;
@@ -50,13 +49,11 @@ pub struct Rescored {
 }
 
 impl RescoreRequest {
-    /// Remakes the report.
-    ///
-    /// # Errors
-    /// A folder that is no report; faults in the definitions.
+    /// Remakes the report. Errors: a folder that is no report; faults in the definitions.
     pub fn run(&self) -> Result<Rescored, StudyError> {
         let manifest = provenance::manifest(&self.report)?;
-        let options = ReportOptions { style: self.style(&manifest)?, figures: has_figures(&self.report) };
+        let figures = self.report.join("figures").is_dir() || self.report.join("report.html").is_file();
+        let options = ReportOptions { style: self.style(&manifest)?, figures };
         let study = Study::of(self.traces.clone())?.threads(self.threads).asked(self.question(&manifest))?;
         study.source.traces()?;
         study.check_folder(&self.out, &options)?;
@@ -131,17 +128,9 @@ fn beside(report: &Path) -> Result<PathBuf, StudyError> {
 
 fn changes(study: &Study, before: EpisodeTable, report: &Report) -> Result<Diff, StudyError> {
     let traces = study.source.traces()?;
-    let names = |table: &EpisodeTable| table.metrics.iter().map(|metric| metric.name.clone()).collect();
-    let scored = |table: EpisodeTable, definitions| Scored { metrics: names(&table), table, definitions };
-    let definitions = study.question.bind(traces)?;
-    let after = scored(report.results.episodes.clone(), Some(definitions));
-    let pair = Pair { before: scored(before, None), after, evidence: None };
-    let mut changes = pair.changes(&report.cells.by)?;
-    TableOrder { catalog: &report.cells.catalog, style: &report.style }.sort(&mut changes);
+    let after = Scored::of(report.results.episodes.clone(), Some(study.question.bind(traces)?));
+    let pair = Pair { before: Scored::of(before, None), after, evidence: None };
+    let mut changes = pair.changes(&report.cells.by, &report.style)?;
     let notes = pair.explain(&mut changes, traces, study.threads)?;
     Ok(Diff { changes, notes })
-}
-
-fn has_figures(report: &Path) -> bool {
-    report.join("figures").is_dir() || report.join("report.html").is_file()
 }

@@ -86,10 +86,8 @@ impl PairAgreement {
 }
 
 impl Study {
-    /// The labels beside the traces, and the agreement of each pair of coders at this confidence.
-    ///
-    /// # Errors
-    /// As [`Study::score`]; scores in the place of traces.
+    /// The labels beside the traces, and the agreement of each pair of coders at this confidence. Errors: as
+    /// [`Study::score`]; scores in the place of traces.
     pub fn agreement(&self, confidence: f64) -> Result<LabelAgreement, StudyError> {
         let labels = self.traces()?.labels();
         let table = self.score()?.episodes;

@@ -11,6 +11,7 @@ use report::bundle::OutputFile;
 use report::cells::Cells;
 use report::cells::group::{DEFAULT_BY, group};
 use report::figures::{self, Figure, FigureError, FigureFormat, FigureName, FigureWidth, Input};
+use report::html;
 use report::style::Style;
 
 /// The options of a figure.
@@ -111,6 +112,21 @@ impl<'a> FigureInputs<'a> {
 }
 
 impl Drawings {
+    pub(crate) fn svgs(&self) -> Vec<String> {
+        self.drawn.iter().map(|(_, figure)| figure.inline_svg()).collect()
+    }
+
+    /// The figures for a page, with the SVG of each.
+    pub(crate) fn on_page<'a>(&'a self, svgs: &'a [String]) -> Vec<html::Figure<'a>> {
+        let figure = |((name, drawn), svg): (&'a (FigureName, Figure), &'a String)| html::Figure {
+            name: name.name(),
+            title: name.title(),
+            caption: drawn.caption(),
+            svg,
+        };
+        self.drawn.iter().zip(svgs).map(figure).collect()
+    }
+
     pub(crate) fn files(&self) -> Result<Vec<OutputFile>, StudyError> {
         let mut files = Vec::new();
         for (name, figure) in &self.drawn {

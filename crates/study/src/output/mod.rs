@@ -7,5 +7,5 @@ pub(crate) mod overview;
 pub(crate) mod provenance;
 pub(crate) mod quality_check;
 pub(crate) mod report;
-mod statistics;
+pub(crate) mod statistics;
 pub mod verify;

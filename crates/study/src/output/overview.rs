@@ -4,13 +4,12 @@ use crate::Study;
 use crate::error::StudyError;
 use crate::figure_inputs::FigureInputs;
 use crate::losses::Counted;
-use crate::report::figure_of;
 use crate::results::Results;
 use report::bundle::Manifest;
 use report::cells::{Cells, KeyValue};
-use report::html::{self, Figure, Page};
+use report::html::{self, Page};
 use report::layout::quality;
-use report::statistics::{Options, Replies};
+use report::statistics::Options;
 use report::style::Style;
 use trace::schema::SCHEMA_VERSION;
 
@@ -32,10 +31,8 @@ pub struct Overview {
 }
 
 impl Study {
-    /// Makes report sections from these results, which come from a scan of this study, or from a part of them.
-    ///
-    /// # Errors
-    /// Faults of the style; a cell that mixes episodes recorded differently.
+    /// Makes report sections from these results, which come from a scan of this study, or from a part of them. Errors:
+    /// faults of the style; a cell that mixes episodes recorded differently.
     pub fn overview(&self, results: Results, style: &str, part: Part) -> Result<Overview, StudyError> {
         let style = Style::load(style)?;
         let counted = self.counted(results);
@@ -44,15 +41,13 @@ impl Study {
             Part::Statistics => Some(self.statistics_of(&counted, &cells, &Options::default())?),
             Part::Tables | Part::Figures => None,
         };
-        let Counted { results, lost, all } = counted;
-        let replies = Replies::of(all.as_ref().unwrap_or(&results.episodes));
+        let replies = counted.replies();
+        let Counted { results, lost, .. } = counted;
         let drawings = match part {
             Part::Figures => FigureInputs::of_a_report(&results, &style)?.draw_all(),
             Part::Tables | Part::Statistics => crate::Drawings::default(),
         };
-        let svgs: Vec<String> = drawings.drawn.iter().map(|(_, figure)| figure.inline_svg()).collect();
-        let figures: Vec<Figure> =
-            drawings.drawn.iter().zip(&svgs).map(|((name, drawn), svg)| figure_of(*name, drawn, svg)).collect();
+        let svgs = drawings.svgs();
         let (tables, ranks) = self.tables(&results.episodes, (&lost, replies.as_ref()), &cells, &style)?;
         let lists: Vec<_> = ranks.into_iter().chain(results.quality.as_ref().and_then(quality::of_cells)).collect();
         let manifest =
@@ -68,7 +63,7 @@ impl Study {
             cells: &cells,
             episodes: &results.episodes,
             manifest: &manifest,
-            figures: &figures,
+            figures: &drawings.on_page(&svgs),
             statistics: statistics.as_ref(),
             lists: &lists,
             recordings: None,

@@ -12,11 +12,11 @@ use exact::replace;
 use exact::suggest::hint;
 use report::bundle::{self, Bundle, BundleError, Manifest, OutputFile};
 use report::cells::Cells;
-use report::figures::{Figure as Drawn, FigureName};
-use report::html::{self, Figure, Page, Recordings};
+use report::figures::FigureName;
+use report::html::{self, Page, Recordings};
 use report::layout::{MetricTable, quality};
 use report::plan::departures::Looks;
-use report::statistics::{Options, Replies, Statistics};
+use report::statistics::{Options, Statistics};
 use report::style::{MAIN_TABLE, OTHER_TABLE, Style};
 use report::tables::ListTable;
 use score::format::Format;
@@ -77,10 +77,8 @@ pub struct WrittenReport {
 }
 
 impl Study {
-    /// Refuses a folder whose report contains a file that this study reads, before anything is read.
-    ///
-    /// # Errors
-    /// An input in the folder.
+    /// Refuses a folder whose report contains a file that this study reads, before anything is read. Errors: an input
+    /// in the folder.
     pub fn check_folder(&self, out: &Path, options: &ReportOptions) -> Result<(), StudyError> {
         bundle::check_old(out, &self.files_read(Some(&options.style)))?;
         self.check_out(out)
@@ -98,8 +96,8 @@ impl Study {
         let cells = self.cells_of(&counted.results.episodes)?;
         let statistics =
             options.figures.then(|| self.statistics_of(&counted, &cells, &Options::default())).transpose()?;
+        let replies = counted.replies();
         let Counted { results, all, lost } = counted;
-        let replies = Replies::of(all.as_ref().unwrap_or(&results.episodes));
         let (tables, ranks) = self.tables(&results.episodes, (&lost, replies.as_ref()), &cells, &style)?;
         let replies = replies.and_then(|replies| replies.sentence());
         let lists = ranks.into_iter().chain(results.quality.as_ref().and_then(quality::of_cells)).collect();
@@ -203,10 +201,7 @@ impl Report {
         self.tables.iter().find(|table| table.name == OTHER_TABLE)
     }
 
-    /// The table of this name.
-    ///
-    /// # Errors
-    /// A name that the style lacks; the error lists its tables.
+    /// The table of this name. Errors: a name that the style lacks; the error lists its tables.
     pub fn table(&self, name: &str) -> Result<&MetricTable, StudyError> {
         self.tables.iter().find(|table| table.name == name).ok_or_else(|| {
             let known = || self.tables.iter().map(|table| table.name.as_str());
@@ -221,11 +216,9 @@ impl Report {
         self.tables.iter().find(|table| table.name == name).map(|table| table.printed().markdown())
     }
 
-    /// Writes the folder of the report and replaces an existing report.
-    ///
-    /// # Errors
-    /// `out` is not a folder or cannot be written: the folder is then unchanged, or has no manifest. The old report
-    /// contains a file that this one is made from.
+    /// Writes the folder of the report and replaces an existing report. Errors: `out` is not a folder or cannot be
+    /// written: the folder is then unchanged, or has no manifest. The old report contains a file that this one is made
+    /// from.
     pub fn write(&self, out: &Path) -> Result<WrittenReport, StudyError> {
         bundle::check_old(out, &self.read)?;
         replace::check_folder(out, &self.read[..self.inputs]).map_err(BundleError::from)?;
@@ -253,22 +246,16 @@ impl Report {
     }
 
     fn page(&self, drawings: &Drawings, statistics: &Statistics) -> Result<String, StudyError> {
-        let svgs: Vec<String> = drawings.drawn.iter().map(|(_, figure)| figure.inline_svg()).collect();
-        let figures: Vec<Figure> =
-            drawings.drawn.iter().zip(&svgs).map(|((name, drawn), svg)| figure_of(*name, drawn, svg)).collect();
+        let svgs = drawings.svgs();
         Ok(html::render(&Page {
             tables: &self.tables,
             cells: &self.cells,
             episodes: &self.results.episodes,
             manifest: &self.manifest,
-            figures: &figures,
+            figures: &drawings.on_page(&svgs),
             statistics: Some(statistics),
             lists: &self.lists,
             recordings: self.recordings.as_ref(),
         })?)
     }
-}
-
-pub(crate) fn figure_of<'a>(name: FigureName, drawn: &'a Drawn, svg: &'a str) -> Figure<'a> {
-    Figure { name: name.name(), title: name.title(), caption: drawn.caption(), svg }
 }

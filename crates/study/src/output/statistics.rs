@@ -1,18 +1,21 @@
-//! Statistics of a study: each verdict gets the exclusions and declarations.
+//! Statistics of a study: each verdict gets the declared design, the exclusions and the declarations.
+
+use std::collections::{BTreeMap, BTreeSet};
 
 use ::report::cells::Cells;
 use ::report::plan::departures::Looks;
-use ::report::statistics::{Options, Replies, Selection, Sequential, Statistics};
+use ::report::statistics::{Options, Selection, Sequential, Statistics};
+use exact::budget::Limit;
 use metric::names::is_about;
 use score::lost_counts::LostCounts;
-use score::table::EpisodeTable;
+use score::table::{CONDITION, EpisodeTable};
 use score::vocabulary;
+use statistics::design::{Cluster, Design, DesignKind};
+use trace::declared::{self, Declared, Origin};
 use trace::labels;
 
-use crate::design::design_of;
 use crate::losses::Counted;
-use crate::results::Outputs;
-use crate::{LostAs, Study, StudyError, pooled, size};
+use crate::{LostAs, Study, StudyError, pooled};
 
 impl Study {
     /// The filter. It depends on results if it uses more than the values recorded before an episode begins.
@@ -25,16 +28,18 @@ impl Study {
         Some(Selection { condition, by_results })
     }
 
-    /// The statistics of the cells: intervals, tests, comparisons.
-    ///
-    /// # Errors
-    /// As [`Study::score`]; sums of squares beyond 128 bits.
+    /// The statistics of the cells: intervals, tests, comparisons. Errors: as [`Study::score`]; sums of squares beyond
+    /// 128 bits.
     pub fn statistics(&self, options: &Options) -> Result<Statistics, StudyError> {
-        let results = self.scan(Outputs { losses: true, ..Outputs::default() })?;
-        self.check_filter(results.episodes.len())?;
-        let counted = self.counted(results);
+        let counted = self.counted_scores()?;
         let cells = self.cells_of(&counted.results.episodes)?;
         self.statistics_of(&counted, &cells, options)
+    }
+
+    fn counted_scores(&self) -> Result<Counted, StudyError> {
+        let results = self.score()?;
+        self.check_filter(results.episodes.len())?;
+        Ok(self.counted(results))
     }
 
     pub(crate) fn pooled(&self, episodes: &EpisodeTable) -> Result<Option<Vec<String>>, StudyError> {
@@ -56,7 +61,7 @@ impl Study {
         let (is_known, total) = (results.lost.is_some() || declared.losses_recorded || !lost.is_empty(), lost.total());
         let beside = self.undecided(lost);
         let (design, selection) = (design_of(declared), self.selection(&results.episodes));
-        let replies = Replies::of(counted.all.as_ref().unwrap_or(&results.episodes));
+        let replies = counted.replies();
         let lost = is_known.then_some(beside);
         let failures = (self.question.lost == LostAs::Failure && total > 0).then_some(total);
         let as_failures = failures.map(|total| format!("{total} lost episodes counted as failures"));
@@ -82,13 +87,40 @@ impl Study {
 
     /// Statistics for a study in progress: confidence sequences and e-values.
     pub fn sequential(&self, options: &Options) -> Result<Sequential, StudyError> {
-        let results = self.scan(Outputs { losses: true, ..Outputs::default() })?;
-        self.check_filter(results.episodes.len())?;
-        let episodes = self.counted(results).results.episodes;
-        size::check_comparisons(&episodes)?;
+        let episodes = self.counted_scores()?.results.episodes;
+        check_comparisons(&episodes)?;
         let (design, selection) = (design_of(&episodes.declared), self.selection(&episodes));
         let options = Options { design, selection, pooled: self.pooled(&episodes)?, ..options.clone() };
         let departures = self.departures(&episodes, &options, Looks::Any);
         Ok(Sequential { departures, ..Sequential::of(&episodes, &options)? })
     }
+}
+
+pub(crate) fn design_of(declared: &Declared) -> Design {
+    let kind = |origin| match origin {
+        Origin::Recording => DesignKind::Recording,
+        Origin::Import => DesignKind::Import,
+        Origin::Reconstruction => DesignKind::Reconstruction,
+    };
+    let cluster = |cluster| match cluster {
+        declared::Cluster::Seed => Cluster::Seed,
+    };
+    Design { kind: declared.origin.map(kind), cluster: declared.cluster.map(cluster) }
+}
+
+/// Every pair of models is compared, so a report grows with the square of the number of models, while the traces grow
+/// linearly. A hundred models in five experiments under ten metrics are 247,500; a comparison takes half a kilobyte.
+const MOST_COMPARISONS: Limit =
+    Limit::new("comparisons of two models under a metric; leave models or metrics out", 400_000);
+
+pub(crate) fn check_comparisons(episodes: &EpisodeTable) -> Result<(), StudyError> {
+    let conditions = episodes.label(CONDITION);
+    let mut subjects = BTreeMap::<_, BTreeSet<_>>::new();
+    for row in 0..episodes.len() {
+        let subject = (episodes.keys.models().code(row), conditions.and_then(|conditions| conditions.get(row)));
+        subjects.entry(episodes.keys.experiments().code(row)).or_default().insert(subject);
+    }
+    let pairs = |count: usize| (count as u64).saturating_mul(count.saturating_sub(1) as u64) / 2;
+    let pairs = subjects.values().fold(0_u64, |sum, subjects| sum.saturating_add(pairs(subjects.len())));
+    Ok(MOST_COMPARISONS.check(pairs.saturating_mul(episodes.metrics.len() as u64))?)
 }

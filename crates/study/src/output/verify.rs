@@ -11,8 +11,8 @@ use std::path::{Component, Path, PathBuf};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::input_hashes::of_file;
 use exact::escape::visible;
+use exact::{hash, input};
 use report::bundle::{MANIFEST, Output};
 
 /// The largest manifest that is read, in bytes; the paper's has 20 KB.
@@ -169,7 +169,8 @@ fn difference(
         return differs(Kind::Changed, kind_of(&about).to_owned());
     }
     let at = folder.join(path);
-    let found = of_file(&at).map_err(|source| VerifyError::Unreadable { path: at, source })?;
+    let found =
+        input::open(&at).and_then(hash::of_reader).map_err(|source| VerifyError::Unreadable { path: at, source })?;
     if found == output.sha256.to_ascii_lowercase() && about.len() == output.bytes {
         return Ok(None);
     }

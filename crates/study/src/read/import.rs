@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::StudyError;
-use crate::expected::ExpectedTraces;
+use crate::findings::ExpectedTraces;
 use exact::budget::Limit;
 use exact::escape::visible;
 use exact::input;

@@ -8,6 +8,8 @@ use std::time::{Duration, UNIX_EPOCH};
 
 use crate::error::StudyError;
 use engines::spark::source::is_uri;
+use exact::hash;
+use report::bundle;
 use score::format::{self, Format};
 use trace::error::TraceError;
 use trace::inputs::{self, Input};
@@ -16,7 +18,7 @@ use trace::open::TraceSet;
 
 #[derive(Debug)]
 pub enum Source {
-    Traces(TraceSet),
+    Traces(Box<TraceSet>),
     Scores(Vec<ScoreFile>),
 }
 
@@ -41,21 +43,17 @@ impl Source {
     pub fn open(inputs: &[Input]) -> Result<Self, StudyError> {
         match ScoreFile::all(inputs)? {
             Some(scores) => Ok(Self::Scores(scores)),
-            None => Ok(Self::Traces(labelled(inputs)?)),
+            None => Ok(Self::Traces(Box::new(labelled(inputs)?))),
         }
     }
 
     pub fn traces(&self) -> Result<&TraceSet, StudyError> {
         match self {
             Self::Traces(traces) => Ok(traces),
-            Self::Scores(files) => Err(no_steps(files)),
-        }
-    }
-
-    pub(crate) fn into_traces(self) -> Result<TraceSet, StudyError> {
-        match self {
-            Self::Traces(traces) => Ok(traces),
-            Self::Scores(files) => Err(no_steps(&files)),
+            Self::Scores(files) => {
+                let scores = files.first().map_or_else(String::new, |file| file.input.name.clone());
+                Err(StudyError::NoSteps { scores })
+            }
         }
     }
 }
@@ -63,10 +61,6 @@ impl Source {
 pub(crate) fn labelled(inputs: &[Input]) -> Result<TraceSet, StudyError> {
     let labels = Labels::beside(inputs).map_err(TraceError::from)?;
     Ok(TraceSet::open(inputs)?.with_labels(labels)?)
-}
-
-fn no_steps(scores: &[ScoreFile]) -> StudyError {
-    StudyError::NoSteps { scores: scores.first().map_or_else(String::new, |file| file.input.name.clone()) }
 }
 
 impl ScoreFile {
@@ -144,4 +138,19 @@ impl Stamp {
 
 fn state_of(path: &std::path::Path) -> io::Result<FileState> {
     std::fs::metadata(path).map(|metadata| FileState::of(&metadata))
+}
+
+/// The inputs as a manifest names them, with their hashes.
+pub(crate) fn hashes(inputs: &[Input]) -> Result<Vec<bundle::Input>, StudyError> {
+    inputs.iter().map(hash_of).collect()
+}
+
+fn hash_of(input: &Input) -> Result<bundle::Input, StudyError> {
+    let read = || {
+        let file = exact::input::open(&input.path)?;
+        let bytes = file.metadata()?.len();
+        Ok::<_, io::Error>((hash::of_reader(file)?, bytes))
+    };
+    let (sha256, bytes) = read().map_err(|error| StudyError::file(&input.name, error))?;
+    Ok(bundle::Input::new(input.name.as_ref(), sha256, bytes))
 }

@@ -1,10 +1,8 @@
 //! From arguments to scored episodes: files, findings, hashes, score files.
 
-pub(crate) mod expected;
 pub(crate) mod experiment_findings;
 pub(crate) mod findings;
 pub(crate) mod import;
-pub(crate) mod input_hashes;
 pub(crate) mod inputs;
 pub(crate) mod results;
 pub(crate) mod scan;

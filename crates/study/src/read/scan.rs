@@ -3,10 +3,10 @@
 use std::thread;
 
 use crate::error::StudyError;
-use crate::inputs::Source;
+use crate::inputs::{self, Source};
 use crate::question::STANDING_LABELS;
 use crate::results::{Outputs, Results};
-use crate::{Backend, Study, backend, input_hashes, losses, own_definitions, scores};
+use crate::{Backend, Study, backend, losses, own_definitions, scores};
 use metric::definitions::Definitions;
 use report::cells::group::CONDITION;
 use score::quality::{QualityByCell, QualityReader};
@@ -21,14 +21,12 @@ use trace::replies::REPLY_STATUS;
 use trace::schema::{self, Column, Domain};
 
 impl Study {
-    /// Reads the inputs once. A file that changed since it was opened is an error.
-    ///
-    /// # Errors
-    /// Faults of the traces or the scores; numbers beyond 64 bits; a file that changed in between.
+    /// Reads the inputs once. A file that changed since it was opened is an error. Errors: faults of the traces or the
+    /// scores; numbers beyond 64 bits; a file that changed in between.
     pub fn scan(&self, outputs: Outputs) -> Result<Results, StudyError> {
         let (results, inputs) = thread::scope(|scope| {
             // Hashing reads the same pages; on its own thread it does not slow the scan.
-            let hashing = outputs.hashes.then(|| scope.spawn(|| input_hashes::hashes(&self.inputs)));
+            let hashing = outputs.hashes.then(|| scope.spawn(|| inputs::hashes(&self.inputs)));
             let results = self.scan_rows(outputs);
             let inputs = hashing.map(|thread| thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
             (results, inputs)
@@ -41,19 +39,15 @@ impl Study {
         Ok(results)
     }
 
-    /// Returns true if the traces record replies, or episodes were lost.
-    ///
-    /// # Errors
-    /// Scores, which have no replies; a list of lost episodes that cannot be read.
+    /// Returns true if the traces record replies, or episodes were lost. Errors: scores, which have no replies; a list
+    /// of lost episodes that cannot be read.
     pub fn has_quality(&self) -> Result<bool, StudyError> {
         let reader = QualityReader::of(self.source.traces()?);
         Ok(!reader.columns().is_empty() || !trace::lost::beside(&self.inputs)?.is_empty())
     }
 
-    /// The reply quality of all episodes, lost ones included.
-    ///
-    /// # Errors
-    /// Scores, which have no replies; faults of the traces or of the list of lost episodes.
+    /// The reply quality of all episodes, lost ones included. Errors: scores, which have no replies; faults of the
+    /// traces or of the list of lost episodes.
     pub fn quality(&self) -> Result<QualityByCell, StudyError> {
         let traces = self.source.traces()?;
         let reader = QualityReader::of(traces);
@@ -86,10 +80,8 @@ impl Study {
         Ok(())
     }
 
-    /// Returns true if the definitions or the filter read coders' labels.
-    ///
-    /// # Errors
-    /// Scores in the place of traces; every fault of the definitions.
+    /// Returns true if the definitions or the filter read coders' labels. Errors: scores in the place of traces; every
+    /// fault of the definitions.
     pub fn reads_labels(&self) -> Result<bool, StudyError> {
         let traces = self.traces()?;
         let plan = self.question.bind(traces)?.plan;
@@ -97,10 +89,7 @@ impl Study {
         Ok(plan.columns(&read).iter().any(|(name, _)| traces.is_label_column(name)))
     }
 
-    /// The results of an earlier scan with the current coders' labels.
-    ///
-    /// # Errors
-    /// Scores in the place of traces.
+    /// The results of an earlier scan with the current coders' labels. Errors: scores in the place of traces.
     pub fn relabelled(&self, mut results: Results) -> Result<Results, StudyError> {
         let traces = self.traces()?;
         let EpisodeTable { labels, keys, .. } = &mut results.episodes;

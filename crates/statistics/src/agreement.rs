@@ -22,7 +22,6 @@ pub struct PairCounts {
     pub neither: u64,
 }
 
-/// Kappa and its interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Kappa {
     pub value: f64,
@@ -41,12 +40,10 @@ impl PairCounts {
         *count += 1;
     }
 
-    /// The number of episodes.
     pub const fn n(&self) -> u64 {
         self.both + self.first_only + self.second_only + self.neither
     }
 
-    /// The number of episodes on which the coders agree.
     pub const fn agreed(&self) -> u64 {
         self.both + self.neither
     }
@@ -55,8 +52,8 @@ impl PairCounts {
     /// every episode the same label, so that all agreement is by chance.
     pub fn kappa(&self, confidence: f64) -> Option<Kappa> {
         let n = self.n() as f64;
-        let shares =
-            [[self.both, self.first_only], [self.second_only, self.neither]].map(|row| row.map(|c| c as f64 / n));
+        let counts = [[self.both, self.first_only], [self.second_only, self.neither]];
+        let shares = counts.map(|row| row.map(|count| count as f64 / n));
         let rows = shares.map(|row| row[0] + row[1]);
         let columns = [0, 1].map(|at| shares[0][at] + shares[1][at]);
         let (agreed, by_chance) = (shares[0][0] + shares[1][1], rows[0] * columns[0] + rows[1] * columns[1]);

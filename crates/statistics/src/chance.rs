@@ -1,7 +1,6 @@
 //! One rate against a level fixed beforehand: the exact binomial test.
 //!
-//! Rule: two-sided by probability. The p value sums all counts that are at most as probable as the observed one
-//! (Gibbons and Pratt 1975, the minimum likelihood rule). Weights are integers as long as they fit 128 bits, which
+//! Rule: two-sided by probability, as in [`super::outcomes`]. Weights are integers as long as they fit 128 bits, which
 //! distinguishes equal from nearly equal probabilities without rounding.
 
 use std::iter::successors;
@@ -12,17 +11,14 @@ use exact::ratio::Ratio;
 /// With more trials, weights never fit 128 bits.
 const MOST_EXACT: u64 = 128;
 
-/// The two-sided p value of `successes` in `n` trials under the rate `level`.
+/// The two-sided p value of `successes` in `n` trials under the rate `level`; 0 if it underflows.
 ///
 /// `None` for n = 0, for more successes than trials, and for a level outside [0, 1].
-/// A p value below the smallest normal floating-point number is 0.
 pub fn two_sided(successes: u64, n: u64, level: Ratio) -> Option<f64> {
     exact_test(successes, n, level).map(|test| test.p)
 }
 
-/// The exact two-sided p value of [`two_sided`] and its mid-p value.
-///
-/// `mid_p` is less conservative and not guaranteed to keep the level. `None` as in [`two_sided`].
+/// The p value of [`two_sided`] and its mid-p value. `None` as in [`two_sided`].
 pub fn exact_test(successes: u64, n: u64, level: Ratio) -> Option<ExactTest> {
     let odds = Odds::of(level).filter(|_| n > 0 && successes <= n)?;
     Some(exact(successes, n, odds).unwrap_or_else(|| by_recurrence(n, odds).test(successes)))
@@ -50,20 +46,14 @@ impl Odds {
         let all = u64::try_from(level.denominator()).ok()?;
         Some(Self { hit, miss: all.checked_sub(hit)? })
     }
-
-    /// The probability of `j + 1` successes in `n` trials divided by that of `j`.
-    fn rise(self, n: u64, j: u64) -> f64 {
-        ((n - j) as f64 * self.hit as f64) / ((j + 1) as f64 * self.miss as f64)
-    }
 }
 
 /// The test in integers; `None` if a weight does not fit 128 bits.
 fn exact(successes: u64, n: u64, odds: Odds) -> Option<ExactTest> {
-    let weights = exact_weights(n, odds)?;
+    let (weights, total) = exact_weights(n, odds)?;
     let seen = weights[usize::try_from(successes).ok()?];
     let as_extreme: u128 = weights.iter().filter(|&&weight| weight <= seen).sum();
     let tied: u128 = weights.iter().filter(|&&weight| weight == seen).sum();
-    let total = exact_total(n, odds)?;
     let p = as_extreme as f64 / total as f64;
     // At a level of 0 or 1 only one count is possible, and it is no evidence.
     let mid_p = if seen == total { 1.0 } else { (as_extreme as f64 - tied as f64 / 2.0) / total as f64 };
@@ -71,18 +61,14 @@ fn exact(successes: u64, n: u64, odds: Odds) -> Option<ExactTest> {
 }
 
 fn exact_least_p(n: u64, odds: Odds) -> Option<f64> {
-    let weights = exact_weights(n, odds)?;
+    let (weights, total) = exact_weights(n, odds)?;
     let least = *weights.iter().min()?;
     let as_extreme: u128 = weights.iter().filter(|&&weight| weight == least).sum();
-    Some(as_extreme as f64 / exact_total(n, odds)? as f64)
+    Some(as_extreme as f64 / total as f64)
 }
 
-fn exact_total(n: u64, odds: Odds) -> Option<u128> {
-    u128::from(odds.hit + odds.miss).checked_pow(u32::try_from(n).ok()?)
-}
-
-/// Counts weigh `C(n, j) * hit^j * miss^(n - j)`; `None` if a weight does not fit 128 bits.
-fn exact_weights(n: u64, odds: Odds) -> Option<Vec<u128>> {
+/// Counts weigh `C(n, j) * hit^j * miss^(n - j)`; and their sum. `None` if one does not fit 128 bits.
+fn exact_weights(n: u64, odds: Odds) -> Option<(Vec<u128>, u128)> {
     if n > MOST_EXACT {
         return None;
     }
@@ -98,15 +84,16 @@ fn exact_weights(n: u64, odds: Odds) -> Option<Vec<u128>> {
         weights.push(choices.checked_mul(*hit)?.checked_mul(*miss)?);
         choices = choices.checked_mul((n - j).into())? / u128::from(j + 1);
     }
-    Some(weights)
+    Some((weights, u128::from(odds.hit + odds.miss).checked_pow(u32::try_from(n).ok()?)?))
 }
 
 /// The same with weights relative to the most probable count, for any `n`.
 fn by_recurrence(n: u64, odds: Odds) -> Outcomes {
     let all = u128::from(odds.hit) + u128::from(odds.miss);
-    let mode = (u128::from(n) + 1) * u128::from(odds.hit) / all;
-    let mode = u64::try_from(mode).unwrap_or(n).min(n);
-    Outcomes::around(mode, (0, n), |j| odds.rise(n, j))
+    let mode = u64::try_from((u128::from(n) + 1) * u128::from(odds.hit) / all).unwrap_or(n).min(n);
+    // The probability of `j + 1` successes in `n` trials divided by that of `j`.
+    let rise = |j: u64| ((n - j) as f64 * odds.hit as f64) / ((j + 1) as f64 * odds.miss as f64);
+    Outcomes::around(mode, (0, n), rise)
 }
 
 #[cfg(test)]

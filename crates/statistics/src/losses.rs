@@ -26,20 +26,12 @@ pub struct Lossy {
     pub interval: Interval,
 }
 
-/// The bounds of a rate, from each episode's value and fate.
-///
-/// The value of a lost episode is ignored, defined or not. `None` if there is nothing to count.
-pub fn bounds(episodes: impl IntoIterator<Item = (Option<i64>, Fate)>, confidence: f64) -> Option<Lossy> {
-    let (mut n, mut successes, mut lost) = (0, 0, 0);
-    for (value, fate) in episodes {
-        match (fate, value) {
-            (Fate::Lost, _) => lost += 1,
-            (Fate::Kept, Some(value)) => {
-                n += 1;
-                successes += u64::from(value == 1);
-            }
-            (Fate::Kept, None) => {}
-        }
+/// The bounds of a rate from the `lost` episodes and the values of the others. `None` if there is nothing to count.
+pub fn bounds(values: impl IntoIterator<Item = i64>, lost: u64, confidence: f64) -> Option<Lossy> {
+    let (mut n, mut successes) = (0, 0);
+    for value in values {
+        n += 1;
+        successes += u64::from(value == 1);
     }
     let (worst, best) = (wilson(successes, n + lost, confidence)?, wilson(successes + lost, n + lost, confidence)?);
     let all = (n + lost) as f64;
@@ -52,24 +44,14 @@ pub fn bounds(episodes: impl IntoIterator<Item = (Option<i64>, Fate)>, confidenc
     })
 }
 
-/// The fate of an episode.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fate {
-    /// It completed normally.
-    Kept,
-    Lost,
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{Fate, bounds};
+    use super::bounds;
     use crate::interval::{Interval, wilson};
 
     #[test]
-    fn lost_episodes_widen_the_bounds_and_their_values_do_not_count() {
-        let kept = [Some(1), Some(1), Some(0), None].map(|value| (value, Fate::Kept));
-        let lost = [Some(1), None].map(|value| (value, Fate::Lost));
-        let found = bounds(kept.into_iter().chain(lost), 0.95).unwrap();
+    fn lost_episodes_widen_the_bounds() {
+        let found = bounds([1, 1, 0], 2, 0.95).unwrap();
         assert_eq!((found.n, found.successes, found.lost), (3, 2, 2));
         assert_eq!((found.bounds.low, found.bounds.high), (2.0 / 5.0, 4.0 / 5.0));
         let (worst, best) = (wilson(2, 5, 0.95).unwrap(), wilson(4, 5, 0.95).unwrap());
@@ -78,14 +60,14 @@ mod tests {
 
     #[test]
     fn without_losses_the_bounds_are_the_rate() {
-        let found = bounds([Some(1), Some(0)].map(|value| (value, Fate::Kept)), 0.95).unwrap();
+        let found = bounds([1, 0], 0, 0.95).unwrap();
         assert_eq!((found.lost, found.bounds.low, found.bounds.high), (0, 0.5, 0.5));
-        assert_eq!(bounds([(None, Fate::Kept)], 0.95), None);
+        assert_eq!(bounds([], 0, 0.95), None);
     }
 
     #[test]
     fn all_episodes_lost_gives_no_verdict() {
-        let found = bounds([(Some(1), Fate::Lost)], 0.95).unwrap();
+        let found = bounds([], 1, 0.95).unwrap();
         assert_eq!((found.bounds.low, found.bounds.high), (0.0, 1.0));
     }
 }

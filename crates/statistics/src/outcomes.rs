@@ -64,9 +64,8 @@ impl Outcomes {
 
     /// The least p value of any count; 0 if it underflows.
     pub fn least_p(&self) -> f64 {
-        let ends = [self.weights.first(), self.weights.last()].map(|weight| weight.copied().unwrap_or(0.0));
+        let [low, high] = [self.weights.first(), self.weights.last()].map(|weight| weight.copied().unwrap_or(0.0));
         let total: f64 = self.weights.iter().sum();
-        let [low, high] = ends;
         match (self.whole, (low - high).abs() <= TIE * low.max(high)) {
             (false, _) => 0.0,
             (true, true) if self.weights.len() > 1 => (low + high) / total,
@@ -74,7 +73,6 @@ impl Outcomes {
         }
     }
 
-    /// The number of counts with a weight.
     pub fn len(&self) -> usize {
         self.weights.len()
     }

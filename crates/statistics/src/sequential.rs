@@ -92,11 +92,7 @@ fn lower(successes: u64, failures: u64, least: f64) -> f64 {
         if middle <= low || middle >= high {
             return quantile::settled(low);
         }
-        if likelihood(middle) < least {
-            low = middle;
-        } else {
-            high = middle;
-        }
+        if likelihood(middle) < least { low = middle } else { high = middle }
     }
 }
 

@@ -8,9 +8,8 @@
 /// Members ascend within a set, sets ascend by their members, and each member is in at least one set. The search is the
 /// Bron-Kerbosch algorithm with a pivot (1973), exponential only for contrived ties.
 pub fn tied_sets(count: usize, separated: impl Fn(usize, usize) -> bool) -> Vec<Vec<usize>> {
-    let tied = Ties {
-        rows: (0..count).map(|a| (0..count).map(|b| a != b && !separated(a.min(b), a.max(b))).collect()).collect(),
-    };
+    let row = |a: usize| (0..count).map(|b| a != b && !separated(a.min(b), a.max(b))).collect();
+    let tied = Ties((0..count).map(row).collect());
     let mut found = Vec::new();
     if count > 0 {
         tied.grow(&mut Vec::new(), (0..count).collect(), Vec::new(), &mut found);
@@ -19,9 +18,7 @@ pub fn tied_sets(count: usize, separated: impl Fn(usize, usize) -> bool) -> Vec<
     found
 }
 
-struct Ties {
-    rows: Vec<Vec<bool>>,
-}
+struct Ties(Vec<Vec<bool>>);
 
 impl Ties {
     /// Extends `set` by each candidate in turn. A set without candidates and excluded members is maximal.
@@ -48,13 +45,13 @@ impl Ties {
     }
 
     fn tied_to(&self, member: usize, others: &[usize]) -> Vec<usize> {
-        others.iter().copied().filter(|&other| self.rows[member][other]).collect()
+        others.iter().copied().filter(|&other| self.0[member][other]).collect()
     }
 
     fn away_from_pivot(&self, candidates: &[usize], excluded: &[usize]) -> Vec<usize> {
         let pivot =
             candidates.iter().chain(excluded).copied().max_by_key(|&pivot| self.tied_to(pivot, candidates).len());
-        candidates.iter().copied().filter(|&member| pivot.is_none_or(|pivot| !self.rows[pivot][member])).collect()
+        candidates.iter().copied().filter(|&member| pivot.is_none_or(|pivot| !self.0[pivot][member])).collect()
     }
 }
 

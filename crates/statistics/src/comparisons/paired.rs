@@ -53,33 +53,27 @@ impl Pairs {
     /// Without a difference, a discordant pair favours either side with probability 1/2. 1 if no pair is discordant;
     /// `None` without pairs.
     pub fn mcnemar(self) -> Option<f64> {
-        match (self.n(), self.discordant()) {
-            (0, _) => None,
-            (_, 0) => Some(1.0),
-            (_, discordant) => chance::two_sided(self.first_only, discordant, Ratio::new(1, 2)?),
-        }
+        self.test().map(|test| test.p)
     }
 
     /// The mid-p value of [`Pairs::mcnemar`] (Fagerland, Lydersen and Laake 2013, BMC Med. Res. Methodol. 13:91).
     ///
-    /// Less conservative than the exact test and **not guaranteed to keep the level**. 1 if no pair is discordant;
-    /// `None` without pairs.
+    /// Less conservative and **not guaranteed to keep the level**. 1 if no pair is discordant; `None` without pairs.
     pub fn mcnemar_mid_p(self) -> Option<f64> {
-        match (self.n(), self.discordant()) {
-            (0, _) => None,
-            (_, 0) => Some(1.0),
-            (_, discordant) => Some(chance::exact_test(self.first_only, discordant, Ratio::new(1, 2)?)?.mid_p),
-        }
+        self.test().map(|test| test.mid_p)
     }
 
     /// [`Pairs::mcnemar`] and its mid-p value.
     pub fn test(self) -> Option<ExactTest> {
-        Some(ExactTest { p: self.mcnemar()?, mid_p: self.mcnemar_mid_p()? })
+        match (self.n(), self.discordant()) {
+            (0, _) => None,
+            (_, 0) => Some(ExactTest { p: 1.0, mid_p: 1.0 }),
+            (_, discordant) => chance::exact_test(self.first_only, discordant, Ratio::new(1, 2)?),
+        }
     }
 
-    /// The least p value that [`Pairs::mcnemar`] can give with this number of discordant pairs: 2^(1 - d).
-    ///
-    /// 1 if no pair is discordant; `None` without pairs.
+    /// The least p value that [`Pairs::mcnemar`] can give with d discordant pairs: 2^(1 - d), at most 1; `None` without
+    /// pairs.
     pub fn mcnemar_least_p(self) -> Option<f64> {
         let halvings = i32::try_from(self.discordant().saturating_sub(1)).unwrap_or(i32::MAX);
         (self.n() > 0).then(|| 0.5f64.powi(halvings))
@@ -95,13 +89,17 @@ impl Pairs {
     /// `None` without pairs and for a confidence outside (0, 1).
     pub fn interval(self, confidence: f64) -> Option<Interval> {
         let (n, difference) = (self.n(), self.difference()?);
-        let first = Arms::of(self.both + self.first_only, n, confidence)?;
-        let second = Arms::of(self.both + self.second_only, n, confidence)?;
+        // The distances from a rate to its Wilson bounds.
+        let arms = |successes: u64| {
+            let rate = successes as f64 / n as f64;
+            wilson(successes, n, confidence).map(|bounds| (rate - bounds.low, bounds.high - rate))
+        };
+        let (first, second) = (arms(self.both + self.first_only)?, arms(self.both + self.second_only)?);
         let phi = self.correlation();
         let reach = |a: f64, b: f64| (a * a - 2.0 * phi * a * b + b * b).max(0.0).sqrt();
         Some(Interval {
-            low: (difference - reach(first.down, second.up)).max(-1.0),
-            high: (difference + reach(first.up, second.down)).min(1.0),
+            low: (difference - reach(first.0, second.1)).max(-1.0),
+            high: (difference + reach(first.1, second.0)).min(1.0),
         })
     }
 
@@ -112,19 +110,6 @@ impl Pairs {
         let excess = a * d - b * c;
         let corrected = if excess > 0.0 { (excess - self.n() as f64 / 2.0).max(0.0) } else { excess };
         if margins > 0.0 { corrected / margins.sqrt() } else { 0.0 }
-    }
-}
-
-/// The distances from a rate to its Wilson bounds.
-struct Arms {
-    down: f64,
-    up: f64,
-}
-
-impl Arms {
-    fn of(successes: u64, n: u64, confidence: f64) -> Option<Self> {
-        let rate = successes as f64 / n as f64;
-        wilson(successes, n, confidence).map(|bounds| Self { down: rate - bounds.low, up: bounds.high - rate })
     }
 }
 

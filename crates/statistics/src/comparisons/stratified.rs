@@ -89,8 +89,8 @@ pub fn cochran_mantel_haenszel(strata: &[Stratum]) -> Option<CochranMantelHaensz
 /// sum has too many values: the asymptotic test then serves better.
 pub fn exact(strata: &[Stratum]) -> Option<ExactTest> {
     let terms = terms(strata)?;
-    let seen = terms.iter().map(|term| term.seen).sum();
-    let all: Option<Vec<Outcomes>> = terms.iter().map(Term::outcomes).collect();
+    let seen = terms.iter().map(|term| term.stratum.first.0).sum();
+    let all: Option<Vec<Outcomes>> = terms.iter().map(|term| tables(term.stratum.first, term.stratum.second)).collect();
     let mut all = all?.into_iter();
     let mut sum = all.next()?;
     let mut products = 0usize;
@@ -129,7 +129,6 @@ fn terms(strata: &[Stratum]) -> Option<Vec<Term>> {
 
 /// One stratum in numbers: `x` of `m` succeed on the first side, `y` of `n` on the second.
 struct Term {
-    seen: u64,
     stratum: Stratum,
     x: f64,
     m: f64,
@@ -140,7 +139,7 @@ struct Term {
 impl Term {
     fn of(stratum: &Stratum) -> Self {
         let ((x, m), (y, n)) = (stratum.first, stratum.second);
-        Self { seen: x, stratum: *stratum, x: x as f64, m: m as f64, y: y as f64, n: n as f64 }
+        Self { stratum: *stratum, x: x as f64, m: m as f64, y: y as f64, n: n as f64 }
     }
 
     fn excess(&self) -> f64 {
@@ -150,10 +149,6 @@ impl Term {
     fn variance(&self) -> f64 {
         let (all, successes) = (self.m + self.n, self.x + self.y);
         self.m * self.n * successes * (all - successes) / (all * all * (all - 1.0))
-    }
-
-    fn outcomes(&self) -> Option<Outcomes> {
-        tables(self.stratum.first, self.stratum.second)
     }
 }
 

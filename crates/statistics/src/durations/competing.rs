@@ -18,7 +18,6 @@ pub struct Incidence {
     points: Vec<Point>,
 }
 
-/// One step at which an episode ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Point {
     steps: i64,
@@ -73,10 +72,10 @@ impl Incidence {
     }
 
     /// The mean number of steps to a correct decision; later than `horizon` and never both count as `horizon`. It
-    /// equals the horizon minus the area under the curve (Andersen 2013).
+    /// equals the horizon minus the area under the curve (Andersen 2013). Its standard error is the infinitesimal
+    /// jackknife's times sqrt(n / (n - 1)).
     ///
-    /// `None` for a horizon that is not positive or beyond the known part of the curve, and for a confidence outside
-    /// (0, 1). Its standard error is the infinitesimal jackknife's times sqrt(n / (n - 1)).
+    /// `None` for a horizon not positive or beyond the known part of the curve, and for a confidence outside (0, 1).
     pub fn restricted_mean(&self, horizon: i64, confidence: f64) -> Option<RestrictedMean> {
         if horizon <= 0 || self.known_until().is_some_and(|known| known < horizon) {
             return None;
@@ -90,8 +89,9 @@ impl Incidence {
         self.points.first().map_or(0, |first| first.at_risk as u64)
     }
 
-    pub(crate) fn mean(&self, horizon: i64) -> f64 {
-        let area: f64 = self.early(horizon).map(|point| point.gain(horizon) * point.correct / point.at_risk).sum();
+    fn mean(&self, horizon: i64) -> f64 {
+        let early = self.points.iter().take_while(|point| point.steps < horizon);
+        let area: f64 = early.map(|point| point.gain(horizon) * point.correct / point.at_risk).sum();
         horizon as f64 - area
     }
 
@@ -127,10 +127,6 @@ impl Incidence {
         }
         Influence { points }
     }
-
-    fn early(&self, horizon: i64) -> impl Iterator<Item = &Point> {
-        self.points.iter().take_while(move |point| point.steps < horizon)
-    }
 }
 
 impl Point {
@@ -140,10 +136,7 @@ impl Point {
 }
 
 impl Influence {
-    /// The contribution of one episode.
-    ///
-    /// # Panics
-    /// For an episode that is not part of the curve.
+    /// The contribution of one episode; panics if it is not part of the curve.
     pub(crate) fn of(&self, ending: Ending) -> f64 {
         let [taken, correct, wrong] = self.points[&ending.steps];
         match ending.outcome {

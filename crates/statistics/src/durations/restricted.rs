@@ -22,7 +22,6 @@ pub fn fewest(level: f64) -> usize {
     fewest_clusters(level).max(FEWEST)
 }
 
-/// One restricted mean minus another.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Difference {
     /// The horizon of both sides, in steps.
@@ -40,26 +39,23 @@ pub struct Difference {
 ///
 /// `None` if either curve is not known up to the horizon, and for a confidence outside (0, 1).
 pub fn independent(first: &[Ending], second: &[Ending], horizon: i64, confidence: f64) -> Option<Difference> {
-    let means = Means::of(first.iter().copied(), second.iter().copied(), horizon, confidence)?;
+    let (difference, [a, b]) = means(first, second, horizon, confidence)?;
     let squares = |influence: &Influence, endings: &[Ending]| -> f64 {
         let sum: f64 = endings.iter().map(|&ending| influence.of(ending)).map(|x| x * x).sum();
         sum * small_sample(endings.len() as u64)
     };
-    let side = |at: usize, endings: &[Ending]| (squares(&means.influences[at], endings), endings.len() as f64 - 1.0);
-    tested(horizon, means.difference, satterthwaite([side(0, first), side(1, second)]), confidence)
+    let side = |influence: &Influence, endings: &[Ending]| (squares(influence, endings), endings.len() as f64 - 1.0);
+    tested(horizon, difference, satterthwaite([side(&a, first), side(&b, second)]), confidence)
 }
 
-/// The difference between the two sides of paired episodes.
-///
-/// With complete durations this is the mean of the differences and its sample standard error.
-/// `None` as in [`independent`].
+/// The difference between the two sides of paired episodes: with complete durations, the mean of the differences and its
+/// sample standard error. `None` as in [`independent`].
 pub fn paired(pairs: &[(Ending, Ending)], horizon: i64, confidence: f64) -> Option<Difference> {
-    let (first, second) = (pairs.iter().map(|pair| pair.0), pairs.iter().map(|pair| pair.1));
-    let means = Means::of(first, second, horizon, confidence)?;
-    let [a, b] = &means.influences;
+    let (first, second): (Vec<Ending>, Vec<Ending>) = pairs.iter().copied().unzip();
+    let (difference, [a, b]) = means(&first, &second, horizon, confidence)?;
     let variance: f64 = pairs.iter().map(|&(first, second)| a.of(first) - b.of(second)).map(|x| x * x).sum();
     let variance = variance * small_sample(pairs.len() as u64);
-    tested(horizon, means.difference, (variance, pairs.len() as f64 - 1.0), confidence)
+    tested(horizon, difference, (variance, pairs.len() as f64 - 1.0), confidence)
 }
 
 /// The difference over units of analysis, such as scenes of several episodes, if all times up to the horizon are known.
@@ -93,36 +89,23 @@ pub fn shared_horizon(first: &[Ending], second: &[Ending]) -> Option<i64> {
     known.or_else(|| first.iter().chain(second).map(|ending| ending.steps).max())
 }
 
-/// The two sides of a difference.
-struct Means {
-    difference: f64,
-    influences: [Influence; 2],
-}
-
-impl Means {
-    fn of(
-        first: impl Iterator<Item = Ending>,
-        second: impl Iterator<Item = Ending>,
-        horizon: i64,
-        confidence: f64,
-    ) -> Option<Self> {
-        let (a, b) = (Incidence::of(&first.collect::<Vec<_>>())?, Incidence::of(&second.collect::<Vec<_>>())?);
-        let mean = |curve: &Incidence| curve.restricted_mean(horizon, confidence).map(|found| found.mean);
-        let difference = mean(&a)? - mean(&b)?;
-        Some(Self { difference, influences: [a.influence(horizon), b.influence(horizon)] })
-    }
+/// The difference of the means of two sides, and the influences of their episodes.
+fn means(first: &[Ending], second: &[Ending], horizon: i64, confidence: f64) -> Option<(f64, [Influence; 2])> {
+    let (a, b) = (Incidence::of(first)?, Incidence::of(second)?);
+    let mean = |curve: &Incidence| curve.restricted_mean(horizon, confidence).map(|found| found.mean);
+    Some((mean(&a)? - mean(&b)?, [a.influence(horizon), b.influence(horizon)]))
 }
 
 fn tested(horizon: i64, difference: f64, (variance, freedom): (f64, f64), confidence: f64) -> Option<Difference> {
     quantile::tail(confidence)?;
     let (se, most) = (variance.sqrt(), horizon as f64);
     let has_spread = has_spread(se, horizon) && freedom > 0.0;
-    let interval = || Some(student_t_of(difference, se, freedom, confidence)?.within(-most, most));
+    let interval = student_t_of(difference, se, freedom, confidence).filter(|_| has_spread);
     Some(Difference {
         horizon,
         difference,
         se,
-        interval: if has_spread { interval() } else { None },
+        interval: interval.map(|interval| interval.within(-most, most)),
         p: has_spread.then(|| quantile::student_beyond(difference / se, freedom)),
     })
 }

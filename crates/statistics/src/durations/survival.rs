@@ -1,7 +1,6 @@
 //! Durations, including some with only a lower bound: unfinished episodes are censored, not slow.
 //!
-//! Rule: an episode that ends without a decision is censored at its length. A decision in step t comes before censoring
-//! in step t.
+//! Rule: an episode without a decision is censored at its length. A decision in step t comes before censoring in t.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -20,7 +19,6 @@ pub struct Survival {
     pub points: Vec<Point>,
 }
 
-/// One step of the curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
     pub steps: i64,
@@ -81,9 +79,8 @@ pub(crate) fn has_spread(se: f64, horizon: i64) -> bool {
 }
 
 impl Survival {
-    /// The curve of these episodes, with any decision as the event; `None` without any.
-    ///
-    /// It is the share that the Aalen-Johansen curves of both decisions leave undecided.
+    /// The curve of these episodes, with any decision as the event; `None` without any. It is the share that the
+    /// Aalen-Johansen curves of both decisions leave undecided.
     pub fn of(endings: &[Ending]) -> Option<Self> {
         let point = |RiskSet { steps, at_risk, ended, after, .. }: RiskSet| {
             let decided = ended[Outcome::Correct as usize] + ended[Outcome::Wrong as usize];
@@ -111,8 +108,7 @@ impl Survival {
     /// The mean duration up to `horizon` (Irwin 1949; Royston and Parmar 2013), its variance by Greenwood's
     /// formula (Klein and Moeschberger 2003, equation 4.5.2).
     ///
-    /// `None` for a horizon that is not positive or beyond the known part of the curve, and for a confidence outside
-    /// (0, 1).
+    /// `None` for a horizon not positive or beyond the known part of the curve, and for a confidence outside (0, 1).
     pub fn restricted_mean(&self, horizon: i64, confidence: f64) -> Option<RestrictedMean> {
         if horizon <= 0 || self.known_until().is_some_and(|known| known < horizon) {
             return None;
@@ -161,9 +157,8 @@ fn log_log(share: f64, sum: f64, z: f64) -> Interval {
     Interval { low: share.powf(reach.exp()), high: share.powf((-reach).exp()) }
 }
 
-/// The last step at which every curve is known: restricted means up to it are comparable.
-///
-/// The longest duration of all if every curve is known forever. `None` without curves.
+/// The last step at which every curve is known: restricted means up to it are comparable. The longest duration of all if
+/// every curve is known forever; `None` without curves.
 pub fn common_horizon<'a>(curves: impl IntoIterator<Item = &'a Survival> + Clone) -> Option<i64> {
     let known = curves.clone().into_iter().filter_map(Survival::known_until).min();
     known.or_else(|| curves.into_iter().filter_map(Survival::longest).max())

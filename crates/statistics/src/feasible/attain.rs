@@ -103,11 +103,7 @@ fn largest_that_leaves(count: i128, most: i128, sum: i128, squares: i128) -> i12
     let (mut low, mut high) = ((sum + count - 1) / count, most);
     while low < high {
         let middle = low + (high - low + 1) / 2;
-        if leaves(middle) {
-            low = middle;
-        } else {
-            high = middle - 1;
-        }
+        if leaves(middle) { low = middle } else { high = middle - 1 }
     }
     low
 }

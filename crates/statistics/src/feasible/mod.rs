@@ -135,11 +135,7 @@ fn first_not((mut low, high): Span, holds: impl Fn(i128) -> bool) -> i128 {
     let mut beyond = (high + 1).max(low);
     while low < beyond {
         let middle = low + (beyond - low) / 2;
-        if holds(middle) {
-            low = middle + 1;
-        } else {
-            beyond = middle;
-        }
+        if holds(middle) { low = middle + 1 } else { beyond = middle }
     }
     low
 }

@@ -7,14 +7,12 @@ use crate::interval::Interval;
 use crate::quantile;
 use crate::random::SplitMix64;
 
-/// The number of resamples. One less than a round number, so that the usual tails are whole ranks (Davison and Hinkley
-/// 1997).
+/// One less than a round number, so that the usual tails are whole ranks (Davison and Hinkley 1997).
 pub const RESAMPLES: usize = 9_999;
 
 /// The most values that are resampled: for more values, Student's interval is equivalent and costs nothing.
 pub const MOST_VALUES: usize = 2_000;
 
-/// The seed of every bootstrap.
 pub const SEED: u64 = 0x6d69_7272_6f72;
 
 /// The bias-corrected and accelerated interval of the mean (Efron 1987), from [`RESAMPLES`] resamples:
@@ -32,9 +30,13 @@ pub fn mean(values: &[i64], confidence: f64) -> Option<Interval> {
     sorted.sort_unstable();
     let total = sorted.iter().copied().map(i128::from).sum();
     let sums = resampled_sums(&sorted);
-    let correction = Correction { bias: bias(&sums, total), acceleration: acceleration(&sorted, total) };
+    let (bias, acceleration) = (bias(&sums, total), acceleration(&sorted, total));
     let deviate = quantile::normal(tail);
-    let at = |deviate: f64| sums[rank(correction.level(deviate))] as f64 / n as f64;
+    let level = |deviate: f64| {
+        let moved = bias + deviate;
+        quantile::normal_below(bias + moved / (1.0 - acceleration * moved))
+    };
+    let at = |deviate: f64| sums[rank(level(deviate))] as f64 / n as f64;
     Some(Interval { low: at(-deviate), high: at(deviate) })
 }
 
@@ -44,19 +46,6 @@ fn resampled_sums(values: &[i64]) -> Vec<i128> {
     let mut sums: Vec<i128> = (0..RESAMPLES).map(|_| values.iter().map(|_| draw()).sum()).collect();
     sums.sort_unstable();
     sums
-}
-
-/// The correction of a percentile interval's levels.
-struct Correction {
-    bias: f64,
-    acceleration: f64,
-}
-
-impl Correction {
-    fn level(&self, deviate: f64) -> f64 {
-        let moved = self.bias + deviate;
-        quantile::normal_below(self.bias + moved / (1.0 - self.acceleration * moved))
-    }
 }
 
 fn bias(sums: &[i128], total: i128) -> f64 {

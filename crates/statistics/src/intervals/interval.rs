@@ -28,6 +28,12 @@ impl Interval {
         Self { low: self.low.clamp(least, most), high: self.high.clamp(least, most) }
     }
 
+    /// The bounds of the negated value.
+    #[must_use]
+    pub fn negated(self) -> Self {
+        Self { low: -self.high, high: -self.low }
+    }
+
     /// Returns true if `value` is between the bounds, inclusive.
     pub fn contains(self, value: f64) -> bool {
         self.low <= value && value <= self.high
@@ -68,16 +74,10 @@ pub fn jeffreys(successes: u64, n: u64, confidence: f64) -> Option<Interval> {
 fn equal_tails(successes: u64, n: u64, confidence: f64, prior: [(f64, f64); 2]) -> Option<Interval> {
     let failures = counted(successes, n)?;
     let tail = quantile::tail(confidence)?;
-    let (k, rest) = (successes as f64, failures as f64);
-    let [below, above] = prior;
-    Some(Interval {
-        low: if successes == 0 { 0.0 } else { quantile::beta(tail, k + below.0, rest + below.1) },
-        high: if failures == 0 {
-            1.0
-        } else {
-            quantile::settled(1.0 - quantile::beta(tail, rest + above.1, k + above.0))
-        },
-    })
+    let (k, rest, [below, above]) = (successes as f64, failures as f64, prior);
+    let low = || quantile::beta(tail, k + below.0, rest + below.1);
+    let high = || quantile::settled(1.0 - quantile::beta(tail, rest + above.1, k + above.0));
+    Some(Interval { low: if successes == 0 { 0.0 } else { low() }, high: if failures == 0 { 1.0 } else { high() } })
 }
 
 /// Student's interval of a mean: mean plus and minus t(n - 1) standard errors (Student 1908).

@@ -5,7 +5,6 @@
 pub struct SplitMix64(u64);
 
 impl SplitMix64 {
-    /// The stream of a seed.
     pub fn seeded(seed: u64) -> Self {
         Self(seed)
     }

@@ -110,11 +110,7 @@ impl Clusters {
         let mut too_few = enough / 2;
         while enough - too_few > 1 {
             let middle = u64::midpoint(too_few, enough);
-            if has_power(middle) {
-                enough = middle;
-            } else {
-                too_few = middle;
-            }
+            if has_power(middle) { enough = middle } else { too_few = middle }
         }
         let from = enough.saturating_sub(NEAR.max(enough / 5)).max(1);
         (from..=enough).find(|runs| has_power(*runs))
@@ -132,11 +128,7 @@ pub fn smallest(wanted: f64, most: f64, mut power: impl FnMut(f64) -> f64) -> Op
     let (mut low, mut high) = (0.0, most);
     for _ in 0..40 {
         let middle = f64::midpoint(low, high);
-        if power(middle) >= wanted {
-            high = middle;
-        } else {
-            low = middle;
-        }
+        if power(middle) >= wanted { high = middle } else { low = middle }
     }
     Some(high)
 }

@@ -7,7 +7,7 @@ use crate::statistics::study::{Block, RowKey, Study};
 use crate::statistics::units::Units;
 use exact::moments::Moments;
 use statistics::holm::{holm, level};
-use statistics::losses::{Fate, Lossy, bounds};
+use statistics::losses::{Lossy, bounds};
 
 /// The name of lost episodes that decide a verdict.
 pub(in crate::statistics) const LOST: &str = "lost episodes";
@@ -115,14 +115,12 @@ pub(in crate::statistics) fn settle(tests: &mut [(LossCase, &mut Option<LossCase
 }
 
 fn of_block(study: &Study, block: &Block, confidence: f64) -> Vec<LossRow> {
-    let lost = usize::try_from(block.lost).unwrap_or(usize::MAX);
     let row = |metric: &str, lossy| LossRow { key: block.key(), metric: metric.to_owned(), lossy };
     study
         .rates()
         .filter_map(|column| {
-            let kept = block.rows().map(|at| (column.get(at), Fate::Kept));
-            bounds(kept.chain(std::iter::repeat_n((None, Fate::Lost), lost)), confidence)
-                .map(|lossy| row(&column.name, lossy))
+            let values = block.rows().filter_map(|row| column.get(row));
+            bounds(values, block.lost, confidence).map(|lossy| row(&column.name, lossy))
         })
         .filter(|row| row.lossy.lost > 0)
         .collect()

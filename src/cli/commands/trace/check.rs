@@ -2,9 +2,8 @@
 
 use std::io::{self, Write as _};
 
-use crate::cli::args::TraceArgs;
-use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::output;
+use crate::cli::args::{self, TraceArgs};
+use crate::cli::{Failure, Outcome, output};
 use exact::escape::visible;
 use exact::format::fixed;
 use report::layout::quality;
@@ -99,7 +98,5 @@ fn number(value: f64) -> String {
 }
 
 fn share(text: &str) -> Result<f64, String> {
-    let fault = || format!("expected a share from 0 to 1 such as 0.05, found `{}`", visible(text));
-    let value: f64 = text.parse().map_err(|_| fault())?;
-    if (0.0..=1.0).contains(&value) { Ok(value) } else { Err(fault()) }
+    args::number(text, "a share from 0 to 1 such as 0.05", |value| (0.0..=1.0).contains(&value))
 }

@@ -3,8 +3,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::output;
+use crate::cli::{Failure, Outcome, output};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use exact::replace;
 use study::ImportRequest;

@@ -7,8 +7,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::cli::args::TraceArgs;
-use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::{output, terminal};
+use crate::cli::{Failure, Outcome, output, terminal};
 use exact::escape::visible;
 use exact::format::counted;
 use report::layout::quality;
@@ -43,7 +42,6 @@ pub struct InfoAnswer {
 }
 
 impl InfoCommand {
-    /// Reads the traces and prints their contents.
     pub fn run(&self) -> Result<Outcome, Failure> {
         let study = self.input.open()?;
         let listing = if self.episodes { Listing::Episodes } else { Listing::Nothing };
@@ -120,7 +118,6 @@ fn coverage(info: &Info) -> Table {
     table
 }
 
-/// The number of seeds and runs listed per cell.
 const LISTED: usize = 8;
 
 fn gaps(out: &mut impl Write, info: &Info) -> io::Result<()> {

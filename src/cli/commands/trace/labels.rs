@@ -1,19 +1,14 @@
 //! `mirrorstats trace labels`: the labels of coders, and their agreement.
 
-use std::io::{self, Write as _};
-
 use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
-use crate::cli::outcome::{Failure, Outcome};
-
-use crate::cli::{output, terminal};
+use crate::cli::{Failure, Outcome, output, terminal};
 use exact::format::{counted, fixed};
 use report::tables::Table;
 use study::{LabelAgreement, PairAgreement};
 
-/// Confidence of the intervals.
 const CONFIDENCE: f64 = 0.95;
 
-/// List the labels that coders put on episodes, and how far two coders agree: Cohen's kappa
+/// List the labels of coders, and the agreement of two coders: Cohen's kappa
 ///
 /// Labels are in `labels.jsonl` beside the traces; `mirrorstats view --label NAME` writes them.
 #[derive(Clone, Debug, clap::Args)]
@@ -32,11 +27,7 @@ impl LabelsArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
         let scoring = ScoringArgs { condition: self.condition, ..ScoringArgs::default() };
         let found = self.input.study(&scoring, &GroupingArgs::default())?.agreement(CONFIDENCE)?;
-        if self.json {
-            return output::print_json(&found);
-        }
-        io::stdout().lock().write_all(text(&found, terminal::width()).as_bytes())?;
-        Ok(Outcome::Done)
+        output::print_rendered(&found, self.json, |found| text(found, terminal::width()))
     }
 }
 

@@ -10,7 +10,7 @@ pub mod schema;
 pub mod seal;
 pub mod validate;
 
-use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::{Failure, Outcome};
 
 /// Inspect, check and rewrite traces; their schema
 #[derive(Debug, clap::Subcommand)]

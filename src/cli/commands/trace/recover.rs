@@ -9,8 +9,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::output;
+use crate::cli::{Failure, Outcome, output};
 use exact::format::counted;
 use trace::diagnostic::Severity;
 use trace::inputs::Input;
@@ -109,7 +108,6 @@ impl RecoverArgs {
         Input { name: self.out.display().to_string(), path: self.out.clone() }
     }
 
-    /// Checks the written trace against every rule of the schema.
     fn check(&self) -> Result<(), Failure> {
         let report = validate(&[self.target()], None, NonZeroUsize::MIN).map_err(Failure::input)?;
         match report.findings.iter().find(|finding| finding.severity == Severity::Error) {

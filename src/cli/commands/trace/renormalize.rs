@@ -1,17 +1,16 @@
 //! `mirrorstats trace renormalize`: derives the attributions of old traces by the rule of this program.
 
-use std::fmt;
+use std::fmt::{self, Write as _};
 use std::path::PathBuf;
 
 use crate::cli::args::TraceArgs;
-use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::{output, terminal};
+use crate::cli::{Failure, Outcome, output, terminal};
 use exact::escape::visible;
 use exact::format::counted;
 use report::tables::Table;
 use trace::renormalize::{RenormalizeAnswer, RenormalizeError, RenormalizedFile, renormalize};
 
-/// Make the attributions of old traces anew from the texts of `identification`
+/// Recompute the attributions of old traces from the texts of `identification`
 ///
 /// Writes each trace again under its name into another folder, with `self_color` as this program reads the texts, and
 /// prints every step whose attribution changes. Steps without a text, all other columns and the rest of the recording's
@@ -40,7 +39,7 @@ impl RenormalizeArgs {
         output::note_stale_checksums(&inputs);
         let folder = self.out.as_deref().filter(|_| !self.dry_run);
         let answer = renormalize(&inputs, folder, self.input.threads.count())?;
-        output::print(&Shown(&answer), self.json)?;
+        output::print_told(&answer, self.json, tell)?;
         let has_failed = self.fail_on_change && !answer.flips.is_empty();
         Ok(if has_failed { Outcome::CheckFailed } else { Outcome::Done })
     }
@@ -55,40 +54,32 @@ impl From<RenormalizeError> for Failure {
     }
 }
 
-/// The answer as text.
-#[derive(serde::Serialize)]
-#[serde(transparent)]
-struct Shown<'a>(&'a RenormalizeAnswer);
-
 /// The most characters of a text in the table; `--json` prints all.
 const LONGEST: usize = 80;
 
-impl fmt::Display for Shown<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self(answer) = self;
-        if !answer.flips.is_empty() {
-            let header = ["episode", "t", "before", "after", "identification"];
-            let mut table = Table { names: 2, ..Table::of_texts(header).aligned_right([1]) };
-            let name = |color: &Option<String>| visible(color.as_deref().unwrap_or("--"));
-            for flip in &answer.flips {
-                table.push([
-                    visible(&flip.episode_id),
-                    flip.t.to_string(),
-                    name(&flip.before),
-                    name(&flip.after),
-                    shortened(&flip.identification),
-                ]);
-            }
-            writeln!(f, "{}", table.within(terminal::width()))?;
+fn tell(text: &mut String, answer: &RenormalizeAnswer) -> fmt::Result {
+    if !answer.flips.is_empty() {
+        let header = ["episode", "t", "before", "after", "identification"];
+        let mut table = Table { names: 2, ..Table::of_texts(header).aligned_right([1]) };
+        let name = |color: &Option<String>| visible(color.as_deref().unwrap_or("--"));
+        for flip in &answer.flips {
+            table.push([
+                visible(&flip.episode_id),
+                flip.t.to_string(),
+                name(&flip.before),
+                name(&flip.after),
+                shortened(&flip.identification),
+            ]);
         }
-        let sum = |of: fn(&RenormalizedFile) -> u64| answer.files.iter().map(of).sum::<u64>();
-        let (flips, texts) = (counted(answer.flips.len() as u64, "attribution"), sum(|file| file.texts));
-        let (steps, files) = (counted(sum(|file| file.steps), "step"), counted(answer.files.len() as u64, "trace"));
-        let verb = if answer.flips.len() == 1 { "changes" } else { "change" };
-        write!(f, "{flips} {verb} of {texts} with a text, in {steps} of {files}")?;
-        writeln!(f, "; identification version {}{}", versions_before(answer), answer.identification_version)?;
-        if answer.written { Ok(()) } else { writeln!(f, "nothing was written") }
+        writeln!(text, "{}", table.within(terminal::width()))?;
     }
+    let sum = |of: fn(&RenormalizedFile) -> u64| answer.files.iter().map(of).sum::<u64>();
+    let (flips, texts) = (counted(answer.flips.len() as u64, "attribution"), sum(|file| file.texts));
+    let (steps, files) = (counted(sum(|file| file.steps), "step"), counted(answer.files.len() as u64, "trace"));
+    let verb = if answer.flips.len() == 1 { "changes" } else { "change" };
+    write!(text, "{flips} {verb} of {texts} with a text, in {steps} of {files}")?;
+    writeln!(text, "; identification version {}{}", versions_before(answer), answer.identification_version)?;
+    if answer.written { Ok(()) } else { writeln!(text, "nothing was written") }
 }
 
 /// `0 -> ` with the traces' versions, if they differ from this one.

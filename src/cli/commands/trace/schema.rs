@@ -6,8 +6,7 @@ use clap::ValueEnum as _;
 use schemars::schema_for;
 use serde_json::{Value, json};
 
-use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::terminal;
+use crate::cli::{Failure, Outcome, terminal};
 use report::tables::Table;
 use trace::describe::SchemaDocument;
 use trace::import;
@@ -16,7 +15,7 @@ use world::agent::reply;
 use world::experiment::schema::ExperimentFile;
 use world::experiment::{Experiment, Spec};
 
-/// Print what a trace is: columns, footer metadata, rules; or a JSON Schema by its name
+/// Print the trace schema: columns, footer metadata, rules; or a JSON Schema by name
 #[derive(Clone, Copy, Debug, clap::Args)]
 pub struct SchemaCommand {
     /// The schema to describe; all but `trace` are printed as JSON Schema

@@ -1,11 +1,10 @@
 //! `mirrorstats trace seal`: a copy with checksums.
 
-use std::fmt;
+use std::fmt::{self, Write as _};
 use std::path::PathBuf;
 
 use crate::cli::args::ThreadArgs;
-use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::output;
+use crate::cli::{Failure, Outcome, output};
 use exact::format::counted;
 use trace::inputs::Input;
 use trace::seal::{SealAnswer, SealError, seal};
@@ -32,7 +31,7 @@ pub struct SealArgs {
 impl SealArgs {
     pub fn run(&self) -> Result<Outcome, Failure> {
         let answer = seal(&Input::new(&self.input), &self.out, self.threads.count())?;
-        output::print(&Shown(&answer), self.json)
+        output::print_told(&answer, self.json, tell)
     }
 }
 
@@ -45,15 +44,8 @@ impl From<SealError> for Failure {
     }
 }
 
-/// The answer as text.
-#[derive(serde::Serialize)]
-#[serde(transparent)]
-struct Shown<'a>(&'a SealAnswer);
-
-impl fmt::Display for Shown<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let SealAnswer { name, out, episodes, steps, sha256, .. } = self.0;
-        let (episodes, steps) = (counted(*episodes, "episode"), counted(*steps, "step"));
-        writeln!(f, "{out}: {name} with checksums, {episodes}, {steps}; sha256 {sha256}")
-    }
+fn tell(text: &mut String, answer: &SealAnswer) -> fmt::Result {
+    let SealAnswer { name, out, episodes, steps, sha256, .. } = answer;
+    let (episodes, steps) = (counted(*episodes, "episode"), counted(*steps, "step"));
+    writeln!(text, "{out}: {name} with checksums, {episodes}, {steps}; sha256 {sha256}")
 }

@@ -1,18 +1,17 @@
 //! `mirrorstats trace validate`: checks every rule of the schema and reports all findings.
 
-use std::io::{self, Write as _};
+use std::io;
 use std::path::PathBuf;
 
 use crate::cli::args::TraceArgs;
-use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::output;
+use crate::cli::{Failure, Outcome, output};
 use study::{findings, findings_text};
 use trace::answered::by_others;
 use trace::diagnostic::Severity;
 use trace::inputs;
 use trace::open::TraceFile;
 
-/// Check traces against every rule of the schema and report all that is wrong
+/// Check traces against every rule of the schema and report every problem
 ///
 /// Exits with 1 if a rule does not hold; notes do not count.
 #[derive(Clone, Debug, clap::Args)]
@@ -33,12 +32,7 @@ impl ValidateCommand {
         let report = findings(&self.definitions, &inputs, self.input.threads.count())?;
         let files: Vec<_> = inputs.iter().filter_map(|input| TraceFile::open(input).ok()).collect();
         output::notes(&by_others(&files));
-        let mut out = io::stdout().lock();
-        if self.json {
-            writeln!(out, "{:#}", serde_json::json!(report))?;
-        } else {
-            out.write_all(findings_text(&report).as_bytes())?;
-        }
+        output::print_rendered(&report, self.json, findings_text)?;
         Ok(if report.count(Severity::Error) == 0 { Outcome::Done } else { Outcome::CheckFailed })
     }
 }

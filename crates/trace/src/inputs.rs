@@ -150,7 +150,7 @@ pub(crate) fn traces_at(path: &Path) -> Result<Vec<PathBuf>, TraceError> {
     for entry in fs::read_dir(path).map_err(failed)? {
         let entry = entry.map_err(failed)?;
         let below = entry.path();
-        if is_left_over(&entry.file_name()) {
+        if entry.file_name().to_string_lossy().starts_with(['_', '.']) {
             continue;
         }
         if entry.file_type().map_err(failed)?.is_dir() {
@@ -167,10 +167,6 @@ pub(crate) fn traces_at(path: &Path) -> Result<Vec<PathBuf>, TraceError> {
 /// Returns true if `mirrorstats report` wrote the folder: its Parquet file holds scores, not steps.
 fn is_report(folder: &Path) -> bool {
     ["manifest.json", "cells.csv", "episodes.parquet"].iter().all(|name| folder.join(name).is_file())
-}
-
-fn is_left_over(name: &OsStr) -> bool {
-    name.to_string_lossy().starts_with(['_', '.'])
 }
 
 /// The columns in the folder names of a path, as in partitioned tables of Spark and others: `experiment=E1`.

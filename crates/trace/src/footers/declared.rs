@@ -70,13 +70,8 @@ pub struct Declared {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub unrecorded: Vec<LostEpisode>,
     /// True if every file lists its lost episodes.
-    #[serde(default, skip_serializing_if = "is_false")]
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub losses_recorded: bool,
-}
-
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde gives a reference")]
-const fn is_false(value: &bool) -> bool {
-    !*value
 }
 
 impl Declared {
@@ -91,10 +86,7 @@ impl Declared {
         Self {
             recordings: fingerprints.keys().map(|name| (name.clone(), Arc::clone(&shared))).collect(),
             origin: recording["kind"].as_str().and_then(Origin::named),
-            cluster: recording["design"]["cluster"]
-                .as_str()
-                .filter(|cluster| *cluster == "seed")
-                .map(|_| Cluster::Seed),
+            cluster: (recording["design"]["cluster"] == "seed").then_some(Cluster::Seed),
             fingerprints: fingerprints.into_iter().collect(),
             registration: serde_json::from_value(recording["registration"].clone()).unwrap_or_default(),
             ..Self::default()
@@ -117,11 +109,8 @@ impl Declared {
             origin: self.origin.filter(|origin| other.origin == Some(*origin)).or(made_up),
             cluster: self.cluster.or(other.cluster),
             registration: self.registration.filter(|hash| other.registration.as_ref() == Some(hash)),
-            fingerprints: self.fingerprints,
-            ambiguous: self.ambiguous,
-            recordings: self.recordings,
-            unrecorded: self.unrecorded,
             losses_recorded: self.losses_recorded && other.losses_recorded,
+            ..self
         }
     }
 }

@@ -167,19 +167,11 @@ fn misfit(column: &Column, value: &Value, limits: Limits<'_>) -> Option<Fault> {
         (Kind::Int, Value::Int(value)) if *value < lowest(column) => {
             refused(if column.name == "t" { "number the steps from 1" } else { "correct the number" })
         }
-        (Kind::Int, Value::Int(value)) => {
-            let (_, highest) = column.stored.range()?;
-            if *value > highest { refused("correct the number, or use smaller ones") } else { None }
-        }
-        (Kind::Int, Value::LargeInt(_)) => refused("correct the number, or use smaller ones"),
+        (Kind::Int, Value::Int(value)) if column.stored.range().is_none_or(|(_, highest)| *value <= highest) => None,
+        (Kind::Int, Value::Int(_) | Value::LargeInt(_)) => refused("correct the number, or use smaller ones"),
         (Kind::Int, Value::Float(_)) => refused("write it without a point and without an exponent"),
-        (Kind::Float, Value::Int(_) | Value::LargeInt(_) | Value::Float(_)) => {
-            if is_held(column, value) {
-                None
-            } else {
-                refused("correct the number")
-            }
-        }
+        (Kind::Float, _) if is_held(column, value) => None,
+        (Kind::Float, Value::Int(_) | Value::LargeInt(_) | Value::Float(_)) => refused("correct the number"),
         (Kind::String, Value::Text(text)) => {
             let Limits { expected, palette, .. } = limits;
             let rules = rules_of(column, Known { palette, experiments: expected.experiments });
@@ -201,11 +193,8 @@ fn misdeclared(key: &str, value: &Value, limits: Limits<'_>) -> Option<Fault> {
     );
     let help = "correct the value, or declare the column as the lines have it, under `[column.NAME]`";
     if !is_of_kind {
-        return Some(Fault::new(
-            format!("{}, as the definitions declare it", named(declared.kind)),
-            value.shown(),
-            help,
-        ));
+        let expected = format!("{}, as the definitions declare it", named(declared.kind));
+        return Some(Fault::new(expected, value.shown(), help));
     }
     let Value::Text(text) = value else { return None };
     let is_known = declared.values.is_empty() || declared.values.contains(text);

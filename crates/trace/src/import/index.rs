@@ -85,28 +85,26 @@ fn sequence_fault(id: &str, episode: &[Step], texts: &[Text]) -> Option<Fault> {
     let mut before: Option<&Step> = None;
     for step in episode {
         let wanted = before.map_or(1, |before| before.t.saturating_add(1));
-        let found = |words: String| format!("t = {}{words}", step.t);
-        let fault = match before {
-            Some(before) if step.t == before.t => Fault::new(
+        let is_again = before.is_some_and(|before| before.t == step.t);
+        if step.t == wanted && !is_again {
+            before = Some(step);
+            continue;
+        }
+        let (expected, words, help) = match before {
+            None => {
+                (format!("t = 1 as the first {of}"), String::new(), "add the first steps, or number the steps from 1")
+            }
+            Some(before) if is_again => (
                 format!("one line for each t {of}"),
-                found(format!(" again, as in {}", place(before))),
+                format!(" again, as in {}", place(before)),
                 "keep one line for each t",
             ),
-            _ if step.t == wanted => {
-                before = Some(step);
-                continue;
+            Some(before) => {
+                let expected = format!("t = {wanted} {of}, one more than in {}", place(before));
+                (expected, String::new(), "add the missing steps, or leave the episode out")
             }
-            None => Fault::new(
-                format!("t = 1 as the first {of}"),
-                found(String::new()),
-                "add the first steps, or number the steps from 1",
-            ),
-            Some(before) => Fault::new(
-                format!("t = {wanted} {of}, one more than in {}", place(before)),
-                found(String::new()),
-                "add the missing steps, or leave the episode out",
-            ),
         };
+        let fault = Fault::new(expected, format!("t = {}{words}", step.t), help);
         return Some(fault.of_key("t").at(&place(step)));
     }
     None

@@ -170,7 +170,7 @@ fn write(
         (Field::new(&own.name, stored, true), own.kind)
     });
     let mut rows = Gathered::new(known.chain(own));
-    let mut file = RowGroups::new(file, &rows.layout, Some(&recording)).map_err(failed)?;
+    let mut file = RowGroups::new(file, &rows.layout, Some(&recording), true).map_err(failed)?;
     for episode in steps.chunk_by(|a, b| a.episode == b.episode) {
         for step in episode {
             let text = &mut texts[step.text];

@@ -166,9 +166,7 @@ impl Text {
             }
             self.lines += 1;
             let ended = bytes.ends_with(b"\n");
-            if offset == 0 && bytes.starts_with(BYTE_ORDER_MARK) {
-                bytes.drain(..BYTE_ORDER_MARK.len());
-            }
+            skip_mark(offset, &mut bytes);
             if !bytes.trim_ascii().is_empty() {
                 let place = self.place(self.lines);
                 return Ok(Some(Line { place, offset, bytes, ended }));
@@ -187,9 +185,7 @@ impl Text {
             self.offset = offset;
         }
         let mut bytes = self.read_line()?;
-        if offset == 0 && bytes.starts_with(BYTE_ORDER_MARK) {
-            bytes.drain(..BYTE_ORDER_MARK.len());
-        }
+        skip_mark(offset, &mut bytes);
         Ok(bytes)
     }
 
@@ -197,5 +193,11 @@ impl Text {
         let bytes = input::line(&mut self.reader, LONGEST_LINE).map_err(ImportError::read(&self.name))?;
         self.offset += bytes.len() as u64;
         Ok(bytes)
+    }
+}
+
+fn skip_mark(offset: u64, line: &mut Vec<u8>) {
+    if offset == 0 && line.starts_with(BYTE_ORDER_MARK) {
+        line.drain(..BYTE_ORDER_MARK.len());
     }
 }

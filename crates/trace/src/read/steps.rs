@@ -41,7 +41,8 @@ const AHEAD: usize = 4;
 pub struct Steps {
     shape: Shape,
     parts: vec::IntoIter<Part>,
-    ahead: VecDeque<Ahead>,
+    /// Row groups that are being decoded: the name of the file, and the rows.
+    ahead: VecDeque<(String, Receiver<Rows>)>,
     threads: NonZeroUsize,
 }
 
@@ -62,17 +63,6 @@ struct Part {
 
 /// Rows, or `None` at the end of a row group.
 type Rows = Result<Option<RecordBatch>, TraceError>;
-
-struct Ahead {
-    name: String,
-    rows: Receiver<Rows>,
-}
-
-struct Reader {
-    name: String,
-    rows: ParquetRecordBatchReader,
-    slot: FaultSlot,
-}
 
 impl Steps {
     /// The steps of these episodes, with these columns in this order; all episodes or columns if absent.
@@ -113,7 +103,7 @@ impl Steps {
         loop {
             let free = self.threads.get().saturating_sub(self.ahead.len());
             self.ahead.extend(self.parts.by_ref().take(free).map(|part| part.ahead(self.shape.clone())));
-            let Some(Ahead { name, rows }) = self.ahead.front() else { return Ok(None) };
+            let Some((name, rows)) = self.ahead.front() else { return Ok(None) };
             let expected = "a row group that can be read";
             let gone = || Box::new(Finding::new(Code::Unreadable, name, expected, "a thread that ended early"));
             match rows.recv().map_err(|_| TraceError::from(gone()))?? {
@@ -199,7 +189,7 @@ impl Part {
         Ok((0..readable.footer.metadata().num_row_groups()).map(part).collect())
     }
 
-    fn ahead(self, shape: Shape) -> Ahead {
+    fn ahead(self, shape: Shape) -> (String, Receiver<Rows>) {
         let (sender, rows) = sync_channel(AHEAD);
         let name = self.name.clone();
         thread::spawn(move || {
@@ -207,21 +197,24 @@ impl Part {
             // If this fails, the reader is gone.
             let _ = sender.send(end);
         });
-        Ahead { name, rows }
+        (name, rows)
     }
 
     fn send(self, shape: &Shape, sender: &SyncSender<Rows>) -> Result<(), TraceError> {
-        let mut reader = self.reader(&shape.schema)?;
-        while let Some(rows) = reader.next() {
-            let rows = shape.complete(&rows?)?;
-            if sender.send(Ok(Some(rows))).is_err() {
-                break;
+        let name = self.name.clone();
+        let (mut reader, slot) = self.reader(&shape.schema)?;
+        loop {
+            let next = contained(|| reader.next())
+                .and_then(|next| next.transpose().map_err(|error| error.to_string()))
+                .map_err(|error| damaged(&name, &slot, &error))?;
+            let Some(rows) = next else { return Ok(()) };
+            if sender.send(Ok(Some(shape.complete(&rows)?))).is_err() {
+                return Ok(());
             }
         }
-        Ok(())
     }
 
-    fn reader(self, schema: &Schema) -> Result<Reader, Box<Finding>> {
+    fn reader(self, schema: &Schema) -> Result<(ParquetRecordBatchReader, FaultSlot), Box<Finding>> {
         let Self { name, path, readable, expansion, row_group } = self;
         let file = input::open(&path).map_err(|error| Finding::unreadable(&name, &error))?;
         let store = Store::new(file, expansion);
@@ -245,20 +238,8 @@ impl Part {
             writes_out: !has_views,
         };
         match contained(|| library.reader(columns, fields.as_ref(), batch, None).map_err(|error| plain(&error))) {
-            Ok(Ok(rows)) => Ok(Reader { name, rows, slot }),
+            Ok(Ok(rows)) => Ok((rows, slot)),
             Ok(Err(error)) | Err(error) => Err(Box::new(damaged(&name, &slot, &error))),
         }
-    }
-}
-
-impl Reader {
-    fn next(&mut self) -> Option<Result<RecordBatch, Box<Finding>>> {
-        let rows = &mut self.rows;
-        let found = match contained(|| rows.next()) {
-            Ok(None) => return None,
-            Ok(Some(batch)) => batch.map_err(|error| error.to_string()),
-            Err(panic) => Err(panic),
-        };
-        Some(found.map_err(|error| Box::new(damaged(&self.name, &self.slot, &error))))
     }
 }

@@ -106,110 +106,40 @@ const HEARSAY: [&str; 9] = ["told", "say", "says", "said", "stated", "states", "
 
 /// Returns true if the words say that the speaker does not know.
 fn is_ignorance(words: &[impl AsRef<str>]) -> bool {
-    let has = |phrase: &[&str]| {
-        words.windows(phrase.len()).any(|window| window.iter().zip(phrase).all(|(a, b)| a.as_ref() == *b))
+    let has = |phrase: &str| {
+        let length = phrase.split(' ').count();
+        words.windows(length).any(|window| window.iter().map(AsRef::as_ref).eq(phrase.split(' ')))
     };
-    IGNORANCE.iter().any(|phrase| has(phrase))
+    IGNORANCE.split(", ").any(has)
         || matches!(words, [one] if matches!(one.as_ref(), "none" | "na" | "null" | "nothing"))
 }
 
-const IGNORANCE: &[&[&str]] = &[
-    &["unknown"],
-    &["unsure"],
-    &["uncertain"],
-    &["unclear"],
-    &["undetermined"],
-    &["indeterminate"],
-    &["unidentified"],
-    &["unverified"],
-    &["unconfirmed"],
-    &["undecided"],
-    &["not", "sure"],
-    &["not", "certain"],
-    &["not", "clear"],
-    &["not", "known"],
-    &["not", "yet"],
-    &["not", "determined"],
-    &["not", "identified"],
-    &["not", "confirmed"],
-    &["not", "visible"],
-    &["not", "been"],
-    &["no", "idea"],
-    &["no", "evidence"],
-    &["no", "information"],
-    &["no", "identification"],
-    &["dont", "know"],
-    &["do", "not", "know"],
-    &["cannot"],
-    &["cant"],
-    &["can", "not"],
-    &["could", "not"],
-    &["couldnt"],
-    &["unable"],
-    &["have", "not"],
-    &["havent"],
-    &["has", "not"],
-    &["hasnt"],
-    &["to", "be", "determined"],
-    &["tbd"],
-    &["n", "a"],
-    &["pending"],
-];
+const IGNORANCE: &str = "\
+    unknown, unsure, uncertain, unclear, undetermined, indeterminate, unidentified, unverified, unconfirmed, \
+    undecided, not sure, not certain, not clear, not known, not yet, not determined, not identified, not confirmed, \
+    not visible, not been, no idea, no evidence, no information, no identification, dont know, do not know, cannot, \
+    cant, can not, could not, couldnt, unable, have not, havent, has not, hasnt, to be determined, tbd, n a, pending";
 
 fn color(word: &str) -> Option<Color> {
     let stem = word.strip_suffix("ish").filter(|stem| stem.len() > 2).unwrap_or(word);
     let stem = if stem == "redd" { "red" } else { stem };
     let in_full = |stem: &str| {
-        Color::named(stem).or_else(|| SYNONYMS.iter().find(|(name, _)| *name == stem).map(|found| found.1))
+        let shade = || SYNONYMS.into_iter().find(|(_, shades)| shades.split(' ').any(|shade| shade == stem));
+        Color::named(stem).or_else(|| shade().map(|(color, _)| color))
     };
     in_full(stem).or_else(|| in_full(word.strip_suffix("colored").or_else(|| word.strip_suffix("coloured"))?))
 }
 
-/// Names of shades, with the palette colour that people would assign them to.
-const SYNONYMS: &[(&str, Color)] = &[
-    ("amber", Color::Orange),
-    ("amethyst", Color::Purple),
-    ("aqua", Color::Cyan),
-    ("aquamarine", Color::Cyan),
-    ("auburn", Color::Brown),
-    ("azure", Color::Blue),
-    ("blu", Color::Blue),
-    ("bronze", Color::Brown),
-    ("burgundy", Color::Red),
-    ("cherry", Color::Red),
-    ("chocolate", Color::Brown),
-    ("cobalt", Color::Blue),
-    ("crimson", Color::Red),
-    ("emerald", Color::Green),
-    ("fuchsia", Color::Pink),
-    ("gold", Color::Yellow),
-    ("golden", Color::Yellow),
-    ("indigo", Color::Purple),
-    ("ivory", Color::White),
-    ("lavender", Color::Purple),
-    ("lemon", Color::Yellow),
-    ("lilac", Color::Purple),
-    ("lime", Color::Green),
-    ("magenta", Color::Pink),
-    ("maroon", Color::Red),
-    ("mauve", Color::Purple),
-    ("navy", Color::Blue),
-    ("olive", Color::Green),
-    ("plum", Color::Purple),
-    ("purpl", Color::Purple),
-    ("rose", Color::Pink),
-    ("rosy", Color::Pink),
-    ("ruby", Color::Red),
-    ("rust", Color::Brown),
-    ("salmon", Color::Pink),
-    ("sapphire", Color::Blue),
-    ("scarlet", Color::Red),
-    ("sienna", Color::Brown),
-    ("tan", Color::Brown),
-    ("tangerine", Color::Orange),
-    ("teal", Color::Cyan),
-    ("turquoise", Color::Cyan),
-    ("vermilion", Color::Red),
-    ("violet", Color::Purple),
-    ("whit", Color::White),
+/// The colours of the palette, with the names of shades that people would assign to them.
+const SYNONYMS: [(Color, &str); 10] = [
+    (Color::Blue, "azure blu cobalt navy sapphire"),
+    (Color::Brown, "auburn bronze chocolate rust sienna tan"),
+    (Color::Cyan, "aqua aquamarine teal turquoise"),
+    (Color::Green, "emerald lime olive"),
+    (Color::Orange, "amber tangerine"),
+    (Color::Pink, "fuchsia magenta rose rosy salmon"),
+    (Color::Purple, "amethyst indigo lavender lilac mauve plum purpl violet"),
+    (Color::Red, "burgundy cherry crimson maroon ruby scarlet vermilion"),
+    (Color::White, "ivory whit"),
+    (Color::Yellow, "gold golden lemon"),
 ];

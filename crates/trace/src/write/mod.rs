@@ -14,7 +14,6 @@ use std::collections::{BTreeMap, HashSet};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use arrow::datatypes::SchemaRef;
 use parquet::errors::ParquetError;
 
 use self::row_groups::{Gathered, RowGroups};
@@ -41,22 +40,6 @@ pub struct OptionalColumns {
     given: Vec<&'static Column>,
     absent: Vec<&'static str>,
 }
-
-/// Columns that recordings of the five experiments do not have.
-const OF_OTHER_TASKS: [&str; 12] = [
-    "frame_digest",
-    "participant",
-    "start_distance",
-    "shown_color",
-    "mark_color",
-    "mark_report",
-    "mirror_mark_px",
-    "mirror_double_px",
-    "shown_px",
-    "target_distance",
-    "answer",
-    "answer_truth",
-];
 
 impl OptionalColumns {
     pub const NONE: Self = Self { given: Vec::new(), absent: Vec::new() };
@@ -94,7 +77,7 @@ impl OptionalColumns {
             _ => match (numbered(name, "pane"), numbered(name, "mark")) {
                 (Some(number), _) => panes >= number.max(2),
                 (_, Some(number)) => own_marks >= number.max(2),
-                _ => !OF_OTHER_TASKS.contains(&name),
+                _ => true,
             },
         };
         let absent = of_some_tasks().filter(|name| is_there(&experiment["absent"], name));
@@ -133,8 +116,6 @@ impl OptionalColumns {
     }
 }
 
-type Make<W> = fn(W, &SchemaRef, Option<&serde_json::Value>) -> parquet::errors::Result<RowGroups<W>>;
-
 /// Encodes episodes as a trace into any output.
 pub struct TraceEncoder<W: Write + Send> {
     file: RowGroups<W>,
@@ -147,20 +128,21 @@ pub struct TraceEncoder<W: Write + Send> {
 
 impl<W: Write + Send> TraceEncoder<W> {
     pub fn new(out: W, metadata: &TraceMetadata) -> Result<Self, TraceError> {
-        Self::with(RowGroups::new, out, metadata)
+        Self::with(out, metadata, true)
     }
 
     /// Starts a trace without checksums, with the same bytes as versions before checksums.
     pub fn without_checksums(out: W, metadata: &TraceMetadata) -> Result<Self, TraceError> {
-        Self::with(RowGroups::without_checksums, out, metadata)
+        Self::with(out, metadata, false)
     }
 
-    fn with(make: Make<W>, out: W, metadata: &TraceMetadata) -> Result<Self, TraceError> {
+    fn with(out: W, metadata: &TraceMetadata, has_checksums: bool) -> Result<Self, TraceError> {
         let recording = metadata.recording.as_ref().unwrap_or(&serde_json::Value::Null);
         let palette = Declared::of("stream", recording).map_err(|finding| *finding)?.palette;
         let (columns, undeclared) = metadata.columns.split();
         let gathered = Gathered::of_columns(columns.iter().copied());
-        let file = make(out, &gathered.layout, metadata.recording.as_ref()).map_err(failed)?;
+        let recording = metadata.recording.as_ref();
+        let file = RowGroups::new(out, &gathered.layout, recording, has_checksums).map_err(failed)?;
         Ok(Self { file, columns, gathered, undeclared, palette, seen: HashSet::new() })
     }
 

@@ -47,18 +47,16 @@ pub(crate) enum Values {
 }
 
 impl<W: Write + Send> RowGroups<W> {
-    pub(crate) fn new(out: W, layout: &SchemaRef, recording: Option<&serde_json::Value>) -> Result<Self> {
-        let properties = properties(layout, recording).set_created_by(CREATED_BY.to_owned()).build();
-        Self::with(properties, out, layout, true)
-    }
-
-    pub(crate) fn without_checksums(out: W, layout: &SchemaRef, recording: Option<&serde_json::Value>) -> Result<Self> {
-        Self::with(properties(layout, recording).build(), out, layout, false)
-    }
-
-    fn with(properties: WriterProperties, out: W, layout: &SchemaRef, has_checksums: bool) -> Result<Self> {
+    pub(crate) fn new(
+        out: W,
+        layout: &SchemaRef,
+        recording: Option<&serde_json::Value>,
+        has_checksums: bool,
+    ) -> Result<Self> {
+        let properties = properties(layout, recording);
+        let properties = if has_checksums { properties.set_created_by(CREATED_BY.to_owned()) } else { properties };
         // Parquet's logical types are complete; an embedded Arrow schema would only pin one library's view.
-        let options = ArrowWriterOptions::new().with_properties(properties).with_skip_arrow_metadata(true);
+        let options = ArrowWriterOptions::new().with_properties(properties.build()).with_skip_arrow_metadata(true);
         let parquet = ArrowWriter::try_new_with_options(Held::new(out), Arc::clone(layout), options)?;
         Ok(Self { parquet, has_checksums, rows: 0 })
     }

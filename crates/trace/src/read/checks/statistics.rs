@@ -70,23 +70,23 @@ impl Chunk {
             );
         let [least, greatest] = match statistics {
             _ if is_unsigned => [None, None],
-            Statistics::Boolean(of) => [of.min_opt(), of.max_opt()].map(|value| value.map(|value| Value::Bool(*value))),
-            Statistics::Int32(of) => {
-                [of.min_opt(), of.max_opt()].map(|value| value.map(|value| Value::Int((*value).into())))
-            }
-            Statistics::Int64(of) => [of.min_opt(), of.max_opt()].map(|value| value.map(|value| Value::Int(*value))),
-            Statistics::Float(of) => {
-                [of.min_opt(), of.max_opt()].map(|value| value.map(|value| Value::Float((*value).into())))
-            }
-            Statistics::Double(of) => [of.min_opt(), of.max_opt()].map(|value| value.map(|value| Value::Float(*value))),
+            Statistics::Boolean(of) => ends([of.min_opt(), of.max_opt()], |value| Value::Bool(*value)),
+            Statistics::Int32(of) => ends([of.min_opt(), of.max_opt()], |value| Value::Int((*value).into())),
+            Statistics::Int64(of) => ends([of.min_opt(), of.max_opt()], |value| Value::Int(*value)),
+            Statistics::Float(of) => ends([of.min_opt(), of.max_opt()], |value| Value::Float((*value).into())),
+            Statistics::Double(of) => ends([of.min_opt(), of.max_opt()], |value| Value::Float(*value)),
             // The older fields are ordered as signed bytes.
             Statistics::ByteArray(of) if !statistics.is_min_max_deprecated() => {
-                [of.min_opt(), of.max_opt()].map(|value| value.map(|value| Value::Text(value.data().to_vec())))
+                ends([of.min_opt(), of.max_opt()], |value| Value::Text(value.data().to_vec()))
             }
             _ => [None, None],
         };
         Some(Self { nulls: statistics.null_count_opt(), bytes, least, greatest })
     }
+}
+
+fn ends<T>(ends: [Option<&T>; 2], value: impl Fn(&T) -> Value) -> [Option<Value>; 2] {
+    ends.map(|end| end.map(&value))
 }
 
 /// The values read so far of a column of a row group.

@@ -22,9 +22,6 @@ const SQUARES: [&str; 9] = [
 const LEAST: usize = 2;
 
 /// The colour of an episode among `count` colours, by its seed and run: 0 to `count` - 1.
-///
-/// # Panics
-/// A `count` of 0 or over 10, which no palette has.
 pub fn index(count: usize, seed: i32, run: i32) -> usize {
     if count < LEAST {
         return 0;

@@ -48,12 +48,10 @@ files!(
     "contingency-swap",
 );
 
-/// The names of the built-in experiments, in order.
 pub fn built_in_names() -> Vec<&'static str> {
     FILES.iter().map(|(name, _)| *name).collect()
 }
 
-/// The file of the built-in experiment of this name.
 pub fn built_in(name: &str) -> Option<&'static str> {
     FILES.iter().find(|(known, _)| *known == name).map(|(_, text)| *text)
 }

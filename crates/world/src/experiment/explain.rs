@@ -148,7 +148,6 @@ fn occlusion(experiment: &Experiment) -> Option<String> {
     ))
 }
 
-/// A build without the world cannot draw scenes.
 #[cfg(not(feature = "sim"))]
 const fn occlusion(_: &Experiment) -> Option<String> {
     None

@@ -8,7 +8,6 @@ use super::spec::Spec;
 use super::table::{self, Beside, Entry};
 use toml_spec::{At, Fault, Faults, Shape, Source};
 
-/// The maximum number of experiments in a file.
 const MOST_EXPERIMENTS: usize = 64;
 
 /// Parses the experiments of a text, which may use the scenes of `known` ones. Their own prompts are folders in

@@ -10,11 +10,8 @@ use exact::budget::Limit;
 use exact::input;
 use toml_spec::{Faults, Place, Source};
 
-/// The maximum size of a file in bytes.
 const LARGEST: Limit = Limit::new("bytes of an experiment file", 1 << 20);
-/// An experiment file that cannot be used.
 #[derive(Debug, thiserror::Error)]
-#[expect(missing_docs, reason = "the messages say it")]
 pub enum FileError {
     #[error(
         "cannot read the experiment file `{}`: {source}\n  help: an experiment file is TOML text; \
@@ -32,12 +29,10 @@ pub struct Loaded {
     pub experiment: Experiment,
     /// The location of its cubes, or of its name if it does not mention cubes.
     pub cubes: Place,
-    /// The location of each of its mirrors.
     pub mirrors: Vec<Place>,
     pub name: Place,
 }
 
-/// Loads the experiments of a file, in order.
 pub fn load(path: &Path) -> Result<Vec<Loaded>, FileError> {
     let text = input::text(path, LARGEST).map_err(|source| FileError::Unreadable { path: path.to_owned(), source })?;
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));

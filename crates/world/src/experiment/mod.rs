@@ -60,14 +60,11 @@ pub struct Known {
     pub templates: Templates,
 }
 
-/// The built-in experiments, parsed once.
 static BUILT_IN: LazyLock<Vec<Known>> = LazyLock::new(built_in::all);
 
-/// An unknown experiment name.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("no experiment `{name}`: expected {}, or a file such as mine.toml", built_in_names().join(", "))]
 pub struct UnknownExperiment {
-    /// The name as written.
     pub name: String,
 }
 
@@ -85,7 +82,6 @@ impl Experiment {
 
     pub const PAPER: [Self; 5] = [Self::E1, Self::E2, Self::E3, Self::E4, Self::E5];
 
-    /// The built-in experiment of this name.
     pub fn parse(name: &str) -> Result<Self, UnknownExperiment> {
         let at = built_in_names().iter().position(|known| *known == name);
         at.map(|at| Self(Origin::BuiltIn(at))).ok_or_else(|| UnknownExperiment { name: name.to_owned() })

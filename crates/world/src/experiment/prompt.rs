@@ -26,7 +26,6 @@ use exact::budget::Limit;
 use exact::hash;
 use exact::input;
 
-/// The maximum size of a template in bytes.
 const LARGEST: Limit = Limit::new("bytes of a prompt", 256 * 1024);
 
 /// A template: the name of its file without the ending, and its text.
@@ -74,7 +73,6 @@ const SHARED: [(&str, &str); 3] = [
     ("warning", include_str!("../../../../assets/prompts/warning.txt")),
 ];
 
-/// The templates of a prompt.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Templates {
     /// `system`, `user`, `history`, `position`, `warning`, in this order; empty if only the hash is known.
@@ -88,14 +86,12 @@ impl Templates {
         hash::of_bytes(text.as_bytes())
     }
 
-    /// The built-in prompt of this name.
     pub fn built_in(name: &str) -> Option<Self> {
         let (_, own) = BUILT_IN.iter().find(|(known, _)| *known == name)?;
         let own: Vec<Template> = own.iter().map(|(name, text)| ((*name).to_owned(), (*text).to_owned())).collect();
         Some(Self::of(&own))
     }
 
-    /// The names of the built-in prompts.
     pub fn built_in_names() -> Vec<&'static str> {
         BUILT_IN.iter().map(|(name, _)| *name).collect()
     }

@@ -308,17 +308,14 @@ impl Spec {
         self.reply.iter().map(|key| key.name()).chain(own).collect()
     }
 
-    /// Returns true if a reply names a cube.
     pub fn asks_for_cube(&self) -> bool {
         self.reply.contains(&ReplyKey::SelectedCube)
     }
 
-    /// Returns true if a reply states how the agent identifies itself.
     pub fn asks_for_identification(&self) -> bool {
         self.reply.contains(&ReplyKey::Identification)
     }
 
-    /// Returns true if a reply names a mark.
     pub fn asks_for_mark(&self) -> bool {
         self.reply.contains(&ReplyKey::Mark)
     }

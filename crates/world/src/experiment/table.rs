@@ -22,7 +22,6 @@ use metric::file::{self as definitions, Document};
 use toml_spec::{At, Fault, Place};
 use trace::palette::Color;
 
-/// The maximum number of characters of a name.
 const LONGEST_NAME: usize = 40;
 
 /// A parsed experiment and the locations of its parts, for errors that only drawing its scenes reveals.
@@ -32,7 +31,6 @@ pub struct Entry {
     pub name: Place,
     /// The location of its cubes, or of its name if it does not mention cubes.
     pub cubes: Place,
-    /// The location of each of its mirrors.
     pub mirrors: Vec<Place>,
 }
 

@@ -8,9 +8,7 @@ use crate::agent::Lost;
 use trace::error::TraceError;
 use trace::log::LogError;
 
-/// An error of the folder.
 #[derive(Debug, thiserror::Error)]
-#[expect(missing_docs, reason = "the messages say it")]
 pub enum StoreError {
     #[error("cannot {doing} `{}`: {source}\n  help: is the folder writable, and the disk not full?", path.display())]
     Io { doing: &'static str, path: PathBuf, source: io::Error },
@@ -64,18 +62,14 @@ impl StoreError {
     }
 }
 
-/// An error that ended an episode.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
-    /// The recording is being stopped.
     #[error("stopped")]
     Stopped,
-    /// The agent's infrastructure failed.
     #[error("{lost}")]
     Lost {
         /// The step that got no reply; `None` before the first.
         step: Option<i32>,
-        /// The failure.
         lost: Lost,
     },
     /// The world, the camera or the disk failed, which would affect every episode.

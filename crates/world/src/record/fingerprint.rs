@@ -14,7 +14,6 @@ const WORDS: [&str; 6] = ["title", "order", "chance", "reference", "definitions"
 /// The keys of an agent's description that are separate parts.
 const SAMPLING: [&str; 4] = ["temperature", "max_output_tokens", "reasoning_effort", "extra_body"];
 
-/// A fingerprint: its id, and its parts.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fingerprint {
     /// The value of the column `fingerprint`: the beginning of the hash of the parts.

@@ -16,7 +16,6 @@ pub(super) const SEEDS: &str = "seeds";
 /// A key that grows with the recorded episodes: their settings, by fingerprint.
 pub(super) const FINGERPRINTS: &str = "fingerprints";
 
-/// The key of this object's version.
 pub(super) const VERSION_KEY: &str = "version";
 
 /// The version of this object's shape: 2 adds a palette, a design and fingerprints, 3 the whole experiment. A recording
@@ -83,10 +82,8 @@ fn recording(
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Difference {
-    /// The key of the metadata.
     pub what: String,
     pub expected: String,
-    /// The value in the other recording.
     pub found: String,
 }
 

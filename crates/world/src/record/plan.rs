@@ -19,13 +19,10 @@ pub struct Plan {
     pub seeds: i32,
     /// Runs 1 to this for each seed (7 in the paper).
     pub runs: i32,
-    /// The number of repetitions of each scene.
     pub repeats: i32,
-    /// The shard of this process.
     pub shard: Shard,
 }
 
-/// The key of an episode within a model's recordings.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Key {
     pub experiment: Experiment,
@@ -38,14 +35,12 @@ pub struct Key {
 /// The subject of episodes: a model, under a named or the default condition.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Subject {
-    /// The name shown in tables.
     pub model: String,
     /// The condition that the study varies besides the model; absent for the default one.
     pub condition: Option<String>,
 }
 
 impl Subject {
-    /// A model under the default condition.
     pub fn of(model: &str) -> Self {
         Self { model: model.to_owned(), condition: None }
     }

@@ -45,9 +45,7 @@ struct Outcomes {
 #[derive(Debug)]
 pub struct Complete {
     pub experiment: Experiment,
-    /// Its recorded episodes.
     pub recorded: Vec<Key>,
-    /// Its lost episodes.
     pub lost: Vec<(Key, LostEpisode)>,
 }
 
@@ -94,7 +92,6 @@ pub struct Held {
 }
 
 impl<'a> Queue<'a> {
-    /// A queue of these episodes, in this order.
     pub fn new(store: &'a Store, keys: &[Key]) -> Self {
         let mut experiments = BTreeMap::<Experiment, Outcomes>::new();
         for key in keys {
@@ -151,7 +148,6 @@ impl<'a> Queue<'a> {
         self.waiting().keys.push_back(key);
     }
 
-    /// The number of episodes without a player.
     pub fn left_out(&self) -> usize {
         self.waiting().left_out
     }

@@ -64,12 +64,10 @@ impl Replies {
         is_first_in_time.then_some(reply)
     }
 
-    /// The counts so far.
     pub fn counts(&self) -> ReplyCounts {
         self.found().counts.clone()
     }
 
-    /// The counts and the first unreadable reply.
     pub fn answer(&self) -> RepliesAnswer {
         let found = self.found();
         RepliesAnswer {

@@ -32,7 +32,6 @@ pub trait Observer {
     fn done(&mut self, t: i32, row: &Step) -> Result<(), RecordError>;
 }
 
-/// An observer that does nothing.
 #[derive(Clone, Copy, Debug)]
 pub struct Nobody;
 
@@ -52,7 +51,6 @@ pub struct Stage<'a> {
     pub config: &'a WorldConfig,
     /// The thread's camera; `None` if no pictures are needed.
     pub eye: Option<&'a RefCell<Camera>>,
-    /// True if the agent sees the frames.
     pub looks: bool,
     /// Set when the recording is to stop.
     pub stop: &'a AtomicBool,
@@ -66,7 +64,6 @@ impl Stage<'_> {
     }
 }
 
-/// The task for the agent of a scene.
 pub fn task(config: &WorldConfig, scene: &Scene, key: &Key) -> Task {
     Task {
         experiment: scene.experiment.clone(),

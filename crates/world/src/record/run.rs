@@ -57,7 +57,6 @@ enum Wait {
     Held(Held),
 }
 
-/// The settings of a recording.
 #[derive(Clone, Copy, Debug)]
 pub struct Settings {
     /// Threads, each with a camera.
@@ -66,20 +65,17 @@ pub struct Settings {
     pub in_flight: NonZeroUsize,
     /// True if frames are drawn and logged even for agents that do not look.
     pub frames: bool,
-    /// True if a log is written.
     pub log: bool,
     /// The number of consecutive replies without a decision that ends the recording; `None` for no limit.
     pub max_unusable: Option<NonZeroU32>,
 }
 
-/// The outcomes of the episodes.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
     /// Episodes recorded by this start.
     pub recorded: Vec<Key>,
     /// The number of their steps.
     pub steps: u64,
-    /// Lost episodes, with reasons.
     pub lost: Vec<(Key, LostEpisode)>,
     /// Episodes under way when the recording was stopped.
     pub under_way: Vec<Key>,

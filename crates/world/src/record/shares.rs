@@ -43,7 +43,6 @@ impl Shares {
         add(&self.all, start);
     }
 
-    /// The time so far.
     pub fn spent(&self) -> Spent {
         let read = |share: &AtomicU64| Duration::from_nanos(share.load(Ordering::Relaxed));
         let [rendering, visibility, writing] = [&self.rendering, &self.visibility, &self.writing].map(read);

@@ -17,9 +17,7 @@ use trace::replies::ReplyCounts;
 /// A recording that was given up because of consecutive unusable replies.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct GivenUp {
-    /// The model's name as shown in tables.
     pub model: String,
-    /// The number of consecutive replies without a decision.
     pub in_a_row: u32,
     pub last: UnreadableReply,
 }

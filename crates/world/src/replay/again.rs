@@ -21,7 +21,6 @@ pub const MOST_RAYS: u32 = 4096;
 /// The part of a trace's metadata that a replay needs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recipe {
-    /// The experiment from the trace.
     pub experiment: Experiment,
     pub config: WorldConfig,
     /// The same configuration with the grid and threshold of the trace's pixel counts: the recorded ones, unless the

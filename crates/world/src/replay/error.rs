@@ -6,9 +6,7 @@ use super::divergence::Divergence;
 use crate::sim::scene::SCENE_VERSIONS;
 use exact::budget::Exceeded;
 
-/// An error of a replay.
 #[derive(Debug, thiserror::Error)]
-#[expect(missing_docs, reason = "the messages say it")]
 pub enum ReplayError {
     #[error(
         "the trace does not say how its world was made (no `world` in the metadata `mirrorstats.recording`)\n  help: traces of `mirrorstats record` do"
@@ -66,7 +64,6 @@ impl ReplayError {
         Self::Apart { episode, trace, traced, log: log.to_owned(), logged }
     }
 
-    /// An error of a trace, a log, the world or the disk.
     pub fn other(error: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Self {
         Self::Other(error.into())
     }

@@ -22,14 +22,12 @@ use trace::schema::RECORDING_KEY;
 /// The maximum pixels of a frame, 2048 x 2048: a small file may decode to many pixels of four bytes each.
 const LARGEST_FRAME: Limit = Limit::new("pixels in a frame", 1 << 22);
 
-/// A requested strip.
 #[derive(Clone, Debug)]
 pub struct Strip {
     pub episode: String,
     pub steps: Steps,
 }
 
-/// The steps of a strip.
 #[derive(Clone, Debug)]
 pub enum Steps {
     /// This number of steps, chosen to tell the story.

@@ -15,9 +15,7 @@ const RAYS: u32 = 24;
 
 /// The end of a replay before its last step.
 enum Halt {
-    /// All requested frames are rendered.
     Done,
-    /// An error.
     Fault(ReplayError),
 }
 

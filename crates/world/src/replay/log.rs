@@ -19,7 +19,6 @@ static CENSUS: LazyLock<Value> = LazyLock::new(|| schema_for!(Visibility).to_val
 /// A step as seen by an observer.
 #[derive(Debug)]
 pub struct Seen<'a> {
-    /// The timestep, from 1.
     pub t: i32,
     /// The world before the action.
     pub world: &'a World,
@@ -28,7 +27,6 @@ pub struct Seen<'a> {
     pub visibility: &'a Visibility,
 }
 
-/// An error of writing a log.
 pub type LogFault = Box<dyn std::error::Error + Send + Sync>;
 
 /// The log of an episode in progress.
@@ -63,7 +61,6 @@ impl Log {
         Ok(self.file.seen(self.time(seen.t), &view)?)
     }
 
-    /// Adds the row of a step.
     pub fn done(&mut self, t: i32, row: &Step) -> Result<(), LogFault> {
         Ok(self.file.decided(self.time(t), &Decision::of(t, row))?)
     }

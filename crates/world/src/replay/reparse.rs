@@ -64,9 +64,7 @@ pub struct Diverged {
     pub parsed: Option<&'static str>,
 }
 
-/// An error of reparsing.
 #[derive(Debug, thiserror::Error)]
-#[expect(missing_docs, reason = "the messages say it")]
 pub enum ReparseError {
     #[error(transparent)]
     Trace(#[from] TraceError),

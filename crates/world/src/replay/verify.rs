@@ -33,12 +33,10 @@ pub struct Recorded {
     recipe: Recipe,
 }
 
-/// The outputs of a replay.
 #[derive(Clone, Debug, Default)]
 pub struct Outputs {
     /// The folder for the frame of every step.
     pub frames: Option<PathBuf>,
-    /// The path of the log.
     pub log: Option<PathBuf>,
     /// The trace with recomputed visibility.
     pub recount: Option<Recount>,
@@ -46,7 +44,6 @@ pub struct Outputs {
     pub skip_frames: bool,
 }
 
-/// The settings of recomputed visibility.
 #[derive(Clone, Debug)]
 pub struct Recount {
     pub out: PathBuf,
@@ -246,7 +243,6 @@ fn recounted(recording: Option<&Value>, eye: &WorldConfig) -> Value {
     recording
 }
 
-/// The path of a step's frame.
 pub fn frame_path(folder: &Path, episode_id: &str, t: impl Display) -> PathBuf {
     folder.join(episode_id.replace('/', "-")).join(format!("t{t:0>3}.png"))
 }

@@ -113,7 +113,6 @@ impl Figure {
 
 /// A rigid piece of the humanoid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[expect(missing_docs, reason = "each is the piece of its name")]
 pub enum Piece {
     Trunk,
     LeftArm,

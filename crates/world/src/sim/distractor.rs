@@ -15,13 +15,11 @@ pub struct Distractor {
     chance: Rng,
     /// Turns to make before it walks on; negative to the right.
     turns: i8,
-    /// Steps to walk before it turns.
     strides: u32,
     waited: u32,
 }
 
 impl Distractor {
-    /// An agent about to start walking.
     pub fn new(other: &Other) -> Self {
         let mut chance = Rng::of_number(u64::from(other.habit));
         let strides = 2 + chance.below(6);

@@ -39,7 +39,6 @@ impl<'a> Place<'a> {
         in_room(self.body, self.local(from_mark))
     }
 
-    /// Returns true if the hand may be there.
     pub fn is_free(&self, from_mark: [i32; 3]) -> bool {
         let half = self.hand.half();
         let [ahead, left, up] = self.local(from_mark);

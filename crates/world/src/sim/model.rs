@@ -90,11 +90,8 @@ pub enum Item {
     Agent(usize),
     /// The humanoid that only one pane shows.
     Double,
-    /// A cube of the scene.
     Cube(usize),
-    /// A mark of the scene.
     Mark(usize),
-    /// The hand of a reaching task.
     Hand,
 }
 
@@ -120,7 +117,6 @@ pub struct Moment {
     pub hand: Option<[f64; 3]>,
 }
 
-/// MuJoCo's error while building the world.
 #[derive(Debug, thiserror::Error)]
 #[error("mujoco cannot build the world: {0}; the configuration or the library is at fault")]
 pub struct ModelError(#[from] MjEditError);
@@ -187,12 +183,10 @@ impl Stage {
         self.marks_at = t;
     }
 
-    /// The look of this stage.
     pub const fn look(&self) -> Look {
         self.look
     }
 
-    /// The owner of each geom.
     pub fn items(&self) -> &[Item] {
         &self.items
     }
@@ -210,12 +204,10 @@ impl Stage {
         self.data.model().id_to_name(MjtObjBase::mjOBJ_GEOM, geom).unwrap_or_default()
     }
 
-    /// Returns true if a geom is in the scene.
     pub fn is_shown(&self, geom: usize) -> bool {
         self.data.model().geom_group()[geom] != group::HIDDEN
     }
 
-    /// Shows a moment of the scene.
     pub fn show(&mut self, config: &WorldConfig, scene: &Scene, moment: &Moment) {
         self.show_marks(scene, moment.t);
         self.pose(config, moment);

@@ -53,9 +53,6 @@ impl Rng {
     }
 
     /// One of `choices`.
-    ///
-    /// # Panics
-    /// An empty list.
     pub fn one_of<T: Copy>(&mut self, choices: &[T]) -> T {
         choices[self.below(u32::try_from(choices.len()).unwrap_or(u32::MAX)) as usize]
     }

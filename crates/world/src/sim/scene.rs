@@ -131,7 +131,6 @@ pub struct Patch {
 /// The shape of a hand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-#[expect(missing_docs, reason = "the names say it")]
 pub enum HandShape {
     Ball,
     Block,
@@ -245,7 +244,6 @@ impl HandStart {
 }
 
 impl Cube {
-    /// The square of floor that it covers.
     pub fn square(&self) -> Square {
         Square { center: [self.x, self.y], half: self.edge / 2.0 }
     }
@@ -318,7 +316,6 @@ impl Scene {
         }
     }
 
-    /// The fixed things as a floor plan.
     pub fn floor_plan(&self, config: &WorldConfig) -> FloorPlan {
         floor_plan(config, &self.cubes)
     }

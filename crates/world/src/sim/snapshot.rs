@@ -7,7 +7,6 @@ use super::body::Piece;
 use super::model::{AGENTS, EYE_CAMERA, Item, Stage};
 use super::world::World;
 
-/// One moment of a world.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Snapshot {
     /// The moving bodies, each in the frame of the room: `agent0_trunk`, .. and `eye`.
@@ -58,7 +57,6 @@ pub enum Shape {
 }
 
 impl World {
-    /// The current state of everything.
     pub fn snapshot(&self) -> Snapshot {
         Snapshot { frames: frames(self), solids: solids(self.stage()) }
     }

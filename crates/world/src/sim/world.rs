@@ -18,14 +18,12 @@ use crate::experiment::spec::{Behavior, PaneKind};
 use trace::episode::Action;
 use trace::palette::Color;
 
-/// The result of an action.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Moved {
     /// True if a wall, a cube or a body was in the way: the agent stays where it was.
     pub bumped: bool,
 }
 
-/// One episode's world.
 #[derive(Debug)]
 pub struct World {
     config: WorldConfig,
@@ -67,22 +65,18 @@ impl World {
         Ok(world)
     }
 
-    /// The scene of this world.
     pub const fn scene(&self) -> &Scene {
         &self.scene
     }
 
-    /// The configuration of this world.
     pub const fn config(&self) -> &WorldConfig {
         &self.config
     }
 
-    /// The fixed things as a floor plan.
     pub const fn floor_plan(&self) -> &FloorPlan {
         &self.plan
     }
 
-    /// The position and direction of the agent.
     pub const fn pose(&self) -> Pose {
         self.ego.pose
     }

@@ -97,7 +97,6 @@ names!(Fact {
 });
 
 impl Fact {
-    /// The type of an answer to this fact.
     pub const fn kind(self) -> AnswerType {
         match self {
             Self::BodyColor | Self::MarkColor => AnswerType::Color,
@@ -160,9 +159,7 @@ impl Answer {
 /// The columns of a key at a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
-    /// The given answer.
     Answer,
-    /// The true value.
     Truth,
 }
 

@@ -7,10 +7,8 @@ use trace::colors::spelling;
 
 /// The maximum number of characters of a key, and of an option.
 const LONGEST: [usize; 2] = [24, 40];
-/// The maximum number of options.
 const MOST_OPTIONS: usize = 12;
 
-/// Checks each answer, and the answers together.
 pub(super) fn check(answers: &[Answer], at: &At<'_>, faults: &mut Vec<Fault>) {
     if answers.len() > MOST_ANSWERS {
         faults.push(at.fault(format!("at most {MOST_ANSWERS} answers, found {}", answers.len())));

@@ -17,7 +17,6 @@ use super::super::error::StoreError;
 use super::super::lock::{lock_folder, lock_of};
 use exact::replace::{make_folder, sweep};
 
-/// The folder of parts within the folder of a recording.
 const PARTS: &str = ".parts";
 
 /// The folder of parts of a recording; temporary files in it are removed.

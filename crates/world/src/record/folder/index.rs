@@ -33,7 +33,6 @@ pub struct RecordingIndex {
 /// The seed, run and repetition of an episode.
 pub type Place = (i32, i32, i32);
 
-/// The episodes of a trace.
 type Places = Arc<BTreeSet<Place>>;
 
 /// The content of a trace, valid as long as this file has its path. The file stays open, so that no other file gets its
@@ -45,7 +44,6 @@ struct InTrace {
 }
 
 impl RecordingIndex {
-    /// The recordings of a model in a folder, with their traces' metadata.
     pub fn new(folder: &Path, subject: Subject, recordings: Recordings) -> Self {
         Self { folder: folder.to_owned(), subject, recordings, traces: Mutex::default() }
     }
@@ -58,12 +56,10 @@ impl RecordingIndex {
         self.recordings.of(experiment)
     }
 
-    /// The trace of an experiment.
     pub fn trace(&self, experiment: &Experiment) -> PathBuf {
         self.folder.join(format!("{}-{}.parquet", experiment.name(), self.subject.slug()))
     }
 
-    /// The log of an experiment.
     pub fn log(&self, experiment: &Experiment) -> PathBuf {
         self.trace(experiment).with_extension("mcap")
     }

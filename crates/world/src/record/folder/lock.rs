@@ -13,10 +13,8 @@ pub struct EpisodeLock {
     path: PathBuf,
 }
 
-/// The result of an attempt to lock an episode.
 #[derive(Debug)]
 pub enum Attempt {
-    /// This process has it now.
     Ours(EpisodeLock),
     /// Another process has it: its id, if the file contains it.
     Theirs(Option<u32>),

@@ -28,7 +28,6 @@ pub struct Removed {
     pub label_lines: usize,
 }
 
-/// An error of removing a person.
 pub type RemovalError = Box<dyn Error + Send + Sync>;
 
 /// Removes all data of the person with this code from a folder. No process may record into it meanwhile; writes in

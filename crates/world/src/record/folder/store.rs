@@ -63,12 +63,10 @@ impl Store {
         self.folder_lock.parts()
     }
 
-    /// The trace of an experiment.
     pub fn trace(&self, experiment: &Experiment) -> PathBuf {
         self.index.trace(experiment)
     }
 
-    /// The log of an experiment.
     pub fn log(&self, experiment: &Experiment) -> PathBuf {
         self.index.log(experiment)
     }
@@ -130,7 +128,6 @@ impl Store {
         Ok(still)
     }
 
-    /// The path of the list of lost episodes.
     pub fn lost_list(&self) -> PathBuf {
         failures::list_of(self.folder_lock.folder())
     }

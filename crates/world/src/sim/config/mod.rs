@@ -278,9 +278,7 @@ pub struct EpisodeConfig {
     pub steps: u32,
 }
 
-/// An error of a configuration.
 #[derive(Debug, thiserror::Error)]
-#[expect(missing_docs, reason = "the messages say it")]
 pub enum ConfigError {
     #[error("world configuration {}: cannot read the file: {source}", path.display())]
     Unreadable { path: PathBuf, source: io::Error },

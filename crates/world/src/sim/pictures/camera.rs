@@ -25,9 +25,7 @@ use crate::experiment::spec::{Look, PaneKind};
 use trace::frame::Frame;
 use trace::renderer::Renderer;
 
-/// An error of drawing.
 #[derive(Debug, thiserror::Error)]
-#[expect(missing_docs, reason = "the messages say it")]
 pub enum CameraError {
     #[error(transparent)]
     Model(#[from] ModelError),
@@ -43,7 +41,6 @@ pub enum CameraError {
 /// The ceiling's index in a picture's groups.
 const CEILING: usize = group::CEILING as usize;
 
-/// One renderer.
 pub struct Camera {
     width: usize,
     height: usize,
@@ -60,12 +57,10 @@ impl std::fmt::Debug for Camera {
 }
 
 impl Camera {
-    /// A camera for the worlds of a configuration.
     pub fn new(config: &WorldConfig) -> Result<Self, CameraError> {
         Self::sized(config, config.eye.width as usize, config.eye.height_px as usize)
     }
 
-    /// A camera with another picture size.
     pub fn sized(config: &WorldConfig, width: usize, height: usize) -> Result<Self, CameraError> {
         Self::painted(config, Paint::Lit, width, height)
     }
@@ -78,7 +73,6 @@ impl Camera {
         Ok(Self { width, height, data: MjData::new(model), renderer, draws_all: false, drawn_by })
     }
 
-    /// The renderer of its pictures.
     pub const fn drawn_by(&self) -> &Renderer {
         &self.drawn_by
     }
@@ -189,7 +183,6 @@ pub struct LabelCamera {
 }
 
 impl LabelCamera {
-    /// A camera for labels with a view of this size.
     pub fn new(config: &WorldConfig, width: usize, height: usize) -> Result<Self, CameraError> {
         Ok(Self { eye: Camera::painted(config, Paint::Labels, width, height)?, painted: None })
     }

@@ -26,9 +26,7 @@ const CAPTION: usize = 22;
 
 const GAP: usize = 6;
 
-/// An error of a contact sheet.
 #[derive(Debug, thiserror::Error)]
-#[expect(missing_docs, reason = "each is the error that it carries")]
 pub enum ContactSheetError {
     #[error(transparent)]
     Crowded(#[from] Crowded),
@@ -42,7 +40,6 @@ pub enum ContactSheetError {
     Png(String),
 }
 
-/// A picture and its caption.
 struct Picture {
     frame: Frame,
     caption: String,

@@ -3,9 +3,7 @@
 /// The label of every pixel, row by row from the top.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LabelImage {
-    /// Pixels in a row.
     pub width: usize,
-    /// Rows.
     pub height: usize,
     /// `width * height` codes, which [`Shown::of_code`](super::super::visibility::Shown::of_code) reads.
     pub codes: Vec<u8>,

@@ -2,7 +2,6 @@
 
 use trace::renderer::Renderer;
 
-/// Names of software renderers.
 const SOFTWARE: [&str; 4] = ["llvmpipe", "softpipe", "swrast", "SwiftShader"];
 
 /// The environment variable that limits the processor extensions used by Mesa.

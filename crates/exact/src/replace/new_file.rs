@@ -39,11 +39,11 @@ impl NewFile {
     }
 
     pub const fn as_file(&self) -> &File {
-        self.file.file()
+        &self.file.file
     }
 
     pub const fn as_file_mut(&mut self) -> &mut File {
-        self.file.file_mut()
+        &mut self.file.file
     }
 
     /// Replaces the target. Afterwards not even a loss of power restores the old content.
@@ -69,7 +69,7 @@ impl NewFile {
     fn copy_into_target(mut self) -> io::Result<()> {
         // A standard stream may be a file with output of others: append to it.
         let mut target = OpenOptions::new().append(true).open(&self.target)?;
-        let content = self.file.file_mut();
+        let content = &mut self.file.file;
         content.seek(SeekFrom::Start(0))?;
         io::copy(content, &mut target).map(drop)
     }

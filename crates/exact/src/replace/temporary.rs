@@ -38,10 +38,30 @@ pub fn remove_temporary() {
     }
 }
 
+/// The path of a temporary file or folder, which is removed when this is dropped, unless it got another name.
+#[derive(Debug)]
+struct Present(PathBuf);
+
+impl Present {
+    fn keep(&mut self) {
+        forget(&mem::take(&mut self.0));
+    }
+}
+
+impl Drop for Present {
+    fn drop(&mut self) {
+        if !self.0.as_os_str().is_empty() {
+            remove(&self.0);
+            forget(&self.0);
+        }
+    }
+}
+
 #[derive(Debug)]
 pub(super) struct TemporaryFile {
-    file: File,
-    path: PathBuf,
+    /// Dropped before the file, which holds the lock.
+    path: Present,
+    pub(super) file: File,
 }
 
 impl TemporaryFile {
@@ -51,29 +71,21 @@ impl TemporaryFile {
             OpenOptions::new().read(true).write(true).create_new(true).open(path).map(Some)
         })?;
         let (path, Some(file)) = made else { return Err(io::ErrorKind::NotFound.into()) };
-        Ok(Self { file, path })
+        Ok(Self { path, file })
     }
 
     pub(super) fn path(&self) -> &Path {
-        &self.path
-    }
-
-    pub(super) const fn file(&self) -> &File {
-        &self.file
-    }
-
-    pub(super) const fn file_mut(&mut self) -> &mut File {
-        &mut self.file
+        &self.path.0
     }
 
     pub(super) fn rename(mut self, target: &Path) -> io::Result<()> {
-        fs::rename(&self.path, target)?;
-        forget(&mem::take(&mut self.path));
+        fs::rename(self.path(), target)?;
+        self.path.keep();
         Ok(())
     }
 
     pub(super) fn rename_new(self, target: &Path) -> io::Result<()> {
-        match fs::hard_link(&self.path, target) {
+        match fs::hard_link(self.path(), target) {
             // Some file systems have no links.
             Err(error) if error.kind() != io::ErrorKind::AlreadyExists && fs::symlink_metadata(target).is_err() => {
                 self.rename(target)
@@ -83,19 +95,10 @@ impl TemporaryFile {
     }
 }
 
-impl Drop for TemporaryFile {
-    fn drop(&mut self) {
-        if !self.path.as_os_str().is_empty() {
-            remove(&self.path);
-            forget(&self.path);
-        }
-    }
-}
-
 /// A temporary folder, removed with its contents.
 #[derive(Debug)]
 pub struct TemporaryFolder {
-    path: PathBuf,
+    path: Present,
     _lock: Option<File>,
 }
 
@@ -123,20 +126,11 @@ impl TemporaryFolder {
     }
 
     pub fn path(&self) -> &Path {
-        &self.path
+        &self.path.0
     }
 
     pub(super) fn keep(mut self) {
-        forget(&mem::take(&mut self.path));
-    }
-}
-
-impl Drop for TemporaryFolder {
-    fn drop(&mut self) {
-        if !self.path.as_os_str().is_empty() {
-            remove(&self.path);
-            forget(&self.path);
-        }
+        self.path.keep();
     }
 }
 
@@ -144,7 +138,7 @@ fn make(
     folder: &Path,
     prefix: &OsStr,
     at: impl Fn(&Path) -> io::Result<Option<File>>,
-) -> io::Result<(PathBuf, Option<File>)> {
+) -> io::Result<(Present, Option<File>)> {
     loop {
         let path = folder.join(name(prefix));
         let file = match at(&path) {
@@ -154,7 +148,7 @@ fn make(
         // Before it was locked, another process may have taken it for a leftover.
         if file.as_ref().is_none_or(|file| leftover::lock(file, &path)) {
             PRESENT.lock().unwrap_or_else(PoisonError::into_inner).insert(path.clone());
-            return Ok((path, file));
+            return Ok((Present(path), file));
         }
     }
 }

@@ -112,7 +112,6 @@ impl Columns {
         self.schema.get(name).copied()
     }
 
-    /// Returns true if a column of the schema reserves this name.
     pub(crate) fn is_reserved(&self, name: &str) -> bool {
         self.schema.contains_key(name) && !self.free.iter().any(|free| free == name)
     }
@@ -155,7 +154,6 @@ impl Columns {
         }
     }
 
-    /// Sets the only texts of a column outside the schema.
     pub(crate) fn set_own_values(&mut self, name: &str, values: &[String]) {
         if self.own.contains_key(name) && !values.is_empty() {
             self.values.insert(name.to_owned(), values.to_vec());

@@ -30,13 +30,11 @@ impl Definitions {
         Ok(Self::check(file::read(name_or_path.as_ref())?, columns, None)?)
     }
 
-    /// Checks definitions given as text, for tests and for other programs.
     pub fn from_toml(name: &str, text: &str, columns: &Columns) -> Result<Self, FileError> {
         let source = Source { name: format!("{name}.toml"), text: text.to_owned() };
         Ok(Self::check(file::read_source(name.to_owned(), source, None)?, columns, None)?)
     }
 
-    /// The same definitions, restricted to episodes where `condition` holds.
     pub fn filtered(self, shown: &str, condition: &str, columns: &Columns) -> Result<Self, Faults> {
         let source = Source { name: shown.to_owned(), text: condition.to_owned() };
         Self::check(self.document, columns, Some(&Written::whole(source.into())))
@@ -168,7 +166,6 @@ impl Definitions {
     }
 }
 
-/// An error while replacing a `let` by a condition on steps.
 #[derive(Debug, thiserror::Error)]
 pub enum ReplaceError {
     #[error(
@@ -347,7 +344,7 @@ fn experiments(document: &Document) -> IndexMap<String, Experiment> {
 #[cfg(test)]
 mod tests {
     use super::{Definitions, ReplaceError};
-    use crate::schema_columns::schema_columns;
+    use crate::tests::schema_columns;
 
     #[test]
     fn a_replaced_condition_equals_an_edited_file() {

@@ -1,28 +1,6 @@
 //! Definition files as written: parses TOML, checks every key, and reports faults with their places.
 //!
-//! This file knows the keys of a definition file, but not the meaning of expressions.
-//!
-//! ```toml
-//! include = ["paper"]              # built-in names, or paths relative to this file
-//! open = false                     # whether unlisted experiments are accepted
-//! domain = "robots"                # what the traces are about; `mirror` if absent
-//! [column.grip_force]              # a column of your own traces
-//! type = "float"                   # bool, int, float or text
-//! unit = "N"
-//! [column.outcome]
-//! type = "text"
-//! constant = true                  # the same in all rows of an episode
-//! values = ["success", "timeout"]  # the only texts that it holds, null apart
-//! [let]
-//! done = "first(action = 'done')"
-//! [experiment.E1]
-//! title = "Active mirror-based self-identification"
-//! order = 1
-//! chance = { TSA = "1/3" }         # "none" where a metric's own chance does not apply
-//! [metric.TSA]
-//! title = "Task Success Accuracy"
-//! value = "coalesce(at(choice, done) = body_color, false)"
-//! ```
+//! This file knows the keys of a definition file, which `shape` declares, but not the meaning of expressions.
 
 use std::path::Path;
 
@@ -85,7 +63,6 @@ pub struct ColumnEntry {
     /// The only texts in it, except null; any if empty.
     pub values: Vec<String>,
     pub unit: String,
-    /// The description for readers; may be empty.
     pub help: String,
 }
 
@@ -129,7 +106,6 @@ pub fn built_in(name: &str) -> Option<&'static str> {
     KIND.built_in_text(name)
 }
 
-/// Reads a built-in definition file by name, or any other by path.
 pub fn read(name_or_path: impl AsRef<Path>) -> Result<Document, FileError> {
     let path = name_or_path.as_ref();
     let unreadable = |source| FileError::Unreadable { path: path.display().to_string(), source };

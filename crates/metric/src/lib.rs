@@ -35,11 +35,11 @@ mod functions;
 pub mod implied;
 mod logical_plan;
 pub mod names;
-#[cfg(test)]
-mod schema_columns;
 pub mod shape;
 pub mod sql;
 pub mod syntax;
+#[cfg(test)]
+mod tests;
 
 use catalogs::measure;
 pub use catalogs::{catalog, relations, restore};

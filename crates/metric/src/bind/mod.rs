@@ -60,7 +60,8 @@ pub(super) fn bind(document: &Document, columns: &Columns, filter: Option<&Writt
             metrics.insert(name.clone(), (bound.node, kind));
         }
     }
-    let filter = filter.and_then(|written| binder.filter(written));
+    let filter = filter.and_then(|written| binder.condition(written, "a filter of episodes"));
+    let filter = filter.map(|bound| bound.node);
     if binder.faults.is_empty() {
         Ok(Binding { plan: binder.builder.finish(), metrics, lets, filter })
     } else {
@@ -91,23 +92,22 @@ impl Binder<'_> {
     /// Each name has one meaning. A column gives way to a definition of its name if only some traces have it, or if
     /// older versions of the schema did not. So definitions mean the same whatever else was recorded.
     fn check_names(&mut self) {
-        let lets = self.document.lets.iter().map(|(name, (_, place))| (name, place, "`let`"));
-        let metrics = self.document.metrics.iter().map(|(name, entry)| (name, &entry.place, "metric"));
-        let mut faults = Vec::new();
+        let document = self.document;
+        let lets = document.lets.iter().map(|(name, (_, place))| (name, place, "`let`"));
+        let metrics = document.metrics.iter().map(|(name, entry)| (name, &entry.place, "metric"));
         for (name, place, what) in lets.chain(metrics) {
-            let is_column = self.columns.is_reserved(name) || self.document.columns.contains_key(name);
+            let is_column = self.columns.is_reserved(name) || document.columns.contains_key(name);
             if name.is_empty() || name.contains(|c: char| c == ',' || c.is_control()) {
                 let message = format!("`{}` is no name of a {}", visible(name), what.trim_matches('`'));
-                faults.push(Fault::new(place.clone(), message).help("a name has visible characters and no comma"));
+                self.faults.push(Fault::new(place.clone(), message).help("a name has visible characters and no comma"));
             } else if name == "t" || is_column {
                 let message = format!("the {what} `{name}` has the name of a column");
-                faults.push(Fault::new(place.clone(), message).help("choose another name"));
-            } else if what == "metric" && self.document.lets.contains_key(name) {
+                self.faults.push(Fault::new(place.clone(), message).help("choose another name"));
+            } else if what == "metric" && document.lets.contains_key(name) {
                 let message = format!("`{name}` is a `let` and a metric");
-                faults.push(Fault::new(place.clone(), message).help("choose another name for one of them"));
+                self.faults.push(Fault::new(place.clone(), message).help("choose another name for one of them"));
             }
         }
-        self.faults.append(&mut faults);
     }
 
     fn definition(&mut self, name: &str) -> Option<Bound> {
@@ -173,10 +173,6 @@ impl Binder<'_> {
             }
             None => self.refuse(Fault::new(place, "a metric that is always null is never defined")),
         }
-    }
-
-    fn filter(&mut self, written: &Written) -> Option<NodeId> {
-        self.condition(written, "a filter of episodes").map(|bound| bound.node)
     }
 
     fn condition(&mut self, written: &Written, what: &str) -> Option<Bound> {

@@ -151,7 +151,6 @@ pub struct Factor {
 }
 
 impl Factor {
-    /// The experiments of the group, from the smallest value to the largest.
     pub fn doses(&self) -> Vec<(&str, f64)> {
         let mut doses: Vec<(&str, f64)> = self.values.iter().map(|(name, value)| (name.as_str(), *value)).collect();
         doses.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(b.0)));

@@ -36,7 +36,6 @@ impl Relations {
         found
     }
 
-    /// The rate that is defined if this duration finished.
     pub fn finished(&self, duration: &str) -> Option<&str> {
         self.durations.iter().find(|(known, _)| known == duration).map(|(_, finished)| finished.as_str())
     }
@@ -57,7 +56,6 @@ struct Completed {
     moment: Expr,
 }
 
-/// The value of an expression if a moment is null.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Without {
     Null,
@@ -133,7 +131,6 @@ impl Reader<'_> {
         }
     }
 
-    /// A `let` or another metric that is always defined.
     fn of_name(&self, moment: &Expr, name: &str, depth: usize) -> Without {
         let metric =
             || self.catalog.metric.get(name).filter(|metric| metric.when.is_none()).map(|metric| &metric.value);
@@ -144,7 +141,6 @@ impl Reader<'_> {
     }
 }
 
-/// The operands of `and` in an expression.
 fn conditions(expr: &Expr) -> Vec<&Expr> {
     match &expr.kind {
         ExprKind::Binary(BinaryOp::And, x, y) => conditions(x).into_iter().chain(conditions(y)).collect(),
@@ -157,7 +153,7 @@ mod tests {
     use super::Relations;
     use crate::definitions::Definitions;
     use crate::file::built_in;
-    use crate::schema_columns::schema_columns;
+    use crate::tests::schema_columns;
 
     fn of(text: &str) -> Relations {
         Relations::of(&Definitions::from_toml("test", text, &schema_columns()).unwrap().catalog)

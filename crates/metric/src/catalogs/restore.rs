@@ -75,7 +75,7 @@ mod tests {
     use crate::columns::Columns;
     use crate::definitions::Definitions;
     use crate::file::built_in_names;
-    use crate::schema_columns::schema_columns;
+    use crate::tests::schema_columns;
 
     fn columns() -> Columns {
         schema_columns()

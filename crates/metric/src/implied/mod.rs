@@ -24,7 +24,6 @@ pub enum Defined {
     Always,
     Where {
         metric: String,
-        /// True for 1.
         is: bool,
     },
     /// Some, by a rule that is not another metric.
@@ -143,7 +142,7 @@ impl Reader<'_> {
 mod tests {
     use super::{Defined, Implied, Restricted, implied};
     use crate::definitions::Definitions;
-    use crate::schema_columns::{has_value, schema_columns};
+    use crate::tests::{has_value, schema_columns};
 
     fn of(metrics: &str) -> Implied {
         let plan = Definitions::from_toml("test", metrics, &schema_columns()).unwrap().plan;

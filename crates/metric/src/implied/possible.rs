@@ -67,7 +67,6 @@ impl Possible {
     }
 }
 
-/// The most moments for which both cases, present and absent, are examined.
 const MOST_MOMENTS: usize = 6;
 
 #[derive(Clone, Copy)]

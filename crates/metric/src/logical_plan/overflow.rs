@@ -12,7 +12,6 @@ pub(crate) type Range = (i128, i128);
 /// All integers of 64 bits.
 pub(crate) const ALL: Range = (i64::MIN as i128, i64::MAX as i128);
 
-/// A node whose value may exceed 64 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Suspect {
     pub node: NodeId,
@@ -49,7 +48,6 @@ pub fn may_overflow(
     found
 }
 
-/// The range of an operation, beyond 64 bits if it may overflow.
 fn range(op: &Op, rows: i128, column: impl Fn(&str) -> Option<(i64, i64)>, of: impl Fn(NodeId) -> Range) -> Range {
     match op {
         Op::Column(name) => column(name).map_or(ALL, |(low, high)| (low.into(), high.into())),

@@ -56,7 +56,6 @@ pub enum Op {
     Negate(NodeId),
     /// The value after the first condition that is true, else the last value, else null.
     Case {
-        /// Conditions and values, in order.
         branches: Vec<(NodeId, NodeId)>,
         otherwise: Option<NodeId>,
     },
@@ -111,11 +110,8 @@ impl Comparison {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Arithmetic {
-    /// `x + y`
     Add,
-    /// `x - y`
     Subtract,
-    /// `x * y`
     Multiply,
     /// `div(x, y)`: only integers; rounds towards zero; null if y is 0.
     Quotient,

@@ -106,7 +106,7 @@ mod tests {
     use crate::columns::{Column, Columns, Level, Type};
     use crate::definitions::Definitions;
     use crate::file::built_in_names;
-    use crate::schema_columns::schema_columns;
+    use crate::tests::schema_columns;
 
     fn plan(text: &str) -> Plan {
         let columns = [

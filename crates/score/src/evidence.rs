@@ -316,7 +316,6 @@ fn as_t(row: usize) -> i64 {
     i64::try_from(row).map_or(i64::MAX, |row| row + 1)
 }
 
-/// Timesteps as ranges: `3-7, 9`.
 pub fn ranges(timesteps: &[i64]) -> String {
     let mut runs: Vec<(i64, i64)> = Vec::new();
     for &t in timesteps {

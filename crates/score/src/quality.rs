@@ -20,7 +20,6 @@ use trace::replies::{REPLY_STATUS, ReplyCounts};
 use trace::scan::EpisodeBatch;
 use trace::schema::{self, Column, Kind};
 
-/// The columns that quality is read from, if the traces have them.
 const READ: [&str; 7] =
     [REPLY_STATUS, "reply_repair", "reply_fault", "latency_ms", "prompt_tokens", "completion_tokens", "cost_usd"];
 /// The separator between the repairs of one reply.
@@ -99,12 +98,10 @@ impl Quality {
         self.statuses.values().sum()
     }
 
-    /// Replies that gave no decision.
     pub fn unusable(&self) -> u64 {
         self.unread().map(|(_, replies)| replies).sum()
     }
 
-    /// The statuses of replies that gave no decision, with counts.
     pub fn unread(&self) -> impl Iterator<Item = (&String, &u64)> {
         self.statuses.iter().filter(|(status, _)| !ReplyCounts::is_read(status))
     }
@@ -224,12 +221,10 @@ impl QualityReader {
         Self { columns, has_condition }
     }
 
-    /// The columns with one value per step that the scan must deliver.
     pub fn columns(&self) -> &[String] {
         &self.columns
     }
 
-    /// The columns with one value per episode that the scan must deliver.
     pub fn constants(&self) -> Option<String> {
         self.has_condition.then(|| CONDITION.to_owned())
     }

@@ -25,7 +25,6 @@ use trace::scan::{EPISODE_COLUMNS, EpisodeBatch, Projection};
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Request {
     pub definitions: PathBuf,
-    /// The names of the metrics; all if absent.
     pub metrics: Option<Vec<String>>,
     /// A condition on episodes in the language of definitions; all episodes if absent.
     pub condition: Option<String>,
@@ -64,7 +63,6 @@ pub fn checked(traces: &TraceSet, mut definitions: Definitions) -> Result<Defini
     Ok(definitions)
 }
 
-/// The most cells whose replies are counted.
 const MOST_CELLS: Limit = Limit::new("experiments times models times conditions whose replies are counted", 100_000);
 
 /// The outputs of a scan besides the metrics.
@@ -83,7 +81,6 @@ pub struct Outputs<'a> {
 /// The results of one scan, with the tables as an array of known length or as a vector.
 #[derive(Clone, Debug)]
 pub struct Scored<T> {
-    /// A table per definitions, with the episodes that its filter keeps.
     pub tables: T,
     /// The timelines of the first definitions, in key order. `None` if they were not requested, or if the definitions
     /// do not name their moments.

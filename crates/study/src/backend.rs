@@ -57,7 +57,6 @@ impl SparkJob {
         Ok(Self { sources, definitions, labels, cluster, read })
     }
 
-    /// For URIs, which only Spark can read.
     pub fn of_uris(uris: Vec<String>, question: &Question, cluster: Cluster) -> Result<Self, StudyError> {
         let definitions = question.bind_to(&score::vocabulary::unknown_columns())?;
         let (sources, labels, read) = (Sources::Uris(uris), question.labels(), Vec::new());

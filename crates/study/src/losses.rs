@@ -33,9 +33,7 @@ pub enum LostAs {
 #[derive(Debug)]
 pub(super) struct Counted {
     pub results: Results,
-    /// All episodes, if some are excluded or added.
     pub all: Option<EpisodeTable>,
-    /// The number of lost episodes, counted or not.
     pub lost: LostCounts,
 }
 

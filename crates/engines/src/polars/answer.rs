@@ -44,7 +44,6 @@ pub struct Excerpt {
     pub columns: Vec<(String, String)>,
     /// The first rows, `None` for null.
     pub head: Vec<Vec<Option<String>>>,
-    /// The last rows that are not among the first.
     pub tail: VecDeque<Vec<Option<String>>>,
     pub rows: usize,
 }

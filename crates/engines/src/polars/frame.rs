@@ -71,7 +71,6 @@ pub fn steps(traces: &TraceSet, columns: &[FrameColumn]) -> Result<LazyFrame, Po
     Ok(if labels.is_empty() { frame } else { frame.with_columns(labels) })
 }
 
-/// A label column: true and false by lists of ids, null elsewhere.
 fn label(labels: &Labels, name: &str) -> Expr {
     let ids = |wanted: bool| {
         let ids: Vec<&str> = labels.episodes().filter(|id| labels.value(name, id) == Some(wanted)).collect();

@@ -43,7 +43,6 @@ pub(super) enum Asked {
 
 const QUERY: Grammar = Grammar { noun: "query", one: "a query", longest: 64 * 1024, most_tokens: 8000, help: None };
 
-/// Parses a query and checks that it reads only the tables.
 pub fn check(text: &str) -> Result<Checked, Faults> {
     with_stack(text, || checked(text))
 }
@@ -112,7 +111,6 @@ impl Checked {
     }
 }
 
-/// The remedy if Polars SQL cannot express a question.
 const OTHERWISE: &str = "ask with a JOIN or a table of WITH; or ask DuckDB, of the file that `mirrorstats score TRACES -o \
                          scores.parquet` writes, or in Python of `study.episodes`";
 

@@ -37,7 +37,6 @@ pub(super) enum Refused {
     Rule { fault: Option<Fault>, faults: u64 },
 }
 
-/// The first episode that breaks a rule.
 #[derive(Debug, Deserialize)]
 pub(super) struct Fault {
     episode: Option<String>,

@@ -35,7 +35,6 @@ fn on_path(path: &OsStr) -> Option<PathBuf> {
     env::split_paths(path).map(|folder| folder.join("spark-submit")).find(|program| program.is_file())
 }
 
-/// The Python that Spark would use.
 fn python() -> String {
     let chosen = ["PYSPARK_DRIVER_PYTHON", "PYSPARK_PYTHON"].into_iter().find_map(|name| env::var(name).ok());
     chosen.unwrap_or_else(|| "python3".to_owned())

@@ -36,7 +36,6 @@ impl Place {
         self.0.path().join("answer.json")
     }
 
-    /// The default path of Spark's log.
     pub(super) fn log(&self) -> PathBuf {
         self.0.path().join("log")
     }
@@ -70,7 +69,6 @@ pub(super) struct Request {
 }
 
 impl Request {
-    /// The request for a job; `folder` is a URI.
     pub(super) fn new(
         job: Job<'_>,
         cluster: &Cluster,

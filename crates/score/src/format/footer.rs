@@ -3,7 +3,6 @@
 use parquet::file::metadata::FileMetaData;
 use serde_json::Value;
 
-/// Spark's key for column metadata, the only key that it writes.
 const SPARK_COLUMNS: &str = "org.apache.spark.sql.parquet.row.metadata";
 
 /// The value of a key: of the file itself, or of one of its columns in Spark's files.

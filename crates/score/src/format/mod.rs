@@ -107,7 +107,6 @@ pub fn read_text(format: Format, catalog: &Catalog, input: impl Read) -> Result<
     })
 }
 
-/// Reads a table with its own definitions, or with those of its partition.
 pub fn read_parquet(input: TableFile, partition: &Partition<'_>) -> Result<EpisodeTable, FormatError> {
     checked(parquet::read(input, partition)?)
 }

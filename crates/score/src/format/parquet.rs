@@ -32,7 +32,6 @@ use trace::{FlatRows, TableFile};
 
 pub const KIND_KEY: &str = "mirrorstats.kind";
 pub const SCORES_KIND: &str = "scores";
-/// The footer key of the definitions, as JSON (a `Catalog`).
 pub const DEFINITIONS_KEY: &str = "mirrorstats.definitions";
 pub const HASH_KEY: &str = "mirrorstats.definitions_hash";
 
@@ -85,7 +84,6 @@ pub struct Encoder<'a> {
     groups: Vec<Mutex<Vec<Option<ArrowColumnWriter>>>>,
 }
 
-/// Takes encoded columns, in the order of the jobs.
 pub struct Writer<W: Write + Send> {
     file: SerializedFileWriter<Held<W>>,
     columns: usize,
@@ -104,7 +102,6 @@ pub fn encoder<W: Write + Send>(table: &EpisodeTable, out: W) -> Result<(Encoder
 }
 
 impl Encoder<'_> {
-    /// All jobs, in the order that a writer expects.
     pub fn jobs(&self) -> impl Iterator<Item = Job> + use<> {
         let columns = self.schema.fields().len();
         (0..self.groups.len()).flat_map(move |group| (0..columns).map(move |column| Job { group, column }))

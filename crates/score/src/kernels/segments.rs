@@ -294,7 +294,6 @@ pub(crate) fn truths(values: &BooleanArray) -> BooleanBuffer {
     }
 }
 
-/// A null buffer, if any value is null.
 pub(crate) fn nulls_of(valid: &[bool]) -> Option<NullBuffer> {
     if valid.iter().all(|&valid| valid) {
         None

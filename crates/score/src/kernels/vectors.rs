@@ -17,7 +17,6 @@ use metric::plan::Constant;
 use parquet_pages::bits;
 use trace::scan::Texts;
 
-/// The result of one step. The physical plan determines its form.
 #[derive(Clone, Debug)]
 pub(crate) enum Vector {
     /// Truth values, integers, floats, or text symbols ([`Symbols`]): one per timestep, one per episode, or one that

@@ -91,9 +91,7 @@ pub enum Kernel {
         otherwise: StepId,
     },
     Coalesce(Vec<StepId>),
-    /// True where the text of a key contains a match of a pattern.
     KeysMatch(StepId, String),
-    /// True where the text of a symbol contains a match of a pattern.
     SymbolsMatch(StepId, String),
     IntFromBool(StepId),
     FloatFromInt(StepId),
@@ -104,7 +102,6 @@ pub enum Kernel {
     Search {
         aggregate: Aggregate,
         condition: StepId,
-        /// A [`Kernel::Within`].
         within: Option<StepId>,
     },
     /// `all`, `min`, `max` or `sum` of a value per timestep.
@@ -177,7 +174,6 @@ pub struct Scores {
     pub filter: Option<StepId>,
 }
 
-/// The steps that compute all requested outputs, operands before their users.
 #[derive(Clone, Debug, Default)]
 pub struct PhysicalPlan {
     steps: Vec<Step>,

@@ -39,7 +39,6 @@ impl TableBuilder {
         &self.header
     }
 
-    /// Adds a row: a value for each label and metric of the header.
     pub fn push<'a>(
         &mut self,
         key: KeyRef<'_>,
@@ -63,7 +62,6 @@ impl TableBuilder {
         self.metrics.iter_mut().zip(metrics).for_each(|(builder, column)| builder.extend(column));
     }
 
-    /// All rows, in key order.
     pub fn finish(self) -> EpisodeTable {
         let Header { catalog, labels, metrics } = self.header;
         let keys = self.keys.finish();

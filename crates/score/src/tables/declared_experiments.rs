@@ -46,7 +46,6 @@ impl Declarations {
     }
 }
 
-/// Adds to a catalog the experiments that the traces declare and it lacks.
 pub fn declare(catalog: &mut Catalog, traces: &TraceSet) -> Result<(), DeclarationError> {
     let (declarations, errors) = declarations(catalog, traces);
     if let Some(error) = errors.into_iter().next() {

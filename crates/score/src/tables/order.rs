@@ -51,7 +51,6 @@ fn compared(keys: &EpisodeKeys) -> Vec<u32> {
     order
 }
 
-/// Sorts rows with equal experiment, model, seed and run by their ids.
 fn sort_equal<N: Eq>(keys: &EpisodeKeys, order: &mut [u32], key: impl Fn(usize) -> N) {
     let mut start = 0;
     for end in 1..=order.len() {
@@ -117,7 +116,6 @@ impl Span {
     }
 }
 
-/// The rank of each code's text in a column, by UTF-8 bytes.
 fn ranks(column: &TextColumn) -> Vec<u32> {
     let mut codes: Vec<u32> = (0..narrow(column.texts.len())).collect();
     codes.sort_unstable_by_key(|code| column.texts.value(*code as usize));

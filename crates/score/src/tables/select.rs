@@ -88,7 +88,6 @@ pub fn truths_of(label: &LabelColumn) -> impl Iterator<Item = Option<bool>> + '_
     label.values.iter().map(|text| text.map(|text| text == "true"))
 }
 
-/// The table as typed columns for the engine.
 fn columns(table: &EpisodeTable) -> Vec<(&str, Type, ArrayRef)> {
     let text = |values: Vec<Option<&str>>| {
         (Type::Text, Arc::new(values.into_iter().collect::<DictionaryArray<Int32Type>>()) as ArrayRef)

@@ -103,7 +103,6 @@ pub(crate) enum MetricValues {
 pub struct Header {
     pub catalog: Catalog,
     pub labels: Vec<String>,
-    /// The names of the metrics, in their order.
     pub metrics: Vec<String>,
 }
 

@@ -258,7 +258,6 @@ impl Pair {
         })
     }
 
-    /// The changes of the requested metrics, in table order.
     pub(crate) fn changes(&self, by: &[String], style: &Style) -> Result<Changes, StudyError> {
         let mut changes = Changes::of(&self.before.table, &self.after.table, by)?;
         changes.metrics = Overlap::of(&self.before.metrics, &self.after.metrics);

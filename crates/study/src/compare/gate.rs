@@ -127,7 +127,6 @@ pub(crate) fn check_metric<'t>(table: &'t EpisodeTable, name: &str) -> Result<&'
     })
 }
 
-/// The deciding steps and values of some episodes, and pages with frames.
 #[derive(Default)]
 struct Shown {
     evidence: BTreeMap<String, (Option<i64>, Vec<i64>)>,

@@ -30,7 +30,6 @@ use trace::schema::domain::Domain;
 
 /// The column that a threshold applies to.
 const PIXELS: &str = "mirror_self_px";
-/// The `let` that is true at steps with evidence.
 const EVIDENCE: &str = "visible";
 /// The column that records evidence as ground truth.
 const GROUND_TRUTH: &str = "mirror_visible";
@@ -150,7 +149,6 @@ struct Scored {
 struct Trial {
     thresholds: Vec<u32>,
     definitions: Vec<Definitions>,
-    /// Counts the steps of each episode without recorded pixels.
     pixels: Definitions,
     lost: Option<Definitions>,
     reference: Reference,

@@ -19,13 +19,11 @@ use trace::schema::Domain;
 /// Experiments that the same definitions score.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ScoredAlike {
-    /// The definitions, by name or by the original path of their file.
     pub definitions: String,
     /// SHA-256 of a definition file that is not built in.
     pub hash: Option<String>,
     /// The experiments by name, without those that no footer names.
     pub experiments: BTreeSet<String>,
-    /// A condition that keeps only their episodes.
     pub condition: String,
 }
 

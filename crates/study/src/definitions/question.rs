@@ -74,7 +74,6 @@ impl Question {
         self.applied(self.load(columns)?, columns)
     }
 
-    /// The definitions with the filter and the metrics of the question.
     pub(crate) fn applied(&self, mut definitions: Definitions, columns: &Columns) -> Result<Definitions, StudyError> {
         if let Some(filter) = &self.filter {
             definitions = definitions.filtered("--where", filter, columns)?;

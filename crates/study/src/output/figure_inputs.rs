@@ -44,7 +44,6 @@ pub(crate) struct FigureInputs<'a> {
     remark: Option<String>,
 }
 
-/// The most models that a figure shows well.
 pub const MANY_MODELS: usize = 20;
 
 /// The number of models in a report's figures if there are more than [`MANY_MODELS`].
@@ -116,7 +115,6 @@ impl Drawings {
         self.drawn.iter().map(|(_, figure)| figure.inline_svg()).collect()
     }
 
-    /// The figures for a page, with the SVG of each.
     pub(crate) fn on_page<'a>(&'a self, svgs: &'a [String]) -> Vec<html::Figure<'a>> {
         let figure = |((name, drawn), svg): (&'a (FigureName, Figure), &'a String)| html::Figure {
             name: name.name(),

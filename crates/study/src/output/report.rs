@@ -71,7 +71,6 @@ pub struct Report {
 
 #[derive(Clone, Debug)]
 pub struct WrittenReport {
-    /// The paths of its files inside the folder, in order.
     pub files: Vec<String>,
     pub manifest: Manifest,
 }

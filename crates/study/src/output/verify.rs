@@ -62,7 +62,6 @@ pub enum Kind {
     Unexpected,
 }
 
-/// An error of verifying a folder.
 #[derive(Debug, thiserror::Error)]
 pub enum VerifyError {
     #[error("{}: expected a report's folder with its {MANIFEST}, found {found}; name the folder that `mirrorstats report` wrote", path.display())]
@@ -73,7 +72,6 @@ pub enum VerifyError {
     Unreadable { path: PathBuf, source: io::Error },
 }
 
-/// Compares the files of a folder with its manifest.
 pub fn verify(folder: &Path) -> Result<Verification, VerifyError> {
     let listed = listed(folder)?;
     let mut there = BTreeMap::new();
@@ -93,7 +91,6 @@ pub fn verify(folder: &Path) -> Result<Verification, VerifyError> {
     Ok(Verification { files: listed.len(), differences })
 }
 
-/// The files that the manifest of a folder lists, by path.
 fn listed(folder: &Path) -> Result<BTreeMap<String, Output>, VerifyError> {
     let path = folder.join(MANIFEST);
     let none = |found: String| VerifyError::NoManifest { path: folder.to_owned(), found };
@@ -122,7 +119,6 @@ fn listed(folder: &Path) -> Result<BTreeMap<String, Output>, VerifyError> {
     Ok(listed)
 }
 
-/// The reason why an output cannot be a file of a report.
 fn fault(output: &Output) -> Option<String> {
     let shown = visible(&output.path);
     let is_plain = |part: &str| matches!(Path::new(part).components().collect::<Vec<_>>()[..], [Component::Normal(_)]);
@@ -187,7 +183,6 @@ fn kind_of(about: &Metadata) -> &'static str {
 }
 
 impl Verification {
-    /// Returns true if all files match the manifest and there are no others.
     pub fn holds(&self) -> bool {
         self.differences.is_empty()
     }

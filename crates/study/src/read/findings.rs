@@ -40,7 +40,6 @@ impl ExpectedTraces {
     }
 }
 
-/// The most findings printed for each file and rule.
 const SHOWN: usize = 10;
 
 pub fn findings(definitions: &Path, inputs: &[Input], threads: NonZeroUsize) -> Result<Validation, StudyError> {

@@ -140,7 +140,6 @@ fn state_of(path: &std::path::Path) -> io::Result<FileState> {
     std::fs::metadata(path).map(|metadata| FileState::of(&metadata))
 }
 
-/// The inputs as a manifest names them, with their hashes.
 pub(crate) fn hashes(inputs: &[Input]) -> Result<Vec<bundle::Input>, StudyError> {
     inputs.iter().map(hash_of).collect()
 }

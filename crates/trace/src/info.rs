@@ -184,12 +184,17 @@ pub fn info(set: &TraceSet, listing: Listing, threads: NonZeroUsize) -> Result<I
     )?;
     let (mut files, mut grid) = (Vec::with_capacity(set.files().len()), Grid::default());
     let counts = std::mem::take(&mut tally.files);
-    let files_left = set.files().iter().zip(counts).map(|(file, episodes)| Rest::File(file, episodes));
-    let rest: Vec<Rest<'_>> = std::iter::once(Rest::Grid(Mutex::new(tally))).chain(files_left).collect();
-    in_order(threads, &rest, Rest::done, |done| {
-        match done {
+    let tally = Mutex::new(tally);
+    // Sorting the grid takes as long as hashing the files, so both run at once.
+    let jobs: Vec<_> = std::iter::once(None).chain(set.files().iter().zip(counts).map(Some)).collect();
+    let work = |job: &Option<(&TraceFile, u64)>| match job {
+        None => Ok(Done::Grid(std::mem::take(&mut *tally.lock().unwrap_or_else(PoisonError::into_inner)).grid())),
+        Some((file, episodes)) => about(file, *episodes).map(Done::File),
+    };
+    in_order(threads, &jobs, work, |done| {
+        match done? {
             Done::Grid(found) => grid = found,
-            Done::File(about) => files.push(about?),
+            Done::File(about) => files.push(about),
         }
         Ok::<_, TraceError>(())
     })?;
@@ -218,26 +223,9 @@ fn over_budget(set: &TraceSet, exceeded: &Exceeded) -> TraceError {
     Finding::over_budget(set.files().first().map_or("", TraceFile::name), exceeded).into()
 }
 
-/// The work after all steps are read: sorting takes as long as hashing the files, so both run at once.
-enum Rest<'a> {
-    Grid(Mutex<Tally>),
-    File(&'a TraceFile, u64),
-}
-
 enum Done {
     Grid(Grid),
-    File(Result<FileInfo, TraceError>),
-}
-
-impl Rest<'_> {
-    fn done(&self) -> Done {
-        match self {
-            Self::Grid(tally) => {
-                Done::Grid(std::mem::take(&mut *tally.lock().unwrap_or_else(PoisonError::into_inner)).grid())
-            }
-            Self::File(file, episodes) => Done::File(about(file, *episodes)),
-        }
-    }
+    File(FileInfo),
 }
 
 fn distinct<T: Ord>(values: impl Iterator<Item = T>) -> Vec<T> {

@@ -292,9 +292,9 @@ struct Solid {
     #[prost(message, optional, tag = "1")]
     pose: Option<Pose>,
     #[prost(message, optional, tag = "2")]
-    size: Option<Vector>,
+    size: Option<Numbers>,
     #[prost(message, optional, tag = "3")]
-    color: Option<Rgba>,
+    color: Option<Numbers>,
 }
 
 #[derive(Clone, PartialEq, prost::Message)]
@@ -302,31 +302,22 @@ struct Cylinder {
     #[prost(message, optional, tag = "1")]
     pose: Option<Pose>,
     #[prost(message, optional, tag = "2")]
-    size: Option<Vector>,
+    size: Option<Numbers>,
     #[prost(message, optional, tag = "5")]
-    color: Option<Rgba>,
+    color: Option<Numbers>,
 }
 
 #[derive(Clone, PartialEq, prost::Message)]
 struct Pose {
     #[prost(message, optional, tag = "1")]
-    position: Option<Vector>,
+    position: Option<Numbers>,
     #[prost(message, optional, tag = "2")]
-    orientation: Option<Quaternion>,
+    orientation: Option<Numbers>,
 }
 
+/// `foxglove.Vector3`, a unit quaternion or a colour, which are alike: up to four numbers.
 #[derive(Clone, Copy, PartialEq, prost::Message)]
-struct Vector {
-    #[prost(double, tag = "1")]
-    x: f64,
-    #[prost(double, tag = "2")]
-    y: f64,
-    #[prost(double, tag = "3")]
-    z: f64,
-}
-
-#[derive(Clone, Copy, PartialEq, prost::Message)]
-struct Quaternion {
+struct Numbers {
     #[prost(double, tag = "1")]
     x: f64,
     #[prost(double, tag = "2")]
@@ -335,18 +326,6 @@ struct Quaternion {
     z: f64,
     #[prost(double, tag = "4")]
     w: f64,
-}
-
-#[derive(Clone, Copy, PartialEq, prost::Message)]
-struct Rgba {
-    #[prost(double, tag = "1")]
-    r: f64,
-    #[prost(double, tag = "2")]
-    g: f64,
-    #[prost(double, tag = "3")]
-    b: f64,
-    #[prost(double, tag = "4")]
-    a: f64,
 }
 
 fn shapes(data: &[u8]) -> Vec<Shape> {
@@ -364,7 +343,7 @@ fn of_entity(entity: &Entity) -> Vec<Shape> {
     cubes.chain(spheres).chain(posts).collect()
 }
 
-fn boxed(name: &str, pose: &Pose, size: Vector, color: Rgba) -> Option<Shape> {
+fn boxed(name: &str, pose: &Pose, size: Numbers, color: Numbers) -> Option<Shape> {
     let (at, turn) = (pose.position?, pose.orientation?);
     let corner = |x: f64, y: f64, z: f64| {
         let [dx, dy, _] = turned(turn, [x * size.x / 2.0, y * size.y / 2.0, z * size.z / 2.0]);
@@ -375,18 +354,18 @@ fn boxed(name: &str, pose: &Pose, size: Vector, color: Rgba) -> Option<Shape> {
     Some(Shape { name: name.to_owned(), outline, radius: None, rgba: rgba(color), height: at.z })
 }
 
-fn round(name: &str, pose: &Pose, size: Vector, color: Rgba) -> Option<Shape> {
+fn round(name: &str, pose: &Pose, size: Numbers, color: Numbers) -> Option<Shape> {
     let at = pose.position?;
     let radius = Some(size.x / 2.0);
     Some(Shape { name: name.to_owned(), outline: vec![[at.x, at.y]], radius, rgba: rgba(color), height: at.z })
 }
 
-fn rgba(color: Rgba) -> [f64; 4] {
-    [color.r, color.g, color.b, color.a]
+fn rgba(color: Numbers) -> [f64; 4] {
+    [color.x, color.y, color.z, color.w]
 }
 
 /// A vector rotated by a unit quaternion.
-fn turned(turn: Quaternion, vector: [f64; 3]) -> [f64; 3] {
+fn turned(turn: Numbers, vector: [f64; 3]) -> [f64; 3] {
     let cross =
         |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
     let axis = [turn.x, turn.y, turn.z];
@@ -426,7 +405,7 @@ pub fn hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
 mod tests {
     use std::path::Path;
 
-    use super::{LogIndex, Quaternion, hull, turned, unfinished};
+    use super::{LogIndex, Numbers, hull, turned, unfinished};
     use crate::log::read::{Event, LogReader, png};
 
     #[test]
@@ -469,7 +448,7 @@ mod tests {
     #[test]
     fn a_quarter_turn_and_a_hull() {
         let half = std::f64::consts::FRAC_1_SQRT_2;
-        let [x, y, _] = turned(Quaternion { x: 0.0, y: 0.0, z: half, w: half }, [1.0, 0.0, 0.0]);
+        let [x, y, _] = turned(Numbers { x: 0.0, y: 0.0, z: half, w: half }, [1.0, 0.0, 0.0]);
         assert!(x.abs() < 1e-9 && (y - 1.0).abs() < 1e-9);
         let square = vec![[0.0, 0.0], [1.0, 1.0], [0.0, 1.0], [1.0, 0.0], [0.5, 0.5]];
         assert_eq!(hull(square), [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]);

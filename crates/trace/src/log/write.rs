@@ -13,6 +13,7 @@ use mcap::Writer;
 use mcap::records::MessageHeader;
 use schemars::schema_for;
 use serde::Serialize;
+use serde_json::json;
 
 use super::assemble::writer;
 use super::error::LogError;
@@ -74,21 +75,13 @@ const ROOM: &str = "room";
 pub struct EpisodeLog {
     path: PathBuf,
     out: Writer<Out>,
-    channels: Channels,
+    /// The number of each topic.
+    channels: BTreeMap<&'static str, u16>,
     sequence: u32,
     is_read_meanwhile: bool,
 }
 
 type Out = BufWriter<NewFile>;
-
-struct Channels {
-    episode: u16,
-    camera: u16,
-    transforms: u16,
-    scene: u16,
-    census: u16,
-    decision: u16,
-}
 
 impl EpisodeLog {
     /// Starts the log for `path`; `census` is the JSON Schema of a census.
@@ -97,10 +90,9 @@ impl EpisodeLog {
         let mut out = writer(BufWriter::new(file)).map_err(LogError::writing(path))?;
         let channels = channels(&mut out, census).map_err(LogError::writing(path))?;
         let mut log = Self { path: path.to_owned(), out, channels, sequence: 0, is_read_meanwhile: true };
-        let channel = log.channels.episode;
         // The hash of its rows is not known before its end, which holds it.
         let head = Episode { episode_hash: None, ..head.clone() };
-        log.json(channel, time, &EpisodeMessage::Begin(Box::new(head)))?;
+        log.json(topic::EPISODE, time, &EpisodeMessage::Begin(Box::new(head)))?;
         log.flush()?;
         Ok(log)
     }
@@ -115,18 +107,17 @@ impl EpisodeLog {
                 data: png.to_vec().into(),
                 format: "png".to_owned(),
             };
-            self.protobuf(self.channels.camera, time, &image)?;
+            self.protobuf(topic::CAMERA, time, &image)?;
         }
         let transforms = view.placed.iter().map(|placed| transform(placed, stamp)).collect();
-        self.protobuf(self.channels.transforms, time, &FrameTransforms { transforms })?;
+        self.protobuf(topic::TRANSFORMS, time, &FrameTransforms { transforms })?;
         let entities = view.solids.iter().map(|solid| entity(solid, stamp)).collect();
-        self.protobuf(self.channels.scene, time, &SceneUpdate { deletions: Vec::new(), entities })?;
-        self.json(self.channels.census, time, view.census)
+        self.protobuf(topic::SCENE, time, &SceneUpdate { deletions: Vec::new(), entities })?;
+        self.json(topic::CENSUS, time, view.census)
     }
 
     pub fn decided(&mut self, time: u64, row: &Decision) -> Result<(), LogError> {
-        let channel = self.channels.decision;
-        self.json(channel, time, row)?;
+        self.json(topic::DECISION, time, row)?;
         if self.is_read_meanwhile { self.flush() } else { Ok(()) }
     }
 
@@ -150,55 +141,55 @@ impl EpisodeLog {
             fingerprint: fingerprint.clone(),
             episode_hash: Some(episode_hash::of(episode)),
         };
-        self.json(self.channels.episode, time, &end)?;
+        self.json(topic::EPISODE, time, &end)?;
         self.out.finish().map_err(LogError::writing(&self.path))?;
         let failed = |error| LogError::io("write", &self.path)(error);
         let file = self.out.into_inner().into_inner().map_err(|error| failed(error.into_error()))?;
         file.commit().map_err(failed)
     }
 
-    fn json(&mut self, channel: u16, time: u64, message: &impl Serialize) -> Result<(), LogError> {
+    fn json(&mut self, topic: &str, time: u64, message: &impl Serialize) -> Result<(), LogError> {
         let data = serde_json::to_vec(message).map_err(|error| LogError::io("write", &self.path)(error.into()))?;
-        self.write(channel, time, &data)
+        self.write(topic, time, &data)
     }
 
-    fn protobuf(&mut self, channel: u16, time: u64, message: &impl Encode) -> Result<(), LogError> {
+    fn protobuf(&mut self, topic: &str, time: u64, message: &impl Encode) -> Result<(), LogError> {
         let mut data = Vec::with_capacity(message.encoded_len().unwrap_or_default());
         let encoded = message.encode(&mut data);
         encoded.map_err(|error| LogError::io("write", &self.path)(std::io::Error::other(error.to_string())))?;
-        self.write(channel, time, &data)
+        self.write(topic, time, &data)
     }
 
-    fn write(&mut self, channel_id: u16, time: u64, data: &[u8]) -> Result<(), LogError> {
+    fn write(&mut self, topic: &str, time: u64, data: &[u8]) -> Result<(), LogError> {
         self.sequence += 1;
+        let channel_id = self.channels[topic];
         let header = MessageHeader { channel_id, sequence: self.sequence, log_time: time, publish_time: time };
         self.out.write_to_known_channel(&header, data).map_err(LogError::writing(&self.path))
     }
 }
 
-fn channels(out: &mut Writer<Out>, census: &serde_json::Value) -> mcap::McapResult<Channels> {
-    let mut json = |name: &str, title: &str, schema: &serde_json::Value| {
+fn channels(out: &mut Writer<Out>, census: &serde_json::Value) -> mcap::McapResult<BTreeMap<&'static str, u16>> {
+    let json = [
+        (topic::EPISODE, "mirrorstats.Episode", json!(schema_for!(EpisodeMessage))),
+        (topic::CENSUS, "mirrorstats.Census", census.clone()),
+        (topic::DECISION, "mirrorstats.Decision", json!(schema_for!(Decision))),
+    ];
+    let protobuf = [
+        (topic::CAMERA, CompressedImage::get_schema()),
+        (topic::TRANSFORMS, FrameTransforms::get_schema()),
+        (topic::SCENE, SceneUpdate::get_schema()),
+    ];
+    let mut channels = BTreeMap::new();
+    for (topic, title, schema) in json {
         let schema = out.add_schema(title, "jsonschema", schema.to_string().as_bytes())?;
-        out.add_channel(schema, name, "json", &BTreeMap::new())
-    };
-    let episode = json(topic::EPISODE, "mirrorstats.Episode", &serde_json::json!(schema_for!(EpisodeMessage)))?;
-    let census = json(topic::CENSUS, "mirrorstats.Census", census)?;
-    let decision = json(topic::DECISION, "mirrorstats.Decision", &serde_json::json!(schema_for!(Decision)))?;
-    let mut protobuf = |name: &str, schema: Option<Schema>| {
-        let schema = match schema {
-            Some(schema) => out.add_schema(&schema.name, &schema.encoding, &schema.data)?,
-            None => 0,
-        };
-        out.add_channel(schema, name, "protobuf", &BTreeMap::new())
-    };
-    Ok(Channels {
-        episode,
-        census,
-        decision,
-        camera: protobuf(topic::CAMERA, CompressedImage::get_schema())?,
-        transforms: protobuf(topic::TRANSFORMS, FrameTransforms::get_schema())?,
-        scene: protobuf(topic::SCENE, SceneUpdate::get_schema())?,
-    })
+        channels.insert(topic, out.add_channel(schema, topic, "json", &BTreeMap::new())?);
+    }
+    for (topic, schema) in protobuf {
+        let add = |schema: Schema| out.add_schema(&schema.name, &schema.encoding, &schema.data);
+        let schema = schema.map_or(Ok(0), add)?;
+        channels.insert(topic, out.add_channel(schema, topic, "protobuf", &BTreeMap::new())?);
+    }
+    Ok(channels)
 }
 
 fn vector([x, y, z]: [f64; 3]) -> Vector3 {

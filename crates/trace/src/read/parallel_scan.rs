@@ -291,7 +291,10 @@ impl<T, E: From<TraceError>, W: Fn(Episodes) -> T, R: FnMut(usize, Event<T>) -> 
                 started.push_back(Started { job, parts: listen, _footer: footer });
             }
             let Some(Started { job, parts, .. }) = started.pop_front() else { break };
-            self.enter(job.file)?;
+            if job.file != self.file {
+                self.close()?;
+                (self.file, self.failed) = (job.file, false);
+            }
             for part in parts {
                 if !self.failed {
                     self.take(part)?;
@@ -299,15 +302,6 @@ impl<T, E: From<TraceError>, W: Fn(Episodes) -> T, R: FnMut(usize, Event<T>) -> 
             }
         }
         self.close()
-    }
-
-    fn enter(&mut self, file: usize) -> Result<(), E> {
-        if file != self.file {
-            self.close()?;
-            self.file = file;
-            self.failed = false;
-        }
-        Ok(())
     }
 
     fn take(&mut self, part: Part<T>) -> Result<(), E> {

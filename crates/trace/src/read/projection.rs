@@ -79,23 +79,16 @@ impl Layout {
 }
 
 fn kind_in(set: &TraceSet, name: &str) -> Result<Kind, TraceError> {
-    let refused = |found| TraceError::Column { column: name.to_owned(), expected: "a column of the traces", found };
+    let refused = |expected, found| Err(TraceError::Column { column: name.to_owned(), expected, found });
     let Some(column) = set.column(name) else {
-        return Err(refused(format!("none; they have {}", set.column_names().join(", "))));
+        return refused("a column of the traces", format!("none; they have {}", set.column_names().join(", ")));
     };
-    match column {
-        column if column.kind != Kind::Unsupported => Ok(column.kind),
-        column => Err(match column.conflict {
-            Some([(one, this), (other, that)]) => TraceError::Column {
-                column: name.to_owned(),
-                expected: "the same type in all files",
-                found: format!("{} in {one} and {} in {other}; cast one of them", this.name(), that.name()),
-            },
-            None => TraceError::Column {
-                column: name.to_owned(),
-                expected: "bool, integer, float or string",
-                found: "another type; cast it where the file is written".into(),
-            },
-        }),
+    match column.conflict {
+        _ if column.kind != Kind::Unsupported => Ok(column.kind),
+        Some([(one, this), (other, that)]) => refused(
+            "the same type in all files",
+            format!("{} in {one} and {} in {other}; cast one of them", this.name(), that.name()),
+        ),
+        None => refused("bool, integer, float or string", "another type; cast it where the file is written".into()),
     }
 }

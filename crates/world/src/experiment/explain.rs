@@ -22,12 +22,11 @@ pub fn explained(experiment: &Experiment) -> String {
     };
     line("scenes", scenes);
     line("body", body(experiment));
-    let shape = match experiment.body {
-        None => None,
-        Some(Body::Mannequin) => Some("mannequins, with a neutral head and a face"),
-        Some(Body::Humanoid) => Some("humanoids with the sizes of MuJoCo's, all in one colour"),
-    };
-    if let Some(words) = shape {
+    if let Some(shape) = experiment.body {
+        let words = match shape {
+            Body::Mannequin => "mannequins, with a neutral head and a face",
+            Body::Humanoid => "humanoids with the sizes of MuJoCo's, all in one colour",
+        };
         line("shape", words.to_owned());
     }
     line("cubes", cubes(experiment.layout.cubes));
@@ -67,12 +66,8 @@ pub fn explained(experiment: &Experiment) -> String {
     if let Some(hand) = experiment.hand {
         line("hand", self::hand(hand));
     }
-    let camera = match experiment.camera {
-        Camera::Eye => None,
-        Camera::Behind => Some("behind the body and above it, which looks over its head"),
-    };
-    if let Some(words) = camera {
-        line("camera", words.to_owned());
+    if experiment.camera == Camera::Behind {
+        line("camera", "behind the body and above it, which looks over its head".to_owned());
     }
     if let Some(Picture { width, height, fovy }) = experiment.view {
         line("view", format!("{width} x {height} pixels, {fovy} degrees high"));

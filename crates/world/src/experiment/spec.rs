@@ -1,7 +1,6 @@
 //! A validated experiment: every value is in range and consistent with the others.
 
 mod answers;
-mod appearance;
 mod layout;
 mod marks;
 mod panes;
@@ -13,7 +12,6 @@ use serde::{Deserialize, Serialize};
 use exact::names;
 
 pub use answers::{Answer, AnswerType, Fact, Side, UNKNOWN};
-pub use appearance::{Body, Look};
 pub use layout::{Behavior, Colors, Cubes, Layout, Occluders, Others, Start, Wall};
 pub use marks::{Mark, MarkColor, Part, Wearer};
 pub use panes::{BodyShown, Paint, Pane, PaneKind};
@@ -94,7 +92,7 @@ pub struct Spec {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub absent: Vec<AbsentColumn>,
     /// How the room and its mirrors look.
-    #[serde(default, skip_serializing_if = "Look::is_plain")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub look: Look,
     /// The shape of all bodies; the world's if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -295,6 +293,36 @@ pub enum Camera {
 }
 
 names!(Camera { Eye: "eye", Behind: "behind" });
+
+/// How the room and its mirrors look. What is visible is the same.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Look {
+    /// Walls of one grey each, mirrors without frame or tint.
+    #[default]
+    Plain,
+    /// Walls of panels, soft shadows, mirrors with a frame of wood and a slight tint.
+    Textured,
+}
+
+names!(Look { Plain: "plain", Textured: "textured" });
+
+/// The shape of all bodies.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Body {
+    /// Twenty-one parts, 1.6 m tall, with a neutral head and a face.
+    #[default]
+    Mannequin,
+    /// The sizes of MuJoCo's standard humanoid: nineteen parts, 1.56 m tall, all in the body's colour.
+    Humanoid,
+}
+
+names!(Body { Mannequin: "mannequin", Humanoid: "humanoid" });
+
+pub(crate) fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}
 
 impl Spec {
     /// Returns true if one of several cubes is to be selected.

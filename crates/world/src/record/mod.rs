@@ -6,25 +6,6 @@
 //!                                     agents wait)                   episode)   whole)
 //! ```
 //!
-//! | file | what it knows |
-//! |---|---|
-//! | [`plan`] | the episodes, their names, and the share of a shard |
-//! | [`rollout`] | one episode, from the first frame to the last step |
-//! | [`fingerprint`] | the settings of an episode's recording, in a few hashes |
-//! | [`metadata`] | a trace's metadata on its recording |
-//! | [`index`] | the recorded episodes of a folder |
-//! | [`store`] | the folder: how an episode commits, how the final files are made |
-//! | [`folder_lock`] | other processes that record into the folder |
-//! | [`lock`] | the locks of a folder and of an episode |
-//! | [`queue`] | the remaining episodes, and those that other processes have |
-//! | `continued` | the check that an existing log belongs to the recording |
-//! | [`error`] | errors of a folder, and of an unfinished episode |
-//! | [`failures`] | the list of episodes lost to failures |
-//! | [`replies`] | the number of replies without a decision |
-//! | [`unusable`] | the end of a recording whose agent cannot answer |
-//! | [`run`] | threads, episodes under way, stopping |
-//! | [`shares`] | the time by activity |
-//!
 //! Rule: an episode is a function of the world's configuration, its experiment, seed and run, and its agent. Threads,
 //! shards, interruptions and their order do not affect a trace. Nothing here knows a metric.
 

@@ -18,7 +18,7 @@ use crate::replay::log::{Seen, frame_time};
 use crate::sim::camera::Camera;
 use crate::sim::config::WorldConfig;
 use crate::sim::scene::Scene;
-use crate::sim::visibility::{Visibility, columns};
+use crate::sim::visibility::{Visibility, by_column};
 use crate::sim::world::World;
 use trace::episode::{Episode, Extra, Step};
 use trace::frame::Frame;
@@ -190,7 +190,7 @@ fn nothing() -> Arc<Frame> {
 
 /// The row of a step, without `bumped`.
 fn row(world: &World, key: &Key, t: i32, visibility: &Visibility, reply: Reply) -> Step {
-    let counts = columns::by_column(world, visibility);
+    let counts = by_column(world, visibility);
     let px = |column: &str| counts.iter().find(|(name, _)| *name == column).map(|(_, px)| *px);
     let cube = reply.selected_cube.as_deref().and_then(Color::named);
     let pose = world.pose();

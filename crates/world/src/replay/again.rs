@@ -2,13 +2,12 @@
 
 use serde_json::Value as Json;
 
-use super::divergence::Divergence;
-use super::error::ReplayError;
+use super::error::{Divergence, ReplayError};
 use crate::experiment::spec::Side;
 use crate::experiment::{Experiment, Spec};
 use crate::sim::config::WorldConfig;
 use crate::sim::scene::{SCENE_VERSIONS, Scene};
-use crate::sim::visibility::{Visibility, columns};
+use crate::sim::visibility::{Visibility, by_column};
 use crate::sim::world::World;
 use trace::answers::Answered;
 use trace::episode::{Episode, Extra, Step};
@@ -174,11 +173,10 @@ fn truths(episode: &Episode, step: &Step, world: &World, visibility: &Visibility
 
 fn counts(episode: &Episode, at: usize, world: &World, visibility: &Visibility) -> Vec<Compared> {
     let recorded = |name: &str| schema::column(name)?.of_steps(episode).nth(at)?;
-    let compared =
-        columns::by_column(world, visibility).into_iter().filter_map(|(name, found)| match recorded(name)? {
-            Value::Int(own) => Some((name, own.to_string(), found.to_string())),
-            _ => None,
-        });
+    let compared = by_column(world, visibility).into_iter().filter_map(|(name, found)| match recorded(name)? {
+        Value::Int(own) => Some((name, own.to_string(), found.to_string())),
+        _ => None,
+    });
     let visible = world.is_mirror_visible(visibility);
     let recorded = episode.steps[at].mirror_visible;
     compared.chain([("mirror_visible", recorded.to_string(), visible.to_string())]).collect()

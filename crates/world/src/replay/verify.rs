@@ -1,4 +1,4 @@
-//! Replays traces and compares them with the recorded values; writes new frames, logs and counts on the way.
+//! Replays traces and compares rows and frames with the recorded ones; writes new frames, logs and counts on the way.
 
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
@@ -10,19 +10,19 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::again::{Recipe, again};
-use super::divergence::Divergence;
-use super::error::ReplayError;
+use super::error::{Divergence, ReplayError};
 use super::log::{Log, Seen};
-use super::same_frames::{FramesAnswer, has_digests};
 use crate::sim::camera::Camera;
 use crate::sim::config::WorldConfig;
-use crate::sim::visibility::columns;
+use crate::sim::visibility::by_column;
 use exact::replace::TemporaryFolder;
 use trace::episode::Episode;
+use trace::frame::{Frame, Likeness, TOLERANCE, likeness};
 use trace::inputs::Input;
 use trace::log::assemble;
 use trace::merge::{self, EpisodeRows};
 use trace::open::TraceSet;
+use trace::renderer::{self, Renderer};
 use trace::schema::RECORDING_KEY;
 
 /// One trace to replay.
@@ -66,6 +66,25 @@ pub struct ReplayAnswer {
     pub flipped: Option<usize>,
     /// The frames, where traces say what their agents saw.
     pub frames: Option<FramesAnswer>,
+}
+
+/// How the frames of a replay compare with those that agents saw.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct FramesAnswer {
+    /// Frames of the same bytes.
+    pub equal: usize,
+    /// Frames of other bytes whose digests have the same levels within `tolerance`.
+    pub alike: usize,
+    /// Other frames.
+    pub different: usize,
+    /// Levels of 255 by which the means of 8 x 6 blocks may differ in frames that are alike.
+    pub tolerance: u8,
+    /// What drew the recorded frames.
+    pub recorded_with: Vec<Renderer>,
+    /// What drew those of the replay; null where nothing could be drawn.
+    pub drawn_with: Option<Renderer>,
+    /// The reason why no frames were compared.
+    pub not_compared: Option<String>,
 }
 
 impl Recorded {
@@ -145,6 +164,44 @@ impl Recorded {
     }
 }
 
+impl FramesAnswer {
+    /// Adds a trace: the recorded and the current renderer of its frames.
+    fn add_trace(&mut self, recording: Option<&Value>, drawn_with: Option<&Renderer>) {
+        self.tolerance = TOLERANCE;
+        self.drawn_with = drawn_with.cloned();
+        for renderer in recording.map(renderer::of_recording).unwrap_or_default() {
+            if !self.recorded_with.contains(&renderer) {
+                self.recorded_with.push(renderer);
+            }
+        }
+    }
+
+    /// Compares a frame; returns the divergence if the picture differs.
+    fn add(&mut self, (episode_id, t): (&str, i32), recorded: &str, frame: &Frame) -> Option<Divergence> {
+        let drawn = frame.digest();
+        match likeness(recorded, &drawn) {
+            Some(Likeness::Equal) => self.equal += 1,
+            Some(Likeness::Alike) => self.alike += 1,
+            Some(Likeness::Different) | None => {
+                self.different += 1;
+                return Some(Divergence {
+                    episode_id: episode_id.to_owned(),
+                    t,
+                    column: "frame_digest".to_owned(),
+                    expected: recorded.to_owned(),
+                    found: drawn,
+                });
+            }
+        }
+        None
+    }
+}
+
+/// Returns true if the trace has digests of its agents' frames.
+fn has_digests(recording: Option<&Value>) -> bool {
+    recording.is_some_and(|recording| recording["frame_digest"].is_string())
+}
+
 impl Recount {
     fn eye(&self, recipe: &Recipe) -> WorldConfig {
         let mut config = recipe.eye.clone();
@@ -181,7 +238,7 @@ impl Player<'_> {
         let mut log = log.transpose().map_err(unwritten)?;
         let (mut counts, mut other_frame) = (Counts::default(), None);
         let divergence = again(&self.trace.recipe, self.eye, episode, |t, world, visibility, step| {
-            counts.add(columns::by_column(world, visibility), world.is_mirror_visible(visibility));
+            counts.add(by_column(world, visibility), world.is_mirror_visible(visibility));
             let frame = self.camera.as_mut().map(|camera| camera.frame(world)).transpose();
             let frame = frame.map_err(ReplayError::other)?.map(Arc::new);
             let recorded = step.extra.frame_digest.as_deref();

@@ -1,29 +1,25 @@
 //! `mirrorstats world replay`: repeats a trace's episodes and compares them with the recording.
 
 use std::ffi::OsString;
-use std::fmt;
+use std::fmt::{self, Write as _};
 use std::io;
 use std::path::{Path, PathBuf};
 
-use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::output;
+use crate::cli::{Failure, Outcome, output};
 use exact::format::counted;
 use exact::replace::{self, is_same_file};
-use serde::Serialize;
 use trace::inputs;
 use trace::log::read::{episode_hashes, other_episode};
 use trace::renderer::Renderer;
 use world::replay::again::MOST_RAYS;
-use world::replay::divergence::Divergence;
-use world::replay::error::ReplayError;
-use world::replay::same_frames::FramesAnswer;
-use world::replay::verify::{Outputs, Recorded, Recount, ReplayAnswer, frame_path};
+use world::replay::error::{Divergence, ReplayError};
+use world::replay::verify::{FramesAnswer, Outputs, Recorded, Recount, ReplayAnswer, frame_path};
 
-/// Repeat a trace's episodes in the worlds that it describes, and hold every step against what was recorded
+/// Replay a trace's episodes in their recorded worlds, and compare every step with the recording
 ///
-/// Poses, distances, pixel counts, `bumped` and `mirror_visible` must match, and frames that agents saw must look alike: the
-/// same bytes, or mean levels within 2 of 255 in each of 8 x 6 blocks. Exits with 1 where they do not; the first divergence of
-/// each episode is printed.
+/// Poses, distances, pixel counts, `bumped` and `mirror_visible` must match, and frames that agents saw must look
+/// alike: the same bytes, or mean levels within 2 of 255 in each of 8 x 6 blocks. Exits with 1 if they do not, and
+/// prints the first divergence of each episode.
 #[derive(Clone, Debug, clap::Args)]
 pub struct ReplayArgs {
     /// Traces of `mirrorstats record`: files, folders or quoted globs
@@ -35,11 +31,11 @@ pub struct ReplayArgs {
     /// Render every step into this folder, as EPISODE/t001.png
     #[arg(long, value_name = "DIR")]
     frames: Option<PathBuf>,
-    /// Write a log of the replay in place of the log that is there; for a single trace. With --episode, a log that has
-    /// other episodes is refused
+    /// Write a log of the replay, replacing an existing one; for a single trace. With --episode, a log with other
+    /// episodes is refused
     #[arg(long, value_name = "LOG.mcap")]
     mcap: Option<PathBuf>,
-    /// Count pixels and decide visibility anew, into the trace of --out; for a single trace
+    /// Recompute pixel counts and visibility, into the trace of --out; for a single trace
     #[arg(long, requires = "out")]
     recompute_visibility: bool,
     /// The threshold for visibility, pixels of the grid [default: the recorded one, scaled to the grid]
@@ -51,8 +47,7 @@ pub struct ReplayArgs {
     /// The trace to write with --recompute-visibility
     #[arg(short, long, value_name = "TRACE.parquet", requires = "recompute_visibility")]
     out: Option<PathBuf>,
-    /// Compare no frames: without it, traces of agents that see frames are drawn again, and each frame is held against the
-    /// digest of the one that the agent saw
+    /// Do not compare frames; otherwise frames that an agent saw are drawn again and compared with their digests
     #[arg(long)]
     skip_frames: bool,
     /// Answer as JSON
@@ -81,7 +76,7 @@ impl ReplayArgs {
         for trace in &traces {
             trace.replay(&self.outputs(), &mut answer, save)?;
         }
-        output::print(&Shown(&answer), self.json)?;
+        output::print_told(&answer, self.json, tell)?;
         Ok(if answer.divergences.is_empty() { Outcome::Done } else { Outcome::CheckFailed })
     }
 
@@ -157,48 +152,46 @@ fn save(path: &Path, png: &[u8]) -> Result<(), Failure> {
     output::write_file(path, png)
 }
 
-fn tell_frames(f: &mut fmt::Formatter<'_>, frames: &FramesAnswer) -> fmt::Result {
+fn tell_frames(text: &mut String, frames: &FramesAnswer) -> fmt::Result {
     let FramesAnswer { equal, alike, different, tolerance, recorded_with, drawn_with, not_compared } = frames;
     if let Some(reason) = not_compared {
-        return writeln!(f, "frames are not compared: {reason}");
+        return writeln!(text, "frames are not compared: {reason}");
     }
     writeln!(
-        f,
+        text,
         "frames: {equal} equal, {alike} alike (means of blocks within {tolerance} levels), {different} different"
     )?;
     let drawn_with = drawn_with.as_slice();
     if recorded_with != drawn_with {
         let names = |all: &[Renderer]| all.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ");
-        writeln!(f, "different renderers: recorded with {}, replayed with {}", names(recorded_with), names(drawn_with))?;
+        writeln!(
+            text,
+            "different renderers: recorded with {}, replayed with {}",
+            names(recorded_with),
+            names(drawn_with)
+        )?;
     }
     Ok(())
 }
 
-/// The answer, with its text.
-#[derive(Serialize)]
-#[serde(transparent)]
-struct Shown<'a>(&'a ReplayAnswer);
-
-impl fmt::Display for Shown<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for Divergence { episode_id, t, column, expected, found } in &self.0.divergences {
-            // Hashes are enough for people.
-            let [expected, found] = [expected, found].map(|text| match column.as_str() {
-                "frame_digest" => text.split('-').next().unwrap_or_default(),
-                _ => text,
-            });
-            writeln!(f, "{episode_id}, t = {t}: {column}: recorded {expected}, replayed {found}")?;
-        }
-        write!(f, "{}, {} replayed", counted(self.0.episodes as u64, "episode"), counted(self.0.steps as u64, "step"))?;
-        match self.0.divergences.len() {
-            0 => write!(f, ": all match")?,
-            1 => write!(f, ": 1 of the episodes parts from the trace")?,
-            parted => write!(f, ": {parted} of the episodes part from the trace")?,
-        }
-        match self.0.flipped {
-            Some(flipped) => writeln!(f, "; mirror_visible differs at {}", counted(flipped as u64, "step"))?,
-            None => writeln!(f)?,
-        }
-        self.0.frames.as_ref().map_or(Ok(()), |frames| tell_frames(f, frames))
+fn tell(text: &mut String, answer: &ReplayAnswer) -> fmt::Result {
+    for Divergence { episode_id, t, column, expected, found } in &answer.divergences {
+        // Hashes are enough for people.
+        let [expected, found] = [expected, found].map(|text| match column.as_str() {
+            "frame_digest" => text.split('-').next().unwrap_or_default(),
+            _ => text,
+        });
+        writeln!(text, "{episode_id}, t = {t}: {column}: recorded {expected}, replayed {found}")?;
     }
+    write!(text, "{}, {} replayed", counted(answer.episodes as u64, "episode"), counted(answer.steps as u64, "step"))?;
+    match answer.divergences.len() {
+        0 => write!(text, ": all match")?,
+        1 => write!(text, ": 1 of the episodes parts from the trace")?,
+        parted => write!(text, ": {parted} of the episodes part from the trace")?,
+    }
+    match answer.flipped {
+        Some(flipped) => writeln!(text, "; mirror_visible differs at {}", counted(flipped as u64, "step"))?,
+        None => writeln!(text)?,
+    }
+    answer.frames.as_ref().map_or(Ok(()), |frames| tell_frames(text, frames))
 }

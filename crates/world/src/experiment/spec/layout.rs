@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::Paint;
+use super::{Paint, is_default};
 use exact::names;
 use trace::palette::Color;
 
@@ -54,7 +54,7 @@ pub enum Cubes {
     /// Cubes of any colours.
     Clutter {
         /// The places of the cubes.
-        #[serde(default, skip_serializing_if = "Occluders::is_before_mirror")]
+        #[serde(default, skip_serializing_if = "is_default")]
         occluders: Occluders,
         /// The least number; the world's if absent.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -88,13 +88,6 @@ pub enum Occluders {
 }
 
 names!(Occluders { BeforeMirror: "before_mirror", Random: "random" });
-
-impl Occluders {
-    #[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde asks for")]
-    pub(crate) const fn is_before_mirror(&self) -> bool {
-        matches!(self, Self::BeforeMirror)
-    }
-}
 
 /// The other agents of a world.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]

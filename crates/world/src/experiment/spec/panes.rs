@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::Wall;
+use super::{Wall, is_default};
 use exact::names;
 use trace::palette::Color;
 
@@ -14,13 +14,13 @@ pub struct Pane {
     /// Its kind.
     pub kind: PaneKind,
     /// Steps by which it is late.
-    #[serde(default, skip_serializing_if = "is_zero")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub delay: u32,
     /// The colour of the body that it shows.
-    #[serde(default, skip_serializing_if = "Paint::is_own")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub color: Paint,
     /// Whose motion the body that it shows has.
-    #[serde(default, skip_serializing_if = "BodyShown::is_own")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub body: BodyShown,
     /// Its wall.
     #[serde(default)]
@@ -34,11 +34,6 @@ pub struct Pane {
     /// Its lower edge above the floor, mm; about the world's height of centres if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bottom_mm: Option<u32>,
-}
-
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde asks for")]
-const fn is_zero(value: &u32) -> bool {
-    *value == 0
 }
 
 /// The kind of a pane.
@@ -71,13 +66,6 @@ pub enum Paint {
     Named(Color),
 }
 
-impl Paint {
-    #[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde asks for")]
-    const fn is_own(&self) -> bool {
-        matches!(self, Self::Own)
-    }
-}
-
 /// Whose motion a body has that a decoy shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -90,10 +78,3 @@ pub enum BodyShown {
 }
 
 names!(BodyShown { Own: "own", Independent: "independent" });
-
-impl BodyShown {
-    #[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde asks for")]
-    const fn is_own(&self) -> bool {
-        matches!(self, Self::Own)
-    }
-}

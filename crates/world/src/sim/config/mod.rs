@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use toml::Value;
 
 use crate::experiment::Spec;
-use crate::experiment::spec::{Body, Camera, Cubes, Look, Occluders, Others};
+use crate::experiment::spec::{Body, Camera, Cubes, Look, Occluders, Others, is_default};
 use exact::budget::Limit;
 use exact::hash;
 use exact::input;
@@ -52,7 +52,7 @@ pub struct WorldConfig {
     /// The length of an episode.
     pub episode: EpisodeConfig,
     /// How the room and its mirrors look; experiments say it.
-    #[serde(default, skip_serializing_if = "Look::is_plain")]
+    #[serde(default, skip_serializing_if = "is_default")]
     #[schemars(skip)]
     pub look: Look,
 }
@@ -109,7 +109,7 @@ pub struct MirrorConfig {
 #[serde(deny_unknown_fields)]
 pub struct BodyConfig {
     /// The shape of all bodies, where the experiment does not say it.
-    #[serde(default, skip_serializing_if = "Body::is_mannequin")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub shape: Body,
     /// Of the upright cylinder that is a body to walls, cubes and other bodies, m.
     #[schemars(range(min = 0.39, max = 0.6))]
@@ -139,7 +139,7 @@ pub struct EyeConfig {
     #[schemars(range(min = 30.0, max = 115.0))]
     pub fovy: f64,
     /// The camera's pitch below the horizon, degrees; only for experiments whose camera is not the eye.
-    #[serde(default, skip_serializing_if = "is_level")]
+    #[serde(default, skip_serializing_if = "is_default")]
     #[schemars(range(min = 0.0, max = 0.0))]
     pub pitch: f64,
     /// Pixels in a row.
@@ -160,11 +160,6 @@ pub struct EyeConfig {
     /// Divisions of a flat part.
     #[schemars(range(min = 1, max = 16))]
     pub quads: u32,
-}
-
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde asks for")]
-fn is_level(pitch: &f64) -> bool {
-    pitch.abs() <= 0.0
 }
 
 /// The light.

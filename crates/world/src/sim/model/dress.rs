@@ -6,9 +6,8 @@ use mujoco_rs::prelude::MjtObjBase;
 use super::super::angle::{Heading, Quaternion};
 use super::super::config::WorldConfig;
 use super::super::scene::{Cube, HandShape, HandStart, HungPane, Scene, WornMark};
-use super::{AGENTS, BARS, Item, Look, group, shadow};
-use crate::experiment::spec::{MOST_MARKS, PaneKind};
-use crate::sim::scene::MOST_CUBES;
+use super::{BARS, Item, Look, group, shadow};
+use crate::experiment::spec::PaneKind;
 use trace::palette::Color;
 
 /// Half the depth of a pane, m.
@@ -82,7 +81,7 @@ pub(super) fn label(model: &mut MjModel, items: &[Item]) {
         model.geom_rgba_mut()[geom] = match *item {
             Item::Pane(pane) => paint([0, step(pane + 1), 0]),
             item => {
-                let [red, green, blue, opacity] = paint([step(number(item)), 0, 0]);
+                let [red, green, blue, opacity] = paint([step(item.number()), 0, 0]);
                 // Ensures that a mark that appears keeps its label.
                 [red, if matches!(item, Item::Mark(_)) { LABEL_GREEN } else { green }, blue, opacity]
             }
@@ -99,41 +98,14 @@ fn step(number: usize) -> u8 {
     u8::try_from(STEP * number).expect("a world holds fewer than 30 things")
 }
 
-fn number(item: Item) -> usize {
-    match item {
-        Item::Room | Item::Pane(_) => 0,
-        Item::Agent(agent) => 1 + agent,
-        Item::Cube(cube) => 1 + AGENTS + cube,
-        Item::Mark(mark) => 1 + AGENTS + MOST_CUBES + mark,
-        Item::Hand => 1 + AGENTS + MOST_CUBES + MOST_MARKS,
-        Item::Double => 2 + AGENTS + MOST_CUBES + MOST_MARKS,
-    }
-}
-
-/// The meaning of a label's colour.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Labelled {
-    /// A thing that is seen directly.
-    Item(Item),
-    /// A pane, regardless of its content.
-    Pane(usize),
-}
-
-/// The meaning of the label with this red and green; `None` for no label.
-pub fn labelled([red, green]: [u8; 2]) -> Option<Labelled> {
+/// The meaning of the label with this red and green, regardless of what a pane shows; `None` for no label.
+pub fn labelled([red, green]: [u8; 2]) -> Option<Item> {
     let number = |part: u8| (usize::from(part) % STEP == 0).then_some(usize::from(part) / STEP);
     let (red, green) = (number(red)?, number(green)?);
-    if let Some(pane) = green.checked_sub(1) {
-        return (red == 0).then_some(Labelled::Pane(pane));
+    match green.checked_sub(1) {
+        Some(pane) => (red == 0).then_some(Item::Pane(pane)),
+        None => Some(Item::of_number(red)),
     }
-    let Some(at) = red.checked_sub(1) else { return Some(Labelled::Item(Item::Room)) };
-    Some(Labelled::Item(match at {
-        _ if at < AGENTS => Item::Agent(at),
-        _ if at < AGENTS + MOST_CUBES => Item::Cube(at - AGENTS),
-        _ if at < AGENTS + MOST_CUBES + MOST_MARKS => Item::Mark(at - AGENTS - MOST_CUBES),
-        _ if at == AGENTS + MOST_CUBES + MOST_MARKS => Item::Hand,
-        _ => Item::Double,
-    }))
 }
 
 fn hide_wall(model: &mut MjModel, geom: usize, pane: Option<&HungPane>) {

@@ -14,7 +14,7 @@ use mujoco_rs::renderer::MjRenderer;
 use super::super::config::WorldConfig;
 use super::super::label_image::{LabelImage, Rectangle};
 use super::super::model::{
-    BEYOND_CAMERA, EYE_CAMERA, Item, Labelled, ModelError, Paint, Stage, TOP_CAMERA, compile, group, labelled,
+    BEYOND_CAMERA, EYE_CAMERA, Item, ModelError, Paint, Stage, TOP_CAMERA, compile, group, labelled,
 };
 use super::super::passage;
 use super::super::renderer;
@@ -199,9 +199,8 @@ impl LabelCamera {
         let named = |frame: &Frame, at: usize| labelled([frame.rgb[3 * at], frame.rgb[3 * at + 1]]);
         let mut codes: Vec<u8> = (0..direct.width * direct.height)
             .map(|at| match named(&direct, at) {
-                Some(Labelled::Item(item)) => Shown::Direct(item),
-                Some(Labelled::Pane(pane)) => Shown::Through(pane, Item::Room),
-                None => Shown::Direct(Item::Room),
+                Some(Item::Pane(pane)) => Shown::Through(pane, Item::Room),
+                item => Shown::Direct(item.unwrap_or(Item::Room)),
             })
             .map(Shown::code)
             .collect();
@@ -212,7 +211,7 @@ impl LabelCamera {
             }
             let seen = self.eye.through(stage, &world.scene().panes[pane], None)?;
             for (at, code) in codes.iter_mut().enumerate().filter(|(_, code)| **code == blank) {
-                if let Some(Labelled::Item(item)) = named(&seen, at) {
+                if let Some(item) = named(&seen, at).filter(|item| !matches!(item, Item::Pane(_))) {
                     *code = Shown::Through(pane, item).code();
                 }
             }

@@ -1,4 +1,4 @@
-//! The pixel counts, as stored in traces and logs.
+//! The pixel counts of a step, as stored in logs and in the columns of traces.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 use super::super::model::Item;
 use super::super::scene::{HungPane, Scene};
 use super::view::Shown;
-use crate::experiment::spec::PaneKind;
+use crate::experiment::spec::{MOST_MARKS, MOST_PANES, PaneKind, is_default};
+use crate::sim::world::World;
 use trace::palette::Color;
 
 /// The visible pixels of one step, out of `view_px`.
@@ -29,12 +30,12 @@ pub struct Visibility {
     /// Each other agent, in the order of the scene.
     pub others: Vec<Sighting>,
     /// Each cube, in the order of the scene.
-    pub cubes: Vec<CubeSighting>,
+    pub cubes: Vec<Sighting>,
     /// Of marks on the own body by way of a mirror.
-    #[serde(default, skip_serializing_if = "is_zero")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub mark_px: u32,
     /// Of bodies that a pane alone shows: in place of the own one, or behind a window.
-    #[serde(default, skip_serializing_if = "is_zero")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub double_px: u32,
     /// The hand of a reaching task.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -45,11 +46,6 @@ pub struct Visibility {
     /// Each pane, in the order of the scene, where there are several or one that is no plain mirror.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub panes: Vec<PaneSighting>,
-}
-
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde asks for")]
-const fn is_zero(value: &u32) -> bool {
-    *value == 0
 }
 
 /// The visible pixels of a pane, and of its contents.
@@ -80,15 +76,12 @@ pub struct Sighting {
     pub mirror_px: u32,
 }
 
-/// The visible pixels of a cube.
-pub type CubeSighting = Sighting;
-
 /// The counts from a tally of codes.
 pub(super) fn of_tally(tally: &[u32; 256], scene: &Scene) -> Visibility {
     let counts = Counts { tally, scene };
     let others: Vec<Sighting> =
         scene.others.iter().enumerate().map(|(at, other)| counts.body(at + 1, other.color)).collect();
-    let cubes: Vec<CubeSighting> =
+    let cubes: Vec<Sighting> =
         scene.cubes.iter().enumerate().map(|(at, cube)| counts.sighting(Item::Cube(at), cube.color)).collect();
     let marks: Vec<Sighting> =
         scene.marks.iter().enumerate().map(|(at, mark)| counts.sighting(Item::Mark(at), mark.color)).collect();
@@ -157,4 +150,40 @@ impl Counts<'_> {
             mark_px: self.marks(0).map(through).sum(),
         }
     }
+}
+
+const PANES: [&str; MOST_PANES] = ["pane1_body_px", "pane2_body_px", "pane3_body_px", "pane4_body_px"];
+const MARKS: [&str; MOST_MARKS] = ["mark1_px", "mark2_px", "mark3_px", "mark4_px"];
+
+/// The counts of a scene: those of panes if there are several, those of marks if the own body wears several.
+pub fn by_column(world: &World, seen: &Visibility) -> Vec<(&'static str, i32)> {
+    let scene = world.scene();
+    let mut counts = vec![
+        ("mirror_self_px", seen.self_px),
+        ("mirror_other_px", seen.other_px),
+        ("mirror_px", seen.mirror_px),
+        ("direct_other_px", seen.direct_other_px),
+    ];
+    if world.has_own_mark() {
+        counts.push(("mirror_mark_px", seen.mark_px));
+    }
+    if world.has_double() {
+        counts.push(("mirror_double_px", seen.double_px));
+    }
+    // A pane shows the own body or another one, never both.
+    let bodies: Vec<u32> = seen.panes.iter().map(|pane| pane.self_px + pane.double_px).collect();
+    if let Some(shown) = scene.shown_color() {
+        let colors = scene.panes.iter().map(|pane| pane.paint.or_else(|| pane.double.map(|double| double.color)));
+        let of_shown = colors.zip(&bodies).filter(|(color, _)| *color == Some(shown));
+        counts.push(("shown_px", of_shown.map(|(_, px)| px).sum()));
+    }
+    if scene.panes.len() > 1 {
+        counts.extend(PANES.into_iter().zip(bodies));
+    }
+    let own = scene.marks.iter().zip(&seen.marks).filter(|(mark, _)| mark.wearer == 0);
+    let marks: Vec<u32> = own.map(|(_, sighting)| sighting.mirror_px).collect();
+    if marks.len() > 1 {
+        counts.extend(MARKS.into_iter().zip(marks));
+    }
+    counts.into_iter().map(|(column, px)| (column, i32::try_from(px).unwrap_or(i32::MAX))).collect()
 }

@@ -9,13 +9,13 @@
 //! nothing visible in one. The own body is not excluded from the direct view: a test shows that it never appears there.
 
 mod cast;
-pub(crate) mod columns;
 mod count;
 mod shape;
 mod truths;
 mod view;
 
-pub use count::{CubeSighting, PaneSighting, Sighting, Visibility};
+pub(crate) use count::by_column;
+pub use count::{PaneSighting, Sighting, Visibility};
 pub use view::Shown;
 
 use view::View;

@@ -2,11 +2,11 @@
 
 use super::super::angle::sine_cosine;
 use super::super::label_image::LabelImage;
-use super::super::model::{AGENTS, Item, Stage, group};
+use super::super::model::{Item, Stage, group};
 use super::super::passage;
-use super::super::scene::{HungPane, MOST_CUBES};
+use super::super::scene::HungPane;
 use super::super::world::World;
-use crate::experiment::spec::{MOST_MARKS, PaneKind};
+use crate::experiment::spec::PaneKind;
 
 /// The content of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -17,23 +17,20 @@ pub enum Shown {
     Through(usize, Item),
 }
 
-/// The number of codes per view, direct or through a pane: the room, then bodies, cubes, marks, the hand, the double.
-const CODES: usize = 1 + AGENTS + MOST_CUBES + MOST_MARKS + 2;
-
 impl Shown {
     pub fn code(self) -> u8 {
         let code = match self {
-            Self::Direct(Item::Pane(pane)) => CODES * (1 + pane),
-            Self::Direct(item) => index(item),
-            Self::Through(pane, item) => CODES * (1 + pane) + index(item),
+            Self::Direct(Item::Pane(pane)) => Item::COUNT * (1 + pane),
+            Self::Direct(item) => item.number(),
+            Self::Through(pane, item) => Item::COUNT * (1 + pane) + item.number(),
         };
         u8::try_from(code).expect("a world holds fewer than 256 things to be seen")
     }
 
     /// The meaning of a byte of [`Shown::code`].
     pub fn of_code(code: u8) -> Self {
-        let (look, at) = (usize::from(code) / CODES, usize::from(code) % CODES);
-        look.checked_sub(1).map_or(Self::Direct(of_index(at)), |pane| Self::Through(pane, of_index(at)))
+        let (look, at) = (usize::from(code) / Item::COUNT, usize::from(code) % Item::COUNT);
+        look.checked_sub(1).map_or(Self::Direct(Item::of_number(at)), |pane| Self::Through(pane, Item::of_number(at)))
     }
 
     /// The pane through which the thing is seen.
@@ -42,28 +39,6 @@ impl Shown {
             Self::Direct(_) => None,
             Self::Through(pane, _) => Some(pane),
         }
-    }
-}
-
-const fn index(item: Item) -> usize {
-    match item {
-        Item::Room | Item::Pane(_) => 0,
-        Item::Agent(agent) => 1 + agent,
-        Item::Cube(cube) => 1 + AGENTS + cube,
-        Item::Mark(mark) => 1 + AGENTS + MOST_CUBES + mark,
-        Item::Hand => CODES - 2,
-        Item::Double => CODES - 1,
-    }
-}
-
-const fn of_index(at: usize) -> Item {
-    match at {
-        0 => Item::Room,
-        _ if at < 1 + AGENTS => Item::Agent(at - 1),
-        _ if at < 1 + AGENTS + MOST_CUBES => Item::Cube(at - 1 - AGENTS),
-        _ if at < CODES - 2 => Item::Mark(at - 1 - AGENTS - MOST_CUBES),
-        _ if at == CODES - 2 => Item::Hand,
-        _ => Item::Double,
     }
 }
 
@@ -205,9 +180,10 @@ impl LabelImage {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::scene::MOST_CUBES;
-    use super::{AGENTS, Item, MOST_MARKS, Shown};
-    use crate::experiment::spec::MOST_PANES;
+    use super::{Item, Shown};
+    use crate::experiment::spec::{MOST_MARKS, MOST_PANES};
+    use crate::sim::model::AGENTS;
+    use crate::sim::scene::MOST_CUBES;
 
     #[test]
     fn every_code_comes_back() {

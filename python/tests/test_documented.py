@@ -22,7 +22,7 @@ def members():
 
 
 @pytest.mark.parametrize("one", list(members()), ids=lambda one: getattr(one, "__qualname__", getattr(one, "__name__", str(one))))
-def test_a_docstring_is_there_and_its_example_runs(one, paper, monkeypatch, tmp_path):
+def test_a_docstring_exists_and_its_example_runs(one, paper, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     words = inspect.getdoc(one)
     assert words, "no docstring"

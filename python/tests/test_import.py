@@ -35,7 +35,7 @@ def test_gaps_of_a_frame_are_null_and_its_whole_numbers_integers(tmp_path):
         assert trace.equals(traces[0])
 
 
-def test_a_fault_is_told_once_per_column_with_its_first_row_and_a_count(tmp_path):
+def test_an_error_is_reported_once_per_column_with_its_first_row_and_count(tmp_path):
     out, frame = tmp_path / "steps.parquet", pandas.DataFrame(random_rows(7))
     frame.loc[2:5, "mirror_px"] = 999
     frame["mirror_px"] = frame["mirror_px"].astype(float)
@@ -50,7 +50,7 @@ def test_a_fault_is_told_once_per_column_with_its_first_row_and_a_count(tmp_path
     assert not out.exists()
 
 
-def test_what_is_no_value_of_a_step_is_told_by_row_and_column(tmp_path):
+def test_an_invalid_value_is_reported_by_row_and_column(tmp_path):
     rows, out = random_rows(7), tmp_path / "steps.parquet"
     with pytest.raises(ValueError, match=r"row 1 \(from 0\), column `x`: expected a finite number, found inf"):
         ms.import_steps([{**rows[0], "x": 1.0}, {**rows[1], "x": math.inf}], out)
@@ -65,7 +65,7 @@ def test_what_is_no_value_of_a_step_is_told_by_row_and_column(tmp_path):
     assert not out.exists()
 
 
-def test_what_is_known_beside_the_rows_is_declared(tmp_path):
+def test_a_palette_and_a_cluster_are_declared_in_the_footer(tmp_path):
     out = tmp_path / "steps.parquet"
     answer = ms.import_steps(random_rows(3), out, palette=["red", "green", "blue", "white"], cluster="seed")
     assert answer["out"].endswith("steps.parquet") and answer["steps"] == len(random_rows(3))

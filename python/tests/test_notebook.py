@@ -29,12 +29,12 @@ QUESTIONS = [
 
 
 @pytest.mark.parametrize("sql, columns, rows", QUESTIONS)
-def test_questions_in_sql(paper, sql, columns, rows):
+def test_queries_have_the_expected_columns_and_rows(paper, sql, columns, rows):
     answer = ms.open(paper).query(sql)
     assert answer.column_names == columns and len(answer) == rows
 
 
-def test_answers_in_sql_are_those_of_duckdb(paper):
+def test_queries_agree_with_duckdb(paper):
     study = ms.open(paper)
     episodes = study.episodes
     for sql in [
@@ -61,7 +61,7 @@ def test_answers_in_sql_are_those_of_duckdb(paper):
         ("DROP TABLE episodes", "it reads, and changes nothing"),
     ],
 )
-def test_what_sql_cannot_answer_says_what_can(paper, sql, words):
+def test_a_failed_query_names_the_remedy(paper, sql, words):
     with pytest.raises(ms.QueryError, match=f"(?s){words}") as raised:
         ms.open(paper).query(sql)
     assert raised.value.faults[0]["file"] == "query"
@@ -165,7 +165,7 @@ def test_definitions_and_styles_are_text_or_dicts(paper):
     assert style.markdown.index("Qwen 3.6 Plus") < style.markdown.index("Claude")
 
 
-def test_studies_stand_below_each_other(paper):
+def test_compared_studies_are_stacked_with_their_changes(paper):
     studies = {"all": ms.open(paper, by="model"), "first": ms.open(paper, by="model", where="seed = 1")}
     found = ms.compare(studies).to_polars().filter(polars.col("metric") == "TSA")
     wide = found.pivot("study", index="model", values="mean")
@@ -191,7 +191,7 @@ def test_answers_can_be_pickled(paper, tmp_path):
         pickle.dumps(study.steps())
 
 
-def test_errors_are_of_a_kind_and_speak_of_arguments(paper, tmp_path):
+def test_errors_have_specific_types_and_name_arguments(paper, tmp_path):
     study = ms.open(paper)
     for ask, kind in [
         (lambda: ms.open("nowhere"), ms.InputError),
@@ -214,7 +214,7 @@ def test_errors_are_of_a_kind_and_speak_of_arguments(paper, tmp_path):
         ms.open(steps).cells
 
 
-def test_an_agent_that_raises_is_a_traceback(tmp_path):
+def test_an_exception_of_an_agent_keeps_its_traceback(tmp_path):
     class Tired:
         def __call__(self, message):
             if message["kind"] == "observation" and message["t"] > 1:

@@ -26,7 +26,7 @@ def rows(folder, experiment):
 
 
 @pytest.mark.parametrize("images", ["path", "base64"])
-def test_a_function_records_what_the_same_program_records(images, tmp_path):
+def test_a_function_and_the_same_program_record_the_same(images, tmp_path):
     program = f"exec:{sys.executable} {agent.__file__}"
     by_program = ms.record(program, **SHORT, exec_images=images, out=tmp_path / "program")
     by_function = ms.record(agent.decide, **SHORT, images=images, out=tmp_path / "function")
@@ -40,7 +40,7 @@ def test_a_function_records_what_the_same_program_records(images, tmp_path):
     assert by_function["traces"] and ms.validate(tmp_path / "function")["findings"] == []
 
 
-def test_of_a_class_each_episode_has_an_instance(tmp_path):
+def test_each_episode_has_its_own_instance_of_a_class(tmp_path):
     ms.record(agent.Counting, "E1", seeds=1, runs=3, out=tmp_path, model="walker", no_log=True)
     last = [row["reasoning"] for row in rows(tmp_path, "E1") if row["t"] == 12]
     assert last == ["task " + " ".join(["observation"] * 12)] * 3
@@ -64,7 +64,7 @@ def test_an_agent_that_raises_loses_its_episode_and_the_same_call_continues(tmp_
         ms.record(wrong, "E1", seeds=1, runs=1, out=tmp_path / "wrong", no_log=True, on_error="lose")
 
 
-def test_texts_that_are_no_replies_stop_a_recording_as_on_the_command_line(tmp_path):
+def test_unusable_replies_stop_a_recording_as_on_the_command_line(tmp_path):
     with pytest.raises(ms.RecordError, match="gave 5 replies in a row without a decision") as raised:
         ms.record(lambda message: "well", "E1", seeds=1, runs=1, out=tmp_path, model="walker", max_unusable=5)
     assert raised.value.hint.startswith("`max_unusable=N` allows more")
@@ -77,7 +77,7 @@ class Stumbles:
         return agent.decide(message)
 
 
-def test_what_an_agent_raises_ends_the_recording_with_its_type_and_traceback(tmp_path):
+def test_an_exception_ends_the_recording_with_its_type_and_traceback(tmp_path):
     with pytest.raises(LookupError, match="no legs") as raised:
         ms.record(Stumbles, "E1", seeds=1, runs=2, out=tmp_path, no_log=True)
     assert raised.traceback[-1].name == "__call__"
@@ -92,7 +92,7 @@ def test_what_an_agent_raises_ends_the_recording_with_its_type_and_traceback(tmp
         ms.record(stops, "E1", seeds=1, runs=1, out=tmp_path, no_log=True, on_error="lose")
 
 
-def test_what_is_wrong_with_arguments_is_said_before_anything_begins(tmp_path):
+def test_invalid_arguments_are_refused_before_recording(tmp_path):
     out = tmp_path / "runs"
     with pytest.raises(TypeError, match="expected a name, a function or a class, found NoneType"):
         ms.record(None, out=out)
@@ -210,7 +210,7 @@ def test_an_interrupt_ends_an_agent_that_never_returns(tmp_path):
     assert turns == before, "a thread that still runs aborts the interpreter when it exits"
 
 
-def test_an_interrupt_ends_the_command_as_it_ends_the_program(tmp_path):
+def test_an_interrupt_ends_the_installed_command(tmp_path):
     command = pathlib.Path(sys.executable).parent / "mirrorstats"
     # A command that listens ends with a code of its own, another one by the signal.
     words = ["record", "--agent", "exec:sleep 60", "--experiment", "E1", "--seeds", "1", "--runs", "1", "--out", "runs"]

@@ -23,7 +23,7 @@ def written(command, tmp_path, *words):
 # The reconstructed traces hold no words, which the extended definitions read.
 @pytest.mark.parametrize("fixture, definitions", [("paper", "paper"), ("recorded", "paper"), ("recorded", "extended")])
 @pytest.mark.parametrize("where", [None, "experiment <> 'E2' and TSA = 1", "seed > 99"])
-def test_episodes_are_those_that_score_writes(fixture, where, definitions, request, command, tmp_path):
+def test_episodes_equal_the_output_of_score(fixture, where, definitions, request, command, tmp_path):
     traces = request.getfixturevalue(fixture)
     words = [traces, "--definitions", definitions] + (["--where", where] if where else [])
     expected = written(command, tmp_path, *words)
@@ -74,7 +74,7 @@ def random_rows(seed):
 
 
 @pytest.mark.parametrize("seed", range(16))
-def test_episodes_of_random_traces_are_those_that_score_writes(seed, command, tmp_path):
+def test_episodes_of_random_traces_equal_the_output_of_score(seed, command, tmp_path):
     imported = ms.import_steps(random_rows(seed), tmp_path / "steps.parquet")
     for definitions in ["paper", "extended"]:
         expected = written(command, tmp_path, imported["out"], "--definitions", definitions)
@@ -93,7 +93,7 @@ def test_every_library_takes_the_same_episodes(paper):
     assert pyarrow.schema(episodes) == table.schema
 
 
-def test_cells_are_those_of_a_report(paper, command, tmp_path):
+def test_cells_equal_those_of_a_report(paper, command, tmp_path):
     command("report", paper, "--out", "report")
     expected = polars.read_csv(tmp_path / "report" / "cells.csv")
     cells = polars.DataFrame(ms.open(paper).cells)
@@ -102,7 +102,7 @@ def test_cells_are_those_of_a_report(paper, command, tmp_path):
     assert cells["sum"].cast(polars.Int64).to_list() == expected["sum"].to_list()
 
 
-def test_steps_are_those_of_the_files(recorded):
+def test_steps_equal_those_of_the_files(recorded):
     study = ms.open(recorded, where="experiment = 'E1' and TSA = 1")
     wanted = set(pyarrow.table(study.episodes)["episode_id"].to_pylist())
     names = ["t", "episode_id", "action", "mirror_visible"]
@@ -119,7 +119,7 @@ def test_steps_are_those_of_the_files(recorded):
 
 
 @pytest.mark.parametrize("where", [None, "experiment = 'E1' and TSA = 1"])
-def test_steps_for_polars_are_those_of_the_stream(recorded, where):
+def test_steps_for_polars_equal_the_arrow_stream(recorded, where):
     steps = ms.open(recorded, where=where).steps()
     found, expected = steps.to_polars(), polars.DataFrame(pyarrow.table(steps))
     assert found.height > 0 and found.equals(expected) and found.schema == expected.schema
@@ -188,7 +188,7 @@ def test_a_figure_has_a_metric_a_heading_and_a_width(paper, command, tmp_path):
             study.figure("intervals", **wrong)
 
 
-def test_answers_are_those_of_the_command_line(paper, command):
+def test_answers_equal_those_of_the_command_line(paper, command):
     study = ms.open(paper, where="experiment = 'E1'")
     words = [paper, "--where", "experiment = 'E1'"]
     assert study.stats() == json.loads(command("stats", *words, "--json").stdout)
@@ -203,7 +203,7 @@ def test_answers_are_those_of_the_command_line(paper, command):
     assert shown.startswith("<pre style=") and "overflow-x" in shown and "&lt;0.0001" in shown and "<0.0001" not in shown
 
 
-def test_a_gate_is_that_of_the_command_line(recorded, command):
+def test_a_gate_equals_that_of_the_command_line(recorded, command):
     sides = [f"{recorded}/E1-oracle.parquet", f"{recorded}/E1-random.parquet"]
     words = ["gate", *sides, "--metric", "TSA", "--margin", "0.2"]
     base, new = map(ms.open, sides)
@@ -228,7 +228,7 @@ def test_a_gate_is_that_of_the_command_line(recorded, command):
         ms.gate(base, sides[1])
 
 
-def test_a_difference_is_that_of_the_command_line(paper, command, tmp_path):
+def test_a_diff_equals_that_of_the_command_line(paper, command, tmp_path):
     mine = tmp_path / "mine.toml"
     mine.write_text('include = ["paper"]\n[let]\nmirror_evidence = "mirror_visible and t > 3"\n')
     old, new = ms.open(paper), ms.open(paper, definitions=mine)

@@ -78,7 +78,7 @@ def test_pyright_finds_the_types_of_answers_and_a_key_that_none_has(tmp_path):
             checked(tmp_path, *PYRIGHT, "used.py")
 
 
-def test_the_types_of_answers_are_those_of_the_schemas(tmp_path):
+def test_the_types_of_answers_match_the_schemas(tmp_path):
     checked(tmp_path, str(FIXTURES.parent / "scripts" / "python-types.py"), "--check")
 
 

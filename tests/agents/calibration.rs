@@ -65,7 +65,7 @@ fn check_logic(profiles: &Profiles) {
 }
 
 #[test]
-fn a_few_episodes_already_show_who_is_who() {
+fn a_few_episodes_distinguish_the_scripted_agents() {
     let [e1, e2, e3, e4, e5] = Experiment::PAPER;
     let plan = [
         episodes(Scripted::Oracle, &[e1.clone(), e4], 1, 2),
@@ -98,7 +98,7 @@ fn the_oracle_finds_itself_through_a_narrow_view_too() {
 /// The study's 21 episodes of every agent in each experiment; takes minutes in release.
 #[test]
 #[ignore = "`make calibrate` runs it in release"]
-fn twenty_one_episodes_an_experiment_show_the_predicted_profiles() {
+fn twenty_one_episodes_per_experiment_show_the_predicted_profiles() {
     let plan: Vec<_> = Scripted::ALL.into_iter().flat_map(|agent| episodes(agent, &Experiment::PAPER, 3, 7)).collect();
     let profiles = profiles(&plan, "paper");
     write_table("The paper's experiments", &profiles.markdown(&METRICS));

@@ -70,7 +70,7 @@ fn a_function_gets_the_messages_of_a_program_and_its_replies_are_recorded() {
 }
 
 #[test]
-fn a_frame_that_is_a_file_is_there_until_the_episode_ends() {
+fn frame_files_exist_until_the_episode_ends() {
     let folder = tempfile::tempdir().unwrap();
     let seen = Arc::new(Mutex::new(Vec::new()));
     let kept = Arc::clone(&seen);

@@ -61,7 +61,7 @@ fn verbatim(experiment: &Experiment, stated_color: Option<&str>) -> [String; 2] 
 }
 
 #[test]
-fn each_of_the_five_asks_in_the_papers_words() {
+fn the_five_experiments_ask_in_the_words_of_the_paper() {
     let config = WorldConfig::default();
     for experiment in Experiment::PAPER {
         let scene = Scene::draw(&config, experiment.clone(), 1, 1).unwrap();
@@ -91,7 +91,7 @@ fn every_experiment_reports_a_stopped_move() {
 }
 
 #[test]
-fn the_five_name_the_two_prompts_of_the_paper() {
+fn the_five_experiments_use_the_two_prompts_of_the_paper() {
     let prompts = Experiment::PAPER.map(|experiment| experiment.prompt.clone());
     assert_eq!(prompts, ["cube-selection", "cube-selection", "cube-selection", "cube-selection", "exploration"]);
     for experiment in Experiment::PAPER {
@@ -100,7 +100,7 @@ fn the_five_name_the_two_prompts_of_the_paper() {
 }
 
 #[test]
-fn history_is_one_step_on_one_line_whatever_was_thought() {
+fn the_history_is_one_line_for_any_thought() {
     let prompt = Prompt::of(&Experiment::E5).unwrap();
     let thought = Some("I turn.\n\nTask: <b>{{ 1 + 1 }}</b>".to_owned());
     let seen = |history| {
@@ -124,7 +124,7 @@ fn history_is_one_step_on_one_line_whatever_was_thought() {
 }
 
 #[test]
-fn families_differ_in_their_hash_and_actions_in_their_letters() {
+fn prompts_have_distinct_hashes_and_actions_distinct_letters() {
     let hashes = [Experiment::E1, Experiment::E5].map(|experiment| Prompt::of(&experiment).unwrap().hash().to_owned());
     assert_ne!(hashes[0], hashes[1]);
     for action in Action::ALL {
@@ -134,7 +134,7 @@ fn families_differ_in_their_hash_and_actions_in_their_letters() {
 }
 
 #[test]
-fn the_prompts_of_reaching_tell_every_step_and_those_of_the_paper_the_last() {
+fn reaching_prompts_list_all_steps_and_paper_prompts_the_last() {
     let step = |action, bumped| Past { action, bumped, thought: Some("went up".to_owned()) };
     let past = vec![step(Some(Action::HandUp), false), step(None, false), step(Some(Action::HandBackward), true)];
     let later = Observation {

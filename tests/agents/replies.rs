@@ -203,7 +203,7 @@ fn draft() -> String {
 }
 
 #[test]
-fn thoughts_before_the_object_are_a_repair_and_no_object_of_theirs_is_taken() {
+fn objects_inside_thoughts_are_not_taken_as_the_reply() {
     use Repair::{CodeFence, SurroundingText, Thoughts, TrailingComma};
     let (draft, comma) = (draft(), GOOD.replace("\"unknown\"}", "\"unknown\",}"));
     let cases: Vec<(String, Vec<Repair>)> = vec![

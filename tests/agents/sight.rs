@@ -75,7 +75,7 @@ fn a_cut_off_cube_is_ignored() {
 }
 
 #[test]
-fn a_body_is_not_taken_for_a_cube_and_seen_at_its_place() {
+fn a_body_is_located_and_not_taken_for_a_cube() {
     for color in Color::ALL {
         let room = Painted { others: vec![(color, at(-2.0, -0.5))], ..room() };
         let view = view(&room, pose(0.5, 0.0, 180.0));
@@ -86,7 +86,7 @@ fn a_body_is_not_taken_for_a_cube_and_seen_at_its_place() {
 }
 
 #[test]
-fn feet_lie_on_walls_and_through_the_mirror_beyond_them() {
+fn feet_are_on_walls_or_behind_the_mirror() {
     let feet = view(&room(), pose(1.0, 0.0, 0.0)).feet;
     let on_wall = |place: Place| (place.x.abs() - 4.0).abs() < 0.3 || (place.y.abs() - 4.0).abs() < 0.3;
     assert!(feet.len() > 40);
@@ -115,7 +115,7 @@ fn no_mirror_is_found_in_a_room_without_one() {
 }
 
 #[test]
-fn ones_own_color_is_known_after_tests_from_two_places() {
+fn two_viewpoints_reveal_the_own_color() {
     for own in Color::ALL {
         let room = Painted { own, ..room() };
         let poses = before_the_mirror();
@@ -159,7 +159,7 @@ fn known_of(poses: &[Pose], reflected: impl Fn(usize) -> Place) -> Knowledge {
 }
 
 #[test]
-fn a_late_reflection_is_ones_own() {
+fn a_delayed_reflection_is_recognised_as_oneself() {
     let poses = along_the_mirror();
     for late in [2, 5] {
         let known = known_of(&poses, |at| poses[at.saturating_sub(late)].place);
@@ -168,7 +168,7 @@ fn a_late_reflection_is_ones_own() {
 }
 
 #[test]
-fn who_walks_by_itself_is_not_oneself() {
+fn a_stranger_walking_alone_is_not_mistaken_for_oneself() {
     let poses = along_the_mirror();
     // They cross the agent's path now and then, and follow it at no lag.
     let strangers: [fn(usize) -> Place; 3] = [

@@ -56,7 +56,7 @@ fn the_guesser_takes_what_it_sees() {
 }
 
 #[test]
-fn frozen_and_random_do_as_they_are_called() {
+fn frozen_stands_still_and_random_varies_with_the_seed() {
     let short = Task { step_budget: 5, ..task(Experiment::E5, 3) };
     let (replies, place) = room().play(Scripted::Frozen, &short, start());
     assert!(replies.iter().all(|reply| reply.action.is_none() && reply.self_color.as_deref() == Some("unknown")));

@@ -72,7 +72,7 @@ fn piped_input_is_read_within_the_limit() {
 }
 
 #[test]
-fn includes_that_double_are_counted() {
+fn exponential_includes_are_limited() {
     let folder = tempfile::tempdir().unwrap();
     for at in 0..40 {
         let text = format!("include = [\"{0}.toml\", \"{0}.toml\"]\n", at + 1);
@@ -84,7 +84,7 @@ fn includes_that_double_are_counted() {
 }
 
 #[test]
-fn an_include_tells_nothing_of_its_target() {
+fn an_invalid_include_does_not_reveal_its_contents() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     fs::write(at.join("top.toml"), "include = [\"mid.toml\"]\n[metric.M]\nvalue = \"1\"\n").unwrap();
@@ -128,7 +128,7 @@ fn a_statement_is_counted_while_it_is_written() {
 }
 
 #[test]
-fn faults_and_keys_without_end_are_counted() {
+fn numbers_of_errors_and_keys_are_limited() {
     let folder = tempfile::tempdir().unwrap();
     let check = |text: String| {
         fs::write(folder.path().join("d.toml"), text).unwrap();

@@ -164,7 +164,7 @@ fn a_color_in_another_spelling_is_refused_in_every_column() {
 }
 
 #[test]
-fn a_word_is_refused_where_it_means_nothing() {
+fn a_special_word_is_refused_in_other_columns() {
     for (column, text, help) in MISPLACED {
         check(column, text, &format!("`{text}`"), help);
     }
@@ -254,7 +254,7 @@ fn a_claimed_color_that_nothing_has_is_a_note() {
 }
 
 #[test]
-fn what_a_footer_declares_is_all_there_is() {
+fn only_colors_declared_in_the_footer_are_valid() {
     let palette = r#"{"palette":["teal","magenta"],"seeds":[1]}"#;
     let sound = Colors {
         body: ["teal"; 4],

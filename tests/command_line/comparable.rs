@@ -171,7 +171,7 @@ fn models_of_two_worlds_prompts_or_step_budgets_are_not_compared() {
 }
 
 #[test]
-fn lost_episodes_and_unreadable_replies_stand_beside_their_cells() {
+fn cells_show_lost_episodes_and_unreadable_replies() {
     // The last reply of a lost episode has no decision either.
     let folder = two(|cell| (cell.lost, cell.unread) = (2, 3));
     let at = folder.path();
@@ -195,7 +195,7 @@ fn lost_episodes_and_unreadable_replies_stand_beside_their_cells() {
 }
 
 #[test]
-fn scores_in_parquet_refuse_as_their_traces_do() {
+fn scores_in_parquet_are_refused_like_their_traces() {
     let folder = two(|cell| cell.mirror = 1.2);
     run(folder.path(), &["score", "runs", "-o", "scores.parquet"]).done();
     let (answer, _) = differs(folder.path(), &["scores.parquet"]);
@@ -203,7 +203,7 @@ fn scores_in_parquet_refuse_as_their_traces_do() {
 }
 
 #[test]
-fn a_cell_of_which_a_half_has_no_fingerprint_is_refused_unless_pooled() {
+fn a_cell_partly_without_fingerprints_is_refused_unless_pooled() {
     let folder = tempfile::tempdir().unwrap();
     Cell { declared: 10, solved: solved(21, 21), ..LIKE }.write(&folder.path().join("runs"));
     let message = run(folder.path(), &["stats", "runs"]).refused();
@@ -217,7 +217,7 @@ fn a_cell_of_which_a_half_has_no_fingerprint_is_refused_unless_pooled() {
 }
 
 #[test]
-fn experiments_are_contrasted_in_one_world_and_of_like_tasks_alone() {
+fn only_experiments_of_one_world_and_similar_tasks_are_contrasted() {
     let contrast = |mirror, against| {
         let folder = tempfile::tempdir().unwrap();
         Cell { solved: solved(21, 21), ..LIKE }.write(folder.path());
@@ -277,7 +277,7 @@ fn bold_marks_the_models_that_no_test_shows_to_be_worse() {
 }
 
 #[test]
-fn ranks_are_in_a_report_and_lost_episodes_beside_the_test_over_all_experiments() {
+fn a_report_shows_ranks_and_lost_episodes() {
     let folder = two(|_| ());
     let at = folder.path();
     Cell { experiment: "E2", solved: solved(21, 21), ..LIKE }.write(&at.join("runs"));

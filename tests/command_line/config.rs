@@ -32,7 +32,7 @@ fn written(folder: &Path, variables: &[(&str, &str)], typed: &[&str]) -> String 
 }
 
 #[test]
-fn what_is_typed_comes_before_the_environment_and_that_before_the_file() {
+fn options_override_variables_and_variables_override_the_file() {
     let folder = configured("out = \"of-all\"\n[report]\nout = \"of-report\"\n");
     let here = folder.path();
     let of_all = ("MIRRORSTATS_OUT", "of-variable");
@@ -119,7 +119,7 @@ fn every_fault_of_the_file_is_underlined_before_anything_runs() {
 }
 
 #[test]
-fn errors_are_told_as_one_json_object_where_that_is_asked_for() {
+fn errors_are_one_json_object_if_requested() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("wrong.toml"), "[metric.A]\nkind = \"rate\"\n").unwrap();
     let told = |variables: &[(&str, &str)], arguments: &[&str]| -> Value {
@@ -142,7 +142,7 @@ fn errors_are_told_as_one_json_object_where_that_is_asked_for() {
 }
 
 #[test]
-fn a_refused_option_or_command_is_told_where_it_is() {
+fn a_refused_option_or_command_names_the_right_one() {
     let here = Path::new(".");
     let refused = run(here, &["stats", "runs", "--published", "x.csv"]).refused();
     assert!(refused.contains("tip: `--published` is an option of `table compare`"), "{refused}");

@@ -91,7 +91,7 @@ fn nothing_depends_on_the_order_of_the_files() {
 }
 
 #[test]
-fn the_library_takes_it_as_well() {
+fn the_library_scores_a_declared_experiment() {
     let folder = folder();
     let traces = open(&[&folder.path().join("six.parquet")]);
     let definitions = score_traces::definitions(&traces, &Request::of("paper")).unwrap();
@@ -161,7 +161,7 @@ fn every_command_takes_a_declared_experiment() {
 }
 
 #[test]
-fn what_decided_is_found_for_scores_of_a_declared_experiment() {
+fn evidence_is_found_for_scores_of_a_declared_experiment() {
     let folder = folder();
     let at = folder.path();
     fs::write(at.join("own.toml"), "include = [\"paper\"]\n[let]\nvisible = \"t = 3\"\n").unwrap();
@@ -199,7 +199,7 @@ fn a_threshold_of_evidence_keeps_a_declared_experiment() {
 }
 
 #[test]
-fn an_experiment_that_nobody_declares_is_refused_as_before() {
+fn an_undeclared_experiment_is_refused() {
     let folder = folder();
     let at = folder.path();
     write(at, "nine", "E9", &json!({ "experiment": six() }));
@@ -270,7 +270,7 @@ fn files_that_declare_one_experiment_differently_are_refused_together() {
 }
 
 #[test]
-fn what_the_definitions_say_counts() {
+fn definitions_override_declarations() {
     let folder = folder();
     let at = folder.path();
     let own = "include = [\"paper\"]\n[experiment.E6]\ntitle = \"Own\"\norder = 9\nchance = { TSA = \"1/2\" }\n";
@@ -286,7 +286,7 @@ fn what_the_definitions_say_counts() {
 }
 
 #[test]
-fn a_declaration_that_is_not_as_it_must_be_is_an_error_of_its_file() {
+fn an_invalid_declaration_is_reported_with_its_file() {
     let folder = folder();
     let at = folder.path();
     for (key, value, words) in [

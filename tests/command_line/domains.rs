@@ -178,7 +178,7 @@ fn definitions_may_name_the_domain_of_the_mirror() {
 }
 
 #[test]
-fn the_file_of_the_domain_declares_what_the_program_knows_of_its_columns() {
+fn the_mirror_domain_file_matches_the_built_in_columns() {
     let text = fs::read_to_string(repository().join("assets/domains/mirror.toml")).unwrap();
     let file: toml::Value = toml::from_str(&text).unwrap();
     let declared = file["column"].as_table().unwrap();
@@ -195,7 +195,7 @@ fn the_file_of_the_domain_declares_what_the_program_knows_of_its_columns() {
 }
 
 #[test]
-fn rules_of_the_mirror_hold_for_the_mirror_alone() {
+fn rules_of_the_mirror_apply_only_to_the_mirror() {
     let folder = folder();
     let at = folder.path();
     let refused = run(at, &["score", "robots.parquet", "-o", "scores.csv"]).refused();

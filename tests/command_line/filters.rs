@@ -5,7 +5,7 @@ use trace::write::write_episodes;
 use crate::{episode, run, two_files};
 
 #[test]
-fn a_filter_that_keeps_nothing_is_refused_with_the_values_there_are() {
+fn a_filter_that_keeps_nothing_is_refused_with_the_present_values() {
     let folder = two_files();
     let at = folder.path();
     run(at, &["score", ".", "-o", "s.csv"]).done();
@@ -27,7 +27,7 @@ fn a_filter_that_keeps_nothing_is_refused_with_the_values_there_are() {
 }
 
 #[test]
-fn a_filter_by_a_value_that_a_column_never_has_is_refused_at_the_value() {
+fn a_filter_by_an_impossible_value_is_refused_at_the_value() {
     let folder = two_files();
     let said = run(folder.path(), &["score", ".", "--where", "any(action = 'turn_lft')"]).refused();
     let expected = "error: `action` never is 'turn_lft'\n --> --where:1:14\n";
@@ -36,7 +36,7 @@ fn a_filter_by_a_value_that_a_column_never_has_is_refused_at_the_value() {
 }
 
 #[test]
-fn a_table_for_programs_may_be_empty_and_a_note_says_why() {
+fn an_empty_machine_readable_table_has_a_note() {
     let folder = two_files();
     let answer = run(folder.path(), &["score", "a.parquet", "--where", "seed = 9", "--metrics", "TSA"]);
     assert_eq!((answer.code, answer.stdout.as_str()), (0, "episode_id,model,experiment,seed,run,TSA\n"));

@@ -66,7 +66,7 @@ fn every_form_of_scores_gives_the_same_verdicts_and_caveats() {
 }
 
 #[test]
-fn reconstructed_episodes_are_paired_with_recorded_ones_in_no_form() {
+fn reconstructed_and_recorded_episodes_are_never_paired() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     Cell { kind: "reconstruction", ..ant() }.write(&at.join("a"));

@@ -47,7 +47,7 @@ fn each_verdict_has_its_exit_code() {
 }
 
 #[test]
-fn a_cell_of_which_nothing_is_said_names_the_episodes_that_would_settle_it() {
+fn an_undecided_cell_names_the_episodes_needed() {
     let folder = two(&of(14, 21), &of(13, 21));
     let (_, found) = cell_of(folder.path(), &[]);
     let settled = found["settled_by"].as_u64().unwrap();
@@ -60,7 +60,7 @@ fn a_cell_of_which_nothing_is_said_names_the_episodes_that_would_settle_it() {
 }
 
 #[test]
-fn what_differs_is_named_and_may_be_pooled() {
+fn differing_worlds_are_named_and_can_be_pooled() {
     let folder = two(&of(21, 21), &Cell { mirror: 1.2, ..of(0, 21) });
     let (_, found) = cell_of(folder.path(), &[]);
     assert_eq!(found["why"], "world.mirror.width is 3.0 and 1.2");
@@ -110,7 +110,7 @@ fn lost_episodes_that_could_turn_a_verdict_withhold_it() {
 }
 
 #[test]
-fn scores_stand_for_traces_and_durations_have_a_margin_in_steps() {
+fn scores_replace_traces_and_durations_have_a_margin_in_steps() {
     let folder = two(&of(21, 21), &of(0, 21));
     for side in ["base", "new"] {
         run(folder.path(), &["score", side, "-o", &format!("{side}.parquet")]).done();

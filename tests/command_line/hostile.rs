@@ -104,7 +104,7 @@ fn names_of_models_and_episodes_cannot_reach_the_terminal_raw() {
 }
 
 #[test]
-fn values_in_a_faulty_trace_are_shown_and_do_not_act() {
+fn values_of_an_invalid_trace_are_escaped() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     for name in NAMES {
@@ -118,7 +118,7 @@ fn values_in_a_faulty_trace_are_shown_and_do_not_act() {
 }
 
 #[test]
-fn the_name_of_a_file_does_not_act() {
+fn the_name_of_a_file_is_escaped() {
     let folder = tempfile::tempdir().unwrap();
     let name = "\u{1b}[31mred.parquet";
     write_episodes(&folder.path().join(name), None, &[episode("m", "E9", 1, "red")]).unwrap();

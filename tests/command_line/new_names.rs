@@ -138,7 +138,7 @@ fn data_of_page(line: &str) -> Option<serde_json::Value> {
 }
 
 #[test]
-fn new_names_of_all_metrics_and_experiments_change_names_alone() {
+fn renaming_all_metrics_and_experiments_changes_only_names() {
     let (old, new) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     // Points of the scatter have attributes named after metrics.
     let attributes = [("laca", "caal"), ("dtt", "ttd")];

@@ -92,7 +92,7 @@ fn definitions_of_one_s_own_include_the_paper_s() {
 }
 
 #[test]
-fn an_unknown_experiment_is_accepted_where_the_file_says_so() {
+fn an_unknown_experiment_is_accepted_by_open_definitions() {
     let folder = tempfile::tempdir().unwrap();
     let episodes = [crate::episode("ant", "E9", 1, "red")];
     trace::write::write_episodes(&folder.path().join("a.parquet"), None, &episodes).unwrap();

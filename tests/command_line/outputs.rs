@@ -31,7 +31,7 @@ fn check(folder: &Path, file: &str, command: &[&str]) {
 }
 
 #[test]
-fn a_trace_is_no_output_of_what_reads_it() {
+fn an_input_trace_is_refused_as_the_output() {
     for command in [
         &["score", "a.parquet", "b.parquet", "-o"][..],
         &["score", ".", "--engine", "native", "-o"],
@@ -48,7 +48,7 @@ fn a_trace_is_no_output_of_what_reads_it() {
 }
 
 #[test]
-fn scores_definitions_and_steps_are_no_outputs_either() {
+fn input_scores_definitions_and_steps_are_refused_as_outputs() {
     let folder = two_files();
     run(folder.path(), &["score", "a.parquet", "-o", "s.csv"]).done();
     check(folder.path(), "s.csv", &["score", "s.csv", "-o"]);
@@ -85,7 +85,7 @@ fn a_report_does_not_replace_what_it_is_made_of() {
 }
 
 #[test]
-fn a_copy_is_another_file() {
+fn a_copy_of_an_input_may_be_replaced() {
     let folder = two_files();
     fs::copy(folder.path().join("a.parquet"), folder.path().join("copy.parquet")).unwrap();
     run(folder.path(), &["score", "a.parquet", "-o", "copy.parquet"]).done();
@@ -129,7 +129,7 @@ fn standard_output_by_its_name_may_be_a_file() {
 }
 
 #[test]
-fn a_folder_with_inputs_is_no_folder_for_outputs() {
+fn a_folder_with_inputs_is_refused_as_the_output() {
     let folder = two_files();
     let runs = folder.path().join("runs");
     fs::create_dir_all(runs.join("deep")).unwrap();
@@ -248,7 +248,7 @@ const WRITING: [(&str, &str); 7] = [
 ];
 
 #[test]
-fn a_limit_of_the_size_of_files_is_an_error_that_is_told() {
+fn a_file_size_limit_is_reported_as_an_error() {
     let folder = two_files();
     let at = folder.path();
     for (words, output) in WRITING {

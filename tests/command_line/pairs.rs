@@ -27,7 +27,7 @@ fn refused(at: &Path, words: &str, limit: &str) {
 }
 
 #[test]
-fn an_episode_of_millions_of_steps() {
+fn an_episode_of_millions_of_steps_stays_within_the_limits() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     long_episode(&at.join("a.parquet"), 4_000_000);
@@ -44,7 +44,7 @@ fn an_episode_of_millions_of_steps() {
 }
 
 #[test]
-fn texts_of_a_million_steps() {
+fn texts_of_a_million_steps_stay_within_the_limits_or_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     long_texts(&at.join("a.parquet"), 1_000_000);
@@ -59,7 +59,7 @@ fn texts_of_a_million_steps() {
 }
 
 #[test]
-fn hundreds_of_thousands_of_episodes() {
+fn hundreds_of_thousands_of_episodes_stay_within_the_limits_or_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     many_episodes(&at.join("all.parquet"), 0..900_000);
@@ -97,7 +97,7 @@ fn many_small_files_have_one_budget() {
 }
 
 #[test]
-fn hundreds_of_thousands_of_models() {
+fn hundreds_of_thousands_of_models_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     many_models(&at.join("a.parquet"), 290_000);
@@ -115,7 +115,7 @@ fn hundreds_of_thousands_of_models() {
 }
 
 #[test]
-fn definitions_and_rows_together() {
+fn definitions_and_rows_are_limited_together() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     many_episodes(&at.join("episodes.parquet"), 0..290_000);

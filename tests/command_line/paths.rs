@@ -48,7 +48,7 @@ fn run(folder: &tempfile::TempDir, words: &str) -> Answer {
 }
 
 #[test]
-fn a_path_need_not_be_text() {
+fn a_path_may_be_invalid_utf8() {
     let folder = folder();
     for words in [
         "info @",
@@ -85,7 +85,7 @@ fn a_path_need_not_be_text() {
 }
 
 #[test]
-fn globs_and_lists_have_such_names_too() {
+fn globs_and_lists_find_names_with_invalid_utf8() {
     let folder = folder();
     let expected = run(&folder, "score @").done();
     assert_eq!(expected.lines().count(), 17);
@@ -99,7 +99,7 @@ fn globs_and_lists_have_such_names_too() {
 
 #[cfg(feature = "polars")]
 #[test]
-fn polars_reads_such_files_as_well() {
+fn polars_reads_paths_with_invalid_utf8() {
     let folder = folder();
     let expected = run(&folder, "score @").done();
     assert_eq!(run(&folder, "score @ --engine polars").done(), expected);
@@ -110,7 +110,7 @@ fn polars_reads_such_files_as_well() {
 
 #[cfg(feature = "sim")]
 #[test]
-fn recordings_and_experiments_have_such_names_too() {
+fn recordings_and_experiments_may_have_names_with_invalid_utf8() {
     let folder = folder();
     let mine = fs::read_to_string("assets/experiments/E1.toml").unwrap().replace("experiment.E1", "experiment.mine");
     fs::write(folder.path().join(odd("-mine.toml")), mine).unwrap();
@@ -128,7 +128,7 @@ fn recordings_and_experiments_have_such_names_too() {
 }
 
 #[test]
-fn a_name_that_gives_nothing_is_shown_as_text() {
+fn the_name_of_a_missing_file_is_escaped() {
     let folder = folder();
     for words in [
         "score @-none",

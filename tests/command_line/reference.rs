@@ -119,7 +119,7 @@ fn reference_pages_are_current() {
 }
 
 #[test]
-fn the_version_is_that_of_the_package_and_the_long_one_tells_the_features() {
+fn the_long_version_adds_the_features_to_the_package_version() {
     let version = run(Path::new("."), &["-V"]).done();
     assert_eq!(version, format!("mirrorstats {}\n", env!("CARGO_PKG_VERSION")));
     let long = run(Path::new("."), &["--version"]).done();

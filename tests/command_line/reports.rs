@@ -111,7 +111,7 @@ fn a_report_whose_manifest_lists_no_outputs_is_known_by_its_names() {
 }
 
 #[test]
-fn a_manifest_of_something_else_lists_nothing_to_remove() {
+fn a_foreign_manifest_removes_no_files() {
     let folder = two_files();
     let out = folder.path().join("out");
     put_foreign(&out);

@@ -12,7 +12,7 @@ fn score(at: &Path, arguments: &[&str], output: &str) {
 }
 
 #[test]
-fn a_report_from_scores_is_the_report_from_traces() {
+fn scores_and_traces_give_the_same_report() {
     let folder = two_files();
     let at = folder.path();
     run(at, &["report", ".", "--out", "out/traces"]).done();
@@ -54,7 +54,7 @@ fn a_report_from_scores_is_the_report_from_traces() {
 }
 
 #[test]
-fn scores_in_parts_are_the_whole() {
+fn partial_score_files_add_up_to_the_whole() {
     let folder = two_files();
     let at = folder.path();
     let expected = run(at, &["score", "a.parquet", "b.parquet"]).done();
@@ -84,7 +84,7 @@ fn conditions_and_choices_work_on_scores() {
 }
 
 #[test]
-fn scores_that_no_scoring_gave_are_refused() {
+fn impossible_scores_are_refused() {
     let folder = two_files();
     let at = folder.path();
     score(at, &["a.parquet"], "s.csv");
@@ -124,7 +124,7 @@ fn scores_that_no_scoring_gave_are_refused() {
 }
 
 #[test]
-fn scores_and_traces_do_not_mix_and_have_no_steps() {
+fn scores_mixed_with_traces_or_used_for_steps_are_refused() {
     let folder = two_files();
     let at = folder.path();
     score(at, &["a.parquet"], "s.parquet");

@@ -137,7 +137,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 8, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn cells_are_those_of_definitions_edited_by_hand(px in 1_u32..400) {
+    fn cells_equal_those_of_edited_definitions(px in 1_u32..400) {
         compare(fixture("glimpses.parquet").to_str().unwrap(), px);
         compare(fixture("recorded/E*.parquet").to_str().unwrap(), px);
     }

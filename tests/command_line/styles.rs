@@ -38,7 +38,7 @@ fn metrics_that_a_style_does_not_name_follow_its_main_table() {
 }
 
 #[test]
-fn a_built_in_style_is_shown_and_begins_one_of_ones_own() {
+fn a_built_in_style_is_printed_as_a_template() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     for name in ["default", "paper"] {

@@ -22,7 +22,7 @@ fn the_last_process_removes_the_shared_files() {
 }
 
 #[test]
-fn files_of_a_killed_process_are_removed_by_the_next_one_alone() {
+fn a_process_removes_files_of_a_killed_one_only_when_alone() {
     let folder = tempfile::tempdir().unwrap();
     let first = FolderLock::stake(folder.path()).unwrap();
     let parts = first.parts();

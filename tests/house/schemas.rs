@@ -107,7 +107,7 @@ fn keys_and_types(schema: &Value) -> Value {
 
 /// People and other harnesses get these files; agents get only the structure.
 #[test]
-fn replies_are_described_as_the_files_say() {
+fn reply_schemas_match_their_files() {
     let replies =
         [(Experiment::E1, "reply-cubes", "Reply in E1 to E4"), (Experiment::E5, "reply-exploration", "Reply in E5")];
     for (experiment, name, title) in replies {

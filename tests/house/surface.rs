@@ -29,7 +29,7 @@ fn names_are_read_from_every_form_of_a_declaration() {
 }
 
 #[test]
-fn the_library_promises_these_names_and_no_others() {
+fn the_public_names_of_the_library_are_listed() {
     insta::assert_snapshot!(reexported(&lib()).join("\n"), @r"
     Backend
     CellChange

@@ -238,7 +238,7 @@ fn the_completion_gap_is_the_difference_of_two_cells() {
 }
 
 #[test]
-fn the_ends_of_an_interval_are_those_of_wilson() {
+fn intervals_are_wilson_intervals() {
     let cast = cast::paper();
     let marks = marks(&svg(FigureName::Intervals, &cast));
     assert_eq!(marks.len(), 40);
@@ -268,7 +268,7 @@ fn outcomes_are_read_back_as_given() {
 }
 
 #[test]
-fn a_decision_curve_counts_who_decided() {
+fn a_decision_curve_counts_decided_episodes() {
     let cast = cast::paper();
     let marks = marks(&svg(FigureName::DecisionCurve, &cast));
     assert_eq!(marks.len(), 40);
@@ -331,7 +331,7 @@ fn undefined_and_empty_cells_are_shown_as_such() {
 }
 
 #[test]
-fn the_chance_marker_is_there_where_there_is_a_chance_level() {
+fn experiments_with_a_chance_level_have_a_chance_marker() {
     let svg = svg(FigureName::Spider, &cast::paper());
     let document = Document::parse(&svg).unwrap();
     let marked: Vec<_> = document

@@ -165,7 +165,7 @@ fn printed(values: &[i32], metric: &str, source: Source) -> Option<Value> {
 }
 
 #[test]
-fn every_published_cell_prints_but_the_one_slip() {
+fn all_published_cells_but_one_are_reproduced() {
     let cells = cells();
     let mut differing = Vec::new();
     let mut checked = 0;
@@ -189,7 +189,7 @@ fn every_published_cell_prints_but_the_one_slip() {
 }
 
 #[test]
-fn the_undefined_cells_are_those_of_findings() {
+fn only_mtato_and_sc_have_undefined_cells() {
     let undefined: Vec<_> = cells().into_iter().filter(|(_, values)| values.is_empty()).map(|(key, _)| key).collect();
     let mtato: Vec<_> = undefined.iter().filter(|key| key.2 == "MTATO").map(|key| (&*key.0, &*key.1)).collect();
     assert_eq!(mtato, [("E2", "Ministral 3 14B"), ("E5", "Ministral 3 14B")]);
@@ -218,7 +218,7 @@ fn the_solver_finds_exactly_the_known_contradictions() {
 }
 
 #[test]
-fn the_committed_traces_equal_the_generators() {
+fn the_committed_traces_equal_the_generated_ones() {
     let differences = files::differences(&fixture("paper"), &TRACES).unwrap();
     assert!(
         differences.is_empty(),

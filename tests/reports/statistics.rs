@@ -273,7 +273,7 @@ fn lost_episodes_are_bounded_and_unknown_losses_are_said_to_be_unknown() {
 }
 
 #[test]
-fn no_episodes_are_no_fault() {
+fn no_episodes_are_not_an_error() {
     let found = statistics(&[]);
     assert_eq!((found.episodes, found.cells.len(), found.models.len()), (0, 0, 0));
     assert!(found.render(&found.headline, Length::Short, None).starts_with("0 episodes"));

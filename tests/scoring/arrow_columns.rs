@@ -14,7 +14,7 @@ use trace::write::{OptionalColumns, write_episodes};
 use crate::harness::traces::{episode, rows, write_trace};
 
 #[test]
-fn episodes_are_those_that_score_writes() {
+fn episodes_equal_the_output_of_score() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scores.parquet");
     for (traces, definitions) in [("fixtures/paper", "paper"), ("fixtures/recorded", "extended")] {
@@ -97,7 +97,7 @@ fn views_have_the_texts_of_the_files() {
 }
 
 #[test]
-fn nothing_follows_a_damaged_page() {
+fn reading_stops_at_a_damaged_page() {
     let folder = folder();
     let path = folder.path().join("a.parquet");
     let study = study(folder.path());

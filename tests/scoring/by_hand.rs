@@ -77,7 +77,7 @@ fn the_paper_s_metrics_are_as_worked_out_by_hand() {
 }
 
 #[test]
-fn an_episode_alone_scores_as_among_others() {
+fn the_score_of_an_episode_does_not_depend_on_others() {
     for Case { episode, expected } in cases() {
         assert_eq!(
             values(&score_paper(std::slice::from_ref(&episode)), &episode.episode_id),
@@ -89,7 +89,7 @@ fn an_episode_alone_scores_as_among_others() {
 }
 
 #[test]
-fn cells_of_one_episode_and_of_no_success() {
+fn cells_with_one_episode_or_no_success_match_worked_examples() {
     let cases = cases();
     let named = |name: &str, model: &str, id: &str| {
         let case = cases.iter().find(|case| case.episode.episode_id == name).expect("a case of the file");

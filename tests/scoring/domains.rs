@@ -90,7 +90,7 @@ fn place(names: &[String], name: &str) -> usize {
 }
 
 #[test]
-fn native_is_what_was_worked_out_by_hand() {
+fn native_matches_worked_examples() {
     check(Engine::Native);
 }
 

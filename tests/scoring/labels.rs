@@ -114,7 +114,7 @@ fn definitions_read_labels() {
 }
 
 #[test]
-fn a_filter_by_labels_is_one_by_results() {
+fn a_filter_by_labels_counts_as_a_filter_by_results() {
     let folder = coded();
     let by = |condition: &str| {
         let told = asked(folder.path(), &["stats", "runs", "--where", condition, "--json"]).json();

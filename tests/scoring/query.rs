@@ -119,7 +119,7 @@ fn polars_gives_the_bytes_of_the_native_engine() {
 }
 
 #[test]
-fn evidence_is_not_said_to_be_of_another_engine() {
+fn evidence_is_refused_for_another_engine() {
     let (code, out, err) = run(&["score", FIXTURE, "--engine", "polars", "--explain", "E1/gpt-5-1/s1/r2"]);
     assert_eq!((code, out.as_str()), (2, ""));
     assert!(err.contains("--explain shows what the native engine decided by"), "{err}");

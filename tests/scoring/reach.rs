@@ -112,7 +112,7 @@ fn check(engine: Engine) {
 }
 
 #[test]
-fn a_series_worked_out_by_hand() {
+fn a_series_matches_worked_examples() {
     let cases = cases();
     let expected = [
         // Each of four steps is nearer, and all of the 400 mm are covered.
@@ -133,22 +133,22 @@ fn a_series_worked_out_by_hand() {
 }
 
 #[test]
-fn native_is_the_formulas() {
+fn native_agrees_with_the_formulas() {
     check(Engine::Native);
 }
 
 #[test]
-fn polars_is_the_formulas() {
+fn polars_agrees_with_the_formulas() {
     check(Engine::Polars);
 }
 
 #[test]
-fn duckdb_is_the_formulas() {
+fn duckdb_agrees_with_the_formulas() {
     check(Engine::Duckdb);
 }
 
 #[test]
-fn spark_is_the_formulas() {
+fn spark_agrees_with_the_formulas() {
     check(Engine::Spark);
 }
 
@@ -199,16 +199,16 @@ fn the_last_number_counts_only_in_answers_that_were_not_read() {
 }
 
 #[test]
-fn polars_counts_the_same_last_numbers() {
+fn polars_parses_the_same_last_numbers() {
     check_fallback(Engine::Polars);
 }
 
 #[test]
-fn duckdb_counts_the_same_last_numbers() {
+fn duckdb_parses_the_same_last_numbers() {
     check_fallback(Engine::Duckdb);
 }
 
 #[test]
-fn spark_counts_the_same_last_numbers() {
+fn spark_parses_the_same_last_numbers() {
     check_fallback(Engine::Spark);
 }

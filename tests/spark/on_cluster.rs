@@ -74,7 +74,7 @@ fn a_cluster_gives_the_scores_of_the_native_engine() {
 
 #[test]
 #[ignore = "soak: a cluster of its own, three more statements"]
-fn soak_a_cluster_gives_the_native_report_and_refuses_what_it_cannot_read() {
+fn soak_a_cluster_gives_the_native_report_and_refuses_unreadable_traces() {
     let cluster = Cluster::start();
     what_a_uri_does_not_give_is_refused(&cluster);
     a_report_is_the_native_one(&cluster);

@@ -26,7 +26,7 @@ fn ints(values: &[Option<i64>]) -> ArrayRef {
 }
 
 #[test]
-fn parts_without_definitions_are_scores_of_those_that_are_named() {
+fn parts_without_definitions_use_the_named_ones() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     // `tsa_c` comes from an engine that folds case (portable `TSA_C` for `TSA-C`); folder names hold the other keys.

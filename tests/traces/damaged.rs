@@ -36,7 +36,7 @@ fn cases() -> BTreeMap<String, Vec<(String, String)>> {
 }
 
 #[test]
-fn the_files_are_what_the_generator_makes() {
+fn the_files_equal_the_generated_ones() {
     let files = damage::damaged_files().unwrap();
     for file in &files {
         let kept = fs::read(folder().join(file.name)).unwrap();

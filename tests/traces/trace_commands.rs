@@ -137,7 +137,7 @@ fn every_way_to_name_the_files_gives_the_same() {
 }
 
 #[test]
-fn info_counts_and_names_what_is_missing() {
+fn info_counts_episodes_and_names_missing_seeds_and_runs() {
     let folder = folder();
     let (code, out, _) = run(folder.path(), &["trace", "info", "--json", "runs"], "");
     let info: Value = serde_json::from_str(&out).unwrap();

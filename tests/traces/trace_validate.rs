@@ -93,7 +93,7 @@ fn everything_wrong_is_reported_by_row() {
 }
 
 #[test]
-fn rows_of_an_episode_that_lie_apart_are_one_finding() {
+fn an_episode_with_scattered_rows_is_one_finding() {
     let folder = tempfile::tempdir().unwrap();
     let rows = sound(folder.path());
     let parts = [rows.slice(0, 2), rows.slice(4, 4), rows.slice(2, 2)];
@@ -130,7 +130,7 @@ fn all_faults_of_a_footer_are_reported_at_once() {
 }
 
 #[test]
-fn a_renamed_column_is_pointed_at() {
+fn a_misspelled_column_is_suggested() {
     let folder = tempfile::tempdir().unwrap();
     let rows = sound(folder.path());
     let names =

@@ -56,7 +56,7 @@ fn row_groups_end_where_episodes_do() {
 }
 
 #[test]
-fn only_declared_optional_columns_are_there() {
+fn only_declared_optional_columns_are_written() {
     let plain = episode("a", 2);
     let seen = with_extra(episode("b", 2), Extra { mirror_px: Some(7), ..Extra::default() });
     assert_eq!(OptionalColumns::used_by([&plain]), OptionalColumns::NONE);
@@ -149,7 +149,7 @@ fn a_palette_in_the_recording_applies_to_written_rows() {
 }
 
 #[test]
-fn an_id_is_taken_once() {
+fn a_repeated_episode_id_is_refused() {
     let mut encoder = TraceEncoder::new(Vec::new(), &TraceMetadata::default()).unwrap();
     encoder.write(&episode("a", 1)).unwrap();
     let error = encoder.write(&episode("a", 2)).unwrap_err().to_string();
@@ -187,7 +187,7 @@ fn a_trace_is_of_the_oldest_version_that_has_its_columns() {
 }
 
 #[test]
-fn a_name_that_version_2_brought_stays_a_column_of_its_own_in_a_trace_of_version_1() {
+fn a_column_name_new_in_version_2_stays_custom_in_version_1() {
     let folder = tempfile::tempdir().unwrap();
     // It is neither constant in an episode nor text, as the schema's column would be.
     let own = |version: &str| {

@@ -104,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn a_joiner_stays_only_where_it_joins() {
+    fn a_joiner_that_joins_nothing_is_escaped() {
         for (text, expected) in [
             ("x\u{200d}y", "x\\u{200d}y"),
             ("🤖\u{200d}", "🤖\\u{200d}"),

@@ -56,7 +56,7 @@ mod tests {
     use super::{bounds, e_value, fixed, p_value};
 
     #[test]
-    fn zero_has_no_sign_and_nothing_is_not_zero() {
+    fn zero_is_unsigned_and_a_missing_value_is_a_dash() {
         assert_eq!(fixed(Some(-0.0004), 3), "0.000");
         assert_eq!(fixed(Some(-0.0006), 3), "-0.001");
         assert_eq!(fixed(Some(12.345), 1), "12.3");

@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_byte_that_is_no_text_is_named() {
+    fn the_first_invalid_byte_is_named() {
         let told = utf8(b"ab\xffc".to_vec()).unwrap_err().to_string();
         assert!(told.contains("0xff at byte 2"), "{told}");
     }

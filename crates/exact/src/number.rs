@@ -252,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn a_float_is_taken_for_the_binary_number_it_is() {
+    fn a_float_is_rounded_on_its_binary_value() {
         for (value, expected) in [
             (2.675, "2.67"),
             (1.005, "1.00"),
@@ -277,7 +277,7 @@ mod tests {
     }
 
     #[test]
-    fn values_compare_whatever_their_digits() {
+    fn numbers_with_different_digits_compare_by_value() {
         let of = |text: &str| text.parse::<Decimal>().unwrap();
         assert_eq!(of("0.1").cmp_value(of("0.10")), Ordering::Equal);
         assert_eq!(of("-0.00").cmp_value(of("0")), Ordering::Equal);

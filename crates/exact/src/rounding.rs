@@ -91,7 +91,7 @@ mod tests {
 
     // Python 3.11: decimal.Decimal(above) / below with quantize and ROUND_HALF_EVEN, ROUND_HALF_UP, ROUND_DOWN; "%.2f".
     #[test]
-    fn each_way_rounds_as_it_says() {
+    fn each_rounding_matches_worked_examples() {
         check(1, 8, ["0.12", "0.13", "0.12", "0.13", "0.12"]);
         check(3, 8, ["0.38", "0.38", "0.38", "0.38", "0.37"]);
         check(19, 21, ["0.90", "0.90", "0.90", "0.91", "0.90"]);
@@ -115,7 +115,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn every_way_is_monotone_and_off_by_less_than_a_unit(above in -5_000_i128..5_000, below in 1_i128..400) {
+        fn every_rounding_is_monotone_and_within_one_unit(above in -5_000_i128..5_000, below in 1_i128..400) {
             for rule in Rounding::ALL {
                 let here = rule.ratio(above, below, 2).unwrap().units();
                 prop_assert!(here <= rule.ratio(above + 1, below, 2).unwrap().units());

@@ -29,7 +29,7 @@ mod tests {
     use super::nearest;
 
     #[test]
-    fn the_most_alike_wins_and_strangers_do_not() {
+    fn the_closest_name_is_suggested_and_distant_ones_are_not() {
         let names = ["self_color", "selected_cube", "body_color"];
         assert_eq!(nearest("self_colour", names), Some("self_color"));
         assert_eq!(nearest("SELF_COLOR", names), Some("self_color"));

@@ -358,7 +358,7 @@ mod tests {
     }
 
     #[test]
-    fn only_a_condition_on_steps_is_replaced_and_by_no_fault() {
+    fn an_unknown_unsuitable_or_invalid_condition_is_refused() {
         let columns = schema_columns();
         let paper = Definitions::load("paper", &columns).unwrap();
         let error = |name: &str, text: &str| paper.with_condition_let(name, "test", text, &columns).unwrap_err();

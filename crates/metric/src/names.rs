@@ -58,7 +58,7 @@ mod tests {
     use super::{is_about, mentioned};
 
     #[test]
-    fn an_aggregate_and_an_unknown_name_are_more_than_keys() {
+    fn a_condition_on_aggregates_or_other_names_is_not_about_keys() {
         let is_key = |name: &str| ["seed", "model"].contains(&name);
         for text in ["seed = 1 and model in ('a', 'b')", "regexp_like(model, 'x')"] {
             assert!(is_about(text, &is_key), "{text}");

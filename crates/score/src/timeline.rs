@@ -115,7 +115,7 @@ mod tests {
     use super::runs;
 
     #[test]
-    fn neighbours_are_one_run() {
+    fn adjacent_timesteps_form_one_range() {
         assert_eq!(runs(&[]), []);
         assert_eq!(runs(&[1, 2, 3, 5, 9, 10]), [1..=3, 5..=5, 9..=10]);
     }

@@ -122,7 +122,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn coders_may_change_places_and_labels_may_be_turned(of in [0_u64..60, 0..60, 0..60, 0..60]) {
+        fn swapping_coders_or_labels_keeps_kappa(of in [0_u64..60, 0..60, 0..60, 0..60]) {
             let [both, first, second, neither] = of;
             let close = |a: Option<Kappa>, b: Option<Kappa>| match (a, b) {
                 (Some(a), Some(b)) => {

@@ -109,7 +109,7 @@ mod tests {
     // Python: F = Fraction; P[j] = F(comb(n, j) * a**j * (b - a)**(n - j), b**n); sum(p for p in P if p <= P[k]). scipy
     // 1.17.1 stats.binomtest(k, n, a / b).pvalue agrees in all its digits.
     #[test]
-    fn p_values_are_the_known_ones() {
+    fn p_values_match_known_values() {
         for (k, n, (a, b), expected) in [
             (5, 21, (1, 3), 0.488_521_635_152_284_8),
             (13, 21, (1, 3), 0.009_113_064_649_926_048),
@@ -146,7 +146,7 @@ mod tests {
 
     // Python: the fractions above, sum(p for p in P if p < P[k]) + sum(p for p in P if p == P[k]) / 2
     #[test]
-    fn mid_p_values_are_the_known_ones() {
+    fn mid_p_values_match_known_values() {
         for (k, n, (a, b), expected) in [
             (5, 21, (1, 3), 0.424_776_557_040_700_16),
             (13, 21, (1, 3), 0.006_623_022_536_192_27),
@@ -163,7 +163,7 @@ mod tests {
 
     // Python: the smallest of these p values over all counts.
     #[test]
-    fn least_p_values_are_the_known_ones() {
+    fn least_p_values_match_known_values() {
         for (n, (a, b), expected) in [
             (1, (1, 3), 1.0 / 3.0),
             (3, (1, 3), 1.0 / 27.0),
@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn counting_failures_instead_changes_nothing() {
+    fn swapping_successes_and_failures_keeps_the_p_value() {
         for k in 0..=21 {
             assert_eq!(two_sided(k, 21, level(1, 3)), two_sided(21 - k, 21, level(2, 3)));
             assert!((0.0..=1.0).contains(&two_sided(k, 21, level(1, 3)).unwrap()));

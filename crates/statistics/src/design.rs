@@ -53,7 +53,7 @@ mod tests {
     use super::{Cluster, Design, DesignKind};
 
     #[test]
-    fn a_reconstruction_has_neither_pairs_nor_clusters_whatever_it_declares() {
+    fn a_reconstruction_never_has_pairs_or_clusters() {
         let made_up = Design { kind: Some(DesignKind::Reconstruction), cluster: Some(Cluster::Seed) };
         assert_eq!((made_up.has_pairs(), made_up.clusters()), (false, None));
         let recorded = Design { kind: Some(DesignKind::Recording), cluster: Some(Cluster::Seed) };

@@ -156,7 +156,7 @@ mod tests {
     // Python fractions: the product of Krichevsky and Trofimov's estimates over p**k * (1 - p)**(n - k). scipy 1.17.1,
     // exp(betaln(k + 0.5, n - k + 0.5) - betaln(0.5, 0.5)) over the same, agrees in its digits.
     #[test]
-    fn e_values_are_the_known_ones() {
+    fn e_values_match_known_values() {
         for (k, n, (a, b), e, p) in [
             (0, 1, (1, 2), 1.0, 1.0),
             (6, 6, (1, 2), 14.4375, 0.06926406926406926),
@@ -177,7 +177,7 @@ mod tests {
 
     // scipy 1.17.1: the roots of k log(p) + (n - k) log(1 - p) = log(1 - confidence) + betaln(...) as above, by brentq.
     #[test]
-    fn confidence_sequences_are_the_known_ones() {
+    fn confidence_sequences_match_known_values() {
         for (k, n, confidence, low, high) in [
             (0, 1, 0.95, 0.0, 0.975),
             (1, 1, 0.95, 0.025, 1.0),
@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn discordant_pairs_alone_are_bet_on() {
+    fn only_discordant_pairs_count() {
         let pairs = |both, first_only, second_only, neither| Pairs { both, first_only, second_only, neither };
         assert_eq!(discordant(pairs(30, 7, 0, 50)), against_level(7, 7, level(1, 2)));
         assert_eq!(discordant(pairs(3, 0, 0, 5)), Some(EValue { e: 1.0, p: 1.0 }));
@@ -247,7 +247,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_sequence_holds_the_levels_that_are_not_refuted(n in 1u64..200, part in 0.0f64..=1.0, above in 1i64..100) {
+        fn the_sequence_contains_exactly_the_levels_not_refuted(n in 1u64..200, part in 0.0f64..=1.0, above in 1i64..100) {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_precision_loss, reason = "a part of n")]
             let k = (part * n as f64) as u64;
             let (bounds, at) = (confidence_sequence(k, n, 0.95).unwrap(), level(above, 100));

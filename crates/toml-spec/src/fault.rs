@@ -185,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn a_span_outside_of_its_text_is_no_panic() {
+    fn a_span_outside_its_text_does_not_panic() {
         let source = Arc::new(Source { name: "a".into(), text: "é".into() });
         for span in [0..1, 1..1, 1..9, 5..9] {
             assert!(!Faults(vec![Fault::new(Place { source: source.clone(), span }, "m")]).to_string().is_empty());

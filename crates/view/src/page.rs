@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn the_classic_script_has_no_word_of_modules() {
+    fn the_classic_script_has_no_imports_or_exports() {
         assert!(!classic().lines().any(|line| line.starts_with("import ") || line.starts_with("export ")));
     }
 }

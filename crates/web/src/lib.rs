@@ -284,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn only_the_own_name_and_the_own_site_may_ask() {
+    fn requests_for_another_host_or_from_another_site_are_refused() {
         let guard = Guard::new("127.0.0.1:7000".parse().unwrap(), None, None);
         for (headers, refused) in [
             (&[("host", "127.0.0.1:7000")][..], None),

@@ -54,7 +54,7 @@ mod tests {
 
     /// Every possible belief, length and gaze gives exactly that gaze, in time and not too early.
     #[test]
-    fn every_possible_gaze_is_looked() {
+    fn every_possible_gaze_is_generated() {
         let beliefs = [Belief::Unresolved, Belief::Corrected, Belief::Silent, Belief::BlindWrong];
         let mut generator = Generator::of("test");
         for belief in beliefs {

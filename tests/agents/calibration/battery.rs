@@ -114,7 +114,7 @@ fn check_frozen_and_guesser(shown: &Shown<'_>) {
 }
 
 #[test]
-fn a_few_episodes_of_the_battery_already_show_who_is_who() {
+fn a_few_episodes_of_the_battery_distinguish_the_agents() {
     let [delayed, decoy, window, mark] = experiments(["delayed", "decoy", "window", "mark"]);
     let plan = [
         episodes(Scripted::Oracle, &[delayed, decoy.clone(), window.clone(), mark.clone()], 1, 1),

@@ -91,7 +91,7 @@ fn check_contingency(profiles: &Profiles) {
 }
 
 #[test]
-fn a_few_episodes_already_show_who_knows_itself_by_its_motion() {
+fn a_few_episodes_show_which_agents_know_themselves_by_motion() {
     let all = experiments(&CONTINGENCY);
     let plan = [
         episodes(Scripted::Oracle, &all[..1], 1, 2),
@@ -106,7 +106,7 @@ fn a_few_episodes_already_show_who_knows_itself_by_its_motion() {
 }
 
 #[test]
-fn a_few_episodes_already_show_who_invents_an_answer() {
+fn a_few_episodes_show_which_agents_invent_answers() {
     let evidence = experiments(&EVIDENCE);
     let plan = [
         episodes(Scripted::Oracle, &evidence, 1, 1),

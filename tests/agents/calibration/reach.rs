@@ -47,7 +47,7 @@ fn experiments(names: &[&str]) -> Vec<Experiment> {
 }
 
 #[test]
-fn a_few_episodes_of_reaching_already_show_who_is_who() {
+fn a_few_episodes_of_reaching_distinguish_the_agents() {
     let plan = [
         episodes(Scripted::Oracle, &experiments(&["reach-mirror", "reach-no-mirror"]), 1, 2),
         episodes(Scripted::Mimic, &experiments(&["reach-mirror"]), 1, 1),

@@ -95,7 +95,7 @@ fn frames_come_as_files_for_as_long_as_the_episode_or_in_the_line() {
 }
 
 #[test]
-fn every_message_is_of_the_schema() {
+fn every_message_matches_the_schema() {
     let bench = Bench::new();
     bench.program(&three_steps());
     outcome(&bench.record(&[]).output().unwrap());
@@ -115,7 +115,7 @@ fn every_message_is_of_the_schema() {
 }
 
 #[test]
-fn replies_are_read_as_those_of_a_model() {
+fn replies_of_programs_and_models_are_read_alike() {
     let bench = Bench::new();
     let done = done();
     // Text around the object is repaired. Words alone are not a decision. `done` ends the episode.

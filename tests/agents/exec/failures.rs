@@ -48,7 +48,7 @@ fn a_program_that_hangs_is_ended_in_time() {
 }
 
 #[test]
-fn a_program_that_closes_its_output() {
+fn a_program_that_closes_its_output_loses_the_episode() {
     // `exec` replaces the shell, which would otherwise keep the output open.
     let bench = Bench::new();
     bench.program("exec >&-; sleep 600");
@@ -59,12 +59,12 @@ fn a_program_that_closes_its_output() {
 }
 
 #[test]
-fn a_line_without_end() {
+fn an_endless_line_loses_the_episode() {
     loses("head -c 3000000 /dev/zero | tr '\\0' x; sleep 600", &[], &["longer than 1048576 bytes"]);
 }
 
 #[test]
-fn a_program_that_talks_out_of_turn() {
+fn an_unrequested_line_loses_the_episode() {
     // Two lines for one observation: the second would be read as the answer to the next observation.
     let bench = Bench::new();
     bench.program(&format!("printf '%s\\n%s\\n' '{FORWARD}' 'loading the model'"));
@@ -80,7 +80,7 @@ fn a_program_that_talks_out_of_turn() {
 }
 
 #[test]
-fn a_line_in_place_of_the_reply_is_named() {
+fn a_banner_read_as_a_reply_is_named() {
     // The banner comes before the reply. At the second observation the program can tell the two apart.
     let bench = Bench::new();
     bench.program(&format!("[ $n = 1 ] && echo 'loading the model'; echo '{FORWARD}'"));
@@ -181,7 +181,7 @@ fn a_missing_command_ends_the_recording_at_once() {
 }
 
 #[test]
-fn another_command_is_another_agent() {
+fn another_command_cannot_continue_the_recording() {
     let bench = Bench::new();
     bench.program(&three_steps());
     assert_eq!(outcome(&bench.record(&[]).output().unwrap()).0, Some(0));

@@ -45,7 +45,7 @@ fn each_episode_has_a_process_of_its_own() {
 }
 
 #[test]
-fn in_flight_is_how_many_run_at_once() {
+fn in_flight_limits_the_processes_at_once() {
     let bench = Bench::new();
     // A program that runs alone creates the folder; a second one at the same time finds it and fails.
     let lock = "[ $n = 1 ] && { mkdir alone || exit 9; }; [ $n = 3 ] && rmdir alone";
@@ -78,7 +78,7 @@ fn children_in_another_process_group_end_too() {
 }
 
 #[test]
-fn ctrl_c_ends_programs_with_the_steps_under_way_and_twice_at_once() {
+fn ctrl_c_finishes_the_current_steps_and_a_second_one_stops_at_once() {
     let bench = Bench::new();
     for times in [1, 2] {
         let _ = fs::remove_file(bench.path("ids"));

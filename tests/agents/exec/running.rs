@@ -18,7 +18,7 @@ fn record(bench: &Bench) -> Command {
 }
 
 #[test]
-fn an_experiment_that_is_complete_is_there_before_the_others_are() {
+fn a_complete_experiment_appears_before_the_others() {
     let bench = Bench::new();
     // The second episode of E1 is lost. E2 waits for the file `go`.
     let lost =
@@ -45,7 +45,7 @@ fn an_experiment_that_is_complete_is_there_before_the_others_are() {
 }
 
 #[test]
-fn together_or_one_after_the_other_experiments_leave_the_same_bytes() {
+fn experiments_recorded_together_or_one_by_one_give_the_same_bytes() {
     let bench = Bench::new();
     let record = |experiments: &str, out: &str| {
         let words = "record --config small.toml --seeds 2 --runs 2 --threads 2 --agent random --experiment";

@@ -45,7 +45,7 @@ fn an_agent_whose_every_reply_is_unreadable_ends_its_recording() {
 }
 
 #[test]
-fn replies_in_a_row_count_over_episodes_and_whole_ones_stay() {
+fn consecutive_replies_count_across_episodes_and_whole_episodes_stay() {
     let bench = Bench::new();
     // The first episode ends with two unusable replies; the second has only unusable ones.
     let first = format!("case $n in 1[0-8]|?) echo '{FORWARD}' ;; *) echo no ;; esac");
@@ -60,7 +60,7 @@ fn replies_in_a_row_count_over_episodes_and_whole_ones_stay() {
 }
 
 #[test]
-fn one_episode_in_flight_that_cannot_answer_is_enough() {
+fn one_failing_episode_among_good_ones_ends_the_recording() {
     let bench = Bench::new();
     // The second episode never gives a usable reply; the first does, slowly.
     bench.program(&format!("if [ \"$run\" = 2 ]; then echo no; else sleep 0.05; echo '{FORWARD}'; fi"));
@@ -78,7 +78,7 @@ fn one_episode_in_flight_that_cannot_answer_is_enough() {
 }
 
 #[test]
-fn the_limit_is_a_number_from_one_or_none() {
+fn a_limit_of_zero_and_a_limit_with_keep_going_are_refused() {
     let bench = Bench::new();
     bench.program(&three_steps());
     for (words, expected) in [

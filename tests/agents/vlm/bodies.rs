@@ -113,7 +113,7 @@ fn the_frame_comes_before_the_words_with_every_provider() {
 }
 
 #[test]
-fn no_word_about_the_task_is_sent_but_the_prompt_and_the_keys_of_the_reply() {
+fn requests_describe_the_task_only_by_the_prompt_and_the_reply_keys() {
     for dialect in PROVIDERS {
         for experiment in built_in() {
             let (body, words) = body(dialect, &experiment);
@@ -133,7 +133,7 @@ fn no_word_about_the_task_is_sent_but_the_prompt_and_the_keys_of_the_reply() {
 }
 
 #[test]
-fn most_tokens_and_reasoning_are_asked_for_as_each_provider_has_them() {
+fn token_limit_and_reasoning_have_each_providers_parameters() {
     let asked = |dialect: Dialect, id: &str, effort: Option<Effort>| {
         let server = Server::start(move |_, _| whole(dialect, &decision("w")));
         let bench = Bench::new(Limits::default());

@@ -53,7 +53,7 @@ fn one_model_is_one_fingerprint() {
 }
 
 #[test]
-fn most_tokens_and_reasoning_of_the_command_line_come_before_the_files_and_are_sampling() {
+fn token_limit_and_reasoning_options_override_files_and_are_fingerprinted() {
     let folder = Folder::new();
     let own =
         "[model.own]\nbackend = \"compatible\"\nid = \"m\"\nmax_output_tokens = 900\nreasoning_effort = \"high\"\n";

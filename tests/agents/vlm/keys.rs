@@ -69,7 +69,7 @@ fn check(server: &Server, key: &str, words: &str) -> String {
 }
 
 #[test]
-fn a_server_that_says_everything_back_learns_the_key_and_nobody_else_does() {
+fn a_key_echoed_by_the_server_is_not_printed_or_stored() {
     let statuses = ["200 OK", "307 Temporary Redirect", "400 Bad Request", "401 Unauthorized", "404 Not Found"];
     for status in statuses {
         let server = Server::start(move |_, request| {
@@ -106,7 +106,7 @@ fn a_misplaced_key_is_not_printed() {
 }
 
 #[test]
-fn a_word_in_place_of_a_key_leaves_answers_as_they_are() {
+fn a_placeholder_key_leaves_answers_unchanged() {
     let server = Server::start(|_, _| whole(Dialect::OpenaiCompatible, &decision("done")));
     let folder = Folder::new();
     let mut command = folder.record(&server, "own", "--seeds 1 --runs 1");

@@ -157,12 +157,12 @@ fn check(models: usize, runs: usize, kills: usize) {
 }
 
 #[test]
-fn killed_again_and_again_it_records_every_episode_once_and_asks_for_nothing_twice() {
+fn repeated_kills_lose_no_episode_and_repeat_no_request() {
     check(2, 2, 6);
 }
 
 #[test]
 #[ignore = "soak: eight models, twenty-one episodes each, killed twenty times"]
-fn soak_eight_models_killed_twenty_times_record_every_episode_once_and_ask_for_nothing_twice() {
+fn soak_twenty_kills_of_eight_models_lose_no_episode_and_repeat_no_request() {
     check(8, 7, 20);
 }

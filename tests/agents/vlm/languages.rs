@@ -16,7 +16,7 @@ use super::server::{Request, Server, decision, whole};
 use crate::harness::program::{program, stderr};
 
 #[test]
-fn each_provider_is_asked_in_its_language() {
+fn each_provider_gets_its_own_wire_format() {
     let openai = format!("authorization: Bearer {KEY}");
     let providers = [
         (Dialect::OpenaiChat, "/v1/chat/completions", openai.clone()),

@@ -168,7 +168,7 @@ fn study(options: &str, episodes: u64) {
 }
 
 #[test]
-fn a_study_file_is_recorded_in_one_command_and_goes_on_after_a_kill() {
+fn a_killed_study_is_continued_by_the_same_command() {
     study("experiment = \"E1,E2\"\nseeds = 1\nruns = 2", 32);
 }
 
@@ -330,22 +330,22 @@ fn in_batches(server: usize, model: &str) {
 }
 
 #[test]
-fn steps_of_many_episodes_go_as_message_batches_of_anthropic_and_none_is_paid_twice_after_a_kill() {
+fn anthropic_batches_are_not_paid_twice_after_a_kill() {
     in_batches(1, "Sonnet");
 }
 
 #[test]
-fn steps_of_many_episodes_go_as_files_of_openai_and_none_is_paid_twice_after_a_kill() {
+fn openai_batches_are_not_paid_twice_after_a_kill() {
     in_batches(0, "GPT 5.1");
 }
 
 #[test]
-fn steps_of_many_episodes_go_as_batches_of_google_and_none_is_paid_twice_after_a_kill() {
+fn google_batches_are_not_paid_twice_after_a_kill() {
     in_batches(2, "Flash");
 }
 
 #[test]
-fn a_server_of_ones_own_takes_no_batches() {
+fn the_batch_tier_is_refused_for_a_local_server() {
     let folder = Folder::new();
     let _servers = prepare(&folder, "");
     let refused = one(&folder, "Own", "--runs 1 --tier batch").output().unwrap();
@@ -355,6 +355,6 @@ fn a_server_of_ones_own_takes_no_batches() {
 
 #[test]
 #[ignore = "minutes: make soak"]
-fn soak_a_study_of_eight_models_and_five_experiments_goes_on_after_a_kill() {
+fn soak_a_killed_study_of_eight_models_and_five_experiments_is_continued() {
     study("experiment = \"E1..E5\"\nseeds = 3\nruns = 7", 840);
 }

@@ -53,7 +53,7 @@ fn a_whole_answer_counts_whatever_its_content_type_says() {
 }
 
 #[test]
-fn a_rate_limit_with_a_delay_is_waited_for_and_uses_up_no_attempts() {
+fn waiting_for_a_rate_limit_uses_no_attempts() {
     // OpenAI's client reads `retry-after-ms` before `retry-after`: openai-python, `_base_client.py`.
     let milliseconds = || http("429 Too Many Requests", "retry-after-ms: 20\r\nretry-after: 99\r\n", b"slow down");
     for (dialect, is_google) in [(Dialect::Gemini, true), (Dialect::OpenaiChat, false)] {

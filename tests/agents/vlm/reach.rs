@@ -27,7 +27,7 @@ fn recorded(folder: &Folder, server: &Server, words: &str) -> (Option<i32>, Stri
 }
 
 #[test]
-fn an_address_where_nobody_listens_is_named_before_anything_is_recorded() {
+fn an_unreachable_address_is_reported_before_recording() {
     let folder = Folder::new();
     let server = Server::start(|at, request| whole(Dialect::OpenaiCompatible, &counting(request, 1, at)));
     let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
@@ -65,7 +65,7 @@ fn a_server_that_takes_no_images_ends_the_recording_with_its_first_answer() {
 }
 
 #[test]
-fn a_model_without_images_is_no_outage() {
+fn refused_images_are_a_failure_not_an_outage() {
     let server = Server::start(|at, _| match at {
         0 => whole(Dialect::OpenaiChat, &decision("w")),
         _ => http("500 Internal Server Error", JSON, br#"{"error":"this model does not support images"}"#),

@@ -46,7 +46,7 @@ fn statuses(replies: &[Result<Reply, Lost>]) -> Vec<Status> {
 }
 
 #[test]
-fn a_refusal_as_a_bad_request_costs_its_step_and_plays_again_alike() {
+fn a_bad_request_that_refuses_costs_one_step_and_replays() {
     for dialect in PROVIDERS {
         let server = Server::start(move |at, _| match at {
             1 => bad_request(&refusal(dialect)),
@@ -191,7 +191,7 @@ fn one_request_that_is_too_long_costs_one_episode() {
 }
 
 #[test]
-fn a_start_that_goes_on_knows_that_the_model_has_answered() {
+fn a_continued_recording_remembers_that_the_model_answered() {
     let folder = Folder::new();
     let first = Server::start(|at, request| whole(Dialect::OpenaiCompatible, &counting(request, 1, at)));
     let output = folder.record(&first, "own", "--seeds 1 --runs 1").output().unwrap();

@@ -303,7 +303,7 @@ fn a_forecast_follows_the_episodes_that_are_finished() {
 }
 
 #[test]
-fn no_more_requests_go_out_in_a_minute_than_the_account_takes() {
+fn requests_per_minute_stay_within_the_limit_of_the_account() {
     let server = Server::start(|at, request| whole(Dialect::OpenaiCompatible, &counting(request, 4, at)));
     let folder = Folder::new();
     let start = Instant::now();

@@ -256,7 +256,7 @@ fn slow_bytes_in_time_are_an_answer() {
 }
 
 #[test]
-fn the_wait_that_a_provider_asks_for_is_kept() {
+fn retry_after_is_respected() {
     let server = Server::start(|at, _| match at {
         0 => http("429 Too Many Requests", "retry-after: 1\r\n", b""),
         _ => whole(Dialect::AnthropicMessages, &decision("w")),

@@ -91,7 +91,7 @@ fn an_unusable_reply_leaves_the_last_good_summary() {
 }
 
 #[test]
-fn statuses_are_counted_apart_and_replies_that_are_read_are_no_news() {
+fn statuses_are_counted_separately_and_readable_replies_not_listed() {
     let server = Server::start(|at, _| match at {
         1 => whole(Dialect::OpenaiCompatible, "I go on."),
         2 | 3 => ok(&spoken(Dialect::OpenaiCompatible, "", "content_filter")),

@@ -87,12 +87,12 @@ fn check(most: usize) {
 }
 
 #[test]
-fn a_recording_goes_on_whatever_call_has_failed() {
+fn a_recording_continues_after_any_failed_call() {
     check(60);
 }
 
 #[test]
 #[ignore = "soak: every call of a recording with every error"]
-fn soak_a_recording_goes_on_whatever_call_has_failed() {
+fn soak_a_recording_continues_after_any_failed_call() {
     check(usize::MAX);
 }

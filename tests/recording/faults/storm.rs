@@ -153,12 +153,12 @@ fn check(count: usize) {
 }
 
 #[test]
-fn processes_on_one_folder_lose_nothing_whenever_they_are_killed() {
+fn killed_processes_sharing_a_folder_lose_no_episode() {
     check(100);
 }
 
 #[test]
 #[ignore = "soak: ROUNDS rounds, 10000 if nothing is said"]
-fn soak_processes_on_one_folder_lose_nothing_whenever_they_are_killed() {
+fn soak_killed_processes_sharing_a_folder_lose_no_episode() {
     check(rounds("ROUNDS", 10_000));
 }

@@ -21,7 +21,7 @@ fn check(at: usize) {
 }
 
 #[test]
-fn at_every_record_and_beside_it() {
+fn a_log_cut_at_or_near_a_record_is_recovered() {
     assert!(RECORDING.boundaries().len() > 20);
     for at in RECORDING.boundaries() {
         for at in [at - 1, at, at + 1, at + 9] {
@@ -31,7 +31,7 @@ fn at_every_record_and_beside_it() {
 }
 
 #[test]
-fn at_fifty_bytes_here_and_there_by_the_program() {
+fn the_program_recovers_logs_cut_at_fifty_bytes() {
     let desk = Desk::new();
     // Steps by the golden section cover the whole file evenly, whatever its length.
     let length = RECORDING.log.len() - mcap::MAGIC.len();

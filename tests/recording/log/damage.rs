@@ -67,7 +67,7 @@ fn any_flipped_bit_of_a_chunk_loses_at_most_its_episode() {
 }
 
 #[test]
-fn bytes_that_are_missing_or_too_many_in_the_middle() {
+fn missing_extra_or_zeroed_bytes_lose_only_their_episode() {
     let (start, end) = RECORDING.chunks[1];
     let mut missing = RECORDING.log.clone();
     missing.drain(start + 100..start + 150);

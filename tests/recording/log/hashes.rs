@@ -51,7 +51,7 @@ fn alter(path: &Path) {
 }
 
 #[test]
-fn it_is_the_same_in_both_and_that_of_the_rows() {
+fn log_trace_and_rows_have_the_same_episode_hash() {
     let desk = Desk::new();
     fs::write(desk.trace(), &RECORDING.trace).unwrap();
     fs::write(desk.trace().with_extension("mcap"), &RECORDING.log).unwrap();
@@ -65,7 +65,7 @@ fn it_is_the_same_in_both_and_that_of_the_rows() {
 }
 
 #[test]
-fn an_episode_with_other_rows_than_its_end_tells_of_is_lost() {
+fn an_episode_whose_rows_do_not_match_its_end_record_is_lost() {
     let desk = Desk::new();
     let all = RECORDING.ended(RECORDING.log.len());
     let edited = edited("mirror_px", &123_456.into());
@@ -107,7 +107,7 @@ fn a_log_with_other_rows_than_the_trace_is_not_replaced_by_its_replay() {
 }
 
 #[test]
-fn a_film_strip_of_a_log_and_a_trace_that_do_not_belong_together_is_refused() {
+fn a_film_strip_of_a_mismatched_log_and_trace_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let trace = folder.path().join("E1-guesser.parquet");
     fs::copy(fixture("recorded/E1-guesser.mcap"), folder.path().join("E1-guesser.mcap")).unwrap();

@@ -230,7 +230,7 @@ fn lengths_within_a_chunk_lose_no_episode_but_its_own() {
 }
 
 #[test]
-fn without_any_checksum_a_length_does_no_harm_either() {
+fn a_bad_length_is_harmless_without_checksums() {
     let mut log = plain();
     for field in fields_of(&log) {
         // The checksum of a chunk follows its size. The end record holds only the data's checksum.
@@ -252,7 +252,7 @@ fn without_any_checksum_a_length_does_no_harm_either() {
 
 #[cfg(unix)]
 #[test]
-fn a_recording_is_not_continued_with_such_a_log() {
+fn a_log_with_a_bad_length_is_not_continued() {
     let folder = tempfile::tempdir().unwrap();
     let runs = folder.path().join("runs");
     fs::create_dir(&runs).unwrap();
@@ -276,7 +276,7 @@ fn a_recording_is_not_continued_with_such_a_log() {
 
 #[cfg(unix)]
 #[test]
-fn an_episode_that_waits_with_such_a_log_is_named() {
+fn a_pending_episode_with_a_bad_log_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let parts = folder.path().join("runs/.parts");
     fs::create_dir_all(&parts).unwrap();

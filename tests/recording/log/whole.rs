@@ -77,7 +77,7 @@ fn a_trace_that_has_more_than_the_log_is_not_written_over() {
 }
 
 #[test]
-fn a_log_that_is_not_there_and_a_place_that_cannot_be_written() {
+fn a_missing_log_and_an_unwritable_output_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("whole.mcap"), &RECORDING.log).unwrap();
     for (words, expected) in [

@@ -72,7 +72,7 @@ fn one_declaration_gives_columns_of_answer_and_truth() {
 }
 
 #[test]
-fn a_trace_keeps_to_what_its_experiment_declares() {
+fn answers_that_contradict_the_declaration_are_reported() {
     let bench = Bench::new();
     let mut all = recorded(&bench);
     let folder = bench.folder.path();

@@ -98,7 +98,7 @@ fn a_condition_is_a_column_of_traces_tables_and_figures() {
 }
 
 #[test]
-fn one_folder_holds_conditions_apart_and_does_not_mix_two_recordings_of_one() {
+fn conditions_have_separate_files_and_different_recordings_do_not_mix() {
     let bench = Bench::new();
     let words = "--agent random --experiment E1 --seeds 1 --no-log";
     bench.recorded("runs", &format!("{words} --runs 1"));
@@ -137,7 +137,7 @@ fn scenes_are_shared_by_the_first_three_experiments_and_by_all_agents() {
 }
 
 #[test]
-fn the_same_scene_is_played_again_and_its_flips_are_the_noise_floor() {
+fn flips_between_repeats_of_a_scene_are_the_noise_floor() {
     let bench = Bench::new();
     let words = "--agent random --experiment E1,E3 --seeds 1 --runs 3";
     bench.recorded("once", &format!("{words} --no-log"));

@@ -221,7 +221,7 @@ fn the_footer_has_all_that_replay_needs_and_nothing_of_the_machine() {
 }
 
 #[test]
-fn a_report_can_be_made_of_it() {
+fn a_recording_can_be_reported() {
     let bench = Bench::new();
     for agent in ["random", "frozen"] {
         bench.recorded("runs", &format!("--agent {agent} --experiment E1..E5 --seeds 1 --runs 2"));
@@ -250,7 +250,7 @@ fn agents_that_look_are_shown_frames() {
 }
 
 #[test]
-fn the_bundled_recordings_are_those_that_this_program_makes() {
+fn recording_again_gives_the_bundled_recordings() {
     let bench = Bench::new();
     std::fs::write(bench.path("small.toml"), "body.shape = \"mannequin\"").unwrap();
     bench.recorded("runs", "--agent random --experiment E1..E5 --seeds 1 --runs 2 --no-log");

@@ -61,7 +61,7 @@ fn a_log_without_its_trace_is_not_added_to_under_another_configuration() {
 }
 
 #[test]
-fn a_log_without_its_trace_gives_it_again() {
+fn a_missing_trace_can_be_recovered_from_its_log() {
     let bench = Bench::new();
     let whole = bench.recorded("whole", &words(3));
     bench.recorded("runs", &words(2));
@@ -76,7 +76,7 @@ fn a_log_without_its_trace_gives_it_again() {
 }
 
 #[test]
-fn a_log_with_an_episode_that_the_trace_does_not_have() {
+fn a_log_with_an_episode_missing_from_the_trace_is_refused() {
     let bench = Bench::new();
     let more = bench.recorded("more", &words(3));
     bench.recorded("runs", &words(2));
@@ -95,7 +95,7 @@ fn alter(trace: &Path, column: &str, value: i32) {
 }
 
 #[test]
-fn a_log_with_other_rows_of_an_episode() {
+fn a_log_with_different_rows_is_refused() {
     let bench = Bench::new();
     bench.recorded("runs", &words(2));
     alter(&bench.path("runs/E1-random.parquet"), "mirror_px", 123_456);
@@ -124,7 +124,7 @@ fn a_removed_log_starts_again_with_new_episodes() {
 }
 
 #[test]
-fn a_log_that_was_put_together_before_its_trace_is_gone_on_with() {
+fn a_log_assembled_before_its_trace_is_continued() {
     let bench = Bench::new();
     let whole = bench.recorded("whole", &words(2));
     // The state after a kill between the two: the episodes wait as parts, and the log already has them.

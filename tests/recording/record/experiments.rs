@@ -62,7 +62,7 @@ fn whole(folder: &Bench) -> Value {
 }
 
 #[test]
-fn a_script_plays_it_and_reports_show_it_beside_the_five() {
+fn a_custom_experiment_is_recorded_and_reported() {
     let bench = bench();
     let at = bench.folder.path();
     bench.recorded("runs", "--agent random --experiment E1,echo.toml --seeds 2 --runs 4");
@@ -102,7 +102,7 @@ fn a_script_plays_it_and_reports_show_it_beside_the_five() {
 }
 
 #[test]
-fn its_episodes_and_those_of_e1_are_pairs() {
+fn a_custom_experiment_and_e1_share_scenes() {
     let bench = bench();
     // Experiments are contrasted if their chance levels are equal.
     fs::write(bench.path("echo.toml"), ECHO.replace("1/4", "1/3")).unwrap();
@@ -122,7 +122,7 @@ fn its_episodes_and_those_of_e1_are_pairs() {
 }
 
 #[test]
-fn a_program_is_asked_in_its_words_and_another_prompt_is_another_recording() {
+fn a_custom_prompt_is_sent_and_changing_it_needs_another_recording() {
     let bench = bench();
     let at = bench.folder.path();
     succeeds(&mut play(&bench, "runs", "1"));

@@ -20,7 +20,7 @@ fn wait_for_parts(bench: &Bench, child: &mut Child, count: usize) {
 }
 
 #[test]
-fn killed_at_any_moment_it_goes_on() {
+fn a_recording_killed_at_any_moment_continues() {
     let bench = Bench::new();
     let whole = bench.recorded("whole", WORDS);
     let mut killed = 0;

@@ -44,7 +44,7 @@ fn refused_in(bench: &Bench, line: usize, text: &str, expected: &[&str]) {
 }
 
 #[test]
-fn invalid_numbers_and_numbers_out_of_range() {
+fn invalid_and_out_of_range_numbers_are_refused() {
     let bench = Bench::new();
     for (line, more, expected) in [
         (5, "step_length = nan", "`step_length` may be 0.1 to 1, but is NaN"),
@@ -60,7 +60,7 @@ fn invalid_numbers_and_numbers_out_of_range() {
 }
 
 #[test]
-fn what_no_episode_could_mean() {
+fn contradictory_experiments_are_refused() {
     let bench = Bench::new();
     for (line, more, expected) in [
         (5, "decision = \"mark_report\"\nmark = [{ part = \"head\" }]", "the prompt asks for \"exactly these keys\""),
@@ -106,7 +106,7 @@ fn what_no_episode_could_mean() {
 }
 
 #[test]
-fn names_and_keys() {
+fn invalid_names_and_keys_are_refused() {
     let bench = Bench::new();
     let told = |line, text: &str, expected: &[&str]| refused_in(&bench, line, text, expected);
     let with = |more: &str| format!("{HEAD}{more}\n");
@@ -130,7 +130,7 @@ fn names_and_keys() {
 }
 
 #[test]
-fn prompts() {
+fn invalid_prompts_are_refused() {
     let bench = Bench::new();
     let outside = tempfile::tempdir().unwrap();
     for folder in [outside.path().to_owned(), bench.path("broken"), bench.path("asked"), bench.path("half")] {
@@ -162,7 +162,7 @@ fn prompts() {
 }
 
 #[test]
-fn files_that_are_no_experiments() {
+fn files_that_are_not_experiments_are_refused() {
     let bench = Bench::new();
     let folder = bench.folder.path();
     let place = bench.path("mine.toml");
@@ -193,7 +193,7 @@ fn files_that_are_no_experiments() {
 }
 
 #[test]
-fn a_room_too_small_for_its_cubes() {
+fn a_room_too_small_for_its_cubes_is_refused() {
     let bench = Bench::new();
     let cubes = HEAD.replace("kind = \"none\"", "kind = \"candidates\", count = 10");
     fs::write(bench.path("mine.toml"), cubes.replace("exploration", "cube-selection")).unwrap();

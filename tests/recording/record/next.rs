@@ -31,7 +31,7 @@ fn cell(bench: &Bench, report: &str, metric: &str) -> String {
 }
 
 #[test]
-fn it_reports_the_episodes_under_the_definitions_of_their_experiments() {
+fn the_printed_next_command_reports_with_the_right_definitions() {
     let bench = Bench::new();
     let said = succeeds(&mut bench.record("marks", "--agent oracle --experiment mark --seeds 1 --runs 2 --no-log"));
     let footer = recording(&bench.path("marks/mark-oracle.parquet"));
@@ -50,7 +50,7 @@ fn it_reports_the_episodes_under_the_definitions_of_their_experiments() {
 }
 
 #[test]
-fn a_definition_file_of_ones_own_is_named() {
+fn the_printed_next_command_names_a_custom_definition_file() {
     let bench = Bench::new();
     fs::create_dir(bench.path("files")).unwrap();
     let experiment = "[experiment.mine]\ntitle = 'Mine'\nscenes = 'E1'\nprompt = 'cube-selection'\ndefinitions = 'own.toml'\n\

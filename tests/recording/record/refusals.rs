@@ -24,7 +24,7 @@ fn refused(bench: &Bench, out: &str, words: &str, expected: &[&str]) {
 }
 
 #[test]
-fn an_agent_an_experiment_or_a_share_that_is_not_there() {
+fn an_unknown_agent_experiment_or_shard_is_refused() {
     let bench = Bench::new();
     for (words, expected) in [
         ("--agent oracel", "did you mean `oracle`?"),
@@ -41,7 +41,7 @@ fn an_agent_an_experiment_or_a_share_that_is_not_there() {
 }
 
 #[test]
-fn a_configuration_that_is_faulty_or_leaves_no_room() {
+fn an_invalid_configuration_is_refused() {
     let bench = Bench::new();
     for (text, expected) in [
         ("room.sise = 8.0", "size"),
@@ -58,7 +58,7 @@ fn a_configuration_that_is_faulty_or_leaves_no_room() {
 }
 
 #[test]
-fn a_folder_that_cannot_be_made() {
+fn a_folder_that_cannot_be_created_is_reported() {
     let bench = Bench::new();
     fs::write(bench.path("file"), "").unwrap();
     for out in ["file", "file/runs"] {
@@ -155,7 +155,7 @@ fn a_trace_that_is_damaged_or_of_another_recorder_is_not_written_over() {
 }
 
 #[test]
-fn a_machine_that_cannot_draw() {
+fn a_machine_that_cannot_render_is_reported() {
     let bench = Bench::new();
     // A vendor file that names a missing library leaves EGL without a driver.
     fs::write(bench.path("none.json"), r#"{"file_format_version":"1.0.0","ICD":{"library_path":"libnone.so"}}"#)

@@ -63,7 +63,7 @@ fn two_renderers_are_told_apart_everywhere() {
 }
 
 #[test]
-fn a_frame_that_shows_something_else_is_another_frame() {
+fn a_frame_with_other_contents_is_reported_as_different() {
     need::drawing();
     let bench = Bench::new();
     succeeds(&mut bench.record("runs", "--agent mimic --experiment E1 --seeds 1 --runs 1 --no-log"));

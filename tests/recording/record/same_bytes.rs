@@ -7,7 +7,7 @@ use crate::harness::program::succeeds;
 const WHOLE: &str = "--agent random --experiment E1,E4..E5 --seeds 2 --runs 2";
 
 #[test]
-fn again_and_on_any_number_of_threads() {
+fn repeats_and_any_number_of_threads_give_the_same_bytes() {
     let bench = Bench::new();
     let once = bench.recorded("once", &format!("{WHOLE} --threads 1"));
     let names: Vec<&str> = once.keys().map(String::as_str).collect();
@@ -27,7 +27,7 @@ fn again_and_on_any_number_of_threads() {
 }
 
 #[test]
-fn in_any_split_and_at_the_same_time() {
+fn shards_and_simultaneous_processes_give_the_same_bytes() {
     let bench = Bench::new();
     let whole = bench.recorded("whole", WHOLE);
     for share in ["3/3", "1/3", "2/3"] {
@@ -51,7 +51,7 @@ fn in_any_split_and_at_the_same_time() {
 }
 
 #[test]
-fn grown_by_experiments_seeds_and_runs() {
+fn a_recording_grown_in_parts_has_the_same_bytes() {
     let bench = Bench::new();
     let whole = bench.recorded("whole", WHOLE);
     for step in ["--experiment E5 --seeds 1 --runs 1", "--experiment E1..E4 --seeds 1 --runs 2", "--seeds 2 --runs 1"] {

@@ -133,7 +133,7 @@ fn waiting(bench: &Bench) -> (FolderLock, EpisodeLock, Child, String) {
 
 #[cfg(unix)]
 #[test]
-fn an_episode_that_another_process_has_is_waited_for() {
+fn a_process_waits_for_an_episode_of_another_process() {
     let bench = bench();
     let whole = bench.recorded("whole", WORDS);
     let (claim, lock, child, said) = waiting(&bench);
@@ -169,7 +169,7 @@ fn waiting_can_be_ended() {
 }
 
 #[test]
-fn shares_that_overlap_are_no_trouble() {
+fn overlapping_shards_give_the_same_bytes() {
     let bench = bench();
     let whole = bench.recorded("whole", WORDS);
     let shares = ["1/1", "1/2", "2/2", "2/3"];

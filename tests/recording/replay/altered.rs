@@ -33,7 +33,7 @@ fn check(experiment: &str, change: impl FnOnce(&mut Episode), t: i32, column: &s
 }
 
 #[test]
-fn a_count() {
+fn an_altered_count_is_reported() {
     for (column, of) in [("mirror_self_px", 0), ("mirror_other_px", 1), ("mirror_px", 2), ("direct_other_px", 3)] {
         let change = |episode: &mut Episode| {
             let extra = &mut episode.steps[1].extra;
@@ -51,7 +51,7 @@ fn a_count() {
 }
 
 #[test]
-fn a_pose() {
+fn an_altered_pose_is_reported() {
     let nudged = |value: &mut Option<f32>| *value = value.map(f32::next_up);
     check("E1", |episode| nudged(&mut episode.steps[2].extra.pose_x), 3, "pose_x");
     check("E1", |episode| nudged(&mut episode.steps[0].extra.pose_y), 1, "pose_y");
@@ -59,7 +59,7 @@ fn a_pose() {
 }
 
 #[test]
-fn a_distance() {
+fn an_altered_distance_is_reported() {
     let further = |episode: &mut Episode| {
         let distances = episode.steps.iter_mut().map(|step| &mut step.extra.cube_distance);
         let known = distances.flatten().next().unwrap();
@@ -76,7 +76,7 @@ fn a_distance() {
 }
 
 #[test]
-fn a_truth() {
+fn an_altered_truth_is_reported() {
     let (expected, found) = check("E1", |episode| episode.steps[3].mirror_visible ^= true, 4, "mirror_visible");
     assert_ne!(expected, found);
     let bump = |episode: &mut Episode| episode.steps[0].extra.bumped = Some(true);
@@ -84,7 +84,7 @@ fn a_truth() {
 }
 
 #[test]
-fn an_action_shows_at_the_step_behind_it() {
+fn an_altered_action_is_reported_at_the_next_step() {
     let turn = |episode: &mut Episode| {
         let action = &mut episode.steps[0].action;
         let turned = if *action == Some(Action::TurnLeft) { Action::TurnRight } else { Action::TurnLeft };
@@ -94,7 +94,7 @@ fn an_action_shows_at_the_step_behind_it() {
 }
 
 #[test]
-fn constants_of_the_episode_are_step_0() {
+fn altered_episode_constants_are_reported_at_step_0() {
     let other = |color: &str| if color == "red" { "blue".to_owned() } else { "red".to_owned() };
     check("E1", |episode| episode.body_color = other(&episode.body_color), 0, "body_color");
     check("E3", |episode| episode.stated_color = None, 0, "stated_color");
@@ -123,7 +123,7 @@ fn the_first_difference_of_each_episode_is_printed() {
 }
 
 #[test]
-fn a_name_that_is_no_experiment_of_the_world() {
+fn an_unknown_experiment_is_reported() {
     let (_folder, path) = copy("E1", |episodes, _| episodes[0].experiment = "E9".to_owned());
     let output = replay(&path, &[]);
     assert_eq!(output.status.code(), Some(2));

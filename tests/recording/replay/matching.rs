@@ -25,7 +25,7 @@ fn every_step_matches() {
 }
 
 #[test]
-fn one_episode_alone() {
+fn one_episode_can_be_replayed() {
     let output = replay(&recorded("E1"), &["--episode", "E1/random/s1/r2"]);
     assert!(stdout(&output).starts_with("1 episode, "), "{}", stdout(&output));
     let output = replay(&recorded("E1"), &["--episode", "E1/random/s1/r9"]);

@@ -14,7 +14,7 @@ use crate::harness::program::{limited, program, stderr, succeeds, typed};
 use crate::harness::traces::episodes;
 
 #[test]
-fn the_trace_is_no_output_under_any_name() {
+fn the_trace_is_refused_as_the_output_under_any_name() {
     let (folder, path) = copy("E1", |_, _| ());
     symlink("copy.parquet", folder.path().join("soft.parquet")).unwrap();
     fs::hard_link(&path, folder.path().join("hard.parquet")).unwrap();

@@ -10,7 +10,7 @@ use crate::harness::program::{limited, program, stderr, succeeds, typed};
 use crate::harness::traces::episodes;
 
 #[test]
-fn frames_and_a_log_of_a_replay() {
+fn a_replay_writes_frames_and_a_log() {
     let folder = tempfile::tempdir().unwrap();
     need::drawing();
     let mut command = program(folder.path());
@@ -106,7 +106,7 @@ fn a_film_strip_tells_the_story_of_its_episode() {
 }
 
 #[test]
-fn a_film_strip_that_cannot_be_is_refused_and_leaves_no_file() {
+fn an_impossible_film_strip_is_refused_and_leaves_no_file() {
     let folder = tempfile::tempdir().unwrap();
     let log = fixture("recorded/E1-guesser.mcap").display().to_string();
     let last = episodes(&fixture("recorded/E1-guesser.parquet"))[0].steps.len();

@@ -40,7 +40,7 @@ fn never_shows(shape: Body, poses: usize) {
 }
 
 #[test]
-fn a_body_that_did_show_would_be_found() {
+fn the_check_finds_a_body_in_its_own_view() {
     let config = WorldConfig {
         eye: world::sim::config::EyeConfig { forward: 0.0, ..WorldConfig::default().eye },
         ..WorldConfig::default()
@@ -88,7 +88,7 @@ fn a_body_is_within_its_cylinder_at_every_stride() {
 }
 
 #[test]
-fn everything_is_in_the_room() {
+fn every_solid_is_inside_the_room() {
     let mut chance = Rng::of(8, 8, 8);
     for (at, experiment) in Experiment::PAPER.into_iter().cycle().take(25).enumerate() {
         let mut world = world(experiment.clone(), i32::try_from(at).unwrap());

@@ -83,7 +83,7 @@ fn the_ten_colours_differ_directly_and_in_the_mirror() {
 }
 
 #[test]
-fn a_colour_in_the_mirror_is_that_of_the_thing() {
+fn the_mirror_shows_the_same_colour() {
     let config = WorldConfig::default();
     need::drawing();
     let mut eye = Camera::new(&config).unwrap();

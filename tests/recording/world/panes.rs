@@ -148,18 +148,18 @@ fn holds_against_pictures(name: &str) {
 }
 
 #[test]
-fn several_mirrors_hold_against_pictures() {
+fn several_mirrors_agree_with_pictures() {
     holds_against_pictures("mirrors");
 }
 
 #[test]
-fn textured_mirrors_hold_against_pictures() {
+fn textured_mirrors_agree_with_pictures() {
     holds_against_pictures("textured");
 }
 
 /// Textures change the picture but not visibility.
 #[test]
-fn a_textured_room_shows_the_same_otherwise() {
+fn textures_do_not_change_visibility() {
     need::drawing();
     let [textured, plain] = ["textured", "mirrors"].map(kind);
     let config = config();
@@ -184,22 +184,22 @@ fn a_textured_room_shows_the_same_otherwise() {
 }
 
 #[test]
-fn late_mirrors_hold_against_pictures() {
+fn delayed_mirrors_agree_with_pictures() {
     holds_against_pictures("late");
 }
 
 #[test]
-fn painted_decoys_hold_against_pictures() {
+fn painted_decoys_agree_with_pictures() {
     holds_against_pictures("painted");
 }
 
 #[test]
-fn decoys_that_move_by_themselves_hold_against_pictures() {
+fn moving_decoys_agree_with_pictures() {
     holds_against_pictures("stranger");
 }
 
 #[test]
-fn windows_hold_against_pictures() {
+fn windows_agree_with_pictures() {
     holds_against_pictures("window");
 }
 
@@ -289,7 +289,7 @@ fn marks_appear_at_their_step_and_later_in_a_late_mirror() {
 }
 
 #[test]
-fn a_mark_has_a_colour_that_its_wearer_and_the_own_body_have_not() {
+fn a_mark_differs_in_colour_from_its_wearer_and_the_own_body() {
     for seed in 1..40 {
         let world = world(kind("late"), seed);
         let scene = world.scene();
@@ -340,7 +340,7 @@ fn a_decoy_shows_the_own_body_in_another_colour() {
 }
 
 #[test]
-fn a_window_shows_a_stranger_and_nobody_of_the_room() {
+fn a_window_shows_only_a_stranger() {
     paints("window", Item::Double, |scene| scene.panes[0].double.unwrap().color);
     let mut chance = Rng::of(82, 1, 2);
     let mut world = world(kind("window"), 3);
@@ -368,7 +368,7 @@ fn a_double_moves_whatever_the_agent_does() {
 }
 
 #[test]
-fn the_eye_of_a_mirror_is_its_mirror_image_and_that_of_a_window_is_further_back() {
+fn a_mirror_reflects_the_eye_and_a_window_moves_it_back() {
     for name in ["mirrors", "window"] {
         let mut world = world(kind(name), 7);
         let mut chance = Rng::of(83, 1, 2);

@@ -176,7 +176,7 @@ fn a_late_mirror_shows_the_hand_as_it_was() {
 }
 
 #[test]
-fn a_hand_that_has_no_place_so_far_from_the_mark_is_a_fault_of_its_file() {
+fn an_impossible_distance_of_hand_and_mark_is_an_error_of_the_file() {
     let folder = tempfile::tempdir().unwrap();
     let text = built_in("reach-scheme").unwrap().replace("reach-scheme", "far").replace("most = 12", "most = 40");
     let read = |least: u32| {

@@ -32,7 +32,7 @@ fn scenes(experiment: Experiment) -> impl Iterator<Item = Scene> {
 }
 
 #[test]
-fn scenes_are_these_on_every_machine() {
+fn scenes_are_identical_on_every_machine() {
     let config = WorldConfig::default();
     let hashes = Experiment::PAPER.map(|experiment| {
         let drawn: Vec<Scene> = (0..3)
@@ -45,7 +45,7 @@ fn scenes_are_these_on_every_machine() {
 }
 
 #[test]
-fn one_candidate_has_the_colour_of_the_body_and_none_has_that_of_another() {
+fn one_of_three_distinct_candidates_has_the_colour_of_the_body() {
     for scene in [Experiment::E1, Experiment::E2, Experiment::E3, Experiment::E4].into_iter().flat_map(scenes) {
         let colors: BTreeSet<Color> = scene.cubes.iter().map(|cube| cube.color).collect();
         assert_eq!((scene.cubes.len(), colors.len()), (3, 3));
@@ -54,7 +54,7 @@ fn one_candidate_has_the_colour_of_the_body_and_none_has_that_of_another() {
 }
 
 #[test]
-fn the_false_colour_of_e3_is_that_of_another_candidate_and_no_other_experiment_states_one() {
+fn only_e3_states_a_false_colour_of_another_candidate() {
     for scene in Experiment::PAPER.into_iter().flat_map(scenes) {
         match scene.stated_color {
             Some(stated) => {

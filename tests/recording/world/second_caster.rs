@@ -164,7 +164,7 @@ fn a_second_caster_agrees_on_what_the_mirror_shows() {
 
 #[test]
 #[ignore = "`make soak`: half an hour"]
-fn soak_of_five_thousand_views_by_a_second_caster() {
+fn soak_a_second_caster_agrees_on_five_thousand_views() {
     compare(Body::Mannequin, 5_000);
     compare(Body::Humanoid, 200);
 }

@@ -26,7 +26,7 @@ fn a_picture_does_not_depend_on_what_the_eye_drew_before() {
 }
 
 #[test]
-fn the_picture_is_of_now() {
+fn the_picture_shows_the_current_state() {
     let config = WorldConfig::default();
     need::drawing();
     let mut eye = Camera::new(&config).unwrap();

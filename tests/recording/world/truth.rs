@@ -53,7 +53,7 @@ fn visibility_agrees_with_a_picture_of_labels() {
 
 #[test]
 #[ignore = "`make soak`: a minute"]
-fn soak_of_labels_of_two_hundred_poses_of_the_humanoid() {
+fn soak_labels_of_two_hundred_humanoid_poses() {
     agrees_with_labels(Body::Humanoid, 210);
 }
 
@@ -99,7 +99,7 @@ fn visibility_agrees_with_mujocos_rays() {
 }
 
 #[test]
-fn the_census_counts_the_labels() {
+fn visibility_counts_the_labels() {
     for_scattered(WorldConfig::default().body.shape, &[Experiment::E4, Experiment::E5, Experiment::E2], 30, |world| {
         let visibility = world.visibility();
         let image = labels(world, 640, 480);

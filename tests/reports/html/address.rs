@@ -67,7 +67,7 @@ fn words_are_searched_for_in_rows_and_groups() {
 }
 
 #[test]
-fn one_list_and_an_open_cell_are_in_the_address_too() {
+fn the_ungrouped_list_and_the_open_cell_are_in_the_address() {
     let page = Report::bare().render().unwrap();
     let mut browser = Browser::open(&page);
     browser.click("#grouped");
@@ -87,7 +87,7 @@ fn one_list_and_an_open_cell_are_in_the_address_too() {
 }
 
 #[test]
-fn an_address_that_names_nothing_of_the_page_does_no_harm() {
+fn unknown_names_in_the_address_are_ignored() {
     let page = Report::bare().render().unwrap();
     let query = "?model=<script>&experiment=E9&sort=main:sideways:TSA&sort=main:ascending:NONE&sort=x&cell=TSA&of=nobody&a=1&search=%3Cimg%20src%3Dx%3E";
     let mut browser = Browser::open_at(&page, query);

@@ -274,7 +274,7 @@ impl Browser {
 }
 
 #[test]
-fn whatever_goes_wrong_in_a_page_is_noticed() {
+fn errors_and_requests_of_a_page_are_noticed() {
     for (body, complaint) in [
         ("<script>console.error('a slip')</script>", "a slip"),
         ("<script>throw new Error('a slip')</script>", "a slip"),

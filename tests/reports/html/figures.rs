@@ -74,7 +74,7 @@ fn left(browser: &mut Browser, figure: &str, is_counted: &str) -> (u64, u64) {
 }
 
 #[test]
-fn figures_show_what_the_filters_leave() {
+fn figures_show_only_filtered_data() {
     let mut browser = Browser::open_at(&PAPER_PAGE, "?experiment=E1&experiment=E2&model=GPT+5.1");
     let of_gpt = "mark.dataset.model === 'GPT 5.1'";
     let wanted = format!("{of_gpt} && ['E1', 'E2'].includes(mark.dataset.experiment)");

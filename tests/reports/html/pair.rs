@@ -28,7 +28,7 @@ fn test<'s>(statistics: &'s Statistics, experiment: &str, metric: &str, models: 
 }
 
 #[test]
-fn the_tests_of_the_chosen_two_are_those_of_the_statistics() {
+fn the_tests_of_two_chosen_models_match_the_statistics() {
     let report = Report::paper();
     let statistics = report.statistics.as_ref().unwrap();
     let mut browser = Browser::open(&PAPER_PAGE);

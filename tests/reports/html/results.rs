@@ -203,7 +203,7 @@ fn the_keyboard_alone_is_enough() {
 }
 
 #[test]
-fn a_closed_panel_takes_the_focus_from_nobody() {
+fn closing_a_panel_does_not_steal_the_focus() {
     let report = Report::bare();
     let mut browser = Browser::open(&report.render().unwrap());
     // The browser reports the end of a panel late; the reader may already be elsewhere.

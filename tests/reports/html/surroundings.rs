@@ -80,7 +80,7 @@ fn paper_has_everything_but_the_controls() {
 }
 
 #[test]
-fn what_stays_whole_on_paper_is_less_than_half_a_page() {
+fn unbreakable_parts_fit_half_a_printed_page() {
     let mut browser = Browser::open(&PAPER_PAGE);
     // A4 without its margins: 186 mm x 269 mm, at 96 px per inch.
     let size = json!({"width": 703, "height": 1017, "deviceScaleFactor": 1, "mobile": false});

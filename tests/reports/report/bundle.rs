@@ -79,7 +79,7 @@ fn a_failed_write_changes_nothing() {
 }
 
 #[test]
-fn no_file_leaves_the_folder_or_hides_another() {
+fn no_file_escapes_the_folder_or_overwrites_another() {
     let home = tempfile::tempdir().unwrap();
     for path in ["../outside", "/outside", "", "cells.csv", "./cells.csv"] {
         let other = OutputFile { path: path.into(), bytes: Vec::new() };

@@ -87,7 +87,7 @@ fn an_include_comes_first_and_the_file_overrides_it() {
 }
 
 #[test]
-fn includes_do_not_run_in_circles_or_without_end() {
+fn cyclic_and_deep_includes_are_refused() {
     let (_folder, path) = files(&[("a.toml", "include = ['b.toml']\n"), ("b.toml", "include = ['./a.toml']\n")]);
     let said = fault_of(&path);
     assert!(said.contains("the include leads back to itself: ") && said.contains("a.toml -> "), "{said}");
@@ -113,7 +113,7 @@ fn contents_of_an_include_are_not_shown() {
 }
 
 #[test]
-fn a_name_that_is_no_style_gets_the_nearest() {
+fn an_unknown_style_is_refused_with_the_nearest_name() {
     let message = |name: &str| Style::load(name).unwrap_err().to_string();
     assert_eq!(
         message("papre"),
@@ -124,7 +124,7 @@ fn a_name_that_is_no_style_gets_the_nearest() {
 }
 
 #[test]
-fn a_style_is_called_after_its_file_never_its_path() {
+fn a_style_is_named_after_its_file_without_the_path() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("mine.toml");
     fs::write(&path, MAIN).unwrap();

@@ -176,7 +176,7 @@ fn marks_agree_with_the_caption() {
 }
 
 #[test]
-fn a_mean_alone_makes_no_model_the_best() {
+fn a_higher_mean_alone_is_not_marked_as_best() {
     let row = |name: &str, successes: i128| (vec![text("E1"), text(name)], successes);
     let two = [row("a", 9), row("b", 1)];
     let rows: Vec<_> =
@@ -236,7 +236,7 @@ fn every_metric_is_in_some_table() {
 }
 
 #[test]
-fn other_keys_head_groups_and_name_rows() {
+fn any_keys_can_group_and_name_rows() {
     let one: &[(u64, i128, i128)] = &[(3, 2, 2), (2, 1, 1), (3, 30, 302), (3, 6, 12)];
     let int = KeyValue::Int;
     let outline = |by: &[&str], keys: &[&[KeyValue]]| {
@@ -278,7 +278,7 @@ fn other_keys_head_groups_and_name_rows() {
 }
 
 #[test]
-fn a_rate_of_nothing_never_looks_certain() {
+fn a_rate_of_zero_keeps_its_uncertainty() {
     let spelled = |style: &str| everything(&hostile(), style);
     assert!(spelled("default").contains("0/9 [.00, .30]"));
     assert!(spelled("default").contains("(all equal)"));

@@ -30,7 +30,7 @@ fn models_are_paired_by_scene_and_tied_rather_than_ranked() {
 
 /// Equal seeds and runs do not make pairs, because the bodies differ.
 #[test]
-fn different_scenes_make_no_pairs_however_equal_seed_and_run_are() {
+fn different_scenes_with_equal_seed_and_run_are_not_paired() {
     let rows = [block("E1", "a", 21, 9), block("E1", "b", 7, 9)].concat();
     let found = with_scenes(&rows, RECORDED, |row| Some(format!("{} {} {}", row.1, row.2, row.3)));
     let test = &found.models[0].tests[0];
@@ -83,7 +83,7 @@ fn episodes_without_a_scene_are_counted_and_left_out_of_pairs() {
 }
 
 #[test]
-fn repeats_of_a_scene_are_counted_and_are_no_pairs() {
+fn repeats_of_a_scene_are_counted_but_not_paired() {
     let rows = [block("E1", "a", 21, 9), block("E1", "b", 7, 9)].concat();
     let found = with_scenes(&rows, RECORDED, |row| Some(row.2.to_string()));
     let test = &found.models[0].tests[0];

@@ -53,7 +53,7 @@ fn improvement_counts_decided_and_undecided_episodes() {
 }
 
 #[test]
-fn a_difference_that_no_outcome_could_show_is_reported_as_untestable() {
+fn a_difference_that_cannot_be_detected_is_untestable() {
     let rows: Vec<Row> = (0..3).flat_map(|run| [("E1", "a", 0, run, true, 9), ("E1", "b", 0, run, false, 9)]).collect();
     let said =
         |found: &Statistics| found.conclusions.iter().find(|line| line.contains("cannot show any difference")).cloned();

@@ -54,7 +54,7 @@ fn declared_seeds_are_the_unit_of_every_test() {
 }
 
 #[test]
-fn one_participant_is_one() {
+fn episodes_of_one_participant_count_as_one() {
     let table = labelled(&opposed(3, 7), "participant", |row| Some(row.1.to_owned()));
     let options = Options { design: RECORDED, ..Options::default() };
     let found = Statistics::of(&table, &cells(&table), &options).unwrap();
@@ -64,7 +64,7 @@ fn one_participant_is_one() {
 
 /// Eight people and a model on four scenes.
 #[test]
-fn people_who_play_the_same_scenes_are_no_retest_and_no_scenes() {
+fn people_on_shared_scenes_count_by_participant() {
     let people = (0..8).flat_map(|person| (0..4).map(move |scene| ("E1", "people", scene, person, person < 4, 9)));
     let rows: Vec<Row> = people.chain((0..4).map(|scene| ("E1", "model", scene, 0, true, 9))).collect();
     let mut table = labelled(&rows, "scene", by_scene);
@@ -218,7 +218,7 @@ fn interrupted_repeats_leave_durations_untested() {
 // Python: mean squares within scenes, 3.5 / 7 over 14 episodes and 2.5 / 6 over 13
 // episodes: (0.5 / 14 + 2.5 / 6 / 13) ** 0.5; no rate varies.
 #[test]
-fn a_difference_has_the_noise_of_repeats_beside_it() {
+fn a_difference_is_shown_with_the_noise_of_repeats() {
     let mut rows = timed(7);
     rows.pop();
     let found = with_scenes(&rows, RECORDED, by_scene);

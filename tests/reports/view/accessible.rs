@@ -35,7 +35,7 @@ pub fn check(browser: &mut Browser, what: &str) {
 }
 
 #[test]
-fn the_engine_finds_what_is_wrong() {
+fn the_engine_finds_violations() {
     let mut browser =
         Browser::open("<!doctype html><html lang=en><title>t</title><main><h1>t</h1><img src='data:,'></main>");
     let found = violations(&mut browser);
@@ -43,7 +43,7 @@ fn the_engine_finds_what_is_wrong() {
 }
 
 #[test]
-fn every_page_of_recordings() {
+fn every_page_of_recordings_is_accessible() {
     let folder = tempfile::tempdir().unwrap();
     let server = Server::start(folder.path(), &[RECORDED, "--against", "extended"]);
     for (query, ready) in [
@@ -66,7 +66,7 @@ fn every_page_of_recordings() {
 }
 
 #[test]
-fn every_part_of_the_report() {
+fn every_part_of_the_report_is_accessible() {
     let folder = tempfile::tempdir().unwrap();
     let server = Server::start(folder.path(), &[PAPER]);
     let mut browser = Browser::at(&server.link);

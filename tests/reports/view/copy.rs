@@ -150,7 +150,7 @@ fn a_copy_filters_as_the_server_does_or_says_that_it_cannot() {
 }
 
 #[test]
-fn two_episodes_of_a_copy_part_where_those_of_the_server_do() {
+fn a_copy_and_the_server_align_two_episodes_alike() {
     let folder = tempfile::tempdir().unwrap();
     run(folder.path(), &["view", RECORDED, "--where", "model in ('guesser', 'gullible')", "--export", "page"]).done();
     let page = format!("file://{}/index.html", folder.path().join("page").display());

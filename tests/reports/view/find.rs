@@ -69,7 +69,7 @@ fn filters_by_click_are_chips_that_remove_them() {
 }
 
 #[test]
-fn a_condition_with_a_fault_stays_and_the_fault_is_told() {
+fn an_invalid_condition_stays_with_its_error() {
     let folder = tempfile::tempdir().unwrap();
     let server = Server::start(folder.path(), &[RECORDED]);
     for view in ["overview", "episodes"] {
@@ -88,7 +88,7 @@ fn a_condition_with_a_fault_stays_and_the_fault_is_told() {
 }
 
 #[test]
-fn where_nothing_is_found_each_filter_can_go() {
+fn an_empty_result_offers_to_remove_each_filter() {
     let folder = tempfile::tempdir().unwrap();
     let server = Server::start(folder.path(), &[RECORDED]);
     for view in ["overview", "episodes"] {

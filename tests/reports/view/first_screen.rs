@@ -67,7 +67,7 @@ fn the_first_screen_says_what_happened() {
 }
 
 #[test]
-fn a_map_is_never_an_empty_box() {
+fn a_map_is_never_empty() {
     let folder = tempfile::tempdir().unwrap();
     let server = Server::start(folder.path(), &[RECORDED]);
     let mut browser = at(&server, "?view=episodes", 1400);
@@ -85,7 +85,7 @@ fn a_map_is_never_an_empty_box() {
 }
 
 #[test]
-fn a_map_is_small_and_the_server_too() {
+fn maps_and_server_memory_stay_small() {
     let folder = tempfile::tempdir().unwrap();
     let server = Server::start(folder.path(), &[RECORDED]);
     for run in [1, 2] {
@@ -103,7 +103,7 @@ fn a_map_is_small_and_the_server_too() {
 }
 
 #[test]
-fn an_episode_is_one_file_that_needs_nothing_beside_it() {
+fn an_episode_exports_as_one_standalone_file() {
     let folder = tempfile::tempdir().unwrap();
     run(folder.path(), &["view", RECORDED, "--episode", EPISODE, "--export", "episode.html"]).done();
     let page = std::fs::read_to_string(folder.path().join("episode.html")).unwrap();
@@ -124,7 +124,7 @@ fn an_episode_is_one_file_that_needs_nothing_beside_it() {
 }
 
 #[test]
-fn an_episode_is_a_film() {
+fn an_episode_exports_as_an_animation() {
     let folder = tempfile::tempdir().unwrap();
     run(folder.path(), &["view", RECORDED, "--episode", EPISODE, "--export", "film.png"]).done();
     let film = std::fs::read(folder.path().join("film.png")).unwrap();

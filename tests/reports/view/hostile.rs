@@ -67,7 +67,7 @@ fn looked_at(browser: &mut Browser) {
 }
 
 #[test]
-fn names_and_megabytes_are_shown_as_text() {
+fn hostile_names_and_huge_texts_are_shown_as_text() {
     let folder = tempfile::tempdir().unwrap();
     write(folder.path());
     let server = Server::start(folder.path(), &["hostile.parquet"]);
@@ -77,7 +77,7 @@ fn names_and_megabytes_are_shown_as_text() {
 }
 
 #[test]
-fn names_and_megabytes_are_text_in_a_copy_too() {
+fn a_copy_shows_hostile_names_and_huge_texts_as_text() {
     let folder = tempfile::tempdir().unwrap();
     write(folder.path());
     run(folder.path(), &["view", "hostile.parquet", "--export", "page"]).done();

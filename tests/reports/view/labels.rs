@@ -34,7 +34,7 @@ fn post(server: &Server, label: &Value) -> Response {
 }
 
 #[test]
-fn a_label_is_put_seen_after_a_reload_and_in_a_copy() {
+fn a_label_persists_after_a_reload_and_in_a_copy() {
     let folder = tempfile::tempdir().unwrap();
     runs(folder.path());
     let server = Server::start(folder.path(), &["runs", "--label", "ann"]);
@@ -171,7 +171,7 @@ fn only_the_page_of_a_coder_may_write() {
 }
 
 #[test]
-fn the_labels_of_another_coder_arrive_and_a_bad_line_is_told() {
+fn labels_of_another_coder_appear_and_a_bad_line_is_reported() {
     let folder = tempfile::tempdir().unwrap();
     runs(folder.path());
     let server = Server::start(folder.path(), &["runs"]);

@@ -14,7 +14,7 @@ pub fn until(browser: &mut Browser, expression: &str) {
 }
 
 #[test]
-fn from_the_report_to_the_step_that_decided() {
+fn links_lead_from_the_report_to_the_deciding_step() {
     let folder = tempfile::tempdir().unwrap();
     let server = Server::start(folder.path(), &[RECORDED]);
     let mut browser = Browser::at(&server.link);

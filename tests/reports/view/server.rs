@@ -7,7 +7,7 @@ use crate::harness::program::wait_for;
 use crate::view::{PAPER, RECORDED, Server};
 
 #[test]
-fn only_this_machine_and_its_own_page_are_answered() {
+fn requests_of_other_hosts_and_sites_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let server = Server::start(folder.path(), &[RECORDED]);
     let host = format!("127.0.0.1:{}", server.port);
@@ -31,7 +31,7 @@ fn only_this_machine_and_its_own_page_are_answered() {
 }
 
 #[test]
-fn every_answer_has_the_pages_permissions() {
+fn every_response_has_the_security_headers() {
     let folder = tempfile::tempdir().unwrap();
     let server = Server::start(folder.path(), &[RECORDED]);
     for path in ["/", "/assets/main.js", "/assets/view.css", "/api/study", "/api/nothing", "/nowhere", "/robots.txt"] {

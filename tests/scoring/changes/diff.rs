@@ -30,7 +30,7 @@ fn a_flip_comes_with_the_timesteps_that_decided_it_on_both_sides() {
 }
 
 #[test]
-fn scores_differ_as_their_definitions_do() {
+fn scores_and_their_definitions_have_the_same_diff() {
     let folder = folder();
     let at = folder.path();
     let expected = run(at, &["diff", "all.toml", "late.toml", "a.parquet", "--json"]).json();
@@ -76,7 +76,7 @@ fn no_change_is_printed_and_is_no_failure() {
 }
 
 #[test]
-fn a_change_fails_where_it_must_not_be() {
+fn a_change_fails_with_fail_on_change() {
     let folder = folder();
     let at = folder.path();
     let diff = ["diff", "all.toml", "late.toml", "a.parquet"];
@@ -102,7 +102,7 @@ fn items_of_one_side_are_listed_and_fail() {
 }
 
 #[test]
-fn a_metric_of_one_side_alone_needs_no_column() {
+fn a_metric_on_one_side_needs_no_column_on_the_other() {
     let folder = folder();
     let at = folder.path();
     std::fs::write(
@@ -115,7 +115,7 @@ fn a_metric_of_one_side_alone_needs_no_column() {
 }
 
 #[test]
-fn to_undefined_is_a_flip_of_its_own() {
+fn a_change_to_undefined_is_a_flip() {
     let folder = folder();
     let at = folder.path();
     std::fs::write(at.join("when.toml"), format!("{}when = \"any(mirror_visible)\"\n", crate::changes::gaze(1)))

@@ -107,7 +107,7 @@ fn the_old_report_is_never_replaced() {
 }
 
 #[test]
-fn a_folder_that_is_no_report_is_refused() {
+fn a_folder_without_a_report_is_refused() {
     let folder = reported();
     let at = folder.path();
     let said = run(at, &["table", "rescore", ".", "--definitions", "late.toml"]).refused();

@@ -53,7 +53,7 @@ fn an_empty_file_has_no_fault() {
 }
 
 #[test]
-fn a_literal_that_a_column_takes_or_may_take_has_no_fault() {
+fn a_literal_that_a_column_may_have_is_accepted() {
     for text in [
         "action = 'turn_left'",
         "'truncated' <> reply_status",
@@ -77,7 +77,7 @@ fn a_literal_that_a_column_takes_or_may_take_has_no_fault() {
 }
 
 #[test]
-fn a_file_that_is_no_text_is_named() {
+fn a_file_that_is_not_text_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let write = |name: &str, bytes: &[u8]| {
         let path = folder.path().join(name);

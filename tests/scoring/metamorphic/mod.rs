@@ -170,7 +170,7 @@ fn soak_parts_and_filters_fit_together() {
 
 #[test]
 #[ignore = "soak: 500 cases of parts and 1000 of definitions"]
-fn soak_duckdb() {
+fn soak_parts_and_definitions_on_duckdb() {
     soak(1000, |count, seed| {
         check_parts(Engine::Duckdb, count / 2, seed);
         check_definitions(Engine::Duckdb, count, seed);

@@ -12,7 +12,7 @@ fn parts_and_filters_fit_together_on_spark() {
 
 #[test]
 #[ignore = "soak: 30 cases of parts and 100 of definitions"]
-fn soak_spark() {
+fn soak_parts_and_definitions_on_spark() {
     soak(100, |count, seed| {
         check_parts(Engine::Spark, count * 3 / 10, seed);
         check_definitions(Engine::Spark, count, seed);

@@ -43,7 +43,7 @@ fn queried(at: &Path, columns: &str) -> Vec<String> {
 }
 
 #[test]
-fn a_column_of_csv_has_the_type_of_all_its_cells() {
+fn a_csv_column_has_the_type_that_fits_all_cells() {
     let folder = folder();
     let at = folder.path();
     let rows = "\u{feff}episode,frame,success,reward,code,note,nothing\n\

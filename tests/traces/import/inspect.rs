@@ -72,7 +72,7 @@ fn a_log_of_inspect_has_a_step_per_event_in_every_form() {
 
 #[cfg(feature = "polars")]
 #[test]
-fn errors_limits_and_messages_of_pools_are_there() {
+fn errors_limits_and_pooled_messages_are_imported() {
     let folder = folder();
     let at = folder.path();
     let mapped = ["--map", "last=event.input.2.content", "--map", "sent=event.call.request.messages.0.content"];

@@ -71,7 +71,7 @@ fn steps_become_a_trace_that_scores() {
 }
 
 #[test]
-fn the_way_the_lines_come_does_not_matter() {
+fn the_order_of_the_lines_does_not_matter() {
     let a: Vec<Value> = (1..=5).map(|t| step("a", t)).collect();
     let b: Vec<Value> = (1..=4).map(|t| step_with("b", t, json!({ "run": 2 }))).collect();
     let plain = lines(&a) + &lines(&b);

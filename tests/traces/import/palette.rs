@@ -60,7 +60,7 @@ fn another_colour_is_refused_with_its_line_and_the_nearest_name() {
 }
 
 #[test]
-fn a_palette_that_is_none_is_refused() {
+fn an_invalid_palette_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     for (palette, expected) in [
         (

@@ -33,7 +33,7 @@ const ACTIONS: &str = "one of move_forward, move_backward, turn_left, turn_right
      hand_left, hand_right, hand_forward, hand_backward, or null";
 
 #[test]
-fn a_value_of_another_type_or_out_of_range() {
+fn a_value_of_the_wrong_type_or_range_is_refused() {
     let int32 = "an integer from -2147483648 to 2147483647";
     let t = "an integer from 1 to 2147483647";
     let count = "an integer from 0 to 2147483647, or null";
@@ -63,7 +63,7 @@ fn a_value_of_another_type_or_out_of_range() {
 }
 
 #[test]
-fn an_invalid_name() {
+fn an_invalid_name_is_refused() {
     check(json!({ "action": "Done" }), ACTIONS, "the text `Done`", "did you mean `done`?");
     check(json!({ "action": "TURN_LEFT" }), ACTIONS, "the text `TURN_LEFT`", "did you mean `turn_left`?");
     check(json!({ "action": "" }), ACTIONS, "the text ``", SEE);
@@ -87,7 +87,7 @@ fn an_invalid_name() {
 }
 
 #[test]
-fn an_invalid_color() {
+fn an_invalid_color_is_refused() {
     let [body, claim, cube] = [
         "the lower-case name of a colour",
         "the lower-case name of a colour, `unknown`, or null",
@@ -112,7 +112,7 @@ fn an_invalid_color() {
 }
 
 #[test]
-fn two_spellings_of_one_color_are_no_trace() {
+fn two_spellings_of_one_color_are_refused() {
     let steps = [
         step_with("a", 1, json!({ "body_color": "light blue" })),
         step_with("a", 2, json!({ "body_color": "light blue", "self_color": "lightblue" })),
@@ -123,7 +123,7 @@ fn two_spellings_of_one_color_are_no_trace() {
 }
 
 #[test]
-fn a_key_that_is_missing_twice_or_empty() {
+fn a_missing_repeated_or_empty_key_is_refused() {
     let mut bare = step("a", 1);
     bare.as_object_mut().unwrap().remove("self_color");
     bare["self_colour"] = json!("red");
@@ -151,7 +151,7 @@ fn a_key_that_is_missing_twice_or_empty() {
 }
 
 #[test]
-fn a_line_that_is_no_json_object() {
+fn a_line_other_than_a_json_object_is_refused() {
     let good = lines(&[step("a", 1)]);
     for (line, found) in [
         ("[1]", "a list"),
@@ -186,14 +186,14 @@ fn a_line_that_is_no_json_object() {
 }
 
 #[test]
-fn a_file_without_a_step() {
+fn a_file_without_steps_is_refused() {
     for text in ["", "\n \r\n", "\u{feff}"] {
         assert!(refused(text).starts_with("error: s.jsonl\n  expected at least one step\n  found none"), "{text:?}");
     }
 }
 
 #[test]
-fn episodes_that_are_not_whole() {
+fn incomplete_episodes_are_refused() {
     let said = refused(lines(&[step("a", 1), step("a", 2), step("b", 1), step("a", 2)]));
     let words = "s.jsonl, line 4, key `t`\n  expected one line for each t of episode `a`\n  found t = 2 again, as in \
                  s.jsonl, line 2\n";
@@ -208,7 +208,7 @@ fn episodes_that_are_not_whole() {
 }
 
 #[test]
-fn names_that_change_within_an_episode() {
+fn constants_that_change_within_an_episode_are_refused() {
     let first = "as in the episode's first line (s.jsonl, line 1)";
     let help = "correct the lines, or give the episodes ids of their own";
     check(json!({ "model": "other" }), &format!("the text `mine`, {first}"), "the text `other`", help);
@@ -217,7 +217,7 @@ fn names_that_change_within_an_episode() {
 }
 
 #[test]
-fn own_keys_whose_types_change() {
+fn custom_keys_with_changing_types_are_refused() {
     let said = |one: Value, other: Value| {
         refused(lines(&[step_with("a", 1, json!({ "own": one })), step_with("a", 2, json!({ "own": other }))]))
     };
@@ -235,7 +235,7 @@ fn own_keys_whose_types_change() {
 }
 
 #[test]
-fn places_that_cannot_be_read_or_written() {
+fn unreadable_inputs_and_unwritable_outputs_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("s.jsonl"), lines(&[step("a", 1)])).unwrap();
     fs::write(folder.path().join("x.parquet"), "before").unwrap();

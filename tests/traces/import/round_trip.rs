@@ -44,7 +44,7 @@ fn exported(episode: &Episode) -> Vec<Value> {
 }
 
 #[test]
-fn the_paper_is_the_same_after_it() {
+fn the_traces_of_the_paper_round_trip() {
     let fixtures = fixture("paper");
     let mut traces: Vec<_> = fs::read_dir(&fixtures).unwrap().map(|entry| entry.unwrap().path()).collect();
     traces.retain(|path| path.extension().is_some_and(|ending| ending == "parquet"));
@@ -58,7 +58,7 @@ fn the_paper_is_the_same_after_it() {
 }
 
 #[test]
-fn every_value_of_every_column_is_the_same_after_it() {
+fn every_value_of_every_column_round_trips() {
     let extra = Extra {
         mirror_self_px: Some(i32::MAX),
         pose_x: Some(0.1),

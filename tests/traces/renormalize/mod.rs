@@ -109,7 +109,7 @@ fn attributions_follow_the_texts_and_all_else_stays() {
 }
 
 #[test]
-fn a_second_time_changes_nothing_and_gives_the_same_bytes() {
+fn renormalizing_twice_gives_the_same_bytes() {
     let folder = tempfile::tempdir().unwrap();
     old(folder.path(), "x.parquet");
     assert_eq!(run(folder.path(), &["x.parquet", "-o", "one", "--fail-on-change"]).code, 1);

@@ -125,7 +125,7 @@ fn a_flipped_bit_of_a_header_is_refused_or_changes_no_score() {
 }
 
 #[test]
-fn every_page_with_a_wrong_checksum_is_found_on_every_way_to_read_it() {
+fn every_reader_finds_every_page_with_a_wrong_checksum() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("flipped.parquet");
     for name in FILES {

@@ -143,7 +143,7 @@ fn sizes_that_no_codec_gives_are_refused_before_memory_is_taken() {
 }
 
 #[test]
-fn counts_that_no_bytes_hold_are_refused() {
+fn counts_larger_than_the_bytes_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let whole = file(folder.path(), Compression::UNCOMPRESSED);
     let most = i64::from(i32::MAX);

@@ -157,7 +157,7 @@ fn int(out: &mut Vec<u8>, number: usize) {
 }
 
 #[test]
-fn numbers_of_headers_that_their_pages_do_not_keep_are_refused() {
+fn counts_in_headers_that_contradict_their_pages_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     for (form, column) in [(FORMS[0], "t"), (FORMS[0], "action"), (FORMS[1], "t"), (FORMS[1], "episode_id")] {
         let whole = file(folder.path(), form);
@@ -194,7 +194,7 @@ fn numbers_of_headers_that_their_pages_do_not_keep_are_refused() {
 }
 
 #[test]
-fn counts_of_the_footer_that_its_pages_do_not_keep_are_refused() {
+fn counts_in_the_footer_that_contradict_the_pages_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     for form in FORMS {
         let whole = file(folder.path(), form);

@@ -269,7 +269,7 @@ fn invalid_checksums_are_refused() {
 
 /// An unknown field number in the footer hides all keys, including `created_by`.
 #[test]
-fn keys_that_damage_hides_are_missed() {
+fn keys_hidden_by_damage_are_reported_missing() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("hidden.parquet");
     let mut bytes = trace();
@@ -285,7 +285,7 @@ fn keys_that_damage_hides_are_missed() {
 }
 
 #[test]
-fn each_row_group_has_its_own() {
+fn each_row_group_has_its_own_checksums() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("groups.parquet");
     let steps = |count| vec![Step::default(); count];
@@ -320,7 +320,7 @@ fn scores_carry_checksums_too() {
 
 /// An episode's rows with a changed value, as written by a program that does not know the hash.
 #[test]
-fn an_episode_whose_rows_are_not_those_of_its_hash_is_refused() {
+fn an_episode_whose_rows_contradict_its_hash_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("hashed.parquet");
     let columns = OptionalColumns::named(&["episode_hash", "mirror_px", "cost_usd", "distractors"]).unwrap();

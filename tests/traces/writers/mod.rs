@@ -107,7 +107,7 @@ fn of_writer<'a>(files: &'a BTreeMap<PathBuf, PathBuf>, writer: &str) -> Vec<(&'
 
 /// When pyarrow rewrites a trace, it copies the footer's keys, including our checksums.
 #[test]
-fn a_trace_that_another_program_wrote_again_is_read_and_every_verb_says_so() {
+fn every_command_notes_a_trace_rewritten_by_another_program() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let own = fixture("recorded/E1-guesser.parquet");

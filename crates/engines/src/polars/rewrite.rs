@@ -333,7 +333,7 @@ mod tests {
     }
 
     #[test]
-    fn columns_without_a_name_get_that_of_duckdb() {
+    fn unnamed_columns_are_named_as_in_duckdb() {
         assert_eq!(
             rewritten("select a, COUNT(*), AVG(x), avg(x), (x + 1) from t"),
             "SELECT a, COUNT(*) AS \"count_star()\", AVG(x) AS \"avg(x)\", avg(x) AS \"avg(x)_1\", (x + 1) AS \"(x + 1)\" FROM t"

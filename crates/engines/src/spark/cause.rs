@@ -88,7 +88,7 @@ mod tests {
     use crate::spark::Cluster;
 
     #[test]
-    fn a_cause_is_one_line_without_place_class_or_state() {
+    fn a_cause_is_shortened_to_its_message() {
         for (message, expected) in [
             (
                 "[UNRESOLVED_COLUMN] A column `x` cannot be resolved. SQLSTATE: 42703; line 3 pos 4;\n'Project",

@@ -58,7 +58,7 @@ mod tests {
     use super::on_path;
 
     #[test]
-    fn the_first_on_the_path_is_taken() {
+    fn the_first_match_on_the_path_wins() {
         let folder = tempfile::tempdir().unwrap();
         let [none, first, second] = ["none", "first", "second"].map(|name| folder.path().join(name));
         for place in [&none, &first, &second] {

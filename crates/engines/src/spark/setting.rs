@@ -69,7 +69,7 @@ mod tests {
     use super::Setting;
 
     #[test]
-    fn a_setting_is_a_key_and_whatever_follows_the_first_sign() {
+    fn a_setting_is_split_at_the_first_equals_sign() {
         let setting: Setting = "spark.driver.extraJavaOptions=-Da=b -Dc=d".parse().unwrap();
         assert_eq!((setting.key(), setting.value()), ("spark.driver.extraJavaOptions", "-Da=b -Dc=d"));
         for wrong in

@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_name_is_no_glob() {
+    fn glob_characters_of_a_file_name_are_escaped() {
         assert_eq!(literal("file:///a/x[1]{b}*.parquet"), r"file:///a/x\[1\]\{b\}\*.parquet");
     }
 

@@ -18,7 +18,7 @@ fn temporary_name(target: &str) -> String {
 }
 
 #[test]
-fn a_target_is_replaced_by_a_commit_alone() {
+fn only_a_commit_replaces_the_target() {
     let folder = tempfile::tempdir().unwrap();
     let target = folder.path().join("a.txt");
     fs::write(&target, "old").unwrap();
@@ -47,7 +47,7 @@ fn a_new_target_is_not_replaced() {
 }
 
 #[test]
-fn a_folder_is_no_target() {
+fn a_folder_is_refused_as_a_target() {
     let folder = tempfile::tempdir().unwrap();
     let error = NewFile::create(folder.path()).unwrap_err();
     assert_eq!(error.kind(), std::io::ErrorKind::IsADirectory);
@@ -133,7 +133,7 @@ fn a_folder_is_made_with_those_above_it() {
 }
 
 #[test]
-fn a_long_name_has_a_temporary_one() {
+fn a_file_with_a_long_name_can_be_replaced() {
     let folder = tempfile::tempdir().unwrap();
     for name in ["x".repeat(255), "é".repeat(127)] {
         let target = folder.path().join(name);

@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn a_declared_count_of_steps_is_no_duration() {
+    fn a_declared_count_is_not_a_duration() {
         let text =
             built_in("paper").unwrap().replace("value   = \"finish\"", "value = \"finish\"\nmeasures = \"count\"");
         assert!(of(&text).durations.is_empty());

@@ -100,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn steps_and_pixels_need_no_check_and_large_numbers_do() {
+    fn only_large_numbers_need_an_overflow_check() {
         for value in
             ["sum(px) - 1", "length() * 1000000", "max(px * px)", "min(-px)", "min(big % 0)", "min(div(big, 2))"]
         {

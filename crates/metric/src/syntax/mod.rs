@@ -231,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn a_chain_needs_no_stack_of_the_caller() {
+    fn a_long_chain_does_not_overflow_a_small_stack() {
         for chain in [vec!["a"; 1999].join("+"), format!("count({})", vec!["a > 1"; 990].join(" and "))] {
             let parsed = std::thread::Builder::new().stack_size(256 << 10).spawn(move || parse(&chain)).unwrap();
             let faults = parsed.join().unwrap().unwrap_err();

@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn each_run_of_thresholds_is_said_once() {
+    fn adjacent_thresholds_form_one_range() {
         check(&[(1, "a"), (10, "a"), (60, "a")], &[]);
         check(&[(1, "b"), (10, "b"), (60, "a")], &["b up to 10 px"]);
         check(&[(1, "a"), (10, "b"), (60, "b")], &["b from 10 px on"]);

@@ -297,7 +297,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn keys_are_compared_as_their_texts_are(
+        fn comparing_keys_equals_comparing_texts(
             episodes in vec((option::of(0..4_usize), vec(option::of(0..3_u8), 1..12)), 1..9), equal in any::<bool>(),
         ) {
             const KNOWN: [&str; 3] = ["red", "blue", "green"];
@@ -324,7 +324,7 @@ mod tests {
     }
 
     #[test]
-    fn texts_under_two_keys_are_one_text() {
+    fn equal_texts_under_two_keys_are_equal() {
         let mut symbols = Symbols::default();
         for column in both(&mut symbols, &["red", "blue", "red"], &[Some(0), None, Some(1), Some(2)]) {
             let found = column.keyed().symbols();

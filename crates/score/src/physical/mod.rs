@@ -271,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn the_plan_of_the_papers_definitions() {
+    fn the_plan_of_the_paper_matches_its_snapshot() {
         insta::assert_snapshot!(PhysicalPlan::of(&[&paper().plan]));
     }
 

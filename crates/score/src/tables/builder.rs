@@ -351,7 +351,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn rows_come_out_as_they_went_in_and_in_the_order_of_keys(
+        fn rows_are_unchanged_and_sorted_by_key(
             mut rows in vec(row(), 1..30), batches in 1_usize..10, by_row in any::<bool>(),
         ) {
             let mut builder = TableBuilder::new(header(2));

@@ -146,7 +146,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn rows_are_ordered_as_their_keys_are(keys in vec(key(), 0..40)) {
+        fn sorting_columns_equals_sorting_keys(keys in vec(key(), 0..40)) {
             let columns: EpisodeKeys = keys.iter().cloned().collect();
             let order = order(&columns).unwrap_or_else(|| (0..u32::try_from(keys.len()).unwrap()).collect());
             let found: Vec<&EpisodeKey> = order.iter().map(|row| &keys[*row as usize]).collect();

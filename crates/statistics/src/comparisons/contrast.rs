@@ -53,7 +53,7 @@ mod tests {
     // statsmodels 0.15.0: confint_proportions_2indep(k1, n1, k2, n2, method="newcomb", compare="diff").
     // The first two are Newcombe's examples (a) and (c): 0.0524 to 0.3339, 0.1705 to 0.8090.
     #[test]
-    fn newcombe_is_the_known_one() {
+    fn newcombe_matches_known_values() {
         check(newcombe((56, 70), (48, 80), 0.95), 0.052431472402365, 0.333872654036906);
         check(newcombe((9, 10), (3, 10), 0.95), 0.170522723934503, 0.809017973535488);
         check(newcombe((21, 21), (0, 21), 0.95), 0.781307402164412, 1.0);
@@ -63,7 +63,7 @@ mod tests {
 
     // scipy 1.17.1: ttest_ind(x, y, equal_var=False).confidence_interval()
     #[test]
-    fn welch_is_the_known_one() {
+    fn welch_matches_known_values() {
         check(welch(&of(&[4, 8, 15, 16, 23, 42]), &of(&[3, 5, 9, 1]), 0.95), -0.657935919364713, 27.6579359193647);
         assert_eq!(welch(&of(&[1]), &of(&[1, 2]), 0.95), None);
         assert_eq!(welch(&of(&[3, 3]), &of(&[5, 5]), 0.95), None);

@@ -131,7 +131,7 @@ mod tests {
     // scipy 1.17.1: mean of mannwhitneyu(x, y).statistic / (len(x) * len(y)). The bounds, for three copies of each
     // value: Python, with the same generator and ranks; 60,000 resamples of numpy's own generator give 0.441 to 0.671.
     #[test]
-    fn the_probability_and_its_interval_are_the_known_ones() {
+    fn the_probability_and_its_interval_match_known_values() {
         assert_eq!(of(&STRATA).unwrap().interval, None, "too few values");
         let thrice = STRATA.map(|(first, second)| (first.repeat(3), second.repeat(3)));
         let found = of(&thrice.each_ref().map(|(first, second)| (&first[..], &second[..]))).unwrap();
@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn no_spread_gives_no_interval_and_a_missing_side_no_answer() {
+    fn without_spread_there_is_no_interval_and_without_a_side_no_result() {
         let (high, low) = ([2, 3].repeat(30), [0, 1].repeat(30));
         assert_eq!(of(&[(&high, &low)]), Some(Improvement { probability: 1.0, interval: None }));
         let many = vec![7; 3000];

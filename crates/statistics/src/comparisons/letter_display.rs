@@ -71,7 +71,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_sets_are_those_of_trying_every_subset(bits in prop::collection::vec(any::<bool>(), 64)) {
+        fn the_sets_match_a_brute_force_search(bits in prop::collection::vec(any::<bool>(), 64)) {
             const COUNT: usize = 8;
             let separated = |a: usize, b: usize| bits[a * COUNT + b];
             let is_tied = |mask: usize| (0..COUNT).all(|b| (0..b).all(|a| mask >> a & mask >> b & 1 == 0 || !separated(a, b)));

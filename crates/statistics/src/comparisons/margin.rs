@@ -289,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn a_unit_counts_once_and_few_units_show_nothing() {
+    fn repeats_of_a_unit_count_once_and_no_units_give_no_test() {
         let repeated = Units { shared: vec![(2.0 / 3.0, 2.0 / 3.0); 3], ..Units::default() };
         close(repeated.non_inferior(0.1), 0.9_f64.powi(3));
         assert_eq!(Units::default().non_inferior(0.1), None);
@@ -303,7 +303,7 @@ mod tests {
 
     // (norm.isf(0.05) + norm.isf(0.2)) ** 2 is 6.182557232; half of one of 21 pairs in each direction: variance 1/22.
     #[test]
-    fn the_number_that_settles_is_that_of_the_normal_approximation() {
+    fn the_number_needed_follows_from_the_normal_approximation() {
         assert_eq!(pairs(0, 0, 21).spread().unwrap().settling(0.1, 0.05), Some(29));
         assert_eq!(pairs(0, 2, 21).spread().unwrap().settling(0.1, 0.05).map(|n| n > 100), Some(true));
     }

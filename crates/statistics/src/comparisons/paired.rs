@@ -126,7 +126,7 @@ mod tests {
 
     // statsmodels 0.15.0: mcnemar([[0, b], [c, 0]], exact=True).pvalue
     #[test]
-    fn the_exact_test_is_the_known_one() {
+    fn the_exact_test_matches_known_values() {
         for (b, c, expected) in
             [(5, 0, 0.0625), (6, 0, 0.03125), (8, 1, 0.0390625), (10, 3, 0.09228515625), (4, 4, 1.0), (0, 0, 1.0)]
         {
@@ -137,7 +137,7 @@ mod tests {
     // Python fractions over comb(n, j) / 2**n; Fagerland et al. 2013: p minus the probability of the observed counts, 1
     // minus half of it if both counts are equal.
     #[test]
-    fn the_mid_p_value_and_the_least_p_value_are_the_known_ones() {
+    fn mid_p_and_least_p_match_known_values() {
         for (b, c, mid_p, least) in [
             (1, 0, 0.5, 1.0),
             (5, 0, 0.03125, 0.0625),
@@ -156,7 +156,7 @@ mod tests {
 
     // Python: method 10 over the Wilson limits of statsmodels 0.15.0, proportion_confint(k, n, 0.05, "wilson")
     #[test]
-    fn the_interval_is_the_known_one() {
+    fn the_interval_matches_known_values() {
         for (table, low, high) in [
             ([36, 12, 2, 0], 0.0569295840032387, 0.340427602974941),
             ([10, 8, 1, 2], 0.0557733667386439, 0.552373622263244),
@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn no_pair_has_no_answer() {
+    fn without_pairs_there_is_no_result() {
         let none = Pairs::default();
         assert_eq!((none.difference(), none.mcnemar(), none.interval(0.95)), (None, None, None));
         assert_eq!((none.mcnemar_mid_p(), none.mcnemar_least_p()), (None, None));
@@ -181,7 +181,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn exchanging_the_two_turns_the_sign(table in prop::array::uniform4(0u64..40)) {
+        fn swapping_the_sides_negates_the_difference(table in prop::array::uniform4(0u64..40)) {
             prop_assume!(table.iter().sum::<u64>() > 0);
             let (here, there) = (pairs(table), pairs([table[0], table[2], table[1], table[3]]));
             let (a, b) = (here.interval(0.95).unwrap(), there.interval(0.95).unwrap());

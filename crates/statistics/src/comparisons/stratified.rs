@@ -211,7 +211,7 @@ mod tests {
     // statsmodels 0.15.0: StratifiedTable(tables).test_null_odds(correction). It computes p as 1 - cdf, so small p
     // values have few digits: those are scipy 1.17.1 chi2.sf(statistic, 1).
     #[test]
-    fn the_test_is_the_known_one() {
+    fn the_test_matches_known_values() {
         for (counts, statistic, p, statistic_corrected, p_corrected) in [
             (&THREE[..], 5.145414138110284, 0.023307850255107176, 4.317784713811399, 0.03771599246980417),
             (&SPARSE, 4.740606936416186, 0.02945867668977764, 2.9134754335260125, 0.08784239303713393),
@@ -228,7 +228,7 @@ mod tests {
 
     // Python: fractions for the sums, scipy 1.17.1 brentq for the roots of (d - x)² = z² (slope x + constant) / weight².
     #[test]
-    fn the_common_difference_is_the_known_one() {
+    fn the_common_difference_matches_known_values() {
         for (counts, difference, low, high) in [
             (&THREE[..], 0.19389031143929017, 0.025098064301969435, 0.3511478414166653),
             (&SPARSE, 0.47093023255813954, 0.019775569362376663, 0.7580276416446508),
@@ -246,7 +246,7 @@ mod tests {
 
     // Python: fractions, convolution of the strata's hypergeometric probabilities.
     #[test]
-    fn the_exact_test_is_the_known_one() {
+    fn the_exact_test_matches_known_values() {
         for (counts, p, mid_p) in [
             (&THREE[..], 0.0348427546215399, 0.02902267571595362),
             (&SPARSE, 0.053714285714285714, 0.03485714285714286),
@@ -315,7 +315,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn exchanging_the_sides_turns_the_sign(counts in prop::collection::vec(prop::array::uniform4(0u64..12), 1..5)) {
+        fn swapping_the_sides_negates_the_difference(counts in prop::collection::vec(prop::array::uniform4(0u64..12), 1..5)) {
             let here: Vec<Stratum> = counts
                 .iter()
                 .map(|&[a, b, c, d]| Stratum { first: (a, a + b + 1), second: (c, c + d + 1) })

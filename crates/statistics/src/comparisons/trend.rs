@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_to_compare_has_no_trend() {
+    fn without_a_comparison_there_is_no_trend() {
         assert_eq!(cochran_armitage::<Vec<(f64, bool)>>(&[]), None);
         assert_eq!(cochran_armitage(&[stratum(&[(0.0, 3, 3), (1.0, 4, 4)])]), None, "all succeed");
         assert_eq!(cochran_armitage(&[stratum(&[(2.0, 1, 4)])]), None, "one dose");
@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stratum_of_one_outcome_changes_nothing_and_the_other_direction_turns_the_sign() {
+    fn a_constant_stratum_is_ignored_and_reversed_doses_negate_the_trend() {
         let one = stratum(&[(0.0, 9, 10), (4.0, 6, 10), (16.0, 2, 10)]);
         let alone = cochran_armitage(std::slice::from_ref(&one)).unwrap();
         assert_eq!(cochran_armitage(&[one.clone(), stratum(&[(0.0, 2, 2), (4.0, 2, 2)])]), Some(alone));

@@ -173,7 +173,7 @@ mod tests {
 
     // Enumeration of the 64 signs: 2 * (1 + 6) / 64. scipy 1.17.1: binomtest(1, 6).pvalue
     #[test]
-    fn six_scenes_of_four_experiments_are_six() {
+    fn six_scenes_shared_by_four_experiments_count_as_six() {
         let mut scenes = vec![(unit(4, 4), unit(0, 4)); 5];
         scenes.push((unit(0, 4), unit(4, 4)));
         let only = |shared: &[(Moments, Moments)]| Sides { shared: shared.to_vec(), ..Sides::default() };

@@ -53,7 +53,7 @@ mod tests {
     // scipy 1.17.1: fisher_exact([[k1, n1 - k1], [k2, n2 - k2]]).pvalue. Mid-p and the least p of the margins:
     // Python fractions over the hypergeometric probabilities comb(n1, a) * comb(n2, K - a) / comb(n1 + n2, K).
     #[test]
-    fn the_test_is_the_known_one() {
+    fn the_test_matches_known_values() {
         for (first, second, p, mid_p, least) in [
             ((8, 10), (1, 6), 0.03496503496503497, 0.023164335664335664, 0.0008741258741258741),
             ((3, 21), (12, 21), 0.00884048268676175, 0.004878617052712931, 1.0998817260517252e-06),

@@ -175,7 +175,7 @@ pub(super) mod tests {
 
     // statsmodels 0.15.0: CumIncidenceRight(time, status).cinc
     #[test]
-    fn the_curve_is_the_known_one() {
+    fn the_curve_matches_known_values() {
         let curve = Incidence::of(&endings(FIRST)).unwrap();
         for (steps, correct, wrong) in [
             (4, 0.0, 0.0),
@@ -197,7 +197,7 @@ pub(super) mod tests {
     // Python, exact fractions: the mean as a function of the episodes' weights, differentiated by each weight with a
     // step of 1e-12, squared and summed; times sqrt(n / (n - 1)). scipy 1.17.1 for the bounds: logit, expit, t.ppf.
     #[test]
-    fn the_restricted_mean_is_the_known_one() {
+    fn the_restricted_mean_matches_known_values() {
         let curve = Incidence::of(&endings(FIRST)).unwrap();
         let factor = (15.0f64 / 14.0).sqrt();
         for (horizon, mean, se) in
@@ -230,7 +230,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn a_wrong_decision_is_never_a_correct_one_later() {
+    fn a_wrong_decision_never_becomes_correct_later() {
         let found = Incidence::of(&endings("10w 10w 10w")).unwrap().restricted_mean(100, 0.95).unwrap();
         assert_eq!((found.mean, found.interval), (100.0, None));
         let censored = Incidence::of(&endings("10- 20c 20c")).unwrap();

@@ -125,7 +125,7 @@ mod tests {
     // Python, exact fractions: derivatives of both means by the episodes' weights, squared and summed per side or per
     // pair, times n / (n - 1); degrees of freedom by Satterthwaite's formula; scipy 1.17.1: t.ppf(0.975, df), t.sf
     #[test]
-    fn differences_are_the_known_ones() {
+    fn differences_match_known_values() {
         let (first, second) = (endings(FIRST), endings(SECOND));
         let pairs: Vec<_> = first.iter().copied().zip(second.iter().copied()).collect();
         for (horizon, difference, [se, low, high, p], [pair_se, pair_low, pair_high, pair_p]) in [
@@ -158,7 +158,7 @@ mod tests {
 
     /// scipy 1.17.1: `sem(x - y)`, `ttest_rel(x, y)` and `ttest_ind(x, y, equal_var=False)` of complete durations.
     #[test]
-    fn complete_durations_have_the_t_tests_of_their_means() {
+    fn for_complete_durations_the_test_is_a_t_test() {
         let (first, second) = (endings("3c 8c 15c 20c 44c"), endings("5c 4c 10c 31c 39c"));
         let pairs: Vec<_> = first.into_iter().zip(second).collect();
         let found = paired(&pairs, 44, 0.95).unwrap();
@@ -228,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn no_spread_has_no_interval_and_an_unknown_horizon_no_difference() {
+    fn without_spread_there_is_no_interval_and_without_a_horizon_no_difference() {
         let (all, none) = (endings("12c 12c 12c"), endings("100- 100-"));
         let found = independent(&all, &none, 100, 0.95).unwrap();
         close(found.difference, -88.0);

@@ -199,7 +199,7 @@ mod tests {
     // lifelines 0.30.3: restricted_mean_survival_time(km, t=tau); standard errors by exact fractions in Python:
     // sqrt(sum(area(t, tau)**2 * F(d, n * (n - d)))), times sqrt(n / (n - 1))
     #[test]
-    fn the_restricted_mean_is_the_known_one() {
+    fn the_restricted_mean_matches_known_values() {
         for (durations, horizon, mean, se) in [
             (&REMISSIONS[..], 35, 23.287394957983192, 2.8274676233714393),
             (&REMISSIONS[..], 20, 16.116526610644257, 1.2515601960050473),
@@ -217,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn half_reached_exactly_is_the_median_and_half_not_reached_is_none() {
+    fn the_median_is_where_the_curve_reaches_one_half() {
         assert_eq!(curve(&[5, -100, -100, 12, 30, -100]).median(), Some(30));
         assert_eq!(curve(&[5, -100, -100]).median(), None);
         assert_eq!(curve(&[-100; 21]).median(), None);
@@ -238,7 +238,7 @@ mod tests {
     // lifelines 0.30.3: median_survival_times(KaplanMeierFitter().fit(T, E).confidence_interval_). If all are decided
     // it bounds the median by the longest duration, which the method does not support: no bound here, as in R's survfit
     #[test]
-    fn the_interval_of_the_median_is_the_known_one() {
+    fn the_interval_of_the_median_matches_known_values() {
         let written = [5, 12, -100, 30, -100, 44, 61, -100, 8, 77, -100, 15, -100, 90, 33];
         for (durations, low, high) in [
             (&REMISSIONS[..], 13, None),

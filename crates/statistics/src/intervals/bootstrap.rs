@@ -94,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_resampled_from_one_value() {
+    fn too_few_or_too_many_values_give_no_interval() {
         assert_eq!(mean(&[], 0.95), None);
         assert_eq!(mean(&[7], 0.95), None);
         assert_eq!(mean(&[7, 8], 1.0), None);

@@ -158,7 +158,7 @@ mod tests {
     // statsmodels 0.15.0: OLS(y, ones).fit(cov_type="cluster", cov_kwds={"groups": g, "use_correction": False}),
     // bse * sqrt(C / (C - 1)), scipy 1.17.1 t.ppf(0.975, C - 1); mean squares by numpy, checked with f_oneway.
     #[test]
-    fn three_seeds_of_seven_runs() {
+    fn three_seeds_of_seven_runs_match_known_values() {
         let found =
             clustered(&[of(&[1, 1, 1, 0, 1, 1, 1]), of(&[0, 0, 1, 0, 0, 0, 0]), of(&[1, 1, 0, 1, 0, 1, 0])], 0.95)
                 .unwrap();
@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn clusters_of_unequal_size() {
+    fn clusters_of_unequal_size_match_known_values() {
         let found = clustered(&[of(&[3, 5, 4]), of(&[9, 8, 12, 10, 7]), of(&[1, 6])], 0.95).unwrap();
         close(found.se, 2.0291623887703016);
         close(found.interval.unwrap().low, -2.2307810911474775);
@@ -196,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn clusters_of_one_member_are_the_members() {
+    fn clusters_of_one_have_the_plain_standard_error() {
         let values = [3, 5, 4, 9, 8];
         let found = clustered(&values.map(|v| of(&[v])), 0.95).unwrap();
         close(found.se, of(&values).se(Sample).unwrap());

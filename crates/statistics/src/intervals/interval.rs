@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rate_of_nothing_or_everything_touches_its_end_exactly_and_keeps_a_width() {
+    fn the_interval_of_an_extreme_rate_ends_at_the_rate_and_has_width() {
         for n in [1, 2, 21, 1000, 1 << 40] {
             let (none, all) = (wilson(0, n, 0.95).unwrap(), wilson(n, n, 0.95).unwrap());
             assert_eq!((none.low.to_bits(), all.high.to_bits()), (0.0f64.to_bits(), 1.0f64.to_bits()));
@@ -145,7 +145,7 @@ mod tests {
 
     // statsmodels 0.15.0: proportion_confint(k, n, 0.05, "wilson")
     #[test]
-    fn wilson_is_the_known_one() {
+    fn wilson_matches_known_values() {
         check(wilson(5, 21, 0.95), 0.106280130226365, 0.450911736829508);
         check(wilson(0, 21, 0.95), 0.0, 0.154639018924847);
         check(wilson(21, 21, 0.95), 0.845360981075153, 1.0);
@@ -154,7 +154,7 @@ mod tests {
 
     // scipy 1.17.1: stats.t.interval(0.95, 5, loc=mean(x), scale=sem(x, ddof))
     #[test]
-    fn student_is_the_known_one() {
+    fn student_matches_known_values() {
         let m = of(&[4, 8, 15, 16, 23, 42]);
         check(student_t(&m, Sample, 0.95), 3.8423391926607877, 32.15766080733921);
         check(student_t(&m, Population, 0.95), 5.075883023855853, 30.92411697614415);
@@ -163,7 +163,7 @@ mod tests {
     // statsmodels 0.15.0: proportion_confint(k, n, 0.05, "beta"), likewise "jeffreys" if 0 < k < n; at the ends
     // statsmodels' Jeffreys is one-sided, and its inner bound is the same.
     #[test]
-    fn the_beta_intervals_are_the_known_ones() {
+    fn beta_intervals_match_known_values() {
         for (k, n, [cp_low, cp_high], [j_low, j_high]) in [
             (0, 21, [0.0, 0.16109761521908], [0.0, 0.111470316193041]),
             (1, 21, [0.00120488344836351, 0.238159909936821], [0.00518704310790212, 0.201755968321684]),

@@ -94,7 +94,7 @@ mod tests {
 
     // mpmath 1.4.1, 40 digits: sqrt(2) * erfinv(1 - 2 * tail)
     #[test]
-    fn normal_deviates_are_the_known_ones() {
+    fn normal_quantiles_match_known_values() {
         close(normal(0.025), 1.95996398454005);
         close(normal(0.05), 1.64485362695147);
         close(normal(0.005), 2.5758293035489);
@@ -104,7 +104,7 @@ mod tests {
     // scipy 1.17.1 stats.t.isf, refined with mpmath: findroot of betainc(d/2, 1/2, 0, d/(d+t*t))/2 - tail
     // scipy 1.17.1: 2 * t.sf(x, freedom)
     #[test]
-    fn shares_beyond_a_deviate_of_student_are_the_known_ones() {
+    fn student_tail_probabilities_match_known_values() {
         for (freedom, beyond) in [
             (1.0, [0.936548965138893, 0.2951672353008665, 0.1256659163780024]),
             (2.5, [0.9278065440624897, 0.1573914957579659, 0.02345118997086185]),
@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn student_deviates_are_the_known_ones() {
+    fn student_quantiles_match_known_values() {
         for (freedom, at_025, at_005) in [
             (1.0, 12.7062047361747, 63.6567411628716),
             (2.0, 4.30265272974946, 9.92484320091829),
@@ -136,7 +136,7 @@ mod tests {
 
     // scipy 1.17.1: stats.chi2.sf(x, 1)
     #[test]
-    fn chi_squared_shares_are_the_known_ones() {
+    fn chi_squared_tail_probabilities_match_known_values() {
         for (statistic, share) in [
             (0.5, 0.47950012218695337),
             (3.841458820694124, 0.04999999999999989),

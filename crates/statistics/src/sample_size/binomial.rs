@@ -45,7 +45,7 @@ mod tests {
     // scipy 1.17.1: binom.pmf(k, n, p)
     #[test]
     #[expect(clippy::unreadable_literal, reason = "reference values as their source prints them")]
-    fn probabilities_are_the_known_ones() {
+    fn probabilities_match_known_values() {
         for (n, rate, k, expected) in [
             (21, 0.3, 6, 0.18780620309837354),
             (500, 0.013, 6, 0.15839599380117572),

@@ -22,7 +22,7 @@ fn rates(lower: f64, higher: f64) -> Rates {
 }
 
 #[test]
-fn the_power_over_pairs_is_the_known_one() {
+fn paired_power_matches_known_values() {
     for (n, level, of, expected) in [
         (21, 0.05, rates(0.35, 0.65), 0.3573349060535207),
         (21, HOLM, rates(0.2, 0.9), 0.8660932225112565),
@@ -37,7 +37,7 @@ fn the_power_over_pairs_is_the_known_one() {
 }
 
 #[test]
-fn the_power_without_pairs_is_the_known_one() {
+fn unpaired_power_matches_known_values() {
     for (n, level, of, expected) in [
         (21, 0.05, rates(0.35, 0.65), 0.3569567112674831),
         (21, HOLM, rates(0.2, 0.9), 0.9607203914437078),
@@ -49,7 +49,7 @@ fn the_power_without_pairs_is_the_known_one() {
 }
 
 #[test]
-fn the_power_against_chance_is_the_known_one() {
+fn power_against_chance_matches_known_values() {
     let ratio = |above, below| Ratio::new(above, below).unwrap();
     for (n, level, chance, rate, expected) in [
         (21, 0.05, ratio(1, 3), 0.6, 0.6914440331282141),
@@ -61,7 +61,7 @@ fn the_power_against_chance_is_the_known_one() {
 }
 
 #[test]
-fn sizes_are_the_first_that_have_the_power() {
+fn the_smallest_sizes_match_known_values() {
     let seeds = |seeds| Clusters { seeds, icc: 0.0, people: false };
     let around = |difference| Rates::apart(difference, None).unwrap();
     assert_eq!(seeds(3).runs_for(0.8, &mut pairs(0.05, around(0.3))), Some(17));
@@ -74,7 +74,7 @@ fn sizes_are_the_first_that_have_the_power() {
 }
 
 #[test]
-fn smallest_differences_are_the_known_ones() {
+fn smallest_differences_match_known_values() {
     let around = |difference| Rates::apart(difference, None).unwrap();
     let paired = |level| smallest(0.8, 1.0, |difference| pairs(level, around(difference)).power(21)).unwrap();
     close(paired(0.05), 0.4744232099584026);
@@ -86,7 +86,7 @@ fn smallest_differences_are_the_known_ones() {
 
 /// The p values of `stats` decide each outcome, weighted by its probability.
 #[test]
-fn power_is_that_of_the_tests_that_statistics_run() {
+fn power_agrees_with_the_tests_of_statistics() {
     let (level, difference, discordance) = (0.05, 0.4, 0.5);
     for n in [5_u64, 9, 14] {
         let outcomes = (0..=n).flat_map(|first| (0..=n - first).map(move |second| (first, second)));

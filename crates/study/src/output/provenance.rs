@@ -166,7 +166,7 @@ mod tests {
     use std::path::{Path, PathBuf};
 
     #[test]
-    fn a_manifest_names_nothing_outside() {
+    fn paths_outside_the_folder_are_not_plain() {
         for (path, plain) in
             [("a.parquet", true), ("runs/a.parquet", true), ("/a.parquet", false), ("../a.parquet", false), ("", false)]
         {

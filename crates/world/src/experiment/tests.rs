@@ -128,7 +128,7 @@ fn a_file_may_hold_several_and_have_scenes_of_its_own() {
 }
 
 #[test]
-fn a_mirror_with_a_delay_is_a_late_one() {
+fn a_mirror_with_a_delay_has_the_delayed_kind() {
     let text = "[experiment.A]\ntitle = \"A\"\nprompt = \"cube-selection\"\n\
                 mirror = [{ kind = \"mirror\", delay = 5 }, { delay = 0 }, { kind = \"decoy\", delay = 2 }]";
     let source = Source { name: "mine.toml".to_owned(), text: text.to_owned() };
@@ -149,7 +149,7 @@ fn a_misspelt_built_in_prompt_is_suggested() {
 }
 
 #[test]
-fn an_answer_that_could_mean_nothing_is_refused_with_its_place() {
+fn an_invalid_answer_is_refused_with_its_location() {
     let head = "[experiment.X]\ntitle = \"X\"\nprompt = \"answers\"\ncubes = { kind = \"none\" }\n";
     let of = |answer: &str| faults(&format!("{head}answer = [{{ words = \"w\", {answer} }}]")).join("; ");
     for (answer, expected) in [

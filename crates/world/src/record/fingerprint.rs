@@ -91,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn each_part_changes_alone() {
+    fn each_change_affects_one_part_of_the_fingerprint() {
         let base = Fingerprint::of(&recording(), Some("x-1"), None);
         let changed = |change: &dyn Fn(&mut Value), model| {
             let mut other = recording();

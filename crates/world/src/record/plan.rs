@@ -252,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_time_has_the_name_and_the_chances_that_it_always_had() {
+    fn the_first_repetition_has_an_unsuffixed_id_and_a_fixed_seed() {
         let first = Key::first(E1, 1, 3);
         let again = Key { repetition: 2, ..first.clone() };
         let subject = Subject::of("oracle");

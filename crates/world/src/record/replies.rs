@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_unusable_reply_is_the_first_by_place_and_printed_once() {
+    fn one_unusable_reply_is_printed_and_the_earliest_is_reported() {
         let replies = Replies::default();
         let key = |run| Key::first(Experiment::E1, 1, run);
         assert_eq!(replies.add(&Subject::of("m"), &key(2), 1, &row("ok", None)), None);

@@ -115,7 +115,7 @@ mod tests {
     use super::{HEADINGS, Heading, Quaternion, sine_cosine};
 
     #[test]
-    fn headings_face_where_the_library_says() {
+    fn headings_agree_with_the_library() {
         for thirties in 0..HEADINGS {
             let [x, y] = Heading::new(thirties).direction();
             let (sine, cosine) = (f64::from(thirties) * 30.0).to_radians().sin_cos();
@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn turns_go_round() {
+    fn headings_wrap_around() {
         assert_eq!(Heading::new(0).turned(-1), Heading::new(11));
         assert_eq!(Heading::new(11).turned(1), Heading::new(0));
         assert_eq!(Heading::new(14), Heading::new(2));

@@ -71,7 +71,7 @@ mod tests {
     use super::Rng;
 
     #[test]
-    fn every_number_of_a_range_comes_about_equally_often() {
+    fn draws_are_roughly_uniform() {
         let mut chance = Rng::of(1, 2, 3);
         let mut counts = [0_u32; 7];
         for _ in 0..70_000 {

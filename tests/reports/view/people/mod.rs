@@ -354,7 +354,7 @@ fn a_claim_belongs_to_the_step_in_which_it_was_typed() {
 const CLAIMS: &str = "select run, t, self_color from steps order by run, t";
 
 #[test]
-fn a_page_whose_server_has_gone_thanks_too() {
+fn a_page_without_its_server_still_thanks_the_participant() {
     need::drawing();
     let folder = tempfile::tempdir().unwrap();
     let mut people = People::start(folder.path(), "P1,P2", &["--runs", "2", "--contact", "Dr. Ask, room 7"]);
@@ -451,7 +451,7 @@ fn a_failed_reply_is_reported_and_sent_again() {
 }
 
 #[test]
-fn nobody_is_given_the_answers_of_another_person() {
+fn answers_are_not_attributed_to_another_participant() {
     need::drawing();
     let folder = tempfile::tempdir().unwrap();
     let mut people = People::start(folder.path(), "early-01", &["--runs", "1"]);

@@ -216,7 +216,7 @@ fn one_interrupt_ends_a_recording_that_waits_for_a_person() {
 }
 
 #[test]
-fn what_one_participant_leaves_of_a_split_study_the_others_play() {
+fn the_others_play_the_episodes_left_by_a_participant() {
     need::drawing();
     let folder = tempfile::tempdir().unwrap();
     let people = People::start(folder.path(), "a1,b2", &["--runs", "4"]);
@@ -263,7 +263,7 @@ fn participants_have_seeds_of_their_own() {
 }
 
 #[test]
-fn what_was_typed_outlives_a_reload() {
+fn typed_text_survives_a_reload() {
     need::drawing();
     let folder = tempfile::tempdir().unwrap();
     let mut people = People::start(folder.path(), "P1", &["--runs", "1"]);

@@ -144,7 +144,7 @@ mod tests {
     use super::ranks;
 
     #[test]
-    fn a_rank_is_as_wide_as_the_tests_leave_it() {
+    fn models_without_a_difference_have_overlapping_ranks() {
         let rows = ranks(Some("E1"), "TSA", &["a", "b", "c"], &[("a", "c")]);
         let found: Vec<(usize, usize)> = rows.iter().map(|row| (row.best, row.worst)).collect();
         assert_eq!(found, [(1, 2), (1, 3), (2, 3)]);

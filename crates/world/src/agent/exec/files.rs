@@ -84,7 +84,7 @@ mod tests {
     use exact::hash;
 
     #[test]
-    fn words_that_may_name_files_are_kept_with_their_places() {
+    fn possible_file_names_of_a_command_are_found() {
         for (command, expected) in [
             ("python3 agent.py", vec![(2, "agent.py")]),
             ("./agent --model 'my model.bin'", vec![(1, "./agent"), (2, "--model"), (3, "my model.bin")]),
@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn the_hash_is_of_places_and_contents() {
+    fn the_hash_covers_positions_and_contents() {
         let folder = tempfile::tempdir().unwrap();
         let path = |name: &str| folder.path().join(name).display().to_string();
         fs::write(path("a"), "abc").unwrap();

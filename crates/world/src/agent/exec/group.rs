@@ -109,7 +109,7 @@ mod tests {
     use super::{Group, Groups};
 
     #[test]
-    fn nothing_is_started_after_all_were_killed() {
+    fn after_killing_all_groups_none_can_start() {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
         runtime.block_on(async {
             let groups = Arc::<Groups>::default();

@@ -138,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn no_part_of_a_key_stays_wherever_it_is_cut() {
+    fn a_key_cut_anywhere_is_removed_completely() {
         let key = "sk-0123456789abcdef";
         let secrets = [Secret::new(key.to_owned())];
         for after in (IN_FILE + MARGIN - key.len() - 1)..=(IN_FILE + MARGIN) {
@@ -153,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn the_file_has_the_last_output_and_is_absent_without_one() {
+    fn the_last_output_is_written_to_a_file_if_there_is_any() {
         let folder = tempfile::tempdir().unwrap();
         let of = |words: &[u8]| {
             let kept = Kept::new(&folder.path().join("stderr"), "E1/own/s1/r2", [].into());

@@ -36,7 +36,7 @@ mod tests {
     }
 
     #[test]
-    fn a_seed_says_it_all() {
+    fn equal_seeds_give_equal_draws() {
         let draws = |seed| {
             let mut chance = Chance::new(seed);
             (0..20).map(|_| chance.pick(&[1, 2, 3, 4, 5]).unwrap()).collect::<Vec<i32>>()

@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn the_way_leads_around_what_stands_there() {
+    fn the_route_leads_around_an_obstacle() {
         let obstacle = Obstacle { place: Place { x: 1.2, y: 0.0 }, radius: 0.8 };
         let goal = Place { x: 3.0, y: 0.0 };
         let places = walk(goal, &[obstacle]);
@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn there_is_no_way_out_of_the_room() {
+    fn a_goal_outside_the_room_has_no_route() {
         assert_eq!(walk(Place { x: 9.0, y: 0.0 }, &[]).len(), 1);
     }
 }

@@ -101,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn a_word_in_place_of_a_key_changes_no_answer() {
+    fn a_placeholder_key_is_not_removed_from_answers() {
         let answer = r#"{"selected_cube": "none"}"#;
         assert_eq!(Secret::new("none".to_owned()).without_in_answer(answer), answer);
     }

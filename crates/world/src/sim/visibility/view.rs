@@ -186,7 +186,7 @@ mod tests {
     use crate::sim::scene::MOST_CUBES;
 
     #[test]
-    fn every_code_comes_back() {
+    fn every_code_round_trips() {
         let bodies = (0..AGENTS).map(Item::Agent).chain([Item::Room, Item::Hand, Item::Double]);
         let items: Vec<Item> =
             bodies.chain((0..MOST_CUBES).map(Item::Cube)).chain((0..MOST_MARKS).map(Item::Mark)).collect();

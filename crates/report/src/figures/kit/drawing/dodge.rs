@@ -55,13 +55,13 @@ mod tests {
     use super::{abreast, fanned};
 
     #[test]
-    fn who_is_alone_stays() {
+    fn distant_marks_do_not_move() {
         let places = [(1.0, 2.0), (30.0, 2.0)];
         assert_eq!((fanned(&places, 6.0), abreast(&places, 6.0, 20.0)), (places.to_vec(), places.to_vec()));
     }
 
     #[test]
-    fn who_shares_a_place_is_set_apart() {
+    fn overlapping_marks_are_spread() {
         for count in [2, 3, 5, 20] {
             let fanned = fanned(&vec![(50.0, 50.0); count], 6.0);
             for (at, a) in fanned.iter().enumerate() {

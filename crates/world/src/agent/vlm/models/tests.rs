@@ -69,7 +69,7 @@ fn an_unknown_id_goes_to_the_provider_of_its_form() {
 }
 
 #[test]
-fn a_price_that_is_no_amount_is_refused() {
+fn an_invalid_price_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("own.toml");
     for price in ["-1.0", "nan", "inf"] {
@@ -81,7 +81,7 @@ fn a_price_that_is_no_amount_is_refused() {
 }
 
 #[test]
-fn a_model_has_its_own_most_tokens_and_more_if_it_reasons() {
+fn reasoning_raises_the_default_token_limit_of_a_model() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("own.toml");
     let most = |keys: &str| {

@@ -98,7 +98,7 @@ impl Default for Options {
 }
 
 /// All statistics of a set of episodes.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Statistics {
     /// The definition file's own name.
     pub definitions: String,
@@ -193,15 +193,8 @@ impl Statistics {
             by: cells.by.clone(),
             episodes: table.len(),
             selection: options.selection.clone(),
-            departures: None,
             pooled: pooled(&study, options),
-            not_comparable: Vec::new(),
             design: options.design,
-            design_note: String::new(),
-            families: 0,
-            answers: Vec::new(),
-            conclusions: Vec::new(),
-            warnings: Vec::new(),
             cells: CellRow::all(&study, cells, confidence),
             chance: ChanceRow::all(&study, confidence),
             ranks: RankRow::all(&models, &overall),
@@ -218,6 +211,7 @@ impl Statistics {
             replies: options.replies.clone(),
             headline,
             relations: study.relations.clone(),
+            ..Self::default()
         };
         for cell in &mut statistics.cells {
             cell.note_left_out(options.lost.as_ref(), options.replies.as_ref());

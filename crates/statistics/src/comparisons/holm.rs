@@ -7,6 +7,11 @@ pub fn level(confidence: f64) -> Option<f64> {
     quantile::tail(confidence).map(|tail| 2.0 * tail)
 }
 
+/// Returns true if a p value reaches the level of this confidence.
+pub fn is_significant(p: f64, confidence: f64) -> bool {
+    level(confidence).is_some_and(|level| p <= level)
+}
+
 /// Holm's step-down adjustment (Holm 1979): valid under any dependence between the tests.
 ///
 /// Compare an adjusted value with the level of the whole family. Values are in input order; each is at least its own p

@@ -17,7 +17,7 @@ use score::table::MetricColumn;
 use statistics::competing::{Ending, Outcome};
 use statistics::contrast::{newcombe, welch};
 use statistics::coverage::{self, Withheld};
-use statistics::holm::{holm, level};
+use statistics::holm::level;
 use statistics::interval::{Interval, student_t};
 use statistics::outcomes::ExactTest;
 use statistics::paired::Pairs;
@@ -26,10 +26,11 @@ use statistics::units;
 use statistics::unpaired::fisher;
 
 /// The test of a difference, and the method of its interval.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
     /// Pairs of a rate: the exact test of `McNemar`, Newcombe's interval for pairs.
+    #[default]
     Mcnemar,
     /// Independent rates: Fisher's exact test, Newcombe's hybrid score interval.
     Fisher,
@@ -47,7 +48,7 @@ pub enum Method {
 }
 
 /// The first minus the second.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Comparison {
     /// The test and the interval.
     pub method: Method,
@@ -136,9 +137,8 @@ impl Compared<'_, '_> {
                 LossCase { difference, p: test.map(|test| test.p) }
             }
             Method::Units => {
-                let one = |is_first| toward.moments(Moments::default(), 1, is_first);
-                let lost: Vec<_> = (0..lost).map(|_| (one(true), one(false))).collect();
-                LossCase { difference, p: sides.and_then(|sides| sides.test(&lost)).map(|test| test.p) }
+                let test = sides.and_then(|sides| sides.test(&toward.units(lost)));
+                LossCase { difference, p: test.map(|test| test.p) }
             }
             Method::RestrictedMeanPaired | Method::RestrictedMean => {
                 let found = seen.horizon.and_then(|horizon| match seen.units {
@@ -210,7 +210,8 @@ impl Compared<'_, '_> {
 
     /// Compares a duration by unit if all its times up to the horizon are known; other quantities have no test.
     fn quantity_by_unit(&self, column: &MetricColumn) -> Comparison {
-        let seen = self.of_episodes(column).withheld_as_dependent();
+        let seen = self.of_episodes(column);
+        let seen = Comparison { interval: None, withheld: Some(Withheld::Dependent), p: None, ..seen };
         if !is_duration(self.study, &column.name) {
             return seen;
         }
@@ -332,25 +333,7 @@ impl Compared<'_, '_> {
 
 impl Comparison {
     fn of(method: Method, n: [u64; 2]) -> Self {
-        Self {
-            method,
-            n,
-            successes: None,
-            pairs: None,
-            undefined: 0,
-            horizon: None,
-            difference: None,
-            interval: None,
-            withheld: None,
-            repeat_se: None,
-            p: None,
-            mid_p: None,
-            p_adjusted: None,
-            separated: false,
-            units: None,
-            losses: None,
-            incomparable: None,
-        }
+        Self { method, n, ..Self::default() }
     }
 
     pub(in crate::statistics) fn unless(self, incomparable: Option<String>) -> Self {
@@ -359,10 +342,6 @@ impl Comparison {
         }
         let Self { method, n, successes, .. } = self;
         Self { successes, withheld: Some(Withheld::Incomparable), incomparable, ..Self::of(method, n) }
-    }
-
-    fn withheld_as_dependent(self) -> Self {
-        Self { interval: None, withheld: Some(Withheld::Dependent), p: None, ..self }
     }
 
     /// The test needs as many units as any other test, the interval as many as its coverage requires.
@@ -436,13 +415,9 @@ pub enum Sign {
 pub(in crate::statistics) fn adjust<'c>(family: impl Iterator<Item = &'c mut Comparison>, confidence: f64) {
     let mut tested: Vec<&mut Comparison> = family.filter(|comparison| comparison.p.is_some()).collect();
     let seen = |it: &Comparison| LossCase { difference: it.difference, p: it.p };
-    settle(&mut tested.iter_mut().map(|it| (seen(it), &mut it.losses)).collect::<Vec<_>>(), confidence);
-    let p_values: Vec<f64> = tested.iter().filter_map(|comparison| comparison.p).collect();
-    for (comparison, adjusted) in tested.iter_mut().zip(holm(&p_values)) {
-        let too_few = comparison.units.as_ref().is_some_and(|units| units.too_few);
-        comparison.p_adjusted = Some(adjusted);
-        comparison.separated = level(confidence).is_some_and(|level| adjusted <= level)
-            && !too_few
-            && comparison.losses.is_none_or(|losses| losses.agree);
+    let settled = settle(tested.iter_mut().map(|it| (seen(it), &mut it.losses)), confidence);
+    for (comparison, (p, is_shown)) in tested.into_iter().zip(settled) {
+        comparison.p_adjusted = Some(p);
+        comparison.separated = is_shown && !comparison.units.as_ref().is_some_and(|units| units.too_few);
     }
 }

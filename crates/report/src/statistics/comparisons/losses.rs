@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::statistics::study::{Block, RowKey, Study};
 use crate::statistics::units::Units;
 use exact::moments::Moments;
-use statistics::holm::{holm, level};
+use statistics::holm::{holm, is_significant};
 use statistics::losses::{Lossy, bounds};
 
 /// The name of lost episodes that decide a verdict.
@@ -76,6 +76,12 @@ impl Toward {
         let (zeros, ones) = if (self == Self::Highest) == is_first { (0, lost) } else { (lost, 0) };
         known.with_truths(zeros, ones).unwrap_or(known)
     }
+
+    /// Each lost episode of either side as a shared unit, against the outcome that gives it its largest effect.
+    pub fn units(self, lost: u64) -> Vec<(Moments, Moments)> {
+        let one = |is_first| self.moments(Moments::default(), 1, is_first);
+        (0..lost).map(|_| (one(true), one(false))).collect()
+    }
 }
 
 impl LossCases {
@@ -96,22 +102,30 @@ impl LossCases {
     }
 }
 
-pub(in crate::statistics) fn settle(tests: &mut [(LossCase, &mut Option<LossCases>)], confidence: f64) {
-    let verdicts = |case: fn(LossCase, LossCases) -> LossCase| -> Vec<Option<bool>> {
+/// The p value of each test of a family, adjusted by Holm's method, and whether it shows a difference, with the lost
+/// episodes too.
+pub(in crate::statistics) fn settle<'c>(
+    family: impl Iterator<Item = (LossCase, &'c mut Option<LossCases>)>,
+    confidence: f64,
+) -> Vec<(f64, bool)> {
+    let tests: Vec<_> = family.collect();
+    let verdicts = |case: fn(LossCase, LossCases) -> LossCase| -> Vec<(f64, Option<bool>)> {
         let of = |(seen, cases): &(LossCase, &mut Option<LossCases>)| cases.map_or(*seen, |cases| case(*seen, cases));
         let cases: Vec<LossCase> = tests.iter().map(of).collect();
         let adjusted = holm(&cases.iter().map(|case| case.p.unwrap_or(1.0)).collect::<Vec<_>>());
-        let is_shown = |p: f64| level(confidence).is_some_and(|level| p <= level);
-        let sign = |(case, p): (&LossCase, f64)| is_shown(p).then(|| case.difference.is_some_and(|it| it > 0.0));
-        cases.iter().zip(adjusted).map(sign).collect()
+        let sign = |case: &LossCase| case.difference.is_some_and(|it| it > 0.0);
+        cases.iter().zip(adjusted).map(|(case, p)| (p, is_significant(p, confidence).then(|| sign(case)))).collect()
     };
     let (without, lowest) = (verdicts(|seen, _| seen), verdicts(|_, cases| cases.lowest));
     let highest = verdicts(|_, cases| cases.highest);
-    for (at, (_, cases)) in tests.iter_mut().enumerate() {
+    let settled = |(at, (_, cases)): (usize, (LossCase, &mut Option<LossCases>))| {
+        let (p, sign) = without[at];
         if let Some(cases) = cases {
-            cases.agree = lowest[at] == without[at] && highest[at] == without[at];
+            cases.agree = lowest[at].1 == sign && highest[at].1 == sign;
         }
-    }
+        (p, sign.is_some() && cases.is_none_or(|cases| cases.agree))
+    };
+    tests.into_iter().enumerate().map(settled).collect()
 }
 
 fn of_block(study: &Study, block: &Block, confidence: f64) -> Vec<LossRow> {

@@ -9,7 +9,7 @@ use crate::statistics::Verdict;
 use crate::statistics::study::{Block, Study, Unit};
 use metric::catalog::Factor;
 use score::table::MetricColumn;
-use statistics::holm::{holm, level};
+use statistics::holm::{holm, is_significant};
 use statistics::trend::{Trend, cochran_armitage};
 
 /// A rate of one model at the doses of a factor, and the test of no trend.
@@ -135,9 +135,7 @@ fn adjust(family: &mut [TrendRow], confidence: f64) {
     let adjusted = holm(&tested.iter().filter_map(|row| Some(row.trend?.p)).collect::<Vec<_>>());
     for (row, p) in tested.into_iter().zip(adjusted) {
         row.p_adjusted = Some(p);
-        let rises = row.trend.is_some_and(|trend| trend.z > 0.0);
-        if level(confidence).is_some_and(|level| p <= level) {
-            row.verdict = if rises { Verdict::Above } else { Verdict::Below };
-        }
+        let z = row.trend.map_or(0.0, |trend| trend.z);
+        row.verdict = Verdict::by_order(z.total_cmp(&0.0), is_significant(p, confidence));
     }
 }

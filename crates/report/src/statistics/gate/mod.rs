@@ -43,7 +43,7 @@ pub struct GateOptions {
 }
 
 /// The verdict on the later episodes of a cell.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum GateVerdict {
     /// Shown to be better.
@@ -53,6 +53,7 @@ pub enum GateVerdict {
     /// None of the others is shown.
     CannotSay,
     /// Recorded differently, or on one side alone.
+    #[default]
     NotComparable,
     /// Shown to be worse, and not shown to be within the margin.
     Regressed,
@@ -76,7 +77,7 @@ pub struct Gate {
 }
 
 /// One experiment and model, later against earlier.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct GateCell {
     /// The experiment.
     pub experiment: String,
@@ -279,19 +280,11 @@ impl GateCell {
         Self {
             experiment: experiment.to_owned(),
             model: model.to_owned(),
-            base_model: None,
             condition: new.or(base).and_then(sides::condition),
-            verdict: GateVerdict::NotComparable,
             why: setting.unwrap_or_default(),
             base: side(base),
             new: side(new),
-            difference: None,
-            interval: None,
-            p_adjusted: None,
-            p_held: None,
-            units: None,
-            settled_by: None,
-            flips: Vec::new(),
+            ..Self::default()
         }
     }
 

@@ -3,6 +3,8 @@
 //! Rule: a rate that counts unfinished episodes as failures is beside the same rate among finished episodes
 //! ([`Relations`](metric::relations::Relations)): a model that never finishes is below chance, but need not guess.
 
+use std::cmp::Ordering;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -13,7 +15,7 @@ use exact::moments::Moments;
 use exact::ratio::Ratio;
 use score::table::MetricColumn;
 use statistics::chance::{exact_test, least_p};
-use statistics::holm::{holm, level};
+use statistics::holm::level;
 use statistics::outcomes::ExactTest;
 use statistics::units::rate_test;
 
@@ -85,8 +87,8 @@ impl ChanceRow {
         let mut rows = Vec::new();
         for experiment in &study.experiments {
             for column in study.rates() {
-                for (role, level) in levels(study, experiment.name, &column.name) {
-                    rows.extend(Self::family(study, experiment, &column.name, (role, level), confidence));
+                for level in levels(study, experiment.name, &column.name) {
+                    rows.extend(Self::family(study, experiment, column, level, confidence));
                 }
             }
         }
@@ -96,42 +98,34 @@ impl ChanceRow {
     fn family(
         study: &Study,
         experiment: &Experiment,
-        metric: &str,
+        column: &MetricColumn,
         (role, chance): (Role, Ratio),
         confidence: f64,
     ) -> Vec<Self> {
-        let Some(column) = study.column(metric) else { return Vec::new() };
         let mut tested: Vec<_> = experiment
             .blocks
             .iter()
             .filter_map(|block| Tested::of(study, block, column, (chance, confidence)))
             .collect();
-        settle(&mut tested.iter_mut().map(|tested| (tested.seen, &mut tested.losses)).collect::<Vec<_>>(), confidence);
-        let adjusted = holm(&tested.iter().map(|tested| tested.test.p).collect::<Vec<_>>());
-        let row = |(Tested { block, successes, n, test, units, losses, .. }, p_adjusted): (Tested, f64)| Self {
-            key: block.key(),
-            metric: metric.to_owned(),
-            role,
-            level: chance,
-            successes,
-            n,
-            p: test.p,
-            mid_p: test.mid_p,
-            p_adjusted,
-            verdict: Verdict::of(
+        let settled = settle(tested.iter_mut().map(|tested| (tested.seen, &mut tested.losses)), confidence);
+        let row = |(Tested { block, successes, n, test, units, losses, .. }, (p_adjusted, is_shown)): (Tested, _)| {
+            let too_few = units.as_ref().map_or_else(|| few_episodes(n, chance, confidence), |units| units.too_few);
+            Self {
+                key: block.key(),
+                metric: column.name.clone(),
+                role,
+                level: chance,
                 successes,
                 n,
-                chance,
-                level(confidence).is_some_and(|level| p_adjusted <= level)
-                    && !units
-                        .as_ref()
-                        .map_or_else(|| few_episodes(n, chance, confidence), |units: &Units| units.too_few)
-                    && losses.is_none_or(|losses: LossCases| losses.agree),
-            ),
-            units,
-            losses,
+                p: test.p,
+                mid_p: test.mid_p,
+                p_adjusted,
+                verdict: Verdict::of(successes, n, chance, is_shown && !too_few),
+                units,
+                losses,
+            }
         };
-        tested.into_iter().zip(adjusted).map(row).collect()
+        tested.into_iter().zip(settled).map(row).collect()
     }
 
     /// The units or episodes that are too few for a verdict, or the lost ones that decide it; otherwise `None`.
@@ -180,21 +174,20 @@ impl<'s, 'a> Tested<'s, 'a> {
         let (successes, n) = known.counts()?;
         let of_units: Option<Vec<Moments>> =
             block.repeats.then(|| study.by_unit(block, |row| column.get(row)).into_values().collect());
+        let with_lost = |toward: Option<Toward>| toward.map_or(known, |it| it.moments(known, block.lost, true));
         let tested = |toward: Option<Toward>| {
-            let with_lost = |known| toward.map_or(known, |toward| toward.moments(known, block.lost, true));
             let Some(units) = &of_units else {
-                let (successes, n) = with_lost(known).counts()?;
+                let (successes, n) = with_lost(toward).counts()?;
                 return Some((exact_test(successes, n, chance)?, least_p(n, chance)?));
             };
-            let one = |toward: Toward| toward.moments(Moments::default(), 1, true);
-            let lost = (0..block.lost).filter_map(|_| toward.map(one));
+            let lost = toward.map_or_else(Vec::new, |toward| toward.units(block.lost));
+            let lost = lost.into_iter().map(|(one, _)| one);
             rate_test(&units.iter().copied().chain(lost).collect::<Vec<_>>(), chance)
         };
-        let difference = |toward: Option<Toward>| {
-            let mean = toward.map_or(known, |toward| toward.moments(known, block.lost, true)).mean();
-            mean.map(|mean| mean - chance.value())
+        let case = |toward| LossCase {
+            difference: with_lost(toward).mean().map(|mean| mean - chance.value()),
+            p: tested(toward).map(|(test, _)| test.p),
         };
-        let case = |toward| LossCase { difference: difference(toward), p: tested(toward).map(|(test, _)| test.p) };
         let (test, least) = tested(None)?;
         let units = of_units.as_ref().map(|units| Units::new(study, block, units.len(), least, confidence));
         let losses = LossCases::of(block.lost, |toward| case(Some(toward)));
@@ -214,9 +207,13 @@ impl Verdict {
     pub(in crate::statistics) fn of(successes: u64, n: u64, level: Ratio, is_shown: bool) -> Self {
         let seen = i128::from(successes) * i128::from(level.denominator());
         let expected = i128::from(level.numerator()) * i128::from(n);
-        match is_shown {
-            true if seen > expected => Self::Above,
-            true if seen < expected => Self::Below,
+        Self::by_order(seen.cmp(&expected), is_shown)
+    }
+
+    pub(in crate::statistics) fn by_order(order: Ordering, is_shown: bool) -> Self {
+        match order {
+            Ordering::Greater if is_shown => Self::Above,
+            Ordering::Less if is_shown => Self::Below,
             _ => Self::NotSeparated,
         }
     }

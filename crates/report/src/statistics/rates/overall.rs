@@ -13,22 +13,22 @@ use crate::statistics::losses::{LossCase, LossCases, Toward, settle};
 use crate::statistics::matching::{Matched, Scenes, outcomes};
 use crate::statistics::study::{Block, Study};
 use crate::statistics::units::Sides;
-use exact::moments::Moments;
 use metric::catalog::Kind;
 use score::table::MetricColumn;
 use statistics::clustered::fewest_clusters;
 use statistics::competing::Outcome;
-use statistics::holm::{holm, level};
+use statistics::holm::level;
 use statistics::improvement::{Improvement, probability_of_improvement};
 use statistics::interval::Interval;
 use statistics::outcomes::ExactTest;
 use statistics::stratified::{Stratum, common_difference, exact, pooled};
 
 /// The comparison of two rates over several experiments.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum OverallMethod {
     /// The exact conditional test over the experiments; the Mantel-Haenszel difference with Klingenberg's interval.
+    #[default]
     MantelHaenszel,
     /// The exact test of `McNemar` over the pairs of all experiments; Newcombe's interval for pairs.
     PooledMcnemar,
@@ -37,7 +37,7 @@ pub enum OverallMethod {
 }
 
 /// Two models under one rate, over all experiments that both have.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct OverallRow {
     /// The metric.
     pub metric: String,
@@ -129,29 +129,23 @@ impl<'s, 'a> Couple<'s, 'a> {
         confidence: f64,
     ) -> OverallRow {
         let sides = Sides::of(study, column, &self.strata);
-        let of = |toward| self.taken(column, pairs, sides.as_ref(), (toward, confidence));
+        let of = |toward: Option<Toward>| {
+            let row = self.by_episodes(column, pairs, toward, confidence);
+            let Some(sides) = &sides else { return row };
+            let few = level(confidence).is_none_or(|level| sides.len() < fewest_clusters(level));
+            let lost = toward.map_or_else(Vec::new, |toward| toward.units(self.lost()));
+            let p = sides.test(&lost).filter(|_| !few).map(|test| test.p);
+            OverallRow { method: OverallMethod::Units, interval: None, p, mid_p: None, ..row }
+        };
         let case = |row: &OverallRow| LossCase { difference: row.difference, p: row.p };
         let row = of(None);
-        let lost = self.strata.iter().map(|(a, b)| a.lost + b.lost).sum();
-        let losses = LossCases::of(lost, |toward| case(&of(Some(toward)))).filter(|_| row.p.is_some());
+        let losses = LossCases::of(self.lost(), |toward| case(&of(Some(toward)))).filter(|_| row.p.is_some());
         OverallRow { losses, ..row }
     }
 
-    fn taken(
-        &self,
-        column: &MetricColumn,
-        pairs: Option<&[Vec<(usize, usize)>]>,
-        sides: Option<&Sides>,
-        (toward, confidence): (Option<Toward>, f64),
-    ) -> OverallRow {
-        let row = self.by_episodes(column, pairs, toward, confidence);
-        let Some(sides) = sides else { return row };
-        let few = level(confidence).is_none_or(|level| sides.len() < fewest_clusters(level));
-        let pair = |toward: Toward| [true, false].map(|is_first| toward.moments(Moments::default(), 1, is_first));
-        let lost = self.strata.iter().map(|(a, b)| a.lost + b.lost).sum::<u64>();
-        let lost: Vec<_> = (0..lost).filter_map(|_| toward.map(|toward| pair(toward).into())).collect();
-        let p = sides.test(&lost).filter(|_| !few).map(|test| test.p);
-        OverallRow { method: OverallMethod::Units, interval: None, p, mid_p: None, ..row }
+    /// The lost episodes of both sides.
+    fn lost(&self) -> u64 {
+        self.strata.iter().map(|(a, b)| a.lost + b.lost).sum()
     }
 
     fn by_episodes(
@@ -171,16 +165,13 @@ impl<'s, 'a> Couple<'s, 'a> {
             interval,
             p: test.map(|test| test.p),
             mid_p: test.map(|test| test.mid_p),
-            p_adjusted: None,
-            separated: false,
-            losses: None,
+            ..OverallRow::default()
         };
         if let Some(strata) = pairs {
             let mut all = pooled(&strata.iter().map(|rows| outcomes(column, rows)).collect::<Vec<_>>());
-            let lost: u64 = self.strata.iter().map(|(a, b)| a.lost + b.lost).sum();
             match toward {
-                Some(Toward::Lowest) => all.second_only += lost,
-                Some(Toward::Highest) => all.first_only += lost,
+                Some(Toward::Lowest) => all.second_only += self.lost(),
+                Some(Toward::Highest) => all.first_only += self.lost(),
                 None => {}
             }
             return row(OverallMethod::PooledMcnemar, all.difference(), all.interval(confidence), all.test());
@@ -189,11 +180,11 @@ impl<'s, 'a> Couple<'s, 'a> {
             .strata
             .iter()
             .filter_map(|(a, b)| {
-                let [first, second] = [(a, true), (b, false)].map(|(block, is_first)| {
+                let side = |block: &Block, is_first| {
                     let known = block.moments(column);
                     toward.map_or(known, |toward| toward.moments(known, block.lost, is_first)).counts()
-                });
-                Some(Stratum { first: first?, second: second? })
+                };
+                Some(Stratum { first: side(a, true)?, second: side(b, false)? })
             })
             .filter(|stratum| stratum.first.1 > 0 && stratum.second.1 > 0)
             .collect();
@@ -248,13 +239,10 @@ pub(in crate::statistics) fn improvements(study: &Study, metrics: &[String], con
 
 fn adjust(rows: &mut [OverallRow], confidence: f64) {
     let seen = |row: &OverallRow| LossCase { difference: row.difference, p: row.p };
-    let tested = rows.iter_mut().filter(|row| row.p.is_some());
-    settle(&mut tested.map(|row| (seen(row), &mut row.losses)).collect::<Vec<_>>(), confidence);
-    let p_values: Vec<f64> = rows.iter().filter_map(|row| row.p).collect();
-    for (row, adjusted) in rows.iter_mut().filter(|row| row.p.is_some()).zip(holm(&p_values)) {
-        row.p_adjusted = Some(adjusted);
-        row.separated =
-            level(confidence).is_some_and(|level| adjusted <= level) && row.losses.is_none_or(|losses| losses.agree);
+    let mut tested: Vec<&mut OverallRow> = rows.iter_mut().filter(|row| row.p.is_some()).collect();
+    let settled = settle(tested.iter_mut().map(|row| (seen(row), &mut row.losses)), confidence);
+    for (row, (p, is_shown)) in tested.into_iter().zip(settled) {
+        (row.p_adjusted, row.separated) = (Some(p), is_shown);
     }
 }
 
@@ -269,7 +257,7 @@ impl OverallRow {
             first: self.second,
             second: self.first,
             difference: self.difference.map(|difference| -difference),
-            interval: self.interval.map(|Interval { low, high }| Interval { low: -high, high: -low }),
+            interval: self.interval.map(Interval::negated),
             losses: self.losses.map(LossCases::turned),
             ..self
         }

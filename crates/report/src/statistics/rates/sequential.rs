@@ -17,7 +17,7 @@ use exact::moments::{MomentOverflow, Moments};
 use exact::ratio::Ratio;
 use metric::catalog::Kind;
 use score::table::{EpisodeTable, MetricColumn};
-use statistics::holm::{holm, level};
+use statistics::holm::{holm, is_significant};
 use statistics::interval::Interval;
 use statistics::paired::Pairs;
 use statistics::sequential::{against_level, confidence_sequence, discordant};
@@ -130,6 +130,7 @@ impl Sequential {
     pub fn of(table: &EpisodeTable, options: &Options) -> Result<Self, MomentOverflow> {
         let mut study = Study::of(table, options.design, None)?;
         study.pool = options.pooled.is_some();
+        let rates = SequentialRate::all(&study, options.confidence);
         Ok(Self {
             definitions: table.catalog.name.clone(),
             definitions_hash: table.catalog.hash.clone(),
@@ -139,9 +140,9 @@ impl Sequential {
             departures: None,
             pooled: crate::statistics::pooled(&study, options),
             headline: headline_rates(&study),
-            rates: SequentialRate::all(&study, options.confidence),
-            chance: SequentialChance::all(&study, options.confidence),
+            chance: SequentialChance::all(&study, &rates, options.confidence),
             models: SequentialPair::all(&study, options.confidence),
+            rates,
         })
     }
 }
@@ -152,64 +153,57 @@ fn headline_rates(study: &Study) -> Vec<String> {
 }
 
 impl SequentialRate {
+    /// The rates with values 0 or 1 in every episode, by experiment, then by metric and model.
     fn all(study: &Study, confidence: f64) -> Vec<Self> {
-        study.experiments.iter().flat_map(|experiment| of_experiment(study, experiment, confidence)).collect()
+        let of_experiment = |experiment: &Experiment| -> Vec<Self> {
+            let each = study.rates().flat_map(|column| experiment.blocks.iter().map(move |block| (column, block)));
+            each.filter_map(|(column, block)| Self::of(study, block, column, confidence)).collect()
+        };
+        study.experiments.iter().flat_map(of_experiment).collect()
     }
-}
 
-/// The rates of an experiment with values 0 or 1 in every episode, by metric, then by model.
-#[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
-fn of_experiment(study: &Study, experiment: &Experiment, confidence: f64) -> Vec<SequentialRate> {
-    let each = study.rates().flat_map(|column| experiment.blocks.iter().map(move |block| (column, block)));
-    each.filter_map(|(column, block)| {
+    fn of(study: &Study, block: &Block, column: &MetricColumn, confidence: f64) -> Option<Self> {
         let mut firsts = study.firsts(block, column).into_iter();
-        let (successes, n) = firsts.try_fold(Moments::default(), |sum, (_, value)| sum.with(value)).ok()?.counts()?;
-        Some(SequentialRate {
+        let moments = firsts.try_fold(Moments::default(), |sum, (_, value)| sum.with(value)).ok()?;
+        let (successes, n) = moments.counts()?;
+        Some(Self {
             key: block.key(),
             metric: column.name.clone(),
             successes,
             n,
-            rate: (n > 0).then(|| successes as f64 / n as f64),
+            rate: moments.mean(),
             interval: confidence_sequence(successes, n, confidence),
         })
-    })
-    .collect()
+    }
 }
 
 impl SequentialChance {
     /// Every rate against every level of its experiment.
-    fn all(study: &Study, confidence: f64) -> Vec<Self> {
-        let mut rows = Vec::new();
-        for experiment in &study.experiments {
-            let rates = of_experiment(study, experiment, confidence);
-            for column in study.rates() {
-                let rates: Vec<&SequentialRate> = rates.iter().filter(|rate| rate.metric == column.name).collect();
-                for level in levels(study, experiment.name, &column.name) {
-                    rows.extend(Self::family(&rates, level, confidence));
-                }
-            }
-        }
-        rows
+    fn all(study: &Study, rates: &[SequentialRate], confidence: f64) -> Vec<Self> {
+        let is_same =
+            |a: &SequentialRate, b: &SequentialRate| a.key.experiment == b.key.experiment && a.metric == b.metric;
+        let families = rates.chunk_by(is_same).flat_map(|rates| {
+            let levels = levels(study, &rates[0].key.experiment, &rates[0].metric);
+            levels.into_iter().map(move |level| Self::family(rates, level, confidence))
+        });
+        families.flatten().collect()
     }
 
-    fn family(rates: &[&SequentialRate], (role, chance): (Role, Ratio), confidence: f64) -> Vec<Self> {
-        let evidence = |rate: &&SequentialRate| Some(((*rate).clone(), against_level(rate.successes, rate.n, chance)?));
+    fn family(rates: &[SequentialRate], (role, chance): (Role, Ratio), confidence: f64) -> Vec<Self> {
+        let evidence = |rate: &SequentialRate| Some((rate.clone(), against_level(rate.successes, rate.n, chance)?));
         let tested: Vec<_> = rates.iter().filter_map(evidence).collect();
         let adjusted = holm(&tested.iter().map(|(_, found)| found.p).collect::<Vec<_>>());
-        let rows = tested.into_iter().zip(adjusted).map(|((rate, found), p_adjusted)| {
-            let is_shown = level(confidence).is_some_and(|level| p_adjusted <= level);
-            Self {
-                verdict: Verdict::of(rate.successes, rate.n, chance, is_shown),
-                key: rate.key,
-                metric: rate.metric,
-                role,
-                level: chance,
-                successes: rate.successes,
-                n: rate.n,
-                e: found.e,
-                p: found.p,
-                p_adjusted,
-            }
+        let rows = tested.into_iter().zip(adjusted).map(|((rate, found), p_adjusted)| Self {
+            verdict: Verdict::of(rate.successes, rate.n, chance, is_significant(p_adjusted, confidence)),
+            key: rate.key,
+            metric: rate.metric,
+            role,
+            level: chance,
+            successes: rate.successes,
+            n: rate.n,
+            e: found.e,
+            p: found.p,
+            p_adjusted,
         });
         rows.collect()
     }
@@ -229,11 +223,10 @@ impl SequentialPair {
         let mut tested = Vec::new();
         for (at, (first, here)) in firsts.iter().enumerate() {
             for (second, there) in &firsts[at + 1..] {
-                if study.incomparable(first, second).is_some() {
-                    continue;
+                if study.incomparable(first, second).is_none() {
+                    let (pairs, shared) = matched(here, there);
+                    tested.extend(discordant(pairs).map(|found| (first, second, pairs, shared, found)));
                 }
-                let (pairs, shared) = matched(here, there);
-                tested.extend(discordant(pairs).map(|found| (first, second, pairs, shared, found)));
             }
         }
         let adjusted = holm(&tested.iter().map(|(.., found)| found.p).collect::<Vec<_>>());
@@ -247,7 +240,10 @@ impl SequentialPair {
             e: found.e,
             p: found.p,
             p_adjusted,
-            verdict: direction(pairs, level(confidence).is_some_and(|level| p_adjusted <= level)),
+            verdict: Verdict::by_order(
+                pairs.first_only.cmp(&pairs.second_only),
+                is_significant(p_adjusted, confidence),
+            ),
         });
         rows.collect()
     }
@@ -263,12 +259,4 @@ fn matched(first: &[(Unit, i64)], second: &[(Unit, i64)]) -> (Pairs, u64) {
     };
     let rest = alone(first).into_iter().zip(alone(second));
     (Pairs::of(shared.values().copied().chain(rest)), shared.len() as u64)
-}
-
-fn direction(pairs: Pairs, is_shown: bool) -> Verdict {
-    match is_shown {
-        true if pairs.first_only > pairs.second_only => Verdict::Above,
-        true if pairs.first_only < pairs.second_only => Verdict::Below,
-        _ => Verdict::NotSeparated,
-    }
 }

@@ -131,6 +131,5 @@ fn difference(difference: Option<f64>, places: usize) -> [String; 2] {
 }
 
 fn interval(interval: Option<Interval>, withheld: Option<Withheld>, places: usize) -> [String; 2] {
-    let turned = interval.map(|interval| Interval { low: -interval.high, high: -interval.low });
-    [interval, turned].map(|interval| held(interval, withheld, places))
+    [interval, interval.map(Interval::negated)].map(|interval| held(interval, withheld, places))
 }

@@ -1,7 +1,7 @@
 //! Calls of functions: arities, arguments, aggregates.
 
 use super::super::functions::{self, Entry, FUNCTIONS, Function};
-use super::super::plan::{Aggregate, Arithmetic, Comparison, Op};
+use super::super::plan::{Aggregate, Arithmetic, Comparison, NodeId, Op};
 use super::super::syntax::{Expr, ExprKind, Literal};
 use super::Bound;
 use super::scope::Scope;
@@ -149,19 +149,13 @@ impl Scope<'_, '_> {
     }
 
     pub(super) fn null_if(&mut self, value: &Expr, other: &Expr, whole: &Expr) -> Option<Bound> {
-        let (a, b) = (self.bind(value), self.bind(other));
-        let (a, b) = (a?, b?);
+        let (a, b) = self.both(value, other)?;
         self.check_equality((a, value), (b, other))?;
-        let (value, other) = (a, b);
-        let equal = self.compared(Comparison::Equal, value, other, whole)?;
-        let ty = value.ty.unwrap_or(Type::Bool);
+        let equal = self.compared(Comparison::Equal, a, b, whole)?;
+        let ty = a.ty.unwrap_or(Type::Bool);
         let null = self.null_of(ty);
-        Some(
-            self.combine(&[equal, null, value], ty, |n| Op::Case {
-                branches: vec![(n[0], n[1])],
-                otherwise: Some(n[2]),
-            }),
-        )
+        let case = |n: &[NodeId]| Op::Case { branches: vec![(n[0], n[1])], otherwise: Some(n[2]) };
+        Some(self.combine(&[equal, null, a], ty, case))
     }
 
     pub(super) fn regexp_like(&mut self, text: &Expr, pattern: &Expr) -> Option<Bound> {

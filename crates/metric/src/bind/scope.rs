@@ -183,8 +183,7 @@ impl Scope<'_, '_> {
         right: &Expr,
         whole: &Expr,
     ) -> Option<Bound> {
-        let (a, b) = (self.bind(left), self.bind(right));
-        let (a, b) = (a?, b?);
+        let (a, b) = self.both(left, right)?;
         // Comparisons by order also make sense with other texts.
         if matches!(comparison, Comparison::Equal | Comparison::NotEqual) {
             self.check_equality((a, left), (b, right))?;

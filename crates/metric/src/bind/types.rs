@@ -142,9 +142,14 @@ impl Scope<'_, '_> {
         Some((bounds?, ty))
     }
 
+    /// Binds both operands, so that the faults of both are reported.
+    pub(super) fn both(&mut self, left: &Expr, right: &Expr) -> Option<(Bound, Bound)> {
+        let (left, right) = (self.bind(left), self.bind(right));
+        Some((left?, right?))
+    }
+
     pub(super) fn pair(&mut self, left: &Expr, right: &Expr, whole: &Expr) -> Option<(Bound, Bound)> {
-        let (a, b) = (self.bind(left), self.bind(right));
-        let (a, b) = (a?, b?);
+        let (a, b) = self.both(left, right)?;
         self.check_equality((a, left), (b, right))?;
         let (both, _) = self.unified(&[a, b], whole, "compared")?;
         Some((both[0], both[1]))

@@ -185,6 +185,11 @@ impl Plan {
         self.outputs.retain(|output| names.contains(&output.name));
     }
 
+    /// The nodes that the metrics and the filter depend on, in order.
+    pub fn needed(&self) -> Vec<NodeId> {
+        self.needed_by(self.outputs.iter().map(|output| output.node).chain(self.filter))
+    }
+
     /// These nodes and all that they depend on, in order.
     pub fn needed_by(&self, roots: impl IntoIterator<Item = NodeId>) -> Vec<NodeId> {
         let mut needed = vec![false; self.nodes.len()];

@@ -61,15 +61,12 @@ pub fn lower(plan: &Plan, dialect: Dialect) -> Result<String, LoweringError> {
     check_patterns(plan, dialect)?;
     check_names(plan, dialect)?;
     let OnePass { plan, windowed } = OnePass::of(plan);
-    let layout = Layout::new(&plan, dialect, &roots(&plan), &windowed);
+    let roots: Vec<NodeId> = plan.outputs.iter().map(|output| output.node).chain(plan.filter).collect();
+    let layout = Layout::new(&plan, dialect, &roots, &windowed);
     let mut statement = Statement::new(&layout);
     statement.passes(&[])?;
     statement.episodes()?;
     Ok(statement.text)
-}
-
-fn roots(plan: &Plan) -> Vec<NodeId> {
-    plan.outputs.iter().map(|output| output.node).chain(plan.filter).collect()
 }
 
 fn check_patterns(plan: &Plan, dialect: Dialect) -> Result<(), LoweringError> {
@@ -86,8 +83,7 @@ fn check_names(plan: &Plan, dialect: Dialect) -> Result<(), LoweringError> {
     if dialect != Dialect::Portable {
         return Ok(());
     }
-    let needed = plan.needed_by(roots(plan));
-    if let Some((name, _)) = plan.columns(&needed).into_iter().find(|(name, _)| !is_plain(name)) {
+    if let Some((name, _)) = plan.columns(&plan.needed()).into_iter().find(|(name, _)| !is_plain(name)) {
         return Err(LoweringError::Name { name: name.to_owned() });
     }
     let mut seen = BTreeSet::new();

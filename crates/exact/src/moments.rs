@@ -21,10 +21,7 @@ pub struct Moments {
 pub struct MomentOverflow;
 
 impl Moments {
-    /// Adds one value.
-    ///
-    /// # Errors
-    /// A sum beyond 128 bits, which no metric of steps can reach.
+    /// Adds one value. Errors: a sum beyond 128 bits, which no metric of steps can reach.
     pub fn with(self, value: i64) -> Result<Self, MomentOverflow> {
         let value = i128::from(value);
         Ok(Self {

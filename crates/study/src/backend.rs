@@ -43,8 +43,8 @@ impl SparkJob {
         labels.iter().try_for_each(|label| check_label(traces, label))?;
         let definitions = study.question.bind(traces)?;
         let plan = &definitions.plan;
-        let read = plan.needed_by(plan.outputs.iter().map(|output| output.node).chain(plan.filter));
-        let read = plan.columns(&read).into_iter().map(|(name, _)| name.to_owned()).chain(study.question.labels());
+        let read =
+            plan.columns(&plan.needed()).into_iter().map(|(name, _)| name.to_owned()).chain(study.question.labels());
         if let Some(column) = read.into_iter().find(|name| traces.is_label_column(name)) {
             return Err(SparkError::Label { column }.into());
         }

@@ -122,6 +122,11 @@ pub(super) fn beside_cells(lost: &LostCounts, replies: Option<&Replies>) -> Opti
     (!named.is_empty()).then(|| format!("Beside the numbers: {}{rest}.", named.join("; ")))
 }
 
+pub(super) fn told(lost: u64) -> String {
+    let (noun, verb) = if lost == 1 { ("episode", "was") } else { ("episodes", "were") };
+    format!("{lost} {noun} {verb} lost for want of an answer")
+}
+
 fn is_lost(table: &EpisodeTable, row: usize) -> bool {
     table.label(LOST).is_some_and(|label| label.get(row) == Some(YES))
 }

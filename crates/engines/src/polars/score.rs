@@ -39,7 +39,7 @@ pub fn score(
 
 fn columns(traces: &TraceSet, definitions: &Definitions) -> Vec<FrameColumn> {
     let plan = &definitions.plan;
-    let needed = plan.needed_by(plan.outputs.iter().map(|output| output.node).chain(plan.filter));
+    let needed = plan.needed();
     let mut names: Vec<&str> = EPISODE_COLUMNS.into_iter().chain(["t"]).collect();
     for (name, _) in plan.columns(&needed) {
         if !names.contains(&name) {
@@ -53,7 +53,7 @@ fn columns(traces: &TraceSet, definitions: &Definitions) -> Vec<FrameColumn> {
 /// Checks numbers that may leave 64 bits: Polars wraps where the native engine returns an error.
 fn check_overflow(traces: &TraceSet, definitions: &Definitions, steps: &LazyFrame) -> Result<(), PolarsError> {
     let plan = &definitions.plan;
-    let needed = plan.needed_by(plan.outputs.iter().map(|output| output.node).chain(plan.filter));
+    let needed = plan.needed();
     let rows = traces.files().iter().map(TraceFile::rows).sum();
     let suspects = may_overflow(plan, &needed, rows, |name| traces.schema_column(name)?.stored.range());
     let overflow = |node| Err(PolarsError::Overflow { metric: user_of(definitions, node) });

@@ -122,8 +122,7 @@ pub(super) fn columns(plan: &Plan, labels: &[String]) -> Vec<(String, &'static s
             columns.push((name.to_owned(), kind));
         }
     };
-    let roots = plan.outputs.iter().map(|output| output.node).chain(plan.filter);
-    for id in plan.needed_by(roots) {
+    for id in plan.needed() {
         let node = plan.node(id);
         if let Op::Column(name) = &node.op {
             add(name, kind(node.ty));

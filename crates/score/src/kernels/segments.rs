@@ -25,15 +25,11 @@ impl<'a> Segments<'a> {
         Self { offsets }
     }
 
-    pub fn len(self) -> usize {
+    pub(crate) fn len(self) -> usize {
         self.offsets.len().saturating_sub(1)
     }
 
-    pub fn is_empty(self) -> bool {
-        self.len() == 0
-    }
-
-    pub fn rows(self) -> usize {
+    pub(crate) fn rows(self) -> usize {
         self.offsets.last().copied().unwrap_or(0)
     }
 

@@ -56,7 +56,11 @@ impl fmt::Display for Kernel {
             Self::Arithmetic(op, x, y) | Self::Divide(op, x, y) => write!(f, "{x} {op} {y}"),
             Self::KeysMatch(x, pattern) => write!(f, "keys {x} match {pattern:?}"),
             Self::SymbolsMatch(x, pattern) => write!(f, "symbols {x} match {pattern:?}"),
-            Self::Within(windows) => write!(f, "rows where {}", Windows(windows)),
+            Self::Within(windows) => {
+                let window = |(comparison, moments): &(Comparison, StepId)| format!("t {comparison} {moments}");
+                let windows: Vec<String> = windows.iter().map(window).collect();
+                write!(f, "rows where {}", windows.join(" and "))
+            }
             Self::Search { aggregate, condition, within } => {
                 write!(f, "{aggregate} {condition}")?;
                 within.map_or(Ok(()), |rows| write!(f, " within {rows}"))
@@ -104,15 +108,4 @@ impl Kernel {
 
 const fn sign(equal: bool) -> &'static str {
     if equal { "=" } else { "<>" }
-}
-
-struct Windows<'a>(&'a [(Comparison, StepId)]);
-
-impl fmt::Display for Windows<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (at, (comparison, moments)) in self.0.iter().enumerate() {
-            write!(f, "{}t {comparison} {moments}", if at == 0 { "" } else { " and " })?;
-        }
-        Ok(())
-    }
 }

@@ -269,14 +269,6 @@ impl EpisodeKey {
 }
 
 impl TextColumn {
-    pub fn len(&self) -> usize {
-        self.codes.len()
-    }
-
-    pub fn is_empty(&self) -> bool {
-        self.codes.is_empty()
-    }
-
     /// The text of a row; `None` for null.
     pub fn get(&self, row: usize) -> Option<&str> {
         self.codes.is_valid(row).then(|| self.texts.value(self.codes.value(row) as usize))
@@ -296,7 +288,7 @@ impl TextColumn {
     }
 
     pub fn iter(&self) -> impl Iterator<Item = Option<&str>> {
-        (0..self.len()).map(|row| self.get(row))
+        (0..self.codes.len()).map(|row| self.get(row))
     }
 
     pub(crate) fn taken(&self, rows: &UInt32Array) -> Self {
@@ -316,10 +308,7 @@ impl MetricColumn {
         Self { name: name.into(), values: MetricValues::Ints(values.into_iter().collect()) }
     }
 
-    /// The value of a row; `None` if the metric is undefined.
-    ///
-    /// # Panics
-    /// If the row does not exist.
+    /// The value of a row; `None` if the metric is undefined. Panics if the row does not exist.
     pub fn get(&self, row: usize) -> Option<i64> {
         match &self.values {
             MetricValues::Bools(bools) => bools.is_valid(row).then(|| bools.value(row).into()),
@@ -341,13 +330,8 @@ impl MetricColumn {
         }
     }
 
-    /// Adds the defined values of some rows to `moments`.
-    ///
-    /// # Errors
-    /// A sum beyond 128 bits.
-    ///
-    /// # Panics
-    /// If a row is out of range.
+    /// Adds the defined values of some rows to `moments`. Errors: a sum beyond 128 bits. Panics if a row is out of
+    /// range.
     pub fn add_moments(&self, moments: Moments, rows: Range<usize>) -> Result<Moments, MomentOverflow> {
         match &self.values {
             // For a few rows, single values are faster than a slice of bits.

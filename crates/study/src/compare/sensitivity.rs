@@ -8,9 +8,9 @@ use std::collections::BTreeSet;
 use std::str::FromStr;
 
 use crate::error::StudyError;
-use crate::losses::Counted;
+use crate::losses::{self, Counted};
 use crate::results::Results;
-use crate::scan::lost_episodes;
+use crate::scan::{ids, lost_episodes};
 use crate::{Question, Study, own_definitions};
 use metric::columns::Columns;
 use metric::definitions::{Definitions, ReplaceError};
@@ -108,8 +108,7 @@ impl Study {
     fn stages(&self, trial: &Trial, mut tables: Vec<EpisodeTable>) -> Result<Vec<Scored>, StudyError> {
         let mut others = tables.split_off(trial.definitions.len()).into_iter();
         let pixels = others.next();
-        let ids = |table: EpisodeTable| table.keys.iter().map(|key| key.episode_id.to_owned()).collect();
-        let lost: Option<BTreeSet<String>> = others.next().map(ids);
+        let lost = others.next().map(|table| ids(&table));
         self.check_filter(tables.iter().map(EpisodeTable::len).max().unwrap_or(0))?;
         let counted: Vec<Counted> = tables
             .into_iter()
@@ -192,8 +191,7 @@ impl Trial {
             notes.push(format!("the filter depends on `{EVIDENCE}`: each threshold keeps its own episodes"));
         }
         if lost > 0 {
-            let (noun, verb) = if lost == 1 { ("episode", "was") } else { ("episodes", "were") };
-            notes.push(format!("{lost} {noun} {verb} lost for want of an answer: in no denominator"));
+            notes.push(format!("{}: in no denominator", losses::told(lost)));
         }
         notes
     }

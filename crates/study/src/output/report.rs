@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::error::StudyError;
 use crate::figure_inputs::{Drawings, FigureInputs};
-use crate::losses::Counted;
+use crate::losses::{self, Counted};
 use crate::results::{Outputs, Results};
 use crate::{DEFAULT_DEFINITIONS, LostAs, Source, Study, scores};
 use exact::replace;
@@ -154,12 +154,11 @@ impl Study {
         }
         let total = lost.total();
         if total > 0 {
-            let (noun, verb) = if total == 1 { ("episode", "was") } else { ("episodes", "were") };
             let counted = match self.question.lost {
                 LostAs::Nothing => "in no denominator (--lost as-failure counts them)",
                 LostAs::Failure => "counted as failures",
             };
-            notes.push(format!("{total} {noun} {verb} lost for want of an answer: {counted}; see tables/quality.md"));
+            notes.push(format!("{}: {counted}; see tables/quality.md", losses::told(total)));
         }
         notes
     }

@@ -1,5 +1,6 @@
 //! The one scan of the inputs, and all its results.
 
+use std::collections::BTreeSet;
 use std::thread;
 
 use crate::error::StudyError;
@@ -61,7 +62,7 @@ impl Study {
         let definitions = [&all, lost.as_ref().unwrap_or(&nobody)];
         let Scored { tables: [episodes, ended], quality, .. } =
             score_traces::score_each(traces, definitions, wanted, self.threads)?;
-        let lost = lost.map(|_| ended.keys.iter().map(|key| key.episode_id.to_owned()).collect());
+        let lost = lost.map(|_| ids(&ended));
         let mut results = Results { lost, quality, ..Results::of(episodes) };
         self.declare(&mut results)?;
         self.check_unchanged()?;
@@ -85,8 +86,7 @@ impl Study {
     pub fn reads_labels(&self) -> Result<bool, StudyError> {
         let traces = self.traces()?;
         let plan = self.question.bind(traces)?.plan;
-        let read = plan.needed_by(plan.outputs.iter().map(|output| output.node).chain(plan.filter));
-        Ok(plan.columns(&read).iter().any(|(name, _)| traces.is_label_column(name)))
+        Ok(plan.columns(&plan.needed()).iter().any(|(name, _)| traces.is_label_column(name)))
     }
 
     /// The results of an earlier scan with the current coders' labels. Errors: scores in the place of traces.
@@ -133,16 +133,12 @@ impl Study {
         let quality = reader.as_ref();
         let wanted = score_traces::Outputs { labels: &labels, timelines, quality, unchecked: &UNCHECKED };
         let lost = if outputs.losses { lost_episodes(traces)? } else { None };
-        let Some(lost) = lost else {
-            let Scored { tables: [episodes], timelines, quality } =
-                score_traces::score_each(traces, [&definitions], wanted, self.threads)?;
-            own_definitions::check(&definitions, traces, &episodes)?;
-            return Ok(Results { timelines, quality, ..Results::of(episodes) });
-        };
-        let Scored { tables: [episodes, lost], timelines, quality } =
-            score_traces::score_each(traces, [&definitions, &lost], wanted, self.threads)?;
+        let all: Vec<&Definitions> = std::iter::once(&definitions).chain(&lost).collect();
+        let Scored { tables, timelines, quality } = score_traces::score_all(traces, &all, wanted, self.threads)?;
+        let mut tables = tables.into_iter();
+        let episodes = tables.next().expect("a table per definitions");
         own_definitions::check(&definitions, traces, &episodes)?;
-        let lost = Some(lost.keys.iter().map(|key| key.episode_id.to_owned()).collect());
+        let lost = tables.next().map(|table| ids(&table));
         Ok(Results { timelines, lost, quality, ..Results::of(episodes) })
     }
 
@@ -152,6 +148,10 @@ impl Study {
             Backend::Native | Backend::Polars => backend::polars(self.source.traces()?, &self.question, self.threads),
         }
     }
+}
+
+pub(crate) fn ids(table: &EpisodeTable) -> BTreeSet<String> {
+    table.keys.iter().map(|key| key.episode_id.to_owned()).collect()
 }
 
 fn says_something(label: &LabelColumn) -> bool {

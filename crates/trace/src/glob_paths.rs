@@ -31,7 +31,9 @@ pub(crate) fn matches(pattern: &str) -> Result<Vec<PathBuf>, GlobError> {
             Component::Normal(_) if text == "**" => each(&found, below)?,
             Component::Normal(_) if is_glob(text) => {
                 let pattern = Pattern::new(text).map_err(GlobError::Pattern)?;
-                each(&found, |folder| Ok(entries(folder)?.into_iter().filter(|path| fits(&pattern, path)).collect()))?
+                let fits =
+                    |path: &PathBuf| path.file_name().is_some_and(|name| pattern.matches(&name.to_string_lossy()));
+                each(&found, |folder| Ok(entries(folder)?.into_iter().filter(fits).collect()))?
             }
             _ => found.into_iter().map(|path| path.join(text)).filter(|path| path.symlink_metadata().is_ok()).collect(),
         };
@@ -45,10 +47,6 @@ fn each(
 ) -> Result<Vec<PathBuf>, GlobError> {
     let found = folders.iter().map(|folder| find(folder)).collect::<Result<Vec<_>, _>>()?;
     Ok(found.into_iter().flatten().collect())
-}
-
-fn fits(pattern: &Pattern, path: &Path) -> bool {
-    path.file_name().is_some_and(|name| pattern.matches(&name.to_string_lossy()))
 }
 
 fn entries(folder: &Path) -> Result<Vec<PathBuf>, GlobError> {
@@ -107,7 +105,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn a_name_that_is_not_utf8_is_matched() {
+    fn a_name_that_is_no_text_is_matched() {
         use std::os::unix::ffi::OsStrExt as _;
         let folder = tempfile::tempdir().unwrap();
         let name = std::ffi::OsStr::from_bytes(b"b\xff.parquet");

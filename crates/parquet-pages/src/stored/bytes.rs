@@ -25,11 +25,6 @@ impl<'a> Place<'a> {
         self.metadata.row_group(self.row_group).column(self.column)
     }
 
-    /// The CRC-32 of the chunk's bytes, if the file has checksums.
-    pub(crate) fn checksum(self) -> Option<u32> {
-        self.checksums.of(self.row_group, self.column)
-    }
-
     pub(crate) fn rows(self) -> usize {
         rows_of(self.metadata.row_group(self.row_group))
     }
@@ -41,7 +36,7 @@ const LARGEST: u64 = 8 << 20;
 /// A file, or a part of one in memory, addressed by file offsets.
 pub struct Store {
     held: Held,
-    expansion: Arc<Expansion>,
+    pub(crate) expansion: Arc<Expansion>,
 }
 
 enum Held {
@@ -58,10 +53,6 @@ impl Store {
     pub fn of_memory(start: u64, bytes: Bytes) -> Self {
         let expansion = Arc::new(Expansion::new(bytes.len() as u64));
         Self { held: Held::Memory { start, bytes }, expansion }
-    }
-
-    pub(crate) fn expansion(&self) -> &Arc<Expansion> {
-        &self.expansion
     }
 
     fn of(&self, held: Held) -> Self {

@@ -71,7 +71,7 @@ impl Verified {
             progress: Mutex::default(),
             slot,
         };
-        let declared = place.checksum();
+        let declared = place.checksums.of(place.row_group, place.column);
         let sums = declared.map(|declared| pages.store.sum(start, length).map(|found| (declared, found)));
         match sums.transpose().map_err(unreadable)? {
             Some((declared, found)) if declared != found => {
@@ -123,7 +123,7 @@ impl Verified {
 
     pub(crate) fn texts(&self, bytes: u64) -> Result<()> {
         let offset = self.offset();
-        self.store.expansion().texts(self.place, offset, bytes).map_err(|exceeded| self.over(offset, &exceeded))
+        self.store.expansion.texts(self.place, offset, bytes).map_err(|exceeded| self.over(offset, &exceeded))
     }
 
     /// The page that starts at `offset`: the bytes of its header, and the parsed header.
@@ -143,10 +143,7 @@ impl Verified {
         {
             return Err(self.fault(offset, expected, found));
         }
-        self.store
-            .expansion()
-            .page(self.place, offset, header.whole)
-            .map_err(|exceeded| self.over(offset, &exceeded))?;
+        self.store.expansion.page(self.place, offset, header.whole).map_err(|exceeded| self.over(offset, &exceeded))?;
         progress.pages += 1;
         if matches!(header.kind, Kind::Data | Kind::DataV2) {
             progress.values += header.values;

@@ -4,7 +4,7 @@
 //! Rule: keys that analysis does not need are ignored. An invalid value of a needed key is a fault of the file.
 
 use indexmap::IndexMap;
-use serde_json::{Map, Value};
+use serde_json::Value;
 
 use crate::answers;
 use crate::diagnostic::{Code, Finding};
@@ -76,26 +76,25 @@ fn read(recording: &Value) -> Result<Vec<DeclaredExperiment>, Fault> {
 impl DeclaredExperiment {
     fn read(key: &str, value: &Value) -> Result<Self, Fault> {
         let members = value.as_object().ok_or_else(|| fault(key, "an object", value))?;
-        let text = |member: &str, expected| match members.get(member) {
-            None | Some(Value::Null) => Ok(None),
+        let member = |name: &str| members.get(name).filter(|value| !value.is_null());
+        let text = |name: &str, expected| match member(name) {
+            None => Ok(None),
             Some(Value::String(text)) => Ok(Some(text.clone())),
-            Some(other) => Err(fault(format!("{key}.{member}"), expected, other)),
+            Some(other) => Err(fault(format!("{key}.{name}"), expected, other)),
         };
         let missing = || fault(format!("{key}.name"), "a name", members.get("name").unwrap_or(&Value::Null));
         let name = text("name", "a name")?.filter(|name| !name.is_empty()).ok_or_else(missing)?;
-        let order = match members.get("order") {
-            None | Some(Value::Null) => None,
-            Some(order) => Some(order.as_i64().ok_or_else(|| fault(format!("{key}.order"), "a whole number", order))?),
-        };
+        let whole =
+            |order: &Value| order.as_i64().ok_or_else(|| fault(format!("{key}.order"), "a whole number", order));
         Ok(Self {
             name,
             title: text("title", "a text")?,
-            order,
-            chance: levels(&format!("{key}.chance"), members.get("chance"), chance)?,
-            reference: levels(&format!("{key}.reference"), members.get("reference"), reference)?,
+            order: member("order").map(whole).transpose()?,
+            chance: levels(&format!("{key}.chance"), member("chance"), chance)?,
+            reference: levels(&format!("{key}.reference"), member("reference"), reference)?,
             definitions: text("definitions", "the name of definitions")?,
             definitions_hash: text("definitions_hash", "a hash")?,
-            absent: columns(&format!("{key}.absent"), members.get("absent"))?,
+            absent: columns(&format!("{key}.absent"), member("absent"))?,
             answers: answers::declared(value),
         })
     }
@@ -106,9 +105,8 @@ fn levels<T>(
     value: Option<&Value>,
     read: impl Fn(&str, &Value) -> Result<T, Fault>,
 ) -> Result<IndexMap<String, T>, Fault> {
-    let none = Map::new();
     let members = match value {
-        None | Some(Value::Null) => &none,
+        None => return Ok(IndexMap::new()),
         Some(Value::Object(members)) => members,
         Some(other) => return Err(fault(key, "an object with the names of metrics as keys", other)),
     };
@@ -118,12 +116,9 @@ fn levels<T>(
 
 fn columns(key: &str, value: Option<&Value>) -> Result<Vec<&'static str>, Fault> {
     let known = |name: &Value| of_some_tasks().find(|known| *name == **known);
-    let named = match value {
-        None | Some(Value::Null) => Some(Vec::new()),
-        Some(value) => value.as_array().and_then(|names| names.iter().map(known).collect()),
-    };
-    let named =
-        named.ok_or_else(|| fault(key, "a list of `self_color` and `selected_cube`", value.unwrap_or(&Value::Null)))?;
+    let Some(value) = value else { return Ok(Vec::new()) };
+    let named: Option<Vec<_>> = value.as_array().and_then(|names| names.iter().map(known).collect());
+    let named = named.ok_or_else(|| fault(key, "a list of `self_color` and `selected_cube`", value))?;
     Ok(of_some_tasks().filter(|known| named.contains(known)).collect())
 }
 
@@ -184,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn a_column_is_absent_if_every_experiment_declares_it_absent() {
+    fn a_column_is_absent_where_every_experiment_says_so() {
         let of = |recording: Value| absent("a.parquet", &recording);
         let both = json!({ "name": "A", "absent": ["selected_cube", "self_color"] });
         let one = json!({ "name": "B", "absent": ["self_color"] });
@@ -196,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn a_missing_or_empty_declaration_is_accepted() {
+    fn an_empty_declaration_is_no_fault() {
         for text in [
             None,
             Some("no JSON"),
@@ -210,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn each_invalid_member_is_named() {
+    fn each_member_that_is_not_as_it_must_be_is_named() {
         let of = |key: &str, value: Value| json!({ "experiment": { "name": "E6", key: value } });
         for (recording, words) in [
             (json!({ "experiment": ["E6"] }), "`mirrorstats.recording.experiment` to be an object\n  found `[\"E6\"]`"),

@@ -48,7 +48,9 @@ impl Columns {
         for (key, value) in members {
             let fault = match limits.expected.domain.column(key) {
                 Some(column) => {
-                    self.note_known(column);
+                    if !self.known.contains(&column.name) {
+                        self.known.push(column.name);
+                    }
                     misfit(column, value, limits)
                 }
                 None => misdeclared(key, value, limits).or_else(|| self.check_own(key, value, place)),
@@ -79,12 +81,6 @@ impl Columns {
 
     pub(super) fn own(&self) -> Vec<Own> {
         self.own.iter().map(|(name, inferred)| Own { name: name.clone(), kind: inferred.kind }).collect()
-    }
-
-    fn note_known(&mut self, column: &'static Column) {
-        if !self.known.contains(&column.name) {
-            self.known.push(column.name);
-        }
     }
 
     fn check_own(&mut self, key: &str, value: &Value, place: &Place) -> Option<Fault> {

@@ -74,9 +74,9 @@ impl Limits<'_> {
         if let Some(cluster) = self.cluster {
             recording["design"] = json!({ "cluster": cluster });
         }
-        if let Some(source) = texts.iter().find_map(Text::source) {
+        if let Some(source) = texts.iter().find_map(|text| text.source.as_ref()) {
             recording["mapping"] = source.mapping.clone();
-            let format = |text: &Text| text.source().map_or(Format::JsonLines, |source| source.format).name();
+            let format = |text: &Text| text.source.as_ref().map_or(Format::JsonLines, |source| source.format).name();
             recording["formats"] = texts.iter().map(format).collect();
         }
         Ok(recording)
@@ -146,7 +146,7 @@ fn survey(
             expected: "at least one step".into(),
             found: "none".into(),
             help: "leave the file out, or write its steps anew".into(),
-            ..Fault::of_file(text.name())
+            ..Fault::of_file(&text.name)
         });
     }
     Ok(())
@@ -175,8 +175,8 @@ fn write(
         for step in episode {
             let text = &mut texts[step.text];
             let bytes = text.line_at(step.offset)?;
-            let members = text.members(&bytes, true).map_err(|_| ImportError::changed(text.name()))?;
-            add(&mut rows, &members).map_err(|()| ImportError::changed(text.name()))?;
+            let members = text.members(&bytes, true).map_err(|_| ImportError::changed(&text.name))?;
+            add(&mut rows, &members).map_err(|()| ImportError::changed(&text.name))?;
         }
         file.end_episode(&mut rows).map_err(failed)?;
     }

@@ -22,7 +22,7 @@ use exact::{hash, input};
 
 #[derive(Debug)]
 pub struct Text {
-    name: Arc<str>,
+    pub(super) name: Arc<str>,
     noun: &'static str,
     reader: BufReader<File>,
     /// The position of the reader, in bytes from the start.
@@ -30,7 +30,7 @@ pub struct Text {
     lines: u64,
     /// True if the lines are rows of a data frame, which stores integers beside nulls as floats.
     is_frame: bool,
-    source: Option<Source>,
+    pub(super) source: Option<Source>,
 }
 
 /// A file of another shape, and the mapping of its rows to steps.
@@ -126,14 +126,6 @@ impl Text {
             members.iter_mut().filter(|(key, _)| is_integer(key)).for_each(|(_, value)| value.make_integer());
         }
         Ok(members)
-    }
-
-    pub(super) fn name(&self) -> &str {
-        &self.name
-    }
-
-    pub(super) const fn source(&self) -> Option<&Source> {
-        self.source.as_ref()
     }
 
     pub(super) fn place(&self, line: u64) -> Place {

@@ -133,14 +133,14 @@ impl Messages {
             }
             let fault = match self.records.next().map_err(LogError::io("read", &self.path))? {
                 Some(Piece::Record(Record::DataEnd(end))) => {
-                    let (written, found) = (end.data_section_crc, self.records.checksum());
+                    let (written, found) = (end.data_section_crc, self.records.checksum);
                     if written == 0 || written == found {
                         return Ok(None);
                     }
                     format!("the checksum of the data: expected {written:08x}, found {found:08x}")
                 }
                 Some(Piece::Record(record)) => return Ok(Some(record)),
-                Some(Piece::Chunk(at, bytes)) => match inside(&bytes, self.records.budgets()) {
+                Some(Piece::Chunk(at, bytes)) => match inside(&bytes, &self.records.budgets) {
                     Ok(records) => {
                         (self.chunk, self.at) = (records, at);
                         continue;

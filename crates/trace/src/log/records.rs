@@ -32,13 +32,14 @@ pub(super) enum Piece {
 pub(super) struct Records<R> {
     bytes: R,
     at: u64,
-    end: u64,
+    /// The number of bytes.
+    pub(super) end: u64,
     /// The damage in the record before, to be reported next.
     damage: Option<String>,
     running: crc32fast::Hasher,
     /// The checksum of the section that has ended.
-    checksum: u32,
-    budgets: Budgets,
+    pub(super) checksum: u32,
+    pub(super) budgets: Budgets,
 }
 
 /// An opcode, and the length of the contents.
@@ -123,25 +124,8 @@ impl<R: Read + Seek> Records<R> {
         }
     }
 
-    pub(super) fn checksum(&self) -> u32 {
-        self.checksum
-    }
-
-    pub(super) fn bytes(&self) -> u64 {
-        self.end
-    }
-
-    pub(super) fn budgets(&self) -> &Budgets {
-        &self.budgets
-    }
-
     pub(super) fn is_closed(&mut self) -> io::Result<bool> {
         Ok(self.read(self.at, MAGIC.len() + 1)? == MAGIC)
-    }
-
-    pub(super) fn of_summary(&mut self) -> io::Result<Vec<mcap::records::Channel>> {
-        let channel = |record| if let Record::Channel(channel) = record { Some(channel) } else { None };
-        Ok(self.summary()?.into_iter().filter_map(channel).collect())
     }
 
     pub(super) fn summary(&mut self) -> io::Result<Vec<Record<'static>>> {

@@ -108,24 +108,26 @@ struct Salvage {
 impl Salvage {
     fn of(records: &mut Records<impl Read + Seek>) -> io::Result<Self> {
         // A chunk does not repeat the channels of earlier chunks, which may be damaged; the summary does.
-        let channels = records.of_summary()?.into_iter().map(|channel| (channel.id, channel.topic)).collect();
-        let rows = Budget::new(most_rows(records.bytes()));
+        let topic =
+            |record| if let Record::Channel(channel) = record { Some((channel.id, channel.topic)) } else { None };
+        let channels = records.summary()?.into_iter().filter_map(topic).collect();
+        let rows = Budget::new(most_rows(records.end));
         let mut salvage = Self { channels, open: None, rows, result: Recovered::default() };
         let mut is_open = true;
         while let Some(piece) = records.next()? {
             match piece {
                 Piece::Record(Record::DataEnd(end)) => {
                     is_open = false;
-                    salvage.compare("the data", end.data_section_crc, records.checksum());
+                    salvage.compare("the data", end.data_section_crc, records.checksum);
                     salvage.index(records)?;
                     break;
                 }
                 Piece::Record(record) => salvage.record(record),
-                Piece::Chunk(at, chunk) => salvage.chunk(at, &chunk, records.budgets()),
+                Piece::Chunk(at, chunk) => salvage.chunk(at, &chunk, &records.budgets),
                 Piece::Damage(fault) => salvage.result.losses.damage.push(fault),
                 Piece::Cut(fault, tail) => {
                     salvage.close("the log ends before the episode does");
-                    salvage.lose_all(&tail, records.budgets(), "the log ends before the episode does");
+                    salvage.lose_all(&tail, &records.budgets, "the log ends before the episode does");
                     salvage.result.losses.cut = Some(fault);
                 }
             }
@@ -140,7 +142,7 @@ impl Salvage {
         while let Some(piece) = records.next()? {
             match piece {
                 Piece::Record(Record::Footer(footer)) => {
-                    self.compare("the index", footer.summary_crc, records.checksum());
+                    self.compare("the index", footer.summary_crc, records.checksum);
                     if !records.is_closed()? {
                         self.result.losses.damage.push("the log does not end as an MCAP file does".to_owned());
                     }

@@ -199,7 +199,7 @@ impl<'a> RowGroup<'a> {
     /// The footer's statistics of a column, in a file without checksums.
     fn described(&self, at: usize) -> Option<&Chunk> {
         let leaf = leaf(&self.readable.footer, root(self.file, self.layout, at)?)?;
-        self.file.statistics().chunk(self.index, leaf)
+        self.file.statistics.chunk(self.index, leaf)
     }
 
     fn check_statistics(&self) -> Result<(), Box<Finding>> {
@@ -220,7 +220,7 @@ impl<'a> RowGroup<'a> {
         }
         let names = if known.is_some_and(|known| known.constant) { check_names(&column) } else { Ok(()) };
         let place = (self.index, root(self.file, self.layout, at).unwrap_or(usize::MAX));
-        let checked = names.and_then(|()| self.file.expansion().rows(place, self.first, &column));
+        let checked = names.and_then(|()| self.file.expansion.rows(place, self.first, &column));
         let over =
             |exceeded| Finding::over_budget(self.file.name(), &exceeded).in_row_group(self.index).in_column(name);
         checked.map(|()| column).map_err(|exceeded| Box::new(over(exceeded)))

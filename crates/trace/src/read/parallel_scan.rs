@@ -355,7 +355,7 @@ fn too_long(file: &TraceFile, open: &[Rows]) -> Option<Box<Finding>> {
 fn too_many(file: &TraceFile, episodes: &Episodes) -> Option<Box<Finding>> {
     let (piece, rows) = (episodes.pieces.last()?, *episodes.offsets.last()?);
     let end = (piece.row + rows - piece.at) as u64;
-    let exceeded = file.episodes().spend(piece.row_group, end, episodes.offsets.len() - 1).err()?;
+    let exceeded = file.episodes.spend(piece.row_group, end, episodes.offsets.len() - 1).err()?;
     Some(Box::new(Finding::over_budget(file.name(), &exceeded).in_row_group(piece.row_group)))
 }
 

@@ -35,7 +35,10 @@ pub fn search(set: &TraceSet, words: &str, threads: NonZeroUsize) -> Result<BTre
     let known = set.column_names();
     let said: Vec<&str> = match set.domain() {
         Domain::Mirror => SAID.into_iter().filter(|name| known.contains(name)).collect(),
-        Domain::Own => known.into_iter().filter(|name| is_text(set, name)).collect(),
+        Domain::Own => {
+            let is_text = |name: &&str| set.column(name).is_some_and(|column| column.kind == Kind::String);
+            known.into_iter().filter(|name| *name != "episode_id" && is_text(name)).collect()
+        }
     };
     let names: Vec<String> = ["episode_id", "t"].into_iter().chain(said).map(str::to_owned).collect();
     let mut found: BTreeMap<String, Found> = BTreeMap::new();
@@ -63,10 +66,6 @@ pub fn search(set: &TraceSet, words: &str, threads: NonZeroUsize) -> Result<BTre
         }
     }
     Ok(found)
-}
-
-fn is_text(set: &TraceSet, name: &str) -> bool {
-    name != "episode_id" && set.column(name).is_some_and(|column| column.kind == Kind::String)
 }
 
 /// Some text around words, which are in lower case; `None` if the text does not contain them.

@@ -163,17 +163,14 @@ fn data_type(set: &TraceSet, name: &str, kind: Kind) -> DataType {
 
 /// The fields with `Utf8View` for each kind of text.
 fn with_views(fields: &Fields) -> Fields {
-    let is_text = |kind: &DataType| matches!(kind, DataType::Utf8 | DataType::LargeUtf8);
-    let viewed = |field: &Arc<Field>| match field.data_type() {
-        DataType::Dictionary(_, values) if is_text(values) => view_of(field),
-        kind if is_text(kind) => view_of(field),
-        _ => Arc::clone(field),
+    let viewed = |field: &Arc<Field>| {
+        let held = if let DataType::Dictionary(_, values) = field.data_type() { values } else { field.data_type() };
+        match held {
+            DataType::Utf8 | DataType::LargeUtf8 => Arc::new(field.as_ref().clone().with_data_type(DataType::Utf8View)),
+            _ => Arc::clone(field),
+        }
     };
     fields.iter().map(viewed).collect()
-}
-
-fn view_of(field: &Field) -> Arc<Field> {
-    Arc::new(field.clone().with_data_type(DataType::Utf8View))
 }
 
 impl Part {
@@ -183,7 +180,7 @@ impl Part {
             name: file.name().to_owned(),
             path: file.path().to_owned(),
             readable: Arc::clone(&readable),
-            expansion: Arc::clone(file.expansion()),
+            expansion: Arc::clone(&file.expansion),
             row_group,
         };
         Ok((0..readable.footer.metadata().num_row_groups()).map(part).collect())

@@ -125,7 +125,7 @@ impl Tally {
             if is_seen {
                 self.seen.insert(sighting.name.clone());
             }
-            if files[file].colors().has(&sighting.name) {
+            if files[file].colors.has(&sighting.name) {
                 continue;
             }
             let key = (sighting.column.name, sighting.name.clone());
@@ -162,9 +162,8 @@ impl Tally {
         let expected = "the colour of a body or of a selected cube in these inputs";
         let finding = sighting.place(Finding::new(Code::UnseenColor, file.name(), expected, found));
         let like = most_like(&sighting.name, self.seen.iter().map(String::as_str));
-        let help = like.map(|like| format!("{} Otherwise {}", did_you_mean(like), Code::UnseenColor.help()));
-        Some(match help {
-            Some(help) => finding.with_help(help),
+        Some(match like {
+            Some(like) => finding.with_help(format!("{} Otherwise {}", did_you_mean(like), Code::UnseenColor.help())),
             None => finding,
         })
     }

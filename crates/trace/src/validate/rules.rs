@@ -226,28 +226,25 @@ impl Look<'_> {
     fn sequence(&mut self) {
         let t = self.values.as_primitive::<Int64Type>();
         for ends in self.episodes.offsets.windows(2) {
-            self.sequence_of(t, ends[0], ends[1]);
-        }
-    }
-
-    fn sequence_of(&mut self, t: &Int64Array, start: usize, end: usize) {
-        if let Some(first) = valid(t, start).filter(|first| *first != 1) {
-            self.report(Code::TStart, start, "t = 1 in the episode's first row".into(), format!("t = {first}"));
-        }
-        let mut reported = Vec::new();
-        for row in start + 1..end {
-            let (Some(before), Some(now)) = (valid(t, row - 1), valid(t, row)) else { continue };
-            let code = match now {
-                now if before.checked_add(1) == Some(now) => continue,
-                now if now == before => Code::TDuplicate,
-                1 => Code::EpisodeTwice,
-                now if now < before => Code::TOrder,
-                _ => Code::TGap,
-            };
-            if !reported.contains(&code) {
-                reported.push(code);
-                let expected = format!("t = {}, one more than in the row before", before.saturating_add(1));
-                self.report(code, row, expected, format!("t = {now}"));
+            let start = ends[0];
+            if let Some(first) = valid(t, start).filter(|first| *first != 1) {
+                self.report(Code::TStart, start, "t = 1 in the episode's first row".into(), format!("t = {first}"));
+            }
+            let mut reported = Vec::new();
+            for row in start + 1..ends[1] {
+                let (Some(before), Some(now)) = (valid(t, row - 1), valid(t, row)) else { continue };
+                let code = match now {
+                    now if before.checked_add(1) == Some(now) => continue,
+                    now if now == before => Code::TDuplicate,
+                    1 => Code::EpisodeTwice,
+                    now if now < before => Code::TOrder,
+                    _ => Code::TGap,
+                };
+                if !reported.contains(&code) {
+                    reported.push(code);
+                    let expected = format!("t = {}, one more than in the row before", before.saturating_add(1));
+                    self.report(code, row, expected, format!("t = {now}"));
+                }
             }
         }
     }

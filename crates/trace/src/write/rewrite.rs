@@ -64,7 +64,7 @@ fn copied<W: Write + Send>(
     let old = metadata.file_metadata().schema_descr();
     let (schema, pairs) = match anew {
         Some((column, recording)) => (with_text(old, column).map_err(failed)?, with_recording(file, recording)),
-        None => (old.root_schema_ptr(), file.pairs().to_vec()),
+        None => (old.root_schema_ptr(), file.pairs.clone()),
     };
     let mut writer = SerializedFileWriter::new(Held::new(out), schema, properties(pairs)).map_err(failed)?;
     let input = file.reader().map_err(|source| TraceError::Read { what: file.name().to_owned(), source })?;
@@ -159,7 +159,7 @@ fn with_text(schema: &SchemaDescriptor, target: &str) -> parquet::errors::Result
 }
 
 fn with_recording(file: &TraceFile, recording: &serde_json::Value) -> Vec<KeyValue> {
-    let mut pairs = file.pairs().to_vec();
+    let mut pairs = file.pairs.clone();
     let value = Some(recording.to_string());
     match pairs.iter_mut().find(|pair| pair.key == RECORDING_KEY) {
         Some(pair) => pair.value = value,

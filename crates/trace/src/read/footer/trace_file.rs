@@ -41,15 +41,15 @@ pub struct TraceFile {
     domain: Domain,
     columns: Vec<FileColumn>,
     rows: Vec<usize>,
-    pairs: Vec<KeyValue>,
-    colors: Declared,
+    pub(crate) pairs: Vec<KeyValue>,
+    pub(crate) colors: Declared,
     experiments: Vec<DeclaredExperiment>,
     checksums: Checksums,
     /// The footer's statistics, in a file without checksums.
-    statistics: Statistics,
+    pub(crate) statistics: Statistics,
     footer: Mutex<Weak<Readable>>,
-    expansion: Arc<Expansion>,
-    episodes: EpisodeBudget,
+    pub(crate) expansion: Arc<Expansion>,
+    pub(crate) episodes: EpisodeBudget,
 }
 
 /// The parts of a file that a reader needs.
@@ -121,14 +121,6 @@ impl TraceFile {
         Ok(Store::new(file, Arc::clone(&self.expansion)))
     }
 
-    pub(crate) fn expansion(&self) -> &Arc<Expansion> {
-        &self.expansion
-    }
-
-    pub(crate) fn episodes(&self) -> &EpisodeBudget {
-        &self.episodes
-    }
-
     /// Its path, for engines that read files themselves.
     pub fn path(&self) -> &Path {
         &self.input.path
@@ -190,20 +182,8 @@ impl TraceFile {
         self.checksums
     }
 
-    pub(crate) fn statistics(&self) -> &Statistics {
-        &self.statistics
-    }
-
-    pub(crate) fn pairs(&self) -> &[KeyValue] {
-        &self.pairs
-    }
-
     pub fn palette(&self) -> Option<&Palette> {
         self.colors.palette.as_ref()
-    }
-
-    pub(crate) fn colors(&self) -> &Declared {
-        &self.colors
     }
 
     /// The experiments in the footer, each once.

@@ -13,7 +13,7 @@ use pyo3::prelude::*;
 use world::agent::Player;
 use world::agent::exec::Images;
 use world::agent::function::{Function, FunctionPlayer, Listener};
-use world::record::folder_lock::parts_of;
+use world::record::lock::parts_of;
 
 use crate::answer::{self, Answer};
 use crate::error;
@@ -70,7 +70,6 @@ impl PythonAgent {
     }
 }
 
-/// The listener for one episode.
 fn listener(function: Py<PyAny>, failed: impl Fn(Python<'_>, PyErr) -> String + Send + 'static) -> Listener {
     Box::new(move |message| {
         let message = serde_json::to_string(message).map_err(|fault| fault.to_string())?;

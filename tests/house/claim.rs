@@ -3,7 +3,7 @@
 
 use std::fs;
 
-use world::record::folder_lock::FolderLock;
+use world::record::lock::FolderLock;
 
 #[test]
 fn the_last_process_removes_the_shared_files() {

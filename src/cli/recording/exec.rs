@@ -3,9 +3,9 @@
 use std::path::Path;
 use std::time::Duration;
 
-use crate::cli::outcome::Failure;
+use crate::cli::Failure;
 use world::agent::exec::{Exec, Images, Settings};
-use world::record::folder_lock::parts_of;
+use world::record::lock::parts_of;
 
 /// The folder inside a recording's folder for the standard error of programs.
 const STANDARD_ERROR: &str = "stderr";
@@ -14,10 +14,10 @@ const STANDARD_ERROR: &str = "stderr";
 #[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "With --agent exec:'CMD'")]
 pub struct ExecArgs {
-    /// The passing of frames to the program
+    /// How the program gets frames
     #[arg(long, value_enum, default_value_t)]
     exec_images: ExecImages,
-    /// Seconds for one reply, the first one with the program's start
+    /// Seconds for one reply; the first includes the program's start
     #[arg(long, value_name = "SECONDS", default_value_t = 180, value_parser = clap::value_parser!(u64).range(1..=86_400))]
     exec_timeout: u64,
 }
@@ -25,10 +25,10 @@ pub struct ExecArgs {
 /// The passing of frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 enum ExecImages {
-    /// A PNG file, which is there until the episode ends
+    /// A PNG file, kept until the episode ends
     #[default]
     Path,
-    /// PNG in base64, within the line
+    /// PNG in base64, in the line
     Base64,
 }
 

@@ -7,8 +7,7 @@ use std::thread::sleep;
 use std::time::Duration;
 
 use serde_json::Value;
-use world::record::folder_lock::FolderLock;
-use world::record::lock::{Attempt, EpisodeLock};
+use world::record::lock::{Attempt, EpisodeLock, FolderLock};
 
 use super::recordings::Bench;
 use crate::harness::files::{Contents, assert_same, write_small_world};

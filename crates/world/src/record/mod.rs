@@ -25,4 +25,4 @@ pub mod unusable;
 use folder::continued;
 #[cfg(feature = "view")]
 pub use folder::participants;
-pub use folder::{failures, folder_lock, index, lock, store};
+pub use folder::{failures, index, lock, store};

@@ -148,10 +148,6 @@ impl<'a> Queue<'a> {
         self.waiting().keys.push_back(key);
     }
 
-    pub fn left_out(&self) -> usize {
-        self.waiting().left_out
-    }
-
     /// Notes that a taken episode is recorded or lost.
     pub fn ended(&self, key: &Key, lost: Option<LostEpisode>) {
         self.waiting().end(key, lost);
@@ -162,13 +158,11 @@ impl<'a> Queue<'a> {
         std::mem::take(&mut self.waiting().complete)
     }
 
-    pub fn has_more(&self) -> bool {
-        !self.waiting().keys.is_empty()
-    }
-
-    /// The episodes that other processes have recorded in the meantime.
-    pub fn elsewhere(&self) -> Vec<Key> {
-        self.waiting().elsewhere.clone()
+    /// Once no thread uses the queue: the episodes that other processes have recorded in the meantime, the number
+    /// without a player, and true if episodes remain.
+    pub(super) fn into_rest(self) -> (Vec<Key>, usize, bool) {
+        let rest = self.waiting.into_inner().unwrap_or_else(PoisonError::into_inner);
+        (rest.elsewhere, rest.left_out, !rest.keys.is_empty())
     }
 
     fn waiting(&self) -> MutexGuard<'_, Waiting> {

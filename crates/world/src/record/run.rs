@@ -139,8 +139,8 @@ impl Recording<'_> {
                 (0..threads).map(|at| scope.spawn(move || self.thread(queue, unusable, share(at)))).collect();
             workers.into_iter().map(|worker| worker.join().unwrap_or_else(|_| Err(panicked()))).collect::<Vec<_>>()
         });
-        let (elsewhere, given_up) = (queue.elsewhere(), unusable.given_up());
-        let (stopped, left_out) = (queue.has_more(), queue.left_out());
+        let (elsewhere, left_out, stopped) = queue.into_rest();
+        let given_up = unusable.given_up();
         let mut tally = Tally { left_out, elsewhere, stopped, given_up, ..Tally::default() };
         for result in results {
             let part = result?;

@@ -29,8 +29,7 @@ pub struct Recipe {
 
 impl Recipe {
     /// Parses the value of `mirrorstats.recording`.
-    pub fn of(recording: Option<&Json>) -> Result<Self, ReplayError> {
-        let recording = recording.ok_or(ReplayError::NoRecipe)?;
+    pub fn of(recording: &Json) -> Result<Self, ReplayError> {
         // This check is first: a world of another version may lack values that this one has.
         let version = recording.get("scene_version").ok_or(ReplayError::NoRecipe)?;
         if !SCENE_VERSIONS.iter().any(|drawn| *version == *drawn) {

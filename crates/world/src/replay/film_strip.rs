@@ -17,7 +17,6 @@ use trace::log::read::{Event, LogReader, png};
 use trace::log::recover::ended;
 use trace::merge::{self, EpisodeRows};
 use trace::open::TraceSet;
-use trace::schema::RECORDING_KEY;
 
 /// The maximum pixels of a frame, 2048 x 2048: a small file may decode to many pixels of four bytes each.
 const LARGEST_FRAME: Limit = Limit::new("pixels in a frame", 1 << 22);
@@ -131,8 +130,7 @@ impl Strip {
         for (input, file) in traces.iter().zip(set.files()) {
             let rows = merge::read(&input.path).map_err(ReplayError::other)?;
             let Some(found) = rows.iter().find(|rows| rows.episode_id == self.episode) else { continue };
-            let recording = file.metadata_value(RECORDING_KEY).and_then(|text| serde_json::from_str(text).ok());
-            let recipe = Recipe::of(recording.as_ref())?;
+            let recipe = Recipe::of(&file.recording())?;
             return self.rendered(&recipe, found.episode().map_err(ReplayError::other)?).map(Some);
         }
         Ok(None)

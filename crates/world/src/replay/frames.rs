@@ -31,7 +31,7 @@ pub fn frames(
     episode: &Episode,
     steps: &RangeInclusive<i32>,
 ) -> Result<BTreeMap<i32, Vec<u8>>, ReplayError> {
-    let recipe = Recipe::of(recording)?;
+    let recipe = Recipe::of(recording.unwrap_or(&Value::Null))?;
     let mut camera = Camera::new(&recipe.config).map_err(ReplayError::other)?;
     let mut frames = BTreeMap::new();
     let mut eye = recipe.eye.clone();
@@ -56,5 +56,5 @@ pub fn frames(
 
 /// Returns true if a trace describes its world, and this program can build it.
 pub fn is_recipe(recording: Option<&Value>) -> bool {
-    Recipe::of(recording).is_ok()
+    recording.is_some_and(|recording| Recipe::of(recording).is_ok())
 }

@@ -12,7 +12,7 @@ use crate::sim::world::World;
 use trace::episode::{Episode, Step};
 use trace::frame::Frame;
 use trace::log::message::Decision;
-use trace::log::write::{EpisodeLog, Form, Placed, Solid, View};
+use trace::log::write::{EpisodeLog, Form, Solid, View};
 
 static CENSUS: LazyLock<Value> = LazyLock::new(|| schema_for!(Visibility).to_value());
 
@@ -55,9 +55,8 @@ impl Log {
     pub fn seen(&mut self, seen: &Seen<'_>) -> Result<(), LogFault> {
         let png = seen.frame.map(|frame| frame.to_png()).transpose()?;
         let snapshot = seen.world.snapshot();
-        let placed: Vec<Placed> = snapshot.frames.iter().map(placed).collect();
         let solids: Vec<Solid> = snapshot.solids.iter().map(solid).collect();
-        let view = View { png, placed: &placed, solids: &solids, census: seen.visibility };
+        let view = View { png, placed: &snapshot.frames, solids: &solids, census: seen.visibility };
         Ok(self.file.seen(self.time(seen.t), &view)?)
     }
 
@@ -88,10 +87,6 @@ pub fn frame_time(seed: i32, run: i32, repetition: i32, t: i32) -> i64 {
 /// The time of a step in the log, never below 0.
 fn time(seed: i32, run: i32, repetition: i32, t: i32) -> u64 {
     u64::try_from(frame_time(seed, run, repetition, t)).unwrap_or(0)
-}
-
-fn placed(placed: &snapshot::Placed) -> Placed {
-    Placed { name: placed.name.clone(), position: placed.position, rotation: placed.rotation }
 }
 
 fn solid(solid: &snapshot::Solid) -> Solid {

@@ -19,7 +19,6 @@ use trace::error::TraceError;
 use trace::inputs::Input;
 use trace::open::TraceFile;
 use trace::renormalize::put_version;
-use trace::schema::RECORDING_KEY;
 use trace::write::merge::{self, NotAnEpisode};
 use trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
 
@@ -135,8 +134,7 @@ fn recipe(input: &Input) -> Result<(Value, Experiment), ReparseError> {
     if file.column("reply").is_none() {
         return Err(none("no such column"));
     }
-    let recording: Value =
-        file.metadata_value(RECORDING_KEY).and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default();
+    let recording = file.recording();
     let spec =
         serde_json::from_value::<Spec>(recording["experiment"].clone()).map_err(|fault| none(&fault.to_string()))?;
     Ok((recording, Experiment::of_footer(spec)))

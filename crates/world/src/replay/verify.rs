@@ -23,13 +23,12 @@ use trace::log::assemble;
 use trace::merge::{self, EpisodeRows};
 use trace::open::TraceSet;
 use trace::renderer::{self, Renderer};
-use trace::schema::RECORDING_KEY;
 
 /// One trace to replay.
 pub struct Recorded {
     pub path: PathBuf,
     pub rows: Vec<EpisodeRows>,
-    recording: Option<Value>,
+    recording: Value,
     recipe: Recipe,
 }
 
@@ -93,9 +92,9 @@ impl Recorded {
         let set = TraceSet::open(files).map_err(ReplayError::other)?;
         let mut traces = Vec::new();
         for (input, file) in files.iter().zip(set.files()) {
-            let recording = file.metadata_value(RECORDING_KEY).and_then(|text| serde_json::from_str(text).ok());
+            let recording = file.recording();
             let named = |fault| ReplayError::InTrace { trace: file.name().to_owned(), fault: Box::new(fault) };
-            let recipe = Recipe::of(recording.as_ref()).map_err(named)?;
+            let recipe = Recipe::of(&recording).map_err(named)?;
             let mut rows = merge::read(&input.path).map_err(ReplayError::other)?;
             rows.retain(|rows| episode.is_none_or(|id| rows.episode_id == id));
             traces.push(Self { path: input.path.clone(), rows, recording, recipe });
@@ -132,11 +131,10 @@ impl Recorded {
             }
         }
         if let Some(path) = &outputs.log {
-            let recording = self.recording.clone().unwrap_or(Value::Null);
-            assemble::write(path, &logs, &recording).map_err(ReplayError::other)?;
+            assemble::write(path, &logs, &self.recording).map_err(ReplayError::other)?;
         }
         if let Some(recount) = &outputs.recount {
-            let recording = recounted(self.recording.as_ref(), &eye);
+            let recording = recounted(&self.recording, &eye);
             merge::write(&recount.out, Some(&recording), &rewritten).map_err(ReplayError::other)?;
         }
         Ok(())
@@ -147,7 +145,7 @@ impl Recorded {
     /// The camera, if frames are to be written or compared.
     fn camera(&self, outputs: &Outputs, answer: &mut ReplayAnswer) -> Result<Option<Camera>, ReplayError> {
         let is_written = outputs.frames.is_some() || outputs.log.is_some();
-        let is_compared = has_digests(self.recording.as_ref()) && !outputs.skip_frames;
+        let is_compared = has_digests(&self.recording) && !outputs.skip_frames;
         if !is_written && !is_compared {
             return Ok(None);
         }
@@ -157,7 +155,7 @@ impl Recorded {
         };
         if is_compared {
             let frames = answer.frames.get_or_insert_default();
-            frames.add_trace(self.recording.as_ref(), camera.as_ref().ok().map(Camera::drawn_by));
+            frames.add_trace(&self.recording, camera.as_ref().ok().map(Camera::drawn_by));
             frames.not_compared = camera.as_ref().err().map(ToString::to_string);
         }
         Ok(camera.ok())
@@ -166,10 +164,10 @@ impl Recorded {
 
 impl FramesAnswer {
     /// Adds a trace: the recorded and the current renderer of its frames.
-    fn add_trace(&mut self, recording: Option<&Value>, drawn_with: Option<&Renderer>) {
+    fn add_trace(&mut self, recording: &Value, drawn_with: Option<&Renderer>) {
         self.tolerance = TOLERANCE;
         self.drawn_with = drawn_with.cloned();
-        for renderer in recording.map(renderer::of_recording).unwrap_or_default() {
+        for renderer in renderer::of_recording(recording) {
             if !self.recorded_with.contains(&renderer) {
                 self.recorded_with.push(renderer);
             }
@@ -198,8 +196,8 @@ impl FramesAnswer {
 }
 
 /// Returns true if the trace has digests of its agents' frames.
-fn has_digests(recording: Option<&Value>) -> bool {
-    recording.is_some_and(|recording| recording["frame_digest"].is_string())
+fn has_digests(recording: &Value) -> bool {
+    recording["frame_digest"].is_string()
 }
 
 impl Recount {
@@ -293,8 +291,8 @@ impl Counts {
     }
 }
 
-fn recounted(recording: Option<&Value>, eye: &WorldConfig) -> Value {
-    let mut recording = recording.cloned().unwrap_or_else(|| json!({}));
+fn recounted(recording: &Value, eye: &WorldConfig) -> Value {
+    let mut recording = recording.clone();
     recording["visibility_threshold_px"] = json!(eye.evidence.mirror_self_px);
     recording["visibility_grid"] = json!({ "width": eye.eye.width, "height": eye.eye.height_px });
     recording

@@ -6,24 +6,14 @@ use super::angle::Quaternion;
 use super::body::Piece;
 use super::model::{AGENTS, EYE_CAMERA, Item, Stage};
 use super::world::World;
+use trace::log::write::Placed;
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct Snapshot {
-    /// The moving bodies, each in the frame of the room: `agent0_trunk`, .. and `eye`.
+    /// The moving bodies, each in the frame of the room and with a name of its own: `agent0_trunk`, .. and `eye`.
     pub frames: Vec<Placed>,
     /// Every visible shape, in the frame of the room.
     pub solids: Vec<Solid>,
-}
-
-/// A named placement.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Placed {
-    /// Unique among the frames.
-    pub name: String,
-    /// m.
-    pub position: [f64; 3],
-    /// A unit quaternion: w, x, y, z.
-    pub rotation: [f64; 4],
 }
 
 /// A visible shape.

@@ -39,7 +39,8 @@ pub struct World {
     hand: VecDeque<[i32; 3]>,
     stage: Stage,
     beyond: Vec<Stage>,
-    labels: OnceCell<LabelImage>,
+    /// The label of every pixel of the eye's view, cached until something moves, for counts and pictures.
+    pub(super) labels: OnceCell<LabelImage>,
 }
 
 impl World {
@@ -126,11 +127,6 @@ impl World {
     /// The position and direction of the eye behind a pane.
     pub fn eye_beyond(&self, pane: usize) -> Pose {
         passage::eye(&self.config, &self.scene.panes[pane], self.ego.pose)
-    }
-
-    /// The label of every pixel of the eye's view, cached until something moves, for counts and pictures.
-    pub(super) fn labels_or(&self, cast: impl FnOnce() -> LabelImage) -> &LabelImage {
-        self.labels.get_or_init(cast)
     }
 
     /// The Manhattan distance from the hand to the mark, mm; `None` without a hand.

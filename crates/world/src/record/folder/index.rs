@@ -10,8 +10,7 @@ use serde_json::Value;
 
 use super::super::continued;
 use super::super::error::StoreError;
-use super::super::folder_lock;
-use super::super::lock::is_at;
+use super::super::lock::{is_at, parts_of};
 use super::super::metadata::{Recordings, difference};
 use super::super::plan::Subject;
 use crate::sim::Experiment;
@@ -117,7 +116,7 @@ impl RecordingIndex {
     }
 
     pub(in crate::record) fn parts_of(&self, experiment: &Experiment) -> Result<Vec<PathBuf>, StoreError> {
-        let parts = folder_lock::parts_of(&self.folder);
+        let parts = parts_of(&self.folder);
         if !parts.exists() {
             return Ok(Vec::new());
         }

@@ -2,7 +2,6 @@
 
 pub(super) mod continued;
 pub mod failures;
-pub mod folder_lock;
 pub mod index;
 pub mod lock;
 #[cfg(feature = "view")]

@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::super::folder_lock::FolderLock;
 use super::super::index::recording_of;
+use super::super::lock::FolderLock;
 use crate::agent::human::journal;
 use trace::labels;
 use trace::log::assemble;

@@ -15,31 +15,22 @@ use crate::experiment::spec::PaneKind;
 /// then flipped, since a camera cannot be mirrored.
 pub fn eye(config: &WorldConfig, pane: &HungPane, body: Pose) -> Pose {
     let eye = body.ahead(config.eye.forward);
-    match pane.kind {
-        PaneKind::Window => moved(config, pane, eye),
-        PaneKind::Mirror | PaneKind::Delayed | PaneKind::Decoy => mirrored(config, pane, eye),
-    }
-}
-
-/// Returns true if pictures through a pane are flipped.
-pub const fn is_flipped(pane: &HungPane) -> bool {
-    !matches!(pane.kind, PaneKind::Window)
-}
-
-fn mirrored(config: &WorldConfig, hung: &HungPane, eye: Pose) -> Pose {
-    let out = hung.place.heading();
+    let out = pane.place.heading();
     let [out_x, out_y] = out.direction();
-    let away = 2.0 * hung.place.distance(eye.spot(), config);
+    if pane.kind == PaneKind::Window {
+        let length = shift(config);
+        return Pose { x: eye.x - length * out_x, y: eye.y - length * out_y, heading: eye.heading };
+    }
+    let away = 2.0 * pane.place.distance(eye.spot(), config);
     // The middle of the two directions is at a right angle to the normal.
     let thirties = 2 * i16::from(out.thirties()) + 6 - i16::from(eye.heading.thirties());
     let heading = Heading::new(u8::try_from(thirties.rem_euclid(12)).unwrap_or(0));
     Pose { x: eye.x + away * out_x, y: eye.y + away * out_y, heading }
 }
 
-fn moved(config: &WorldConfig, hung: &HungPane, eye: Pose) -> Pose {
-    let [out_x, out_y] = hung.place.heading().direction();
-    let length = shift(config);
-    Pose { x: eye.x - length * out_x, y: eye.y - length * out_y, heading: eye.heading }
+/// Returns true if pictures through a pane are flipped.
+pub const fn is_flipped(pane: &HungPane) -> bool {
+    !matches!(pane.kind, PaneKind::Window)
 }
 
 /// The distance of the second room from the first, m: from a pane's face to the face of one on the wall across.

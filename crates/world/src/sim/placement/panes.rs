@@ -8,9 +8,8 @@ use super::super::body::Pose;
 use super::super::config::{WorldConfig, metres};
 use super::super::hand::Place;
 use super::super::rng::Rng;
-use super::super::scene::{Cube, HandShape, HandStart, HungPane, MirrorPlace, Other, Patch, WornMark, floor_plan};
+use super::super::scene::{HandShape, HandStart, HungPane, MirrorPlace, Other, Patch, Scene, WornMark, floor_plan};
 use super::{Drawing, is_in_view};
-use crate::experiment::Spec;
 use crate::experiment::spec::{BodyShown, Hand, Mark, MarkColor, Paint, Pane, PaneKind, Part, Stated, Wall, Wearer};
 use trace::palette::Color;
 
@@ -23,15 +22,10 @@ const STARTS: u32 = 2000;
 /// Separates this stream from the layout's.
 const PURPOSE: u64 = 0x7061_6e65_7300;
 
-/// The layout to which panes and marks are added.
+/// A scene without panes and marks, to which they are added.
 pub(super) struct Layout<'a> {
     pub config: &'a WorldConfig,
-    pub experiment: &'a Spec,
-    pub mirror: MirrorPlace,
-    pub body_color: Color,
-    pub cubes: &'a [Cube],
-    pub others: &'a [Other],
-    pub start: Pose,
+    pub scene: &'a Scene,
 }
 
 /// The draws in addition to the layout.
@@ -48,25 +42,25 @@ impl Layout<'_> {
         let stream = |at: u64| Rng::of(purpose ^ (PURPOSE + at), seed, run);
         // Separate streams, so that an unused one does not affect the others.
         let mut marks: Vec<WornMark> = Vec::new();
-        for (at, mark) in (16_u64..).zip(&self.experiment.marks) {
+        for (at, mark) in (16_u64..).zip(&self.scene.experiment.marks) {
             marks.extend(self.worn(*mark, &marks, &mut stream(at)));
         }
-        let hand = self.experiment.hand.and_then(|hand| self.hand(hand, &marks, &mut stream(32)));
+        let hand = self.scene.experiment.hand.and_then(|hand| self.hand(hand, &marks, &mut stream(32)));
         let mut others = stream(0);
         let another = match hand {
             Some(hand) => self.color_beside(hand, &marks, &mut others),
             None => self.another_color(&mut others),
         };
         let any = self.any_other_color(&mut others);
-        let stated_color = match self.experiment.stated_color {
+        let stated_color = match self.scene.experiment.stated_color {
             Stated::None => None,
             Stated::Candidate => Some(another),
             Stated::Random => Some(any),
         };
         let mut panes = Vec::new();
-        for (at, pane) in (1_u64..).zip(&self.experiment.panes) {
+        for (at, pane) in (1_u64..).zip(&self.scene.experiment.panes) {
             let mut chance = stream(at);
-            let place = if panes.is_empty() { self.mirror } else { self.place(pane, &panes, &mut chance) };
+            let place = if panes.is_empty() { self.scene.mirror } else { self.place(pane, &panes, &mut chance) };
             panes.push(self.hung(pane, place, another, &mut chance));
         }
         Extras { stated_color, panes, marks, hand }
@@ -75,8 +69,8 @@ impl Layout<'_> {
     /// A hand in neither the body's nor its mark's colour, which starts on the near side of the mirror, outside the
     /// body; `None` if no such place has the required distance.
     fn hand(&self, task: Hand, marks: &[WornMark], chance: &mut Rng) -> Option<HandStart> {
-        let taken = |color: Color| color == self.body_color || marks.iter().any(|mark| mark.color == color);
-        let palette = &self.experiment.layout.palette;
+        let taken = |color: Color| color == self.scene.body_color || marks.iter().any(|mark| mark.color == color);
+        let palette = &self.scene.experiment.layout.palette;
         let free: Vec<Color> = palette.iter().copied().filter(|color| !taken(*color)).collect();
         let color = if free.is_empty() { chance.one_of(palette) } else { chance.one_of(&free) };
         let shape = chance.one_of(&HandShape::ALL);
@@ -90,7 +84,7 @@ impl Layout<'_> {
         };
         let fits = |hand: &HandStart| {
             let steps: u32 = hand.from_mark.iter().map(|steps| steps.unsigned_abs()).sum();
-            let is_there = Place { task, patch, hand: *hand, config: self.config, body: self.start };
+            let is_there = Place { task, patch, hand: *hand, config: self.config, body: self.scene.start };
             (task.least..=task.most).contains(&steps) && is_there.is_free(hand.from_mark)
         };
         (0..STARTS).map(|_| draw(chance)).find(fits)
@@ -99,22 +93,23 @@ impl Layout<'_> {
     /// A colour other than those of the body, its mark and the hand, which would be invisible on a body of that colour.
     fn color_beside(&self, hand: HandStart, marks: &[WornMark], chance: &mut Rng) -> Color {
         let taken = |color: Color| {
-            color == self.body_color || color == hand.color || marks.iter().any(|mark| mark.color == color)
+            color == self.scene.body_color || color == hand.color || marks.iter().any(|mark| mark.color == color)
         };
-        let palette = &self.experiment.layout.palette;
+        let palette = &self.scene.experiment.layout.palette;
         let free: Vec<Color> = palette.iter().copied().filter(|color| !taken(*color)).collect();
         if free.is_empty() { self.any_other_color(chance) } else { chance.one_of(&free) }
     }
 
     fn another_color(&self, chance: &mut Rng) -> Color {
-        let candidates = if self.experiment.has_candidates() { self.cubes } else { &[] };
-        let colors: Vec<Color> = candidates.iter().map(|cube| cube.color).filter(|c| *c != self.body_color).collect();
+        let candidates = if self.scene.experiment.has_candidates() { self.scene.cubes.as_slice() } else { &[] };
+        let colors: Vec<Color> =
+            candidates.iter().map(|cube| cube.color).filter(|c| *c != self.scene.body_color).collect();
         if colors.is_empty() { self.any_other_color(chance) } else { chance.one_of(&colors) }
     }
 
     fn any_other_color(&self, chance: &mut Rng) -> Color {
-        let palette = &self.experiment.layout.palette;
-        let colors: Vec<Color> = palette.iter().copied().filter(|color| *color != self.body_color).collect();
+        let palette = &self.scene.experiment.layout.palette;
+        let colors: Vec<Color> = palette.iter().copied().filter(|color| *color != self.scene.body_color).collect();
         chance.one_of(&colors)
     }
 
@@ -130,7 +125,7 @@ impl Layout<'_> {
             MirrorPlace { wall, offset: Drawing { config, chance }.length(-slack, slack) }
         };
         let last = draw();
-        let unseen = |place: &MirrorPlace| !is_in_view(config, *place, self.start);
+        let unseen = |place: &MirrorPlace| !is_in_view(config, *place, self.scene.start);
         if unseen(&last) { last } else { (0..PLACES).map(|_| draw()).find(unseen).unwrap_or(last) }
     }
 
@@ -145,7 +140,7 @@ impl Layout<'_> {
         let center_height = pane.bottom_mm.map_or(mirror.center_height, |bottom| metres(bottom) + height / 2.0);
         let center_height = center_height.clamp(height / 2.0, room.height - height / 2.0);
         let color = match pane.color {
-            Paint::Own => self.body_color,
+            Paint::Own => self.scene.body_color,
             Paint::Other => another,
             Paint::Named(color) => color,
         };
@@ -157,7 +152,7 @@ impl Layout<'_> {
             height,
             center_height,
             delay: pane.delay,
-            paint: (!is_independent && color != self.body_color).then_some(color),
+            paint: (!is_independent && color != self.scene.body_color).then_some(color),
             double: is_independent.then(|| self.double(pane, place, color, chance)),
         }
     }
@@ -166,7 +161,7 @@ impl Layout<'_> {
     fn double(&self, pane: &Pane, place: MirrorPlace, color: Color, chance: &mut Rng) -> Other {
         let [out_x, out_y] = place.heading().direction();
         // The second room is the first one moved: its opening is in the wall across.
-        let (side, cubes) = if pane.kind == PaneKind::Window { (-1.0, &[][..]) } else { (1.0, self.cubes) };
+        let (side, cubes) = if pane.kind == PaneKind::Window { (-1.0, &[][..]) } else { (1.0, &self.scene.cubes[..]) };
         let plan = floor_plan(self.config, cubes);
         let half = self.config.room.size / 2.0;
         let mut draw = || {
@@ -186,11 +181,11 @@ impl Layout<'_> {
     /// A mark on a body, in a colour other than its wearer's and the earlier marks'.
     fn worn(&self, mark: Mark, before: &[WornMark], chance: &mut Rng) -> Option<WornMark> {
         let (wearer, body) = match mark.on {
-            Wearer::Own => (0, self.body_color),
-            Wearer::Other => (1, self.others.first()?.color),
+            Wearer::Own => (0, self.scene.body_color),
+            Wearer::Other => (1, self.scene.others.first()?.color),
         };
-        let is_free = |color: Color| color != body && color != self.body_color;
-        let palette = &self.experiment.layout.palette;
+        let is_free = |color: Color| color != body && color != self.scene.body_color;
+        let palette = &self.scene.experiment.layout.palette;
         let free: Vec<Color> = palette.iter().copied().filter(|color| is_free(*color)).collect();
         let unused: Vec<Color> =
             free.iter().copied().filter(|color| before.iter().all(|other| other.color != *color)).collect();

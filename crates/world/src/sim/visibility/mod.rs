@@ -28,26 +28,22 @@ impl World {
     /// The label of every pixel of the eye's view.
     pub fn labels(&self) -> &LabelImage {
         let eye = &self.config().eye;
-        self.labels_or(|| labels(self, eye.width as usize, eye.height_px as usize))
+        self.labels.get_or_init(|| labels(self, eye.width as usize, eye.height_px as usize))
     }
 
     /// The visible pixels of everything, directly and in the mirror.
     pub fn visibility(&self) -> Visibility {
-        take(self)
+        let mut tally = [0_u32; 256];
+        for code in &self.labels().codes {
+            tally[usize::from(*code)] += 1;
+        }
+        count::of_tally(&tally, self.scene())
     }
 
     /// Returns true if mirror evidence is in view, by the configured threshold.
     pub const fn is_mirror_visible(&self, visibility: &Visibility) -> bool {
         visibility.self_px >= self.config().evidence.mirror_self_px
     }
-}
-
-fn take(world: &World) -> Visibility {
-    let mut tally = [0_u32; 256];
-    for code in &world.labels().codes {
-        tally[usize::from(*code)] += 1;
-    }
-    count::of_tally(&tally, world.scene())
 }
 
 /// Returns, per geom, true if it may appear within these pixels of a view of this size; others do not change the

@@ -100,7 +100,6 @@ pub fn pack(truths: &[bool]) -> Vec<u8> {
     bytes
 }
 
-/// The number of set bits among `length` bits from `start`.
 pub fn count(data: &[u8], start: usize, length: usize) -> usize {
     (0..length).step_by(STEP).map(|at| wide(data, start, length, at).count_ones() as usize).sum()
 }

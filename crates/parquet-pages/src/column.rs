@@ -101,13 +101,11 @@ impl Column {
         values.as_any_dictionary_opt().map_or(values, |texts| texts.values())
     }
 
-    /// The keys and texts of a text column in the form of keys.
     pub fn byte_texts(&self) -> Option<(&UInt8Array, &StringArray)> {
         let Self::Keys(Keys { keys, values }) = self else { return None };
         values.as_string_opt().map(|texts| (keys, texts))
     }
 
-    /// The text at a row of a text column; `None` for null.
     pub fn text(&self, row: usize) -> Option<&str> {
         match self {
             Self::Flat(values) => text_at(values, row),
@@ -235,7 +233,6 @@ impl Runs {
         self.length
     }
 
-    /// `length` rows from row `start`, without copying.
     #[must_use]
     pub fn slice(&self, start: usize, length: usize) -> Self {
         Self { start: self.start + start, length, ..self.clone() }
@@ -259,7 +256,6 @@ impl Runs {
         self.starts().skip(1).filter(differs).map(|(start, _)| start)
     }
 
-    /// The text at a row; `None` for null.
     pub fn text(&self, row: usize) -> Option<&str> {
         text_at(&self.values, self.run_of(row))
     }
@@ -304,7 +300,6 @@ impl Runs {
     }
 }
 
-/// Returns true if every key is one of `count` values.
 pub(crate) fn all_within(keys: &[i32], count: usize) -> bool {
     // A negative key counts as a very large one.
     keys.iter().map(|key| key.cast_unsigned()).max().is_none_or(|largest| (largest as usize) < count)
@@ -315,7 +310,6 @@ pub fn text_at(column: &ArrayRef, row: usize) -> Option<&str> {
     DictionaryTexts::of(column).at(row)
 }
 
-/// A dictionary of texts: one key per row, one text per key.
 #[derive(Clone, Copy)]
 struct DictionaryTexts<'a> {
     keys: &'a Int32Array,
@@ -332,7 +326,6 @@ impl<'a> DictionaryTexts<'a> {
         self.keys.is_valid(row).then(|| self.keys.value(row).as_usize())
     }
 
-    /// The text at a row; `None` for null.
     fn at(self, row: usize) -> Option<&'a str> {
         self.key(row).map(|key| self.texts.value(key))
     }

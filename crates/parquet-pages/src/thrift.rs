@@ -70,7 +70,6 @@ impl<'a> Compact<'a> {
         Ok(Some(Field { id: id.ok_or(Fault::Invalid("a field number out of range"))?, wire }))
     }
 
-    /// The value of a 32-bit integer field.
     pub(crate) fn int(&mut self, field: Field) -> Result<i32, Fault> {
         if field.wire != Wire::I32 {
             return Err(Fault::Invalid("a field of another type"));

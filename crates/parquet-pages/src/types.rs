@@ -32,11 +32,7 @@ pub fn with_texts_as_keys(metadata: ParquetMetaData, is_text: &[bool]) -> Parque
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Refused {
     Unreadable(String),
-    /// An integer that does not fit, and its row.
-    TooLarge {
-        row: usize,
-        value: u64,
-    },
+    TooLarge { row: usize, value: u64 },
 }
 
 /// A column from the Parquet library, converted to `held`: truth values, 64 bits, or [`text_type`]. Checks that keys

@@ -62,7 +62,6 @@ pub fn copies(set: &TraceSet, may_be: BTreeSet<String>, threads: NonZeroUsize) -
     Ok(found)
 }
 
-/// The ids, and the bytes of each row without its id.
 fn without_ids(rows: &RecordBatch) -> Option<(&arrow::array::StringArray, Vec<Box<[u8]>>)> {
     let id = rows.schema().index_of(EPISODE_ID).ok()?;
     let ids = rows.column(id).as_string_opt::<i32>()?;

@@ -52,7 +52,6 @@ pub enum Severity {
     Note,
 }
 
-/// The table of codes: severity, stable name, rule and remedy of each.
 macro_rules! codes {
     ($(#[$doc:meta] $code:ident, $severity:ident, $name:literal: $rule:literal, $help:literal;)+) => {
         /// A rule of the schema; the name in kebab case is stable.
@@ -199,7 +198,6 @@ impl Code {
         self.entry().0
     }
 
-    /// The stable name, `t-gap`.
     pub const fn name(self) -> &'static str {
         self.entry().1
     }
@@ -264,7 +262,6 @@ impl Finding {
         self
     }
 
-    /// Sets the timestep, if known.
     #[must_use]
     pub fn at(mut self, t: impl Into<Option<i64>>) -> Self {
         self.t = t.into();
@@ -277,7 +274,6 @@ impl Finding {
         self
     }
 
-    /// Replaces the code's own remedy.
     #[must_use]
     pub fn with_help(mut self, help: impl Into<String>) -> Self {
         self.help = help.into();

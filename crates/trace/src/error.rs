@@ -1,5 +1,3 @@
-//! Errors of reading and writing traces.
-
 use std::io;
 use std::path::Path;
 

@@ -59,7 +59,6 @@ fn entries(folder: &Path) -> Result<Vec<PathBuf>, GlobError> {
     names.collect::<Result<_, _>>().map_err(failed)
 }
 
-/// A folder and all those below it.
 fn below(folder: &Path) -> Result<Vec<PathBuf>, GlobError> {
     let mut all = vec![folder.to_owned()];
     let mut at = 0;

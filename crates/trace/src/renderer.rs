@@ -38,7 +38,6 @@ pub fn of_recording(recording: &Value) -> Vec<Renderer> {
     once(parts.filter_map(|parts| serde_json::from_value(parts["renderer"].clone()).ok()))
 }
 
-/// The renderers of some traces, each once.
 pub fn of_files(files: &[TraceFile]) -> Vec<Renderer> {
     once(files.iter().flat_map(|file| of_recording(&file.recording())))
 }

@@ -64,7 +64,6 @@ pub struct EpisodeBatch {
     pub texts: Vec<Texts>,
     /// One row per episode: [`EPISODE_COLUMNS`], then the columns of [`Projection::constants`], those of labels last.
     pub episodes: RecordBatch,
-    /// The location of the first row.
     pub origin: Origin,
 }
 
@@ -81,14 +80,12 @@ pub struct Texts {
 }
 
 impl Texts {
-    /// `length` rows from row `start`, without copying.
     #[must_use]
     pub fn slice(&self, start: usize, length: usize) -> Self {
         Self { keys: self.keys.slice(start, length), ..self.clone() }
     }
 }
 
-/// A row of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Origin {
     /// The file's position in [`TraceSet::files`].
@@ -180,7 +177,6 @@ impl TraceSet {
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct EpisodePlace {
-    /// The file's position in [`TraceSet::files`].
     pub file: usize,
     /// Its rows, counted from the start of the file.
     pub rows: Range<usize>,
@@ -215,7 +211,6 @@ struct Checked<T, E> {
     result: Result<Result<T, E>, Box<Finding>>,
 }
 
-/// Maps the layout's columns to those of a batch.
 struct Shape<'a> {
     layout: &'a Layout,
     steps: Vec<usize>,
@@ -252,7 +247,6 @@ impl<'a> Shape<'a> {
         Ok(EpisodeBatch { offsets: episodes.offsets, steps, texts, episodes: constants, origin })
     }
 
-    /// Some columns of the layout, `rows` values each.
     fn part(
         &self,
         places: &[usize],

@@ -79,7 +79,6 @@ fn sound(input: &Input, threads: NonZeroUsize) -> Result<(u64, u64), TraceError>
     checked.errors().map(|()| counts)
 }
 
-/// Compares the bytes of each column.
 fn compare(old: &TraceFile, new: &TraceFile) -> Result<(), TraceError> {
     let chunks = |file: &TraceFile| {
         let footer = file.footer_again(Extent::Whole)?;

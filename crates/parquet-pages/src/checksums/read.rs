@@ -1,5 +1,3 @@
-//! Compares checksums with the bytes of a file.
-
 use std::io::Read as _;
 use std::sync::Arc;
 

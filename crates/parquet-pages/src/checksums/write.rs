@@ -1,5 +1,3 @@
-//! Adds checksums to a file while it is written.
-
 use std::io::{self, Write};
 
 use memchr::memmem;
@@ -50,7 +48,6 @@ impl<W: Write> Held<W> {
         self.bytes.get(at(start)?..at(end)?)
     }
 
-    /// Passes on the held bytes, without checksums.
     pub fn release(mut self) -> Result<W> {
         self.out.write_all(&self.bytes)?;
         self.out.flush()?;

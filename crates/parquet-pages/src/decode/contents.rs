@@ -237,7 +237,6 @@ fn ones(stored: Bytes, count: usize) -> Result<usize, Unsupported> {
     hybrid.finish().map(|()| ones)
 }
 
-/// Visits all of `count` numbers.
 fn each_span(hybrid: &mut Hybrid, mut count: usize, mut take: impl FnMut(Span<'_>)) -> Result<(), Unsupported> {
     while count > 0 {
         let span = hybrid.span(count)?;

@@ -36,7 +36,6 @@ pub struct Cursor {
     unread: usize,
 }
 
-/// A page of values and its unread rest.
 struct DataPage {
     rows: usize,
     valid: usize,
@@ -183,7 +182,6 @@ impl Cursor {
         self.page.take().map_or(Ok(()), |page| page.finish())
     }
 
-    /// The next page with values; reads a dictionary before it.
     fn next_page(&mut self) -> Result<Option<DataPage>, Unsupported> {
         loop {
             let Some(page) = self.pages.get_next_page().map_err(|_| Unsupported)? else { return Ok(None) };

@@ -1,5 +1,3 @@
-//! The distinct values of a column.
-
 use std::sync::Arc;
 
 use arrow::array::{
@@ -29,7 +27,6 @@ impl Dictionary {
         Ok(Self::Texts(Arc::new(texts.finish())))
     }
 
-    /// Integers of 32 or 64 bits.
     pub(crate) fn ints(data: &[u8], count: usize, long: bool) -> Result<Self, Unsupported> {
         let ints: Vec<i64> = if long {
             data.as_chunks().0.iter().map(|bytes| i64::from_le_bytes(*bytes)).collect()

@@ -19,7 +19,6 @@ pub struct Library {
     pub metadata: Arc<ParquetMetaData>,
     pub checksums: ChunkChecksums,
     pub row_groups: Vec<usize>,
-    /// The slot for the first fault of a page.
     pub slot: FaultSlot,
     /// True if texts are needed row by row, not as keys into a dictionary.
     pub writes_out: bool,
@@ -64,7 +63,6 @@ impl RowGroups for Library {
     }
 }
 
-/// The pages of one column, row group by row group.
 struct Chunks<I>(I);
 
 impl<I: Iterator> Iterator for Chunks<I> {

@@ -1,5 +1,3 @@
-//! Decodes pages: by the short cut, or through the Parquet library after a check.
-
 pub(crate) mod contents;
 pub(crate) mod cursor;
 mod delta;

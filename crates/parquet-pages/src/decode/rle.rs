@@ -203,7 +203,6 @@ impl Packed<'_> {
         });
     }
 
-    /// Passes all numbers to `take`, in blocks.
     pub(crate) fn blocks<E>(&self, mut take: impl FnMut(&[i32]) -> Result<(), E>) -> Result<(), E> {
         let mut numbers = [0_i32; 64];
         for first in (0..self.count).step_by(numbers.len()) {

@@ -10,7 +10,6 @@ use parquet::file::metadata::{ColumnChunkMetaData, ParquetMetaData, RowGroupMeta
 use crate::checksums::{self, ChunkChecksums};
 use crate::expansion::Expansion;
 
-/// One column of one row group of a file.
 #[derive(Clone, Copy)]
 pub struct Place<'a> {
     pub metadata: &'a ParquetMetaData,
@@ -86,7 +85,6 @@ impl Store {
         }
     }
 
-    /// `length` bytes from `start` on, or fewer at the end.
     pub(crate) fn read(&self, start: u64, length: usize) -> io::Result<Bytes> {
         match &self.held {
             Held::File(file) => {

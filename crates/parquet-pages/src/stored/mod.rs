@@ -1,5 +1,3 @@
-//! Stored pages: read, compared with the footer and their checksums, decompressed.
-
 pub(crate) mod bytes;
 pub(crate) mod header;
 pub(crate) mod reader;

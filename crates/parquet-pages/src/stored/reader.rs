@@ -16,7 +16,6 @@ pub(crate) struct Pages {
     stored: Arc<Verified>,
     inner: SerializedPageReader<Verified>,
     next: Option<Page>,
-    /// Checks the contents of pages, for a decoder that does not.
     contents: Option<Contents>,
 }
 

@@ -59,7 +59,6 @@ impl Answered {
     }
 }
 
-/// The column names of a key: of the answer, and of its truth.
 pub fn columns_of(key: &str) -> [String; 2] {
     PREFIXES.map(|prefix| format!("{prefix}{key}"))
 }
@@ -102,7 +101,6 @@ pub(crate) fn declared(experiment: &Json) -> Vec<DeclaredColumn> {
     columns.flatten().filter(|column| is_answer(&column.name)).collect()
 }
 
-/// The same, as columns for a writer.
 pub(crate) fn columns(experiment: &Json) -> Vec<&'static Column> {
     declared(experiment).iter().filter_map(|column| known(&column.name, column.kind)).collect()
 }

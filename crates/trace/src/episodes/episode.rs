@@ -68,13 +68,9 @@ pub enum Action {
     Done,
     HandUp,
     HandDown,
-    /// The hand moves one step left in the picture.
     HandLeft,
-    /// The hand moves one step right in the picture.
     HandRight,
-    /// The hand moves one step away from the camera.
     HandForward,
-    /// The hand moves one step towards the camera.
     HandBackward,
 }
 
@@ -101,7 +97,6 @@ exact::names!(Action {
     HandBackward: "hand_backward",
 });
 
-/// Optional fields, which the JSON leaves out if they have no value.
 macro_rules! optional {
     ($(#[$about:meta])+ $name:ident { $($field:ident: $type:ty,)+ }) => {
         $(#[$about])+

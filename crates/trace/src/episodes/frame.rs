@@ -1,5 +1,3 @@
-//! One picture in memory.
-
 #[cfg(feature = "sim")]
 use std::sync::OnceLock;
 
@@ -28,7 +26,6 @@ impl Frame {
     }
 }
 
-/// The number of blocks in a row of a digest.
 const COLUMNS: usize = 8;
 const ROWS: usize = 6;
 const HASH_DIGITS: usize = 16;
@@ -68,7 +65,6 @@ fn levels(digits: &str) -> Option<Vec<u8>> {
 }
 
 impl Frame {
-    /// The digest, for the column `frame_digest`.
     pub fn digest(&self) -> String {
         let hash = hash::of_bytes(&self.rgb);
         let blocks = (0..ROWS).flat_map(|row| (0..COLUMNS).map(move |column| [column, row]));

@@ -1,5 +1,3 @@
-//! One episode: steps, hash, pictures, colours, labels, losses, replies.
-
 pub mod answers;
 pub mod episode;
 pub mod episode_hash;

@@ -14,7 +14,6 @@ use exact::escape::visible;
 use parquet_pages::Column;
 
 pub const REPLY_STATUS: &str = "reply_status";
-/// The statuses of replies with a decision.
 const READ: [&str; 2] = ["ok", "repaired"];
 
 pub fn statuses() -> &'static [&'static str] {
@@ -45,7 +44,6 @@ impl ReplyCounts {
         }
     }
 
-    /// The number of replies without a decision, of any status.
     pub fn all_unreadable(&self) -> u64 {
         self.unreadable.values().sum()
     }

@@ -45,7 +45,6 @@ pub struct Registration {
     pub definitions: Option<String>,
 }
 
-/// The common declarations of some files.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Declared {
     /// The origin of the rows, if all files declare the same; a reconstruction if any file is one.

@@ -1,5 +1,3 @@
-//! Declarations of a footer: clusters, experiments, answering models, checksums.
-
 pub mod answered;
 pub mod checksums;
 pub mod declared;

@@ -12,7 +12,6 @@ use crate::schema::rules::{Known, Requirement, Rule, rules_of};
 use crate::schema::{COLUMNS, Column, Kind, Stored};
 use exact::suggest::nearest;
 
-/// A column outside the schema.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Own {
     pub name: String,
@@ -26,7 +25,6 @@ pub(super) struct Columns {
     own: IndexMap<String, Inferred>,
 }
 
-/// The inferred type of an own column.
 #[derive(Debug, Default)]
 struct Inferred {
     kind: Option<Kind>,

@@ -13,7 +13,6 @@ const TOLD: usize = 10;
 /// Columns of the mirror's steps. If all are missing, the steps belong to another domain.
 const OF_MIRRORS: [&str; 3] = ["body_color", "action", "self_color"];
 
-/// The faults so far: the first ones, and the number of others.
 #[derive(Debug, Default)]
 pub(super) struct Faults {
     told: Vec<Fault>,
@@ -96,7 +95,6 @@ impl fmt::Display for Place {
     }
 }
 
-/// One problem of a line, or of a file without lines.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Fault {
     pub file: String,

@@ -78,7 +78,6 @@ impl Index {
     }
 }
 
-/// The first place where t does not increase by one.
 fn sequence_fault(id: &str, episode: &[Step], texts: &[Text]) -> Option<Fault> {
     let place = |step: &Step| texts[step.text].place(step.line);
     let of = format!("of episode `{}`", visible(id));

@@ -16,7 +16,6 @@ pub struct Mapping {
     dropped: BTreeMap<String, u64>,
 }
 
-/// A row of any format: keys and values, which may be nested.
 pub(super) type Row<'a> = [(&'a str, &'a Value)];
 
 /// The path to a value in a line: keys and positions separated by dots, and an integer to add to the value.

@@ -49,7 +49,6 @@ use line::Members;
 /// Limits on the values of steps beyond the schema, and the trace's declarations about them.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Limits<'a> {
-    /// The known experiments, the domain, and its declared columns.
     pub expected: Expected<'a>,
     /// The name of the domain; the mirror if `None`.
     pub domain: Option<&'a str>,
@@ -183,7 +182,6 @@ fn write(
     Ok(file.finish(Some(rows)).map_err(failed)?)
 }
 
-/// Puts the values of a line into the columns of a trace.
 fn add(rows: &mut Gathered, members: &Members) -> Result<(), ()> {
     for (field, values) in rows.layout.fields().iter().zip(&mut rows.columns) {
         let value = members.iter().find(|(key, _)| key == field.name()).map(|(_, value)| value);

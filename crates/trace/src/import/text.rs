@@ -41,7 +41,6 @@ pub(super) struct Source {
     pub(super) mapping: Value,
 }
 
-/// One line that is not blank.
 #[derive(Debug)]
 pub(super) struct Line {
     pub(super) place: Place,

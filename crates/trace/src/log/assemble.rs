@@ -120,7 +120,6 @@ fn copy_all<W: Write + Seek>(
     Ok(())
 }
 
-/// A log that is copied episode by episode.
 struct Source {
     path: PathBuf,
     messages: Messages,

@@ -1,5 +1,3 @@
-//! Errors of a log.
-
 use std::io;
 use std::path::Path;
 

@@ -19,7 +19,6 @@ use super::records::{Piece, Records};
 use super::topic;
 use crate::episode::{Episode, Step};
 
-/// The positions of a log's steps.
 #[derive(Debug)]
 pub struct LogIndex {
     path: PathBuf,
@@ -364,7 +363,6 @@ fn rgba(color: Numbers) -> [f64; 4] {
     [color.x, color.y, color.z, color.w]
 }
 
-/// A vector rotated by a unit quaternion.
 fn turned(turn: Numbers, vector: [f64; 3]) -> [f64; 3] {
     let cross =
         |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];

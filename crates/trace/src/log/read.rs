@@ -119,7 +119,6 @@ impl Messages {
         Ok(Self { path: path.to_owned(), records, channels, chunk: Unpacked::default(), at: 0, has_ended: false })
     }
 
-    /// The error for a message with invalid contents in the last chunk.
     pub(super) fn damaged(&self, fault: &str) -> LogError {
         let fault = format!("in the chunk at byte {}, {fault}", self.at);
         LogError::Damaged { file: self.path.display().to_string(), fault }

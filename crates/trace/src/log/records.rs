@@ -17,7 +17,6 @@ use exact::input;
 /// The header of a chunk without the name of its compression.
 const CHUNK_HEADER: usize = 8 + 8 + 8 + 4 + 4 + 8;
 
-/// The content at an offset of the file.
 #[derive(Debug)]
 pub(super) enum Piece {
     Record(Record<'static>),
@@ -32,7 +31,6 @@ pub(super) enum Piece {
 pub(super) struct Records<R> {
     bytes: R,
     at: u64,
-    /// The number of bytes.
     pub(super) end: u64,
     /// The damage in the record before, to be reported next.
     damage: Option<String>,

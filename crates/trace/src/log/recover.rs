@@ -66,7 +66,6 @@ impl Losses {
         *self != Self::default()
     }
 
-    /// One of the losses in words; `None` if there are none.
     pub fn first(&self) -> Option<String> {
         let episode = self.episodes.first().map(|lost| format!("the episode `{}`: {}", lost.episode_id, lost.reason));
         let told = self.damage.first().or(self.cut.as_ref()).or(self.recording.as_ref()).cloned();

@@ -75,7 +75,6 @@ const ROOM: &str = "room";
 pub struct EpisodeLog {
     path: PathBuf,
     out: Writer<Out>,
-    /// The number of each topic.
     channels: BTreeMap<&'static str, u16>,
     sequence: u32,
     is_read_meanwhile: bool,
@@ -97,7 +96,6 @@ impl EpisodeLog {
         Ok(log)
     }
 
-    /// Adds the perception before a step.
     pub fn seen<C: Serialize>(&mut self, time: u64, view: &View<'_, C>) -> Result<(), LogError> {
         let stamp = Timestamp::new_checked(u32::try_from(time / 1_000_000_000).unwrap_or(u32::MAX), 0);
         if let Some(png) = view.png {

@@ -15,7 +15,6 @@ pub(crate) const LONGEST_NAME: Limit = Limit::new("bytes in a name", 1024);
 /// The most steps of an episode, which is held in memory as a whole.
 pub(crate) const LONGEST_EPISODE: Limit = Limit::new("steps in an episode", 1 << 22);
 
-/// The most columns of a file.
 pub(crate) const MOST_COLUMNS: Limit = Limit::new("columns in a file", 10_000);
 
 pub(crate) fn most_rows(bytes: u64) -> Limit {

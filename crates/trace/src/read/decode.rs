@@ -33,7 +33,6 @@ const BATCH_ROWS: usize = 32 * 1024;
 /// of texts differ.
 const BATCH_TEXT: u64 = 64 << 20;
 
-/// Some rows of one row group, with the columns of the layout in order.
 #[derive(Clone, Debug)]
 pub(crate) struct Rows {
     pub(crate) columns: Vec<Column>,
@@ -47,7 +46,6 @@ impl Rows {
         self.columns[T].len()
     }
 
-    /// `length` rows from row `start`, without copying.
     pub(crate) fn slice(&self, start: usize, length: usize) -> Self {
         let columns = self.columns.iter().map(|column| column.slice(start, length)).collect();
         let whole = self.whole && start + length == self.len();
@@ -65,7 +63,6 @@ pub(crate) struct Ids {
     pub(crate) ends: bool,
 }
 
-/// The rows of one row group, in order, until its end or its first fault.
 pub(crate) struct RowGroup<'a> {
     file: &'a TraceFile,
     layout: &'a Layout,
@@ -91,7 +88,6 @@ enum Source {
     Library(Box<Library>),
 }
 
-/// A column decoded by the Parquet library, this many rows at a time.
 struct Library {
     reader: ParquetRecordBatchReader,
     held: Vec<ArrayRef>,

@@ -1,5 +1,3 @@
-//! Runs work on several threads, with results in order.
-
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
 use std::sync::atomic::{AtomicUsize, Ordering};

@@ -1,5 +1,3 @@
-//! Reads traces from bytes to complete episodes, in the order of the files.
-
 pub(crate) mod budget;
 mod checks;
 pub(crate) mod decode;

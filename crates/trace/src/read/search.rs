@@ -22,7 +22,6 @@ const AROUND: usize = 40;
 pub struct Found {
     /// The first step with a match.
     pub t: i64,
-    /// The column of that match.
     pub column: String,
     pub excerpt: String,
     /// The number of steps with a match.

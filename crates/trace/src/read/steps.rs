@@ -46,7 +46,6 @@ pub struct Steps {
     threads: NonZeroUsize,
 }
 
-/// The types of the output rows.
 #[derive(Clone)]
 struct Shape {
     schema: SchemaRef,
@@ -161,7 +160,6 @@ fn data_type(set: &TraceSet, name: &str, kind: Kind) -> DataType {
     known.map_or(kind.data_type(), Stored::data_type)
 }
 
-/// The fields with `Utf8View` for each kind of text.
 fn with_views(fields: &Fields) -> Fields {
     let viewed = |field: &Arc<Field>| {
         let held = if let DataType::Dictionary(_, values) = field.data_type() { values } else { field.data_type() };

@@ -1,5 +1,3 @@
-//! A column: its name, its type, its meaning, and the field behind it.
-
 use arrow::datatypes::DataType;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -24,7 +22,6 @@ pub struct Column {
     pub constant: bool,
     pub unit: Option<&'static str>,
     pub doc: &'static str,
-    /// The only values of the column, if they are fixed.
     pub values: &'static [&'static str],
     /// The first schema version with the column. In an older trace, a column of this name may mean something else.
     pub since: u32,
@@ -32,7 +29,6 @@ pub struct Column {
     /// `null` means that a missing column equals a column without values, so that definitions may read it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub default: Option<&'static str>,
-    /// The code of a finding about a text outside `values`.
     #[serde(skip)]
     pub rule: Option<Code>,
     #[serde(skip)]
@@ -58,7 +54,6 @@ pub(super) enum Scope {
     Every,
     /// Traces of any domain, if it has the schema's type.
     Any,
-    /// Those of the mirror's domain.
     #[default]
     Mirror,
 }

@@ -10,7 +10,6 @@ pub struct SchemaDocument {
     pub title: &'static str,
     pub description: &'static str,
     pub version: u32,
-    /// The columns, required ones first.
     pub columns: &'static [Column],
     pub metadata: &'static [MetadataKey],
     pub rules: Vec<Rule>,

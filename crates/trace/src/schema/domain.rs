@@ -39,7 +39,6 @@ struct DomainFile {
     column: IndexMap<String, DomainColumn>,
 }
 
-/// A column as declared in the file, which documents each key.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a key of the file")]

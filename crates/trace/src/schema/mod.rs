@@ -33,13 +33,9 @@ pub struct MetadataKey {
     pub doc: &'static str,
 }
 
-/// Footer key: the version of this schema, a decimal integer.
 pub const VERSION_KEY: &str = "mirrorstats.schema_version";
-/// Footer key: the program that wrote the file.
 pub(crate) const WRITER_KEY: &str = "mirrorstats.writer";
-/// Footer key: the circumstances of the recording, JSON.
 pub const RECORDING_KEY: &str = "mirrorstats.recording";
-/// Footer key: checksums of the columns and of the footer, JSON.
 pub(crate) const CHECKSUMS_KEY: &str = parquet_pages::checksums::KEY;
 
 pub const METADATA: &[MetadataKey] = &[

@@ -17,18 +17,14 @@ pub struct Rule<'a> {
 /// A rule's requirement. Only [`Present`](Self::Present) and [`Constant`](Self::Constant) are about nulls.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Requirement<'a> {
-    /// No null.
     Present,
-    /// No empty text.
     Name,
-    /// One of these texts.
     OneOf(&'static [&'static str]),
     /// One of the texts that the definitions declare.
     Among(&'a [String]),
     Color(ColorColumn, Option<&'a Palette>),
     /// An integer within these bounds of a type.
     Within(i64, i64, &'static str),
-    /// A non-negative number.
     Count,
     Constant,
     /// A known experiment; another rule requires a name.

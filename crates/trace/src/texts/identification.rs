@@ -15,7 +15,6 @@
 
 use crate::palette::Color;
 
-/// The version of the rule.
 pub const VERSION: &str = "1";
 
 /// The attribution if the agent says that it does not know.
@@ -104,7 +103,6 @@ fn is_about_oneself(clause: &[String]) -> bool {
 /// Words that introduce statements of others.
 const HEARSAY: [&str; 9] = ["told", "say", "says", "said", "stated", "states", "claimed", "claims", "prompt"];
 
-/// Returns true if the words say that the speaker does not know.
 fn is_ignorance(words: &[impl AsRef<str>]) -> bool {
     let has = |phrase: &str| {
         let length = phrase.split(' ').count();

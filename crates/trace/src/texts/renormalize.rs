@@ -25,12 +25,10 @@ use crate::write::rewrite::{Before, rewrite};
 use exact::budget::Budget;
 use exact::replace::{Content, FolderFiles, TemporaryFolder, folder_of, is_same_file, make_folder, replace_folder};
 
-/// The free text of the reply.
 const SOURCE: &str = "identification";
 const TARGET: &str = "self_color";
 /// The printed size of a flip, without its text.
 const PRINTED: usize = 1 << 10;
-/// The key of a recording for the version of the rule.
 const VERSION_KEY: &str = "identification_version";
 
 /// The changes.
@@ -80,7 +78,6 @@ pub struct Flip {
     pub identification: String,
 }
 
-/// An error of renormalizing traces.
 #[derive(Debug, thiserror::Error)]
 pub enum RenormalizeError {
     #[error(transparent)]
@@ -162,7 +159,6 @@ fn unwritable(path: &Path, source: io::Error) -> RenormalizeError {
     RenormalizeError::Unwritable { path: path.to_owned(), source }
 }
 
-/// A trace whose attributions can be derived again.
 #[derive(Debug)]
 struct Old {
     set: TraceSet,

@@ -20,7 +20,6 @@ use crate::schema::colors::spelling::{WORDS, did_you_mean, meant_by, most_like, 
 use crate::schema::colors::{ColorColumn, column};
 use parquet_pages::Column;
 
-/// A colour in one column of some episodes.
 pub(crate) struct Sighting {
     column: ColorColumn,
     name: String,

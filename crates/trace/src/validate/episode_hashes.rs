@@ -1,5 +1,3 @@
-//! Checks each episode's hash against its rows.
-
 use arrow::array::{Array as _, ArrayRef};
 
 use super::rules::Located;

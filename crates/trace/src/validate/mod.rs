@@ -56,7 +56,6 @@ pub struct CheckedFile {
     pub checksums: Checksums,
 }
 
-/// Findings left out of an abridged report.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rest<'a> {
     pub file: &'a str,
@@ -95,7 +94,6 @@ impl Validation {
     }
 }
 
-/// The requirements of definitions for traces.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Expected<'a> {
     /// The known experiments, besides those that the files declare; any if `None`.
@@ -117,7 +115,6 @@ pub fn validate(
     validate_as(inputs, Expected { experiments, ..Expected::default() }, threads)
 }
 
-/// Checks these files against the requirements of definitions.
 pub fn validate_as(inputs: &[Input], expected: Expected<'_>, threads: NonZeroUsize) -> Result<Validation, TraceError> {
     let mut report = Validation::default();
     let mut found: Vec<Vec<Finding>> = Vec::new();

@@ -17,7 +17,6 @@ use exact::escape::exact;
 use exact::suggest::nearest;
 use parquet_pages::{Column as Held, text_at};
 
-/// A finding and its row in the episodes.
 pub(crate) struct Located {
     pub(crate) row: usize,
     pub(crate) finding: Finding,
@@ -165,7 +164,6 @@ impl Look<'_> {
         }
     }
 
-    /// Adds one finding for each episode with a row that is `bad`.
     fn each_episode(&mut self, rule: &Rule<'_>, bad: impl Fn(usize) -> bool) {
         for ends in self.episodes.offsets.windows(2) {
             let mut rows = (ends[0]..ends[1]).filter(|row| bad(*row));

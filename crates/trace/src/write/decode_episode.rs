@@ -62,7 +62,6 @@ pub struct OwnColumn {
 }
 
 impl OwnColumn {
-    /// The values of all steps; `None` for null.
     pub fn values(&self) -> impl Iterator<Item = Option<Value<'_>>> {
         (0..self.values.len()).map(|row| value_at(&self.values, row))
     }

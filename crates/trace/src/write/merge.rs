@@ -228,7 +228,6 @@ fn episodes(rows: &RecordBatch) -> Result<Vec<EpisodeRows>, String> {
     Ok(found)
 }
 
-/// The rows of an episode, for a trace with these optional columns.
 pub fn rows(episode: &Episode, columns: &OptionalColumns) -> Result<EpisodeRows, TraceError> {
     let (columns, undeclared) = columns.split();
     write::check(episode, &columns, &undeclared, None)?;

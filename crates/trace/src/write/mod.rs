@@ -91,7 +91,6 @@ impl OptionalColumns {
         names.iter().all(|name| columns.given.iter().any(|column| column.name == *name)).then_some(columns)
     }
 
-    /// The columns with a value in one of these episodes.
     pub fn used_by<'a>(episodes: impl IntoIterator<Item = &'a Episode>) -> Self {
         let mut used = Vec::new();
         let mut unused: Vec<_> = COLUMNS.iter().filter(|column| !column.required).collect();
@@ -116,7 +115,6 @@ impl OptionalColumns {
     }
 }
 
-/// Encodes episodes as a trace into any output.
 pub struct TraceEncoder<W: Write + Send> {
     file: RowGroups<W>,
     columns: Vec<&'static Column>,

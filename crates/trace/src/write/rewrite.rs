@@ -141,7 +141,6 @@ fn write_texts<W: Write + Send>(
     column.close().map_err(failed)
 }
 
-/// The file's schema with the target as nullable text.
 fn with_text(schema: &SchemaDescriptor, target: &str) -> parquet::errors::Result<TypePtr> {
     let root = schema.root_schema();
     let fields = root.get_fields().iter().map(|field| {

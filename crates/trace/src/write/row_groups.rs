@@ -36,13 +36,11 @@ pub(crate) struct Gathered {
     pub(crate) rows: usize,
 }
 
-/// The values of one column of some rows.
 pub(crate) enum Values {
     Bool(BooleanBuilder),
     Int(Int64Builder),
     Float(Float64Builder),
     Text(StringBuilder),
-    /// Only nulls.
     Null(usize),
 }
 

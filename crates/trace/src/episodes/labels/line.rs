@@ -90,12 +90,7 @@ pub enum LabelsError {
     #[error("cannot write {}: {source}\n  help: is the folder writable, and the disk not full?", .path.display())]
     Write { path: PathBuf, source: io::Error },
     #[error("{}, line {line}: {problem}\n  help: correct or remove the line; docs/how-to/view.md has examples", .path.display())]
-    Line {
-        /// The list.
-        path: PathBuf,
-        line: usize,
-        problem: String,
-    },
+    Line { path: PathBuf, line: usize, problem: String },
     #[error("{}: {source}", .path.display())]
     Budget { path: PathBuf, source: Exceeded },
 }

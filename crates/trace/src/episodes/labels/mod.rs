@@ -43,7 +43,6 @@ pub fn lists_beside(traces: &[Input]) -> BTreeSet<PathBuf> {
     traces.iter().map(|input| list_beside(&input.path)).collect()
 }
 
-/// Adds a line to a list, which is created if needed.
 pub fn append(list: &Path, line: &LabelLine) -> Result<(), LabelsError> {
     let failed = |source| LabelsError::Write { path: list.to_owned(), source };
     let mut file = OpenOptions::new().create(true).append(true).read(true).open(list).map_err(failed)?;
@@ -112,7 +111,6 @@ pub struct Labels {
     notes: Vec<Box<str>>,
 }
 
-/// Texts by number.
 #[derive(Clone, Debug, Default)]
 struct Names {
     all: Vec<Arc<str>>,
@@ -138,7 +136,6 @@ struct Entry {
 enum State {
     Removed,
     Plain,
-    /// The number of a note.
     Note(u32),
 }
 
@@ -161,7 +158,6 @@ impl Names {
     }
 }
 
-/// The number of a word or a coder.
 fn narrow(number: u32) -> u16 {
     u16::try_from(number).unwrap_or(NONE)
 }

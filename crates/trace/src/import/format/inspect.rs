@@ -64,7 +64,6 @@ impl EvalArchive {
         Ok(Self { zip, names })
     }
 
-    /// Parses a member; the error says why it cannot be read.
     fn json<T: DeserializeOwned>(&mut self, name: &str) -> Result<T, String> {
         let bytes = self.bytes(name).map_err(|error| error.to_string())?;
         from_slice(&bytes).map_err(|error| error.to_string())

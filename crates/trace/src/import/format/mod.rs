@@ -24,15 +24,11 @@ use json::WithoutNan;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
-    /// One object per line.
     JsonLines,
-    /// A header and one record per step.
     Csv,
-    /// One row per step, in any shape.
     Parquet,
     /// A log of Inspect, `.eval` or `.json`.
     Inspect,
-    /// The `EvalLog` of inspect-robots.
     InspectRobots,
     /// `eval_info.json`, the folder of a data set, or Parquet files of its frames.
     LeRobot,

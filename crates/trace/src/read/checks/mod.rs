@@ -1,4 +1,2 @@
-//! Checks of stored values.
-
 pub(crate) mod statistics;
 pub mod verify;

@@ -198,7 +198,6 @@ impl Seen {
         self.used(values, &used);
     }
 
-    /// Adds values with the number of rows of each.
     fn used(&mut self, values: &ArrayRef, used: &[u64]) {
         if let Some(texts) = values.as_string_opt::<i32>() {
             let bytes =

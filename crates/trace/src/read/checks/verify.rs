@@ -29,7 +29,6 @@ pub(crate) fn verify_columns(file: &TraceFile, is_wanted: impl Fn(&str) -> bool)
     Ok(())
 }
 
-/// The finding about a column that could not be decoded.
 pub(crate) fn damaged(file: &str, slot: &FaultSlot, error: &str) -> Finding {
     if let Some(PageFault { kind, row_group, column, part, expected, found }) = slot.get() {
         let code = match kind {

@@ -27,7 +27,6 @@ const SMALLEST: u64 = 12;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Extent {
     Pages,
-    /// The statistics too.
     Whole,
 }
 

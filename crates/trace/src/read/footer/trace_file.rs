@@ -52,7 +52,6 @@ pub struct TraceFile {
     pub(crate) episodes: EpisodeBudget,
 }
 
-/// The parts of a file that a reader needs.
 #[derive(Debug)]
 pub(crate) struct Readable {
     pub(crate) footer: ArrowReaderMetadata,

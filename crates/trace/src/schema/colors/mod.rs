@@ -19,7 +19,6 @@ use self::spelling::{WORDS, did_you_mean, is_well_spelled, meant_by, normal, spe
 pub use super::column::ColorColumn;
 use crate::schema;
 
-/// The columns of colours, in schema order.
 pub fn columns() -> impl Iterator<Item = ColorColumn> {
     schema::COLUMNS.iter().filter_map(|column| column.color)
 }

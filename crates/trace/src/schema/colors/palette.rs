@@ -27,7 +27,6 @@ fn hint(meant: Option<&str>) -> String {
     meant.map_or_else(String::new, |meant| format!("; {}", did_you_mean(meant)))
 }
 
-/// The colours that a file declares.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Declared {
     pub(crate) palette: Option<Palette>,

@@ -32,6 +32,9 @@ static BASES: LazyLock<Vec<shape::Base>> = LazyLock::new(shape::all);
 pub enum Outcome {
     /// Both read the same rows.
     Agreed,
+    /// Both read the same rows, the library only as keys of a dictionary: as texts it reads ahead into the bytes behind
+    /// the last value.
+    AgreedOnKeys,
     /// Both refuse.
     Refused(Depth),
     /// The program refuses what the library reads.
@@ -46,7 +49,7 @@ pub fn bases() -> usize {
 /// The target.
 pub fn target(data: &[u8]) {
     reached(match outcome(data) {
-        Outcome::Agreed => "rows",
+        Outcome::Agreed | Outcome::AgreedOnKeys => "rows",
         Outcome::Stricter(_) => "stricter",
         Outcome::Refused(Depth::Header) => "header",
         Outcome::Refused(Depth::Body) => "body",
@@ -69,6 +72,9 @@ pub fn outcome(data: &[u8]) -> Outcome {
             assert!(same(&ours, &theirs), "ours {}, the library's {}", shown(&ours), shown(&theirs));
             Outcome::Agreed
         }
+        (Ok(ours), Err(_)) if *ours.data_type() == DataType::Utf8 && is_read_as_keys(&mutant, &ours) => {
+            Outcome::AgreedOnKeys
+        }
         (Ok(ours), Err(error)) => panic!("the library refuses what is read: {error}; read: {}", shown(&ours)),
         (Err(refusal), Err(_)) => Outcome::Refused(depth(&refusal)),
         (Err(refusal), Ok(theirs)) => {
@@ -82,6 +88,10 @@ pub fn outcome(data: &[u8]) -> Outcome {
             )
         }
     }
+}
+
+fn is_read_as_keys(mutant: &Mutant, ours: &ArrayRef) -> bool {
+    reference::read_keys(mutant).is_ok_and(|theirs| same(ours, &joined(&theirs, ours.data_type())))
 }
 
 /// An array as text. It may be an array that only the library accepts and that panics when printed.

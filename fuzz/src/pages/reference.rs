@@ -4,10 +4,11 @@
 use std::sync::{Arc, Mutex};
 
 use arrow::array::ArrayRef;
+use arrow::datatypes::{DataType, Fields};
 use bytes::Bytes;
 use bytes::buf::{Buf as _, Reader};
 use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, RowGroups};
-use parquet::arrow::{ProjectionMask, parquet_to_arrow_field_levels};
+use parquet::arrow::{ProjectionMask, parquet_to_arrow_field_levels, parquet_to_arrow_schema};
 use parquet::column::page::{PageIterator, PageReader};
 use parquet::errors::{ParquetError, Result};
 use parquet::file::metadata::{ParquetMetaData, RowGroupMetaData};
@@ -106,10 +107,25 @@ impl RowGroups for One<'_> {
 
 /// The library's values of a mutant, in the types of the file, or its refusal as text.
 pub fn read(mutant: &Mutant) -> Result<Vec<ArrayRef>, String> {
+    read_as(mutant, None)
+}
+
+/// The same, with texts read as keys and their dictionary. For texts the library reads ahead of the last value.
+pub fn read_keys(mutant: &Mutant) -> Result<Vec<ArrayRef>, String> {
+    let keys = DataType::Dictionary(DataType::Int32.into(), DataType::Utf8.into());
+    let schema = mutant.metadata.file_metadata().schema_descr();
+    let schema = parquet_to_arrow_schema(schema, None).map_err(|error| error.to_string())?;
+    read_as(
+        mutant,
+        Some(&schema.fields().iter().map(|field| field.as_ref().clone().with_data_type(keys.clone())).collect()),
+    )
+}
+
+fn read_as(mutant: &Mutant, types: Option<&Fields>) -> Result<Vec<ArrayRef>, String> {
     let read = || -> Result<Vec<ArrayRef>> {
         let one = One { metadata: &mutant.metadata, bytes: &mutant.bytes };
         let schema = mutant.metadata.file_metadata().schema_descr();
-        let levels = parquet_to_arrow_field_levels(schema, ProjectionMask::all(), None)?;
+        let levels = parquet_to_arrow_field_levels(schema, ProjectionMask::all(), types)?;
         let reader = ParquetRecordBatchReader::try_new_with_row_groups(&levels, &one, mutant.at_once, None)?;
         let mut columns = Vec::new();
         for batch in reader {

@@ -7,7 +7,7 @@
 use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
 
-use arrow::array::{Array as _, ArrayRef, AsArray as _, BooleanArray, StringArray};
+use arrow::array::{Array as _, ArrayRef, ArrowPrimitiveType, AsArray as _, BooleanArray, StringArray};
 use arrow::datatypes::{Float64Type, Int32Type, Int64Type};
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -238,13 +238,13 @@ impl QualityReader {
             if kept.is_some_and(|kept| !(kept.is_valid(episode) && kept.value(episode))) {
                 continue;
             }
-            let quality = cells.of(keys, episode);
-            quality.episodes += 1;
-            quality.steps += (rows[1] - rows[0]) as u64;
+            let counts = cells.of(keys, episode);
+            counts.rest.episodes += 1;
+            counts.rest.steps += (rows[1] - rows[0]) as u64;
             if !self.columns.is_empty() {
-                (rows[0]..rows[1]).for_each(|row| columns.add(row, quality));
+                (rows[0]..rows[1]).for_each(|row| columns.add(row, counts));
                 let replies = columns.replies(rows[0]..rows[1]).filter(|[_, all]| *all > 0);
-                quality.rest.by_episode.extend(ids.get(episode).cloned().zip(replies));
+                counts.rest.by_episode.extend(ids.get(episode).cloned().zip(replies));
             }
         }
         cells.finish(&columns)
@@ -260,8 +260,6 @@ struct Cells {
 
 #[derive(Default)]
 struct Counts {
-    episodes: u64,
-    steps: u64,
     statuses: Vec<u64>,
     repairs: Vec<u64>,
     faults: Vec<u64>,
@@ -291,7 +289,7 @@ impl Cells {
     fn finish(self, columns: &Columns<'_>) -> QualityByCell {
         let mut found = QualityByCell::default();
         for (key, counts) in self.cells {
-            let mut quality = Quality { episodes: counts.episodes, steps: counts.steps, ..counts.rest };
+            let mut quality = counts.rest;
             for (status, replies) in named(columns.status.as_ref(), &counts.statuses) {
                 *quality.statuses.entry(status.to_owned()).or_default() += replies;
             }
@@ -356,34 +354,30 @@ impl<'a> Columns<'a> {
         count(self.status.as_ref(), row, &mut counts.statuses);
         count(self.repair.as_ref(), row, &mut counts.repairs);
         count(self.fault.as_ref(), row, &mut counts.faults);
-        if let Some(latency) = int(self.latency, row) {
+        if let Some(latency) = number::<Int64Type>(self.latency, row) {
             *counts.rest.latencies.entry(latency).or_default() += 1;
         }
         for (column, total) in [
             (self.prompt_tokens, &mut counts.rest.prompt_tokens),
             (self.completion_tokens, &mut counts.rest.completion_tokens),
         ] {
-            if let Some(tokens) = int(column, row) {
+            if let Some(tokens) = number::<Int64Type>(column, row) {
                 total.add(tokens.into());
             }
         }
-        if let Some(cost) = float(self.cost, row).filter(|cost| cost.is_finite()) {
+        if let Some(cost) = number::<Float64Type>(self.cost, row).filter(|cost| cost.is_finite()) {
             #[expect(clippy::cast_possible_truncation, reason = "a cost of a reply is far below 2^127 billionths")]
             counts.rest.cost_nano_usd.add((cost * NANO).round() as i128);
         }
     }
 }
 
-fn int(column: Option<&ArrayRef>, row: usize) -> Option<i64> {
-    let column = column?.as_primitive_opt::<Int64Type>()?;
+fn number<T: ArrowPrimitiveType>(column: Option<&ArrayRef>, row: usize) -> Option<T::Native> {
+    let column = column?.as_primitive_opt::<T>()?;
     column.is_valid(row).then(|| column.value(row))
 }
 
-fn float(column: Option<&ArrayRef>, row: usize) -> Option<f64> {
-    let column = column?.as_primitive_opt::<Float64Type>()?;
-    column.is_valid(row).then(|| column.value(row))
-}
-
+/// A text column as indices of its distinct values.
 struct Coded<'a> {
     codes: Codes<'a>,
     texts: &'a StringArray,

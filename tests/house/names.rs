@@ -14,7 +14,7 @@ const ALLOWED: [(&str, &str); 10] = [
     ),
     ("crates/world/src/agent/prompt.rs", "the prompts of the paper under their names"),
     ("crates/world/src/experiment/built_in.rs", "the list of the built-in files"),
-    ("crates/world/src/experiment/load.rs", "an example"),
+    ("crates/world/src/experiment/file.rs", "an example"),
     ("crates/world/src/experiment/mod.rs", "the list of the built-in files"),
     ("crates/world/src/record/plan.rs", "an example"),
     ("src/cli/commands/trace/schema.rs", "two forms of a reply"),

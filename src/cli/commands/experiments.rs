@@ -10,7 +10,7 @@ use crate::cli::{Failure, Outcome, experiments, output};
 use exact::escape::visible;
 use exact::suggest::hint;
 use world::experiment::explain::explained;
-use world::experiment::load::Loaded;
+use world::experiment::file::Loaded;
 use world::experiment::{Experiment, Spec, UnknownExperiment, built_in, built_in_names};
 
 /// Check, explain and show experiments
@@ -32,7 +32,7 @@ pub enum Action {
         #[arg(long)]
         json: bool,
     },
-    /// Say in words what an experiment shows, asks and decides
+    /// Explain in words what an experiment shows, asks and decides
     Explain {
         /// A built-in experiment, or a TOML file
         #[arg(value_name = "NAME|FILE")]

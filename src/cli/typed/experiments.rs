@@ -6,7 +6,7 @@ use std::path::Path;
 use clap::builder::{OsStringValueParser, TypedValueParser};
 
 use crate::cli::Failure;
-use world::experiment::load::{self, FileError, Loaded};
+use world::experiment::file::{self, FileError, Loaded};
 #[cfg(feature = "sim")]
 use {
     toml_spec::{Fault, Faults},
@@ -22,7 +22,7 @@ pub fn parser() -> impl TypedValueParser<Value = Experiments> {
 }
 
 pub fn load(path: &Path) -> Result<Vec<Loaded>, Failure> {
-    load::load(path).map_err(|error| match error {
+    file::load(path).map_err(|error| match error {
         FileError::Faults(faults) => Failure::Faults(faults),
         unreadable @ FileError::Unreadable { .. } => Failure::input(unreadable),
     })

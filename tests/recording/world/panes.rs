@@ -75,8 +75,7 @@ fn kind(name: &str) -> Experiment {
     // A window with this name is built in; a text without a folder may use the same name.
     let source = Source { name: "kinds".to_owned(), text: KINDS.to_owned() };
     let entries = file::read(source, None, &[]).unwrap();
-    let entry = entries.into_iter().find(|entry| entry.known.spec.name == name).unwrap();
-    Experiment::of_file(0, entry.known)
+    entries.into_iter().map(|entry| entry.experiment).find(|experiment| experiment.name() == name).unwrap()
 }
 
 /// Mannequins: the limbs of humanoids are a few pixels wide, and `truth` has bounds of their own for them.

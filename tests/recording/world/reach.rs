@@ -2,7 +2,7 @@
 //! the mirror shows.
 
 use trace::episode::Action;
-use world::experiment::{Experiment, built_in, built_in_names, load};
+use world::experiment::{Experiment, built_in, built_in_names, file};
 use world::sim::camera::LabelCamera;
 use world::sim::config::WorldConfig;
 use world::sim::model::Item;
@@ -185,7 +185,7 @@ fn an_impossible_distance_of_hand_and_mark_is_an_error_of_the_file() {
             .replace("least = 6", &format!("least = {least}"))
             .replace("prompt = \"far\"", "prompt = \"reach-scheme\"");
         std::fs::write(&path, text).unwrap();
-        placement::crowded(&WorldConfig::default(), &load::load(&path).unwrap()[0].experiment)
+        placement::crowded(&WorldConfig::default(), &file::load(&path).unwrap()[0].experiment)
     };
     assert_eq!(read(8), None);
     let fault = read(20).unwrap();

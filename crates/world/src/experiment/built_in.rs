@@ -1,6 +1,6 @@
 //! The built-in experiments, one file each.
 
-use super::Known;
+use super::Experiment;
 use super::file;
 use toml_spec::Source;
 
@@ -57,10 +57,10 @@ pub fn built_in(name: &str) -> Option<&'static str> {
 }
 
 /// Every built-in experiment, parsed as one text, so that one may use the scenes of another.
-pub(super) fn all() -> Vec<Known> {
+pub(super) fn all() -> Vec<Experiment> {
     let text: String = FILES.iter().map(|(_, text)| *text).collect::<Vec<_>>().join("\n");
     let source = Source { name: "built-in experiments".to_owned(), text };
     let entries =
         file::read(source, None, &[]).unwrap_or_else(|faults| panic!("the built-in experiments are tested:\n{faults}"));
-    entries.into_iter().map(|entry| entry.known).collect()
+    entries.into_iter().map(|entry| entry.experiment).collect()
 }

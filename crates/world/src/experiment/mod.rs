@@ -17,7 +17,6 @@ pub mod balance;
 mod built_in;
 pub mod explain;
 pub mod file;
-pub mod load;
 pub mod prompt;
 pub mod schema;
 pub mod spec;
@@ -53,14 +52,13 @@ enum Origin {
 }
 
 /// The content of an experiment.
-#[derive(Debug)]
-pub struct Known {
-    pub spec: Spec,
+struct Known {
+    spec: Spec,
     /// Its prompt; empty if it comes from a trace's footer, which has only the hash.
-    pub templates: Templates,
+    templates: Templates,
 }
 
-static BUILT_IN: LazyLock<Vec<Known>> = LazyLock::new(built_in::all);
+static BUILT_IN: LazyLock<Vec<Experiment>> = LazyLock::new(built_in::all);
 
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("no experiment `{name}`: expected {}, or a file such as mine.toml", built_in_names().join(", "))]
@@ -88,7 +86,7 @@ impl Experiment {
     }
 
     /// An experiment of a file, at this place among the others of files.
-    pub fn of_file(place: usize, known: Known) -> Self {
+    fn of_file(place: usize, known: Known) -> Self {
         Self(Origin::File { place, known: Arc::new(known) })
     }
 
@@ -96,7 +94,7 @@ impl Experiment {
     pub fn of_footer(spec: Spec) -> Self {
         // Older footers, which lack the definitions, differ in nothing else.
         let unnamed = |known: &Spec| spec.definitions.is_none() && Spec { definitions: None, ..known.clone() } == spec;
-        match BUILT_IN.iter().position(|known| known.spec == spec || unnamed(&known.spec)) {
+        match BUILT_IN.iter().position(|known| **known == spec || unnamed(known)) {
             Some(at) => Self(Origin::BuiltIn(at)),
             None => Self::of_file(0, Known { spec, templates: Templates::default() }),
         }
@@ -113,7 +111,7 @@ impl Experiment {
 
     fn known(&self) -> &Known {
         match &self.0 {
-            Origin::BuiltIn(at) => &BUILT_IN[*at],
+            Origin::BuiltIn(at) => BUILT_IN[*at].known(),
             Origin::File { known, .. } => known,
         }
     }
@@ -145,7 +143,7 @@ impl Experiment {
 }
 
 fn built_in_specs() -> Vec<&'static Spec> {
-    BUILT_IN.iter().map(|known| &known.spec).collect()
+    BUILT_IN.iter().map(|known| &**known).collect()
 }
 
 /// A number derived from a name: the beginning of its SHA-256.

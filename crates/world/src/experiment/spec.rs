@@ -19,7 +19,6 @@ pub use panes::{BodyShown, Paint, Pane, PaneKind};
 /// The maximum number of glass panes (mirrors and windows) in a room.
 pub const MOST_PANES: usize = 4;
 
-/// The maximum number of marks in a world.
 pub const MOST_MARKS: usize = 4;
 
 /// An experiment: what its world shows, what its agent is asked, and how the answer is decided.

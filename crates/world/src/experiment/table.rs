@@ -15,7 +15,7 @@ use super::spec::{
     AbsentColumn, Actions, Behavior, Colors, Cubes, Decision, Layout, Mark, Others, ReplyKey, Spec, Start, Stated,
     Truth, Wall, Wearer,
 };
-use super::{Known, built_in_names};
+use super::{Experiment, Known, built_in_names};
 use exact::ratio::Ratio;
 use exact::suggest::{self, nearest};
 use metric::file::{self as definitions, Document};
@@ -25,9 +25,9 @@ use trace::palette::Color;
 const LONGEST_NAME: usize = 40;
 
 /// A parsed experiment and the locations of its parts, for errors that only drawing its scenes reveals.
-#[derive(Debug)]
-pub struct Entry {
-    pub known: Known,
+#[derive(Clone, Debug)]
+pub struct Loaded {
+    pub experiment: Experiment,
     pub name: Place,
     /// The location of its cubes, or of its name if it does not mention cubes.
     pub cubes: Place,
@@ -38,12 +38,14 @@ pub struct Entry {
 pub(super) struct Beside<'a> {
     /// The folder of its file; `None` for a built-in one.
     pub folder: Option<&'a Path>,
+    /// Its place in its file.
+    pub place: usize,
     /// The experiments whose scenes it may use: earlier ones of its file, and built-in ones.
     pub before: &'a [&'a Spec],
 }
 
 /// Parses one experiment; `None` if it has errors.
-pub(super) fn read(name: &str, at: &At<'_>, beside: &Beside<'_>, faults: &mut Vec<Fault>) -> Option<Entry> {
+pub(super) fn read(name: &str, at: &At<'_>, beside: &Beside<'_>, faults: &mut Vec<Fault>) -> Option<Loaded> {
     let before = faults.len();
     check_name(name, at, beside, faults);
     let table: ExperimentTable = toml_spec::read(at, "an experiment", faults)?;
@@ -113,8 +115,8 @@ pub(super) fn read(name: &str, at: &At<'_>, beside: &Beside<'_>, faults: &mut Ve
     }
     checks::colors(&spec, at, faults);
     checks::marks(&spec, at, faults);
-    (faults.len() == before).then(|| Entry {
-        known: Known { spec, templates },
+    (faults.len() == before).then(|| Loaded {
+        experiment: Experiment::of_file(beside.place, Known { spec, templates }),
         name: at.name_place(),
         cubes: at.get("cubes").map_or_else(|| at.name_place(), |cubes| cubes.place()),
         mirrors: at.key("mirror").items().map(|mirror| mirror.name_place()).collect(),

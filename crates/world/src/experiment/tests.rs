@@ -121,7 +121,7 @@ fn a_file_may_hold_several_and_have_scenes_of_its_own() {
                 [experiment.C]\ntitle = \"C\"\nprompt = \"exploration\"\nscenes = \"B\"\nmirror = [{ width = 2 }]";
     let source = Source { name: "mine.toml".to_owned(), text: text.to_owned() };
     let entries = file::read(source, Some(std::path::Path::new(".")), &super::built_in_specs()).unwrap();
-    let specs: Vec<_> = entries.iter().map(|entry| &entry.known.spec).collect();
+    let specs: Vec<_> = entries.iter().map(|entry| &entry.experiment).collect();
     assert_eq!(specs.iter().map(|spec| spec.scenes.as_str()).collect::<Vec<_>>(), ["A", "A", "A"]);
     assert!(specs.iter().all(|spec| spec.layout == specs[0].layout && spec.decision == Decision::SelfColor));
     assert_eq!(specs[2].panes[0].width_mm, Some(2000));
@@ -133,7 +133,7 @@ fn a_mirror_with_a_delay_has_the_delayed_kind() {
                 mirror = [{ kind = \"mirror\", delay = 5 }, { delay = 0 }, { kind = \"decoy\", delay = 2 }]";
     let source = Source { name: "mine.toml".to_owned(), text: text.to_owned() };
     let entries = file::read(source, Some(std::path::Path::new(".")), &super::built_in_specs()).unwrap();
-    let panes = &entries[0].known.spec.panes;
+    let panes = &entries[0].experiment.panes;
     let kinds: Vec<_> = panes.iter().map(|pane| (pane.kind, pane.delay)).collect();
     assert_eq!(kinds, [(PaneKind::Delayed, 5), (PaneKind::Mirror, 0), (PaneKind::Decoy, 2)]);
 }

@@ -55,7 +55,6 @@ impl Subject {
 }
 
 impl Key {
-    /// The first repetition of a scene.
     pub const fn first(experiment: Experiment, seed: i32, run: i32) -> Self {
         Self { experiment, seed, run, repetition: FIRST }
     }
@@ -125,7 +124,6 @@ impl Shard {
     }
 }
 
-/// A text that names no shard or no experiments.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("expected {expected}, found `{found}`")]
 pub struct NotAPlan {
@@ -150,7 +148,6 @@ impl FromStr for Shard {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Experiments(pub Vec<Named>);
 
-/// A typed experiment, or a file of experiments.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Named {
     BuiltIn(Experiment),

@@ -27,15 +27,6 @@ use trace::renderer::Renderer;
 
 /// An observer of an episode: writes a log, counts steps.
 pub trait Observer {
-    fn seen(&mut self, seen: &Seen<'_>) -> Result<(), RecordError>;
-
-    fn done(&mut self, t: i32, row: &Step) -> Result<(), RecordError>;
-}
-
-#[derive(Clone, Copy, Debug)]
-pub struct Nobody;
-
-impl Observer for Nobody {
     fn seen(&mut self, _: &Seen<'_>) -> Result<(), RecordError> {
         Ok(())
     }
@@ -45,8 +36,12 @@ impl Observer for Nobody {
     }
 }
 
+#[derive(Clone, Copy, Debug)]
+pub struct Nobody;
+
+impl Observer for Nobody {}
+
 /// The setting of an episode, besides its key.
-#[derive(Debug)]
 pub struct Stage<'a> {
     pub config: &'a WorldConfig,
     /// The thread's camera; `None` if no pictures are needed.

@@ -59,7 +59,6 @@ enum Wait {
 
 #[derive(Clone, Copy, Debug)]
 pub struct Settings {
-    /// Threads, each with a camera.
     pub threads: NonZeroUsize,
     /// Episodes under way at once, over all threads.
     pub in_flight: NonZeroUsize,
@@ -97,9 +96,7 @@ pub struct Recording<'a> {
     pub player: &'a dyn Player,
     pub subject: &'a Subject,
     pub store: &'a Store,
-    /// The receiver of all events.
     pub progress: &'a dyn Progress,
-    /// Set when the recording is to stop.
     pub stop: &'a AtomicBool,
     pub shares: &'a Shares,
     pub settings: Settings,

@@ -12,7 +12,6 @@ pub struct Shares {
     all: AtomicU64,
 }
 
-/// The total times by activity.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Spent {
     /// Drawing frames.

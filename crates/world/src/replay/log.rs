@@ -17,19 +17,16 @@ use trace::log::write::{EpisodeLog, Form, Solid, View};
 static CENSUS: LazyLock<Value> = LazyLock::new(|| schema_for!(Visibility).to_value());
 
 /// A step as seen by an observer.
-#[derive(Debug)]
 pub struct Seen<'a> {
     pub t: i32,
     /// The world before the action.
     pub world: &'a World,
-    /// The picture, if one was drawn.
     pub frame: Option<&'a Arc<Frame>>,
     pub visibility: &'a Visibility,
 }
 
 pub type LogFault = Box<dyn std::error::Error + Send + Sync>;
 
-/// The log of an episode in progress.
 pub struct Log {
     seed: i32,
     run: i32,
@@ -38,7 +35,6 @@ pub struct Log {
 }
 
 impl Log {
-    /// Begins the log of an episode at `path`.
     pub fn begin(path: &Path, episode: &Episode) -> Result<Self, LogFault> {
         let (seed, run, repetition) = (episode.seed, episode.run, episode.repetition.unwrap_or(1));
         let file = EpisodeLog::create(path, episode, &CENSUS, time(seed, run, repetition, 0))?;

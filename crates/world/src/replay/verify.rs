@@ -24,7 +24,6 @@ use trace::merge::{self, EpisodeRows};
 use trace::open::TraceSet;
 use trace::renderer::{self, Renderer};
 
-/// One trace to replay.
 pub struct Recorded {
     pub path: PathBuf,
     pub rows: Vec<EpisodeRows>,
@@ -214,7 +213,6 @@ impl Recount {
     }
 }
 
-/// The replay of a trace's episodes.
 struct Player<'a> {
     trace: &'a Recorded,
     outputs: &'a Outputs,

@@ -56,7 +56,6 @@ impl Heading {
         Self(u8::try_from(turned).expect("a remainder of 12 is less than 12"))
     }
 
-    /// The unit vector of this heading.
     pub fn direction(self) -> [f64; 2] {
         let fifteens = 2 * usize::from(self.0);
         [sine_of_fifteens(fifteens + 6), sine_of_fifteens(fifteens)]

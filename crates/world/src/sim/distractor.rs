@@ -8,7 +8,6 @@ use super::floor::FloorPlan;
 use super::rng::Rng;
 use super::scene::Other;
 
-/// Another agent in motion.
 #[derive(Clone, Debug)]
 pub struct Distractor {
     pub figure: Figure,

@@ -42,7 +42,6 @@ pub const HAND: &str = "hand";
 /// The square mark on the front of a body that stands still.
 pub const PATCH: &str = "patch";
 
-/// The camera that sees the room from above.
 pub const TOP_CAMERA: &str = "top";
 
 /// Groups for MuJoCo's pictures and rays.
@@ -159,12 +158,6 @@ pub struct Stage {
     beyond: usize,
     hand: usize,
     marks_at: u32,
-}
-
-impl std::fmt::Debug for Stage {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Stage").field("geoms", &self.items.len()).finish_non_exhaustive()
-    }
 }
 
 impl Stage {

@@ -43,10 +43,7 @@ const FINGERPRINT_DIGITS: usize = 16;
 /// The distance of an agent that starts before the mirror, m.
 pub(super) const BEFORE_MIRROR: f64 = 2.0;
 
-/// The maximum number of other agents in a world.
 pub const MOST_OTHERS: usize = 6;
-
-/// The maximum number of cubes in a world.
 pub const MOST_CUBES: usize = 12;
 
 /// An episode's world at its start.

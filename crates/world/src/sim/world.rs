@@ -24,7 +24,6 @@ pub struct Moved {
     pub bumped: bool,
 }
 
-#[derive(Debug)]
 pub struct World {
     config: WorldConfig,
     scene: Scene,
@@ -135,7 +134,6 @@ impl World {
         i32::try_from(place.distance_mm(*self.hand.back()?)).ok()
     }
 
-    /// Returns true if the hand has reached the mark.
     pub fn is_reached(&self) -> bool {
         Place::of(&self.scene, &self.config)
             .zip(self.hand.back())

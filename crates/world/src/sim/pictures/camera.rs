@@ -50,12 +50,6 @@ pub struct Camera {
     drawn_by: Renderer,
 }
 
-impl std::fmt::Debug for Camera {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Camera").field("width", &self.width).field("height", &self.height).finish_non_exhaustive()
-    }
-}
-
 impl Camera {
     pub fn new(config: &WorldConfig) -> Result<Self, CameraError> {
         Self::sized(config, config.eye.width as usize, config.eye.height_px as usize)
@@ -176,7 +170,6 @@ fn flipped(frame: &Frame) -> Frame {
 }
 
 /// A camera for labels: every pixel has the colour of its label, in the mirror too.
-#[derive(Debug)]
 pub struct LabelCamera {
     eye: Camera,
     painted: Option<(Scene, (Stage, Vec<Stage>))>,

@@ -25,7 +25,6 @@ use super::model::{Item, Look, ModelError, Paint, Stage};
 use super::world::World;
 
 impl World {
-    /// The label of every pixel of the eye's view.
     pub fn labels(&self) -> &LabelImage {
         let eye = &self.config().eye;
         self.labels.get_or_init(|| labels(self, eye.width as usize, eye.height_px as usize))

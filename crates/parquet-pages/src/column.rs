@@ -140,16 +140,13 @@ impl Column {
 
     pub fn concat<'a>(parts: impl IntoIterator<Item = &'a Self>) -> Result<Self, ArrowError> {
         let parts: Vec<&Self> = parts.into_iter().collect();
-        if parts.iter().all(|part| part.holds_texts()) {
+        let holds_texts = |part: &&Self| matches!(part.data_type(), DataType::Dictionary(_, _) | DataType::Utf8);
+        if parts.iter().all(holds_texts) {
             return joined_texts(&parts).map(Self::Flat);
         }
         let arrays = parts.into_iter().map(Self::flat).collect::<Result<Vec<_>, _>>()?;
         let arrays: Vec<_> = arrays.iter().map(AsRef::as_ref).collect();
         Ok(Self::Flat(concat(&arrays)?))
-    }
-
-    fn holds_texts(&self) -> bool {
-        matches!(self.data_type(), DataType::Dictionary(_, _) | DataType::Utf8)
     }
 }
 

@@ -115,8 +115,8 @@ impl TraceSet {
         let read = EPISODE_COLUMNS.into_iter().chain(constants.iter().copied());
         let mut layout = Layout::new(self, projection.step_columns(), read)?;
         layout.with_declared(&projection.declared);
-        for column in &projection.unchecked {
-            layout.without_rules(column);
+        for column in layout.columns.iter_mut().filter(|column| projection.unchecked.contains(&column.name)) {
+            column.known = None;
         }
         let rules = Rules { layout: &layout, experiments: projection.experiments.as_deref() };
         let shape = Shape::new(&layout, projection, &constants);

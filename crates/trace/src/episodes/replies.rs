@@ -48,11 +48,6 @@ impl ReplyCounts {
         self.unreadable.values().sum()
     }
 
-    pub(crate) fn of_known_statuses(mut self) -> Self {
-        self.unreadable.retain(|status, _| statuses().contains(&status.as_str()));
-        self
-    }
-
     pub fn is_read(status: &str) -> bool {
         READ.contains(&status)
     }

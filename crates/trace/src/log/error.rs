@@ -34,8 +34,4 @@ impl LogError {
             Self::Io { doing: "write", file, source }
         }
     }
-
-    pub(super) fn no_log(path: &Path) -> Self {
-        Self::Foreign { file: path.display().to_string(), fault: "it does not begin as an MCAP file does".to_owned() }
-    }
 }

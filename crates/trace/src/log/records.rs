@@ -70,7 +70,10 @@ impl Records<BufReader<File>> {
 impl<R: Read + Seek> Records<R> {
     /// The records of a log in these bytes; `path` is for error messages.
     pub(super) fn of(path: &Path, bytes: R) -> Result<Self, LogError> {
-        Self::new(bytes).map_err(LogError::io("read", path))?.ok_or_else(|| LogError::no_log(path))
+        Self::new(bytes).map_err(LogError::io("read", path))?.ok_or_else(|| LogError::Foreign {
+            file: path.display().to_string(),
+            fault: "it does not begin as an MCAP file does".to_owned(),
+        })
     }
 
     /// The records after the first magic bytes; `None` if the file does not start with them.

@@ -91,12 +91,6 @@ pub fn recover_from(path: &Path, bytes: impl Read + Seek) -> Result<Recovered, L
     Ok(salvage.finished())
 }
 
-/// The limit of rows in memory, where saved rows are kept. A row takes far more memory than a row of few words in a
-/// chunk. Logs in use have some hundred bytes per row, without its frame.
-fn most_rows(bytes: u64) -> Limit {
-    Limit::new("rows in a log of its size", 200_000 + bytes / 8)
-}
-
 struct Salvage {
     channels: BTreeMap<u16, String>,
     open: Option<(Episode, Vec<Step>, Option<String>)>,
@@ -110,7 +104,9 @@ impl Salvage {
         let topic =
             |record| if let Record::Channel(channel) = record { Some((channel.id, channel.topic)) } else { None };
         let channels = records.summary()?.into_iter().filter_map(topic).collect();
-        let rows = Budget::new(most_rows(records.end));
+        // Saved rows are kept in memory, where a row takes far more than one of few words in a chunk. Logs in use have
+        // some hundred bytes per row, without its frame.
+        let rows = Budget::new(Limit::new("rows in a log of its size", 200_000 + records.end / 8));
         let mut salvage = Self { channels, open: None, rows, result: Recovered::default() };
         let mut is_open = true;
         while let Some(piece) = records.next()? {

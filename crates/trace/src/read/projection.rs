@@ -67,12 +67,6 @@ impl Layout {
         }
     }
 
-    pub(crate) fn without_rules(&mut self, name: &str) {
-        for column in self.columns.iter_mut().filter(|column| column.name == name) {
-            column.known = None;
-        }
-    }
-
     pub(crate) fn position(&self, name: &str) -> Option<usize> {
         self.columns.iter().position(|column| column.name == name)
     }

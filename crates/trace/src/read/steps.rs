@@ -71,7 +71,10 @@ impl Steps {
         episodes: Option<BTreeSet<String>>,
         threads: NonZeroUsize,
     ) -> Result<Self, TraceError> {
-        let all = || set.column_names().into_iter().filter(|name| is_readable(set, name)).map(str::to_owned).collect();
+        let is_readable = |name: &&str| {
+            set.column(name).is_some_and(|column| column.kind != Kind::Unsupported || column.conflict.is_some())
+        };
+        let all = || set.column_names().into_iter().filter(is_readable).map(str::to_owned).collect();
         let names: Vec<String> = columns.map_or_else(all, <[String]>::to_vec);
         let layout = Layout::new(set, [], names.iter().map(String::as_str))?;
         let field = |name: &String| {
@@ -148,10 +151,6 @@ impl Iterator for Steps {
         }
         rows.transpose()
     }
-}
-
-fn is_readable(set: &TraceSet, name: &str) -> bool {
-    set.column(name).is_some_and(|column| column.kind != Kind::Unsupported || column.conflict.is_some())
 }
 
 /// The type of a column: the schema's, or the widest of its kind for columns outside the schema.

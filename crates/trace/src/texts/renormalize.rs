@@ -107,7 +107,7 @@ pub fn renormalize(
     };
     let stage = folder.map(stage_beside).transpose()?;
     let mut staged = Vec::new();
-    let changed = Budget::new(most_changed(old.iter().map(Old::bytes).sum()));
+    let changed = Budget::new(most_changed(old.iter().flat_map(|old| old.set.files()).map(TraceFile::bytes).sum()));
     for (at, (input, old)) in inputs.iter().zip(&old).enumerate() {
         let target = targets.as_ref().map(|targets| targets[at].as_path());
         let new = stage.as_ref().map(|stage| stage.path().join(at.to_string()));
@@ -184,10 +184,6 @@ impl Old {
         Ok(Self { set, recording })
     }
 
-    fn bytes(&self) -> u64 {
-        self.set.files().iter().map(TraceFile::bytes).sum()
-    }
-
     fn renormalized(
         &self,
         name: &str,
@@ -196,7 +192,8 @@ impl Old {
     ) -> Result<(RenormalizedFile, Vec<Flip>), RenormalizeError> {
         let mut recording = self.recording.clone();
         let version_before = put_version(&mut recording);
-        let mut texts = Normalizer { name, changed, version_before, steps: 0, texts: 0, flips: Vec::new() };
+        let file = RenormalizedFile { name: name.to_owned(), out: None, version_before, steps: 0, texts: 0, flips: 0 };
+        let mut texts = Normalizer { file, changed, flips: Vec::new() };
         match to {
             None => drop(rewrite(&self.set, [SOURCE, TARGET], |step| texts.attribution(step), &recording, io::sink())?),
             Some((target, staged)) => {
@@ -205,38 +202,30 @@ impl Old {
                 written.map_err(|error| error.writing(target))?;
             }
         }
-        Ok(texts.into_file())
+        let Normalizer { file, flips, .. } = texts;
+        Ok((RenormalizedFile { flips: flips.len(), ..file }, flips))
     }
 }
 
 struct Normalizer<'a> {
-    name: &'a str,
+    file: RenormalizedFile,
     /// The budget for the flips of all traces.
     changed: &'a Budget,
-    version_before: Option<String>,
-    steps: u64,
-    texts: u64,
     flips: Vec<Flip>,
 }
 
 impl Normalizer<'_> {
-    fn into_file(self) -> (RenormalizedFile, Vec<Flip>) {
-        let Self { name, version_before, steps, texts, flips, .. } = self;
-        let name = name.to_owned();
-        (RenormalizedFile { name, out: None, version_before, steps, texts, flips: flips.len() }, flips)
-    }
-
     /// The new attribution of a step; records a change.
     fn attribution(&mut self, (episode_id, t, source, target): Before<'_>) -> Result<Option<String>, TraceError> {
-        self.steps += 1;
+        self.file.steps += 1;
         let before = target.map(str::to_owned);
         let Some(text) = source else { return Ok(before) };
-        self.texts += 1;
+        self.file.texts += 1;
         let after = normal_form(text).map(str::to_owned);
         if before != after {
-            let over = |exceeded| TraceError::from(Finding::over_budget(self.name, &exceeded));
+            let over = |exceeded| TraceError::from(Finding::over_budget(&self.file.name, &exceeded));
             self.changed.spend((PRINTED + text.len()) as u64).map_err(over)?;
-            let (file, episode_id) = (self.name.to_owned(), episode_id.to_owned());
+            let (file, episode_id) = (self.file.name.clone(), episode_id.to_owned());
             let (after, identification) = (after.clone(), text.to_owned());
             self.flips.push(Flip { file, episode_id, t, before, after, identification });
         }

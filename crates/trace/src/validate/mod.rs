@@ -25,7 +25,7 @@ use super::read::open::{TraceFile, TraceSet};
 use super::read::parallel_scan::{Episodes, Event, pass};
 use super::read::projection::Layout;
 use super::read::verify::verify_columns;
-use super::replies::{REPLY_STATUS, ReplyCounts};
+use super::replies::{REPLY_STATUS, ReplyCounts, statuses};
 use super::schema::{self, COLUMNS, DeclaredColumn, Domain, Kind};
 use color_set::{Tally, sightings};
 use duplicate_ids::{Ids, Start, starts};
@@ -161,9 +161,10 @@ pub fn validate_as(inputs: &[Input], expected: Expected<'_>, threads: NonZeroUsi
         }
         found[*place].extend(stale(file));
     }
-    for ((found, input), replies) in found.iter_mut().zip(inputs).zip(replies) {
+    for ((found, input), mut replies) in found.iter_mut().zip(inputs).zip(replies) {
         // A status outside the schema has a finding already.
-        found.extend(unreadable(&input.name, &replies.of_known_statuses()));
+        replies.unreadable.retain(|status, _| statuses().contains(&status.as_str()));
+        found.extend(unreadable(&input.name, &replies));
     }
     report.findings = found.into_iter().flatten().collect();
     Ok(report)

@@ -89,15 +89,12 @@ impl<W: Write + Send> RowGroups<W> {
     }
 }
 
-fn version(layout: &Schema) -> u32 {
-    let known = layout.fields().iter().filter_map(|field| schema::column(field.name()));
-    known.map(|column| column.since).max().unwrap_or(1)
-}
-
 fn properties(layout: &Schema, recording: Option<&serde_json::Value>) -> WriterPropertiesBuilder {
     let pair = |key: &str, value: String| KeyValue::new(key.to_owned(), value);
+    let known = layout.fields().iter().filter_map(|field| schema::column(field.name()));
+    let version = known.map(|column| column.since).max().unwrap_or(1);
     let mut pairs = vec![
-        pair(schema::VERSION_KEY, version(layout).to_string()),
+        pair(schema::VERSION_KEY, version.to_string()),
         pair(schema::WRITER_KEY, concat!("mirrorstats ", env!("CARGO_PKG_VERSION")).to_owned()),
     ];
     pairs.extend(recording.map(|json| pair(schema::RECORDING_KEY, json.to_string())));

@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn statements_read_the_view_of_the_traces_and_nothing_else() {
+    fn statements_read_only_the_view_of_the_traces() {
         let hostile = r#"
             open = true
             [experiment."\\' UNION SELECT * FROM secrets -- "]

@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn a_column_of_the_traces_keeps_its_name_beside_those_of_the_statement() {
+    fn columns_of_the_traces_do_not_clash_with_generated_names() {
         let statements = (0..10).map(|n| {
             let column = Column { ty: Type::Text, level: Level::Step };
             let text = "[metric.M]\nvalue = \"first(c = 'a') - last(c = 'a' and t > 1) + count(c is null)\"";
@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn the_step_before_is_joined_on_its_time() {
+    fn a_lagged_step_is_joined_on_its_time() {
         let text = "count(lag(action) = action and lag(lag(t)) > 1) + length()";
         let statement = lower(&metric(text), Dialect::Portable).unwrap();
         for (lag, columns) in [(1, "t AS lag1_t,\n      action AS lag1_0"), (2, "t AS lag2_t\n")] {

@@ -37,7 +37,7 @@ mod tests {
 
     // statsmodels 0.15.0: multipletests(p, method="holm")[1]
     #[test]
-    fn the_adjustment_is_the_known_one() {
+    fn the_adjustment_matches_known_values() {
         let found = holm(&[0.01, 0.04, 0.03, 0.005, 0.2, 0.6]);
         let expected = [0.05, 0.12, 0.12, 0.03, 0.4, 0.6];
         assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-15), "{found:?}");

@@ -9,10 +9,10 @@ use metric::catalog::StandardError::Sample;
 use statistics::bootstrap;
 use statistics::clustered::{clustered, clustered_rate};
 use statistics::competing::{Ending, Incidence, Outcome};
-use statistics::contrast::welch;
 use statistics::interval::{Interval, student_t};
 use statistics::restricted::{independent, paired};
 use statistics::survival::Survival;
+use statistics::unpaired::welch;
 
 const SEED: u64 = 20_260_115;
 const SAMPLES: usize = 4_000;

@@ -27,7 +27,6 @@ pub mod sample_size;
 pub mod sequential;
 
 mod comparisons {
-    pub mod contrast;
     pub mod holm;
     pub mod improvement;
     pub mod letter_display;
@@ -40,7 +39,6 @@ mod comparisons {
 }
 mod durations {
     pub mod competing;
-    pub(crate) mod endings;
     pub mod restricted;
     pub mod survival;
 }
@@ -53,10 +51,7 @@ mod intervals {
     pub mod random;
 }
 
-pub use comparisons::{
-    contrast, holm, improvement, letter_display, margin, paired, stratified, trend, units, unpaired,
-};
-use durations::endings;
+pub use comparisons::{holm, improvement, letter_display, margin, paired, stratified, trend, units, unpaired};
 pub use durations::{competing, restricted, survival};
 use intervals::quantile;
 pub use intervals::{bootstrap, clustered, coverage, interval, random};

@@ -5,21 +5,33 @@
 //! grouping. Every comparison is by experiment, model and condition, and follows the declared design: paired if scenes
 //! are equal, by clusters if they are declared, otherwise over independent episodes.
 
+#![expect(clippy::cast_precision_loss, reason = "counts of episodes, cells and tests are far below 2^53")]
+
 mod answers;
 mod apart;
-mod comparisons;
+mod comparisons {
+    pub(super) mod compare;
+    pub(super) mod conditions;
+    pub(super) mod losses;
+    pub(super) mod matching;
+    pub(super) mod models;
+    pub(super) mod retest;
+    pub(super) mod trends;
+}
 mod conclusions;
+mod episodes;
 mod gate;
-mod rates;
-mod replies;
-mod selection;
+mod rates {
+    pub(super) mod cells;
+    pub(super) mod chance;
+    pub(super) mod durations;
+    pub(super) mod overall;
+    pub(super) mod ranks;
+    pub(super) mod sequential;
+}
 mod study;
 pub mod text;
 mod warnings;
-
-use rates::{cells, chance, clusters, durations, overall, ranks, sequential};
-
-use comparisons::{compare, conditions, losses, matching, models, retest, trends, units};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -27,26 +39,25 @@ use serde::{Deserialize, Serialize};
 pub use answers::{Answer, AnswerRole};
 pub use apart::SettingApart;
 pub(crate) use cells::FEW;
-pub use cells::{CellRow, Intervals};
+pub use cells::{CellRow, ClusterRow, Intervals};
 pub use chance::{ChanceRow, Role, Verdict};
-pub use clusters::ClusterRow;
 pub use compare::{Comparison, Method, Sign};
 pub use conditions::Contrast;
 pub use durations::{CorrectRow, DurationRow};
+pub use episodes::{Replies, Selection, UnusableReplies};
 pub use gate::{FlippedPair, Gate, GateCell, GateFormat, GateOptions, GateVerdict, Played};
 pub use losses::{LossCase, LossCases, LossRow, Losses};
-pub use matching::Matching;
+pub use matching::{Matching, Units};
 pub use models::{Family, Gap, PairTest, Reach};
 pub use overall::{ImprovementRow, OverallMethod, OverallRow};
 pub use ranks::{RankRow, Ranks};
-pub use replies::{Replies, UnusableReplies};
 pub use retest::RetestRow;
-pub use selection::Selection;
 pub use sequential::{Sequential, SequentialChance, SequentialPair, SequentialRate};
 pub use study::RowKey;
 pub use trends::{Dose, TrendRow};
-pub use units::Units;
 
+use self::comparisons::{compare, conditions, losses, matching, models, retest, trends};
+use self::rates::{cells, chance, durations, overall, ranks, sequential};
 use crate::cells::Cells;
 use crate::cells::interval::CONFIDENCE;
 use exact::moments::MomentOverflow;

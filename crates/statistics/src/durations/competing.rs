@@ -5,9 +5,8 @@
 
 use std::collections::BTreeMap;
 
-pub use crate::endings::{Ending, Outcome};
-use crate::endings::{RiskSet, risk_sets};
-use crate::survival::RestrictedMean;
+pub use crate::survival::{Ending, Outcome};
+use crate::survival::{RestrictedMean, RiskSet, risk_sets};
 
 /// The tolerance around one half, for rounding only.
 const HALF: f64 = 0.5 - 1e-12;

@@ -7,11 +7,11 @@
 
 use crate::clustered::fewest_clusters;
 use crate::competing::{Ending, Incidence, Influence};
-use crate::contrast::satterthwaite;
 use crate::interval::{Interval, student_t_of};
 use crate::quantile;
 use crate::survival::{has_spread, small_sample};
 use crate::units::Sides;
+use crate::unpaired::satterthwaite;
 use exact::moments::Moments;
 
 /// With 6 scenes, 8 equal models that decide at once or never gave a false claim after Holm in 0.065 of studies.

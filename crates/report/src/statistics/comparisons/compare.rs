@@ -7,15 +7,13 @@ use serde::{Deserialize, Serialize};
 
 use crate::statistics::durations::{decided, is_duration};
 use crate::statistics::losses::{LossCase, LossCases, Toward, settle};
-use crate::statistics::matching::{Matched, outcomes};
+use crate::statistics::matching::{Matched, Sides, Units, outcomes};
 use crate::statistics::retest::repeat_variance;
 use crate::statistics::study::{Block, Study, Unit};
-use crate::statistics::units::{Sides, Units};
 use exact::moments::Moments;
 use metric::catalog::{Kind, StandardError};
 use score::table::MetricColumn;
 use statistics::competing::{Ending, Outcome};
-use statistics::contrast::{newcombe, welch};
 use statistics::coverage::{self, Withheld};
 use statistics::holm::level;
 use statistics::interval::{Interval, student_t};
@@ -23,7 +21,7 @@ use statistics::outcomes::ExactTest;
 use statistics::paired::Pairs;
 use statistics::restricted::{Difference, by_units, fewest, independent, paired, shared_horizon};
 use statistics::units;
-use statistics::unpaired::fisher;
+use statistics::unpaired::{fisher, newcombe, welch};
 
 /// The test of a difference, and the method of its interval.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
@@ -368,7 +366,6 @@ impl Comparison {
     }
 
     /// The units, pairs or episodes that are too few for a verdict, or the lost episodes that decide it; else `None`.
-    #[expect(clippy::cast_precision_loss, reason = "few episodes: more of them are never too few")]
     pub(in crate::statistics) fn unsaid(&self, confidence: f64) -> Option<Units> {
         if let Some(units) = &self.units {
             return units.too_few.then(|| units.clone()).or_else(|| LossCases::unsettled(self.losses.as_ref()));

@@ -1,16 +1,22 @@
-//! Pairs of episodes of two blocks: those with the same scene.
+//! Two blocks by pairs of episodes with the same scene, and by unit of analysis: a scene, a declared cluster or a
+//! participant counts once.
 //!
 //! Rule: a pair is one episode of each side with one scene, if each side has exactly one with it. Only the scenes
 //! decide whether two blocks are compared by pairs, before any outcome is read.
 
 use std::collections::BTreeMap;
+use std::mem::discriminant;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::statistics::study::{Block, Study};
+use crate::statistics::study::{Block, Study, Unit};
+use exact::moments::Moments;
 use score::table::MetricColumn;
+use statistics::clustered::fewest_clusters;
+use statistics::holm::level;
 use statistics::paired::Pairs;
+use statistics::units::{self, UnitTest, difference_test};
 
 /// The matching of the episodes of two blocks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -80,5 +86,115 @@ impl Matched {
         let most = first.episodes().max(second.episodes());
         matching.paired = !pairs.is_empty() && 2 * matching.pairs >= most;
         Self { matching, pairs: matching.paired.then_some(pairs) }
+    }
+}
+
+/// Scenes, seeds or participants with several episodes.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Units {
+    /// The number of units.
+    pub n: u64,
+    /// Their name, in the plural.
+    pub name: String,
+    /// True if the units are too few for a verdict: no symmetric test can reach the level of significance.
+    pub too_few: bool,
+}
+
+impl Units {
+    pub(in crate::statistics) fn new(study: &Study, block: &Block, n: usize, least: f64, confidence: f64) -> Self {
+        Self { n: n as u64, name: study.unit_name(block).to_owned(), too_few: too_few(n, least, confidence) }
+    }
+
+    /// The units of two sides. Units of different kinds, such as participants and scenes, cannot be tested.
+    pub(super) fn between(study: &Study, blocks: [&Block; 2], sides: &Sides, least: f64, confidence: f64) -> Self {
+        let ([first, second], names) = (sides.counts(), blocks.map(|block| study.unit_name(block)));
+        if names[0] == names[1] {
+            return Self::new(study, blocks[0], first.min(second), least, confidence);
+        }
+        Self { n: first as u64, name: format!("{} against {second} {}", names[0], names[1]), too_few: true }
+    }
+}
+
+/// True if no symmetric test with this number of units or episodes, or with this least p value, can reach the level.
+pub(in crate::statistics) fn too_few(n: usize, least: f64, confidence: f64) -> bool {
+    level(confidence).is_none_or(|level| least > level || n < fewest_clusters(level))
+}
+
+/// The values of two sides by unit.
+pub(in crate::statistics) struct Sides {
+    units: BTreeMap<Unit, (Moments, Moments)>,
+}
+
+impl Sides {
+    /// The sides of all strata together: a unit of several strata counts once.
+    ///
+    /// `None` if each episode is its own unit, or all units are pairs of one episode each.
+    pub fn of(study: &Study, column: &MetricColumn, strata: &[(&Block, &Block)]) -> Option<Self> {
+        if !study.has_units() {
+            return None;
+        }
+        let sides = Self::by(study, strata, |row| column.get(row));
+        let repeats = sides.units.values().any(|(a, b)| a.n > 1 || b.n > 1);
+        let shared = sides.units.values().filter(|(a, b)| a.n > 0 && b.n > 0).count();
+        let is_partly_shared = shared > 0 && shared < sides.units.len();
+        (repeats || is_partly_shared).then_some(sides)
+    }
+
+    /// The sides for any value of an episode.
+    pub fn by(study: &Study, strata: &[(&Block, &Block)], value: impl Fn(usize) -> Option<i64>) -> Self {
+        let mut units: BTreeMap<Unit, (Moments, Moments)> = BTreeMap::new();
+        let add = |sum: &mut Moments, part: Moments| {
+            sum.n += part.n;
+            sum.sum += part.sum;
+            sum.sum_sq += part.sum_sq;
+        };
+        for (first, second) in strata {
+            for (unit, part) in study.by_unit(first, &value) {
+                add(&mut units.entry(unit).or_default().0, part);
+            }
+            for (unit, part) in study.by_unit(second, &value) {
+                add(&mut units.entry(unit).or_default().1, part);
+            }
+        }
+        Self { units }
+    }
+
+    /// The units on the smaller side.
+    pub fn len(&self) -> usize {
+        self.counts().into_iter().min().unwrap_or_default()
+    }
+
+    /// The units on each side.
+    fn counts(&self) -> [usize; 2] {
+        let has = |[first, second]: [usize; 2], (a, b): &(Moments, Moments)| {
+            [first + usize::from(a.n > 0), second + usize::from(b.n > 0)]
+        };
+        self.units.values().fold([0, 0], has)
+    }
+
+    /// The shared units, and those of one side; `None` if the units of the two sides are of different kinds.
+    pub(crate) fn divided(&self) -> Option<units::Sides> {
+        let mut sides = units::Sides::default();
+        let mut kinds = [None; 2];
+        for (unit, &(a, b)) in &self.units {
+            match (a.n, b.n) {
+                (0, _) => sides.second.push(b),
+                (_, 0) => sides.first.push(a),
+                _ => sides.shared.push((a, b)),
+            }
+            for (kind, side) in kinds.iter_mut().zip([a, b]) {
+                if side.n > 0 {
+                    kind.get_or_insert(discriminant(unit));
+                }
+            }
+        }
+        (kinds[0] == kinds[1]).then_some(sides)
+    }
+
+    /// The exact test of a rate; `lost` are additional shared units.
+    pub fn test(&self, lost: &[(Moments, Moments)]) -> Option<UnitTest> {
+        let mut sides = self.divided()?;
+        sides.shared.splice(..0, lost.iter().copied());
+        difference_test(&sides)
     }
 }

@@ -188,7 +188,6 @@ impl Family {
 }
 
 impl Reach {
-    #[expect(clippy::cast_precision_loss, reason = "a family has few tests")]
     fn of(tests: &[PairTest], confidence: f64) -> Option<Self> {
         let of_method = |method| {
             let tested =

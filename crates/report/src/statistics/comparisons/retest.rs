@@ -55,7 +55,6 @@ impl RetestRow {
         study.blocks().flat_map(of_block).collect()
     }
 
-    #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
     fn of(block: &Block, times: &Times, column: &MetricColumn) -> Option<Self> {
         let (mut count, mut episodes, mut unstable, mut flipped) = (0, 0, 0, 0.0);
         let mut parts = Vec::new();
@@ -101,7 +100,6 @@ fn times(study: &Study, block: &Block) -> Times {
     times
 }
 
-#[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
 pub(in crate::statistics) fn repeat_variance(study: &Study, block: &Block, column: &MetricColumn) -> Option<f64> {
     if !block.repeats {
         return None;

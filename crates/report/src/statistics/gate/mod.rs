@@ -3,22 +3,20 @@
 //! Rule: a loss within the margin is accepted, so `held` comes before `regressed`. Every verdict is Holm-adjusted over
 //! the cells, based on the unit of analysis, and valid for every outcome of the lost episodes.
 
-mod flips;
 mod sides;
 mod text;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub use flips::{FlippedPair, Played};
+pub use sides::{FlippedPair, Played};
 pub use text::GateFormat;
 
 use self::sides::{Fill, Sides, joined};
 use super::Replies;
 use super::compare::{Compared, Comparison};
-use super::matching::{Matched, Scenes};
+use super::matching::{Matched, Scenes, Units};
 use super::study::{Block, Study};
-use super::units::Units;
 use crate::comparable::Varied;
 use exact::format::{fixed, p_value};
 use exact::moments::{MomentOverflow, Moments};
@@ -208,7 +206,7 @@ fn judged(study: &Study, options: &GateOptions, barrier: Option<&str>) -> Vec<Ga
             let cell = GateCell::blank(study, column, *couple, setting);
             match (tried, couple) {
                 (Some(tried), (Some(base), Some(new))) => {
-                    let cell = GateCell { flips: flips::of(study, column, [base, new]), ..cell };
+                    let cell = GateCell { flips: sides::flips(study, column, [base, new]), ..cell };
                     cell.decided(tried, adjusted, tests, options, (study, new))
                 }
                 _ => cell,
@@ -230,7 +228,6 @@ impl Tried {
             return Self { comparison: at(options.confidence), spread: units.spread(), held };
         }
         // Verdicts on a quantity use its interval, at the Bonferroni level.
-        #[expect(clippy::cast_precision_loss, reason = "few cells")]
         let share = (1.0 - options.confidence) / tests.max(1) as f64;
         let (told_apart, within) = (at(1.0 - share), at(1.0 - 2.0 * share));
         let is_lower = study.better(&column.name) == Better::Lower;
@@ -313,7 +310,6 @@ impl GateCell {
         } else {
             (GateVerdict::CannotSay, String::new())
         };
-        #[expect(clippy::cast_precision_loss, reason = "few cells")]
         let settled_by = (verdict == GateVerdict::CannotSay)
             .then(|| tried.spread?.settling(options.margin, alpha / tests.max(1) as f64))
             .flatten();

@@ -9,8 +9,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::statistics::losses::{LossCase, LossCases, Toward, settle};
+use crate::statistics::matching::{Units, too_few};
 use crate::statistics::study::{Block, Experiment, RowKey, Study};
-use crate::statistics::units::{Units, too_few};
 use exact::moments::Moments;
 use exact::ratio::Ratio;
 use score::table::MetricColumn;
@@ -138,7 +138,6 @@ impl ChanceRow {
 
     /// The largest number of units or episodes, if no outcome of these models could pass Holm's first step.
     pub(in crate::statistics) fn hopeless(family: &[&Self], confidence: f64) -> Option<Units> {
-        #[expect(clippy::cast_precision_loss, reason = "a family has few tests")]
         let first_step = level(confidence)? / family.len() as f64;
         let counted =
             |row: &Self| row.units.clone().unwrap_or(Units { n: row.n, name: "episodes".to_owned(), too_few: true });

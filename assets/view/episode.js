@@ -150,7 +150,7 @@ function headline(episode) {
   const other = (id, words, key) => (id ? make("a", { href: to(id), rel: key, title: `${words} ( ${key === "prev" ? "[" : "]"} )` }, words) : make("span", { class: "quiet" }, words));
   const facts = ["model", "experiment", "condition", "body_color", "stated_color", "shown_color", "participant", "scene"];
   const list = facts.filter((name) => constant(episode, name) !== null).map((name) => make("div", {}, make("dt", {}, name.replaceAll("_", " ")), make("dd", {}, /color$/.test(name) ? colored(constant(episode, name)) : spelled(constant(episode, name)))));
-  const state = [episode.running ? make("strong", { class: "state" }, "under way") : null, episode.lost ? make("strong", { class: "state warn" }, "lost for want of an answer: in no denominator") : null];
+  const state = [episode.running ? make("strong", { class: "state" }, "under way") : null, episode.lost ? make("strong", { class: "state warn" }, "lost without an answer: in no denominator") : null];
   const beside = (episode.siblings ?? []).slice(0, 40).map((own) => make("option", { value: own.id }, own.condition === "default" ? own.model : `${own.model}, ${own.condition}`));
   const select = make("select", { id: "beside", "aria-label": "Compare with" }, make("option", { value: "" }, "Compare with …"), beside, make("option", { value: "*" }, "another from the list"));
   select.addEventListener("change", () => {

@@ -417,7 +417,7 @@ class _LostEpisode(TypedDict):
 
 
 class LostEpisode(_LostEpisode, total=False):
-    """An episode that was lost for want of an answer."""
+    """An episode that was lost without an answer."""
     condition: Optional[str]
 
 

@@ -52,7 +52,7 @@ def test_queries_agree_with_duckdb(paper):
 @pytest.mark.parametrize(
     "sql, words",
     [
-        ("SELECT model, avg(TSA) FROM episodes", "`model` stands beside an aggregate, and there is no GROUP BY"),
+        ("SELECT model, avg(TSA) FROM episodes", "`model` is used beside an aggregate without GROUP BY"),
         ("SELECT *, avg(TSA) FROM episodes", "name the columns in its place"),
         ("SELECT avg(TSA-C) FROM episodes", 'write "TSA-C" in double quotes'),
         ("SELECT (SELECT TSA FROM episodes)", "a subquery runs by itself first: .* 840 rows"),

@@ -63,7 +63,7 @@ fn a_headline_and_the_losses_count_the_same_episodes() {
     let cell = stats["cells"].as_array().unwrap().iter().find(|cell| cell["metric"] == "TSA").unwrap();
     assert_eq!([&cell["n"], &cell["sum"]], [&json!(6), &json!(2)]);
     let notes = run(at, &["report", "a.parquet", "--out", "out"]).ends(0).stderr;
-    assert!(notes.contains("2 episodes were lost for want of an answer: in no denominator"), "{notes}");
+    assert!(notes.contains("2 episodes were lost without an answer: in no denominator"), "{notes}");
     // A file of scores keeps every row and marks the lost ones.
     for name in ["scores.parquet", "scores.csv", "scores.jsonl"] {
         run(at, &["score", "a.parquet", "-o", name]).done();

@@ -56,7 +56,7 @@ fn a_threshold_that_changes_a_conclusion_is_named_in_sentences() {
     let arguments =
         ["sensitivity", ".", "--definitions", "chance.toml", "--metrics", "MCR,MGD,TSA", "--thresholds", "1,10,60,101"];
     let answer = run(folder.path(), &arguments);
-    assert_eq!(answer.stderr, "note: 1 episode was lost for want of an answer: in no denominator\n");
+    assert_eq!(answer.stderr, "note: 1 episode was lost without an answer: in no denominator\n");
     assert_shown!(arguments.join(" "), answer.done());
     let none =
         run(folder.path(), &["definitions", "sensitivity", ".", "--where", "experiment = 'E1'", "--thresholds", "60"])

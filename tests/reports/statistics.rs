@@ -267,7 +267,7 @@ fn lost_episodes_are_bounded_and_unknown_losses_are_said_to_be_unknown() {
     let row = &found.losses.rows[0];
     assert_eq!((row.metric.as_str(), row.lossy.n, row.lossy.successes, row.lossy.lost), ("TSA", 18, 10, 3));
     assert_eq!(row.lossy.bounds, Interval { low: 10.0 / 21.0, high: 13.0 / 21.0 });
-    assert!(found.warnings.iter().any(|warning| warning.starts_with("3 episodes were lost for want of an answer")));
+    assert!(found.warnings.iter().any(|warning| warning.starts_with("3 episodes were lost without an answer")));
     let unknown = statistics(&block("E1", "a", 10, 9));
     assert!(!unknown.losses.recorded && unknown.warnings.iter().any(|warning| warning.contains("reply_status")));
 }

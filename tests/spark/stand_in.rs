@@ -34,7 +34,10 @@ fn answering(json: &str) -> String {
 #[test]
 fn the_drivers_answers_become_messages() {
     for (json, words) in [
-        (r#"{"refused": {"rows": {"expected": 4, "found": 0}}}"#, "expected 4 rows by the footers of the traces, Spark read 0"),
+        (
+            r#"{"refused": {"rows": {"expected": 4, "found": 0}}}"#,
+            "expected 4 rows by the footers of the traces, Spark read 0",
+        ),
         (r#"{"refused": {"empty": "s3a://k:s@b/x"}}"#, "`s3a://b/x`: expected Parquet files"),
         (r#"{"refused": {"rule": {"fault": null, "faults": 0}}}"#, "no-episodes: a.parquet"),
         (

@@ -58,7 +58,7 @@ pub enum PublishedFault {
     NotCsv(::csv::Error),
     #[error("no column `{column}`: expected the columns {}{}", COLUMNS.join(", "), in_place_of(.nearest.as_deref()))]
     MissingColumn { column: &'static str, nearest: Option<String> },
-    #[error("the column `{column}` is there twice: keep one")]
+    #[error("the column `{column}` occurs twice: keep one")]
     RepeatedColumn { column: &'static str },
     #[error("column `{column}`: expected a name, found nothing")]
     NoName { column: &'static str },
@@ -87,14 +87,6 @@ pub fn read(path: &Path) -> Result<Published, PublishedError> {
     parse(&bytes).map_err(|(line, fault)| PublishedError::Malformed { path: path.to_owned(), line, fault })
 }
 
-impl PublishedFault {
-    fn repeated(name: &CellLabel, first: u64) -> Self {
-        let CellLabel { experiment, model, metric } = name;
-        Self::RepeatedCell { experiment: visible(experiment), model: visible(model), metric: visible(metric), first }
-    }
-}
-
-/// A fault and its line.
 type Fault = (Option<u64>, PublishedFault);
 
 fn parse(bytes: &[u8]) -> Result<Published, Fault> {
@@ -108,7 +100,8 @@ fn parse(bytes: &[u8]) -> Result<Published, Fault> {
         let line = record.position().map_or(0, ::csv::Position::line);
         let (name, cell) = columns.cell(&record).map_err(|fault| (Some(line), fault))?;
         if let Some(&first) = first_lines.get(&name) {
-            return Err((Some(line), PublishedFault::repeated(&name, first)));
+            let [experiment, model, metric] = [name.experiment, name.model, name.metric].map(|name| visible(&name));
+            return Err((Some(line), PublishedFault::RepeatedCell { experiment, model, metric, first }));
         }
         first_lines.insert(name.clone(), line);
         cells.push((name, cell));

@@ -124,7 +124,7 @@ pub(super) fn beside_cells(lost: &LostCounts, replies: Option<&Replies>) -> Opti
 
 pub(super) fn told(lost: u64) -> String {
     let (noun, verb) = if lost == 1 { ("episode", "was") } else { ("episodes", "were") };
-    format!("{lost} {noun} {verb} lost for want of an answer")
+    format!("{lost} {noun} {verb} lost without an answer")
 }
 
 fn is_lost(table: &EpisodeTable, row: usize) -> bool {

@@ -1,19 +1,20 @@
-//! Errors of the viewer.
+//! The errors of the viewer.
 
 use std::error::Error as _;
 use std::io;
 use std::path::PathBuf;
 
-use super::found::Renamed;
 use exact::escape::{visible, visible_lines};
 use study::StudyError;
 use trace::error::TraceError;
 use trace::labels::LabelsError;
 use trace::log::LogError;
 
+/// A folder of copies, and the folder of their originals.
+pub(super) type Renamed = (PathBuf, PathBuf);
+
 /// An error of the viewer.
 #[derive(Debug, thiserror::Error)]
-#[expect(missing_docs, reason = "the messages say it")]
 pub enum ViewError {
     #[error(transparent)]
     Study(Box<StudyError>),

@@ -5,7 +5,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fs;
-use std::io::{self, Cursor};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::thread;
 
@@ -13,10 +13,11 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
 
-use super::error::ViewError;
+use super::answers::{changes, episode, list, map, overview};
 use super::found::Found;
-use super::snapshot::{Opened, Snapshot, Together};
-use super::{Options, View, changes, episode, list, map, overview, page};
+use super::logs::Opened;
+use super::snapshot::Together;
+use super::{Options, Snapshot, View, ViewError, film, page};
 use exact::budget::{Budget, Exceeded, Limit};
 use exact::hash;
 use exact::replace::{Content, FolderError, FolderFiles, TemporaryFolder, folder_of, make_folder, replace_folder};
@@ -210,7 +211,7 @@ pub fn episode_page(view: &View, id: &str) -> Result<String, ViewError> {
 fn part_of(snapshot: &Snapshot, opened: &Opened, scores: (Value, Value)) -> Result<(Value, Value), ViewError> {
     let id = &opened.episode.episode_id;
     // The server's page reports an unreadable log; the export fails, since a copy needs its frames.
-    let first = snapshot.moment(opened, 1)?;
+    let first = snapshot.logs.moment(opened, 1)?;
     let mut told = episode::described(snapshot, opened, usize::MAX, first.as_ref(), scores);
     told["siblings"] = list::siblings(snapshot, id).into();
     let said = said(&told);
@@ -218,7 +219,7 @@ fn part_of(snapshot: &Snapshot, opened: &Opened, scores: (Value, Value)) -> Resu
         let (mut images, mut places, mut map) = (Vec::new(), BTreeMap::new(), map::Map::default());
         let length = opened.episode.steps.len();
         let (mut hashes, mut of) = (vec![Value::Null; length], vec![Value::Null; length]);
-        snapshot.each_moment(opened, &mut |t, moment| {
+        snapshot.logs.each_moment(opened, &mut |t, moment| {
             map.add(t, &moment.shapes);
             let Some(frame) = moment.frame else { return };
             let hash = hash::of_bytes(&frame);
@@ -247,22 +248,18 @@ fn said(told: &Value) -> Value {
 /// The same picture in fewer bytes: logs are written fast, a copy once. Rendered rooms have few colours and long runs,
 /// which a palette keeps and PNG filters break. Measured on frames of E1 to E5: 55 % of the bytes.
 fn smaller(frame: &[u8]) -> Option<Vec<u8>> {
-    let mut reader = png::Decoder::new(Cursor::new(frame)).read_info().ok()?;
-    let mut pixels = vec![0; reader.output_buffer_size()?];
-    let info = reader.next_frame(&mut pixels).ok()?;
-    let is_rgb = info.color_type == png::ColorType::Rgb && info.bit_depth == png::BitDepth::Eight;
-    let pixels = pixels.get(..info.buffer_size()).filter(|_| is_rgb)?;
+    let (width, height, pixels) = film::pixels(frame).ok()?;
     let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, info.width, info.height);
+    let mut encoder = png::Encoder::new(&mut bytes, width, height);
     encoder.set_compression(png::Compression::Balanced);
     encoder.set_filter(png::Filter::NoFilter);
-    if let Some((palette, places)) = indexed(pixels) {
+    if let Some((palette, places)) = indexed(&pixels) {
         encoder.set_color(png::ColorType::Indexed);
         encoder.set_palette(palette);
         encoder.write_header().ok()?.write_image_data(&places).ok()?;
     } else {
         encoder.set_color(png::ColorType::Rgb);
-        encoder.write_header().ok()?.write_image_data(pixels).ok()?;
+        encoder.write_header().ok()?.write_image_data(&pixels).ok()?;
     }
     (bytes.len() < frame.len()).then_some(bytes)
 }
@@ -303,23 +300,17 @@ fn check_folder(folder: &Path) -> Result<(), ViewError> {
 
 fn old_files(root: &Path) -> Vec<PathBuf> {
     let mut old: BTreeSet<PathBuf> =
-        ["index.html", "robots.txt", "NOTICE.txt", "assets/view.css", MARK].iter().map(PathBuf::from).collect();
-    old.extend(named(root, Path::new("data"), "js"));
-    for episode in entries(&root.join("frames")) {
-        old.extend(named(root, &Path::new("frames").join(episode), "png"));
+        ["index.html", "robots.txt", "NOTICE.txt", "assets/view.css", MARK].map(PathBuf::from).into();
+    let has_ending = |path: &PathBuf, ending: &str| path.extension().is_some_and(|found| found == ending);
+    old.extend(entries(root, Path::new("data")).filter(|path| has_ending(path, "js")));
+    for episode in entries(root, Path::new("frames")) {
+        old.extend(entries(root, &episode).filter(|path| has_ending(path, "png")));
     }
     old.into_iter().collect()
 }
 
-/// The files of a folder with this ending, as paths relative to `root`.
-fn named(root: &Path, inside: &Path, ending: &str) -> Vec<PathBuf> {
-    let names = entries(&root.join(inside)).into_iter().map(|name| inside.join(name));
-    names.filter(|path| path.extension().is_some_and(|found| found == ending)).collect()
-}
-
-fn entries(folder: &Path) -> Vec<std::ffi::OsString> {
-    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    let mut names: Vec<_> = entries.map(|entry| entry.file_name()).collect();
-    names.sort();
-    names
+/// The entries of a folder, as paths relative to `root`.
+fn entries(root: &Path, inside: &Path) -> impl Iterator<Item = PathBuf> {
+    let found = fs::read_dir(root.join(inside)).into_iter().flatten().flatten();
+    found.map(move |entry| inside.join(entry.file_name()))
 }

@@ -2,8 +2,7 @@
 
 use std::io::Cursor;
 
-use super::View;
-use super::error::ViewError;
+use super::{View, ViewError};
 use exact::budget::Limit;
 use exact::escape::visible;
 
@@ -18,7 +17,7 @@ pub fn film(view: &View, id: &str) -> Result<Vec<u8>, ViewError> {
     let snapshot = view.newest();
     let opened = snapshot.episode(id)?;
     let (mut frames, mut bytes) = (Vec::new(), 0);
-    snapshot.each_moment(&opened, &mut |_, moment| frames.extend(moment.frame))?;
+    snapshot.logs.each_moment(&opened, &mut |_, moment| frames.extend(moment.frame))?;
     if frames.is_empty() && snapshot.renders(&opened) {
         for t in 1..=opened.episode.steps.len() {
             frames.extend(snapshot.frame(&opened, t)?);
@@ -56,7 +55,8 @@ fn animated(frames: &[Vec<u8>]) -> Result<Vec<u8>, Box<dyn std::error::Error>> {
     Ok(bytes)
 }
 
-fn pixels(frame: &[u8]) -> Result<(u32, u32, Vec<u8>), Box<dyn std::error::Error>> {
+/// The width, height and pixels of a frame of 8 bits of red, green and blue.
+pub(super) fn pixels(frame: &[u8]) -> Result<(u32, u32, Vec<u8>), Box<dyn std::error::Error>> {
     let mut reader = png::Decoder::new(Cursor::new(frame)).read_info()?;
     let mut pixels = vec![0; reader.output_buffer_size().ok_or("a frame is too large")?];
     let info = reader.next_frame(&mut pixels)?;

@@ -2,18 +2,14 @@
 //!
 //! Rule: a condition on columns of the episode table is answered from memory; one on steps takes a scan.
 
-use std::collections::{BTreeMap, HashSet, VecDeque};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::collections::HashSet;
 
-use super::error::ViewError;
-use super::snapshot::{Scored, Snapshot};
+use super::{Snapshot, ViewError};
 use exact::escape::visible;
 use report::cells::group::CONDITION;
-use score::select::{SelectError, select};
 use score::table::EpisodeTable;
-use study::{Question, Results, StudyError};
+use study::Results;
 use trace::labels;
-use trace::search::{Found, search};
 
 /// The keys and values of a request, in order.
 pub(super) type Query = [(String, String)];
@@ -178,7 +174,7 @@ pub(super) fn values_of<'t>(
                 Box::new(|row| table.label(name)?.get(row).map(str::to_owned))
             }
             None => {
-                return Err(ViewError::Request(format!("nothing to choose by is called `{}`", visible(name))));
+                return Err(ViewError::Request(format!("cannot filter by `{}`", visible(name))));
             }
         },
     })
@@ -187,63 +183,4 @@ pub(super) fn values_of<'t>(
 /// The condition of an episode; `default` if it has none.
 pub(super) fn condition_of(table: &EpisodeTable, row: usize) -> &str {
     table.label(CONDITION).and_then(|label| label.get(row)).unwrap_or("default")
-}
-
-impl Snapshot {
-    /// The episodes that satisfy a condition. Recent results are kept, since a condition on steps takes a scan.
-    fn kept(&self, condition: &str) -> Result<Arc<HashSet<String>>, ViewError> {
-        let scored = self.table()?;
-        let found = || {
-            let table = match select(scored.results.episodes.clone(), None, Some(condition)) {
-                Ok(table) => table,
-                Err(SelectError::Condition(_)) => {
-                    let options = &self.options;
-                    let question = Question { filter: Some(condition.to_owned()), ..options.question.clone() };
-                    Scored::study(options, scored.inputs.clone(), question)?.score()?.episodes
-                }
-                Err(error) => return Err(StudyError::from(error).into()),
-            };
-            Ok(table.keys.iter().map(|key| key.episode_id.to_owned()).collect())
-        };
-        self.answers.kept.get(condition, found)
-    }
-
-    /// The episodes whose texts contain these words.
-    pub fn said(&self, words: &str) -> Result<Arc<BTreeMap<String, Found>>, ViewError> {
-        let scored = self.table()?;
-        self.answers.said.get(words, || Ok(search(scored.study.traces()?, words, self.options.threads)?))
-    }
-}
-
-/// Recent answers that took a scan.
-#[derive(Debug, Default)]
-pub(super) struct Answers {
-    kept: Last<HashSet<String>>,
-    said: Last<BTreeMap<String, Found>>,
-}
-
-/// Recent answers by question.
-#[derive(Debug)]
-struct Last<T>(Mutex<VecDeque<(String, Arc<T>)>>);
-
-impl<T> Default for Last<T> {
-    fn default() -> Self {
-        Self(Mutex::default())
-    }
-}
-
-impl<T> Last<T> {
-    const MOST: usize = 4;
-
-    /// Returns a recent answer, or finds it. Concurrent callers wait.
-    fn get(&self, question: &str, find: impl FnOnce() -> Result<T, ViewError>) -> Result<Arc<T>, ViewError> {
-        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, answer)) = kept.iter().find(|(asked, _)| asked == question) {
-            return Ok(Arc::clone(answer));
-        }
-        let answer = Arc::new(find()?);
-        kept.truncate(Self::MOST - 1);
-        kept.push_front((question.to_owned(), Arc::clone(&answer)));
-        Ok(answer)
-    }
 }

@@ -8,7 +8,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, UNIX_EPOCH};
 
-use super::error::ViewError;
+use super::error::{Renamed, ViewError};
 use exact::replace::{FolderError, folder_of};
 use study::resolve;
 use trace::inputs::Input;
@@ -37,9 +37,6 @@ pub(super) struct Found {
 
 /// A file's path, size and modification time, to detect changes.
 pub(super) type Stamp = (PathBuf, u64, Option<Duration>);
-
-/// A folder of copies, and the folder of their originals.
-pub(super) type Renamed = (PathBuf, PathBuf);
 
 impl Found {
     pub fn of(runs: &[OsString]) -> Result<Self, ViewError> {
@@ -72,7 +69,6 @@ impl Found {
             return Ok(Vec::new());
         }
         match resolve(named, io::empty()) {
-            Ok(traces) => Ok(traces),
             Err(_) if !self.parts.is_empty() || !self.unfinished.is_empty() => {
                 let mut some = Vec::new();
                 for name in named {
@@ -84,7 +80,7 @@ impl Found {
                 }
                 Ok(some)
             }
-            Err(error) => Err(error.into()),
+            found => Ok(found?),
         }
     }
 
@@ -183,7 +179,7 @@ impl Found {
     }
 }
 
-pub(super) fn stamp(path: &Path) -> Stamp {
+fn stamp(path: &Path) -> Stamp {
     let metadata = fs::metadata(path).ok();
     let written = metadata.as_ref().and_then(|data| data.modified().ok()?.duration_since(UNIX_EPOCH).ok());
     (path.to_owned(), metadata.map_or(0, |data| data.len()), written)

@@ -29,20 +29,18 @@
 
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
-mod answer;
 mod answers;
 mod error;
 pub mod export;
 pub mod film;
 mod filter;
 mod found;
+mod logs;
 mod page;
 #[cfg(feature = "sim")]
 mod rendered;
 pub mod routes;
 mod snapshot;
-
-use answers::{changes, compare, episode, labels, list, live, map, overview, verdict};
 
 use std::ffi::OsString;
 use std::num::NonZeroUsize;
@@ -51,6 +49,7 @@ use std::sync::{Arc, Mutex, PoisonError, RwLock};
 
 use study::Question;
 
+use answers::{Answer, answer, labels, live};
 pub use error::ViewError;
 use snapshot::Snapshot;
 
@@ -98,10 +97,10 @@ impl View {
     /// The bytes of an answer as the server returns them: JSON, PNG or a page; `None` if the query is unknown.
     pub fn ask(&self, name: &str, query: &[(String, String)]) -> Option<Result<Vec<u8>, ViewError>> {
         let bytes = |answer| match answer {
-            answer::Answer::Json(bytes) | answer::Answer::Png(bytes) => bytes,
-            answer::Answer::Page(page) => page.into_bytes(),
+            Answer::Json(bytes) | Answer::Png(bytes) => bytes,
+            Answer::Page(page) => page.into_bytes(),
         };
-        answer::answer(self, name, query).map(|answer| answer.map(bytes))
+        answer(self, name, query).map(|answer| answer.map(bytes))
     }
 
     /// Adds a label sent by a page as JSON; returns the labels of its episode.

@@ -5,7 +5,7 @@ use std::sync::{Mutex, PoisonError};
 
 use serde_json::Value;
 
-use super::error::ViewError;
+use super::ViewError;
 use trace::episode::Episode;
 use world::replay::frames::frames;
 

@@ -1,6 +1,6 @@
 //! The server: GET for the page and its answers, POST for a label if there is a coder.
 
-use std::net::{SocketAddr, TcpListener};
+use std::net::TcpListener;
 use std::sync::Arc;
 
 use axum::Router;
@@ -10,9 +10,8 @@ use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse as _, Response};
 use axum::routing::{get, post};
 
-use super::answer::{Answer, answer};
-use super::error::ViewError;
-use super::{View, page};
+use super::answers::{Answer, answer};
+use super::{View, ViewError, page};
 use web::{self, Guard};
 
 /// The maximum number of concurrent answers; further ones wait.
@@ -20,13 +19,6 @@ const MOST_ANSWERS: usize = 4;
 
 /// The maximum size in bytes of a label with its note.
 const LARGEST_LABEL: usize = 64 << 10;
-
-/// Binds the address of a server, so that its link can be printed before the first request.
-pub fn bind(host: &str, port: u16) -> std::io::Result<(TcpListener, SocketAddr)> {
-    let listener = TcpListener::bind((host, port))?;
-    let address = listener.local_addr()?;
-    Ok((listener, address))
-}
 
 /// Serves until the process ends.
 pub fn serve(view: Arc<View>, listener: TcpListener, guard: Guard) -> std::io::Result<()> {

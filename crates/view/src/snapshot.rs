@@ -1,28 +1,25 @@
 //! The state of recordings at one time: their episodes, scores and locations.
 
-use std::cell::Cell;
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet, VecDeque};
 use std::io::ErrorKind;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::Options;
-use super::error::ViewError;
-use super::filter::Answers;
 use super::found::{Found, Stamp};
+use super::logs::{Logs, Opened};
+use super::{Options, ViewError};
 use exact::escape::visible;
-use study::{Outputs, Question, Results, Study};
+use score::select::{SelectError, select};
+use study::{Outputs, Question, Results, Study, StudyError};
 use trace::episode::Episode;
 use trace::inputs::Input;
 use trace::log::LogError;
-use trace::log::frames::{self, LogIndex, Moment, Shape};
-use trace::merge::{self, EpisodeRows, OwnColumn};
+use trace::log::frames;
+use trace::merge::{self, EpisodeRows};
 use trace::scan::{EpisodePlace, episode_places};
 use trace::schema::Domain;
-
-/// The number of log indices in memory.
-const KEPT_INDICES: usize = 64;
+use trace::search;
 
 /// Recordings as of the time they were read.
 #[derive(Debug)]
@@ -39,10 +36,9 @@ pub(super) struct Snapshot {
     /// The stamps of the files.
     pub stamps: Vec<Stamp>,
     pub label_stamps: Vec<Stamp>,
-    logs: Vec<PathBuf>,
-    indices: Mutex<BTreeMap<PathBuf, Option<Arc<LogIndex>>>>,
-    reading: Mutex<()>,
-    pub answers: Answers,
+    pub logs: Logs,
+    kept: Recent<HashSet<String>>,
+    said: Recent<BTreeMap<String, search::Found>>,
     #[cfg(feature = "sim")]
     rendered: Arc<super::rendered::Rendered>,
 }
@@ -65,18 +61,6 @@ pub(super) struct Running {
     pub episode: Episode,
 }
 
-/// An episode, and whether it is still being recorded.
-#[derive(Clone, Debug)]
-pub(super) struct Opened {
-    /// The episode, or its steps so far.
-    pub episode: Episode,
-    /// The log of an episode under way.
-    pub running: Option<PathBuf>,
-    pub input: Option<Input>,
-    /// The columns of the steps if the trace is from another domain; the episode then has only identity and time.
-    pub own: Option<Vec<OwnColumn>>,
-}
-
 /// Adjacent episodes of a trace, with their table rows and ids.
 #[derive(Debug)]
 pub(super) struct Together {
@@ -93,7 +77,7 @@ impl Snapshot {
 
     /// The state of these files.
     pub fn of_found(options: &Options, found: Found, generation: u64) -> Result<Self, ViewError> {
-        report::style::Style::load(&options.style).map_err(study::StudyError::from)?;
+        report::style::Style::load(&options.style).map_err(StudyError::from)?;
         let (stamps, label_stamps) = (found.stamps(), found.label_stamps());
         let scored = Self::scored(options, &found)?.map(Arc::new);
         let (running, unreadable) = running(&found, scored.as_deref());
@@ -112,10 +96,9 @@ impl Snapshot {
             unreadable,
             stamps,
             label_stamps,
-            logs: found.logs,
-            indices: Mutex::default(),
-            reading: Mutex::default(),
-            answers: Answers::default(),
+            logs: Logs::new(found.logs),
+            kept: Recent::default(),
+            said: Recent::default(),
             #[cfg(feature = "sim")]
             rendered: Arc::default(),
         })
@@ -143,10 +126,9 @@ impl Snapshot {
             unreadable,
             stamps: self.stamps.clone(),
             label_stamps: self.label_stamps.clone(),
-            logs: self.logs.clone(),
-            indices: Mutex::default(),
-            reading: Mutex::default(),
-            answers: Answers::default(),
+            logs: Logs::new(self.logs.paths.clone()),
+            kept: Recent::default(),
+            said: Recent::default(),
             #[cfg(feature = "sim")]
             rendered: Arc::clone(&self.rendered),
         }
@@ -255,24 +237,9 @@ impl Snapshot {
         Ok(Opened { episode: now, running: Some(own.log.clone()), input: None, own: None })
     }
 
-    /// The log's record of a step.
-    pub fn moment(&self, opened: &Opened, t: usize) -> Result<Option<Moment>, ViewError> {
-        let Some(time) = time_of(&opened.episode, t) else { return Ok(None) };
-        if let Some(log) = &opened.running {
-            return Ok(frames::unfinished_step(log, time)?);
-        }
-        for log in self.logs_of(opened) {
-            let Some(index) = self.index(log)? else { continue };
-            if let Some(moment) = index.step(&opened.episode.episode_id, time)? {
-                return Ok(Some(moment));
-            }
-        }
-        Ok(None)
-    }
-
     /// The frame of a step as PNG: from a log, or rendered again if no log has it and this build can.
     pub fn frame(&self, opened: &Opened, t: usize) -> Result<Option<Vec<u8>>, ViewError> {
-        if let Some(frame) = self.moment(opened, t)?.and_then(|moment| moment.frame) {
+        if let Some(frame) = self.logs.moment(opened, t)?.and_then(|moment| moment.frame) {
             return Ok(Some(frame));
         }
         #[cfg(feature = "sim")]
@@ -300,75 +267,28 @@ impl Snapshot {
         serde_json::from_str(file.metadata_value(trace::schema::RECORDING_KEY)?).ok()
     }
 
-    /// Passes the shapes of each step with its t; no calls without a log. Only one log at a time is read for shapes.
-    pub fn each_shapes(&self, opened: &Opened, give: &mut dyn FnMut(usize, Vec<Shape>)) -> Result<(), LogError> {
-        let _one = self.reading.lock().unwrap_or_else(PoisonError::into_inner);
-        let times: BTreeMap<u64, usize> =
-            (1..=opened.episode.steps.len()).filter_map(|t| Some((time_of(&opened.episode, t)?, t))).collect();
-        let is_found = Cell::new(false);
-        let mut give = |time: u64, shapes: Vec<Shape>| {
-            if let Some(t) = times.get(&time) {
-                is_found.set(true);
-                give(*t, shapes);
-            }
-        };
-        if let Some(log) = &opened.running {
-            return frames::each_unfinished_shapes(log, &mut give);
-        }
-        let wanted: BTreeSet<u64> = times.keys().copied().collect();
-        for log in self.logs_of(opened) {
-            let Some(index) = self.index(log)? else { continue };
-            index.each_shapes(&opened.episode.episode_id, &wanted, &mut give)?;
-            if is_found.get() {
-                break;
-            }
-        }
-        Ok(())
-    }
-
-    /// Passes the log's record of each step of a finished episode, reading the log once.
-    pub fn each_moment(&self, opened: &Opened, give: &mut dyn FnMut(usize, Moment)) -> Result<(), LogError> {
-        let times: BTreeMap<u64, usize> =
-            (1..=opened.episode.steps.len()).filter_map(|t| Some((time_of(&opened.episode, t)?, t))).collect();
-        let wanted: BTreeSet<u64> = times.keys().copied().collect();
-        let found = Cell::new(false);
-        for log in self.logs_of(opened) {
-            let Some(index) = self.index(log)? else { continue };
-            index.each_moment(&opened.episode.episode_id, &wanted, &mut |time, moment| {
-                found.set(true);
-                if let Some(t) = times.get(&time) {
-                    give(*t, moment);
+    /// The episodes that satisfy a condition. Recent results are kept, since a condition on steps takes a scan.
+    pub fn kept(&self, condition: &str) -> Result<Arc<HashSet<String>>, ViewError> {
+        let scored = self.table()?;
+        let found = || {
+            let table = match select(scored.results.episodes.clone(), None, Some(condition)) {
+                Ok(table) => table,
+                Err(SelectError::Condition(_)) => {
+                    let options = &self.options;
+                    let question = Question { filter: Some(condition.to_owned()), ..options.question.clone() };
+                    Scored::study(options, scored.inputs.clone(), question)?.score()?.episodes
                 }
-            })?;
-            if found.get() {
-                break;
-            }
-        }
-        Ok(())
-    }
-
-    fn logs_of(&self, opened: &Opened) -> impl Iterator<Item = &PathBuf> {
-        let beside = opened.input.as_ref().map(|input| input.path.with_extension("mcap"));
-        let own = self.logs.iter().find(|log| Some(*log) == beside.as_ref());
-        let others = if own.is_none() { self.logs.as_slice() } else { &[] };
-        own.into_iter().chain(others)
-    }
-
-    /// The index of a log, read once; `None` if it has no index or is not the log of a recording.
-    fn index(&self, log: &Path) -> Result<Option<Arc<LogIndex>>, LogError> {
-        let mut indices = self.indices.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(index) = indices.get(log) {
-            return Ok(index.clone());
-        }
-        if indices.len() >= KEPT_INDICES {
-            indices.clear();
-        }
-        let index = match LogIndex::open(log) {
-            Err(LogError::Foreign { .. }) => None,
-            opened => opened?.map(Arc::new),
+                Err(error) => return Err(StudyError::from(error).into()),
+            };
+            Ok(table.keys.iter().map(|key| key.episode_id.to_owned()).collect())
         };
-        indices.insert(log.to_owned(), index.clone());
-        Ok(index)
+        self.kept.get(condition, found)
+    }
+
+    /// The episodes whose texts contain these words.
+    pub fn said(&self, words: &str) -> Result<Arc<BTreeMap<String, search::Found>>, ViewError> {
+        let scored = self.table()?;
+        self.said.get(words, || Ok(search::search(scored.study.traces()?, words, self.options.threads)?))
     }
 }
 
@@ -413,11 +333,6 @@ fn opened(rows: &EpisodeRows, input: &Input, is_mirror: bool) -> Result<Opened, 
     Ok(Opened { episode, running: None, input: Some(input.clone()), own })
 }
 
-fn time_of(episode: &Episode, t: usize) -> Option<u64> {
-    let step = episode.steps.get(t.checked_sub(1)?)?;
-    u64::try_from(step.extra.frame_time?).ok()
-}
-
 fn unfinished(log: &Path) -> Result<Option<Episode>, LogError> {
     match frames::unfinished(log) {
         Err(LogError::Io { source, .. }) if source.kind() == ErrorKind::NotFound => Ok(None),
@@ -439,4 +354,30 @@ fn running(found: &Found, scored: Option<&Scored>) -> (Vec<Running>, Vec<String>
     running.sort_by(|a, b| a.episode.episode_id.cmp(&b.episode.episode_id));
     running.dedup_by(|a, b| a.episode.episode_id == b.episode.episode_id);
     (running, unreadable)
+}
+
+/// Recent answers by question, for answers that took a scan.
+#[derive(Debug)]
+struct Recent<T>(Mutex<VecDeque<(String, Arc<T>)>>);
+
+impl<T> Default for Recent<T> {
+    fn default() -> Self {
+        Self(Mutex::default())
+    }
+}
+
+impl<T> Recent<T> {
+    const MOST: usize = 4;
+
+    /// Returns a recent answer, or finds it. Concurrent callers wait.
+    fn get(&self, question: &str, find: impl FnOnce() -> Result<T, ViewError>) -> Result<Arc<T>, ViewError> {
+        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, answer)) = kept.iter().find(|(asked, _)| asked == question) {
+            return Ok(Arc::clone(answer));
+        }
+        let answer = Arc::new(find()?);
+        kept.truncate(Self::MOST - 1);
+        kept.push_front((question.to_owned(), Arc::clone(&answer)));
+        Ok(answer)
+    }
 }

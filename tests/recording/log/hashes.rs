@@ -75,7 +75,7 @@ fn an_episode_whose_rows_do_not_match_its_end_record_is_lost() {
     let lost = json(&output)["losses"]["episodes"][0].clone();
     assert_eq!(lost["episode_id"], all[0]);
     let reason = lost["reason"].as_str().unwrap();
-    assert!(reason.starts_with("its rows are not those that its end tells of: expected the hash "), "{reason}");
+    assert!(reason.starts_with("its rows do not match its end: expected the hash "), "{reason}");
     assert_eq!(desk.validated(), all[1..]);
 }
 

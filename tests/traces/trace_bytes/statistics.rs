@@ -47,7 +47,7 @@ fn a_value_that_the_statistics_do_not_allow_is_refused() {
         let is_told = |finding: &Finding| {
             finding.code == Code::CorruptData
                 && finding.column.as_deref() == Some("mirror_px")
-                && finding.expected.contains("as the statistics of the footer say")
+                && finding.expected.contains("as in the footer's statistics")
         };
         assert!(found.iter().any(is_told), "{value}: {found:?}");
         // A command that does not read the column still works.

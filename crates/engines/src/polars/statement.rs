@@ -234,7 +234,7 @@ impl Visitor for Reader<'_> {
                 "*" => "name the columns in its place, here and in a GROUP BY".to_owned(),
                 _ => format!("add GROUP BY {column}, or write max({column})"),
             };
-            let message = format!("the column `{}` stands beside an aggregate, and there is no GROUP BY", column.value);
+            let message = format!("the column `{}` is used beside an aggregate without GROUP BY", column.value);
             self.refuse(column.span, message, Some(help));
         }
         ControlFlow::Continue(())

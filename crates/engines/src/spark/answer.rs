@@ -102,7 +102,7 @@ pub(super) fn table(path: &Path, job: Job<'_>) -> Result<EpisodeTable, SparkErro
         let line = line.map_err(|error| fault(error.to_string()))?;
         let row: Vec<Value> = serde_json::from_slice(&line).map_err(|error| fault(error.to_string()))?;
         append(&mut builder, row)
-            .ok_or_else(|| fault(format!("an episode that is none: {}", String::from_utf8_lossy(&line).trim_end())))?;
+            .ok_or_else(|| fault(format!("an invalid episode: {}", String::from_utf8_lossy(&line).trim_end())))?;
     }
     Ok(builder.finish())
 }

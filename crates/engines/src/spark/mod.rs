@@ -82,7 +82,7 @@ pub enum SparkError {
     #[error("`{folder}` already exists; Spark writes a new folder: remove it or choose another name")]
     Exists { folder: String },
     #[error(
-        "`{uri}`: expected Parquet files, or folders with *.parquet in them, found none; files that begin with `_` or `.` are passed over"
+        "`{uri}`: expected Parquet files, or folders with *.parquet in them, found none; files that begin with `_` or `.` are skipped"
     )]
     Empty { uri: String },
     #[error(

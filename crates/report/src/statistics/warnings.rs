@@ -137,7 +137,7 @@ fn gaps(statistics: &Statistics) -> Option<String> {
     let places = if statistics.gaps.len() == 1 { "1 scene of a model is" } else { "scenes of models are" };
     let count = if statistics.gaps.len() == 1 { String::new() } else { format!("{} ", statistics.gaps.len()) };
     (!named.is_empty())
-        .then(|| format!("{count}{places} not paired, for want of exactly one episode: {}{rest}.", named.join("; ")))
+        .then(|| format!("{count}{places} not paired, because they do not have exactly one episode each: {}{rest}.", named.join("; ")))
 }
 
 fn losses(statistics: &Statistics) -> Option<String> {
@@ -149,7 +149,7 @@ fn losses(statistics: &Statistics) -> Option<String> {
     let total = lost(statistics);
     (total > 0).then(|| {
         format!(
-            "{total} episodes were lost for want of an answer (a crash, a rate limit, a server error, a timeout): they are \
+            "{total} episodes were lost without an answer (a crash, a rate limit, a server error, a timeout): they are \
              in no denominator; the bounds under losses say what they could have changed."
         )
     })

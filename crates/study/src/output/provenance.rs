@@ -21,7 +21,7 @@ pub enum ProvenanceError {
     NoManifest { path: PathBuf, source: io::Error },
     #[error("{}: expected the manifest of a report, found {found}; make the report again with `mirrorstats report`", path.display())]
     Malformed { path: PathBuf, found: String },
-    #[error("{} of {all} traces of the report are not what they were:\n{}\n{REMEDY}", faults.len(), lines(faults))]
+    #[error("{} of {all} traces of the report have changed:\n{}\n{REMEDY}", faults.len(), lines(faults))]
     Traces { all: usize, faults: Vec<TraceFault> },
 }
 

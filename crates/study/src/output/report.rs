@@ -172,7 +172,7 @@ fn registered(episodes: &EpisodeTable) -> Option<String> {
     let verdict = match &plan.definitions {
         None => "it names no definitions".to_owned(),
         Some(hash) if hash == own => "the definitions are those that it names".to_owned(),
-        Some(hash) => format!("the definitions are others ({}) than those that it names ({})", short(own), short(hash)),
+        Some(hash) => format!("the definitions ({}) differ from those that it names ({})", short(own), short(hash)),
     };
     Some(format!("the recording follows the registered plan {}: {verdict}", short(&plan.sha256)))
 }

@@ -123,7 +123,7 @@ fn fault(output: &Output) -> Option<String> {
     let shown = visible(&output.path);
     let is_plain = |part: &str| matches!(Path::new(part).components().collect::<Vec<_>>()[..], [Component::Normal(_)]);
     if !output.path.split('/').all(is_plain) {
-        return Some(format!("the output `{shown}`, which is no path inside of its folder"));
+        return Some(format!("the output `{shown}`, which is not a path inside its folder"));
     }
     if output.path == MANIFEST {
         return Some(format!("`{MANIFEST}` among its outputs"));

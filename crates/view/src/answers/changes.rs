@@ -2,8 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::super::error::ViewError;
-use super::super::snapshot::Snapshot;
+use crate::{Snapshot, ViewError};
 use exact::escape::visible;
 use report::cells::diff::Flip;
 use study::{DiffRequest, Side, diff};

@@ -2,11 +2,10 @@
 
 use serde_json::{Value, json};
 
-use super::super::episode::{LONGEST, about};
-use super::super::error::ViewError;
-use super::super::filter::{Query, number, required, value};
-use super::super::snapshot::Snapshot;
-use super::super::{list, verdict};
+use super::episode::{LONGEST, about};
+use super::{list, verdict};
+use crate::filter::{Query, number, required, value};
+use crate::{Snapshot, ViewError};
 use exact::escape::visible;
 use trace::episode::Episode;
 use trace::schema::domain::is_identity;
@@ -121,7 +120,7 @@ pub(crate) fn scene(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewErr
             "length": episode.steps.len(),
             "verdict": verdict::answer(&opened),
             "marks": marks.collect::<Vec<_>>(),
-            "frames": snapshot.moment(&opened, 1)?.is_some_and(|moment| moment.frame.is_some()) || snapshot.renders(&opened),
+            "frames": snapshot.logs.moment(&opened, 1)?.is_some_and(|moment| moment.frame.is_some()) || snapshot.renders(&opened),
         }));
     }
     told.sort_by_key(|episode| episode["name"].to_string());

@@ -4,12 +4,11 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::{Map, Value, json};
 
-use super::super::error::ViewError;
-use super::super::filter::{Query, number, required};
-use super::super::labels;
-use super::super::list;
-use super::super::snapshot::{Opened, Scored, Snapshot};
-use super::super::verdict;
+use super::{labels, list, verdict};
+use crate::filter::{Query, number, required};
+use crate::logs::Opened;
+use crate::snapshot::Scored;
+use crate::{Snapshot, ViewError};
 use exact::escape::visible;
 use score::evidence::{Evidence, MetricEvidence, ranges};
 use study::{Question, Study};
@@ -35,9 +34,9 @@ pub(crate) fn answer(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewEr
 /// An episode without its position in a list, its texts cut to `longest` characters. An unreadable log hides nothing
 /// else.
 pub(crate) fn about(snapshot: &Snapshot, opened: &Opened, longest: usize) -> Result<Value, ViewError> {
-    let (first, fault) = match snapshot.moment(opened, 1) {
+    let (first, fault) = match snapshot.logs.moment(opened, 1) {
         Ok(first) => (first, None),
-        Err(error) => (None, Some(error.words())),
+        Err(error) => (None, Some(ViewError::from(error).words())),
     };
     let mut told = described(snapshot, opened, longest, first.as_ref(), scores(snapshot, opened)?);
     if let Some(fault) = fault {

@@ -5,9 +5,7 @@ use std::path::PathBuf;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use super::super::View;
-use super::super::error::ViewError;
-use super::super::snapshot::Snapshot;
+use crate::{Snapshot, View, ViewError};
 use exact::escape::{visible, visible_lines};
 use score::table::EpisodeTable;
 use trace::labels::{LabelLine, Mark, PREFIX, append, list_beside};

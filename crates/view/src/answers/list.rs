@@ -4,10 +4,9 @@ use std::cmp::Ordering;
 
 use serde_json::{Value, json};
 
-use super::super::error::ViewError;
-use super::super::filter::{COLUMNS, Filter, Query, condition_of, number, value};
-use super::super::labels;
-use super::super::snapshot::Snapshot;
+use super::labels;
+use crate::filter::{COLUMNS, Filter, Query, condition_of, number, value};
+use crate::{Snapshot, ViewError};
 use exact::escape::visible;
 use score::select::is_of_coders;
 use score::table::{EpisodeTable, MetricColumn};
@@ -105,11 +104,9 @@ fn sorted(snapshot: &Snapshot, query: &Query) -> Result<Vec<usize>, ViewError> {
     let turned = |ordering: Ordering| if down { ordering.reverse() } else { ordering };
     let Some(name) = value(query, "sort") else { return Ok(rows) };
     if let Some(metric) = table.metric(name) {
-        rows.sort_by(|a, b| match (metric.get(*a), metric.get(*b)) {
-            (None, None) => Ordering::Equal,
-            (None, Some(_)) => Ordering::Greater,
-            (Some(_), None) => Ordering::Less,
-            (Some(a), Some(b)) => turned(a.cmp(&b)),
+        rows.sort_by(|a, b| {
+            let (a, b) = (metric.get(*a), metric.get(*b));
+            a.is_none().cmp(&b.is_none()).then(turned(a.cmp(&b)))
         });
         return Ok(rows);
     }
@@ -120,7 +117,7 @@ fn sorted(snapshot: &Snapshot, query: &Query) -> Result<Vec<usize>, ViewError> {
         "experiment" => rows.sort_by(|a, b| turned(keys(a).experiment.cmp(keys(b).experiment))),
         "condition" => rows.sort_by(|a, b| turned(condition_of(table, *a).cmp(condition_of(table, *b)))),
         "seed" => rows.sort_by(|a, b| turned((keys(a).seed, keys(a).run).cmp(&(keys(b).seed, keys(b).run)))),
-        other => return Err(ViewError::Request(format!("nothing to sort by is called `{}`", visible(other)))),
+        other => return Err(ViewError::Request(format!("cannot sort by `{}`", visible(other)))),
     }
     Ok(rows)
 }

@@ -5,10 +5,9 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
-use super::super::View;
-use super::super::error::ViewError;
-use super::super::found::{Found, stamp};
-use super::super::snapshot::{Running, Snapshot};
+use crate::found::Found;
+use crate::snapshot::Running;
+use crate::{Snapshot, View, ViewError};
 use exact::escape::visible;
 use exact::format::fixed;
 use trace::replies::ReplyCounts;
@@ -59,34 +58,29 @@ impl View {
     }
 
     fn look(&self, watch: &mut Watch) {
-        let old = self.newest();
-        let found = match Found::of(&self.options.runs) {
-            Ok(found) => found,
-            Err(error) => {
-                watch.fault = Some(error.words());
-                return;
-            }
-        };
-        let (is_same, has_labels) = (found.stamps() == old.stamps, found.label_stamps() == old.label_stamps);
-        let growing: Vec<_> = found.unfinished.iter().map(|path| stamp(path).0).collect();
-        let known: Vec<_> = old.running.iter().map(|running| running.log.clone()).collect();
-        if is_same && has_labels && growing.is_empty() && known.is_empty() {
-            watch.fault = None;
-            return;
-        }
-        let newer = match (is_same, has_labels) {
-            (true, true) => Ok(old.grown(&found, old.scored.clone())),
-            (true, false) => old.relabelled(&found),
-            (false, _) => Snapshot::open(&self.options, old.generation + 1),
-        };
-        match newer {
-            Ok(newer) => {
+        watch.fault = match self.newer() {
+            Ok(None) => None,
+            Ok(Some(newer)) => {
                 *self.newest.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(newer);
-                watch.fault = None;
+                None
             }
             // A recording may be replacing a trace; the next scan follows soon.
-            Err(error) => watch.fault = Some(error.words()),
+            Err(error) => Some(error.words()),
+        };
+    }
+
+    /// The state of the files, unless it is the one that is shown.
+    fn newer(&self) -> Result<Option<Snapshot>, ViewError> {
+        let (old, found) = (self.newest(), Found::of(&self.options.runs)?);
+        let (is_same, has_labels) = (found.stamps() == old.stamps, found.label_stamps() == old.label_stamps);
+        if is_same && has_labels && found.unfinished.is_empty() && old.running.is_empty() {
+            return Ok(None);
         }
+        Ok(Some(match (is_same, has_labels) {
+            (true, true) => old.grown(&found, old.scored.clone()),
+            (true, false) => old.relabelled(&found)?,
+            (false, _) => Snapshot::open(&self.options, old.generation + 1)?,
+        }))
     }
 }
 

@@ -7,9 +7,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::{Value, json};
 
-use super::super::error::ViewError;
-use super::super::filter::{Query, required};
-use super::super::snapshot::Snapshot;
+use crate::filter::{Query, required};
+use crate::{Snapshot, ViewError};
 use exact::escape::visible;
 use trace::log::frames::{Shape, hull};
 
@@ -20,7 +19,7 @@ pub(crate) fn answer(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewEr
     let opened = snapshot.episode(required(query, "id")?)?;
     // The episode's page reports an unreadable log.
     let mut map = Map::default();
-    Ok(match snapshot.each_shapes(&opened, &mut |t, shapes| map.add(t, &shapes)) {
+    Ok(match snapshot.logs.each_shapes(&opened, &mut |t, shapes| map.add(t, &shapes)) {
         Ok(()) => map.told(opened.episode.steps.len()),
         Err(_) => Map::default().told(0),
     })

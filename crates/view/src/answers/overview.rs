@@ -5,9 +5,9 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
-use super::super::error::ViewError;
-use super::super::filter::{COLUMNS, Filter, PARTICIPANT, Query, STATUS, values_of};
-use super::super::snapshot::{Scored, Snapshot};
+use crate::filter::{COLUMNS, Filter, PARTICIPANT, Query, STATUS, values_of};
+use crate::snapshot::Scored;
+use crate::{Snapshot, ViewError};
 use exact::escape::visible;
 use exact::format::fixed;
 use report::html;

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::super::snapshot::Opened;
+use crate::logs::Opened;
 use exact::escape::visible;
 use trace::episode::{Action, Episode, Step};
 use world::experiment::Experiment;
@@ -71,7 +71,7 @@ fn reached(episode: &Episode) -> (&'static str, String, usize) {
 #[cfg(test)]
 mod tests {
     use super::answer;
-    use crate::snapshot::Opened;
+    use crate::logs::Opened;
     use trace::episode::{Action, Episode, Step};
 
     fn told(change: impl Fn(&mut Episode)) -> (String, String, u64) {

@@ -39,7 +39,7 @@ pub enum ReplayError {
     Scenes { found: String },
     #[error("episode `{episode}`: {fault}")]
     World { episode: String, fault: String },
-    #[error("no trace has the episode `{0}`; `mirrorstats trace info --episodes` lists what is there")]
+    #[error("no trace has the episode `{0}`; `mirrorstats trace info --episodes` lists the episodes")]
     NoEpisode(String),
     #[error("`{episode}` has no frame of step {t}")]
     NoFrame { episode: String, t: i32 },
@@ -60,7 +60,7 @@ pub enum ReplayError {
     )]
     InLog { log: PathBuf, episode: String, fault: String },
     #[error(
-        "episode `{episode}`: `{trace}` and `{}` do not belong together: expected rows with the hash {traced}, as in the trace, found {logged}\n  help: name the one that is meant, or move the other one away",
+        "episode `{episode}`: `{trace}` and `{}` do not belong together: expected rows with the hash {traced}, as in the trace, found {logged}\n  help: name the right one, or move the other one away",
         log.display()
     )]
     Apart { episode: String, trace: String, traced: String, log: PathBuf, logged: String },

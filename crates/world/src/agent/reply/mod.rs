@@ -22,7 +22,7 @@ use serde_json::{Value, json};
 use repair::NoObject;
 pub use repair::Repair;
 #[cfg(feature = "sim")]
-pub(in crate::agent) use surrogates::without_lone_surrogates;
+pub(crate) use surrogates::without_lone_surrogates;
 
 use super::{Answers, Reply, Status, Usage, Words, prompt};
 use crate::experiment::Spec;
@@ -34,8 +34,9 @@ use trace::identification;
 use trace::palette::Color;
 
 /// The end of a reply, as reported by the provider.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Ending {
+    #[default]
     Whole,
     /// Cut off by the token limit.
     Truncated,
@@ -44,7 +45,7 @@ pub enum Ending {
 }
 
 impl Reply {
-    pub(in crate::agent) fn without_decision(status: Status, fault: Option<String>) -> Self {
+    pub(crate) fn without_decision(status: Status, fault: Option<String>) -> Self {
         Self {
             status,
             repairs: Vec::new(),
@@ -73,6 +74,7 @@ impl Reply {
     }
 
     /// Adds the text that was read, and its cost.
+    #[must_use]
     pub fn with_text(self, raw: String, usage: Usage) -> Self {
         Self { raw: Some(raw), usage, ..self }
     }
@@ -112,10 +114,10 @@ fn without_object(fault: NoObject) -> Reply {
 fn decision(object: &object::Object, experiment: &Spec) -> Result<Reply, String> {
     let keys = experiment.keys();
     if let Some(key) = object.repeated_key() {
-        return Err(format!("the key \"{key}\" stands twice"));
+        return Err(format!("the key \"{key}\" occurs twice"));
     }
     if let Some(key) = object.keys().find(|key| !keys.contains(key)) {
-        return Err(format!("the key \"{key}\" is none of {}", listed(&keys)));
+        return Err(format!("the key \"{key}\" is not one of {}", listed(&keys)));
     }
     let text = |key: ReplyKey| match object.get(key.name()) {
         _ if !experiment.reply.contains(&key) => Ok(None),
@@ -244,36 +246,30 @@ pub fn schema(title: &str, experiment: &Spec) -> Value {
         ReplyKey::Mark => "The colour of the mark on one's own body, or none.",
         ReplyKey::Identification => "The colour of one's own body as far as it is known.",
     };
-    let mut properties = serde_json::Map::new();
+    let mut schema = json!({ "$schema": "https://json-schema.org/draft/2020-12/schema", "title": title });
+    if let (Value::Object(schema), Value::Object(structure)) = (&mut schema, structure(experiment)) {
+        schema.extend(structure);
+    }
     for key in &experiment.reply {
-        let mut property = json!({ "type": "string", "description": description(*key) });
+        let property = &mut schema["properties"][key.name()];
+        property["description"] = description(*key).into();
         match key {
             ReplyKey::Action => {
                 property["enum"] = prompt::actions(actions).iter().map(|action| prompt::letter(*action)).collect();
             }
             ReplyKey::SelectedCube | ReplyKey::Mark => {
-                let colors = Color::ALL.iter().map(|color| color.name());
-                property["enum"] = colors.chain(["none"]).collect();
+                property["enum"] = Color::ALL.map(Color::name).into_iter().chain(["none"]).collect();
             }
             _ => {}
         }
-        properties.insert(key.name().to_owned(), property);
     }
     for answer in &experiment.answers {
-        let mut property = property(answer);
+        let property = &mut schema["properties"][answer.key.as_str()];
         let words = answer.words();
         if !words.is_empty() {
             property["enum"] = words.into();
         }
         property["description"] = answer.words.clone().into();
-        properties.insert(answer.key.clone(), property);
     }
-    json!({
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": title,
-        "type": "object",
-        "properties": properties,
-        "required": experiment.keys(),
-        "additionalProperties": false,
-    })
+    schema
 }

@@ -67,7 +67,6 @@ impl Repair {
 /// The changed text; `None` if there is nothing to repair.
 type Change = fn(&str) -> Option<String>;
 
-/// The reason for a reply without an object.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum NoObject {
     /// The strict parser's message about the original text.

@@ -7,7 +7,7 @@ const REPLACEMENT: &str = "\\ufffd";
 const ESCAPE: usize = 6;
 
 /// JSON with each lone surrogate's escape replaced by that of U+FFFD; `None` without one. Pairs stay.
-pub(in crate::agent) fn without_lone_surrogates(json: &str) -> Option<String> {
+pub(crate) fn without_lone_surrogates(json: &str) -> Option<String> {
     let (mut changed, mut is_changed) = (String::with_capacity(json.len()), false);
     let mut rest = json;
     while let Some(at) = rest.find('\\') {

@@ -3,9 +3,8 @@
 //! The files of the old report are the outputs in its manifest. They are replaced, or removed if the new report lacks
 //! them; all other files in the folder stay.
 
-mod old;
-
 use std::collections::BTreeSet;
+use std::fs;
 use std::io;
 use std::path::{Component, Path, PathBuf};
 
@@ -13,6 +12,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::cells::{Cell, Cells};
+use crate::figures::FigureName;
 use crate::layout::MetricTable;
 use crate::style::Style;
 use crate::tables::{ListTable, Table, key_field};
@@ -20,9 +20,10 @@ use exact::hash;
 use exact::number::full_precision;
 use exact::replace::{self, Content, FolderFiles, FolderHoldsInput, TargetIsInput};
 use metric::catalog::Catalog;
-pub use old::MANIFEST;
 
-/// The contents of the folder.
+/// The name of the manifest, which is written last.
+pub const MANIFEST: &str = "manifest.json";
+
 #[derive(Clone, Copy, Debug)]
 pub struct Bundle<'a> {
     /// For `cells.csv`.
@@ -41,7 +42,6 @@ pub struct Bundle<'a> {
     pub others: &'a [OutputFile],
 }
 
-/// A file of the folder.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct OutputFile {
     /// Its path inside the folder.
@@ -106,7 +106,6 @@ pub struct Output {
     pub bytes: u64,
 }
 
-/// An error while writing a report.
 #[derive(Debug, thiserror::Error)]
 pub enum BundleError {
     #[error("cannot write the report to {}: it is not a folder; give another one with --out", path.display())]
@@ -173,16 +172,12 @@ impl Output {
     }
 }
 
-/// A written report.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Written {
-    /// Its files, ordered by path.
     pub files: Vec<PathBuf>,
-    /// Its manifest, with the outputs.
     pub manifest: Manifest,
 }
 
-/// Writes the report into the folder `out` and replaces the report in it.
 pub fn write(out: &Path, bundle: &Bundle) -> Result<Written, BundleError> {
     let mut files = files(bundle);
     let manifest = bundle.manifest.with_outputs(&files);
@@ -195,14 +190,14 @@ pub fn write(out: &Path, bundle: &Bundle) -> Result<Written, BundleError> {
     check_old(out, bundle.read)?;
     let new: Vec<_> = files.iter().map(|file| (file.path.as_path(), Content::Bytes(&file.bytes))).collect();
     check_inputs(out, &new.iter().map(|(path, _)| path).collect::<Vec<_>>(), bundle.read)?;
-    replace::replace_folder(out, &FolderFiles { new: &new, index: Some(Path::new(MANIFEST)), old: &old::files })
+    replace::replace_folder(out, &FolderFiles { new: &new, index: Some(Path::new(MANIFEST)), old: &old_files })
         .map_err(|error| BundleError::Unwritable { path: error.path, source: error.source })?;
     Ok(Written { files: files.into_iter().map(|file| out.join(file.path)).collect(), manifest })
 }
 
 /// Checks that no file of the report in `out` is among the files that are read: a new report would replace it.
 pub fn check_old(out: &Path, read: &[PathBuf]) -> Result<(), BundleError> {
-    check_inputs(out, &old::files(out), read)
+    check_inputs(out, &old_files(out), read)
 }
 
 fn check_inputs<P: AsRef<Path>>(out: &Path, targets: &[P], read: &[PathBuf]) -> Result<(), BundleError> {
@@ -252,4 +247,52 @@ fn check_paths(files: &[OutputFile]) -> Result<(), BundleError> {
         }
     }
     Ok(())
+}
+
+/// The needed part of a manifest; other versions may have more fields.
+#[derive(Deserialize)]
+struct Listed {
+    outputs: Option<Vec<ListedOutput>>,
+    /// Only distinguishes a report's manifest from other files of that name.
+    #[serde(rename = "schema_version")]
+    _schema_version: u32,
+}
+
+#[derive(Deserialize)]
+struct ListedOutput {
+    path: PathBuf,
+}
+
+/// The files of the report in a folder, including the manifest, by path inside it; empty without a manifest of a
+/// report.
+fn old_files(folder: &Path) -> Vec<PathBuf> {
+    let manifest = fs::read(folder.join(MANIFEST)).ok();
+    let Some(Ok(manifest)) = manifest.map(|text| serde_json::from_slice::<Listed>(&text)) else { return Vec::new() };
+    let mut files = match manifest.outputs {
+        Some(outputs) => outputs.into_iter().map(|output| output.path).collect(),
+        None => by_name(folder),
+    };
+    files.push(MANIFEST.into());
+    files
+}
+
+/// The files that an older report may have, by name: the files with fixed names, every figure in every format, and
+/// every table that exists in all three formats.
+fn by_name(folder: &Path) -> Vec<PathBuf> {
+    let mut files: Vec<PathBuf> = ["cells.csv", "episodes.parquet", "report.html"].map(PathBuf::from).into();
+    for figure in FigureName::ALL {
+        files.extend(["svg", "png", "pdf"].map(|ending| format!("figures/{figure}.{ending}").into()));
+    }
+    for name in table_names(folder) {
+        files.extend(["tex", "md", "csv"].map(|ending| format!("tables/{name}.{ending}").into()));
+    }
+    files.retain(|file| folder.join(file).is_file());
+    files
+}
+
+fn table_names(folder: &Path) -> Vec<String> {
+    let tables = folder.join("tables");
+    let entries = fs::read_dir(&tables).into_iter().flatten().flatten();
+    let names = entries.filter_map(|entry| entry.file_name().to_str()?.strip_suffix(".tex").map(str::to_owned));
+    names.filter(|name| ["md", "csv"].iter().all(|ending| tables.join(format!("{name}.{ending}")).is_file())).collect()
 }

@@ -9,16 +9,14 @@ use metric::catalog::Catalog;
 use serde_json::Value;
 
 use exact::escape::visible;
-use score::table::{Declared, EpisodeTable, TextColumn};
+use score::table::{Declared, EpisodeTable};
 
-/// The label of an episode's recording settings.
 pub const FINGERPRINT: &str = "fingerprint";
 /// Digits of a hash in a message.
 const SHOWN: usize = 8;
 /// World settings that an experiment sets itself.
 const OF_EXPERIMENT: [&str; 2] = ["others", "clutter"];
 
-/// The setting that a comparison varies on purpose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Varied {
     /// The model, its sampling and its driver.
@@ -43,7 +41,6 @@ impl Varied {
     }
 }
 
-/// The settings of some episodes' recordings.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Recorded<'a> {
     fingerprints: BTreeSet<&'a str>,
@@ -52,27 +49,21 @@ pub struct Recorded<'a> {
 }
 
 impl<'a> Recorded<'a> {
-    /// The fingerprints of these rows of a table.
     pub fn of(table: &'a EpisodeTable, rows: impl Iterator<Item = usize>) -> Self {
         let column = table.label(FINGERPRINT);
         let mut found = Self::default();
         for row in rows {
-            found.add(column, row);
+            found.episodes += 1;
+            match column.and_then(|column| column.get(row)) {
+                Some(name) => drop(found.fingerprints.insert(name)),
+                None => found.undeclared += 1,
+            }
         }
         found
     }
 
-    /// Returns true if every episode has a fingerprint.
     pub const fn is_declared(&self) -> bool {
         self.undeclared == 0
-    }
-
-    fn add(&mut self, column: Option<&'a TextColumn>, row: usize) {
-        self.episodes += 1;
-        match column.and_then(|column| column.get(row)) {
-            Some(name) => drop(self.fingerprints.insert(name)),
-            None => self.undeclared += 1,
-        }
     }
 }
 

@@ -5,6 +5,7 @@
 //! compared.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write as _;
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -13,7 +14,8 @@ use crate::errata::{Errata, Erratum, Field};
 use crate::layout::{MetricCell, MetricRow, MetricTable};
 use crate::published::{CellLabel, PrintedCell, Published};
 use crate::style::Style;
-use crate::tables::Emphasis;
+use crate::tables::{Column, Emphasis, Look, Table, push_wrapped};
+use exact::escape::visible;
 use exact::number::Decimal;
 
 /// The result of a comparison.
@@ -53,7 +55,6 @@ pub struct Difference {
     pub excused_by: Option<String>,
 }
 
-/// An error of comparing tables.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ComparisonError {
     #[error(
@@ -67,13 +68,6 @@ pub enum ComparisonError {
         "the style `{style}` prints no standard errors in its table `{table}`: compare with a style of mean and standard error, such as `paper`"
     )]
     NoStandardErrors { style: String, table: String },
-}
-
-impl Comparison {
-    /// Returns true if every difference is excused.
-    pub fn holds(&self) -> bool {
-        self.differing == 0
-    }
 }
 
 /// The table to compare: the one called `name`, else the first that has all the published metrics.
@@ -110,7 +104,6 @@ fn described(table: &MetricTable) -> String {
     format!("`{}` ({})", table.name, metrics.join(", "))
 }
 
-/// Compares `table`, with cells by experiment and model, with the published cells.
 pub fn compare(table: &MetricTable, published: &Published, errata: &Errata) -> Comparison {
     let ours = our_cells(table);
     let about_table: Vec<&Erratum> = errata.erratum.iter().filter(|erratum| erratum.table == table.name).collect();
@@ -219,4 +212,71 @@ fn excuses(erratum: &Erratum, difference: &Difference) -> bool {
     difference.field == Some(erratum.field)
         && is_stated(&erratum.published, &difference.published)
         && is_stated(&erratum.computed, &difference.computed)
+}
+
+impl Comparison {
+    pub fn holds(&self) -> bool {
+        self.differing == 0
+    }
+
+    pub fn render(&self, width: Option<usize>) -> String {
+        let mut text = String::new();
+        if !self.differences.is_empty() {
+            push_differences(&mut text, &self.differences, width);
+            text.push('\n');
+        }
+        for erratum in &self.unused_errata {
+            let Erratum { experiment, model, metric, published, computed, .. } = erratum;
+            let [experiment, model, metric] = [experiment, model, metric].map(|name| visible(name));
+            let (field, published, computed) = (erratum.field.name(), visible(published), visible(computed));
+            let _ = writeln!(
+                text,
+                "erratum not needed: {experiment}, {model}, {metric}, {field}: `{published}` for `{computed}`"
+            );
+        }
+        if !self.unpublished.is_empty() {
+            let _ = writeln!(text, "not in the published table: {} of our cells", self.unpublished.len());
+        }
+        let _ = writeln!(
+            text,
+            "{}: {} cells: {} as published, {} excused by errata, {} differ",
+            visible(&self.table),
+            self.cells,
+            self.same,
+            self.excused,
+            self.differing
+        );
+        text
+    }
+}
+
+fn push_differences(text: &mut String, differences: &[Difference], width: Option<usize>) {
+    let header = ["experiment", "model", "metric", "field", "published", "computed", "verdict"];
+    let mut table = Table::list(Look::Framed, 3, header.map(Column::left));
+    let mut reasons = Vec::new();
+    for difference in differences {
+        let verdict = match &difference.excused_by {
+            None => "differs".to_owned(),
+            Some(reason) => {
+                reasons.push(reason);
+                format!("excused [{}]", reasons.len())
+            }
+        };
+        table.push(record(difference, verdict));
+    }
+    *text += &table.within(width);
+    for (at, reason) in reasons.iter().enumerate() {
+        let number = format!("[{}] ", at + 1);
+        push_wrapped(text, &format!("{number}{}", visible(reason)), width, number.len());
+    }
+}
+
+fn record(difference: &Difference, verdict: String) -> [String; 7] {
+    let or_none = |text: &str| if text.is_empty() { "(none)" } else { text }.to_owned();
+    let (field, computed) = match difference.field {
+        Some(field) => (field.name(), or_none(&difference.computed)),
+        None => ("cell", "(not in the traces)".to_owned()),
+    };
+    let CellLabel { experiment, model, metric } = difference.cell.clone();
+    [experiment, model, metric, field.to_owned(), or_none(&difference.published), computed, verdict]
 }

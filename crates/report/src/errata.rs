@@ -59,7 +59,6 @@ pub enum Field {
     Emphasis,
 }
 
-/// An error of an errata file.
 #[derive(Debug, thiserror::Error)]
 pub enum ErrataError {
     #[error("errata {}: cannot read the file: {source}", path.display())]
@@ -72,12 +71,10 @@ pub enum ErrataError {
 const LARGEST: Limit = Limit::new("bytes of errata", 1 << 20);
 
 impl Errata {
-    /// The errata of the paper.
     pub fn of_paper() -> Self {
         toml::from_str(PAPER).expect("the built-in errata are well-formed: a test reads them")
     }
 
-    /// The errata in a file.
     pub fn read(path: &Path) -> Result<Self, ErrataError> {
         let text =
             input::text(path, LARGEST).map_err(|source| ErrataError::Unreadable { path: path.to_owned(), source })?;
@@ -93,7 +90,6 @@ impl Errata {
 }
 
 impl Erratum {
-    /// Returns true if it applies to this cell of this table.
     pub fn is_about(&self, table: &str, cell: &CellLabel) -> bool {
         let CellLabel { experiment, model, metric } = cell;
         (self.table.as_str(), &self.experiment, &self.model, &self.metric) == (table, experiment, model, metric)

@@ -28,7 +28,6 @@ pub mod layout;
 pub mod plan;
 pub mod published;
 pub mod sensitivity;
-pub mod side_by_side;
 pub mod statistics;
 pub mod style;
 pub mod tables;

@@ -9,14 +9,12 @@ use std::str::FromStr;
 /// The most episodes per row in an audit: printed digits carry no information about more.
 pub const MOST_EPISODES: u64 = 2_000;
 
-/// The episodes of each row.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Episodes {
     others: Option<u64>,
     named: BTreeMap<String, u64>,
 }
 
-/// An error in a text with numbers of episodes.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum EpisodesError {
     #[error("expected a number of episodes from 1 to {MOST_EPISODES}, found `{found}`")]
@@ -32,7 +30,6 @@ impl Episodes {
         of_row.or_else(|| self.named.get(experiment)).copied().or(self.others)
     }
 
-    /// The first key that matches none of these rows of experiment and model.
     pub fn stranger(&self, rows: &[(&str, &str)]) -> Option<&str> {
         let names = |key: &str| rows.iter().any(|&(e, m)| key == e || key.split_once('/') == Some((e, m)));
         self.named.keys().map(String::as_str).find(|key| !names(key))

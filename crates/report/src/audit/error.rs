@@ -6,7 +6,6 @@ use exact::escape::visible;
 use exact::number::Decimal;
 use exact::suggest::hint;
 
-/// An error of an audit.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum AuditError {
     #[error("{table}: the definitions `{definitions}` have no metric `{metric}`{hint}")]
@@ -15,16 +14,13 @@ pub enum AuditError {
     NoEpisodes { table: String, experiment: String, model: String },
     #[error("--n: `{key}` names no row of the tables; expected an experiment, or EXPERIMENT/MODEL")]
     NoSuchRow { key: String },
-    #[error(
-        "{table}: {experiment}, {model}, {metric}: expected a number of at most {MOST_DIGITS} digits, found `{found}`"
-    )]
-    TooManyDigits { table: String, experiment: String, model: String, metric: String, found: String },
+    #[error("{cell}: expected a number of at most {MOST_DIGITS} digits, found `{found}`")]
+    TooManyDigits { cell: String, found: String },
 }
 
 /// The most digits of a number, including those before the point: more would leave 128 bits.
 pub(super) const MOST_DIGITS: u32 = 9;
 
-/// Checks that tables can be audited under these terms.
 pub(super) fn check(tables: &[NamedTable], terms: Terms<'_>) -> Result<(), AuditError> {
     for table in tables {
         for (name, cell) in &table.published.cells {
@@ -33,13 +29,9 @@ pub(super) fn check(tables: &[NamedTable], terms: Terms<'_>) -> Result<(), Audit
                 number.places() >= MOST_DIGITS || number.units().unsigned_abs() >= 10_u128.pow(MOST_DIGITS)
             };
             if let Some(number) = [cell.mean, cell.se].into_iter().flatten().find(is_long) {
-                return Err(AuditError::TooManyDigits {
-                    table: visible(&table.name),
-                    experiment: visible(&name.experiment),
-                    model: visible(&name.model),
-                    metric: visible(&name.metric),
-                    found: number.to_string(),
-                });
+                let CellLabel { experiment, model, metric } = name;
+                let cell = visible(&format!("{}: {experiment}, {model}, {metric}", table.name));
+                return Err(AuditError::TooManyDigits { cell, found: number.to_string() });
             }
         }
     }

@@ -28,21 +28,16 @@ use metric::catalog::{Catalog, Kind};
 use metric::implied::Implied;
 use statistics::feasible::attain::Search;
 
-/// The assumptions of an audit.
 #[derive(Clone, Copy, Debug)]
 pub struct Terms<'t> {
     pub catalog: &'t Catalog,
-    /// The facts that the definitions imply about their values.
     pub implied: &'t IndexMap<String, Implied>,
-    /// The number of episodes of each row.
     pub episodes: &'t Episodes,
-    /// The style, which says where its tables print undefined as zero, and what they emphasise.
     pub style: &'t Style,
     /// The roundings to consider; at least one.
     pub roundings: &'t [Rounding],
 }
 
-/// A published table and its name in answers.
 #[derive(Clone, Debug)]
 pub struct NamedTable {
     /// The name of its file, without a path.
@@ -128,7 +123,6 @@ pub struct ZeroCell {
 }
 
 impl Audit {
-    /// Returns true if some data can give each cell.
     pub fn holds(&self) -> bool {
         self.infeasible.is_empty()
     }
@@ -150,7 +144,6 @@ pub fn audit(tables: &[NamedTable], terms: Terms<'_>) -> Result<Audit, AuditErro
     Ok(summed_up(tables, terms, found, &zeros, audited))
 }
 
-/// The infeasible cells by table and position.
 type Found = BTreeMap<(usize, usize), InfeasibleCell>;
 
 fn summed_up(

@@ -43,7 +43,6 @@ pub(super) fn reason(row: &Row, refused: &Refused, definitions: Definitions<'_>,
     cell.no_mean().or_else(|| cell.no_spread(search)).unwrap_or_else(|| conflict(row, refused, &question, &ns))
 }
 
-/// A cell with numbers, and its possible samples.
 struct Cell {
     print: Print,
     samples: Vec<Sample>,

@@ -27,7 +27,6 @@ pub(super) struct Definitions<'d> {
     pub(super) implied: &'d IndexMap<String, Implied>,
 }
 
-/// A cell of a row and its location.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RowCell {
     pub(super) at: (usize, usize),
@@ -36,21 +35,18 @@ pub(super) struct RowCell {
     pub(super) zero_may_be_undefined: bool,
 }
 
-/// The cells of one experiment and model, by metric.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Row {
     pub(super) n: u64,
     pub(super) metrics: BTreeMap<String, Vec<RowCell>>,
 }
 
-/// The number of episodes in which a metric is defined, and the sum of a rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Count {
     pub(super) n: u64,
     pub(super) sum: i128,
 }
 
-/// One way to count the metrics that others depend on.
 pub(super) type World = BTreeMap<String, Count>;
 
 /// A cell that no data can give together with the cells accepted before it.
@@ -140,7 +136,6 @@ impl Row {
     }
 }
 
-/// The question whether a metric can print these cells.
 #[derive(Clone, Copy)]
 pub(super) struct Question<'q> {
     pub(super) row_n: u64,
@@ -230,7 +225,6 @@ impl Question<'_> {
         }
     }
 
-    /// The numbers of the cells; `None` if any prints none.
     pub(super) fn prints(&self) -> Option<Vec<Print>> {
         self.cells.iter().map(RowCell::numbers).collect()
     }

@@ -20,7 +20,7 @@ pub fn record_batch(cells: &Cells) -> Result<RecordBatch, ArrowError> {
     }
     let int = |name: &'static str, of: fn(&Moments) -> i128| -> Result<(&str, ArrayRef), ArrowError> {
         let values: Result<Vec<i64>, _> = rows.iter().map(|row| i64::try_from(of(row.moments))).collect();
-        let beyond = |_| ArrowError::ComputeError(format!("the column `{name}` of cells leaves 64 bits"));
+        let beyond = |_| ArrowError::ComputeError(format!("the column `{name}` of cells overflows 64 bits"));
         Ok((name, Arc::new(Int64Array::from(values.map_err(beyond)?))))
     };
     let float = |of: fn(&Cell) -> Option<f64>| -> ArrayRef { Arc::new(rows.iter().map(of).collect::<Float64Array>()) };
@@ -42,7 +42,6 @@ pub fn record_batch(cells: &Cells) -> Result<RecordBatch, ArrowError> {
     }))
 }
 
-/// The method of a metric's intervals, as chosen by [`cell_interval`](super::interval::cell_interval).
 fn method(metric: &Metric) -> &'static str {
     if metric.kind == Kind::Rate { "wilson" } else { "student_t" }
 }

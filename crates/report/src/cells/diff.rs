@@ -3,21 +3,19 @@
 //! Rule: integers are compared, never floats. Episodes match if their whole keys are equal. Metrics, episodes and cells
 //! of only one scoring are reported, and are never taken as zero.
 
-mod aligned;
-
+use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
 
 use indexmap::IndexMap;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use self::aligned::Aligned;
 use super::group::{GroupError, group};
 use super::{Cells, Group, KeyValue};
 use exact::moments::Moments;
 use metric::catalog::{Catalog, Kind};
 use score::evidence::Evidence;
-use score::table::{EpisodeKey, EpisodeTable, KeyRef, MetricColumn};
+use score::table::{EpisodeKey, EpisodeKeys, EpisodeTable, KeyRef, MetricColumn};
 
 /// A value of the scoring before, and the one after.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
@@ -197,7 +195,59 @@ impl Changes {
     }
 }
 
+/// The rows of two tables by their keys; both are in key order.
+#[derive(Default)]
+struct Aligned {
+    both: Vec<Pair<usize>>,
+    only_before: Vec<usize>,
+    only_after: Vec<usize>,
+}
+
+impl Aligned {
+    fn of(before: &EpisodeKeys, after: &EpisodeKeys) -> Self {
+        let mut aligned = Self::default();
+        if before.has_keys_of(after) {
+            // One scan scored both, so keys need not be read. Comparing them takes a third of a diff.
+            aligned.both.extend((0..before.len()).map(|row| Pair { before: row, after: row }));
+            return aligned;
+        }
+        let (mut old, mut new) = (0, 0);
+        while old < before.len() && new < after.len() {
+            let order = before.get(old).cmp(&after.get(new));
+            match order {
+                Ordering::Less => aligned.only_before.push(old),
+                Ordering::Greater => aligned.only_after.push(new),
+                Ordering::Equal => aligned.both.push(Pair { before: old, after: new }),
+            }
+            old += usize::from(order.is_le());
+            new += usize::from(order.is_ge());
+        }
+        aligned.only_before.extend(old..before.len());
+        aligned.only_after.extend(new..after.len());
+        aligned
+    }
+
+    fn overlap(&self, before: &EpisodeTable, after: &EpisodeTable) -> Overlap<EpisodeName> {
+        let names = |rows: &[usize], table: &EpisodeTable| -> Vec<EpisodeName> {
+            rows.iter().map(|row| EpisodeName::from(table.keys.get(*row))).collect()
+        };
+        Overlap {
+            both: self.both.len() as u64,
+            only_before: names(&self.only_before, before),
+            only_after: names(&self.only_after, after),
+        }
+    }
+}
+
 impl CellChange {
+    fn new(cells: &Cells, key: &[KeyValue], metric: &str, numbers: Pair<Option<Numbers>>) -> Self {
+        let kind = cells.catalog.metric.get(metric).map_or(Kind::Quantity, |metric| metric.kind);
+        let key = cells.by.iter().cloned().zip(key.iter().cloned()).collect();
+        let mut change = Self { key, metric: metric.to_owned(), kind, numbers, mean_change: None };
+        change.mean_change = change.exact_mean_change().map(as_float);
+        change
+    }
+
     /// The mean after minus the mean before, as an exact fraction; `None` if either is undefined, or beyond 128 bits.
     pub(crate) fn exact_mean_change(&self) -> Option<(i128, i128)> {
         let (before, after) = (self.numbers.before?, self.numbers.after?);
@@ -224,7 +274,6 @@ fn names(table: &EpisodeTable) -> Vec<String> {
 }
 
 impl Overlap<String> {
-    /// The names of both sides, in the order given.
     pub fn of(before: &[String], after: &[String]) -> Self {
         let without = |names: &[String], others: &[String]| -> Vec<String> {
             names.iter().filter(|name| !others.contains(name)).cloned().collect()
@@ -234,7 +283,6 @@ impl Overlap<String> {
     }
 }
 
-/// The differing parts of the compared metrics' definitions, and every `let` that differs.
 fn rewritten(before: &EpisodeTable, after: &EpisodeTable) -> Vec<Rewritten> {
     let mut found = Vec::new();
     let mut push = |name: &str, part, before: Option<String>, after: Option<String>| {
@@ -306,16 +354,6 @@ fn is_same(before: Option<Numbers>, after: Option<Numbers>) -> bool {
     before.map(exact) == after.map(exact)
 }
 
-impl CellChange {
-    fn new(cells: &Cells, key: &[KeyValue], metric: &str, numbers: Pair<Option<Numbers>>) -> Self {
-        let kind = cells.catalog.metric.get(metric).map_or(Kind::Quantity, |metric| metric.kind);
-        let key = cells.by.iter().cloned().zip(key.iter().cloned()).collect();
-        let mut change = Self { key, metric: metric.to_owned(), kind, numbers, mean_change: None };
-        change.mean_change = change.exact_mean_change().map(as_float);
-        change
-    }
-}
-
 #[expect(clippy::cast_precision_loss, reason = "the one conversion from integers, done once")]
 fn as_float((above, below): (i128, i128)) -> f64 {
     above as f64 / below as f64
@@ -338,125 +376,4 @@ impl Numbers {
 }
 
 #[cfg(test)]
-mod tests {
-    use proptest::prelude::*;
-
-    use super::{Changes, Evidence};
-    use metric::definitions::Definitions;
-    use score::evidence::MetricEvidence;
-    use score::table::{Declared, EpisodeKey, EpisodeTable, MetricColumn};
-    use score::vocabulary::schema_columns;
-
-    const RATE: &str = "[metric.R]\nvalue = \"length() > 2\"";
-
-    /// Episodes `0..` of one model with these values of the rate `R`.
-    fn table(definitions: &str, first: i32, values: &[Option<i64>]) -> EpisodeTable {
-        let key = |run: i32| EpisodeKey {
-            experiment: "X".into(),
-            model: "m".into(),
-            seed: 1,
-            run,
-            episode_id: format!("e{run}"),
-        };
-        let keys = (first..).take(values.len()).map(key).collect();
-        let catalog = Definitions::from_toml("d", definitions, &schema_columns()).unwrap().catalog;
-        let metrics = vec![MetricColumn::new("R", values.iter().copied())];
-        EpisodeTable { catalog, keys, labels: vec![], metrics, declared: Declared::default() }
-    }
-
-    fn changes(before: &EpisodeTable, after: &EpisodeTable) -> Changes {
-        Changes::of(before, after, &["model".to_owned()]).unwrap()
-    }
-
-    #[test]
-    fn a_table_does_not_differ_from_itself() {
-        let same = table(RATE, 0, &[Some(1), None, Some(0)]);
-        let changes = changes(&same, &same);
-        assert!(changes.is_empty() && changes.rewritten.is_empty());
-        assert_eq!((changes.cells_compared, changes.metrics.both, changes.episodes.both), (1, 1, 3));
-    }
-
-    #[test]
-    fn undefined_is_no_zero() {
-        let changes = changes(&table(RATE, 0, &[Some(0), Some(1)]), &table(RATE, 0, &[None, Some(1)]));
-        let [flip] = &changes.flips[..] else { panic!("{:?}", changes.flips) };
-        assert_eq!((flip.value.before, flip.value.after), (Some(0), None));
-        let [cell] = &changes.cells[..] else { panic!("{:?}", changes.cells) };
-        let (before, after) = (cell.numbers.before.unwrap(), cell.numbers.after.unwrap());
-        assert_eq!([(before.n, before.sum), (after.n, after.sum)], [(2, 1), (1, 1)]);
-        assert_eq!(cell.exact_mean_change(), Some((1, 2)));
-    }
-
-    #[test]
-    fn flips_that_cancel_move_no_cell() {
-        let changes = changes(&table(RATE, 0, &[Some(0), Some(1)]), &table(RATE, 0, &[Some(1), Some(0)]));
-        assert_eq!((changes.flips.len(), changes.cells.len()), (2, 0));
-        assert!(!changes.is_empty());
-    }
-
-    #[test]
-    fn the_form_of_the_standard_error_moves_a_cell_and_flips_nothing() {
-        let population = format!("{RATE}\nse = \"population\"");
-        let values = [Some(0), Some(1), Some(1)];
-        let changes = changes(&table(RATE, 0, &values), &table(&population, 0, &values));
-        assert_eq!((changes.flips.len(), changes.cells.len()), (0, 1));
-        assert_eq!(changes.rewritten[0].part, "se");
-    }
-
-    #[test]
-    fn episodes_of_one_side_are_listed_and_flip_nothing() {
-        let changes = changes(&table(RATE, 0, &[Some(1), Some(1)]), &table(RATE, 1, &[Some(1), Some(1)]));
-        let ids = |names: &[super::EpisodeName]| names.iter().map(|n| n.episode_id.clone()).collect::<Vec<_>>();
-        assert_eq!(ids(&changes.episodes.only_before), ["e0"]);
-        assert_eq!(ids(&changes.episodes.only_after), ["e2"]);
-        assert_eq!((changes.flips.len(), changes.cells.len(), changes.is_empty()), (0, 0, false));
-    }
-
-    #[test]
-    fn equal_columns_of_other_episodes_flip() {
-        let changes = changes(&table(RATE, 0, &[Some(1), Some(0)]), &table(RATE, 1, &[Some(1), Some(0)]));
-        let [flip] = &changes.flips[..] else { panic!("{:?}", changes.flips) };
-        assert_eq!((flip.episode.run, flip.value.before, flip.value.after), (1, Some(0), Some(1)));
-    }
-
-    #[test]
-    fn metrics_of_one_side_are_listed() {
-        let mut other = table(RATE, 0, &[Some(1)]);
-        other.metrics[0].name = "S".into();
-        let changes = changes(&table(RATE, 0, &[Some(1)]), &other);
-        assert_eq!((changes.metrics.only_before, changes.metrics.only_after), (vec!["R".into()], vec!["S".into()]));
-        assert_eq!(changes.cells_compared, 0);
-    }
-
-    proptest! {
-        #[test]
-        fn flips_lead_from_one_scoring_to_the_other(
-            values in proptest::collection::vec((proptest::option::of(0..2i64), proptest::option::of(0..2i64)), 0..9),
-        ) {
-            let (before, after): (Vec<_>, Vec<_>) = values.into_iter().unzip();
-            let (mut old, new) = (table(RATE, 0, &before), table(RATE, 0, &after));
-            let changes = changes(&old, &new);
-            for flip in &changes.flips {
-                let row = old.keys.iter().position(|key| key.episode_id == flip.episode.episode_id).unwrap();
-                let mut values: Vec<Option<i64>> = old.metrics[0].iter().collect();
-                prop_assert_eq!(values[row], flip.value.before);
-                prop_assert_ne!(flip.value.before, flip.value.after);
-                values[row] = flip.value.after;
-                old.metrics[0] = MetricColumn::new("R", values);
-            }
-            prop_assert_eq!(&old.metrics, &new.metrics);
-            prop_assert_eq!(changes.is_empty(), before == after);
-        }
-    }
-
-    #[test]
-    fn evidence_for_another_value_explains_nothing() {
-        let mut changes = changes(&table(RATE, 0, &[Some(0)]), &table(RATE, 0, &[Some(1)]));
-        let metric = MetricEvidence { metric: "R".into(), value: Some(1), timesteps: vec![2, 5], facts: vec![] };
-        let evidence = Evidence { episode_id: "e0".into(), length: 5, metrics: vec![metric] };
-        let evidence = [("e0".to_owned(), evidence)].into();
-        changes.explain_before(&evidence);
-        changes.explain_after(&evidence);
-        assert_eq!((&changes.flips[0].timesteps.before, &changes.flips[0].timesteps.after), (&None, &Some(vec![2, 5])));
-    }
-}
+mod tests;

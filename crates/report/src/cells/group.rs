@@ -15,15 +15,12 @@ use score::table::{EpisodeTable, KeyRef, LabelColumn, TextColumn};
 
 /// The key columns of every episode table.
 pub const KEY_COLUMNS: [&str; 5] = ["experiment", "model", "seed", "run", "episode_id"];
-
 /// The default columns that cells are grouped by.
 pub const DEFAULT_BY: [&str; 2] = ["experiment", "model"];
 
-/// The most cells of all tables.
 const MOST_CELLS: Limit =
     Limit::new("cells, groups times metrics; group by fewer columns or leave metrics out", 200_000);
 
-/// An error of grouping episodes.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum GroupError {
     #[error("no column to group by: expected at least one of {known}")]
@@ -82,7 +79,6 @@ pub fn membership(table: &EpisodeTable, by: &[String]) -> Result<Vec<usize>, Gro
     Ok(Membership::of(table, by)?.of_row)
 }
 
-/// The group of each episode.
 struct Membership {
     keys: Vec<Vec<KeyValue>>,
     of_row: Vec<usize>,
@@ -117,7 +113,6 @@ impl Membership {
     }
 }
 
-/// A column as ranks of its values among the distinct ones.
 struct Ranks {
     values: Vec<KeyValue>,
     of_row: Vec<usize>,
@@ -151,7 +146,6 @@ impl Ranks {
     }
 }
 
-/// A column to group by, in the table.
 enum KeyColumn<'a> {
     Text(&'a TextColumn),
     Int(fn(KeyRef<'_>) -> i32),

@@ -9,7 +9,6 @@ use score::table::{EpisodeTable, MetricColumn};
 use statistics::coverage::{self, Withheld};
 use statistics::interval::{Interval, student_t, wilson};
 
-/// The default confidence.
 pub const CONFIDENCE: f64 = 0.95;
 
 /// The interval of a mean, or the reason for its absence: Wilson's for a rate, Student's for a quantity.

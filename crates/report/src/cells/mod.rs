@@ -33,11 +33,9 @@ pub struct Cells {
 
 #[derive(Clone, Copy, Debug)]
 pub struct Cell<'c> {
-    /// A value for each column of [`Cells::by`].
     pub key: &'c [KeyValue],
     pub name: &'c str,
     pub metric: &'c Metric,
-    /// The moments of its values.
     pub moments: &'c Moments,
     /// The 95 % interval of the mean; `None` if withheld.
     pub interval: Option<Interval>,
@@ -49,7 +47,6 @@ impl Cells {
         self.groups.iter().flat_map(|group| (0..self.metrics.len()).filter_map(|at| self.at(group, at)))
     }
 
-    /// The cell of a metric in a group.
     pub(crate) fn of_metric<'c>(&'c self, group: &'c Group, name: &str) -> Option<Cell<'c>> {
         self.at(group, self.metrics.iter().position(|metric| metric == name)?)
     }

@@ -2,7 +2,6 @@
 
 use super::{FigureName, FigureWidth};
 
-/// An error of drawing a figure from its inputs.
 #[derive(Debug, thiserror::Error)]
 pub enum FigureError {
     #[error("expected the name of a figure ({known}), found `{name}`{hint}")]

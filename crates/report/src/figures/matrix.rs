@@ -10,22 +10,18 @@ use exact::number::Decimal;
 use metric::catalog::{Better, Catalog, Kind, Metric};
 use statistics::interval::{self, Interval};
 
-/// The confidence of intervals in figures.
 const CONFIDENCE: f64 = 0.95;
 
-/// The content of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reading {
     /// There are no episodes of this model in this experiment.
     Empty,
     /// The number of episodes; the metric is undefined in all of them.
     Undefined(u64),
-    /// The moments of at least one value.
     Known(Moments),
 }
 
 impl Reading {
-    /// The mean, if there is one.
     pub fn mean(self) -> Option<f64> {
         self.moments().and_then(Moments::mean)
     }
@@ -34,7 +30,6 @@ impl Reading {
         self.moments().map_or(0, |moments| moments.n)
     }
 
-    /// The moments, if there is a value.
     pub fn moments(self) -> Option<Moments> {
         match self {
             Self::Known(moments) => Some(moments),
@@ -66,18 +61,12 @@ impl Reading {
         }
     }
 
-    /// The mark of one cell: its experiment, model, metric, value and number of episodes.
     pub fn mark(self, experiment: &str, model: &str, metric: &str) -> Mark {
-        Mark::new(format!("{experiment} · {model} · {metric}: {}", self.words()))
-            .with("experiment", experiment)
-            .with("model", model)
-            .with("metric", metric)
-            .value(self.mean())
-            .with("n", self.n())
+        let title = format!("{experiment} · {model} · {metric}: {}", self.words());
+        Mark::of_cell(title, experiment, model, metric).value(self.mean()).with("n", self.n())
     }
 }
 
-/// Experiments by models.
 #[derive(Clone, Debug)]
 pub(crate) struct Matrix<'a> {
     cells: &'a Cells,
@@ -88,7 +77,6 @@ pub(crate) struct Matrix<'a> {
 }
 
 impl<'a> Matrix<'a> {
-    /// Cells by experiment and model as a matrix.
     pub(crate) fn new(cells: &'a Cells) -> Result<Self, FigureError> {
         let fault = || FigureError::Grouping { found: cells.by.join(",") };
         let place = |name: &str| cells.by.iter().position(|key| key == name).ok_or_else(fault);
@@ -113,12 +101,10 @@ impl<'a> Matrix<'a> {
         Ok(Self { cells, groups, experiments, models })
     }
 
-    /// Every experiment with every model, with or without episodes.
     pub(crate) fn pairs(&self) -> impl Iterator<Item = (&'a str, &'a str)> {
         self.experiments.iter().flat_map(|&experiment| self.models.iter().map(move |&model| (experiment, model)))
     }
 
-    /// The metric with this name.
     pub(crate) fn metric(&self, figure: FigureName, name: &str) -> Result<MetricId<'a>, FigureError> {
         let found = self.cells.metrics.iter().position(|metric| metric == name).and_then(|at| self.metric_at(at));
         found.ok_or_else(|| FigureError::UnknownMetric {
@@ -128,12 +114,10 @@ impl<'a> Matrix<'a> {
         })
     }
 
-    /// The definitions of the metrics.
     pub(crate) fn catalog(&self) -> &'a Catalog {
         &self.cells.catalog
     }
 
-    /// All metrics in the order of the cells.
     pub(crate) fn metrics(&self) -> Vec<MetricId<'a>> {
         (0..self.cells.metrics.len()).filter_map(|at| self.metric_at(at)).collect()
     }
@@ -143,7 +127,6 @@ impl<'a> Matrix<'a> {
         Some(MetricId { name, at, metric: self.cells.catalog.metric.get(name)? })
     }
 
-    /// The reading of `metric` for `model` in `experiment`.
     pub(crate) fn reading(&self, experiment: &str, model: &str, metric: MetricId<'_>) -> Reading {
         let Some(group) = self.groups.get(&(experiment, model)) else { return Reading::Empty };
         match group.moments.get(metric.at) {
@@ -180,7 +163,6 @@ impl<'a> Matrix<'a> {
         })
     }
 
-    /// The value of blind guessing, if there is one.
     pub(crate) fn chance(&self, experiment: &str, metric: MetricId<'_>) -> Option<f64> {
         self.cells.catalog.chance(experiment, metric.name).map(exact::ratio::Ratio::value)
     }
@@ -198,7 +180,6 @@ impl<'a> Matrix<'a> {
     }
 }
 
-/// A metric of the cells.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MetricId<'a> {
     pub name: &'a str,
@@ -207,7 +188,6 @@ pub(crate) struct MetricId<'a> {
 }
 
 impl MetricId<'_> {
-    /// The name as a suffix of an attribute's name.
     pub(crate) fn attribute(self) -> String {
         let plain = |c: char| if c.is_ascii_alphanumeric() || c == '_' { c.to_ascii_lowercase() } else { '-' };
         self.name.chars().map(plain).collect()

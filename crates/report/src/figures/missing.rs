@@ -12,10 +12,10 @@ pub(crate) struct Strip<'a> {
     experiment: &'a str,
     words: Vec<(Point, String)>,
     markers: Vec<(Point, Absent<'a>)>,
-    height: f64,
+    /// The height of the lines, px; 0 if no model is absent.
+    pub height: f64,
 }
 
-/// A model without a mark in the plot.
 #[derive(Clone, Copy, Debug)]
 struct Absent<'a> {
     member: Member<'a>,
@@ -43,12 +43,6 @@ impl<'a> Strip<'a> {
         strip
     }
 
-    /// The height of its lines, px; 0 if no model is absent.
-    pub(crate) fn height(&self) -> f64 {
-        self.height
-    }
-
-    /// Draws it with its top left corner at `corner`.
     pub(crate) fn draw(&self, sheet: &mut Sheet, corner: Point) {
         for ((x, y), word) in &self.words {
             sheet.text((corner.0 + x, corner.1 + y), word, lettering::tick());
@@ -59,7 +53,6 @@ impl<'a> Strip<'a> {
         }
     }
 
-    /// Places a word and its markers at `place`; breaks the line if they do not fit.
     fn run(&mut self, place: &mut Point, width: f64, word: String, absent: Vec<Absent<'a>>) {
         let line = leading(lettering::tick());
         let word_width = lettering::tick().width(&word) + 3.0;
@@ -80,20 +73,16 @@ impl<'a> Strip<'a> {
     }
 }
 
-/// The legend of hatches and crosses, if `readings` have any.
 pub(crate) fn signs(readings: impl Iterator<Item = Reading>) -> Vec<(Swatch, String)> {
-    let mut has_undefined = false;
-    let mut has_empty = false;
+    let mut signs = [(Swatch::Undefined, "undefined", false), (Swatch::Empty, "no episodes", false)];
     for reading in readings {
-        has_undefined |= matches!(reading, Reading::Undefined(_));
-        has_empty |= matches!(reading, Reading::Empty);
+        signs[0].2 |= matches!(reading, Reading::Undefined(_));
+        signs[1].2 |= matches!(reading, Reading::Empty);
     }
-    let undefined = has_undefined.then(|| (Swatch::Undefined, "undefined".to_owned()));
-    let empty = has_empty.then(|| (Swatch::Empty, "no episodes".to_owned()));
-    undefined.into_iter().chain(empty).collect()
+    let seen = signs.into_iter().filter(|(.., is_seen)| *is_seen);
+    seen.map(|(swatch, text, _)| (swatch, text.to_owned())).collect()
 }
 
-/// The legend of words in these strips; empty if there are none.
 pub(crate) fn strip_signs(strips: &[Strip<'_>]) -> Option<(Swatch, String)> {
     let has_any = strips.iter().any(|strip| strip.height > 0.0);
     has_any.then(|| (Swatch::None, "--: undefined".to_owned()))

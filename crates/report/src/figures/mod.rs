@@ -3,9 +3,6 @@
 //! Rule: a figure reads only [`Input`]: cells, the episode table and the other fields. The same input gives the same
 //! bytes. Every data mark is a `<g class="mark">` with a title for hovering and its full values as `data-*` attributes.
 //! Missing values are shown as missing, never as zero.
-//!
-//! One file per figure. They share `matrix` (the cells as input of figures), `missing` (what a plot cannot show) and
-//! the drawing [`kit`].
 
 pub mod kit;
 
@@ -13,7 +10,6 @@ mod charts;
 mod error;
 mod matrix;
 mod missing;
-mod name;
 pub mod shown;
 mod width;
 
@@ -25,9 +21,7 @@ pub use error::FigureError;
 #[cfg(feature = "raster")]
 pub use kit::convert::ConvertError;
 pub use kit::font::style_sheet as font_style_sheet;
-pub use kit::format::{EncodeError, FigureFormat, UnknownEnding};
-pub use kit::picture::Figure;
-pub use name::FigureName;
+pub use kit::picture::{EncodeError, Figure, FigureFormat, UnknownEnding};
 pub use width::{FigureWidth, InvalidWidth};
 
 use crate::cells::Cells;
@@ -36,15 +30,14 @@ use kit::{FULL_WIDTH, NAME_ROOM, Roster, Sheet};
 use matrix::{Matrix, MetricId};
 use score::table::EpisodeTable;
 use score::timeline::Timeline;
+pub use shown::FigureName;
 use shown::{FigureSheets, SHOWN};
 
 #[derive(Clone, Copy, Debug)]
 pub struct Input<'a> {
-    /// The cells by experiment and model.
     pub cells: &'a Cells,
     /// Models in display order, a style's `row_order`; other models follow in the palette's order, then by name.
     pub order: &'a [String],
-    /// The metrics and captions of each figure.
     pub sheets: &'a FigureSheets,
     /// One row per episode, for `decision-curve`.
     pub episodes: Option<&'a EpisodeTable>,
@@ -52,7 +45,6 @@ pub struct Input<'a> {
     pub outcomes: Option<&'a Outcomes>,
     /// Landmarks of each episode, for `gaze`.
     pub timelines: Option<&'a [Timeline]>,
-    /// A custom heading.
     pub title: Option<&'a str>,
     /// The printed width; `None` for the width as drawn.
     pub width: Option<FigureWidth>,
@@ -111,15 +103,12 @@ pub fn draw(name: FigureName, input: &Input<'_>) -> Result<Figure, FigureError> 
     let too_narrow = |least| FigureError::TooNarrow { figure: name, least };
     let printed = input.width.map(|width| width.printed(sheet.width()).map_err(too_narrow)).transpose()?;
     let title = input.title.unwrap_or_else(|| name.title());
-    let figure = Figure::new(sheet, height, title, shown::caption(name, &metrics, input.sheets));
-    let figure = figure.with_models(matrix.models.len());
-    Ok(match printed {
-        Some(px) => figure.printed(px),
-        None => figure,
-    })
+    let mut figure = Figure::new(sheet, height, title, shown::caption(name, &metrics, input.sheets));
+    figure.models = matrix.models.len();
+    figure.printed = printed;
+    Ok(figure)
 }
 
-/// Inputs shared by all figures.
 #[derive(Clone, Copy, Debug)]
 struct Scene<'a> {
     matrix: &'a Matrix<'a>,

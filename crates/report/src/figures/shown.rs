@@ -1,15 +1,73 @@
-//! The metrics and the caption of a figure, as declared by a style and available in the cells.
+//! The figures by name: their titles, and the metrics and captions that a style declares and the cells have.
 
+use std::fmt;
+use std::str::FromStr;
 use std::sync::LazyLock;
 
 use indexmap::IndexMap;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use super::FigureError;
 use super::matrix::{Matrix, MetricId};
-use super::{FigureError, FigureName};
+use exact::suggest::hint;
 use metric::catalog::{Kind, Measures};
 use metric::relations::Relations;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum FigureName {
+    /// Behavioural profiles: one radar per experiment, one line per model.
+    Spider,
+    /// Models by experiments and metrics, coloured by goodness.
+    Heatmap,
+    /// Task success against self-attribution.
+    Scatter,
+    /// Completion-conditioned success minus success.
+    CompletionGap,
+    /// Final self-identification of the open-ended experiment.
+    E5Outcomes,
+    /// Task success with its interval and the level of chance.
+    Intervals,
+    /// Task success from the first experiment to every other.
+    Slopes,
+    /// Task success against the dose of a factor.
+    DoseResponse,
+    /// The share of episodes decided by step t.
+    DecisionCurve,
+    /// The mirror's time in view, per episode.
+    Gaze,
+}
+
+// In the order of a report; each file has this name and the extension of its format.
+exact::names!(FigureName {
+    Spider: "spider",
+    Heatmap: "heatmap",
+    Scatter: "scatter",
+    CompletionGap: "completion-gap",
+    E5Outcomes: "e5-outcomes",
+    Intervals: "intervals",
+    Slopes: "slopes",
+    DoseResponse: "dose-response",
+    DecisionCurve: "decision-curve",
+    Gaze: "gaze",
+});
+
+impl fmt::Display for FigureName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for FigureName {
+    type Err = FigureError;
+
+    fn from_str(text: &str) -> Result<Self, FigureError> {
+        Self::named(text).ok_or_else(|| {
+            let known = Self::ALL.map(Self::name);
+            FigureError::UnknownFigure { name: text.to_owned(), known: known.join(", "), hint: hint(text, known) }
+        })
+    }
+}
 
 /// A style's declaration of one figure.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
@@ -21,19 +79,32 @@ pub struct FigureSheet {
     pub caption: Option<String>,
 }
 
-/// A style's figures, by name.
 pub type FigureSheets = IndexMap<String, FigureSheet>;
 
-/// The default metrics and captions of every figure.
 pub static SHOWN: LazyLock<FigureSheets> =
     LazyLock::new(|| toml::from_str(FIGURES).expect("the file comes with the program"));
 /// The same as TOML, as a base for styles.
 pub(crate) const FIGURES: &str = include_str!("../../../../assets/styles/figures.toml");
-
 /// With more axes the labels overlap.
 const MOST_AXES: usize = 8;
 
 impl FigureName {
+    /// The title, for headings and screen readers.
+    pub const fn title(self) -> &'static str {
+        match self {
+            Self::Spider => "Behavioural profiles",
+            Self::Heatmap => "Performance across experiments and metrics",
+            Self::Scatter => "Task success against self-attribution",
+            Self::CompletionGap => "Completion gap",
+            Self::E5Outcomes => "Final self-identification outcomes",
+            Self::Intervals => "Task success with 95 % intervals",
+            Self::Slopes => "Task success from experiment to experiment",
+            Self::DoseResponse => "Task success against the dose",
+            Self::DecisionCurve => "Share of episodes decided by step t",
+            Self::Gaze => "Mirror in view, episode by episode",
+        }
+    }
+
     /// The fewest and the most metrics that the figure shows; the first ones, by this number, must be rates.
     pub const fn metrics(self) -> ([usize; 2], usize) {
         const ANY: usize = 64;
@@ -48,7 +119,6 @@ impl FigureName {
         }
     }
 
-    /// An error for fewer or more metrics than the figure shows.
     pub fn check_count(self, found: usize) -> Result<(), FigureError> {
         let ([fewest, most], _) = self.metrics();
         if (fewest..=most).contains(&found) {

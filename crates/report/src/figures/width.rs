@@ -8,7 +8,6 @@ use super::kit::FULL_WIDTH;
 /// The smallest scale of text: from 9 px, the smallest lettering, to 6 pt.
 const LEAST_SCALE: f64 = 8.0 / 9.0;
 const PX_PER_CM: f64 = 96.0 / 2.54;
-/// The smallest and the largest width of a figure, cm.
 const RANGE_CM: [f64; 2] = [8.0, 50.0];
 const UNITS: [(&str, f64); 5] =
     [("cm", PX_PER_CM), ("mm", PX_PER_CM / 10.0), ("in", 96.0), ("pt", 96.0 / 72.0), ("px", 1.0)];
@@ -19,7 +18,6 @@ pub struct FigureWidth {
     px: f64,
 }
 
-/// A text that is not a valid figure width.
 #[derive(Debug, thiserror::Error)]
 #[error("expected a width from 8cm to 50cm such as 8.5cm, 85mm, 3.3in, 240pt or 640px, found `{0}`")]
 pub struct InvalidWidth(String);

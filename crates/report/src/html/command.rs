@@ -12,10 +12,8 @@ use exact::escape::visible;
 /// The most folders or files that a command names; if there are more, it names their folder.
 const MOST_NAMED: usize = 3;
 
-/// Arguments of commands that read the page's traces.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Recordings {
-    /// The traces, as the manifest names them.
     pub paths: Vec<String>,
     /// The definitions, by name or path; `None` for the default ones.
     pub definitions: Option<String>,
@@ -26,20 +24,13 @@ impl Recordings {
         let runs = self.runs();
         let definitions = self.definitions.as_deref().map(|name| format!(" --definitions {}", word(name)));
         let definitions = definitions.unwrap_or_default();
-        let command =
-            |title: &str, before: String, after: String| json!({ "title": title, "before": before, "after": after });
+        let score = format!("mirrorstats score {runs}{definitions} --explain ");
+        let view = format!("mirrorstats view {runs}{definitions} --episode ");
+        let to_file = format!(" {runs} --out filmstrip.png");
         json!([
-            command(
-                "why it has its values",
-                format!("mirrorstats score {runs}{definitions} --explain "),
-                String::new()
-            ),
-            command(
-                "step by step in the browser",
-                format!("mirrorstats view {runs}{definitions} --episode "),
-                String::new()
-            ),
-            command("a film strip", "mirrorstats world filmstrip ".to_owned(), format!(" {runs} --out filmstrip.png")),
+            { "title": "why it has its values", "before": score, "after": "" },
+            { "title": "step by step in the browser", "before": view, "after": "" },
+            { "title": "a film strip", "before": "mirrorstats world filmstrip ", "after": to_file },
         ])
     }
 

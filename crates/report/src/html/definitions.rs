@@ -5,7 +5,7 @@ use serde_json::{Value as Json, json};
 use exact::escape::visible;
 use metric::catalog::{Better, Catalog, Kind, Metric, StandardError};
 
-pub(super) fn metrics(catalog: &Catalog) -> Vec<Json> {
+pub fn metrics(catalog: &Catalog) -> Vec<Json> {
     let view = |(name, metric): (&String, &Metric)| {
         json!({
             "name": visible(name),
@@ -24,7 +24,6 @@ pub(super) fn lets(catalog: &Catalog) -> Vec<Json> {
     catalog.lets.iter().map(|(name, value)| json!({ "name": visible(name), "value": multiline(value) })).collect()
 }
 
-/// Every experiment of a catalog, in order, with its levels: `TSA 1/10, 1/11`.
 pub(super) fn experiments(catalog: &Catalog) -> Vec<Json> {
     let view = |(name, experiment): (&String, &metric::catalog::Experiment)| {
         let chance = experiment.chance.iter().map(|(metric, level)| match level {

@@ -18,7 +18,6 @@ use exact::escape::visible;
 /// JavaScript's largest safe integer: it represents all smaller ones exactly.
 const LARGEST_SAFE: u64 = (1 << 53) - 1;
 
-/// Data that the script cannot read from the page.
 #[derive(Debug, Serialize)]
 struct Embedded<'a> {
     undefined: &'a str,
@@ -26,11 +25,9 @@ struct Embedded<'a> {
     groups: Vec<String>,
     episodes: Episodes,
     commands: Json,
-    /// All pairs of models.
     pairs: Json,
 }
 
-/// The episode table by column.
 #[derive(Debug, Serialize)]
 struct Episodes {
     id: Vec<String>,
@@ -55,7 +52,6 @@ impl Serialize for Integer {
     }
 }
 
-/// The JSON of a page, ready for a `<script>` element.
 pub(super) fn json(page: &Page<'_>, metrics: &[Json], undefined: &str) -> Result<String, HtmlError> {
     let Page { episodes, cells, .. } = *page;
     let label = |key: &[_]| key.iter().map(|value| shown(value, undefined)).collect::<Vec<_>>().join(" · ");

@@ -6,21 +6,24 @@ use minijinja::context;
 use minijinja::value::{Serde, Value};
 use serde_json::{Value as Json, json};
 
-use super::cell::cell;
 use super::filter::{Filters, shown};
 use super::template::markup;
 use super::{Figure, HtmlError, Page, definitions, embedded, pair};
 use crate::bundle::Manifest;
-use crate::cells::Cells;
 use crate::cells::group::group;
+use crate::cells::{Cell, Cells};
 use crate::figures;
-use crate::layout::{MetricColumn, MetricRow, MetricRows, MetricTable, heading, row_key};
+use crate::layout::{self, MetricCell, MetricColumn, MetricRow, MetricRows, MetricTable, heading, row_key};
 use crate::statistics::Statistics;
 use crate::statistics::text::Length;
-use crate::tables::ListTable;
+use crate::tables::{DAGGER, Emphasis, ListTable};
 use exact::escape::visible;
-use metric::catalog::Better;
+use exact::moments::Moments;
+use exact::number::{Decimal, full_precision};
+use exact::ratio::Ratio;
+use metric::catalog::{Better, Kind, Metric};
 use score::table::{EpisodeTable, KeyRef};
+use statistics::interval::Interval;
 
 pub(super) fn content(page: &Page<'_>) -> Result<Value, HtmlError> {
     if group(page.episodes, &page.cells.by)? != *page.cells {
@@ -109,6 +112,49 @@ fn row(row: &MetricRow, table: &MetricTable, cells: &Cells, filters: &Filters) -
         "experiment": experiment.as_deref().map(visible),
         "cells": views.collect::<Option<Vec<_>>>().ok_or_else(stray)?,
     }))
+}
+
+/// One table cell. The attributes have the text of `cells.csv`, empty for undefined; a missing value that a style
+/// prints as zero keeps its empty attributes.
+fn cell(cell: &MetricCell, of: Cell, undefined: &str, chance: Option<Ratio>) -> Json {
+    let Cell { name, metric, moments, interval, .. } = of;
+    let (estimate, detail) = cell.value.parts(&visible(undefined));
+    let of = |value: Option<f64>| value.map(full_precision).unwrap_or_default();
+    json!({
+        "metric": visible(name),
+        "estimate": estimate,
+        // The uncertainty; empty without one.
+        "detail": detail.unwrap_or_default(),
+        // True if it shows a missing value; a zero that a style prints instead does not count.
+        "is_undefined": cell.value == layout::Value::Undefined,
+        // True if emphasis covers the detail too.
+        "is_whole": matches!(cell.value, layout::Value::MeanSe { .. }),
+        "element": element(cell.emphasis),
+        "mark": if cell.is_marked { DAGGER.to_string() } else { String::new() },
+        "n": moments.n,
+        "sum": moments.sum.to_string(),
+        "sum_sq": moments.sum_sq.to_string(),
+        "mean": of(moments.mean()),
+        "se": of(moments.se(metric.se)),
+        "ci_low": of(interval.map(|i| i.low)),
+        "ci_high": of(interval.map(|i| i.high)),
+        "chance": chance.map(|level| level.to_string()).unwrap_or_default(),
+        "strip": strip(metric, moments, interval),
+    })
+}
+
+fn element(emphasis: Emphasis) -> &'static str {
+    match emphasis {
+        Emphasis::Plain => "span",
+        Emphasis::Bold => "strong",
+        Emphasis::Underline => "u",
+    }
+}
+
+fn strip(metric: &Metric, moments: &Moments, interval: Option<Interval>) -> Option<Json> {
+    let place = |share: f64| Decimal::of_float(share, 3).map(Decimal::compact);
+    let Interval { low, high } = interval.filter(|_| metric.kind == Kind::Rate)?;
+    Some(json!({ "low": place(low)?, "width": place(high - low)?, "mean": place(moments.mean()?)? }))
 }
 
 fn figure(figure: &Figure<'_>) -> Value {

@@ -5,6 +5,7 @@
 
 use std::collections::BTreeSet;
 
+use indexmap::IndexSet;
 use serde_json::{Value as Json, json};
 
 use crate::statistics::Statistics;
@@ -54,30 +55,19 @@ pub(super) fn pairs(statistics: Option<&Statistics>) -> Json {
 
 /// The families that fit on a page, and the number of others: those over all experiments first, then by metric.
 fn within(families: Vec<FamilyText<'_>>) -> (Vec<FamilyText<'_>>, usize) {
-    let mut metrics: Vec<&str> = Vec::new();
-    for family in &families {
-        if !metrics.contains(&family.metric) {
-            metrics.push(family.metric);
-        }
-    }
+    let metrics: IndexSet<&str> = families.iter().map(|family| family.metric).collect();
     let mut order: Vec<usize> = (0..families.len()).collect();
-    let place = |at: &usize| metrics.iter().position(|metric| *metric == families[*at].metric);
-    order.sort_by_key(|at| (families[*at].experiment.is_some(), place(at)));
+    order.sort_by_key(|at| (families[*at].experiment.is_some(), metrics.get_index_of(families[*at].metric)));
     let mut room = MOST_TESTS;
-    let kept: BTreeSet<usize> = order
-        .into_iter()
-        .take_while(|at| {
-            room.checked_sub(families[*at].tests.len()).is_some_and(|left| {
-                room = left;
-                true
-            })
-        })
-        .collect();
-    let all = families.len();
-    let families: Vec<_> =
-        families.into_iter().enumerate().filter(|(at, _)| kept.contains(at)).map(|(_, family)| family).collect();
-    let left_out = all - families.len();
-    (families, left_out)
+    let fits = |at: &usize| {
+        let left = room.checked_sub(families[*at].tests.len());
+        room = left.unwrap_or(room);
+        left.is_some()
+    };
+    let kept: BTreeSet<usize> = order.into_iter().take_while(fits).collect();
+    let left_out = families.len() - kept.len();
+    let kept = families.into_iter().enumerate().filter(|(at, _)| kept.contains(at)).map(|(_, family)| family);
+    (kept.collect(), left_out)
 }
 
 pub(super) fn heading(statistics: Option<&Statistics>) -> Json {

@@ -55,7 +55,6 @@ pub(super) fn render(content: Value) -> Result<String, Error> {
     })
 }
 
-/// One section of the page with this content.
 pub(super) fn section(name: &str, content: &Value) -> Result<String, Error> {
     environment()?.get_template(&format!("{name}.html"))?.render(content)
 }

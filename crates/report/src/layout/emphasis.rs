@@ -10,7 +10,6 @@ use crate::style::EmphasisRule;
 use crate::tables::Emphasis;
 use metric::catalog::Better;
 
-/// Sets the emphasis of the cells of one column in one group. The order of the cells is unchanged.
 pub(crate) fn emphasise(cells: &mut [&mut MetricCell], better: Better, rule: EmphasisRule) {
     let compare: fn(&MetricCell, &MetricCell) -> Ordering = match rule {
         // Ties come from tests, which cells do not have.

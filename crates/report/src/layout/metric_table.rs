@@ -46,7 +46,6 @@ pub struct MetricColumn {
     pub better: Better,
 }
 
-/// Rows under one heading.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MetricRows {
     /// `E1: Active mirror-based self-identification`; `None` if there is only one group.
@@ -54,18 +53,13 @@ pub struct MetricRows {
     pub rows: Vec<MetricRow>,
 }
 
-/// The cells of one key.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MetricRow {
-    /// A value for each of [`MetricTable::keys`].
     pub key: Vec<KeyValue>,
-    /// The row's name within its group.
     pub name: String,
-    /// One cell per column.
     pub cells: Vec<MetricCell>,
 }
 
-/// One metric of one row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MetricCell {
     pub value: Value,
@@ -80,7 +74,6 @@ pub struct MetricCell {
     pub sum: i128,
 }
 
-/// The rounded value of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Value {
     Undefined,
@@ -104,7 +97,6 @@ pub enum Value {
     },
 }
 
-/// The uncertainty of the mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Spread {
     /// Not given: too few values.
@@ -210,7 +202,6 @@ impl MetricTable {
 }
 
 impl MetricCell {
-    /// A cell of these moments in a row of `episodes` episodes, without emphasis or mark.
     pub fn plain(value: Value, moments: &Moments, episodes: u64) -> Self {
         Self { value, emphasis: Emphasis::Plain, is_marked: false, episodes, n: moments.n, sum: moments.sum }
     }

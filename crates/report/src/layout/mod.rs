@@ -65,7 +65,6 @@ fn other(columns: Vec<String>) -> TableSheet {
     }
 }
 
-/// Properties that the tables of some cells share.
 struct Layout<'a> {
     cells: &'a Cells,
     style: &'a Style,
@@ -124,7 +123,6 @@ impl<'a> Layout<'a> {
         }
     }
 
-    /// The rows in order, split where a key in the headings changes.
     fn groups(&self, sheet: &TableSheet) -> Vec<MetricRows> {
         let mut ordered: Vec<&Group> = self.cells.groups.iter().collect();
         let order = TableOrder { catalog: &self.cells.catalog, style: self.style };

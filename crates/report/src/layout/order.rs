@@ -8,7 +8,6 @@ use crate::cells::diff::Changes;
 use crate::style::{MAIN_TABLE, Style};
 use metric::catalog::Catalog;
 
-/// The keys of the order.
 #[derive(Clone, Copy, Debug)]
 pub struct TableOrder<'a> {
     pub catalog: &'a Catalog,
@@ -35,7 +34,6 @@ impl TableOrder<'_> {
         (shown, defined.get_index_of(metric).unwrap_or(defined.len()))
     }
 
-    /// Sorts cells and flips in table order.
     pub fn sort(self, changes: &mut Changes) {
         let by = changes.by.clone();
         changes.cells.sort_by_cached_key(|cell| {

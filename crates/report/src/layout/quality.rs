@@ -11,7 +11,6 @@ use exact::format::fixed;
 use score::quality::{CellKey, Quality, QualityByCell, statuses};
 
 const NAME: &str = "quality";
-/// The text of an unrecorded value.
 const UNKNOWN: &str = "--";
 /// The shares of replies whose latency is reported.
 const MEDIAN: f64 = 0.5;

@@ -8,7 +8,6 @@ use exact::number::Decimal;
 use metric::catalog::{Kind, Metric, StandardError};
 use statistics::interval::Interval;
 
-/// The value of a cell in a row of `episodes` episodes.
 pub fn value(cell: &Cell, episodes: u64, print: &Print) -> Value {
     let Cell { moments, metric, interval, .. } = *cell;
     let (whole, places) = scale(metric, print);

@@ -38,7 +38,6 @@ impl Looks {
     }
 }
 
-/// Differences between a plan and the analysis of these episodes; empty without any.
 pub fn departures(plan: &RegisteredPlan, table: &EpisodeTable, options: &Options, looks: Looks) -> Vec<String> {
     let request = &plan.plan.request;
     let mut found = Vec::new();
@@ -115,7 +114,6 @@ fn short(hash: &str) -> &str {
     hash.get(..12).unwrap_or(hash)
 }
 
-/// The episodes of one model in one experiment.
 #[derive(Default)]
 struct Block {
     seeds: BTreeSet<i32>,

@@ -32,7 +32,7 @@ pub struct PlanRequest {
     pub confidence: f64,
     /// The number of models; each is compared with each.
     pub models: u64,
-    /// Seeds, each with as many runs; and how far the episodes of one seed resemble each other.
+    /// Seeds, all with equally many runs; and how far the episodes of one seed resemble each other.
     pub clusters: Clusters,
     /// The share of pairs of which one succeeds and the other does not; null takes success as independent in a pair.
     pub discordance: Option<f64>,
@@ -114,7 +114,6 @@ pub enum TestName {
 }
 
 impl TestName {
-    /// The title of the comparison.
     pub const fn title(self) -> &'static str {
         match self {
             Self::Paired => "two models, pairs (exact McNemar)",
@@ -128,7 +127,6 @@ impl TestName {
     }
 }
 
-/// An error of a power analysis.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PlanError {
     #[error(

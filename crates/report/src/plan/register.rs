@@ -10,12 +10,6 @@ use serde::{Deserialize, Serialize};
 use super::Plan;
 use exact::hash;
 
-/// The value of the key `format`.
-const FORMAT: &str = "mirrorstats-plan";
-
-/// The version of the format.
-const VERSION: u32 = 1;
-
 /// A registered plan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -59,12 +53,10 @@ pub struct NamedHash {
 }
 
 impl RegisteredPlan {
-    /// Registers a plan; experiments and prompts may be empty.
     pub fn new(plan: Plan, definitions: NamedHash, experiments: Vec<NamedHash>, prompts: Vec<NamedHash>) -> Self {
-        let (format, version, sha256) = (FORMAT.to_owned(), VERSION, String::new());
         Self {
-            format,
-            version,
+            format: "mirrorstats-plan".to_owned(),
+            version: 1,
             plan,
             definitions,
             experiments,
@@ -73,18 +65,16 @@ impl RegisteredPlan {
             experiment_names: Vec::new(),
             model_names: Vec::new(),
             filter: None,
-            sha256,
+            sha256: String::new(),
         }
         .sealed()
     }
 
-    /// The same plan with the hash of its content.
     #[must_use]
     pub fn sealed(self) -> Self {
         Self { sha256: self.content_hash(), ..self }
     }
 
-    /// Reads a registered plan.
     pub fn parse(text: &str) -> Result<Self, String> {
         let plan: Self = serde_json::from_str(text).map_err(|error| {
             format!("expected a registered plan: {error}\n  help: `mirrorstats plan ... --register FILE` writes one")
@@ -93,15 +83,13 @@ impl RegisteredPlan {
             return Ok(plan);
         }
         let words = "the plan was changed after it was registered: its hash is not that of its content";
-        Err(format!("{words}\n  help: take the file as it was registered, or register anew"))
+        Err(format!("{words}\n  help: use the file as it was registered, or register a new plan"))
     }
 
-    /// Returns true if it is unchanged since its registration.
     pub fn is_unchanged(&self) -> bool {
         self.sha256 == self.content_hash()
     }
 
-    /// The document as JSON text.
     pub fn to_json(&self) -> String {
         serde_json::to_string_pretty(self).expect("texts and finite numbers") + "\n"
     }

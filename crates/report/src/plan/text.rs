@@ -8,7 +8,6 @@ use exact::format::{UNDEFINED, fixed};
 use statistics::sample_size::{Clusters, Rates, SEED, STUDIES};
 
 impl Plan {
-    /// The whole answer, in lines of at most `width` columns.
     pub fn render(&self, width: Option<usize>) -> String {
         let mut text = String::new();
         push_wrapped(&mut text, &self.answer, width, 2);
@@ -29,7 +28,6 @@ impl Plan {
     }
 }
 
-/// The name of a cluster.
 const fn cluster(people: bool) -> &'static str {
     if people { "participant" } else { "seed" }
 }

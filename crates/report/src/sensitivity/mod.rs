@@ -5,7 +5,6 @@
 
 mod changes;
 mod table;
-mod text;
 
 use indexmap::IndexMap;
 use schemars::JsonSchema;
@@ -13,25 +12,27 @@ use serde::Serialize;
 
 use super::statistics::Statistics;
 use super::style::Style;
-use crate::cells::{Cells, Group, KeyValue};
+use crate::cells::{Cell, Cells, Group, KeyValue};
 use crate::layout::MetricTable;
-use crate::tables::Terminal;
-use exact::moments::Moments;
+use crate::tables::{Table, Terminal, escape_markdown, key_field, wrapped};
+use exact::escape::visible;
+use exact::number::full_precision;
 use metric::catalog::Kind;
 
 pub use changes::{Change, Question, Says};
 
-/// The results under one threshold, or under the recorded definitions.
+const HEADING: &str = "Where a conclusion changes";
+const NONE: &str = "No conclusion changes.";
+const ROOM: usize = 110;
+
 #[derive(Clone, Debug)]
 pub struct Level {
     /// The least number of pixels that counts as evidence; `None` for the unchanged definitions.
     pub px: Option<u32>,
     pub cells: Cells,
-    /// The conclusions from the same episodes.
     pub statistics: Statistics,
 }
 
-/// The meaning of the row of the recorded definitions.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Reference {
     /// True if the evidence is the recorded one; definitions may use other evidence.
@@ -137,26 +138,54 @@ impl Sensitivity {
         }
     }
 
-    /// As comma-separated values in full precision: the key columns, then `threshold,metric,n,sum,mean,se`. The
-    /// threshold of the unchanged definitions is `recorded` or `defined`; undefined values are empty.
-    pub fn csv(&self) -> String {
-        text::csv(self)
+    pub fn render(&self, on: Terminal) -> String {
+        let mut lines = vec![String::new()];
+        if self.changes.is_empty() {
+            lines.push(NONE.to_owned());
+        } else {
+            lines.push(HEADING.to_owned());
+            let sentences = self.changes.iter().map(|change| format!("- {}", visible(&change.sentence)));
+            lines.extend(sentences.flat_map(|sentence| wrapped(&sentence, on.width.unwrap_or(ROOM), 2)));
+        }
+        self.table.printed().terminal(on) + &lines.join("\n") + "\n"
     }
 
-    /// As Markdown, with changed conclusions below the table.
     pub fn markdown(&self) -> String {
-        text::markdown(self)
+        let text = self.table.printed().markdown();
+        if self.changes.is_empty() {
+            return text + "\n" + NONE + "\n";
+        }
+        let sentences: Vec<String> =
+            self.changes.iter().map(|change| format!("- {}\n", escape_markdown(&change.sentence))).collect();
+        text + "\n**" + HEADING + ".**\n\n" + &sentences.concat()
     }
 
-    /// As LaTeX, only the table.
     pub fn latex(&self) -> String {
         self.table.printed().latex()
     }
 
-    /// For a terminal: the table, then the changed conclusions.
-    pub fn render(&self, terminal: Terminal) -> String {
-        text::render(self, terminal)
+    /// As comma-separated values in full precision: the key columns, then `threshold,metric,n,sum,mean,se`. The
+    /// threshold of the unchanged definitions is `recorded` or `defined`; undefined values are empty.
+    pub fn csv(&self) -> String {
+        let tail = ["threshold", "metric", "n", "sum", "mean", "se"];
+        let header = self.by.iter().map(String::as_str).chain(tail);
+        Table::of_texts(header).with(self.cells.iter().map(|cell| record(self, cell))).csv()
     }
+}
+
+fn record(found: &Sensitivity, cell: &ThresholdCell) -> Vec<String> {
+    let word = || found.reference.split(' ').next().unwrap_or_default().to_owned();
+    let number = |value: Option<f64>| value.map(full_precision).unwrap_or_default();
+    let keys = cell.key.values().map(key_field);
+    keys.chain([
+        cell.threshold.map_or_else(word, |px| px.to_string()),
+        cell.metric.clone(),
+        cell.n.to_string(),
+        if cell.n == 0 { String::new() } else { cell.sum.to_string() },
+        number(cell.mean),
+        number(cell.se),
+    ])
+    .collect()
 }
 
 fn cells(levels: &[Level], metrics: &[String], style: &Style) -> Vec<ThresholdCell> {
@@ -172,8 +201,7 @@ fn cells(levels: &[Level], metrics: &[String], style: &Style) -> Vec<ThresholdCe
 
 impl ThresholdCell {
     fn of(level: &Level, group: &Group, name: &str) -> Option<Self> {
-        let metric = level.cells.catalog.metric.get(name)?;
-        let moments = level.moments(group, name)?;
+        let Cell { metric, moments, .. } = level.cells.of_metric(group, name)?;
         Some(Self {
             key: level.cells.by.iter().cloned().zip(group.key.iter().cloned()).collect(),
             threshold: level.px,
@@ -191,9 +219,5 @@ impl ThresholdCell {
 impl Level {
     fn group(&self, key: &[KeyValue]) -> Option<&Group> {
         self.cells.groups.iter().find(|group| group.key == key)
-    }
-
-    fn moments<'g>(&self, group: &'g Group, metric: &str) -> Option<&'g Moments> {
-        group.moments.get(self.cells.metrics.iter().position(|known| known == metric)?)
     }
 }

@@ -1,7 +1,7 @@
 //! The table: a group of rows per experiment and model, one row per threshold, one column per metric.
 
 use super::{Level, Reference};
-use crate::cells::{Group, KeyValue};
+use crate::cells::{Cell, Group, KeyValue};
 use crate::layout::{MetricCell, MetricColumn, MetricRow, MetricRows, MetricTable, Spread, TableOrder, Value};
 use crate::style::{CellForm, Style, TableSheet};
 use exact::moments::Moments;
@@ -35,7 +35,6 @@ pub(super) fn table(
     }
 }
 
-/// The groups of all levels, in table order.
 pub(super) fn keys(levels: &[Level], style: &Style) -> Vec<Vec<KeyValue>> {
     let Some(first) = levels.first() else { return Vec::new() };
     let order = TableOrder { catalog: &first.cells.catalog, style };
@@ -79,9 +78,8 @@ fn row(
         None => (reference.words(), KeyValue::Text(reference.word().to_owned())),
     };
     let cell = |metric: &String| {
-        let moments = level.moments(group, metric)?;
-        let value = value(moments, level.cells.catalog.metric.get(metric)?, group.episodes, style);
-        Some(MetricCell::plain(value, moments, group.episodes))
+        let Cell { metric, moments, .. } = level.cells.of_metric(group, metric)?;
+        Some(MetricCell::plain(value(moments, metric, group.episodes, style), moments, group.episodes))
     };
     let cells = metrics.iter().map(cell).collect::<Option<Vec<_>>>()?;
     Some(MetricRow { key: group.key.iter().cloned().chain([threshold]).collect(), name, cells })

@@ -19,11 +19,9 @@ use toml_spec::{Fault, Faults, Place};
 
 /// The table that every report has.
 pub const MAIN_TABLE: &str = "main";
-
 /// The table of the metrics that a style does not name.
 pub const OTHER_TABLE: &str = "other";
 
-/// A style ready for use.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Style {
     /// The built-in name, or the file's name without its extension; never a path.
@@ -119,7 +117,6 @@ pub struct PrintSheet {
     pub mark_n_below: Option<u64>,
 }
 
-/// The complete settings of printed cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Print {
     pub cell: CellForm,
@@ -189,7 +186,6 @@ pub enum SingleSe {
     Zero,
 }
 
-/// An error of a style.
 #[derive(Debug, thiserror::Error)]
 pub enum StyleError {
     #[error("no style `{name}`: expected `default`, `paper` or the path of a style file{hint}")]
@@ -200,12 +196,10 @@ pub enum StyleError {
     Faults(#[from] Faults),
 }
 
-/// The names of the built-in styles.
 pub fn built_in_names() -> Vec<&'static str> {
     read::KIND.built_in_names()
 }
 
-/// The text of a built-in style.
 pub fn built_in(name: &str) -> Option<&'static str> {
     read::KIND.built_in_text(name)
 }
@@ -235,14 +229,12 @@ impl Style {
         if faults.is_empty() { Ok(()) } else { Err(Faults(faults).in_order().into()) }
     }
 
-    /// Returns true if the style is built in.
     pub fn is_built_in(&self) -> bool {
         self.is_built_in
     }
 }
 
 impl Sheet {
-    /// The print settings of `table`'s cells.
     pub fn print_of(&self, table: &TableSheet) -> Print {
         let (own, all) = (&table.print, &self.print);
         Print {
@@ -255,7 +247,6 @@ impl Sheet {
         }
     }
 
-    /// The direction of a metric's column.
     pub fn better(&self, metric: &str, catalog: &Catalog) -> Better {
         let own = self.column.get(metric).and_then(|column| column.better);
         own.or_else(|| catalog.metric.get(metric).map(|m| m.better)).unwrap_or(Better::Neither)
@@ -263,7 +254,6 @@ impl Sheet {
 }
 
 impl Decimals {
-    /// Decimal places of a metric of this kind.
     pub fn of(self, kind: Kind) -> u32 {
         match kind {
             Kind::Rate => self.rate,

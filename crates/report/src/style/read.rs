@@ -26,7 +26,6 @@ pub(super) const KIND: FileKind = FileKind {
     most_includes: Limit::new("includes of a style, those of included files counted", 32),
 };
 
-/// A style file with all its includes.
 pub(super) struct Read {
     pub sheet: Sheet,
     /// Metrics named by the user's files, with locations.

@@ -6,13 +6,16 @@
 use super::Table;
 use crate::cells::KeyValue;
 
-pub fn render(table: &Table) -> String {
-    let mut writer = ::csv::Writer::from_writer(Vec::new());
-    let mut write = |record: Vec<&str>| writer.write_record(record).expect("rows of one length, written to memory");
-    write(table.columns.iter().map(|column| column.heading.as_str()).collect());
-    table.rows().for_each(|row| write(row.iter().map(|cell| cell.text.as_str()).collect()));
-    let bytes = writer.into_inner().expect("flushing to memory does not fail");
-    String::from_utf8(bytes).expect("every field is text")
+impl Table {
+    /// As comma-separated values: the header, then the rows.
+    pub fn csv(&self) -> String {
+        let mut writer = ::csv::Writer::from_writer(Vec::new());
+        let mut write = |record: Vec<&str>| writer.write_record(record).expect("rows of one length, written to memory");
+        write(self.columns.iter().map(|column| column.heading.as_str()).collect());
+        self.rows().for_each(|row| write(row.iter().map(|cell| cell.text.as_str()).collect()));
+        let bytes = writer.into_inner().expect("flushing to memory does not fail");
+        String::from_utf8(bytes).expect("every field is text")
+    }
 }
 
 /// A key as a field; text that a spreadsheet would compute is made harmless.
@@ -23,7 +26,6 @@ pub(crate) fn key_field(value: &KeyValue) -> String {
     }
 }
 
-/// The text of a key's field.
 pub(crate) fn text_of(field: &str) -> &str {
     field.strip_prefix('\'').filter(|text| is_formula(text)).unwrap_or(field)
 }

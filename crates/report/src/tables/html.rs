@@ -10,29 +10,31 @@ use exact::escape::visible;
 const NUMBER: &str = " style=\"text-align: right; white-space: nowrap\"";
 const NAME: &str = " style=\"text-align: left\"";
 
-/// The table with its caption.
-pub fn render(table: &Table) -> String {
-    let mut text = format!("<table>\n<caption{NAME}><b>{}.</b>", escape(&table.title));
-    for sentence in &table.sentences {
-        let _ = write!(text, " {}", escape(sentence));
-    }
-    text.push_str("</caption>\n<thead>\n");
-    push_row(&mut text, "th", table, table.columns.iter().map(|column| column.spelled(escape)));
-    text.push_str("</thead>\n");
-    for group in &table.groups {
-        text.push_str("<tbody>\n");
-        if let Some(heading) = &group.heading {
-            let columns = table.columns.len();
-            let _ = writeln!(text, "<tr><th{NAME} colspan=\"{columns}\">{}</th></tr>", escape(heading));
+impl Table {
+    /// As HTML for notebooks.
+    pub fn html(&self) -> String {
+        let mut text = format!("<table>\n<caption{NAME}><b>{}.</b>", escape(&self.title));
+        for sentence in &self.sentences {
+            let _ = write!(text, " {}", escape(sentence));
         }
-        for row in &group.rows {
-            let cells = row.iter().map(|cell| cell.marked_up(escape, ["<b>", "</b>"], ["<u>", "</u>"]));
-            push_row(&mut text, "td", table, cells);
+        text.push_str("</caption>\n<thead>\n");
+        push_row(&mut text, "th", self, self.columns.iter().map(|column| column.spelled(escape)));
+        text.push_str("</thead>\n");
+        for group in &self.groups {
+            text.push_str("<tbody>\n");
+            if let Some(heading) = &group.heading {
+                let columns = self.columns.len();
+                let _ = writeln!(text, "<tr><th{NAME} colspan=\"{columns}\">{}</th></tr>", escape(heading));
+            }
+            for row in &group.rows {
+                let cells = row.iter().map(|cell| cell.marked_up(escape, ["<b>", "</b>"], ["<u>", "</u>"]));
+                push_row(&mut text, "td", self, cells);
+            }
+            text.push_str("</tbody>\n");
         }
-        text.push_str("</tbody>\n");
+        text.push_str("</table>\n");
+        text
     }
-    text.push_str("</table>\n");
-    text
 }
 
 fn push_row(text: &mut String, element: &str, table: &Table, cells: impl Iterator<Item = String>) {
@@ -63,7 +65,7 @@ fn escape(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{escape, render};
+    use super::escape;
     use crate::tables::{Column, RowGroup, Table};
 
     #[test]
@@ -89,7 +91,7 @@ mod tests {
             groups: vec![RowGroup { heading: Some(text()), rows: vec![vec![text().into()]] }],
             ..Table::default()
         };
-        let html = render(&table);
+        let html = table.html();
         // The one `<b>` that is markup encloses the title.
         assert_eq!((html.matches("<b>").count(), html.matches("&lt;b&gt;").count()), (1, 7), "{html}");
     }

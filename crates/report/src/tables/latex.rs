@@ -6,32 +6,33 @@ use super::{Align, Column, DAGGER, Emphasis, Look, RowGroup, Table, TableCell};
 use exact::escape::visible;
 use metric::catalog::Better;
 
-/// The packages for the preamble, as a comment before a sheet.
 const PACKAGES: &str =
     "% Needs in the preamble: \\usepackage{booktabs}, \\usepackage{graphicx}, \\usepackage[table]{xcolor}\n";
 
-/// The whole float, including caption and label.
-pub fn render(table: &Table) -> String {
-    let is_sheet = table.look == Look::Sheet;
-    let (packages, blank) = if is_sheet { (PACKAGES, "\n") } else { ("", "") };
-    let columns: String = table.columns.iter().map(|c| if c.align == Align::Left { 'l' } else { 'c' }).collect();
-    let header = line(table.columns.iter().map(|column| header(column, is_sheet)));
-    let mut text = format!(
-        "{packages}\\begin{{table*}}[t]\n\\centering\n\\resizebox{{\\textwidth}}{{!}}{{%\n\\begin{{tabular}}{{{columns}}}\n\\toprule\n{header}"
-    );
-    for (at, group) in table.groups.iter().enumerate() {
-        if at == 0 || group.heading.is_some() {
-            let (before, after) = if at == 0 { ("", blank) } else { (blank, "") };
-            let _ = write!(text, "{before}\\midrule\n{after}");
+impl Table {
+    /// As LaTeX; needs the packages booktabs and graphicx; a sheet also needs xcolor with its option `table`.
+    pub fn latex(&self) -> String {
+        let is_sheet = self.look == Look::Sheet;
+        let (packages, blank) = if is_sheet { (PACKAGES, "\n") } else { ("", "") };
+        let columns: String = self.columns.iter().map(|c| if c.align == Align::Left { 'l' } else { 'c' }).collect();
+        let header = line(self.columns.iter().map(|column| header(column, is_sheet)));
+        let mut text = format!(
+            "{packages}\\begin{{table*}}[t]\n\\centering\n\\resizebox{{\\textwidth}}{{!}}{{%\n\\begin{{tabular}}{{{columns}}}\n\\toprule\n{header}"
+        );
+        for (at, group) in self.groups.iter().enumerate() {
+            if at == 0 || group.heading.is_some() {
+                let (before, after) = if at == 0 { ("", blank) } else { (blank, "") };
+                let _ = write!(text, "{before}\\midrule\n{after}");
+            }
+            push_group(&mut text, group, self);
         }
-        push_group(&mut text, group, table);
+        let _ = writeln!(text, "{blank}\\bottomrule\n\\end{{tabular}}%\n}}\n\\caption{{{}}}", caption(self));
+        if let Some(label) = &self.label {
+            let _ = writeln!(text, "\\label{{{}}}", identifier(label));
+        }
+        text.push_str("\\end{table*}\n");
+        text
     }
-    let _ = writeln!(text, "{blank}\\bottomrule\n\\end{{tabular}}%\n}}\n\\caption{{{}}}", caption(table));
-    if let Some(label) = &table.label {
-        let _ = writeln!(text, "\\label{{{}}}", identifier(label));
-    }
-    text.push_str("\\end{table*}\n");
-    text
 }
 
 fn line(cells: impl Iterator<Item = String>) -> String {
@@ -123,7 +124,6 @@ fn identifier(label: &str) -> String {
     label.chars().filter(|c| c.is_alphanumeric() || ":-_.".contains(*c)).collect()
 }
 
-/// Escaped text: each special character becomes the command that prints it.
 pub(crate) fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for c in visible(text).chars() {

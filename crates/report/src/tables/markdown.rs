@@ -7,17 +7,19 @@ use unicode_width::UnicodeWidthStr;
 use super::{Align, Look, RowGroup, Table, TableCell};
 use exact::escape::visible;
 
-/// The whole table with its caption above.
-pub fn render(table: &Table) -> String {
-    let mut text = format!("**{}.**", escape(&table.title));
-    for sentence in &table.sentences {
-        let _ = write!(text, " {}", escape(sentence));
+impl Table {
+    /// As GitHub's Markdown.
+    pub fn markdown(&self) -> String {
+        let mut text = format!("**{}.**", escape(&self.title));
+        for sentence in &self.sentences {
+            let _ = write!(text, " {}", escape(sentence));
+        }
+        text.push('\n');
+        for group in &self.groups {
+            push_group(&mut text, group, self);
+        }
+        text
     }
-    text.push('\n');
-    for group in &table.groups {
-        push_group(&mut text, group, table);
-    }
-    text
 }
 
 fn push_group(text: &mut String, group: &RowGroup, table: &Table) {

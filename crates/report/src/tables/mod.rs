@@ -86,7 +86,6 @@ pub struct TableCell {
     pub is_marked: bool,
 }
 
-/// The emphasis of a cell within its group.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Emphasis {
     #[default]
@@ -99,10 +98,8 @@ pub enum Emphasis {
 /// The sign that marks a cell of few episodes.
 pub(crate) const DAGGER: char = '†';
 
-/// A table of a report in both forms.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ListTable {
-    /// The name of its files.
     pub name: String,
     /// For people; its sentences explain how to read it and its limits.
     pub printed: Table,
@@ -167,46 +164,6 @@ impl Table {
     fn cells(&self) -> impl Iterator<Item = &TableCell> {
         self.rows().flatten()
     }
-
-    /// For a terminal or a pipe; lists have only a title.
-    pub fn terminal(&self, terminal: Terminal) -> String {
-        terminal::render(self, terminal)
-    }
-
-    /// For a terminal of this width or a pipe, with emphasis by signs.
-    pub fn within(&self, width: Option<usize>) -> String {
-        self.terminal(Terminal { width, ..Terminal::default() })
-    }
-
-    /// Only the lines, without title and sentences.
-    pub fn lines(&self, width: Option<usize>) -> String {
-        terminal::list::lines(self, width)
-    }
-
-    /// For a terminal, with words wrapped so that all columns fit into `width`.
-    pub fn wrapped(&self, width: usize) -> String {
-        terminal::list::wrapped(self, width)
-    }
-
-    /// As GitHub's Markdown.
-    pub fn markdown(&self) -> String {
-        markdown::render(self)
-    }
-
-    /// As LaTeX; needs the packages booktabs and graphicx; a sheet also needs xcolor with its option `table`.
-    pub fn latex(&self) -> String {
-        latex::render(self)
-    }
-
-    /// As HTML for notebooks.
-    pub fn html(&self) -> String {
-        html::render(self)
-    }
-
-    /// As comma-separated values: the header, then the rows.
-    pub fn csv(&self) -> String {
-        csv::render(self)
-    }
 }
 
 impl Column {
@@ -218,7 +175,6 @@ impl Column {
         Self { align: Align::Right, ..Self::left(heading) }
     }
 
-    /// The heading and its arrow, escaped by `escape`.
     fn spelled(&self, escape: fn(&str) -> String) -> String {
         let heading = escape(&self.heading);
         self.better.arrow().map_or_else(|| heading.clone(), |arrow| format!("{heading} {arrow}"))

@@ -38,8 +38,7 @@ pub fn draw(scene: Scene<'_>) -> Drawn {
             gaps.draw(&mut sheet, experiment, member.model, frame);
         }
     }
-    let bottom = rows + ROW * many(labels.len()) + 10.0;
-    let height = gaps.draw_key(&mut sheet, bottom);
+    let height = gaps.draw_key(&mut sheet, rows + ROW * many(labels.len()) + 10.0);
     (sheet, height)
 }
 
@@ -90,24 +89,19 @@ impl<'a> Gaps<'a> {
 
     fn draw(&self, sheet: &mut Sheet, experiment: &str, model: &str, frame: Frame) {
         let [finished, all] = self.ids.map(|id| self.scene.matrix.reading(experiment, model, id));
-        let gap = self.gap(experiment, model);
-        let words = self.text(experiment, model).unwrap_or_else(|| "undefined".to_owned());
+        let (gap, text) = (self.gap(experiment, model), self.text(experiment, model));
+        let words = text.as_deref().unwrap_or("undefined");
         let [among, whole] = self.ids.map(|id| id.name);
         let parts = format!("{among}: {}, {whole}: {}", finished.words(), all.words());
-        let mark = Mark::new(format!("{experiment} · {model} · {among} − {whole}: {words} · {parts}"))
-            .with("experiment", experiment)
-            .with("model", model)
-            .with("metric", format!("{among} - {whole}"))
+        let title = format!("{experiment} · {model} · {among} − {whole}: {words} · {parts}");
+        let mark = Mark::of_cell(title, experiment, model, &format!("{among} - {whole}"))
             .value(gap)
             .with("n", all.n())
             .with("n-finished", finished.n());
         sheet.mark(&mark, |sheet| match (all, gap) {
             (Reading::Empty, _) => tiles::empty(sheet, frame),
             (_, None) => tiles::undefined(sheet, frame),
-            (_, Some(gap)) => {
-                let text = self.text(experiment, model);
-                tiles::known(sheet, frame, self.color(gap), &text.into_iter().collect::<Vec<_>>());
-            }
+            (_, Some(gap)) => tiles::known(sheet, frame, self.color(gap), text.as_slice()),
         });
     }
 

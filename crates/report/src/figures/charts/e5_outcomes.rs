@@ -14,7 +14,6 @@ const BAR: f64 = 15.0;
 const LEAST_WIDTH: f64 = 420.0;
 const PLOT_WIDTH: f64 = 260.0;
 
-/// The endings of the episodes of one experiment, by model.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Outcomes {
     pub experiment: String,
@@ -22,7 +21,6 @@ pub struct Outcomes {
     pub rows: Vec<OutcomeRow>,
 }
 
-/// The endings of one model's episodes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct OutcomeRow {
     pub model: String,
@@ -53,8 +51,7 @@ impl Outcomes {
                 (_, false) => row.uncommitted += 1,
             }
         }
-        let rows: Vec<OutcomeRow> = rows.into_values().collect();
-        (!rows.is_empty()).then(|| Self { experiment: experiment.to_owned(), rows })
+        (!rows.is_empty()).then(|| Self { experiment: experiment.to_owned(), rows: rows.into_values().collect() })
     }
 
     /// Returns true if there is any episode that [`of`](Self::of) would count.
@@ -122,12 +119,8 @@ fn bar(sheet: &mut Sheet, plot: &Plot, experiment: &str, row: &OutcomeRow, middl
     for (name, count, fill) in row.parts() {
         let (from, to) = (place(before), place(before + count));
         before += count;
-        let mark = Mark::new(format!("{experiment} · {} · {name}: {count} of {episodes}", row.model))
-            .with("experiment", experiment)
-            .with("model", &row.model)
-            .with("metric", name)
-            .with("value", count)
-            .with("n", episodes);
+        let title = format!("{experiment} · {} · {name}: {count} of {episodes}", row.model);
+        let mark = Mark::of_cell(title, experiment, &row.model, name).with("value", count).with("n", episodes);
         sheet.mark(&mark, |sheet| {
             if count == 0 {
                 return;
@@ -145,10 +138,8 @@ fn bar(sheet: &mut Sheet, plot: &Plot, experiment: &str, row: &OutcomeRow, middl
 }
 
 fn empty_bar(sheet: &mut Sheet, plot: &Plot, experiment: &str, model: &str, middle: f64) {
-    let mark = Mark::new(format!("{experiment} · {model}: no episodes"))
-        .with("experiment", experiment)
-        .with("model", model)
-        .with("n", 0);
+    let mark = Mark::new(format!("{experiment} · {model}: no episodes"));
+    let mark = mark.with("experiment", experiment).with("model", model).with("n", 0);
     let place = Frame::new(plot.frame.left, middle - BAR / 2.0, plot.frame.width, BAR);
     sheet.mark(&mark, |sheet| tiles::empty(sheet, place));
 }

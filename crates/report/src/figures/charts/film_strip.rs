@@ -3,21 +3,14 @@
 use crate::figures::Figure;
 use crate::figures::kit::{Fill, Frame, MARGIN, Mark, PALETTE, Rgb, Sheet, Stroke, label, lettering};
 
-/// One step in the strip.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Still {
     pub t: i32,
-    /// The frame as PNG.
     pub png: Vec<u8>,
-    /// The width and height of `png`, in pixels.
     pub size: (u32, u32),
-    /// The action, in words.
     pub action: String,
-    /// The claim, in words.
     pub claim: String,
-    /// True if mirror evidence was in view.
     pub visible: bool,
-    /// The story's moments at this step.
     pub moments: Vec<&'static str>,
 }
 
@@ -29,7 +22,6 @@ const GAP: f64 = 6.0;
 /// The line height of text, px.
 const LINE: f64 = 15.0;
 
-/// The strip of these steps.
 pub fn film_strip(title: &str, stills: &[Still]) -> Figure {
     let count = stills.len().max(1);
     #[expect(clippy::cast_precision_loss, reason = "a strip has few frames")]
@@ -61,29 +53,22 @@ fn draw(sheet: &mut Sheet, still: &Still, left: f64, top: f64) -> f64 {
     sheet.mark(&mark, |sheet| {
         sheet.picture(frame, &still.png);
         if !still.moments.is_empty() {
-            let outline = Stroke::solid(SEEN, 2.0);
-            sheet.line(&corners(frame), outline);
+            let (left, top, right, bottom) = (frame.left, frame.top, frame.right(), frame.bottom());
+            let outline = [(left, top), (right, top), (right, bottom), (left, bottom), (left, top)];
+            sheet.line(&outline, Stroke::solid(SEEN, 2.0));
         }
     });
     let mut y = frame.bottom() + LINE * 0.8;
-    let mirror = if still.visible { "mirror evidence in view" } else { "no mirror evidence" };
-    let eye = Frame::new(left, y - 4.0, 8.0, 8.0);
-    let paint = if still.visible { SEEN } else { PALETTE.surface.quiet };
-    sheet.rectangle(eye, Fill::plain(paint));
-    for (at, words) in
-        [mirror.to_owned(), format!("t = {}: {}", still.t, still.action), still.claim.clone()].iter().enumerate()
-    {
-        let indent = if at == 0 { 12.0 } else { 0.0 };
+    let (mirror, paint) =
+        if still.visible { ("mirror evidence in view", SEEN) } else { ("no mirror evidence", PALETTE.surface.quiet) };
+    sheet.rectangle(Frame::new(left, y - 4.0, 8.0, 8.0), Fill::plain(paint));
+    let action = format!("t = {}: {}", still.t, still.action);
+    for (indent, words) in [(12.0, mirror), (0.0, action.as_str()), (0.0, still.claim.as_str())] {
         let lettering = lettering::tick();
         sheet.text((left + indent, y), &label::cut(words, WIDTH - indent, lettering), lettering);
         y += LINE;
     }
     y - LINE / 2.0
-}
-
-fn corners(frame: Frame) -> [(f64, f64); 5] {
-    let (left, top, right, bottom) = (frame.left, frame.top, frame.right(), frame.bottom());
-    [(left, top), (right, top), (right, bottom), (left, bottom), (left, top)]
 }
 
 fn ratio((width, height): (u32, u32)) -> f64 {

@@ -9,7 +9,6 @@ use score::timeline::Timeline;
 
 /// The most episodes of the raster: with more, rows become too thin to read.
 pub const MOST_EPISODES: usize = 2_000;
-
 /// The target height of all rows of a column together, px.
 const AIM: f64 = 420.0;
 const THINNEST_ROW: f64 = 1.6;
@@ -56,10 +55,8 @@ struct Raster<'a> {
 impl<'a> Raster<'a> {
     fn new(scene: Scene<'a>, timelines: &'a [Timeline]) -> Self {
         let mut raster = Self { scene, timelines, rows: Vec::new(), row: 0.0, last: 1 };
-        let fullest = |model: &str| {
-            let counts = scene.matrix.experiments.iter().map(|e| raster.episodes(e, model).len());
-            counts.max().unwrap_or(0)
-        };
+        let experiments = &scene.matrix.experiments;
+        let fullest = |model: &str| experiments.iter().map(|e| raster.episodes(e, model).len()).max().unwrap_or(0);
         let rows: Vec<usize> = scene.roster.0.iter().map(|member| fullest(member.model)).collect();
         raster.row = (AIM / many(rows.iter().sum::<usize>().max(1))).clamp(THINNEST_ROW, THICKEST_ROW);
         raster.rows = rows;
@@ -82,8 +79,7 @@ impl<'a> Raster<'a> {
     }
 
     fn height(&self) -> f64 {
-        let last = self.rows.len().saturating_sub(1);
-        let (top, height) = self.block(last);
+        let (top, height) = self.block(self.rows.len().saturating_sub(1));
         top + height
     }
 
@@ -149,15 +145,10 @@ fn mark(timeline: &Timeline) -> Mark {
     let Timeline { key, length, first_sight, claim, decision, .. } = timeline;
     let step = |step: &Option<u32>| step.map(|step| step.to_string()).unwrap_or_default();
     let words = |step: &Option<u32>| step.map_or("none".to_owned(), |step| format!("t = {step}"));
-    let title = format!(
-        "{}: {length} steps; first sight {}, claim {}, decision {}",
-        key.episode_id,
-        words(first_sight),
-        words(claim),
-        words(decision)
-    );
+    let [sight_words, claim_words, decision_words] = [first_sight, claim, decision].map(words);
+    let words = format!("first sight {sight_words}, claim {claim_words}, decision {decision_words}");
     let in_view: usize = timeline.visible.iter().map(|run| run.clone().count()).sum();
-    Mark::new(title)
+    Mark::new(format!("{}: {length} steps; {words}", key.episode_id))
         .with("experiment", &key.experiment)
         .with("model", &key.model)
         .with("episode", &key.episode_id)

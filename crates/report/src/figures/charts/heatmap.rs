@@ -39,15 +39,15 @@ pub fn draw(scene: Scene<'_>) -> Drawn {
     }
     for (experiment, body) in matrix.experiments.iter().zip(&panels.bodies) {
         head.draw(&mut sheet, *body);
-        draw_block(&mut sheet, scene, experiment, metrics, Frame { top: body.top + head.height, ..*body });
+        draw_block(&mut sheet, scene, experiment, Frame { top: body.top + head.height, ..*body });
     }
-    let height = draw_key(&mut sheet, scene, metrics, panels.bottom + 12.0);
+    let height = draw_key(&mut sheet, scene, panels.bottom + 12.0);
     (sheet, height)
 }
 
-fn draw_key(sheet: &mut Sheet, scene: Scene<'_>, metrics: &[MetricId<'_>], top: f64) -> f64 {
+fn draw_key(sheet: &mut Sheet, scene: Scene<'_>, top: f64) -> f64 {
+    let Scene { matrix, metrics, .. } = scene;
     let scale = tiles::scale(sheet, (MARGIN, top), |share| PALETTE.ramp.goodness.at(share), ["worse", "better"]);
-    let matrix = scene.matrix;
     let readings = matrix.pairs().flat_map(|(e, m)| metrics.iter().map(move |metric| matrix.reading(e, m, *metric)));
     legend::draw_signs(sheet, (scale + 24.0, top), missing::signs(readings)).max(top + 14.0) + MARGIN
 }
@@ -74,41 +74,33 @@ impl<'a> Head<'a> {
         let cell = body.width / many(self.metrics.len());
         for (column, metric) in self.metrics.iter().enumerate() {
             let middle = body.left + cell * (many(column) + 0.5);
-            let at = if self.lettering.upwards {
-                (middle, body.top + self.height - 3.0)
+            let (below, room) = if self.lettering.upwards {
+                (self.height - 3.0, self.height - 5.0)
             } else {
-                (middle, body.top + leading(self.lettering) / 2.0)
+                (leading(self.lettering) / 2.0, cell)
             };
-            let room = if self.lettering.upwards { self.height - 5.0 } else { cell };
-            sheet.text(at, &label::cut(metric.name, room, self.lettering), self.lettering);
+            let text = label::cut(metric.name, room, self.lettering);
+            sheet.text((middle, body.top + below), &text, self.lettering);
         }
     }
 }
 
-/// Draws one experiment's cells in `body`.
-fn draw_block(sheet: &mut Sheet, scene: Scene<'_>, experiment: &str, metrics: &[MetricId<'_>], body: Frame) {
+fn draw_block(sheet: &mut Sheet, scene: Scene<'_>, experiment: &str, body: Frame) {
+    let Scene { matrix, roster, metrics, .. } = scene;
     let cell = body.width / many(metrics.len());
-    for (column, metric) in metrics.iter().enumerate() {
-        for (row, member) in scene.roster.0.iter().enumerate() {
-            let corner = (body.left + cell * many(column), body.top + ROW * many(row));
-            let frame = Frame::new(corner.0, corner.1, cell, ROW).inset(0.5);
-            draw_cell(sheet, scene, (experiment, member.model, *metric), frame);
+    for (column, &metric) in metrics.iter().enumerate() {
+        for (row, member) in roster.0.iter().enumerate() {
+            let (left, top) = (body.left + cell * many(column), body.top + ROW * many(row));
+            let frame = Frame::new(left, top, cell, ROW).inset(0.5);
+            let reading = matrix.reading(experiment, member.model, metric);
+            let color = matrix.goodness(experiment, member.model, metric).map(|share| PALETTE.ramp.goodness.at(share));
+            sheet.mark(&reading.mark(experiment, member.model, metric.name), |sheet| match (reading, color) {
+                (Reading::Empty, _) => tiles::empty(sheet, frame),
+                (_, None) => tiles::undefined(sheet, frame),
+                (_, Some(color)) => tiles::known(sheet, frame, color, &texts(reading, metric)),
+            });
         }
     }
-}
-
-fn draw_cell(sheet: &mut Sheet, scene: Scene<'_>, key: (&str, &str, MetricId<'_>), frame: Frame) {
-    let (experiment, model, metric) = key;
-    let reading = scene.matrix.reading(experiment, model, metric);
-    let goodness = scene.matrix.goodness(experiment, model, metric);
-    let mark = reading.mark(experiment, model, metric.name);
-    sheet.mark(&mark, |sheet| match (reading, goodness) {
-        (Reading::Empty, _) => tiles::empty(sheet, frame),
-        (_, None) => tiles::undefined(sheet, frame),
-        (_, Some(goodness)) => {
-            tiles::known(sheet, frame, PALETTE.ramp.goodness.at(goodness), &texts(reading, metric));
-        }
-    });
 }
 
 fn texts(reading: Reading, metric: MetricId<'_>) -> Vec<String> {

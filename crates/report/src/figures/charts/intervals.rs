@@ -35,10 +35,9 @@ pub fn draw(scene: Scene<'_>) -> Drawn {
     }
     let counts = counts_width(scene, metric);
     for (experiment, body) in matrix.experiments.iter().zip(&panels.bodies) {
-        let plot = Frame { width: body.width - counts - 8.0, height: rows_height, ..*body };
-        let panel =
-            Panel { scene, experiment, metric, plot: Plot::new(plot, -0.02..1.02, 0.0..1.0), right: body.right() };
-        panel.draw(&mut sheet);
+        let frame = Frame { width: body.width - counts - 8.0, height: rows_height, ..*body };
+        let plot = Plot::new(frame, -0.02..1.02, 0.0..1.0);
+        Panel { scene, experiment, metric, plot, right: body.right() }.draw(&mut sheet);
     }
     let bottom = legend::draw_signs(&mut sheet, (MARGIN, panels.bottom + 8.0), signs(scene, metric));
     (sheet, bottom + MARGIN)
@@ -66,10 +65,8 @@ fn signs(scene: Scene<'_>, metric: MetricId<'_>) -> Vec<(Swatch, String)> {
     for experiment in &matrix.experiments {
         let levels: Vec<_> = matrix.references(experiment, metric).into_iter().map(|(text, _)| text).collect();
         if !levels.is_empty() {
-            signs.push((
-                Swatch::Rule(reference_rule()),
-                format!("reference levels in {experiment}: {}", levels.join(", ")),
-            ));
+            let words = format!("reference levels in {experiment}: {}", levels.join(", "));
+            signs.push((Swatch::Rule(reference_rule()), words));
         }
     }
     let readings: Vec<_> = matrix.pairs().map(|(e, m)| matrix.reading(e, m, metric)).collect();
@@ -140,8 +137,7 @@ impl Panel<'_> {
             if let Some(mean) = reading.mean() {
                 marker::draw(sheet, (self.plot.at(mean, 0.0).0, middle), 3.2, member.style);
             }
-            let text = lettering::tick().aligned(Align::End);
-            sheet.text((self.right, middle), &counts(reading), text);
+            sheet.text((self.right, middle), &counts(reading), lettering::tick().aligned(Align::End));
         });
     }
 }

@@ -1,10 +1,10 @@
 //! `scatter`: one rate against another, one point per model and experiment, its size a relative duration.
 
 use crate::figures::kit::{
-    Arrangement, Frame, MARGIN, Mark, Member, PALETTE, Panels, Plot, Sheet, Stroke, Swatch, dodge, legend, marker,
-    panels, rate_ticks,
+    Arrangement, Frame, MARGIN, Mark, PALETTE, Panels, Plot, Sheet, Stroke, Swatch, dodge, legend, marker, panels,
+    rate_ticks,
 };
-use crate::figures::matrix::{MetricId, Reading};
+use crate::figures::matrix::MetricId;
 use crate::figures::missing::{self, Strip};
 use crate::figures::{Drawn, Scene};
 
@@ -14,7 +14,6 @@ const LEAST_PANEL: f64 = 120.0;
 const LARGEST: f64 = 5.6;
 /// The smallest radius of a visible shape, px.
 const SMALLEST: f64 = 2.0;
-/// Room for the numbers and the title of the axis on the left, px.
 const AXIS_ROOM: f64 = 34.0;
 const AXIS_BELOW: f64 = 28.0;
 
@@ -25,7 +24,7 @@ pub fn draw(scene: Scene<'_>) -> Drawn {
     let left = MARGIN + AXIS_ROOM;
     let (columns, width) = panels::most(MOST_COLUMNS, all - left - MARGIN, [LEAST_PANEL, gap]);
     let strips: Vec<_> = matrix.experiments.iter().map(|e| Strip::new(matrix, roster, e, &ids[..2], width)).collect();
-    let below = AXIS_BELOW + strips.iter().map(Strip::height).fold(0.0, f64::max);
+    let below = AXIS_BELOW + strips.iter().map(|strip| strip.height).fold(0.0, f64::max);
     let arranged = Arrangement { left, columns, height: width + below, gap };
     let panels = Panels::new(&matrix.experiments, &matrix.titles(&matrix.experiments), all, arranged);
     let mut sheet = panels.sheet(all);
@@ -54,30 +53,22 @@ fn diagonal() -> Stroke {
 
 fn points(sheet: &mut Sheet, scene: Scene<'_>, experiment: &str, ids: [MetricId<'_>; 3], plot: &Plot) {
     let slowest = scene.matrix.span(experiment, ids[2]).map(|(_, slowest)| slowest);
-    let readings = |member: &Member<'_>| ids.map(|id| scene.matrix.reading(experiment, member.model, id));
     let seen = scene.roster.0.iter().filter_map(|member| {
-        let [x, y, duration] = readings(member);
-        Some((*member, x.mean()?, y.mean()?, radius(duration.mean(), slowest)))
+        let readings @ [x, y, duration] = ids.map(|id| scene.matrix.reading(experiment, member.model, id));
+        Some((*member, readings, (x.mean()?, y.mean()?), radius(duration.mean(), slowest)))
     });
     let mut seen: Vec<_> = seen.collect();
     // The large first, so that they do not hide the small.
     seen.sort_by(|a, b| b.3.total_cmp(&a.3));
-    let places: Vec<_> = seen.iter().map(|&(_, x, y, _)| plot.at(x, y)).collect();
-    let places = dodge::fanned(&places, 7.0);
-    for ((member, x, y, radius), place) in seen.into_iter().zip(places) {
-        let [of_x, reading, duration] = readings(&member);
-        let words = [reading, of_x, duration].map(Reading::words);
-        let names = [ids[1], ids[0], ids[2]].map(|id| id.name);
-        let parts: Vec<_> = names.iter().zip(&words).map(|(name, words)| format!("{name}: {words}")).collect();
+    let places: Vec<_> = seen.iter().map(|&(_, _, (x, y), _)| plot.at(x, y)).collect();
+    for ((member, readings, (x, y), radius), place) in seen.into_iter().zip(dodge::fanned(&places, 7.0)) {
+        let parts = [1, 0, 2].map(|at| format!("{}: {}", ids[at].name, readings[at].words()));
         let title = format!("{experiment} · {} · {}", member.model, parts.join(" · "));
-        let mark = Mark::new(title)
-            .with("experiment", experiment)
-            .with("model", member.model)
-            .with("metric", ids[1].name)
+        let mark = Mark::of_cell(title, experiment, member.model, ids[1].name)
             .value(Some(y))
-            .with("n", reading.n())
+            .with("n", readings[1].n())
             .number(ids[0].attribute(), Some(x))
-            .number(ids[2].attribute(), duration.mean());
+            .number(ids[2].attribute(), readings[2].mean());
         sheet.mark(&mark, |sheet| marker::draw(sheet, place, radius, member.style));
     }
 }
@@ -86,7 +77,7 @@ fn points(sheet: &mut Sheet, scene: Scene<'_>, experiment: &str, ids: [MetricId<
 fn radius(duration: Option<f64>, slowest: Option<f64>) -> f64 {
     match (duration, slowest) {
         (Some(duration), Some(slowest)) if slowest > 0.0 => {
-            (LARGEST * (duration / slowest).max(0.0).sqrt()).max(SMALLEST)
+            SMALLEST.max(LARGEST * (duration / slowest).max(0.0).sqrt())
         }
         _ => SMALLEST,
     }

@@ -2,6 +2,8 @@
 //!
 //! Reports do not draw it, so it is not in [`crate::figures::FigureName::ALL`].
 
+use indexmap::IndexSet;
+
 use crate::cells::Cells;
 use crate::figures::kit::{
     Arrangement, FULL_WIDTH, Frame, MARGIN, Member, Panels, Plot, Point, Roster, Sheet, Swatch, Tick, dodge, legend,
@@ -16,7 +18,6 @@ const CAPTION: &str = "Each metric under rising thresholds of mirror evidence, o
                        definitions as they are. Models with the same value stand side by side. Where a metric is undefined \
                        there is no marker, and the line has a gap.";
 
-/// The most panels side by side.
 const MOST_COLUMNS: usize = 5;
 const PLOT_HEIGHT: f64 = 92.0;
 const AXIS_ROOM: f64 = 24.0;
@@ -31,16 +32,13 @@ const OVERHANG: f64 = 4.0;
 /// The gap between two numbers below a plot, px.
 const NUMBER_GAP: f64 = 3.0;
 
-/// The results under one threshold.
 #[derive(Clone, Copy, Debug)]
 pub struct Stage<'a> {
     /// The threshold, px; `None` for the unchanged definitions.
     pub px: Option<u32>,
-    /// The cells by experiment and model.
     pub cells: &'a Cells,
 }
 
-/// The inputs of the figure.
 #[derive(Clone, Copy, Debug)]
 pub struct Input<'a> {
     /// The unchanged definitions, then the thresholds, ascending.
@@ -73,13 +71,10 @@ impl<'a> Field<'a> {
             Err(other) => Err(other),
         };
         let matrices: Vec<Option<Matrix<'a>>> = input.stages.iter().map(matrix).collect::<Result<_, _>>()?;
-        let (mut experiments, mut models) = (Vec::new(), Vec::new());
-        for matrix in matrices.iter().flatten() {
-            experiments.extend(
-                matrix.experiments.iter().filter(|name| !experiments.contains(*name)).copied().collect::<Vec<_>>(),
-            );
-            models.extend(matrix.models.iter().copied());
-        }
+        let experiments: IndexSet<&str> =
+            matrices.iter().flatten().flat_map(|matrix| matrix.experiments.iter().copied()).collect();
+        let mut experiments: Vec<&str> = experiments.into_iter().collect();
+        let models: Vec<&str> = matrices.iter().flatten().flat_map(|matrix| matrix.models.iter().copied()).collect();
         let catalog = &input.stages.first().ok_or(FigureError::NoEpisodes)?.cells.catalog;
         experiments.sort_by_key(|name| catalog.experiment_rank(name));
         if experiments.is_empty() {
@@ -91,8 +86,8 @@ impl<'a> Field<'a> {
 
     fn draw(&self) -> Drawn {
         let panels: Vec<Panel<'_, 'a>> = self.input.metrics.iter().flat_map(|metric| self.row(metric)).collect();
-        let names: Vec<String> =
-            panels.iter().map(|panel| format!("{} · {}", panel.experiment, panel.metric)).collect();
+        let names = panels.iter().map(|panel| format!("{} · {}", panel.experiment, panel.metric));
+        let names: Vec<String> = names.collect();
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
         let gap = if self.shares_axes() { GAP } else { GAP + AXIS_ROOM };
         let arranged =

@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 
 use crate::figures::kit::{
-    Align, Arrangement, Frame, MARGIN, Mark, Member, PALETTE, Panels, Point, Sheet, Stroke, Swatch, legend, lettering,
-    many, marker, panels, polar,
+    Align, Arrangement, MARGIN, Mark, Member, PALETTE, Panels, Point, Sheet, Stroke, Swatch, legend, lettering, many,
+    marker, panels, polar,
 };
 use crate::figures::matrix::MetricId;
 use crate::figures::missing::{self, Strip};
@@ -19,27 +19,21 @@ const RADIUS: f64 = 70.0;
 const LABEL_ROOM: f64 = 18.0;
 
 pub fn draw(scene: Scene<'_>) -> Drawn {
-    // Clockwise from the top.
     let Scene { matrix, roster, metrics: axes, width: all } = scene;
     let (columns, width) = panels::most(MOST_COLUMNS, all - 2.0 * MARGIN, [LEAST_PANEL, GAP]);
     let strips: Vec<_> = matrix.experiments.iter().map(|e| Strip::new(matrix, roster, e, axes, width)).collect();
-    let below = strips.iter().map(Strip::height).fold(0.0, f64::max);
+    let below = strips.iter().map(|strip| strip.height).fold(0.0, f64::max);
     let height = 2.0 * (RADIUS + LABEL_ROOM) + below;
     let arranged = Arrangement { left: MARGIN, columns, height, gap: GAP };
     let panels = Panels::new(&matrix.experiments, &matrix.titles(&matrix.experiments), all, arranged);
     let mut sheet = panels.sheet(all);
     for ((experiment, body), strip) in matrix.experiments.iter().zip(&panels.bodies).zip(&strips) {
-        let radar = Radar { scene, experiment, axes, center: center(*body) };
-        radar.draw(&mut sheet);
+        Radar { scene, experiment, center: (body.center().0, body.top + RADIUS + LABEL_ROOM) }.draw(&mut sheet);
         strip.draw(&mut sheet, (body.left, body.bottom() - below));
     }
     let signs = signs(scene).into_iter().chain(missing::strip_signs(&strips)).collect();
     let height = legend::around(&mut sheet, roster, &panels, Swatch::Line, signs);
     (sheet, height)
-}
-
-fn center(body: Frame) -> Point {
-    (body.center().0, body.top + RADIUS + LABEL_ROOM)
 }
 
 fn signs(scene: Scene<'_>) -> Vec<(Swatch, String)> {
@@ -58,7 +52,6 @@ fn signs(scene: Scene<'_>) -> Vec<(Swatch, String)> {
 struct Radar<'a> {
     scene: Scene<'a>,
     experiment: &'a str,
-    axes: &'a [MetricId<'a>],
     center: Point,
 }
 
@@ -72,8 +65,8 @@ impl Radar<'_> {
         for member in &self.scene.roster.0 {
             self.markers(sheet, *member);
         }
-        if let Some(chance) = self.scene.matrix.chance(self.experiment, self.axes[0]) {
-            let mark = Mark::new(format!("{}: chance level of {}", self.experiment, self.axes[0].name))
+        if let Some(chance) = self.scene.matrix.chance(self.experiment, self.scene.metrics[0]) {
+            let mark = Mark::new(format!("{}: chance level of {}", self.experiment, self.scene.metrics[0].name))
                 .with("experiment", self.experiment)
                 .number("chance", Some(chance));
             sheet.mark(&mark, |sheet| legend::chance(sheet, self.place(0, chance)));
@@ -86,23 +79,23 @@ impl Radar<'_> {
     }
 
     fn angle(&self, axis: usize) -> f64 {
-        TAU * many(axis) / many(self.axes.len())
+        TAU * many(axis) / many(self.scene.metrics.len())
     }
 
     fn web(&self, sheet: &mut Sheet) {
         let surface = &PALETTE.surface;
         for (share, color) in [(0.25, surface.rule), (0.5, surface.rule), (0.75, surface.rule), (1.0, surface.axis)] {
-            let mut ring: Vec<Point> = (0..self.axes.len()).map(|axis| self.place(axis, share)).collect();
+            let mut ring: Vec<Point> = (0..self.scene.metrics.len()).map(|axis| self.place(axis, share)).collect();
             ring.push(ring[0]);
             sheet.line(&ring, Stroke::solid(color, 0.7));
         }
-        for axis in 0..self.axes.len() {
+        for axis in 0..self.scene.metrics.len() {
             sheet.line(&[self.center, self.place(axis, 1.0)], Stroke::solid(surface.rule, 0.7));
         }
     }
 
     fn labels(&self, sheet: &mut Sheet) {
-        for (axis, metric) in self.axes.iter().enumerate() {
+        for (axis, metric) in self.scene.metrics.iter().enumerate() {
             let (x, y) = polar(RADIUS + 9.0, self.angle(axis));
             let align = match x {
                 x if x < -1.0 => Align::End,
@@ -115,7 +108,11 @@ impl Radar<'_> {
     }
 
     fn shares(&self, member: Member<'_>) -> Vec<Option<f64>> {
-        self.axes.iter().map(|&metric| self.scene.matrix.goodness(self.experiment, member.model, metric)).collect()
+        self.scene
+            .metrics
+            .iter()
+            .map(|&metric| self.scene.matrix.goodness(self.experiment, member.model, metric))
+            .collect()
     }
 
     fn line(&self, sheet: &mut Sheet, member: Member<'_>) {
@@ -135,7 +132,7 @@ impl Radar<'_> {
     }
 
     fn markers(&self, sheet: &mut Sheet, member: Member<'_>) {
-        for (axis, (metric, share)) in self.axes.iter().zip(self.shares(member)).enumerate() {
+        for (axis, (metric, share)) in self.scene.metrics.iter().zip(self.shares(member)).enumerate() {
             let Some(share) = share else { continue };
             let reading = self.scene.matrix.reading(self.experiment, member.model, *metric);
             let mark = reading.mark(self.experiment, member.model, metric.name);

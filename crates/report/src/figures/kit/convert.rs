@@ -14,7 +14,6 @@ use super::font;
 
 /// PNG pixels per px of the figure: about 300 dpi for a figure that is 7 inches wide.
 const PNG_SCALE: f32 = 3.0;
-
 const POINTS_PER_PX: f32 = 0.75;
 
 /// Only the embedded font: installed fonts are never used.
@@ -27,7 +26,6 @@ static FONTS: LazyLock<Arc<Database>> = LazyLock::new(|| {
     Arc::new(fonts)
 });
 
-/// An error of converting a figure.
 #[derive(Debug, thiserror::Error)]
 pub enum ConvertError {
     #[error("the figure's SVG cannot be read back; please report this with the model names of the data")]
@@ -40,13 +38,11 @@ pub enum ConvertError {
     Pdf(String),
 }
 
-/// Parses the SVG for both converters.
 pub fn tree(svg: &str) -> Result<Tree, ConvertError> {
     let options = Options { fontdb: FONTS.clone(), font_family: font::FAMILY.to_owned(), ..Options::default() };
     Ok(Tree::from_str(svg, &options)?)
 }
 
-/// The picture as PNG bytes, at three pixels per px.
 pub fn png(tree: &Tree) -> Result<Vec<u8>, ConvertError> {
     let (width, height) = (tree.size().width() * PNG_SCALE, tree.size().height() * PNG_SCALE);
     let mut pixels = Pixmap::new(whole(width), whole(height)).ok_or(ConvertError::Size { width, height })?;

@@ -3,19 +3,15 @@
 /// A point: right, down.
 pub type Point = (f64, f64);
 
-/// An axis-aligned rectangle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Frame {
     pub left: f64,
     pub top: f64,
-    /// From left to right.
     pub width: f64,
-    /// From top to bottom.
     pub height: f64,
 }
 
 impl Frame {
-    /// A rectangle from its top left corner and its size.
     pub const fn new(left: f64, top: f64, width: f64, height: f64) -> Self {
         Self { left, top, width, height }
     }
@@ -32,13 +28,11 @@ impl Frame {
         (self.left + self.width / 2.0, self.top + self.height / 2.0)
     }
 
-    /// The rectangle shrunk by `by` on all four sides.
     pub(crate) fn inset(self, by: f64) -> Self {
         Self::new(self.left + by, self.top + by, self.width - 2.0 * by, self.height - 2.0 * by)
     }
 }
 
-/// A count as a factor of layout.
 pub(crate) fn many(things: usize) -> f64 {
     // Counts of drawn things are far below billions.
     f64::from(u32::try_from(things).unwrap_or(u32::MAX))

@@ -13,19 +13,14 @@ const SWATCH_WIDTH: f64 = 24.0;
 const SWATCH_GAP: f64 = 5.0;
 const COLUMN_GAP: f64 = 16.0;
 
-/// A sign, as drawn beside its meaning.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Swatch {
-    /// A model's line with its marker.
     Line(&'static ModelStyle),
     Marker(&'static ModelStyle),
     Tile(Fill),
-    /// A cell with episodes but no value.
     Undefined,
     Empty,
-    /// The mark of chance on an axis.
     Chance,
-    /// A line across a plot.
     Rule(Stroke),
     Tick(Stroke),
     /// A ring with this radius, px.
@@ -35,12 +30,11 @@ pub(crate) enum Swatch {
     None,
 }
 
-/// Signs and their meanings, placed.
 #[derive(Clone, Debug)]
 pub(crate) struct Legend {
     entries: Vec<(Swatch, String, Point)>,
     lettering: Lettering,
-    height: f64,
+    pub height: f64,
 }
 
 impl Legend {
@@ -83,12 +77,6 @@ impl Legend {
         Self { entries, lettering, height }
     }
 
-    /// The height of all lines, px.
-    pub(crate) fn height(&self) -> f64 {
-        self.height
-    }
-
-    /// Draws it with its top left corner at `corner`.
     pub(crate) fn draw(&self, sheet: &mut Sheet, corner: Point) {
         let leading = line_height(self.lettering);
         for (swatch, text, (x, y)) in &self.entries {
@@ -148,7 +136,7 @@ fn column_widths(labels: &[String], columns: usize, lettering: Lettering) -> (Ve
 }
 
 fn draw_swatch(sheet: &mut Sheet, swatch: Swatch, frame: Frame) {
-    let center = frame.center();
+    let (center, surface) = (frame.center(), &PALETTE.surface);
     let across = [(frame.left, center.1), (frame.right(), center.1)];
     match swatch {
         Swatch::Line(style) => {
@@ -162,14 +150,10 @@ fn draw_swatch(sheet: &mut Sheet, swatch: Swatch, frame: Frame) {
         Swatch::Chance => chance(sheet, center),
         Swatch::Rule(stroke) => sheet.line(&across, stroke),
         Swatch::Tick(stroke) => sheet.line(&[(center.0, frame.top), (center.0, frame.bottom())], stroke),
-        Swatch::Ring(radius) => sheet.circle(center, radius, ring()),
+        Swatch::Ring(radius) => sheet.circle(center, radius, Fill::outlined(surface.paper, surface.axis, 1.0)),
         Swatch::Dot(fill) => sheet.circle(center, 3.0, fill),
         Swatch::None => {}
     }
-}
-
-fn ring() -> Fill {
-    Fill::outlined(PALETTE.surface.paper, PALETTE.surface.axis, 1.0)
 }
 
 /// The red mark of chance: a diamond, whose colour and dark outline differ from any model's.

@@ -1,14 +1,8 @@
 //! The drawing kit: building blocks of figures, without knowledge of their content.
-//!
-//! Bottom-up: `frame`, `look`, `font`, `palette` and `lettering` (positions, styles, embedded assets), `ink` (SVG under
-//! plotters), `mark` and `sheet` (drawing functions), `marker`, `label`, `tiles`, `dodge` (parts), `roster`, `legend`,
-//! `panels` and `plot` (arrangements), `picture`, `format` and `convert` (a drawing as bytes of SVG, PNG, PDF; the last
-//! two with the feature `raster`).
 
 #[cfg(feature = "raster")]
 pub mod convert;
 
-pub(super) mod format;
 pub(super) mod legend;
 pub(super) mod panels;
 pub(super) mod tiles;

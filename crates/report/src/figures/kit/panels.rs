@@ -5,28 +5,22 @@ use super::label;
 use super::lettering::{self, MARGIN, leading};
 use super::sheet::Sheet;
 
-/// Panels in rows under headings of equal height.
 #[derive(Clone, Debug)]
 pub(crate) struct Panels {
     /// The frame below each heading.
     pub bodies: Vec<Frame>,
     headings: Vec<(Point, String, Vec<String>)>,
-    /// The bottom of the last row.
     pub bottom: f64,
     /// The place after the last panel if the last row is not full, including its heading.
     pub rest: Option<Frame>,
 }
 
-/// The arrangement of panels.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Arrangement {
-    /// The left edge of the first column, px.
     pub left: f64,
-    /// The number of panels side by side.
     pub columns: usize,
     /// The height of a panel without its heading, px.
     pub height: f64,
-    /// The gap between panels side by side, px.
     pub gap: f64,
 }
 
@@ -39,7 +33,7 @@ impl Panels {
         let title = |at: usize| title_lines(titles.get(at).unwrap_or(&""), panel);
         let lines: Vec<Vec<String>> = (0..names.len()).map(title).collect();
         let most = lines.iter().map(Vec::len).max().unwrap_or(0);
-        let head = leading(lettering::heading()) + leading(lettering::subheading()) * many(most) + 6.0;
+        let head = leading(lettering::heading()) + leading(lettering::tick()) * many(most) + 6.0;
         let row_height = head + height + 14.0;
         let corner = |at: usize| (left + (panel + gap) * many(at % columns), MARGIN + row_height * many(at / columns));
         let place = |at: usize| {
@@ -59,16 +53,15 @@ impl Panels {
         Self { bodies, headings, bottom: MARGIN + row_height * many(rows) - 14.0, rest }
     }
 
-    /// A sheet of `width` px with the headings on it.
     pub(crate) fn sheet(&self, width: f64) -> Sheet {
         let mut sheet = Sheet::new(width);
         for ((x, y), name, lines) in &self.headings {
             let mut middle = y + leading(lettering::heading()) / 2.0;
             sheet.text((*x, middle), name, lettering::heading());
-            middle += leading(lettering::heading()) / 2.0 + leading(lettering::subheading()) / 2.0;
+            middle += leading(lettering::heading()) / 2.0 + leading(lettering::tick()) / 2.0;
             for line in lines {
-                sheet.text((*x, middle), line, lettering::subheading());
-                middle += leading(lettering::subheading());
+                sheet.text((*x, middle), line, lettering::tick());
+                middle += leading(lettering::tick());
             }
         }
         sheet
@@ -93,12 +86,11 @@ pub(crate) fn balanced(count: usize, most: usize) -> usize {
     count.div_ceil(rows).max(1)
 }
 
-/// A title in at most two lines of `room` px.
 fn title_lines(title: &str, room: f64) -> Vec<String> {
     if title.is_empty() {
         return Vec::new();
     }
-    let lettering = lettering::subheading();
+    let lettering = lettering::tick();
     let mut lines = label::wrapped(title, room, lettering);
     if lines.len() > 2 {
         let rest = lines.split_off(1).join(" ");

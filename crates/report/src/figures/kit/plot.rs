@@ -12,7 +12,7 @@ use super::ink::UNITS_PER_PX;
 use super::lettering::{self, Align};
 use super::look::Stroke;
 use super::palette::PALETTE;
-use super::sheet::Sheet;
+use super::sheet::{Sheet, lattice};
 use exact::number::Decimal;
 
 /// Two linear axes over a frame; y points up.
@@ -21,7 +21,6 @@ pub(crate) struct Plot {
     spec: Cartesian2d<RangedCoordf64, RangedCoordf64>,
 }
 
-/// A position on an axis.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Tick {
     pub at: f64,
@@ -30,20 +29,17 @@ pub(crate) struct Tick {
 }
 
 impl Plot {
-    /// Axes over `frame`.
     pub(crate) fn new(frame: Frame, x: Range<f64>, y: Range<f64>) -> Self {
-        let across = units(frame.left)..units(frame.right());
-        let upwards = units(frame.bottom())..units(frame.top);
-        Self { frame, spec: Cartesian2d::new(x, y, (across, upwards)) }
+        let (left, top) = lattice((frame.left, frame.top));
+        let (right, bottom) = lattice((frame.right(), frame.bottom()));
+        Self { frame, spec: Cartesian2d::new(x, y, (left..right, bottom..top)) }
     }
 
-    /// The position of a pair of values.
     pub(crate) fn at(&self, x: f64, y: f64) -> Point {
         let (x, y) = self.spec.translate(&(x, y));
         (f64::from(x) / UNITS_PER_PX, f64::from(y) / UNITS_PER_PX)
     }
 
-    /// Draws vertical grid lines, with numbers below the plot.
     pub(crate) fn x_axis(&self, sheet: &mut Sheet, ticks: &[Tick]) {
         let lettering = lettering::tick().aligned(Align::Middle);
         for tick in ticks {
@@ -55,7 +51,6 @@ impl Plot {
         }
     }
 
-    /// Draws horizontal grid lines, with numbers to the left of the plot.
     pub(crate) fn y_axis(&self, sheet: &mut Sheet, ticks: &[Tick]) {
         let lettering = lettering::tick().aligned(Align::End);
         for tick in ticks {
@@ -67,7 +62,6 @@ impl Plot {
         }
     }
 
-    /// Draws the title of the x axis.
     pub(crate) fn x_title(&self, sheet: &mut Sheet, text: &str) {
         let at = (self.frame.center().0, self.frame.bottom() + 20.0);
         sheet.text(at, text, lettering::label().aligned(Align::Middle));
@@ -95,11 +89,6 @@ pub(crate) fn whole_ticks(last: u32, most: usize) -> Vec<Tick> {
 
 fn grid() -> Stroke {
     Stroke::solid(PALETTE.surface.rule, 0.7)
-}
-
-#[expect(clippy::cast_possible_truncation, reason = "`as` clamps, and sheets are small")]
-fn units(px: f64) -> i32 {
-    (px * UNITS_PER_PX).round() as i32
 }
 
 #[cfg(test)]

@@ -5,15 +5,12 @@ use std::collections::BTreeMap;
 
 use super::palette::{ModelStyle, PALETTE};
 
-/// A model and its style.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Member<'a> {
     pub model: &'a str,
-    /// Its colour, marker and dash.
     pub style: &'static ModelStyle,
 }
 
-/// The models of a report.
 #[derive(Clone, Debug)]
 pub(crate) struct Roster<'a>(pub Vec<Member<'a>>);
 
@@ -35,7 +32,6 @@ impl<'a> Roster<'a> {
         Self(models.into_iter().map(|model| Member { model, style: &PALETTE.style[styles[model]] }).collect())
     }
 
-    /// The models' names in order.
     pub(crate) fn names(&self) -> Vec<&'a str> {
         self.0.iter().map(|member| member.model).collect()
     }
@@ -45,7 +41,6 @@ fn place(names: &[String], name: &str) -> usize {
     names.iter().position(|known| known == name).unwrap_or(names.len())
 }
 
-/// The style of each model; `models` ascend by name.
 fn styles<'a>(models: &[&'a str]) -> BTreeMap<&'a str, usize> {
     let pinned = PALETTE.pinned.len();
     let is_free = |style: &usize| !models.contains(&PALETTE.pinned[*style].as_str());

@@ -15,7 +15,7 @@ use plotters_backend::BackendCoord;
 
 use super::font::{self, Weight};
 use super::frame::{Frame, Point};
-use super::ink::{Ink, UNITS_PER_PX, escaped};
+use super::ink::{Ink, UNITS_PER_PX};
 use super::label;
 use super::lettering::{self, Align, Lettering, MARGIN};
 use super::look::{Fill, Rgb, Stroke};
@@ -30,7 +30,6 @@ pub struct Sheet {
 }
 
 impl Sheet {
-    /// An empty sheet, `width` px wide.
     pub fn new(width: f64) -> Self {
         Self { ink: Rc::default(), width }
     }
@@ -39,7 +38,6 @@ impl Sheet {
         self.width
     }
 
-    /// Draws a line through these points.
     pub fn line(&mut self, points: &[Point], stroke: Stroke) {
         let points: Vec<_> = points.iter().map(|&at| lattice(at)).collect();
         let style =
@@ -78,7 +76,6 @@ impl Sheet {
         self.put(&Text::new(font::drawable(text), lattice(at), style), String::new());
     }
 
-    /// Draws a picture that fills a frame; it is embedded in the file.
     pub(crate) fn picture(&mut self, frame: Frame, png: &[u8]) {
         let [left, top, width, height] =
             [frame.left, frame.top, frame.width, frame.height].map(|length| fixed(Some(length), 2));
@@ -90,7 +87,6 @@ impl Sheet {
         );
     }
 
-    /// Groups everything that `draw` draws, with the mark's title and values.
     pub fn mark(&mut self, mark: &Mark, draw: impl FnOnce(&mut Self)) {
         self.ink.borrow_mut().body.push_str(&mark.opening());
         draw(self);
@@ -111,17 +107,9 @@ impl Sheet {
         (sheet, height + top)
     }
 
-    /// The SVG, cut at `height`; `title` and `description` are for screen readers.
-    pub fn finish(self, height: f64, title: &str, description: &str) -> Drawing {
-        let body = std::mem::take(&mut self.ink.borrow_mut().body);
-        Drawing {
-            width: self.width.ceil(),
-            height: height.ceil(),
-            printed: None,
-            title: title.into(),
-            description: description.into(),
-            body,
-        }
+    /// The elements that were drawn, as SVG.
+    pub(crate) fn into_body(self) -> String {
+        self.ink.take().body
     }
 
     fn put<E>(&mut self, element: &E, extra: String)
@@ -135,57 +123,8 @@ impl Sheet {
     }
 }
 
-/// A finished drawing that is not yet a document.
-#[derive(Clone, Debug)]
-pub struct Drawing {
-    width: f64,
-    height: f64,
-    printed: Option<f64>,
-    title: String,
-    description: String,
-    body: String,
-}
-
-impl Drawing {
-    /// The same drawing, scaled to `width` px.
-    pub fn printed(self, width: f64) -> Self {
-        Self { printed: Some(width), ..self }
-    }
-
-    /// The SVG for embedding in another document, which must include the font.
-    pub fn inline(&self) -> String {
-        self.element("")
-    }
-
-    /// The SVG as a standalone document, with a title and the style sheet `style`.
-    pub fn document(&self, style: &str) -> String {
-        self.element(&format!("<title>{}</title>\n<style>{style}</style>\n", escaped(&self.title)))
-    }
-
-    fn element(&self, head: &str) -> String {
-        let Self { width, height, .. } = self;
-        let size = match self.printed {
-            Some(px) => [px, height * px / width].map(|length| fixed(Some(length), 2)),
-            None => [width, height].map(f64::to_string),
-        };
-        let [shown_width, shown_height] = size;
-        let (title, description) = (escaped(&self.title), escaped(&self.description));
-        let mut svg = format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{shown_width}\" height=\"{shown_height}\" \
-             viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{title}\" \
-             font-family=\"'{}', sans-serif\" stroke-linejoin=\"round\">\n\
-             {head}<desc>{description}</desc>\n",
-            font::FAMILY
-        );
-        let _ = writeln!(svg, "<rect width=\"{width}\" height=\"{height}\" fill=\"#ffffff\"/>");
-        svg.push_str(&self.body);
-        svg.push_str("</svg>\n");
-        svg
-    }
-}
-
 #[expect(clippy::cast_possible_truncation, reason = "`as` clamps, and sheets are small")]
-fn lattice((x, y): Point) -> BackendCoord {
+pub(super) fn lattice((x, y): Point) -> BackendCoord {
     let place = |px: f64| (px * UNITS_PER_PX).round() as i32;
     (place(x), place(y))
 }
@@ -230,6 +169,7 @@ fn outline_attributes(fill: Fill) -> String {
 mod tests {
     use super::{Align, Fill, Frame, Lettering, Rgb, Sheet, Stroke};
     use crate::figures::kit::mark::Mark;
+    use crate::figures::kit::picture::Figure;
 
     #[test]
     fn a_small_drawing_is_this_text() {
@@ -246,6 +186,6 @@ mod tests {
             sheet.rectangle(Frame::new(0.0, 0.0, 4.0, 3.0), Fill::plain(red));
         });
         sheet.text((20.0, 10.0), "T & A", Lettering::new(10.0, black).semibold().aligned(Align::Middle));
-        insta::assert_snapshot!(sheet.finish(20.0, "Title", "What it is.").inline());
+        insta::assert_snapshot!(Figure::new(sheet, 20.0, "Title", "What it is.").inline_svg());
     }
 }

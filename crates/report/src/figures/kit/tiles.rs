@@ -16,7 +16,6 @@ pub(crate) fn known(sheet: &mut Sheet, frame: Frame, color: Rgb, texts: &[String
     }
 }
 
-/// Episodes without a value: hatched, `--`.
 pub(crate) fn undefined(sheet: &mut Sheet, frame: Frame) {
     const BETWEEN: f64 = 4.0;
     let surface = &PALETTE.surface;
@@ -35,7 +34,6 @@ pub(crate) fn undefined(sheet: &mut Sheet, frame: Frame) {
     sheet.text((x, y), "--", text);
 }
 
-/// No episodes: crossed.
 pub(crate) fn empty(sheet: &mut Sheet, frame: Frame) {
     let stroke = Stroke::solid(PALETTE.surface.hatch, 0.8);
     sheet.rectangle(frame, framed());
@@ -62,7 +60,6 @@ pub(crate) fn scale(sheet: &mut Sheet, corner: Point, colors: impl Fn(f64) -> Rg
     bar.right() + 6.0 + lettering.width(ends[1])
 }
 
-/// Names beside rows: their labels and width, px.
 pub(crate) fn row_labels(names: &[&str], room: f64) -> (Vec<String>, f64) {
     let lettering = lettering::label();
     let labels = label::fitted(names, room, lettering);

@@ -12,16 +12,12 @@ use super::wrap::push_wrapped;
 use crate::tables::{Align, Look, Table};
 use exact::escape::visible;
 
-/// Spaces around a column's text.
 const PADDING: usize = 2;
-
 /// The width of a column besides its text: spaces, and the separator.
 const AROUND: usize = PADDING + 1;
-
 /// The least width of name columns before other columns move into a table below.
 const LEAST_NAME: usize = 16;
 
-/// A column of a table that is too wide: the natural and the least width of its text.
 #[derive(Clone, Copy)]
 struct Measured {
     at: usize,
@@ -29,30 +25,31 @@ struct Measured {
     least: usize,
 }
 
-/// Title, lines, sentences.
 pub fn render(table: &Table, width: Option<usize>) -> String {
     let mut text = String::new();
     if !table.title.is_empty() {
         push_wrapped(&mut text, &visible(&table.title), width, 0);
     }
-    text += &lines(table, width);
+    text += &table.lines(width);
     for sentence in &table.sentences {
         push_wrapped(&mut text, &visible(sentence), width, 0);
     }
     text
 }
 
-/// The lines; `None` sets no limit.
-pub fn lines(table: &Table, width: Option<usize>) -> String {
-    fitted(&laid_out(table), table.names, width) + "\n"
-}
+impl Table {
+    /// Only the lines, without title and sentences.
+    pub fn lines(&self, width: Option<usize>) -> String {
+        fitted(&laid_out(self), self.names, width) + "\n"
+    }
 
-/// The lines, with all columns side by side in `width` columns of the terminal.
-pub fn wrapped(table: &Table, width: usize) -> String {
-    let mut lines = laid_out(table);
-    let width = u16::try_from(width).unwrap_or(u16::MAX);
-    lines.set_content_arrangement(ContentArrangement::Dynamic).set_width(width);
-    lines.trim_fmt() + "\n"
+    /// For a terminal, with words wrapped so that all columns fit into `width`.
+    pub fn wrapped(&self, width: usize) -> String {
+        let mut lines = laid_out(self);
+        let width = u16::try_from(width).unwrap_or(u16::MAX);
+        lines.set_content_arrangement(ContentArrangement::Dynamic).set_width(width);
+        lines.trim_fmt() + "\n"
+    }
 }
 
 fn laid_out(table: &Table) -> Lines {
@@ -77,8 +74,6 @@ fn style(look: Look) -> TableStyle {
     }
 }
 
-/// The text of a table, in lines of at most `width` columns; `None` sets no limit. The first `names` columns name the
-/// rows.
 fn fitted(table: &Lines, names: usize, width: Option<usize>) -> String {
     let text = |table: &Lines| table.trim_fmt();
     let Some(width) = width.filter(|width| widest_line(table) > *width) else { return text(table) };

@@ -1,12 +1,11 @@
 //! Tables for a terminal or a pipe: sheets in our own layout, lists by `comfy_table`.
 
-pub(super) mod list;
+mod list;
 mod sheet;
 pub(super) mod wrap;
 
 use super::{Look, Table};
 
-/// The terminal for a text.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Terminal {
     /// Its number of columns; `None` for unlimited lines.
@@ -23,9 +22,17 @@ pub enum Marks {
     Ansi,
 }
 
-pub(super) fn render(table: &Table, terminal: Terminal) -> String {
-    match table.look {
-        Look::Sheet => sheet::render(table, terminal),
-        Look::Plain | Look::Ruled | Look::Framed => list::render(table, terminal.width),
+impl Table {
+    /// For a terminal or a pipe; lists have only a title.
+    pub fn terminal(&self, terminal: Terminal) -> String {
+        match self.look {
+            Look::Sheet => sheet::render(self, terminal),
+            Look::Plain | Look::Ruled | Look::Framed => list::render(self, terminal.width),
+        }
+    }
+
+    /// For a terminal of this width or a pipe, with emphasis by signs.
+    pub fn within(&self, width: Option<usize>) -> String {
+        self.terminal(Terminal { width, ..Terminal::default() })
     }
 }

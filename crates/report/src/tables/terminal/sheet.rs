@@ -13,11 +13,8 @@ use crate::tables::{Emphasis, RowGroup, Table, TableCell};
 use exact::escape::visible;
 
 const GAP: &str = "  ";
-
-/// The least room for sentences on a narrow terminal.
 const LEAST_ROOM: usize = 40;
 
-/// The whole table: title, rows, notes.
 pub fn render(table: &Table, terminal: Terminal) -> String {
     let grids = Grid::within(table, terminal);
     let room = terminal.width.unwrap_or_else(|| grids[0].width()).max(LEAST_ROOM);
@@ -49,7 +46,6 @@ enum Shape {
     TwoLines,
 }
 
-/// Text and its width on the screen, in columns.
 #[derive(Clone, Default)]
 struct Piece {
     text: String,
@@ -92,7 +88,6 @@ struct Grid {
 }
 
 impl Grid {
-    /// The table as one grid, or as several below each other if necessary.
     fn within(table: &Table, terminal: Terminal) -> Vec<Self> {
         let one_line = Self::new(table, terminal.emphasis, Shape::OneLine);
         let Some(width) = terminal.width.filter(|width| one_line.width() > *width) else { return vec![one_line] };
@@ -119,7 +114,6 @@ impl Grid {
         parts.into_iter().map(|part| self.only(&part)).collect()
     }
 
-    /// Breaks row names wider than `room` into lines.
     fn break_names(&mut self, room: usize) {
         for cell in self.groups.iter_mut().flatten().filter_map(|row| row.first_mut()) {
             let lines = cell.iter().flat_map(|piece| broken(&piece.text, room));
@@ -156,7 +150,6 @@ impl Grid {
         self.widths.iter().sum::<usize>() + GAP.len() * self.widths.len().saturating_sub(1)
     }
 
-    /// The header, a rule, the rows; headings in lines of at most `room` columns.
     fn lines(&self, table: &Table, room: Option<usize>) -> Vec<String> {
         let heading = |group: &RowGroup| {
             let heading = group.heading.as_deref().map(visible);

@@ -44,13 +44,10 @@ pub fn draw(scene: Scene<'_>, episodes: &EpisodeTable) -> Result<Drawn, FigureEr
             }
         }
     }
-    let height = legend::around(&mut sheet, roster, &panels, Swatch::Line, signs());
+    let tick = Swatch::Tick(Stroke::solid(PALETTE.surface.quiet, 1.2));
+    let signs = vec![(tick, "episodes that end undecided, censored".to_owned())];
+    let height = legend::around(&mut sheet, roster, &panels, Swatch::Line, signs);
     Ok((sheet, height))
-}
-
-fn signs() -> Vec<(Swatch, String)> {
-    let tick = Stroke::solid(PALETTE.surface.quiet, 1.2);
-    vec![(Swatch::Tick(tick), "episodes that end undecided, censored".to_owned())]
 }
 
 /// The endings of the episodes of each experiment and model, by step.
@@ -71,15 +68,12 @@ fn endings<'e>(
 }
 
 fn column<'a>(episodes: &'a EpisodeTable, name: &str) -> Result<&'a MetricColumn, FigureError> {
-    let known = || episodes.metrics.iter().map(|metric| metric.name.as_str()).collect::<Vec<_>>().join(", ");
-    episodes.metric(name).ok_or_else(|| FigureError::UnknownMetric {
-        figure: FigureName::DecisionCurve,
-        metric: name.to_owned(),
-        known: known(),
+    episodes.metric(name).ok_or_else(|| {
+        let known = episodes.metrics.iter().map(|metric| metric.name.as_str()).collect::<Vec<_>>().join(", ");
+        FigureError::UnknownMetric { figure: FigureName::DecisionCurve, metric: name.to_owned(), known }
     })
 }
 
-/// One model's curve in one experiment.
 struct Curve<'a> {
     experiment: &'a str,
     member: Member<'a>,
@@ -126,10 +120,8 @@ impl Curve<'_> {
         let median = self.survival.median();
         let median_words = median.map_or("none".to_owned(), |step| format!("t = {step}"));
         let model = self.member.model;
-        Mark::new(format!("{} · {model}: {decided} of {n} decided, median {median_words}", self.experiment))
-            .with("experiment", self.experiment)
-            .with("model", model)
-            .with("metric", "decided")
+        let title = format!("{} · {model}: {decided} of {n} decided, median {median_words}", self.experiment);
+        Mark::of_cell(title, self.experiment, model, "decided")
             .value(points.last().map(|point| 1.0 - point.undecided))
             .with("n", n)
             .with("decided", decided)

@@ -50,7 +50,6 @@ pub fn draw(scene: Scene<'_>) -> Result<Drawn, FigureError> {
     Ok((sheet, height))
 }
 
-/// A factor and the doses that have episodes, ascending.
 struct Shown<'a> {
     name: &'a str,
     factor: &'a Factor,
@@ -87,7 +86,6 @@ impl<'a> Shown<'a> {
     }
 }
 
-/// One model's rates under one factor.
 struct Line<'a> {
     scene: Scene<'a>,
     metric: MetricId<'a>,
@@ -102,8 +100,8 @@ impl Line<'_> {
         let points: Vec<(usize, Reading, Point)> =
             (0..self.factor.doses.len()).filter_map(|at| self.point(plot, at)).collect();
         let places: Vec<Point> = points.iter().map(|(.., place)| *place).collect();
-        let title = format!("{} · {}", self.factor.name, self.member.model);
         if places.len() > 1 {
+            let title = format!("{} · {}", self.factor.name, self.member.model);
             sheet.mark(&Mark::new(title), |sheet| sheet.line(&places, self.member.style.stroke(1.3)));
         }
         for (at, reading, place) in points {

@@ -27,7 +27,7 @@ pub fn draw(scene: Scene<'_>) -> Result<Drawn, FigureError> {
     let width = (room - GAP * many(columns - 1)) / many(columns);
     let strip = |e| Strip::new(matrix, roster, e, &[metric], width / 2.0 - 4.0);
     let strips: Vec<_> = others.iter().map(|other| [strip(first), strip(other)]).collect();
-    let strip_height = strips.iter().flatten().map(Strip::height).fold(0.0, f64::max);
+    let strip_height = strips.iter().flatten().map(|strip| strip.height).fold(0.0, f64::max);
     let height = PLOT_HEIGHT + label_room() + strip_height;
     let arranged = Arrangement { left, columns, height, gap: GAP };
     let panels = Panels::new(others, &matrix.titles(others), all, arranged);
@@ -42,7 +42,7 @@ pub fn draw(scene: Scene<'_>) -> Result<Drawn, FigureError> {
     }
     let legend = Legend::of_models(roster, all - 2.0 * MARGIN, Swatch::Line);
     legend.draw(&mut sheet, (MARGIN, panels.bottom + 10.0));
-    Ok((sheet, panels.bottom + 10.0 + legend.height() + MARGIN))
+    Ok((sheet, panels.bottom + 10.0 + legend.height + MARGIN))
 }
 
 fn label_room() -> f64 {

@@ -13,22 +13,16 @@ use exact::escape::visible;
 
 /// The family name, which is private, so that no installed font replaces it.
 pub(crate) const FAMILY: &str = "Mirrorstats Sans";
-
-/// The replacement for a character that the font lacks.
 const SUBSTITUTE: char = '\u{25a1}';
-
 const REGULAR: &[u8] = include_bytes!("../../../../../../assets/fonts/MirrorstatsSans-Regular.ttf");
 const SEMIBOLD: &[u8] = include_bytes!("../../../../../../assets/fonts/MirrorstatsSans-Semibold.ttf");
 const REGULAR_WEB: &[u8] = include_bytes!("../../../../../../assets/fonts/MirrorstatsSans-Regular.woff2");
 const SEMIBOLD_WEB: &[u8] = include_bytes!("../../../../../../assets/fonts/MirrorstatsSans-Semibold.woff2");
 
-/// The two available weights.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Weight {
-    /// Running text, 400.
     #[default]
     Regular,
-    /// Headings, 600.
     Semibold,
 }
 
@@ -49,7 +43,6 @@ fn face(weight: Weight) -> &'static Face<'static> {
     }
 }
 
-/// The font files, for a converter.
 #[cfg(feature = "raster")]
 pub(crate) const FILES: [&[u8]; 2] = [REGULAR, SEMIBOLD];
 
@@ -81,7 +74,6 @@ pub(crate) fn drawable(text: &str) -> String {
     spelled.split(' ').filter(|word| !word.is_empty()).collect::<Vec<_>>().join(" ")
 }
 
-/// The style sheet that embeds the font, for a browser.
 pub fn style_sheet() -> String {
     [(400, REGULAR_WEB), (600, SEMIBOLD_WEB)]
         .map(|(weight, data)| {

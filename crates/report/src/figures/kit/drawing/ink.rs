@@ -10,18 +10,15 @@ use plotters::prelude::{DrawingBackend, FontTransform};
 use plotters::style::text_anchor::HPos;
 use plotters_backend::{BackendColor, BackendCoord, BackendStyle, BackendTextStyle, DrawingErrorKind, FontStyle};
 
-use crate::figures::kit::font;
 use crate::figures::kit::look::Rgb;
 
 /// Integer units of plotters per px of the figure.
 pub(crate) const UNITS_PER_PX: f64 = 100.0;
-
 /// More room than any figure needs; plotters clamps everything outside.
 const ROOM: u32 = 10_000_000;
 
 type Drawn = Result<(), DrawingErrorKind<Infallible>>;
 
-/// The elements of an SVG, in drawing order.
 #[derive(Debug, Default)]
 pub(crate) struct Ink {
     pub body: String,
@@ -53,7 +50,6 @@ impl Ink {
     }
 }
 
-/// The `d` of a path through `points`.
 fn path(points: impl IntoIterator<Item = BackendCoord>) -> String {
     points.into_iter().enumerate().fold(String::new(), |mut path, (at, (x, y))| {
         let verb = if at == 0 { 'M' } else { 'L' };
@@ -76,17 +72,13 @@ fn paint(attribute: &str, color: BackendColor) -> String {
     text
 }
 
-fn fill(color: BackendColor) -> String {
-    paint("fill", color)
-}
-
 fn stroke<S: BackendStyle>(style: &S) -> String {
     let width = f64::from(style.stroke_width()) / UNITS_PER_PX;
     format!(" fill=\"none\"{} stroke-width=\"{width}\"", paint("stroke", style.color()))
 }
 
 fn either<S: BackendStyle>(style: &S, filled: bool) -> String {
-    if filled { fill(style.color()) } else { stroke(style) }
+    if filled { paint("fill", style.color()) } else { stroke(style) }
 }
 
 impl DrawingBackend for Ink {
@@ -106,12 +98,8 @@ impl DrawingBackend for Ink {
 
     fn draw_pixel(&mut self, (x, y): BackendCoord, color: BackendColor) -> Drawn {
         let element = format!("rect x=\"{}\" y=\"{}\" width=\"1\" height=\"1\"", px(x), px(y));
-        self.element(&element, &fill(color));
+        self.element(&element, &paint("fill", color));
         Ok(())
-    }
-
-    fn draw_line<S: BackendStyle>(&mut self, from: BackendCoord, to: BackendCoord, style: &S) -> Drawn {
-        self.draw_path([from, to], style)
     }
 
     fn draw_rect<S: BackendStyle>(&mut self, from: BackendCoord, to: BackendCoord, style: &S, filled: bool) -> Drawn {
@@ -136,7 +124,7 @@ impl DrawingBackend for Ink {
 
     fn fill_polygon<S: BackendStyle, I: IntoIterator<Item = BackendCoord>>(&mut self, corners: I, style: &S) -> Drawn {
         let element = format!("path d=\"{}Z\"", path(corners));
-        self.element(&element, &fill(style.color()));
+        self.element(&element, &paint("fill", style.color()));
         Ok(())
     }
 
@@ -157,7 +145,7 @@ impl DrawingBackend for Ink {
             FontTransform::None | FontTransform::Rotate90 | FontTransform::Rotate180 => String::new(),
         };
         let size = style.size() / UNITS_PER_PX;
-        let paint = fill(style.color());
+        let paint = paint("fill", style.color());
         let text = escaped(text);
         let _ = writeln!(
             self.body,
@@ -165,23 +153,6 @@ impl DrawingBackend for Ink {
         );
         Ok(())
     }
-
-    fn estimate_text_size<T: BackendTextStyle>(
-        &self,
-        text: &str,
-        style: &T,
-    ) -> Result<(u32, u32), DrawingErrorKind<Infallible>> {
-        let weight = match style.style() {
-            FontStyle::Bold => font::Weight::Semibold,
-            FontStyle::Normal | FontStyle::Oblique | FontStyle::Italic => font::Weight::Regular,
-        };
-        Ok((whole(font::width(text, style.size(), weight)), whole(style.size())))
-    }
-}
-
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "`as` clamps, and sizes are small")]
-fn whole(units: f64) -> u32 {
-    units.ceil() as u32
 }
 
 /// Text escaped for XML, in an element or between double quotes; characters that XML forbids become U+FFFD.

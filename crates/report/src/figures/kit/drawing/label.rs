@@ -6,7 +6,6 @@ use crate::figures::kit::font;
 use crate::figures::kit::lettering::Lettering;
 
 const ELLIPSIS: &str = "…";
-
 /// The most letters of a name that are used: half from its beginning, half from its end.
 const MOST_LETTERS: usize = 160;
 
@@ -24,7 +23,6 @@ pub(crate) fn fitted(names: &[&str], room: f64, lettering: Lettering) -> Vec<Str
     tails.iter().map(|&tail| shown(tail)).find(all_differ).unwrap_or_else(|| numbered(shown(middle), room, lettering))
 }
 
-/// One text in `room` px, cut at its end.
 pub(crate) fn cut(text: &str, room: f64, lettering: Lettering) -> String {
     let text = font::drawable(text);
     if lettering.width(&text) <= room {

@@ -34,11 +34,9 @@ impl From<Rgb> for RGBColor {
     }
 }
 
-/// The style of a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stroke {
     pub color: Rgb,
-    /// Its width, px.
     pub width: f64,
     /// Alternating lengths of ink and gap, px; empty for a solid line.
     pub dash: &'static [f64],
@@ -50,11 +48,9 @@ impl Stroke {
     }
 }
 
-/// The style of an area.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fill {
     pub color: Rgb,
-    /// Opacity; 1 is opaque.
     pub opacity: f64,
     /// The line around it, drawn half inside.
     pub outline: Option<Stroke>,
@@ -65,7 +61,6 @@ impl Fill {
         Self { color, opacity: 1.0, outline: None }
     }
 
-    /// The colour with a solid line around it.
     pub(crate) const fn outlined(color: Rgb, outline: Rgb, width: f64) -> Self {
         Self { color, opacity: 1.0, outline: Some(Stroke::solid(outline, width)) }
     }

@@ -10,7 +10,6 @@ use crate::figures::kit::ink::escaped;
 use exact::escape::visible;
 use exact::number;
 
-/// The title and values of one group of shapes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mark {
     title: String,
@@ -18,9 +17,13 @@ pub struct Mark {
 }
 
 impl Mark {
-    /// A mark with a title and no values yet.
     pub fn new(title: impl Into<String>) -> Self {
         Self { title: title.into(), data: Vec::new() }
+    }
+
+    /// A mark with the names of one cell as its first values.
+    pub fn of_cell(title: String, experiment: &str, model: &str, metric: &str) -> Self {
+        Self::new(title).with("experiment", experiment).with("model", model).with("metric", metric)
     }
 
     /// Adds a value as `data-NAME`; a name already in use gets a dash.
@@ -34,7 +37,6 @@ impl Mark {
         self
     }
 
-    /// Sets the main value in full precision; empty without one.
     pub fn value(self, value: Option<f64>) -> Self {
         self.number("value", value)
     }
@@ -44,7 +46,6 @@ impl Mark {
         self.with(name, value.map(number::full_precision).unwrap_or_default())
     }
 
-    /// The opening tag of the group.
     pub(crate) fn opening(&self) -> String {
         let mut tag = String::from("<g class=\"mark\"");
         for (name, value) in &self.data {

@@ -12,23 +12,9 @@ pub fn draw(sheet: &mut Sheet, center: Point, radius: f64, style: &ModelStyle) {
     let paper = PALETTE.surface.paper;
     let fill =
         if style.hollow { Fill::outlined(paper, style.color, 1.2) } else { Fill::outlined(style.color, paper, 0.6) };
-    match corners(style.marker, radius) {
-        Corners::Round => sheet.circle(center, radius, fill),
-        Corners::At(corners) => {
-            let moved: Vec<_> = corners.iter().map(|&(x, y)| (center.0 + x, center.1 + y)).collect();
-            sheet.polygon(&moved, fill);
-        }
-    }
-}
-
-enum Corners {
-    Round,
-    At(Vec<Point>),
-}
-
-fn corners(shape: Shape, r: f64) -> Corners {
-    Corners::At(match shape {
-        Shape::Circle => return Corners::Round,
+    let r = radius;
+    let corners = match style.marker {
+        Shape::Circle => return sheet.circle(center, radius, fill),
         Shape::Square => regular(4, r * 1.25, 0.25 * PI),
         Shape::Diamond => regular(4, r * 1.3, 0.0),
         Shape::Triangle => regular(3, r * 1.4, 0.0),
@@ -38,7 +24,9 @@ fn corners(shape: Shape, r: f64) -> Corners {
         Shape::Star => star(r * 1.5, r * 0.65),
         Shape::Cross => cross(r * 1.25, r * 0.45),
         Shape::Bar => vec![(-r * 1.3, -r * 0.62), (r * 1.3, -r * 0.62), (r * 1.3, r * 0.62), (-r * 1.3, r * 0.62)],
-    })
+    };
+    let moved: Vec<_> = corners.iter().map(|&(x, y)| (center.0 + x, center.1 + y)).collect();
+    sheet.polygon(&moved, fill);
 }
 
 /// A point on a circle; the angle is clockwise from the top.

@@ -7,50 +7,37 @@ use serde::Deserialize;
 use crate::figures::kit::frame::many;
 use crate::figures::kit::look::{Rgb, Stroke};
 
-/// The palette of all figures.
 pub(crate) static PALETTE: LazyLock<Palette> = LazyLock::new(|| {
     let text = include_str!("../../../../../../assets/palette.toml");
     toml::from_str(text).expect("the built-in palette is well-formed: a test reads it")
 });
 
-/// All colours.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Palette {
     /// The models with a fixed style: the one at their index.
     pub pinned: Vec<String>,
     pub surface: Surface,
-    /// Colours of values.
     pub ramp: Ramps,
-    /// The outcomes of an open question.
     pub outcome: Outcome,
-    /// Landmarks of an episode.
     pub gaze: Gaze,
     pub style: Vec<ModelStyle>,
 }
 
-/// Colours of everything except data.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Surface {
-    /// Primary text.
     pub text: Rgb,
     /// Secondary text.
     pub quiet: Rgb,
-    /// Grid lines.
     pub rule: Rgb,
-    /// Axes and frames.
     pub axis: Rgb,
     pub paper: Rgb,
-    /// Hatches and crosses of missing values.
     pub hatch: Rgb,
-    /// Levels of chance.
     pub chance: Rgb,
-    /// Reference levels.
     pub reference: Rgb,
 }
 
-/// Colours of values, from low to high.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Ramps {
@@ -62,44 +49,33 @@ pub struct Ramps {
     pub fall: Ramp,
 }
 
-/// The outcomes of an open question.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Outcome {
     pub correct: Rgb,
-    /// Another colour.
     pub wrong: Rgb,
-    /// `unknown`, or no answer.
     pub uncommitted: Rgb,
 }
 
-/// Landmarks of an episode.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Gaze {
-    /// The steps of an episode.
     pub episode: Rgb,
     /// Steps with the mirror in view.
     pub visible: Rgb,
     pub first_sight: Rgb,
     /// The first claim of a colour.
     pub claim: Rgb,
-    /// The step of the decision.
     pub decision: Rgb,
 }
 
-/// The style of one model.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ModelStyle {
-    /// The colour of its line and marker.
     pub color: Rgb,
-    /// The shape of its marker.
     pub marker: Shape,
-    /// True if the marker is an outline.
     #[serde(default)]
     pub hollow: bool,
-    /// The dash of its line.
     pub dash: Vec<f64>,
 }
 
@@ -109,7 +85,6 @@ impl ModelStyle {
     }
 }
 
-/// The shapes of markers; the names say what they are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Shape {

@@ -161,7 +161,7 @@ fn a_missing_spark_is_reported_with_the_remedy() {
 }
 
 #[test]
-fn an_experiment_that_the_traces_declare_is_among_those_that_are_checked() {
+fn experiments_declared_by_the_traces_are_checked() {
     let folder = folder("cat \"$last\" >request");
     let at = folder.path();
     let declared =

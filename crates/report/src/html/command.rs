@@ -75,7 +75,7 @@ mod tests {
     use super::{Recordings, word};
 
     #[test]
-    fn a_word_is_one_word_and_nothing_in_it_acts() {
+    fn words_are_quoted_for_the_shell() {
         for (text, expected) in [
             ("E1/gpt-5-1/s1/r1", "E1/gpt-5-1/s1/r1"),
             ("a b", "'a b'"),

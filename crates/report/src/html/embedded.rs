@@ -91,7 +91,7 @@ mod tests {
     use super::{Integer, inert};
 
     #[test]
-    fn nothing_ends_the_element_and_the_text_is_the_same() {
+    fn embedded_text_cannot_close_its_element() {
         for text in ["</script>", "<!--<script>", "a & b", "]]>", "\\u003c", "plain"] {
             let json = inert(&serde_json::to_string(text).unwrap());
             assert!(!json.contains(['<', '>', '&']), "{json}");

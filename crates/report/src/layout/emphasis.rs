@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn the_paper_goes_by_distinct_printed_means() {
+    fn the_paper_ranks_distinct_printed_means() {
         // 13/14 and 14/15 both print 0.93: both are second.
         check(&[(1, 1), (13, 14), (14, 15), (0, 3)], Higher, PrintedMean, "buu.");
         check(&[(13, 14), (14, 15), (0, 3)], Higher, PrintedMean, "bbu");

@@ -69,7 +69,7 @@ mod tests {
     use crate::tables::{Column, RowGroup, Table};
 
     #[test]
-    fn no_name_is_markup() {
+    fn markup_in_names_is_escaped() {
         for (text, expected) in [
             ("GPT 5.1 (mini)", "GPT 5.1 (mini)"),
             ("<img src=x onerror=y>", "&lt;img src=x onerror=y&gt;"),

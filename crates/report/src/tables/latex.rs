@@ -152,7 +152,7 @@ mod tests {
     use super::escape;
 
     #[test]
-    fn no_name_is_a_command() {
+    fn commands_in_names_are_escaped() {
         for (text, expected) in [
             ("GPT 5.1", "GPT 5.1"),
             ("a_b & 50% $x$ #1", "a\\_b \\& 50\\% \\$x\\$ \\#1"),

@@ -87,7 +87,7 @@ mod tests {
     use super::escape;
 
     #[test]
-    fn no_name_is_markup() {
+    fn markup_in_names_is_escaped() {
         for (text, expected) in [
             ("GPT 5.1 (mini)", "GPT 5.1 (mini)"),
             ("a|b`c`", "a\\|b\\`c\\`"),

@@ -162,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn a_body_is_its_outline_and_its_head() {
+    fn a_body_is_drawn_as_an_outline_and_a_head() {
         let mut map = Map::default();
         map.add(1, &[shape("agent0_head", 1.0), shape("agent0_left_foot", 0.5), shape("agent0_torso", 1.0)]);
         let told = map.told(1);
@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn what_stays_is_told_once() {
+    fn shapes_that_do_not_move_are_listed_once() {
         let mut map = Map::default();
         for t in 1..=3_u32 {
             map.add(t as usize, &[shape("cube0", 1.0), shape("agent0", f64::from(t))]);
@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn of_too_many_shapes_some_steps_are_left_out() {
+    fn with_too_many_shapes_some_steps_are_left_out() {
         let mut map = Map::default();
         let length = 3 * MOST;
         for t in 1..=length {

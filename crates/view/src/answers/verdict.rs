@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn of_a_hand_the_nearest_step_is_told() {
+    fn the_verdict_on_a_hand_names_the_nearest_step() {
         let (_, words, t) = told(|episode| {
             episode.start_distance = Some(900);
             for (at, step) in episode.steps.iter_mut().enumerate() {

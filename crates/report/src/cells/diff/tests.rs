@@ -36,7 +36,7 @@ fn a_table_does_not_differ_from_itself() {
 }
 
 #[test]
-fn undefined_is_no_zero() {
+fn undefined_differs_from_zero() {
     let changes = changes(&table(RATE, 0, &[Some(0), Some(1)]), &table(RATE, 0, &[None, Some(1)]));
     let [flip] = &changes.flips[..] else { panic!("{:?}", changes.flips) };
     assert_eq!((flip.value.before, flip.value.after), (Some(0), None));
@@ -54,7 +54,7 @@ fn flips_that_cancel_move_no_cell() {
 }
 
 #[test]
-fn the_form_of_the_standard_error_moves_a_cell_and_flips_nothing() {
+fn another_standard_error_changes_a_cell_without_flips() {
     let population = format!("{RATE}\nse = \"population\"");
     let values = [Some(0), Some(1), Some(1)];
     let changes = changes(&table(RATE, 0, &values), &table(&population, 0, &values));
@@ -72,7 +72,7 @@ fn episodes_of_one_side_are_listed_and_flip_nothing() {
 }
 
 #[test]
-fn equal_columns_of_other_episodes_flip() {
+fn episodes_are_matched_by_id_not_by_row() {
     let changes = changes(&table(RATE, 0, &[Some(1), Some(0)]), &table(RATE, 1, &[Some(1), Some(0)]));
     let [flip] = &changes.flips[..] else { panic!("{:?}", changes.flips) };
     assert_eq!((flip.episode.run, flip.value.before, flip.value.after), (1, Some(0), Some(1)));

@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn names_without_end_are_no_trouble() {
+    fn huge_names_are_shortened() {
         let endless = |i: usize| format!("{}{i}{}", "x".repeat(50_000), "y".repeat(50_000));
         check(&(0..20).map(endless).collect::<Vec<_>>(), 120.0);
         assert!(cut(&endless(1), 120.0, LETTERING).chars().count() < 60);

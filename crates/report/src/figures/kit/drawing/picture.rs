@@ -168,7 +168,7 @@ mod tests {
     use super::FigureFormat as Format;
 
     #[test]
-    fn the_ending_decides_and_an_unknown_one_is_refused() {
+    fn the_extension_selects_the_format() {
         for (name, format) in
             [("a.svg", Format::Svg), ("b/c.PNG", Format::Png), ("d.pdf", Format::Pdf), ("e", Format::Svg)]
         {

@@ -142,11 +142,6 @@ const MOST_COVERED: Limit = Limit::new("seeds and runs of models in experiments"
 /// The bytes of a cell, besides its names.
 const CELL: usize = 256;
 
-/// The names of models are compared, counted and printed in full.
-const fn most_named(bytes: u64) -> Limit {
-    Limit::in_proportion("bytes of models in experiments in files of their size", 24 << 20, 8, bytes)
-}
-
 /// Whether to list episodes or only count them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Listing {
@@ -158,7 +153,9 @@ pub enum Listing {
 pub fn info(set: &TraceSet, listing: Listing, threads: NonZeroUsize) -> Result<Info, TraceError> {
     let mut listed = (listing == Listing::Episodes).then(Vec::new);
     let bytes = set.files().iter().map(TraceFile::bytes).sum();
-    let (most, names) = (most_listed(bytes), most_named(bytes));
+    let most = most_listed(bytes);
+    // The names of models are compared, counted and printed in full.
+    let names = Limit::in_proportion("bytes of models in experiments in files of their size", 24 << 20, 8, bytes);
     let mut tally = Tally { files: vec![0; set.files().len()], ..Tally::default() };
     let statuses: Vec<String> = set.declares(REPLY_STATUS).then(|| REPLY_STATUS.to_owned()).into_iter().collect();
     let mut replies = (!statuses.is_empty()).then(ReplyCounts::default);

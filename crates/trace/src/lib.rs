@@ -4,13 +4,12 @@
 //! |---|---|
 //! | `schema` | the columns, their allowed values, and their fields in an episode |
 //! | `read` | from bytes to complete episodes: footers, pages, columns, one pass on several threads |
-//! | `write` | from episodes to bytes: new traces, merged traces, traces with one new column |
+//! | `write` | from episodes to bytes: new traces, merged traces, traces with one new column or new attributions |
 //! | `validate` | the rules for complete episodes, alone and together |
 //! | `import` | from JSON lines to a trace |
 //! | `log` | MCAP logs of recordings: written, read, recovered |
 //! | `footers` | the declarations of files: clusters, experiments, answering models, checksums |
-//! | `episodes` | one episode: steps, hash, pictures, colours, losses, replies |
-//! | `texts` | rules over free text: attributions, names of models |
+//! | `episodes` | one episode: steps, hash, pictures, colours, losses, replies, attributions, names of models |
 //!
 //! ```
 //! use trace::inputs::Input;
@@ -44,17 +43,14 @@ pub mod renderer;
 pub mod scan;
 pub mod schema;
 pub mod seal;
-mod texts;
 pub mod validate;
 pub mod write;
 
-pub use texts::{identification, model_id, renormalize};
-
-pub use episodes::{answers, episode, episode_hash, frame, labels, lost, palette, replies};
+pub use episodes::{answers, episode, episode_hash, frame, identification, labels, lost, model_id, palette, replies};
 
 pub use footers::{answered, checksums, declared, declared_experiment};
 
 pub use read::flat::{FlatRows, TableFile};
 pub use read::{in_order, open, search, steps, verify};
 pub use schema::{colors, describe};
-pub use write::merge;
+pub use write::{merge, renormalize};

@@ -112,14 +112,18 @@ impl TraceSet {
     ) -> Result<ScanSummary, E> {
         let (labels, constants): (Vec<&str>, Vec<&str>) =
             projection.constants.iter().map(String::as_str).partition(|name| self.is_label_column(name));
-        let read = EPISODE_COLUMNS.into_iter().chain(constants.iter().copied());
-        let mut layout = Layout::new(self, projection.step_columns(), read)?;
+        let read = || EPISODE_COLUMNS.into_iter().chain(constants.iter().copied());
+        let mut layout = Layout::new(self, projection.step_columns(), read())?;
         layout.with_declared(&projection.declared);
         for column in layout.columns.iter_mut().filter(|column| projection.unchecked.contains(&column.name)) {
             column.known = None;
         }
         let rules = Rules { layout: &layout, experiments: projection.experiments.as_deref() };
-        let shape = Shape::new(&layout, projection, &constants);
+        let shape = Shape {
+            layout: &layout,
+            steps: projection.step_columns().filter_map(|name| layout.position(name)).collect(),
+            episodes: read().filter_map(|name| layout.position(name)).collect(),
+        };
         let whole = |episodes: Episodes| -> Result<EpisodeBatch, TraceError> {
             let batch = shape.batch(episodes)?;
             Ok(EpisodeBatch { episodes: self.with_label_columns(batch.episodes, &labels)?, ..batch })
@@ -217,16 +221,7 @@ struct Shape<'a> {
     episodes: Vec<usize>,
 }
 
-impl<'a> Shape<'a> {
-    fn new(layout: &'a Layout, projection: &Projection, constants: &[&str]) -> Self {
-        let constants = constants.iter().copied();
-        Self {
-            layout,
-            steps: projection.step_columns().filter_map(|name| layout.position(name)).collect(),
-            episodes: EPISODE_COLUMNS.into_iter().chain(constants).filter_map(|name| layout.position(name)).collect(),
-        }
-    }
-
+impl Shape<'_> {
     fn batch(&self, episodes: Episodes) -> Result<EpisodeBatch, TraceError> {
         let rows = episodes.columns[0].len();
         let firsts = &episodes.offsets[..episodes.len()];

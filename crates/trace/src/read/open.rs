@@ -7,7 +7,6 @@ use arrow::compute::cast;
 use arrow::datatypes::{DataType, Field, Schema};
 
 pub use super::footer::trace_file::{FileColumn, TraceFile};
-use crate::diagnostic::Finding;
 use crate::error::TraceError;
 use crate::inputs::Input;
 use crate::labels::Labels;
@@ -46,7 +45,8 @@ impl TraceSet {
         }
         let set = Self::of(files);
         if set.domain() == Domain::Mirror {
-            faults.extend(set.strangers());
+            // Files of another domain among traces of the mirror's.
+            faults.extend(set.files.iter().flat_map(TraceFile::strangeness));
         }
         match TraceError::of(faults) {
             Some(error) => Err(error),
@@ -58,10 +58,6 @@ impl TraceSet {
     pub fn domain(&self) -> Domain {
         let is_own = |file: &TraceFile| file.domain() == Domain::Own;
         if !self.files.is_empty() && self.files.iter().all(is_own) { Domain::Own } else { Domain::Mirror }
-    }
-
-    pub(crate) fn strangers(&self) -> Vec<Finding> {
-        self.files.iter().flat_map(TraceFile::strangeness).collect()
     }
 
     /// The schema's column of this name in these files; `None` for an own column.

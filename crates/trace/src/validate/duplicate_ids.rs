@@ -114,7 +114,7 @@ fn first_equal(
 fn repeated(file: &str, id: &str, other: Option<&str>, groups: (usize, usize)) -> Finding {
     let finding = match other {
         None => {
-            let found = format!("rows of it also in row group {}", groups.0);
+            let found = format!("rows of it in row group {} already", groups.0);
             Finding::new(Code::EpisodeTwice, file, "the episode once in the file, its rows together", found)
         }
         Some(other) => {
@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn different_ids_with_equal_hashes_are_not_duplicates() {
+    fn equal_hashes_of_different_ids_are_no_repetition() {
         let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/paper").to_owned();
         let inputs = resolve(&[folder.into()], std::io::empty()).unwrap();
         let set = TraceSet::open(&inputs).unwrap();

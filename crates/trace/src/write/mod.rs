@@ -7,6 +7,7 @@
 
 pub mod decode_episode;
 pub mod merge;
+pub mod renormalize;
 pub(super) mod rewrite;
 pub(super) mod row_groups;
 

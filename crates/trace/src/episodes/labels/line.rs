@@ -1,7 +1,7 @@
 //! One line of a list of labels, and the errors of such lists.
 
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -93,10 +93,4 @@ pub enum LabelsError {
     Line { path: PathBuf, line: usize, problem: String },
     #[error("{}: {source}", .path.display())]
     Budget { path: PathBuf, source: Exceeded },
-}
-
-impl LabelsError {
-    pub(super) fn line(path: &Path, line: usize, problem: impl Into<String>) -> Self {
-        Self::Line { path: path.to_owned(), line, problem: problem.into() }
-    }
 }

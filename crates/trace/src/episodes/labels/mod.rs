@@ -39,10 +39,6 @@ pub fn list_beside(trace: &Path) -> PathBuf {
     recording.unwrap_or(folder).join("labels.jsonl")
 }
 
-pub fn lists_beside(traces: &[Input]) -> BTreeSet<PathBuf> {
-    traces.iter().map(|input| list_beside(&input.path)).collect()
-}
-
 pub fn append(list: &Path, line: &LabelLine) -> Result<(), LabelsError> {
     let failed = |source| LabelsError::Write { path: list.to_owned(), source };
     let mut file = OpenOptions::new().create(true).append(true).read(true).open(list).map_err(failed)?;
@@ -166,7 +162,8 @@ impl Labels {
     /// The labels in the lists beside some traces; empty without lists.
     pub fn beside(traces: &[Input]) -> Result<Self, LabelsError> {
         let mut labels = Self::default();
-        for list in lists_beside(traces) {
+        let lists: BTreeSet<PathBuf> = traces.iter().map(|input| list_beside(&input.path)).collect();
+        for list in lists {
             labels.read(&list)?;
         }
         Ok(labels.in_order())
@@ -186,7 +183,7 @@ impl Labels {
             if line.trim_ascii().is_empty() {
                 continue;
             }
-            let wrong = |problem: String| LabelsError::line(list, at + 1, problem);
+            let wrong = |problem| LabelsError::Line { path: list.to_owned(), line: at + 1, problem };
             let line: LabelLine = serde_json::from_slice(&line).map_err(|error| {
                 let found = error.to_string();
                 let found = found.split(" at line ").next().unwrap_or_default();
@@ -347,7 +344,7 @@ mod tests {
     }
 
     #[test]
-    fn concatenated_lists_are_a_valid_list() {
+    fn two_lists_put_together_are_a_list() {
         let of = |coder: &str| serde_json::to_string(&line(coder, None, Some("loops"), None)).unwrap() + "\n";
         let (both, turned) = (read(&(of("ann") + &of("bob"))).unwrap(), read(&(of("bob") + &of("ann"))).unwrap());
         assert_eq!(both.by_coder(), turned.by_coder());

@@ -1,3 +1,0 @@
-pub mod identification;
-pub mod model_id;
-pub mod renormalize;

@@ -61,7 +61,7 @@ pub fn explained(experiment: &Experiment) -> String {
     }
     if !experiment.absent.is_empty() {
         let columns: Vec<&str> = experiment.absent.iter().map(|column| column.name()).collect();
-        line("absent", format!("{}: of no meaning here, and in no trace", columns.join(", ")));
+        line("absent", format!("{}: not used here, and in no trace", columns.join(", ")));
     }
     if let Some(hand) = experiment.hand {
         line("hand", self::hand(hand));

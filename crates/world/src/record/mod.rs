@@ -20,7 +20,6 @@ pub mod replies;
 pub mod rollout;
 pub mod run;
 pub mod shares;
-pub mod unusable;
 
 use folder::continued;
 #[cfg(feature = "view")]

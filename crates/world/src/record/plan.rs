@@ -1,7 +1,7 @@
 //! The episodes of a recording.
 
 use std::collections::BTreeSet;
-use std::ffi::OsStr;
+use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -154,62 +154,42 @@ pub enum Named {
     File(PathBuf),
 }
 
-impl Experiments {
-    /// Parses typed experiments, for file names with arbitrary bytes.
-    #[cfg(unix)]
-    pub fn of(typed: &OsStr) -> Result<Self, NotAPlan> {
-        use std::os::unix::ffi::OsStrExt as _;
-        let mut found = BTreeSet::new();
-        for part in typed.as_bytes().split(|byte| *byte == b',').map(OsStr::from_bytes) {
-            match part.to_str() {
-                Some(text) => found.extend(text.parse::<Self>()?.0),
-                None if is_file(part) => found.extend([Named::File(part.into())]),
-                None => return Err(NotAPlan { expected: EXPECTED, found: part.to_string_lossy().into_owned() }),
-            }
-        }
-        Ok(Self(found.into_iter().collect()))
-    }
-
-    #[cfg(not(unix))]
-    pub fn of(typed: &OsStr) -> Result<Self, NotAPlan> {
-        typed.to_string_lossy().parse()
-    }
-}
-
 const EXPECTED: &str = "experiments such as E1, E1..E5, E1,E3 or mine.toml";
 
-fn is_file(name: impl AsRef<Path>) -> bool {
-    name.as_ref().extension().is_some_and(|ending| ending == "toml")
-}
-
-impl FromStr for Experiments {
-    type Err = NotAPlan;
-
-    fn from_str(text: &str) -> Result<Self, NotAPlan> {
-        let fault = || NotAPlan { expected: EXPECTED, found: text.to_owned() };
-        let experiment = |name: &str| Experiment::parse(name.trim()).map_err(|_| fault());
+impl Experiments {
+    /// Parses typed experiments, for file names with arbitrary bytes.
+    pub fn of(typed: &OsStr) -> Result<Self, NotAPlan> {
         let mut found = BTreeSet::new();
-        for part in text.split(',') {
-            match part.split_once("..") {
-                _ if is_file(part.trim()) => {
-                    found.insert(Named::File(PathBuf::from(part.trim())));
-                }
-                None => {
-                    found.insert(Named::BuiltIn(experiment(part)?));
-                }
-                Some((first, last)) => {
-                    let range = experiment(first)?..=experiment(last)?;
-                    let known = built_in_names().into_iter().flat_map(Experiment::parse);
-                    let range: Vec<Experiment> = known.filter(|one| range.contains(one)).collect();
-                    if range.is_empty() {
-                        return Err(fault());
-                    }
-                    found.extend(range.into_iter().map(Named::BuiltIn));
-                }
+        for part in parts(typed) {
+            let file = part.to_str().map_or(part.as_os_str(), |text| OsStr::new(text.trim()));
+            if Path::new(file).extension().is_some_and(|ending| ending == "toml") {
+                found.insert(Named::File(file.into()));
+                continue;
             }
+            let text = part.to_string_lossy();
+            let fault = || NotAPlan { expected: EXPECTED, found: text.clone().into_owned() };
+            let experiment = |name: &str| Experiment::parse(name.trim()).map_err(|_| fault());
+            let (first, last) = text.split_once("..").unwrap_or((&text, &text));
+            let range = experiment(first)?..=experiment(last)?;
+            if range.is_empty() {
+                return Err(fault());
+            }
+            let known = built_in_names().into_iter().flat_map(Experiment::parse);
+            found.extend(known.filter(|one| range.contains(one)).map(Named::BuiltIn));
         }
         Ok(Self(found.into_iter().collect()))
     }
+}
+
+#[cfg(unix)]
+fn parts(typed: &OsStr) -> Vec<OsString> {
+    use std::os::unix::ffi::OsStrExt as _;
+    typed.as_bytes().split(|byte| *byte == b',').map(|part| OsStr::from_bytes(part).to_owned()).collect()
+}
+
+#[cfg(not(unix))]
+fn parts(typed: &OsStr) -> Vec<OsString> {
+    typed.to_string_lossy().split(',').map(OsString::from).collect()
 }
 
 #[cfg(test)]
@@ -223,7 +203,7 @@ mod tests {
 
     #[test]
     fn experiments_come_as_names_ranges_and_lists() {
-        let read = |text: &str| text.parse::<Experiments>().map(|list| list.0);
+        let read = |text: &str| Experiments::of(text.as_ref()).map(|list| list.0);
         assert_eq!(read("E1").unwrap(), [E1].map(Named::BuiltIn));
         assert_eq!(read("E1..E3").unwrap(), [E1, E2, E3].map(Named::BuiltIn));
         assert_eq!(read("E5,E1, E1").unwrap(), [E1, E5].map(Named::BuiltIn));

@@ -28,17 +28,15 @@ pub struct Seen<'a> {
 pub type LogFault = Box<dyn std::error::Error + Send + Sync>;
 
 pub struct Log {
-    seed: i32,
-    run: i32,
-    repetition: i32,
+    /// The seed, run and repetition.
+    place: (i32, i32, i32),
     file: EpisodeLog,
 }
 
 impl Log {
     pub fn begin(path: &Path, episode: &Episode) -> Result<Self, LogFault> {
-        let (seed, run, repetition) = (episode.seed, episode.run, episode.repetition.unwrap_or(1));
-        let file = EpisodeLog::create(path, episode, &CENSUS, time(seed, run, repetition, 0))?;
-        Ok(Self { seed, run, repetition, file })
+        let place = (episode.seed, episode.run, episode.repetition.unwrap_or(1));
+        Ok(Self { place, file: EpisodeLog::create(path, episode, &CENSUS, time(place, 0))? })
     }
 
     /// Makes the log smaller, if it is not read before its end.
@@ -53,21 +51,16 @@ impl Log {
         let snapshot = seen.world.snapshot();
         let solids: Vec<Solid> = snapshot.solids.iter().map(solid).collect();
         let view = View { png, placed: &snapshot.frames, solids: &solids, census: seen.visibility };
-        Ok(self.file.seen(self.time(seen.t), &view)?)
+        Ok(self.file.seen(time(self.place, seen.t), &view)?)
     }
 
     pub fn done(&mut self, t: i32, row: &Step) -> Result<(), LogFault> {
-        Ok(self.file.decided(self.time(t), &Decision::of(t, row))?)
+        Ok(self.file.decided(time(self.place, t), &Decision::of(t, row))?)
     }
 
     pub fn end(self, episode: &Episode) -> Result<(), LogFault> {
         let last = i32::try_from(episode.steps.len()).unwrap_or(i32::MAX);
-        let time = self.time(last);
-        Ok(self.file.end(time, episode)?)
-    }
-
-    fn time(&self, t: i32) -> u64 {
-        time(self.seed, self.run, self.repetition, t)
+        Ok(self.file.end(time(self.place, last), episode)?)
     }
 }
 
@@ -81,7 +74,7 @@ pub fn frame_time(seed: i32, run: i32, repetition: i32, t: i32) -> i64 {
 }
 
 /// The time of a step in the log, never below 0.
-fn time(seed: i32, run: i32, repetition: i32, t: i32) -> u64 {
+fn time((seed, run, repetition): (i32, i32, i32), t: i32) -> u64 {
     u64::try_from(frame_time(seed, run, repetition, t)).unwrap_or(0)
 }
 

@@ -27,6 +27,6 @@ pub mod world;
 
 #[cfg(feature = "raster")]
 pub use pictures::contact_sheet;
-pub use pictures::{camera, label_image, passage, renderer};
+pub use pictures::{camera, label_image, passage};
 
 pub use crate::experiment::Experiment;

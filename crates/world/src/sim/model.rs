@@ -325,7 +325,10 @@ pub(super) fn compile(config: &WorldConfig, paint: Paint, size: [usize; 2]) -> R
     set_picture(&mut spec, config, paint, size);
     match paint {
         Paint::Lit => light(&mut spec, &config.lights),
-        Paint::Labels => unlight(&mut spec),
+        Paint::Labels => {
+            let head = &mut spec.visual_mut().headlight;
+            (head.ambient, head.diffuse, head.specular) = ([1.0; 3], [0.0; 3], [0.0; 3]);
+        }
     }
     Ok(spec.compile()?)
 }
@@ -447,10 +450,4 @@ fn light(spec: &mut MjSpec, config: &LightsConfig) {
         *light.ambient_mut() = [0.0; 3];
         light.set_castshadow(false);
     }
-}
-
-fn unlight(spec: &mut MjSpec) {
-    let visual = spec.visual_mut();
-    let head = &mut visual.headlight;
-    (head.ambient, head.diffuse, head.specular) = ([1.0; 3], [0.0; 3], [0.0; 3]);
 }

@@ -29,8 +29,8 @@ const DRAWINGS: u32 = 2000;
 /// An error: the room is too small for all that must be placed.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "{} of seed {seed} and run {run} finds no place for all that stands in its room after {DRAWINGS} drawings: \
-     give it a larger `room.size`, or fewer or smaller cubes and others",
+    "{} of seed {seed} and run {run} has no room for all its objects after {DRAWINGS} attempts: \
+     use a larger `room.size`, or fewer or smaller cubes and others",
     experiment.name()
 )]
 pub struct Crowded {

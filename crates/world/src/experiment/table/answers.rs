@@ -29,7 +29,7 @@ fn key(answer: &Answer, before: &[Answer], at: &At<'_>, faults: &mut Vec<Fault>)
         let message = format!("a key has 1 to {} lower-case letters, digits and `_`, a letter first", LONGEST[0]);
         faults.push(at.fault(message).help("for example `side`"));
     } else if ReplyKey::named(key).is_some() {
-        faults.push(at.fault(format!("a reply has a `{key}` of its own")).help("choose another name"));
+        faults.push(at.fault(format!("a reply already has the key `{key}`")).help("choose another name"));
     } else if columns_of(key).iter().any(|column| trace::schema::column(column).is_some()) {
         faults.push(at.fault(format!("`{key}` would have a column of the schema")).help("choose another name"));
     } else if before.iter().any(|other| other.key == *key) {

@@ -35,9 +35,7 @@ pub(super) fn prompt(spec: &Spec, templates: &Templates, at: &At<'_>, faults: &m
             only(&reply, &asked)
         );
         let at = at.get("reply").unwrap_or_else(|| at.key("prompt"));
-        faults.push(
-            at.fault(message).help("choose another `prompt`, `reply` or `decision`, or mend the words of the prompt"),
-        );
+        faults.push(at.fault(message).help("choose another `prompt`, `reply` or `decision`, or correct the prompt"));
     }
 }
 

@@ -46,7 +46,7 @@ pub(super) fn dress(model: &mut MjModel, items: &[Item], config: &WorldConfig, s
                 paint_body(model, geom, color, group::THINGS, neutral);
             }
             Item::Mark(at) => {
-                model.geom_group_mut()[geom] = group::HIDDEN;
+                hide(model, geom);
                 if let Some(mark) = scene.marks.get(at) {
                     put_patch(model, geom, scene, mark);
                 }
@@ -114,15 +114,16 @@ fn hide_wall(model: &mut MjModel, geom: usize, pane: Option<&HungPane>) {
     let across = if pane.kind == PaneKind::Window { 2 } else { 0 };
     let wall = WALLS[usize::from((pane.place.wall + across) % 4)];
     if model.id_to_name(MjtObjBase::mjOBJ_GEOM, geom) == Some(wall) {
-        model.geom_group_mut()[geom] = group::HIDDEN;
+        hide(model, geom);
     }
 }
 
+fn hide(model: &mut MjModel, geom: usize) {
+    model.geom_group_mut()[geom] = group::HIDDEN;
+}
+
 fn hang(model: &mut MjModel, geom: usize, pane: Option<&HungPane>, config: &WorldConfig) {
-    let Some(pane) = pane else {
-        model.geom_group_mut()[geom] = group::HIDDEN;
-        return;
-    };
+    let Some(pane) = pane else { return hide(model, geom) };
     let [x, y] = pane.place.center(config);
     let [out_x, out_y] = pane.place.heading().direction();
     let half = [pane.height / 2.0, pane.width / 2.0, HALF_DEPTH];
@@ -143,10 +144,7 @@ fn frame(model: &mut MjModel, geom: usize, scene: &Scene, look: Look, config: &W
     let name = model.id_to_name(MjtObjBase::mjOBJ_GEOM, geom).unwrap_or_default();
     let Some(number) = name.strip_prefix("frame").and_then(|digits| digits.parse::<usize>().ok()) else { return };
     let pane = scene.panes.get(number / BARS).filter(|_| look == Look::Direct);
-    let Some(pane) = pane else {
-        model.geom_group_mut()[geom] = group::HIDDEN;
-        return;
-    };
+    let Some(pane) = pane else { return hide(model, geom) };
     let [x, y] = pane.place.center(config);
     let [out_x, out_y] = pane.place.heading().direction();
     let (up, side) = (pane.height / 2.0 + HALF_BAR, pane.width / 2.0 + HALF_BAR);
@@ -176,10 +174,7 @@ fn facing_inwards(heading: Heading) -> Quaternion {
 }
 
 fn put_cube(model: &mut MjModel, geom: usize, cube: Option<&Cube>) {
-    let Some(cube) = cube else {
-        model.geom_group_mut()[geom] = group::HIDDEN;
-        return;
-    };
+    let Some(cube) = cube else { return hide(model, geom) };
     let half = cube.edge / 2.0;
     model.geom_group_mut()[geom] = group::THINGS;
     model.geom_pos_mut()[geom] = [cube.x, cube.y, cube.base + half];
@@ -204,10 +199,7 @@ fn put_patch(model: &mut MjModel, geom: usize, scene: &Scene, mark: &WornMark) {
 
 fn put_hand(model: &mut MjModel, geom: usize, hand: Option<&HandStart>) {
     let name = model.id_to_name(MjtObjBase::mjOBJ_GEOM, geom).unwrap_or_default();
-    let Some(hand) = hand.filter(|hand| name.ends_with(hand.shape.name())) else {
-        model.geom_group_mut()[geom] = group::HIDDEN;
-        return;
-    };
+    let Some(hand) = hand.filter(|hand| name.ends_with(hand.shape.name())) else { return hide(model, geom) };
     let half = hand.half();
     model.geom_group_mut()[geom] = group::THINGS;
     model.geom_size_mut()[geom] = match hand.shape {

@@ -5,4 +5,3 @@ pub mod camera;
 pub mod contact_sheet;
 pub mod label_image;
 pub mod passage;
-pub mod renderer;

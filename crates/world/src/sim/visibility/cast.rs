@@ -47,22 +47,17 @@ fn pane_code(pane: usize) -> u8 {
     Shown::Through(pane, Item::Room).code()
 }
 
-fn parts(stage: &Stage) -> Vec<Part> {
-    let shown = stage.items().iter().enumerate().filter(|(geom, item)| **item != Item::Room && stage.is_shown(*geom));
-    let code = |item: Item| match stage.look() {
-        Look::Direct => Shown::Direct(item).code(),
-        Look::Through(pane) => Shown::Through(pane, item).code(),
-    };
-    shown.map(|(geom, item)| Part { code: code(*item), solid: solid(stage, geom) }).collect()
-}
-
 impl Pass {
     fn new(view: View, stage: &Stage) -> Self {
-        let candidates = parts(stage)
-            .into_iter()
-            .filter_map(|part| Some(Candidate { part, rectangle: part.solid.rectangle(&view)? }))
-            .collect();
-        Self { view, candidates, depths: vec![f64::INFINITY; view.width] }
+        let code = |item: Item| match stage.look() {
+            Look::Direct => Shown::Direct(item).code(),
+            Look::Through(pane) => Shown::Through(pane, item).code(),
+        };
+        let shown =
+            stage.items().iter().enumerate().filter(|(geom, item)| **item != Item::Room && stage.is_shown(*geom));
+        let parts = shown.map(|(geom, item)| Part { code: code(*item), solid: solid(stage, geom) });
+        let candidates = parts.filter_map(|part| Some(Candidate { part, rectangle: part.solid.rectangle(&view)? }));
+        Self { view, candidates: candidates.collect(), depths: vec![f64::INFINITY; view.width] }
     }
 
     /// Writes the code of the nearest part to each open pixel of a row.

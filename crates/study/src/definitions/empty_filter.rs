@@ -10,6 +10,7 @@ use crate::error::StudyError;
 use crate::inputs::Source;
 use crate::{Question, Study, scores};
 use exact::escape::visible;
+use exact::format::counted;
 use metric::names::mentioned;
 use report::cells::KeyValue;
 use report::cells::group::{KEY_COLUMNS, column_values};
@@ -33,8 +34,8 @@ impl Study {
         let Some(filter) = self.question.filter.as_deref().filter(|_| episodes == 0) else { return Ok(None) };
         let names = mentioned(filter);
         let all = self.unfiltered(&names)?;
-        let noun = if all.len() == 1 { "episode" } else { "episodes" };
-        let mut words = format!("the filter `{}` keeps none of {} {noun}", visible(filter), all.len());
+        let episodes = counted(all.len() as u64, "episode");
+        let mut words = format!("the filter `{}` keeps none of {episodes}", visible(filter));
         for name in &names {
             if let Some(values) = column_values(&all, name) {
                 let _ = write!(words, "\n  {}: {}", visible(name), listed(&values));

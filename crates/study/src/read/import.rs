@@ -11,6 +11,7 @@ use crate::StudyError;
 use crate::findings::ExpectedTraces;
 use exact::budget::Limit;
 use exact::escape::visible;
+use exact::format::counted;
 use exact::input;
 use trace::colors::palette::Palette;
 use trace::declared::Cluster;
@@ -101,9 +102,7 @@ fn palette(path: &Path) -> Result<Palette, StudyError> {
 
 impl fmt::Display for ImportAnswer {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let counted =
-            |count: usize, noun: &str| if count == 1 { format!("1 {noun}") } else { format!("{count} {noun}s") };
-        let (episodes, steps) = (counted(self.episodes, "episode"), counted(self.steps, "step"));
+        let (episodes, steps) = (counted(self.episodes as u64, "episode"), counted(self.steps as u64, "step"));
         writeln!(f, "imported {episodes}, {steps} into {}", self.out)?;
         if self.own_columns.is_empty() {
             return Ok(());

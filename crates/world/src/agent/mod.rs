@@ -72,7 +72,6 @@ pub struct Observation {
     pub fov_y: f64,
 }
 
-/// A step that is over.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Past {
     /// The decided action; `None` if the reply gave no decision.

@@ -147,7 +147,7 @@ impl Agent for ExecAgent {
         Box::pin(async move {
             let Some(program) = program else { return };
             if let Ok(line) = Message::End(EndMessage { reason, steps }).line() {
-                program.end(&line).await;
+                program.end(Some(&line)).await;
             }
         })
     }
@@ -189,7 +189,7 @@ impl ExecAgent {
     async fn give_up(&mut self, failure: &Failure) -> Lost {
         let Some(program) = self.program.take() else { return lost(failure) };
         let lost = lost(failure);
-        program.close().await;
+        program.end(None).await;
         let words = self.kept.said.last_words(&self.shared.secrets);
         let words = words.map_or_else(String::new, |words| format!("; its last words:\n{words}"));
         // Output before the reply belongs to the previous step, though it is noticed now.

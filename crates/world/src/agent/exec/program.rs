@@ -167,25 +167,20 @@ impl Program {
         return 0;
     }
 
-    /// Kills it at once, and waits until all of its output is read.
-    pub async fn close(self) {
-        let Self { child, group, input, output, listener, last: _ } = self;
-        drop((child, group, input, output));
-        // A process that left the group may keep standard error open.
-        let _ = timeout(CLOSING, listener).await;
-    }
-
-    /// Sends a last line, closes standard input, and waits for the program to exit; kills it on timeout.
-    pub async fn end(self, line: &[u8]) {
+    /// Ends it, and waits until all of its output is read. After a last line it may exit by itself for a while; without
+    /// one it is killed at once.
+    pub async fn end(self, line: Option<&[u8]>) {
         let Self { mut child, group, mut input, output, listener, last: _ } = self;
         let leaving = async {
+            let Some(line) = line else { return };
             let _ = input.write_all(line).await;
             drop(input);
-            child.wait().await
+            let _ = child.wait().await;
         };
         // It has exited, or is killed here with its group.
         let _ = timeout(FAREWELL, leaving).await;
         drop((child, group, output));
+        // A process that left the group may keep standard error open.
         let _ = timeout(CLOSING, listener).await;
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! Rule: only a participant's position among the codes matters, so the same command always deals the same way.
 
-use std::collections::BTreeMap;
+use indexmap::IndexMap;
 
 use crate::agent::Planned;
 use exact::names;
@@ -67,18 +67,12 @@ fn part(number: i32, size: i32) -> Option<usize> {
 
 /// Experiments stay together, since each has its own prompt; they and their episodes follow the order of the row.
 fn counterbalanced(lane: Vec<&Planned>, row: usize) -> Vec<&Planned> {
-    let mut experiments: BTreeMap<usize, Vec<&Planned>> = BTreeMap::new();
-    let mut names: Vec<&str> = Vec::new();
+    let mut experiments: IndexMap<&str, Vec<&Planned>> = IndexMap::new();
     for episode in lane {
-        let known = names.iter().position(|name| *name == episode.experiment);
-        let at = known.unwrap_or_else(|| {
-            names.push(&episode.experiment);
-            names.len() - 1
-        });
-        experiments.entry(at).or_default().push(episode);
+        experiments.entry(&episode.experiment).or_default().push(episode);
     }
-    let blocks = latin_row(experiments.len(), row).into_iter().filter_map(|at| experiments.remove(&at));
-    blocks.flat_map(|block| latin_row(block.len(), row).into_iter().map(|at| block[at]).collect::<Vec<_>>()).collect()
+    let blocks = latin_row(experiments.len(), row).into_iter().map(|at| &experiments[at]);
+    blocks.flat_map(|block| latin_row(block.len(), row).into_iter().map(move |at| block[at])).collect()
 }
 
 /// A row of Williams' Latin square of `n`: over `n` rows, or `2n` if `n` is odd, each item follows every other item

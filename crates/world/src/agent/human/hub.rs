@@ -27,8 +27,8 @@ const ENDING: Duration = Duration::from_mins(1);
 
 #[derive(Debug)]
 pub struct Hub {
-    terms: Terms,
-    schedule: Schedule,
+    pub(super) terms: Terms,
+    pub(super) schedule: Schedule,
     seats: Vec<Mutex<Seat>>,
     tokens: Vec<String>,
     answers: BTreeMap<(String, String, i32), Entry>,
@@ -62,14 +62,6 @@ impl Hub {
         let (journal, owners, deleted) = (Mutex::new(journal), Mutex::default(), Mutex::default());
         let is_stopping = AtomicBool::new(false);
         Self { terms, schedule, seats, tokens, answers, journal, eraser, owners, deleted, is_stopping }
-    }
-
-    pub fn terms(&self) -> &Terms {
-        &self.terms
-    }
-
-    pub fn schedule(&self) -> &Schedule {
-        &self.schedule
     }
 
     pub fn seats(&self) -> usize {

@@ -39,12 +39,10 @@ enum Line {
         participant: String,
         consent: String,
     },
-    /// Somebody finished the practice.
     Practised {
         participant: String,
         practised: bool,
     },
-    /// Somebody ended their part.
     Left {
         participant: String,
         left: Leaving,
@@ -250,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_person_did_is_forgotten_and_that_they_left_is_not() {
+    fn forgetting_a_person_keeps_that_they_left() {
         let folder = tempfile::tempdir().unwrap();
         let journal = Journal::open(folder.path()).unwrap();
         journal.enrol("P1", 1, "abc").unwrap();

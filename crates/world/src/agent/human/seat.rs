@@ -50,7 +50,6 @@ pub struct Terms {
     pub prefills: bool,
 }
 
-/// The end of a recording, as shown on a page.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct End {
     pub is_complete: bool,

@@ -81,14 +81,14 @@ fn routes(hub: Arc<Hub>) -> Router {
         .route("/", get(|| async { file(web::page("Mirror room", "player.css", BODY), "text/html; charset=utf-8") }))
         .route("/player.css", get(|| async { file(STYLE, "text/css; charset=utf-8") }))
         .route("/player.js", get(|| async { file(SCRIPT, "text/javascript; charset=utf-8") }))
-        .route("/state", get(|hub, link| state_after(hub, link, |_, _| ())))
+        .route("/state", get(|hub, link| async { state_after(hub, link, |_, _| ()) }))
         .route("/frame", get(frame))
         .route("/agree", post(agree))
         .route("/decline", post(|State(hub), Query(link)| leave(hub, link, Leaving::Declined)))
         .route("/withdraw", post(withdraw))
-        .route("/begin", post(|hub, link| state_after(hub, link, Hub::begin)))
-        .route("/pause", post(|hub, link| state_after(hub, link, |hub, seat| hub.pause(seat, true))))
-        .route("/resume", post(|hub, link| state_after(hub, link, |hub, seat| hub.pause(seat, false))))
+        .route("/begin", post(|hub, link| async { state_after(hub, link, Hub::begin) }))
+        .route("/pause", post(|hub, link| async { state_after(hub, link, |hub, seat| hub.pause(seat, true)) }))
+        .route("/resume", post(|hub, link| async { state_after(hub, link, |hub, seat| hub.pause(seat, false)) }))
         .route("/reply", post(reply))
         .layer(DefaultBodyLimit::max(LONGEST))
         // Pages poll constantly: a kept connection would make another page wait.
@@ -116,7 +116,7 @@ fn stranger() -> Response {
 }
 
 /// Does something for a person, and returns what their page then shows.
-async fn state_after(State(hub): State<Arc<Hub>>, Query(link): Query<Link>, does: fn(&Hub, usize)) -> Response {
+fn state_after(State(hub): State<Arc<Hub>>, Query(link): Query<Link>, does: fn(&Hub, usize)) -> Response {
     for_person(&hub, &link, |seat| {
         does(&hub, seat);
         told(&hub.told(seat))

@@ -3,6 +3,7 @@
 //! Rule: only the protocol's vertical field of view and facts that a body knows of itself: the height of its eye, and
 //! the eye's distance before its axis.
 
+use super::real;
 use crate::agent::Observation;
 use crate::sim::angle::sine_cosine;
 
@@ -37,15 +38,8 @@ pub struct Heading(u8);
 
 impl Heading {
     pub const COUNT: u8 = 12;
-    pub const ALL: [Self; 12] = {
-        let mut all = [Self(0); 12];
-        let mut at = 0;
-        while at < Self::COUNT {
-            all[at as usize] = Self(at);
-            at += 1;
-        }
-        all
-    };
+    pub const ALL: [Self; 12] =
+        [Self(0), Self(1), Self(2), Self(3), Self(4), Self(5), Self(6), Self(7), Self(8), Self(9), Self(10), Self(11)];
 
     /// The heading nearest to a yaw in degrees.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0..12 after rem_euclid")]
@@ -88,7 +82,6 @@ impl Heading {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
     pub place: Place,
-    /// The direction of its eye.
     pub heading: Heading,
 }
 
@@ -107,10 +100,9 @@ pub struct Bearing {
     pub right: f64,
 }
 
-/// The eye of a body at a pose, for a picture of a given size.
 #[derive(Clone, Copy, Debug)]
 pub struct Camera {
-    eye: Place,
+    pub eye: Place,
     heading: Heading,
     half_width: f64,
     half_height: f64,
@@ -120,9 +112,8 @@ pub struct Camera {
 impl Camera {
     /// The camera of a body at `pose` whose pictures have `width` x `height` pixels and a vertical field of view of `fov_y`
     /// degrees, less than 180.
-    #[expect(clippy::cast_precision_loss, reason = "pixels of a picture are few")]
     pub fn new(pose: Pose, width: usize, height: usize, fov_y: f64) -> Self {
-        let (half_width, half_height) = (width as f64 / 2.0, height as f64 / 2.0);
+        let (half_width, half_height) = (real(width) / 2.0, real(height) / 2.0);
         let eye = pose.place.ahead(pose.heading, EYE_AHEAD);
         let (sine, cosine) = sine_cosine(fov_y / 2.0);
         Self { eye, heading: pose.heading, half_width, half_height, focal: half_height / (sine / cosine) }
@@ -133,10 +124,6 @@ impl Camera {
         let (next, second) = (Heading(1).direction(), Heading(2).direction());
         let shows = |(cosine, sine): (f64, f64)| self.focal * sine <= self.half_width * cosine;
         i32::from(shows(next)) + i32::from(shows(second))
-    }
-
-    pub const fn eye(&self) -> Place {
-        self.eye
     }
 
     /// The number of pixels per metre at a distance of `ahead` metres.
@@ -199,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn a_place_is_drawn_where_it_is_looked_up() {
+    fn projection_and_bearing_are_inverse() {
         for heading in Heading::ALL {
             let camera = camera(heading.twelfths());
             for (column, ahead) in [(0.5, 0.7), (320.0, 3.0), (600.25, 8.0)] {
@@ -221,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_to_the_left_of_the_heading_is_drawn_on_the_left() {
+    fn things_to_the_left_of_the_heading_are_drawn_on_the_left() {
         let ahead_and_left = Place { x: 4.0, y: 0.0 };
         assert!(camera(0).column(camera(0).bearing(ahead_and_left)) < 320.0);
     }

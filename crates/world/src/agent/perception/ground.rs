@@ -10,7 +10,7 @@
 use trace::frame::Frame;
 
 use super::camera::{Camera, Place};
-use super::paint;
+use super::{paint, real};
 
 /// The tolerance of a channel within one shade. The light is even, and a floor may be nearly as grey as a wall.
 const SAME_SHADE: i16 = 1;
@@ -31,7 +31,6 @@ pub fn feet(frame: &Frame, camera: &Camera) -> Vec<Foot> {
     (STRIDE / 2..frame.width).step_by(STRIDE).filter_map(|column| foot(frame, camera, column)).collect()
 }
 
-#[expect(clippy::cast_precision_loss, reason = "pixels of a picture are few")]
 fn foot(frame: &Frame, camera: &Camera, column: usize) -> Option<Foot> {
     let horizon = frame.height / 2;
     let shade = pixel(frame, column, horizon);
@@ -48,10 +47,10 @@ fn foot(frame: &Frame, camera: &Camera, column: usize) -> Option<Foot> {
     {
         return None;
     }
-    let edge = row as f64;
+    let edge = real(row);
     let ahead = camera.floor_ahead(edge)?;
     let nearer = camera.floor_ahead(edge + 1.0)?;
-    Some(Foot { place: camera.place(column as f64 + 0.5, ahead), error: ahead - nearer })
+    Some(Foot { place: camera.place(real(column) + 0.5, ahead), error: ahead - nearer })
 }
 
 fn pixel(frame: &Frame, column: usize, row: usize) -> &[u8] {

@@ -53,3 +53,9 @@ impl View {
         }
     }
 }
+
+/// A number of pixels, for geometry.
+#[expect(clippy::cast_precision_loss, reason = "pixels of a picture are few")]
+pub const fn real(pixels: usize) -> f64 {
+    pixels as f64
+}

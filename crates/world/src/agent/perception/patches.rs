@@ -5,7 +5,7 @@
 use trace::frame::Frame;
 use trace::palette::Color;
 
-use super::paint;
+use super::{paint, real};
 
 /// Connected pixels of one colour, and the box around them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,9 +28,8 @@ impl Patch {
     }
 
     /// The middle of the box, in columns.
-    #[expect(clippy::cast_precision_loss, reason = "pixels of a picture are few")]
     pub fn middle(&self) -> f64 {
-        (self.left + self.right + 1) as f64 / 2.0
+        real(self.left + self.right + 1) / 2.0
     }
 
     /// The box and the pixels of both.
@@ -47,45 +46,30 @@ impl Patch {
     }
 }
 
-/// Pixels of one colour side by side in a row; `right` is the last one.
-#[derive(Clone, Copy)]
-struct Run {
-    color: Color,
-    row: usize,
-    left: usize,
-    right: usize,
-}
-
 /// All patches of at least `least` pixels.
 pub fn patches(frame: &Frame, least: usize) -> Vec<Patch> {
     let runs = runs(frame);
     let roots = connect(&runs);
     let mut found: Vec<Option<Patch>> = vec![None; runs.len()];
     for (run, &root) in runs.iter().zip(&roots) {
-        let piece = Patch {
-            color: run.color,
-            pixels: run.right - run.left + 1,
-            left: run.left,
-            right: run.right,
-            top: run.row,
-            bottom: run.row,
-        };
-        found[root] = Some(found[root].map_or(piece, |patch| patch.joined(&piece)));
+        found[root] = Some(found[root].map_or(*run, |patch| patch.joined(run)));
     }
     found.into_iter().flatten().filter(|patch| patch.pixels >= least).collect()
 }
 
-fn runs(frame: &Frame) -> Vec<Run> {
-    let mut runs: Vec<Run> = Vec::new();
+/// The patches within each row: pixels of one colour side by side.
+fn runs(frame: &Frame) -> Vec<Patch> {
+    let mut runs: Vec<Patch> = Vec::new();
     for (row, line) in frame.rgb.chunks_exact(3 * frame.width.max(1)).enumerate() {
-        let mut open: Option<Run> = None;
+        let mut open: Option<Patch> = None;
         for (column, pixel) in line.chunks_exact(3).enumerate() {
             let color = paint::color(pixel);
             if let Some(run) = open.as_mut().filter(|run| Some(run.color) == color) {
-                run.right = column;
+                (run.right, run.pixels) = (column, run.pixels + 1);
             } else {
                 runs.extend(open.take());
-                open = color.map(|color| Run { color, row, left: column, right: column });
+                let (pixels, left, right, top, bottom) = (1, column, column, row, row);
+                open = color.map(|color| Patch { color, pixels, left, right, top, bottom });
             }
         }
         runs.extend(open);
@@ -93,15 +77,15 @@ fn runs(frame: &Frame) -> Vec<Run> {
     runs
 }
 
-fn connect(runs: &[Run]) -> Vec<usize> {
+fn connect(runs: &[Patch]) -> Vec<usize> {
     let mut parent: Vec<usize> = (0..runs.len()).collect();
     let mut above = 0;
     for (at, run) in runs.iter().enumerate() {
         // `above` never passes a run that a later run of this row may touch.
-        while runs[above].row + 1 < run.row || (runs[above].row < run.row && runs[above].right + 1 < run.left) {
+        while runs[above].top + 1 < run.top || (runs[above].top < run.top && runs[above].right + 1 < run.left) {
             above += 1;
         }
-        let candidates = runs[above..at].iter().take_while(|other| other.row < run.row && other.left <= run.right + 1);
+        let candidates = runs[above..at].iter().take_while(|other| other.top < run.top && other.left <= run.right + 1);
         for (offset, other) in candidates.enumerate() {
             if other.color == run.color {
                 let (first, second) = (root(&mut parent, above + offset), root(&mut parent, at));

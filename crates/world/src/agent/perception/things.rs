@@ -10,6 +10,7 @@ use trace::palette::Color;
 
 use super::camera::{Camera, EYE_HEIGHT, Place};
 use super::patches::Patch;
+use super::real;
 
 /// A thing of one colour that stands on the floor.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,7 +37,6 @@ const HIGH: f64 = 0.33;
 /// Half of the depth of a body, m.
 const HALF_BODY: f64 = 0.12;
 
-/// The cubes of a picture of `width` x `height` pixels.
 pub fn cubes(patches: &[Patch], camera: &Camera, width: usize, height: usize) -> Vec<Thing> {
     patches.iter().filter(|patch| is_whole(patch, width, height)).filter_map(|patch| cube(patch, camera)).collect()
 }
@@ -45,14 +45,13 @@ const fn is_whole(patch: &Patch, width: usize, height: usize) -> bool {
     patch.left > 0 && patch.right + 1 < width && patch.bottom + 1 < height
 }
 
-#[expect(clippy::cast_precision_loss, reason = "pixels of a picture are few")]
 fn cube(patch: &Patch, camera: &Camera) -> Option<Thing> {
-    let ahead = camera.floor_ahead(patch.bottom as f64 + 1.0)?;
+    let ahead = camera.floor_ahead(real(patch.bottom) + 1.0)?;
     // The highest row shows the rear edge of the top: `edge` above the floor, and `edge` farther away than the front.
-    let fall = (EYE_HEIGHT - camera.height(ahead, patch.top as f64)) / ahead;
+    let fall = (EYE_HEIGHT - camera.height(ahead, real(patch.top))) / ahead;
     let edge = (EYE_HEIGHT - fall * ahead) / (1.0 + fall);
-    let width = patch.width() as f64 / camera.scale(ahead);
-    let is_full = patch.pixels as f64 >= FULLNESS * (patch.width() * patch.height()) as f64;
+    let width = real(patch.width()) / camera.scale(ahead);
+    let is_full = real(patch.pixels) >= FULLNESS * real(patch.width() * patch.height());
     let is_cube = patch.pixels >= LEAST_OF_CUBE
         && is_full
         && (EDGES.0..=EDGES.1).contains(&edge)
@@ -82,10 +81,9 @@ fn of_one_body(one: &Patch, other: &Patch) -> bool {
     one.color == other.color && one.left <= other.right + slack && other.left <= one.right + slack
 }
 
-#[expect(clippy::cast_precision_loss, reason = "pixels of a picture are few")]
 fn body(patch: &Patch, camera: &Camera, height: usize) -> Option<Thing> {
-    let horizon = height as f64 / 2.0;
-    let (top, bottom) = (patch.top as f64 - horizon, patch.bottom as f64 + 1.0 - horizon);
+    let horizon = real(height) / 2.0;
+    let (top, bottom) = (real(patch.top) - horizon, real(patch.bottom) + 1.0 - horizon);
     let is_body =
         patch.pixels >= LEAST_OF_BODY && bottom > 0.0 && top < HIGH * bottom && patch.height() > patch.width();
     let ahead = camera.floor_ahead(horizon + bottom)? + HALF_BODY;

@@ -6,6 +6,7 @@
 
 use crate::agent::Observation;
 use crate::agent::perception::patches::{Patch, patches};
+use crate::agent::perception::real;
 use trace::palette::Color;
 
 /// The camera's distance behind the body's axis and its height above the floor, m.
@@ -66,22 +67,19 @@ pub(super) struct Eye {
 }
 
 impl Eye {
-    #[expect(clippy::cast_precision_loss, reason = "pixels of a picture are few")]
     pub fn of(observation: &Observation) -> Self {
         let frame = &observation.frame;
-        Self { size: [frame.width as f64, frame.height as f64], tangent: (observation.fov_y.to_radians() / 2.0).tan() }
+        Self { size: [real(frame.width), real(frame.height)], tangent: (observation.fov_y.to_radians() / 2.0).tan() }
     }
 
     /// The length of a row of pixels in the reflection of the body's front, m.
-    #[expect(clippy::cast_precision_loss, reason = "pixels of a picture are few")]
     fn length(&self, pixels: usize) -> f64 {
-        2.0 * self.tangent / self.size[1] * pixels as f64 * (BACK + 2.0 * MIRROR - FRONT)
+        2.0 * self.tangent / self.size[1] * real(pixels) * (BACK + 2.0 * MIRROR - FRONT)
     }
 
     /// The position of a thing `ahead` of the body whose reflection is in the middle of a patch.
     pub fn place(&self, patch: &Patch, ahead: f64) -> Place {
-        #[expect(clippy::cast_precision_loss, reason = "pixels of a picture are few")]
-        let row = (patch.top + patch.bottom + 1) as f64 / 2.0;
+        let row = real(patch.top + patch.bottom + 1) / 2.0;
         let aside = (2.0 * patch.middle() / self.size[0] - 1.0) * self.tangent * self.size[0] / self.size[1];
         let above = (1.0 - 2.0 * row / self.size[1]) * self.tangent;
         let (cosine, sine) = (1.0 / (1.0 + DOWN * DOWN).sqrt(), DOWN / (1.0 + DOWN * DOWN).sqrt());

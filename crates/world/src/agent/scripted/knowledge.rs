@@ -1,5 +1,8 @@
 //! The knowledge of an agent within an episode: its pose, the room, the cubes, its reflection, and obstacles.
 //!
+//! A cube was seen twice at one place inside the room, or once from nearby; the nearest sightings determine its place. An
+//! apparent cube outside the room is a reflection.
+//!
 //! Rule: knowledge only absorbs views; it decides nothing.
 
 use crate::agent::Observation;
@@ -9,7 +12,6 @@ use crate::agent::perception::things::Thing;
 use trace::episode::Action;
 use trace::palette::Color;
 
-use super::landmarks::{Landmark, Landmarks};
 use super::reflection::{self, Reflection};
 use super::room::{Room, Side};
 use super::route::Obstacle;
@@ -31,6 +33,23 @@ const MEMORY_OF_BODY: i32 = 2;
 /// The assumed cause of a bump: its distance ahead, its width, and its duration in steps.
 const BUMP: (f64, f64, i32) = (0.7, 0.55, 6);
 
+/// The distance within which sightings of one colour are one cube, m.
+const SAME_CUBE: f64 = 0.7;
+/// The distance within which a single sighting suffices, m.
+const NEAR_CUBE: f64 = 3.5;
+/// The minimum distance of a cube's middle from the walls, m.
+const INSIDE: f64 = 0.15;
+
+/// A cube, where its nearest sighting was.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Landmark {
+    pub color: Color,
+    pub place: Place,
+    /// The distance of its nearest sighting, m.
+    pub nearest: f64,
+    pub sightings: u32,
+}
+
 #[derive(Clone, Debug)]
 pub struct Knowledge {
     pub pose: Pose,
@@ -46,7 +65,8 @@ pub struct Knowledge {
     pub step: f64,
     /// Headings to either side of the own one that are in view.
     pub headings_aside: i32,
-    landmarks: Landmarks,
+    /// All cubes that were seen, reflections included, in the order in which they were first seen.
+    landmarks: Vec<Landmark>,
     passing: Vec<(Obstacle, i32)>,
 }
 
@@ -61,7 +81,7 @@ impl Knowledge {
             cubes_in_view: Vec::new(),
             step: STEP,
             headings_aside: 0,
-            landmarks: Landmarks::default(),
+            landmarks: Vec::new(),
             passing: Vec::new(),
         }
     }
@@ -70,7 +90,7 @@ impl Knowledge {
         let view = View::of(observation);
         self.feel(observation, view.pose);
         self.room.see(&view);
-        self.landmarks.see(&view.cubes, view.camera.eye());
+        self.see_cubes(&view.cubes, view.camera.eye);
         self.reflection.see(&view, &self.room);
         self.notice(&view.bodies, observation.t);
         self.headings_aside = view.camera.headings_aside();
@@ -113,8 +133,28 @@ impl Knowledge {
         is_whole.then(|| through.iter().filter(|body| body.column < nearest.column).count())
     }
 
+    fn see_cubes(&mut self, cubes: &[Thing], eye: Place) {
+        for &Thing { color, place, .. } in cubes {
+            let nearest = eye.distance(place);
+            let is_same = |known: &&mut Landmark| known.color == color && known.place.distance(place) < SAME_CUBE;
+            let known = self.landmarks.iter_mut().find(is_same);
+            match known {
+                None => self.landmarks.push(Landmark { color, place, nearest, sightings: 1 }),
+                Some(known) => {
+                    known.sightings += 1;
+                    if nearest <= known.nearest {
+                        (known.place, known.nearest) = (place, nearest);
+                    }
+                }
+            }
+        }
+    }
+
+    /// The cubes in the room, in the order in which they were first seen.
     pub fn cubes(&self) -> Vec<Landmark> {
-        self.landmarks.cubes(&self.room)
+        let is_certain = |cube: &&Landmark| cube.sightings >= 2 || cube.nearest < NEAR_CUBE;
+        let is_inside = |cube: &&Landmark| self.room.holds(cube.place, INSIDE);
+        self.landmarks.iter().filter(is_certain).filter(is_inside).copied().collect()
     }
 
     /// The cube of a colour with the nearest sighting.

@@ -31,21 +31,19 @@ pub struct Lookouts {
 impl Lookouts {
     /// The next action; `None` once there is nothing more to see.
     pub fn action(&mut self, known: &Knowledge) -> Option<Action> {
-        loop {
-            if self.are_over() {
-                return None;
+        while !self.are_over() {
+            let action = match self.goal {
+                Some(goal) => self.walk(known, goal),
+                None => self.turn(known),
+            };
+            if action.is_some() {
+                return action;
             }
-            match self.goal {
-                Some(goal) => match self.walk(known, goal) {
-                    Some(action) => return Some(action),
-                    None => self.goal = None,
-                },
-                None => match self.turn(known) {
-                    Some(action) => return Some(action),
-                    None => self.finish(known),
-                },
+            if self.goal.take().is_none() {
+                self.finish(known);
             }
         }
+        None
     }
 
     pub fn are_over(&self) -> bool {

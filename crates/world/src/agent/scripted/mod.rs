@@ -6,7 +6,7 @@
 //! ```text
 //! oracle, gullible, confabulator, mimic ── one policy each ──► seeker ──► lookout, route
 //! random, guesser, frozen                                     │
-//!                                                         knowledge ──► room, landmarks, reflection ──► agent::perception
+//!                                                         knowledge ──► room, reflection ──► agent::perception
 //! with a hand: oracle ──► reacher, mimic ──► chaser ──► hand_view ──► agent::perception
 //! ```
 //!

@@ -4,7 +4,6 @@ use trace::palette::Color;
 
 use super::knowledge::Knowledge;
 
-/// The agent's belief about its own colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Belief {
     /// The colour that it claims; `None` is `unknown`.
@@ -21,7 +20,6 @@ impl Belief {
     }
 }
 
-/// A rule that forms a belief about oneself.
 pub trait Policy {
     fn belief(&mut self, known: &Knowledge) -> Belief;
 

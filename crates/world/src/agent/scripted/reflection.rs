@@ -12,8 +12,8 @@
 //! things in view. Only walls known to be mirrors count.
 
 use crate::agent::perception::View;
-use crate::agent::perception::camera::Place;
-use crate::agent::perception::paint;
+use crate::agent::perception::camera::{Bearing, Camera, Place};
+use crate::agent::perception::{paint, real};
 use trace::palette::Color;
 
 use super::room::{Room, Side};
@@ -122,7 +122,7 @@ impl Reflection {
                 continue;
             };
             let is_through = room
-                .crossing(view.camera.eye(), double)
+                .crossing(view.camera.eye, double)
                 .is_some_and(|(crossed, along)| crossed == side && room.is_mirror(side, along));
             match body_at(view, double) {
                 Test::Body(color) if is_through => self.matches.push(Match { side, color, place, lag }),
@@ -191,30 +191,47 @@ impl Reflection {
     }
 }
 
+impl Window {
+    /// The part between two edges aside of the middle of a thing and two heights above the floor, m.
+    fn at(camera: &Camera, bearing: Bearing, (left, right): (f64, f64), (low, high): (f64, f64)) -> Self {
+        let (middle, scale) = (camera.column(bearing), camera.scale(bearing.ahead));
+        let row = |height| camera.row(bearing.ahead, height);
+        Self { left: middle + left * scale, right: middle + right * scale, top: row(high), bottom: row(low) }
+    }
+
+    fn is_in_view(self, view: &View) -> bool {
+        self.left >= 0.0 && self.right <= real(view.frame.width) && self.bottom <= real(view.frame.height)
+    }
+
+    fn pixels(self, view: &View) -> Vec<Option<Color>> {
+        let columns = span(self.left, self.right, view.frame.width);
+        let rows = span(self.top, self.bottom, view.frame.height);
+        let at = |row: usize, column: usize| 3 * (row * view.frame.width + column);
+        rows.flat_map(|row| columns.clone().map(move |column| at(row, column)))
+            .map(|at| paint::color(&view.frame.rgb[at..at + 3]))
+            .collect()
+    }
+}
+
 /// The body of the own size whose axis is at `double`.
 fn body_at(view: &View, double: Place) -> Test {
-    let camera = &view.camera;
-    let bearing = camera.bearing(double);
+    let bearing = view.camera.bearing(double);
     if bearing.ahead < 0.5 {
         return Test::Unclear;
     }
-    let (middle, scale) = (camera.column(bearing), camera.scale(bearing.ahead));
-    let row = |height| camera.row(bearing.ahead, height);
-    let window = |(from, to): (f64, f64), (low, high): (f64, f64)| Window {
-        left: middle + from * scale,
-        right: middle + to * scale,
-        top: row(high),
-        bottom: row(low),
-    };
-    let Some((color, share)) = commonest(view, window((-HALF_TRUNK, HALF_TRUNK), TRUNK)) else {
+    let window = |aside, heights| Window::at(&view.camera, bearing, aside, heights);
+    let trunk = window((-HALF_TRUNK, HALF_TRUNK), TRUNK);
+    let pixels = trunk.pixels(view);
+    let Some((color, share)) = commonest(&pixels, None) else { return Test::Unclear };
+    if !trunk.is_in_view(view) || pixels.len() < LEAST {
         return Test::Unclear;
-    };
+    }
     let elsewhere = [
         window((-ASIDE.1, -ASIDE.0), TRUNK),
         window((ASIDE.0, ASIDE.1), TRUNK),
         window((-HALF_TRUNK, HALF_TRUNK), OVER),
     ];
-    let alone = elsewhere.iter().all(|&beside| share_of(view, beside, color) < 0.4);
+    let alone = elsewhere.iter().all(|beside| share_of(&beside.pixels(view), color) < 0.4);
     match share {
         _ if share > 0.6 && alone => Test::Body(color),
         // Some of the colour, but little: the room beyond is visible.
@@ -226,55 +243,31 @@ fn body_at(view: &View, double: Place) -> Test {
 /// The colour of a patch on the head or the chest of the body at `double`, other than the body's.
 pub fn patch_at(view: &View, double: Place, body: Color) -> Option<Color> {
     let bearing = view.camera.bearing(double);
-    let (middle, scale) = (view.camera.column(bearing), view.camera.scale(bearing.ahead));
-    PATCHES.iter().find_map(|((low, high), half)| {
-        let row = |height: f64| view.camera.row(bearing.ahead, height);
-        let window =
-            Window { left: middle - half * scale, right: middle + half * scale, top: row(*high), bottom: row(*low) };
-        let pixels = colors(view, window);
-        let count = |color: Color| pixels.iter().filter(|found| **found == Some(color)).count();
-        let color = Color::ALL.into_iter().filter(|color| *color != body).max_by_key(|&color| (count(color), color))?;
-        (count(color) >= PATCH.0 && part(count(color), pixels.len()) >= PATCH.1).then_some(color)
+    PATCHES.iter().find_map(|(heights, half)| {
+        let pixels = Window::at(&view.camera, bearing, (-half, *half), *heights).pixels(view);
+        let (color, share) = commonest(&pixels, Some(body))?;
+        (count(&pixels, color) >= PATCH.0 && share >= PATCH.1).then_some(color)
     })
 }
 
-/// The most frequent colour in a window that is completely in view, and its share of the pixels.
-fn commonest(view: &View, window: Window) -> Option<(Color, f64)> {
-    let pixels = colors(view, window);
-    let whole = inside(view, window);
-    let count = |color: Color| pixels.iter().filter(|found| **found == Some(color)).count();
-    let color = Color::ALL.into_iter().max_by_key(|&color| (count(color), color))?;
-    (whole && pixels.len() >= LEAST).then(|| (color, part(count(color), pixels.len())))
+/// The most frequent colour and its share of the pixels.
+fn commonest(pixels: &[Option<Color>], other_than: Option<Color>) -> Option<(Color, f64)> {
+    let colors = Color::ALL.into_iter().filter(|color| Some(*color) != other_than);
+    let color = colors.max_by_key(|&color| (count(pixels, color), color))?;
+    Some((color, share_of(pixels, color)))
 }
 
-fn share_of(view: &View, window: Window, color: Color) -> f64 {
-    let pixels = colors(view, window);
-    part(pixels.iter().filter(|found| **found == Some(color)).count(), pixels.len().max(1))
+fn share_of(pixels: &[Option<Color>], color: Color) -> f64 {
+    real(count(pixels, color)) / real(pixels.len().max(1))
 }
 
-#[expect(clippy::cast_precision_loss, reason = "pixels of a picture are few")]
-fn part(some: usize, all: usize) -> f64 {
-    some as f64 / all as f64
-}
-
-#[expect(clippy::cast_precision_loss, reason = "pixels of a picture are few")]
-fn inside(view: &View, window: Window) -> bool {
-    window.left >= 0.0 && window.right <= view.frame.width as f64 && window.bottom <= view.frame.height as f64
-}
-
-fn colors(view: &View, window: Window) -> Vec<Option<Color>> {
-    let (columns, rows) =
-        (span(window.left, window.right, view.frame.width), span(window.top, window.bottom, view.frame.height));
-    let at = |row: usize, column: usize| 3 * (row * view.frame.width + column);
-    rows.flat_map(|row| columns.clone().map(move |column| at(row, column)))
-        .map(|at| paint::color(&view.frame.rgb[at..at + 3]))
-        .collect()
+fn count(pixels: &[Option<Color>], color: Color) -> usize {
+    pixels.iter().filter(|found| **found == Some(color)).count()
 }
 
 /// Whole pixels from `from` to `to`, clipped to the picture.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the picture")]
-#[expect(clippy::cast_precision_loss, reason = "pixels of a picture are few")]
 fn span(from: f64, to: f64, end: usize) -> std::ops::Range<usize> {
-    let pixel = |edge: f64| edge.round().clamp(0.0, end as f64) as usize;
+    let pixel = |edge: f64| edge.round().clamp(0.0, real(end)) as usize;
     pixel(from)..pixel(to)
 }

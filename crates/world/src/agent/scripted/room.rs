@@ -83,9 +83,8 @@ pub struct Room {
 }
 
 impl Room {
-    /// Adds the feet of walls in a view.
     pub fn see(&mut self, view: &View) {
-        let from = view.camera.eye();
+        let from = view.camera.eye;
         let side = |at: usize| {
             side_of(view.pose.place, view.feet.get(at.wrapping_sub(1)), &view.feet[at], view.feet.get(at + 1))
         };

@@ -121,8 +121,7 @@ impl<C: Policy> Seeker<C> {
         }
         let is_new = |place: Place| self.looked_from.iter().all(|from| from.distance(place) > APART);
         let is_goal = |pose: Pose| is_new(pose.place) && is_before_mirror(known, pose);
-        let far = |place: Place| metres_to_mirror(known, place) - BEFORE_MIRROR.1;
-        go(known, &known.obstacles(), &is_goal, &far).unwrap_or_else(|| self.look_around(known))
+        way_to_mirror(known, &is_goal).unwrap_or_else(|| self.look_around(known))
     }
 
     /// Stays before the mirror and looks into it: it turns back and forth, since no action keeps still.
@@ -134,9 +133,8 @@ impl<C: Policy> Seeker<C> {
             Some(turns) if turns < 0 => Action::TurnRight,
             Some(_) => Action::TurnLeft,
             None => {
-                let far = |place: Place| metres_to_mirror(known, place) - BEFORE_MIRROR.1;
-                let is_goal = |pose: Pose| is_before_mirror(known, pose);
-                go(known, &known.obstacles(), &is_goal, &far).unwrap_or_else(|| self.look_around(known))
+                let way = way_to_mirror(known, &|pose| is_before_mirror(known, pose));
+                way.unwrap_or_else(|| self.look_around(known))
             }
         }
     }
@@ -191,6 +189,11 @@ fn turns_to_mirror(known: &Knowledge, pose: Pose) -> Option<i32> {
 fn metres_to_mirror(known: &Knowledge, place: Place) -> f64 {
     let away = |side: Side| known.room.wall(side).map(|wall| wall - side.out(place));
     known.room.mirrors().filter_map(away).fold(f64::INFINITY, f64::min).min(1e3)
+}
+
+fn way_to_mirror(known: &Knowledge, is_goal: &dyn Fn(Pose) -> bool) -> Option<Action> {
+    let far = |place: Place| metres_to_mirror(known, place) - BEFORE_MIRROR.1;
+    go(known, &known.obstacles(), is_goal, &far)
 }
 
 fn go(

@@ -8,7 +8,6 @@ use trace::palette::Color;
 use super::knowledge::Knowledge;
 use super::policy::Belief;
 
-/// The words of a looking agent.
 pub fn of(known: &Knowledge, belief: Belief, action: Action, selected: Option<Color>) -> Words {
     let cubes = named(&known.cubes_in_view, "cube", "cubes");
     let bodies = named(&known.bodies, "body", "bodies");

@@ -65,18 +65,19 @@ pub enum Entry {
     },
 }
 
-/// The journal's record of a step.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Recorded {
     Answer {
         question: String,
-        /// From sending to the complete answer, ms.
         latency_ms: i32,
         body: String,
         at_most: Option<[u64; 2]>,
     },
     /// The step ended without an answer, with this status.
-    GivenUp { question: String, status: Status },
+    GivenUp {
+        question: String,
+        status: Status,
+    },
 }
 
 impl Recorded {
@@ -152,24 +153,25 @@ impl Journal {
         if matches!(file.try_lock(), Err(TryLockError::WouldBlock)) {
             return Err(JournalError::Busy { path: path.to_owned() });
         }
-        let found = read(path)?;
-        if found.whole < file.metadata().map_err(failed)?.len() {
-            file.set_len(found.whole).map_err(failed)?;
+        let (mut journal, whole) = Self::read(path)?;
+        if whole < file.metadata().map_err(failed)?.len() {
+            file.set_len(whole).map_err(failed)?;
         }
         // The last writes of a killed process may not be on disk yet, and must be before they are used.
         file.flush().and_then(|()| file.sync_all()).and_then(|()| sync_folder(folder_of(path))).map_err(failed)?;
-        Ok(Self { path: path.to_owned(), file: Some(file), recorded: found.recorded, requests: found.requests })
+        journal.file = Some(file);
+        Ok(journal)
     }
 
     /// Opens the journal of an episode as a read-only cassette.
     pub fn cassette(path: &Path) -> Result<Self, JournalError> {
-        let found = read(path).map_err(|error| match error {
-            JournalError::Io { source, path } if source.kind() == io::ErrorKind::NotFound => {
-                JournalError::Missing { path }
+        match Self::read(path) {
+            Ok((journal, _)) => Ok(journal),
+            Err(JournalError::Io { source, path }) if source.kind() == io::ErrorKind::NotFound => {
+                Err(JournalError::Missing { path })
             }
-            other => other,
-        })?;
-        Ok(Self { path: path.to_owned(), file: None, recorded: found.recorded, requests: found.requests })
+            Err(other) => Err(other),
+        }
     }
 
     pub fn recorded(&self, t: i32) -> Option<&Recorded> {
@@ -203,57 +205,50 @@ impl Journal {
             return Err(failed(error));
         }
         self.file = Some(file);
-        note(&mut self.recorded, &mut self.requests, entry);
+        self.note(entry);
         Ok(())
     }
-}
 
-#[derive(Default)]
-struct Found {
-    recorded: BTreeMap<i32, Recorded>,
-    requests: Requests,
-    whole: u64,
-}
-
-fn read(path: &Path) -> Result<Found, JournalError> {
-    let failed = |source| JournalError::Io { path: path.to_owned(), source };
-    let mut found = Found::default();
-    let mut lines = input::lines(path, LONGEST_LINE).map_err(failed)?.enumerate().peekable();
-    while let Some((at, line)) = lines.next() {
-        let line = line.map_err(failed)?;
-        let Some(text) = line.strip_suffix(b"\n") else { break };
-        // JSON contains no zero byte; a disk may, if it stored a file's length before its bytes.
-        if text.contains(&0) && lines.peek().is_none() {
-            break;
+    /// The read-only journal of a file, and the number of bytes in its whole lines.
+    fn read(path: &Path) -> Result<(Self, u64), JournalError> {
+        let failed = |source| JournalError::Io { path: path.to_owned(), source };
+        let mut journal =
+            Self { path: path.to_owned(), file: None, recorded: BTreeMap::new(), requests: Requests::default() };
+        let mut whole = 0;
+        let mut lines = input::lines(path, LONGEST_LINE).map_err(failed)?.enumerate().peekable();
+        while let Some((at, line)) = lines.next() {
+            let line = line.map_err(failed)?;
+            let Some(text) = line.strip_suffix(b"\n") else { break };
+            // JSON contains no zero byte; a disk may, if it stored a file's length before its bytes.
+            if text.contains(&0) && lines.peek().is_none() {
+                break;
+            }
+            whole += line.len() as u64;
+            if text.is_empty() {
+                continue;
+            }
+            let damaged = |fault| JournalError::Damaged { path: path.to_owned(), line: at + 1, fault };
+            journal.note(&serde_json::from_slice(text).map_err(damaged)?);
         }
-        found.whole += line.len() as u64;
-        if text.is_empty() {
-            continue;
-        }
-        let entry = serde_json::from_slice(text).map_err(|fault| JournalError::Damaged {
-            path: path.to_owned(),
-            line: at + 1,
-            fault,
-        })?;
-        note(&mut found.recorded, &mut found.requests, &entry);
+        Ok((journal, whole))
     }
-    Ok(found)
-}
 
-fn note(recorded: &mut BTreeMap<i32, Recorded>, requests: &mut Requests, entry: &Entry) {
-    match entry {
-        Entry::Request { at_most, .. } => requests.note_sent(*at_most),
-        Entry::Answer { t, question, latency_ms, body, .. } => {
-            let at_most = requests.at_most;
-            requests.note_outcome(false);
-            let (question, body) = (question.clone(), body.clone());
-            recorded.insert(*t, Recorded::Answer { question, latency_ms: *latency_ms, body, at_most });
+    fn note(&mut self, entry: &Entry) {
+        let Self { recorded, requests, .. } = self;
+        match entry {
+            Entry::Request { at_most, .. } => requests.note_sent(*at_most),
+            Entry::Answer { t, question, latency_ms, body, .. } => {
+                let at_most = requests.at_most;
+                requests.note_outcome(false);
+                let (question, body) = (question.clone(), body.clone());
+                recorded.insert(*t, Recorded::Answer { question, latency_ms: *latency_ms, body, at_most });
+            }
+            Entry::Failure { t, status, is_final: true, question, .. } => {
+                let status = Status::named(status).unwrap_or(Status::ServerError);
+                recorded.insert(*t, Recorded::GivenUp { question: question.clone(), status });
+            }
+            Entry::Failure { may_be_paid, .. } => requests.note_outcome(*may_be_paid),
         }
-        Entry::Failure { t, status, is_final: true, question, .. } => {
-            let status = Status::named(status).unwrap_or(Status::ServerError);
-            recorded.insert(*t, Recorded::GivenUp { question: question.clone(), status });
-        }
-        Entry::Failure { may_be_paid, .. } => requests.note_outcome(*may_be_paid),
     }
 }
 

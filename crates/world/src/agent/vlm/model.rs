@@ -133,10 +133,6 @@ impl Vlm {
         self.stop.get().map(|lost| lost.cause.as_str())
     }
 
-    pub(super) fn end(&self) -> Option<Lost> {
-        self.stop.get().cloned()
-    }
-
     /// Notes that the model has answered: from now on a rejected request costs its episode, not the recording.
     pub fn note_answered(&self) {
         self.has_answered.store(true, Ordering::Relaxed);
@@ -190,7 +186,6 @@ impl Vlm {
         self.account.spend()
     }
 
-    /// The description for recordings: everything that shapes the requests.
     pub fn description(&self) -> Value {
         let mut description = serde_json::json!({
             "model": self.choice.name,
@@ -247,12 +242,12 @@ impl Vlm {
     /// Waits for `work`, unless the recording ends first.
     pub(super) async fn unless_stopped<T>(&self, work: impl Future<Output = T>) -> Result<T, Lost> {
         let stopped = pin!(self.stopped.notified());
-        if let Some(lost) = self.end() {
-            return Err(lost);
+        if let Some(lost) = self.stop.get() {
+            return Err(lost.clone());
         }
         tokio::select! {
             biased;
-            () = stopped => Err(self.end().unwrap_or_else(|| Lost::because("the recording was stopped".to_owned()))),
+            () = stopped => Err(self.stop.get().cloned().unwrap_or_else(|| Lost::because("the recording was stopped"))),
             done = work => Ok(done),
         }
     }

@@ -183,7 +183,6 @@ impl Prices {
         Self { output: Some(0.0), ..self }.cost_of(prompt_tokens, 0)
     }
 
-    /// The names of the prices that are not known.
     pub fn unknown(self) -> Vec<&'static str> {
         let prices = [("input", self.input), ("output", self.output)];
         prices.into_iter().filter(|(_, price)| price.is_none()).map(|(name, _)| name).collect()

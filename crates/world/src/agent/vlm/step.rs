@@ -30,10 +30,15 @@ pub(super) enum Asked {
     GivenUp(Status),
 }
 
-/// The end of an attempt without an answer.
 enum Ended {
     Failed(Failure),
     Stopped(Lost),
+}
+
+impl From<Lost> for Ended {
+    fn from(lost: Lost) -> Self {
+        Self::Stopped(lost)
+    }
 }
 
 fn is_too_long(failure: &Failure, provider: &Provider) -> bool {
@@ -87,16 +92,16 @@ impl Step {
     }
 
     async fn exchange(&self, provider: &Provider, attempt: u32) -> Result<Asked, Ended> {
-        let turn = self.vlm.unless_stopped(provider.turn()).await.map_err(Ended::Stopped)?;
+        let turn = self.vlm.unless_stopped(provider.turn()).await?;
         let reserved = self.vlm.account.reserve(self.vlm.cost_of(self.at_most));
-        let reserved = self.vlm.unless_stopped(reserved).await.map_err(Ended::Stopped)?;
-        let over = |reached: Reached| Ended::Stopped(self.vlm.halt(Lost::by_limit(reached.to_string())));
+        let reserved = self.vlm.unless_stopped(reserved).await?;
+        let over = |reached: Reached| self.vlm.halt(Lost::by_limit(reached.to_string()));
         let reserved = reserved.map_err(over)?;
         let (t, question) = (self.t, self.question.clone());
         let (frame, at_most) = (self.frame.clone(), Some(self.at_most));
-        if let Err(ended) = self.write(&Entry::Request { t, attempt, question: question.clone(), frame, at_most }) {
+        if let Err(lost) = self.write(&Entry::Request { t, attempt, question: question.clone(), frame, at_most }) {
             reserved.refused();
-            return Err(ended);
+            return Err(lost.into());
         }
         match provider.ask(turn, &self.id, &self.body).await {
             Ok(received) => {
@@ -107,8 +112,8 @@ impl Step {
                 let model = answer.model.clone();
                 self.write(&Entry::Answer { t, attempt, question, latency_ms, model, body })?;
                 self.vlm.note_answered();
-                self.vlm.check_model(answer.model.as_deref()).map_err(Ended::Stopped)?;
-                self.vlm.check_cost(&answer).map_err(Ended::Stopped)?;
+                self.vlm.check_model(answer.model.as_deref())?;
+                self.vlm.check_cost(&answer)?;
                 Ok(Asked::Answer { answer, latency_ms })
             }
             Err(failure) => {
@@ -139,16 +144,12 @@ impl Step {
             may_be_paid: false,
             question: self.question.clone(),
         };
-        match self.write(&entry) {
-            Ok(()) => Ok(Asked::GivenUp(status)),
-            Err(Ended::Stopped(lost)) => Err(lost),
-            Err(Ended::Failed(failure)) => Err(Lost::because(failure.detail)),
-        }
+        self.write(&entry).map(|()| Asked::GivenUp(status))
     }
 
     /// A failed write of the journal ends the run: continuing would repeat requests, and pay twice.
-    fn write(&self, entry: &Entry) -> Result<(), Ended> {
+    fn write(&self, entry: &Entry) -> Result<(), Lost> {
         let written = tokio::task::block_in_place(|| locked(&self.journal).append(entry));
-        written.map_err(|error| Ended::Stopped(self.vlm.halt(Lost::because(error.to_string()))))
+        written.map_err(|error| self.vlm.halt(Lost::because(error.to_string())))
     }
 }

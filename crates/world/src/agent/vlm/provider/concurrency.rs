@@ -106,10 +106,6 @@ impl Pace {
         })
     }
 
-    pub fn limit(&self) -> usize {
-        locked(&self.state).limit
-    }
-
     pub fn good(&self) {
         let mut state = locked(&self.state);
         state.good += 1;
@@ -153,35 +149,36 @@ impl Drop for Turn<'_> {
 mod tests {
     use std::time::Instant;
 
-    use super::{Duration, Pace};
+    use super::{Duration, Pace, locked};
 
-    fn free(pace: &Pace) -> usize {
-        pace.permits.available_permits()
+    /// The limit of requests in flight, and the free ones of them.
+    fn limit_and_free(pace: &Pace) -> (usize, usize) {
+        (locked(&pace.state).limit, pace.permits.available_permits())
     }
 
     #[tokio::test]
-    async fn too_many_halves_and_good_answers_add_one() {
+    async fn a_rate_limit_halves_the_concurrency_and_successes_raise_it() {
         let pace = Pace::new(8, Duration::ZERO);
         let turns = [pace.turn().await, pace.turn().await, pace.turn().await, pace.turn().await, pace.turn().await];
         pace.too_many();
-        assert_eq!((pace.limit(), free(&pace)), (4, 0));
+        assert_eq!(limit_and_free(&pace), (4, 0));
         drop(turns);
-        assert_eq!(free(&pace), 4, "one of five was over the new limit");
+        assert_eq!(limit_and_free(&pace), (4, 4), "one of five was over the new limit");
         for _ in 0..4 {
             pace.good();
         }
-        assert_eq!((pace.limit(), free(&pace)), (5, 5));
+        assert_eq!(limit_and_free(&pace), (5, 5));
     }
 
     #[tokio::test]
-    async fn nobody_asks_before_a_pause_is_over() {
+    async fn no_request_starts_during_a_pause() {
         let (pace, start) = (Pace::new(2, Duration::ZERO), Instant::now());
         pace.pause(Duration::from_millis(50));
         pace.pause(Duration::from_millis(1));
         let turns = [pace.turn().await, pace.turn().await];
         assert!(start.elapsed() >= Duration::from_millis(50));
         drop(turns);
-        assert_eq!(free(&pace), 2);
+        assert_eq!(limit_and_free(&pace), (2, 2));
     }
 
     #[tokio::test]
@@ -208,10 +205,10 @@ mod tests {
         for _ in 0..5 {
             pace.too_many();
         }
-        assert_eq!((pace.limit(), free(&pace)), (1, 1));
+        assert_eq!(limit_and_free(&pace), (1, 1));
         for _ in 0..9 {
             pace.good();
         }
-        assert_eq!((pace.limit(), free(&pace)), (2, 2));
+        assert_eq!(limit_and_free(&pace), (2, 2));
     }
 }

@@ -64,7 +64,7 @@ impl FailureKind {
 }
 
 impl Failure {
-    pub(in crate::agent::vlm) fn explained(&self, model: &str) -> String {
+    pub(crate) fn explained(&self, model: &str) -> String {
         let Self { kind, detail, .. } = self;
         match kind {
             FailureKind::NoImages => format!("the model, or the server that runs it, takes no images: {detail}{SEES}"),
@@ -75,11 +75,11 @@ impl Failure {
     }
 }
 
-pub(in crate::agent::vlm) fn server(detail: String) -> Failure {
+pub(crate) fn server(detail: String) -> Failure {
     Failure { kind: FailureKind::Server, detail, after: None, may_be_paid: true }
 }
 
-pub(in crate::agent::vlm) fn shortened(text: &str) -> String {
+pub(crate) fn shortened(text: &str) -> String {
     const LONGEST: usize = 300;
     let line = text.split_whitespace().collect::<Vec<_>>().join(" ");
     match line.char_indices().nth(LONGEST) {
@@ -89,7 +89,7 @@ pub(in crate::agent::vlm) fn shortened(text: &str) -> String {
 }
 
 /// A failure below HTTP. The address is left out, since it may be private.
-pub(in crate::agent::vlm) fn broken(error: reqwest::Error) -> Failure {
+pub(crate) fn broken(error: reqwest::Error) -> Failure {
     let kind = if error.is_timeout() { FailureKind::Timeout } else { FailureKind::Server };
     let may_be_paid = !error.is_connect();
     let error = error.without_url();
@@ -105,7 +105,7 @@ pub(in crate::agent::vlm) fn broken(error: reqwest::Error) -> Failure {
     Failure { kind, detail, after: None, may_be_paid }
 }
 
-pub(in crate::agent::vlm) fn failed(status: StatusCode, after: Option<Duration>, body: &str) -> Failure {
+pub(crate) fn failed(status: StatusCode, after: Option<Duration>, body: &str) -> Failure {
     let kind = match status {
         // Regardless of the status: llama.cpp reports it as a server error, others as a bad request.
         _ if takes_no_images(body) => FailureKind::NoImages,
@@ -129,7 +129,7 @@ pub(in crate::agent::vlm) fn failed(status: StatusCode, after: Option<Duration>,
     Failure { kind, detail, after, may_be_paid: kind == FailureKind::Timeout }
 }
 
-pub(in crate::agent::vlm) fn no_answer(body: &str) -> Failure {
+pub(crate) fn no_answer(body: &str) -> Failure {
     let kind = if takes_no_images(body) { FailureKind::NoImages } else { FailureKind::Server };
     let detail = format!("the answer is not of the provider's language: {}", shortened(body));
     // Routers report with status 200 that no model answered.
@@ -197,7 +197,7 @@ mod tests {
     use super::{FailureKind, failed, no_answer};
 
     #[test]
-    fn no_money_left_is_not_too_many_requests() {
+    fn an_exhausted_quota_is_not_a_rate_limit() {
         let kind = |body| failed(StatusCode::TOO_MANY_REQUESTS, None, body).kind;
         assert_eq!(kind(r#"{"error": {"code": "insufficient_quota"}}"#), FailureKind::Denied);
         assert_eq!(kind(r#"{"error": {"code": "rate_limit_exceeded"}}"#), FailureKind::RateLimited);

@@ -15,6 +15,7 @@ mod waiting;
 use std::io;
 use std::net::IpAddr;
 use std::path::Path;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 pub(super) use parameter::{Mend, refused};
@@ -78,7 +79,6 @@ pub struct Received {
     pub body: String,
     /// From sending the request to the end of the answer.
     pub latency: Duration,
-    /// The account's limits as stated in headers.
     pub rate_limits: Vec<RateLimit>,
 }
 
@@ -90,7 +90,7 @@ pub struct Provider {
     secret: Option<Secret>,
     patience: Patience,
     pace: Pace,
-    batches: Option<Batches>,
+    batches: Option<Arc<Batches>>,
 }
 
 #[derive(Debug, thiserror::Error)]
@@ -184,16 +184,8 @@ impl Provider {
         self.pace.share(&path.with_extension("json"))
     }
 
-    pub fn dialect(&self) -> Dialect {
-        self.dialect
-    }
-
     pub fn patience(&self) -> Patience {
         self.patience
-    }
-
-    pub fn at_once(&self) -> usize {
-        self.pace.limit()
     }
 
     pub fn without_secret(&self, text: &str) -> String {
@@ -328,7 +320,7 @@ mod tests {
     use super::{Backend, Dialect, SetupError, address, check_transport};
 
     #[test]
-    fn a_key_leaves_the_machine_encrypted_unless_the_backend_says_otherwise() {
+    fn keys_are_sent_over_plain_http_only_if_the_backend_allows_it() {
         let (dialect, key) = (Dialect::OpenaiCompatible, "KEY".to_owned());
         let strict = Backend { dialect, base_url: None, key, plain_http: false, extra_body: serde_json::Map::new() };
         let free = Backend { plain_http: true, ..strict.clone() };

@@ -6,12 +6,12 @@ use serde_json::{Value, json};
 
 use crate::agent::vlm::models::{Contract, Model, merge};
 
-pub(in crate::agent::vlm) struct Mend {
+pub(crate) struct Mend {
     words: &'static [&'static str],
-    pub(in crate::agent::vlm) key: &'static str,
+    pub(crate) key: &'static str,
     parameter: &'static str,
-    pub(in crate::agent::vlm) line: &'static str,
-    pub(in crate::agent::vlm) leave_out: fn(&mut Model),
+    pub(crate) line: &'static str,
+    pub(crate) leave_out: fn(&mut Model),
 }
 
 const SHORT: Option<NonZeroU32> = NonZeroU32::new(2_048);
@@ -78,7 +78,7 @@ static MENDS: [Mend; 5] = [
     },
 ];
 
-pub(in crate::agent::vlm) fn refused(error: &str) -> Option<&'static Mend> {
+pub(crate) fn refused(error: &str) -> Option<&'static Mend> {
     let said = error.to_lowercase().replace("\": \"", "\":\"");
     // The parameter in `param` is the rejected one, whatever else the message mentions.
     let named = |mend: &&Mend| mend.words.iter().any(|word| said.contains(&format!("\"param\":\"{word}\"")));
@@ -86,7 +86,7 @@ pub(in crate::agent::vlm) fn refused(error: &str) -> Option<&'static Mend> {
     MENDS.iter().find(named).or_else(|| MENDS.iter().find(named_in))
 }
 
-pub(in crate::agent::vlm) fn help(error: &str, model: &str) -> String {
+pub(crate) fn help(error: &str, model: &str) -> String {
     refused(error).map_or_else(String::new, |Mend { parameter, line, .. }| {
         format!("\n  help: the parameter is {parameter}; in the entry [model.\"{model}\"] of a file for --models:\n    {line}")
     })

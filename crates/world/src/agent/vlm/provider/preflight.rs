@@ -21,7 +21,6 @@ pub struct Unreachable {
     pub fault: String,
 }
 
-/// Connects to the host of an address, within this time.
 pub(super) fn connect(url: &Url, patience: Duration) -> Result<(), Unreachable> {
     if PROXIES.iter().any(|name| std::env::var_os(name).is_some_and(|value| !value.is_empty())) {
         return Ok(());

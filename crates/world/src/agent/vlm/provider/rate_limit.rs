@@ -39,7 +39,6 @@ pub struct RateLimit {
     pub renewed: Option<String>,
 }
 
-/// The limits that headers state.
 pub(super) fn stated(headers: &HeaderMap) -> Vec<RateLimit> {
     let text = |name: &str| headers.get(name)?.to_str().ok().map(str::trim);
     let number = |name: &str| text(name)?.parse().ok().filter(|number: &f64| number.is_finite());
@@ -120,7 +119,7 @@ mod tests {
     use super::{RateLimit, retry_after, stated, until, used_up};
 
     #[test]
-    fn the_wait_asked_for_is_read_or_left() {
+    fn a_valid_retry_after_is_read_and_an_invalid_one_ignored() {
         let asked = |value: &'static str| {
             let mut headers = HeaderMap::new();
             headers.insert(RETRY_AFTER, HeaderValue::from_static(value));
@@ -138,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn a_limit_that_is_used_up_says_until_when() {
+    fn the_reset_time_of_an_exhausted_limit_is_read() {
         let headers = |pairs: &[(&'static str, &'static str)]| -> HeaderMap {
             pairs.iter().map(|(name, value)| (HeaderName::from_static(name), HeaderValue::from_static(value))).collect()
         };
@@ -163,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn other_texts_state_no_time() {
+    fn durations_and_dates_are_parsed_and_other_texts_ignored() {
         assert_eq!(until("20ms"), Some(Duration::from_millis(20)));
         assert_eq!(until("2000-01-01T00:00:00Z"), Some(Duration::ZERO));
         for nothing in ["", "soon", "5", "1w", "s", "1..0s", "-1s", "9999999999999999999999999999d"] {

@@ -10,7 +10,7 @@ use super::Patience;
 use super::failure::Failure;
 
 #[derive(Debug)]
-pub(in crate::agent::vlm) struct Waiting {
+pub(crate) struct Waiting {
     patience: Patience,
     failed: u32,
     after_failures: ExponentialBackoff,
@@ -19,7 +19,7 @@ pub(in crate::agent::vlm) struct Waiting {
 }
 
 impl Waiting {
-    pub(in crate::agent::vlm) fn new(patience: Patience) -> Self {
+    pub(crate) fn new(patience: Patience) -> Self {
         let backoff = ExponentialBuilder::default()
             .with_min_delay(patience.first_delay)
             .with_max_delay(patience.longest_delay)
@@ -30,7 +30,7 @@ impl Waiting {
     }
 
     /// The wait before the next attempt; `None` if there is none.
-    pub(in crate::agent::vlm) fn next(&mut self, failure: &Failure) -> Option<Duration> {
+    pub(crate) fn next(&mut self, failure: &Failure) -> Option<Duration> {
         if failure.kind.is_busy() { self.busy(failure.after) } else { self.failed(failure.after) }
     }
 
@@ -66,7 +66,7 @@ mod tests {
     }
 
     #[test]
-    fn failures_use_up_attempts_and_busy_providers_time() {
+    fn failures_use_attempts_and_rate_limits_use_time() {
         let mut waiting = Waiting::new(Patience { attempts: 3, ..Patience::default() });
         // An hour in total, longer than 6 attempts.
         for kind in [FailureKind::RateLimited, FailureKind::Overloaded] {

@@ -10,10 +10,74 @@ use std::io;
 use std::path::Path;
 use std::time::{Duration, SystemTime};
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::shared_file::SharedFile;
-use super::spend::{Entry, Others, Spend};
+
+/// The spending.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Spend {
+    /// US dollars of the replies whose cost is known.
+    pub cost_usd: f64,
+    /// Replies whose cost is not known.
+    pub uncosted: u64,
+    /// Requests without an answer that may have been paid: timed out, broken off, or killed.
+    pub unanswered: u64,
+    /// US dollars at most of these requests, and of the replies whose cost is not known, as far as prices are known.
+    pub uncosted_usd_at_most: f64,
+    /// Tokens of requests and replies together.
+    pub tokens: u64,
+    /// Requests that went out.
+    pub requests: u64,
+}
+
+impl Spend {
+    pub fn add_unanswered(&mut self, at_most_usd: f64) {
+        self.unanswered += 1;
+        self.uncosted_usd_at_most += at_most_usd;
+    }
+
+    pub fn add_answer(&mut self, tokens: u64, cost_usd: Option<f64>, at_most_usd: f64) {
+        self.tokens = self.tokens.saturating_add(tokens);
+        if let Some(cost) = cost_usd {
+            self.cost_usd += cost;
+        } else {
+            self.uncosted += 1;
+            self.uncosted_usd_at_most += at_most_usd;
+        }
+    }
+
+    pub fn add(&mut self, other: &Self) {
+        self.cost_usd += other.cost_usd;
+        self.uncosted += other.uncosted;
+        self.unanswered += other.unanswered;
+        self.uncosted_usd_at_most += other.uncosted_usd_at_most;
+        self.tokens = self.tokens.saturating_add(other.tokens);
+        self.requests += other.requests;
+    }
+
+    pub fn cost_at_most(&self) -> f64 {
+        self.cost_usd + self.uncosted_usd_at_most
+    }
+}
+
+/// The spending of one process, and its requests in flight.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Entry {
+    pub(super) spend: Spend,
+    pub(super) in_flight: u64,
+    pub(super) reserved_usd: f64,
+    /// The time until which its requests may be in flight, s since 1970.
+    pub(super) until: u64,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Others {
+    pub(super) spend: Spend,
+    pub(super) reserved_usd: f64,
+    pub(super) is_waiting: bool,
+}
 
 #[derive(Debug, Default, Serialize, Deserialize)]
 struct Page {
@@ -21,7 +85,6 @@ struct Page {
     processes: BTreeMap<String, Entry>,
 }
 
-/// One process's access to the ledger.
 #[derive(Debug)]
 pub(super) struct Ledger {
     file: SharedFile,

@@ -11,9 +11,8 @@ use std::time::Duration;
 
 use tokio::sync::Notify;
 
-use super::ledger::Ledger;
-pub use super::spend::Spend;
-use super::spend::{Entry, Others};
+pub use super::ledger::Spend;
+use super::ledger::{Entry, Ledger, Others};
 use crate::agent::locked;
 
 /// The limits of a run; `None` for no limit.
@@ -34,7 +33,6 @@ pub struct Reached {
     what: &'static str,
     spent: String,
     limit: String,
-    /// The estimate for the next request.
     next: String,
 }
 
@@ -84,11 +82,11 @@ impl Account {
         Self { limits, state: Mutex::new(State { others, ..State::default() }), ..Self::default() }
     }
 
-    pub(in crate::agent::vlm) fn limits_cost(&self) -> bool {
+    pub(crate) fn limits_cost(&self) -> bool {
         self.limits.cost_usd.is_some()
     }
 
-    pub(in crate::agent::vlm) fn begin_with(&self, spent: Spend) {
+    pub(crate) fn begin_with(&self, spent: Spend) {
         locked(&self.state).others.spend = spent;
     }
 
@@ -317,7 +315,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn requests_in_flight_are_reserved_for_and_waited_for() {
+    async fn requests_in_flight_reserve_their_largest_cost() {
         let account = account(Limits { cost_usd: Some(0.2), ..Limits::default() }, Spend::default());
         let first = account.reserve(Some(0.15)).await.unwrap();
         assert!(waits(account.reserve(Some(0.15))).await, "both together may cost 0.30");

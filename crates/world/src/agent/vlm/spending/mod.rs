@@ -4,4 +4,3 @@ pub mod estimate;
 mod ledger;
 pub mod limits;
 pub(super) mod shared_file;
-mod spend;

@@ -12,26 +12,26 @@ use exact::replace::{folder_of, make_folder};
 /// A small file that all processes of a folder read and write under its lock. Without file locks, each process is on
 /// its own.
 #[derive(Debug)]
-pub(in crate::agent::vlm) struct SharedFile(File);
+pub(crate) struct SharedFile(File);
 
 impl SharedFile {
-    pub(in crate::agent::vlm) fn open(path: &Path) -> io::Result<Self> {
+    pub(crate) fn open(path: &Path) -> io::Result<Self> {
         make_folder(folder_of(path))?;
         OpenOptions::new().create(true).truncate(false).read(true).write(true).open(path).map(Self)
     }
 
-    pub(in crate::agent::vlm) fn into_file(self) -> File {
+    pub(crate) fn into_file(self) -> File {
         self.0
     }
 
-    pub(in crate::agent::vlm) fn locked<T>(&self, work: impl FnOnce() -> T) -> T {
+    pub(crate) fn locked<T>(&self, work: impl FnOnce() -> T) -> T {
         let _ = self.0.lock();
         let done = work();
         let _ = self.0.unlock();
         done
     }
 
-    pub(in crate::agent::vlm) fn read<T: DeserializeOwned>(&self) -> io::Result<T> {
+    pub(crate) fn read<T: DeserializeOwned>(&self) -> io::Result<T> {
         let mut text = String::new();
         let mut file = &self.0;
         file.rewind()?;
@@ -39,7 +39,7 @@ impl SharedFile {
         Ok(serde_json::from_str(&text)?)
     }
 
-    pub(in crate::agent::vlm) fn write(&self, content: &impl Serialize) -> io::Result<()> {
+    pub(crate) fn write(&self, content: &impl Serialize) -> io::Result<()> {
         let mut text = serde_json::to_vec(content)?;
         let before = usize::try_from(self.0.metadata()?.len()).unwrap_or_default();
         text.resize(text.len().max(before), b' ');

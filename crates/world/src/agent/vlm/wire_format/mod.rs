@@ -78,7 +78,7 @@ names!(Effort {
     Max: "max"
 });
 
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Answer {
     /// The text of the reply; empty if there is none.
     pub text: String,

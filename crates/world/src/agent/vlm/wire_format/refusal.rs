@@ -53,13 +53,9 @@ pub(super) fn answer(body: &Value) -> Option<Answer> {
     let error = [&body["error"], &body["choices"][0]["error"]].into_iter().find(|error| is_refusal(error))?;
     Some(Answer {
         text: error["message"].as_str().map_or_else(|| error.to_string(), str::to_owned),
-        repairs: Vec::new(),
         ending: Ending::Refused,
-        prompt_tokens: None,
-        cached_tokens: None,
-        completion_tokens: None,
-        cost_usd: None,
         model: text(&body["model"]),
+        ..Answer::default()
     })
 }
 
@@ -86,7 +82,7 @@ mod tests {
     use crate::agent::reply::Ending;
 
     #[test]
-    fn each_providers_form_of_a_refusal_is_one() {
+    fn refusals_of_every_provider_are_recognised() {
         let azure = json!({ "error": { "message": "filtered", "type": null, "param": "prompt", "code": "content_filter",
             "innererror": { "code": "ResponsibleAIPolicyViolation" } } });
         let routed = json!({ "error": { "message": "Provider returned error", "code": 400,

@@ -42,11 +42,8 @@ struct Note {
     requests: Vec<String>,
 }
 
-#[derive(Clone, Debug)]
-pub(super) struct Batches(Arc<Inner>);
-
 #[derive(Debug)]
-struct Inner {
+pub(super) struct Batches {
     service: Service,
     secret: Option<Secret>,
     patience: Patience,
@@ -65,10 +62,15 @@ struct State {
 }
 
 impl Batches {
-    pub(super) fn new(client: Client, url: Url, dialect: Dialect, secret: Option<Secret>, patience: Patience) -> Self {
-        let service = Service::new(client, url, dialect, patience.largest_answer);
-        let (notes, state) = (OnceLock::new(), Mutex::default());
-        Self(Arc::new(Inner { service, secret, patience, notes, state }))
+    pub(super) fn new(
+        client: Client,
+        url: Url,
+        dialect: Dialect,
+        secret: Option<Secret>,
+        patience: Patience,
+    ) -> Arc<Self> {
+        let service = Service { client, url, dialect, largest_answer: patience.largest_answer };
+        Arc::new(Self { service, secret, patience, notes: OnceLock::new(), state: Mutex::default() })
     }
 
     pub(super) fn share(&self, path: &Path) -> io::Result<()> {
@@ -77,27 +79,25 @@ impl Batches {
             Err(error) if error.kind() == io::ErrorKind::NotFound => None,
             lines => Some(lines?),
         };
-        let mut state = locked(&self.0.state);
+        let mut state = locked(&self.state);
         for line in lines.into_iter().flatten() {
             // A line that was cut off names no batch.
             let Ok(note) = serde_json::from_slice::<Note>(&line?) else { continue };
             let note = Arc::new(note);
             state.earlier.extend(note.requests.iter().map(|id| (id.clone(), Arc::clone(&note))));
         }
-        let _ = self.0.notes.set(path.to_owned());
+        let _ = self.notes.set(path.to_owned());
         Ok(())
     }
 
-    pub(super) async fn ask(&self, id: &str, body: &Value) -> Outcome {
+    pub(super) async fn ask(self: &Arc<Self>, id: &str, body: &Value) -> Outcome {
         let (sender, outcome) = oneshot::channel();
-        if let Some(outcome) = self.0.enqueue(id, body, sender) {
+        if let Some(outcome) = self.enqueue(id, body, sender) {
             return outcome;
         }
         outcome.await.unwrap_or_else(|_| Err(server("the batch broke off".to_owned())))
     }
-}
 
-impl Inner {
     fn enqueue(self: &Arc<Self>, id: &str, body: &Value, sender: oneshot::Sender<Outcome>) -> Option<Outcome> {
         let mut state = locked(&self.state);
         if let Some(outcome) = state.kept.remove(id) {
@@ -235,7 +235,7 @@ mod tests {
     use super::{MOST, split};
 
     #[test]
-    fn batches_hold_so_many_bytes_and_requests() {
+    fn batches_are_limited_in_bytes_and_requests() {
         let of = |text: &str| (String::new(), text.into());
         // With its quotes a one-letter text has three bytes.
         let sizes = |texts: Vec<&str>| -> Vec<usize> {

@@ -22,18 +22,14 @@ pub(super) type Ended = Result<(StatusCode, Value), Failure>;
 
 #[derive(Debug)]
 pub(super) struct Service {
-    client: Client,
+    pub(super) client: Client,
     /// The endpoint of single requests.
-    url: Url,
+    pub(super) url: Url,
     pub(super) dialect: Dialect,
-    largest_answer: usize,
+    pub(super) largest_answer: usize,
 }
 
 impl Service {
-    pub(super) fn new(client: Client, url: Url, dialect: Dialect, largest_answer: usize) -> Self {
-        Self { client, url, dialect, largest_answer }
-    }
-
     /// The maximum bytes of a batch, below the provider's limit: 256 MB, 200 MB, and 20 MB for inline requests.
     pub(super) const fn most_bytes(&self) -> usize {
         match self.dialect {

@@ -2,13 +2,13 @@
 
 use std::ffi::OsString;
 use std::io::{self, IsTerminal as _, Write as _};
+use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 
 use crate::cli::args::{GroupingArgs, ScoringArgs, ThreadArgs};
-use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::output;
+use crate::cli::{Failure, Outcome, output};
 use exact::escape::visible;
 use study::Question;
 use trace::inputs;
@@ -16,10 +16,10 @@ use trace::labels::check_coder;
 use view::{Options, View, ViewError, export, film, routes};
 use web::{Guard, check_token, new_token};
 
-/// Look at recordings in the browser: the report, every episode step by step, two beside each other
+/// Show recordings in the browser: the report, each episode step by step, two episodes side by side
 ///
-/// A server for this machine alone: it prints its address, and Ctrl-C ends it. Recordings that still run grow on the page. With --export
-/// the page is written as files instead, which any web server or a disk can hold.
+/// Starts a server for this machine only and prints its address; Ctrl-C stops it. The page updates while a recording
+/// runs. --export writes the page as files instead, for a web server or to open from disk.
 #[derive(Clone, Debug, clap::Args)]
 pub struct ViewArgs {
     /// Traces, logs, folders of them, quoted globs
@@ -38,13 +38,13 @@ pub struct ViewArgs {
     /// The style of tables: `default`, `paper`, or a TOML file
     #[arg(long, value_name = "STYLE", default_value = "default")]
     style: String,
-    /// The port; 0 for any that is free
+    /// The port; 0 picks a free one
     #[arg(long, value_name = "PORT", default_value_t = 7431)]
     port: u16,
-    /// Listen on this address or name instead of this machine alone; the connection is not encrypted
+    /// Listen on this address or name, not only on this machine; the connection is not encrypted
     #[arg(long, value_name = "HOST", conflicts_with = "no_token")]
     host: Option<String>,
-    /// The token of the link: at least 16 letters and digits; a new one each time if absent
+    /// The token of the link, at least 16 letters and digits [default: a new one at each start]
     #[arg(long, value_name = "TOKEN", value_parser = token)]
     token: Option<String>,
     /// Let every account of this machine open the page without a token
@@ -53,11 +53,11 @@ pub struct ViewArgs {
     /// Label episodes and steps as this coder: lines are added to labels.jsonl beside the traces
     #[arg(long, value_name = "CODER", value_parser = coder)]
     label: Option<String>,
-    /// Open no browser
+    /// Do not open a browser
     #[arg(long)]
     no_open: bool,
-    /// Write the page and all that it shows into this folder instead; with --episode one file: a page such
-    /// as episode.html, or a film such as episode.png
+    /// Write the page and its data into this folder instead; with --episode write one file, such as episode.html, or
+    /// episode.png for a film
     #[arg(long, value_name = "DIR|FILE", conflicts_with_all = ["port", "host", "token", "no_token", "no_open", "label"])]
     export: Option<PathBuf>,
     #[command(flatten)]
@@ -65,7 +65,6 @@ pub struct ViewArgs {
 }
 
 impl ViewArgs {
-    /// Shows recordings until the process ends.
     pub fn run(self) -> Result<Outcome, Failure> {
         let options = Options {
             runs: self.runs.clone(),
@@ -121,7 +120,8 @@ impl ViewArgs {
             let help = "is another `mirrorstats view` there? `--port 0` takes any port that is free";
             Failure::Rendered(format!("error: cannot listen on {host}:{}: {error}\n  help: {help}", self.port))
         };
-        let (listener, address) = routes::bind(host, self.port).map_err(taken)?;
+        let listener = TcpListener::bind((host, self.port)).map_err(taken)?;
+        let address = listener.local_addr().map_err(taken)?;
         let drawn = (self.token.is_none() && !self.no_token).then(new_token).transpose();
         let drawn = drawn.map_err(|error| Failure::input(format!("cannot make a token: {error}")))?;
         let guard = Guard::new(address, self.host.as_deref(), self.token.as_deref().or(drawn.as_deref()));

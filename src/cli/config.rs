@@ -27,9 +27,7 @@ use toml_spec::{Fault, Faults, Place, Source, parse_toml};
 const FILE: &str = "mirrorstats.toml";
 /// The variable that names another file; if it is empty, no file is read.
 pub const FILE_VARIABLE: &str = "MIRRORSTATS_CONFIG_FILE";
-/// The prefix of variables for settings.
 const PREFIX: &str = "MIRRORSTATS_";
-/// The most bytes of a file.
 const LARGEST: Limit = Limit::new("bytes of a configuration file", 1 << 20);
 
 /// The source of a setting.
@@ -78,7 +76,6 @@ pub struct Choice<'a> {
     arg: &'a Arg,
 }
 
-/// The settings for a command line.
 pub fn load(command: &Command) -> Result<Settings, Failure> {
     let choices = choices(command, "");
     let mut settings = Settings::default();
@@ -92,7 +89,6 @@ pub fn load(command: &Command) -> Result<Settings, Failure> {
 }
 
 impl Settings {
-    /// Makes these settings the defaults of a command.
     pub fn apply(&self, command: Command) -> Command {
         self.applied(command, "")
     }
@@ -183,7 +179,6 @@ impl<'a> OptionFile<'a> {
         Self { source, choices, faults }
     }
 
-    /// The result, unless there are faults.
     pub fn finish<T>(self, result: T) -> Result<T, Failure> {
         if self.faults.is_empty() { Ok(result) } else { Err(Failure::Faults(Faults(self.faults).in_order())) }
     }
@@ -239,7 +234,6 @@ fn is_within(command: &str, path: &str) -> bool {
     command.strip_prefix(path).is_some_and(|rest| rest.is_empty() || rest.starts_with(' '))
 }
 
-/// A value in its typed form.
 fn values(value: &DeValue<'_>) -> Option<Vec<String>> {
     match value {
         DeValue::Array(all) => {

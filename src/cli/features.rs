@@ -8,7 +8,6 @@ const ALL: [(&str, bool); 4] = [
     ("view", cfg!(feature = "view")),
 ];
 
-/// The features of this build, separated by commas.
 pub fn present() -> String {
     let names: Vec<&str> = ALL.into_iter().filter(|(_, is_there)| *is_there).map(|(name, _)| name).collect();
     if names.is_empty() { "none".to_owned() } else { names.join(", ") }
@@ -25,7 +24,7 @@ mod tests {
     use super::{present, with};
 
     #[test]
-    fn a_feature_is_added_to_those_that_are_there() {
+    fn a_missing_feature_is_added_to_the_present_ones() {
         assert!(with("polars").split(',').any(|name| name == "polars"));
         assert_eq!(with("polars").split(',').any(|name| name == "sim"), cfg!(feature = "sim"));
         assert_eq!(present().contains("sim"), cfg!(feature = "sim"));

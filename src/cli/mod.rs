@@ -9,9 +9,11 @@ mod config;
 mod features;
 mod help;
 mod names;
-mod printed;
+mod outcome;
+mod output;
 #[cfg(feature = "sim")]
 mod recording;
+mod terminal;
 mod typed;
 mod usage;
 
@@ -28,14 +30,13 @@ use outcome::{ErrorFormat, Outcome};
 
 pub use answers::{printed_schema, schemas};
 pub use outcome::{ErrorAnswer, Failure};
-use printed::{outcome, output, terminal};
 #[cfg(all(feature = "sim", feature = "view"))]
 use recording::human;
 #[cfg(feature = "sim")]
 use recording::{dry_run, exec, registration, vlm};
 #[cfg(feature = "sim")]
 pub use typed::options::{Options, option_names, options_of};
-use typed::{args, experiments, scoring, spark};
+use typed::{args, experiments, scoring};
 
 pub(crate) const NAME: &str = "mirrorstats";
 
@@ -125,7 +126,6 @@ fn execute(arguments: Vec<OsString>) -> Result<Outcome, Failure> {
     }
 }
 
-/// Refuses an invalid factor of all budgets before anything is read.
 fn budget_setting() -> Result<(), Failure> {
     budget::setting().map(drop).map_err(Failure::input)
 }

@@ -2,33 +2,20 @@
 
 use std::ffi::OsString;
 
-/// The old names and their replacements.
-const RENAMED: [(&str, [&str; 2]); 17] = [
-    ("audit", ["table", "audit"]),
-    ("check", ["trace", "check"]),
-    ("compare", ["table", "compare"]),
-    ("completions", ["setup", "completions"]),
-    ("config", ["setup", "config"]),
-    ("filmstrip", ["world", "filmstrip"]),
-    ("info", ["trace", "info"]),
-    ("man", ["setup", "man"]),
-    ("recover", ["trace", "recover"]),
-    ("renormalize", ["trace", "renormalize"]),
-    ("replay", ["world", "replay"]),
-    ("rescore", ["table", "rescore"]),
-    ("schema", ["trace", "schema"]),
-    ("sensitivity", ["definitions", "sensitivity"]),
-    ("sql", ["definitions", "sql"]),
-    ("validate", ["trace", "validate"]),
-    ("verify", ["table", "verify"]),
+/// Nouns, and the verbs that were commands of their own.
+const MOVED: [(&str, &[&str]); 5] = [
+    ("definitions", &["sensitivity", "sql"]),
+    ("setup", &["completions", "config", "man"]),
+    ("table", &["audit", "compare", "rescore", "verify"]),
+    ("trace", &["check", "info", "recover", "renormalize", "schema", "validate"]),
+    ("world", &["filmstrip", "replay"]),
 ];
 
-fn renamed(name: &str) -> Option<[&'static str; 2]> {
-    RENAMED.iter().find(|(old, _)| *old == name).map(|(_, new)| *new)
+fn noun_of(verb: &str) -> Option<&'static str> {
+    MOVED.iter().find(|(_, verbs)| verbs.contains(&verb)).map(|(noun, _)| *noun)
 }
 
-/// Replaces an old command name in a command line.
-pub fn current(arguments: Vec<OsString>) -> Vec<OsString> {
+pub fn current(mut arguments: Vec<OsString>) -> Vec<OsString> {
     let words = arguments.iter().skip(1).map(|word| word.to_str().unwrap_or_default());
     let (mut at, mut is_value) = (1, false);
     for word in words {
@@ -39,26 +26,28 @@ pub fn current(arguments: Vec<OsString>) -> Vec<OsString> {
         is_value = word == "--errors";
         at += 1;
     }
-    let Some(new) = arguments.get(at).and_then(|word| renamed(word.to_str()?)) else { return arguments };
-    let (before, rest) = arguments.split_at(at);
-    before.iter().cloned().chain(new.map(OsString::from)).chain(rest[1..].iter().cloned()).collect()
+    if let Some(noun) = arguments.get(at).and_then(|word| noun_of(word.to_str()?)) {
+        arguments.insert(at, noun.into());
+    }
+    arguments
 }
 
 /// The current name of a command, for a section of a configuration file.
 pub fn current_section(name: &str) -> String {
-    renamed(name).map_or_else(|| name.to_owned(), |new| new.join(" "))
+    noun_of(name).map_or_else(|| name.to_owned(), |noun| format!("{noun} {name}"))
 }
 
-/// The old name of a command.
-pub fn before(name: &str) -> Option<&'static str> {
-    RENAMED.iter().find(|(_, new)| new.join(" ") == name).map(|(old, _)| *old)
+/// The name that a command had before.
+pub fn before(name: &str) -> Option<&str> {
+    let (noun, verb) = name.split_once(' ')?;
+    (noun_of(verb) == Some(noun)).then_some(verb)
 }
 
 #[cfg(test)]
 mod tests {
     use std::ffi::OsString;
 
-    use super::{RENAMED, current};
+    use super::{MOVED, current};
     use crate::cli::Cli;
     use clap::CommandFactory as _;
 
@@ -80,8 +69,8 @@ mod tests {
     #[test]
     fn each_old_name_leads_to_a_command() {
         let command = Cli::command();
-        for (old, [noun, verb]) in RENAMED {
-            let is_built = command.find_subcommand(noun).is_some_and(|noun| noun.find_subcommand(verb).is_some());
+        for (noun, old) in MOVED.iter().flat_map(|(noun, verbs)| verbs.iter().map(move |verb| (noun, verb))) {
+            let is_built = command.find_subcommand(noun).is_some_and(|noun| noun.find_subcommand(old).is_some());
             assert!(is_built || cfg!(not(all(feature = "sim", feature = "view"))), "{old}");
             assert!(command.find_subcommand(old).is_none(), "{old} has two meanings");
         }

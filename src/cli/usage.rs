@@ -6,7 +6,6 @@ use clap::{Command, Error};
 use crate::cli::features;
 use exact::suggest;
 
-/// The commands of the feature `sim`.
 const OF_SIM: [&str; 2] = ["record", "world"];
 
 /// Adds the commands that have a refused option, and the feature that has a refused command.

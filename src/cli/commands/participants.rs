@@ -1,13 +1,9 @@
 //! `mirrorstats participants`: the people of a recording.
 
-use std::fmt;
+use std::fmt::{self, Write as _};
 use std::path::PathBuf;
 
-use schemars::JsonSchema;
-use serde::Serialize;
-
-use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::output;
+use crate::cli::{Failure, Outcome, output};
 use exact::escape::visible;
 use exact::format::counted;
 use world::record::participants::{self, Removed};
@@ -37,30 +33,23 @@ enum ParticipantsCommand {
     },
 }
 
-/// The answer.
-#[derive(Clone, Debug, Serialize, JsonSchema)]
-#[serde(transparent)]
-struct RemovedAnswer(Removed);
-
-impl fmt::Display for RemovedAnswer {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Removed { episodes, files, journal_lines, label_lines } = &self.0;
-        let (count, lines) = (counted(episodes.len() as u64, "episode"), counted(*journal_lines as u64, "line"));
-        let labels = counted(*label_lines as u64, "line");
-        write!(f, "removed {count} from {}, ", counted(files.len() as u64, "file"))?;
-        write!(f, "{lines} of the journal and {labels} of labels")?;
-        episodes.iter().try_for_each(|id| write!(f, "\n  {}", visible(id)))
-    }
-}
-
 impl ParticipantsArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
         let ParticipantsCommand::Remove { code, folder, json } = self.command;
         let removed = participants::remove(&folder, &code).map_err(Failure::input)?;
         if removed == Removed::default() {
             let (code, folder) = (visible(&code), folder.display());
-            return Err(Failure::input(format!("nothing in {folder} is of the participant `{code}`")));
+            return Err(Failure::input(format!("{folder} has nothing of the participant `{code}`")));
         }
-        output::print(&RemovedAnswer(removed), json)
+        output::print_told(&removed, json, tell)
     }
+}
+
+fn tell(text: &mut String, removed: &Removed) -> fmt::Result {
+    let Removed { episodes, files, journal_lines, label_lines } = removed;
+    let (count, lines) = (counted(episodes.len() as u64, "episode"), counted(*journal_lines as u64, "line"));
+    let labels = counted(*label_lines as u64, "line");
+    write!(text, "removed {count} from {}, ", counted(files.len() as u64, "file"))?;
+    write!(text, "{lines} of the journal and {labels} of labels")?;
+    episodes.iter().try_for_each(|id| write!(text, "\n  {}", visible(id)))
 }

@@ -3,7 +3,7 @@
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
-use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::{Failure, Outcome, output};
 use exact::escape::visible;
 use exact::suggest::hint;
 use metric::definitions::Definitions;
@@ -53,8 +53,7 @@ fn show(name: &str) -> Result<Outcome, Failure> {
         let (known, hint) = (names.join(", "), hint(name, names));
         return Err(Failure::input(format!("no built-in style `{name}`; there are {known}{hint}")));
     };
-    io::stdout().lock().write_all(text.as_bytes())?;
-    Ok(Outcome::Done)
+    output::plain(text)
 }
 
 fn check(file: &Path, definitions: &Path) -> Result<Outcome, Failure> {

@@ -89,7 +89,7 @@ impl RequestForecast {
         config: &WorldConfig,
         (in_flight, per_minute): (usize, Option<u32>),
     ) -> Result<Self, Box<dyn std::error::Error + Send + Sync>> {
-        let vlm = player.vlm();
+        let vlm = &player.vlm;
         let view = [config.eye.width, config.eye.height_px];
         let finished: Vec<String> = finished.iter().map(|key| key.file_stem(subject)).collect();
         let typical = vlm.typical(finished.iter().map(String::as_str))?;

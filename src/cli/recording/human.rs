@@ -1,11 +1,11 @@
 //! People as agents: their arguments and their player.
 
 use std::collections::BTreeSet;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::cli::outcome::Failure;
-use crate::cli::output;
+use crate::cli::{Failure, output};
 use exact::budget::Limit;
 use exact::input;
 use web::{self, Guard};
@@ -29,7 +29,7 @@ const MOST_SEEDS: i32 = 4_000;
 #[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "With --agent human")]
 pub struct HumanArgs {
-    /// The codes of the people who play, each with a link of their own that stays the same; no names
+    /// Codes of the participants, not their names; each code has its own permanent link
     #[arg(long, value_name = "CODES", value_delimiter = ',', default_value = "P1", value_parser = code)]
     participants: Vec<String>,
     /// Who plays what: split, each episode is played by one participant; crossed, everyone plays every scene; own-seeds,
@@ -40,10 +40,10 @@ pub struct HumanArgs {
     /// counterbalanced if crossed, else planned]
     #[arg(long, value_name = "ORDER", value_parser = order)]
     order: Option<Order>,
-    /// A text file with what people agree to before they begin
+    /// A text that participants agree to before they begin
     #[arg(long, value_name = "FILE")]
     consent: Option<PathBuf>,
-    /// Where people can ask, such as a name and a telephone number: stands on every page
+    /// A contact for questions, such as a name and a telephone number; shown on every page
     #[arg(long, value_name = "TEXT")]
     contact: Option<String>,
     /// Keep an identification in its field from step to step of an episode; a model has no such memory
@@ -52,7 +52,7 @@ pub struct HumanArgs {
     /// The port of their pages; 0 for any that is free
     #[arg(long, value_name = "PORT", default_value_t = 7432)]
     human_port: u16,
-    /// The address or name that their browsers reach this machine by [default: this machine alone]
+    /// The address or name under which browsers reach this machine [default: this machine only]
     #[arg(long, value_name = "HOST")]
     human_host: Option<String>,
 }
@@ -69,7 +69,7 @@ impl HumanArgs {
     ) -> Result<Human, Failure> {
         let own: BTreeSet<&String> = self.participants.iter().collect();
         if own.len() < self.participants.len() {
-            return Err(Failure::input("--participants: a code stands twice"));
+            return Err(Failure::input("--participants: a code occurs twice"));
         }
         let terms = Terms {
             consent: self.consent.as_deref().map(words).transpose()?,
@@ -80,7 +80,8 @@ impl HumanArgs {
         let journal = if plays { Journal::open(out).map_err(unwritable)? } else { Journal::none() };
         let mut people = Vec::new();
         for (code, place) in self.participants.iter().zip(1..) {
-            people.push((code.clone(), self.enrol(&journal, code, place).map_err(|fault| fault.or(unwritable))?));
+            self.check_place(&journal, code, place)?;
+            people.push((code.clone(), enrol(&journal, code, place).map_err(unwritable)?));
         }
         let eraser: Eraser = |folder, code| {
             remove_episodes(folder, code).map(|removed| removed.episodes).map_err(|error| error.to_string())
@@ -115,20 +116,14 @@ impl HumanArgs {
         })
     }
 
-    /// The token of a participant's link: that of the previous start, or a new one.
-    fn enrol(&self, journal: &Journal, code: &str, place: usize) -> Result<String, Enrolment> {
-        if let Some((before, token)) = journal.enrolled(code) {
-            if before != place && self.design != Design::Split {
-                return Err(Enrolment::Moved(Failure::input(format!(
-                    "--participants: `{code}` has place {place}, and had place {before} when this recording began\n  help: keep \
-                     the order of the codes, since it says who plays what, and add new codes at the end"
-                ))));
-            }
-            return Ok(token.to_owned());
+    fn check_place(&self, journal: &Journal, code: &str, place: usize) -> Result<(), Failure> {
+        match journal.enrolled(code) {
+            Some((before, _)) if before != place && self.design != Design::Split => Err(Failure::input(format!(
+                "--participants: `{code}` has place {place}, and had place {before} when this recording began\n  help: keep \
+                 the order of the codes, since it says who plays what, and add new codes at the end"
+            ))),
+            _ => Ok(()),
         }
-        let token = web::new_token().map_err(Enrolment::Io)?;
-        journal.enrol(code, place, &token).map_err(Enrolment::Io)?;
-        Ok(token)
     }
 
     fn serve(&self, hub: &Arc<Hub>, people: &[(String, String)]) -> Result<Server, Failure> {
@@ -148,19 +143,14 @@ impl HumanArgs {
     }
 }
 
-/// The reason why a participant has no link.
-enum Enrolment {
-    Moved(Failure),
-    Io(std::io::Error),
-}
-
-impl Enrolment {
-    fn or(self, failure: impl Fn(std::io::Error) -> Failure) -> Failure {
-        match self {
-            Self::Moved(moved) => moved,
-            Self::Io(error) => failure(error),
-        }
+/// The token of a participant's link: that of the previous start, or a new one.
+fn enrol(journal: &Journal, code: &str, place: usize) -> io::Result<String> {
+    if let Some((_, token)) = journal.enrolled(code) {
+        return Ok(token.to_owned());
     }
+    let token = web::new_token()?;
+    journal.enrol(code, place, &token)?;
+    Ok(token)
 }
 
 fn design(text: &str) -> Result<Design, String> {
@@ -181,6 +171,6 @@ fn code(text: &str) -> Result<String, String> {
 }
 
 fn words(path: &Path) -> Result<String, Failure> {
-    let failed = |error: std::io::Error| Failure::input(format!("--consent: cannot read {}: {error}", path.display()));
+    let failed = |error: io::Error| Failure::input(format!("--consent: cannot read {}: {error}", path.display()));
     input::text(path, LONGEST_CONSENT).map_err(failed)
 }

@@ -3,10 +3,9 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use crate::cli::outcome::Failure;
+use crate::cli::Failure;
 use world::agent::Player;
 
-/// The current player.
 pub type Playing = Arc<Mutex<Option<Arc<dyn Player>>>>;
 
 /// The first Ctrl-C ends a recording after the current steps, or at once for people; a second one ends everything at

@@ -1,4 +1,4 @@
-//! Messages of `record` on standard error, during and after the recording: progress, and time by part.
+//! The answer of `record`, and its messages on standard error after the recording.
 
 pub mod dry_run;
 pub mod episodes;
@@ -7,42 +7,31 @@ pub mod exec;
 pub mod human;
 pub mod interrupt;
 pub mod probe;
+pub mod progress;
 pub mod registration;
 pub mod several;
 pub mod vlm;
 
-use std::collections::BTreeMap;
-use std::io::{self, IsTerminal as _, Write as _};
-use std::path::Path;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::cli::NAME;
 use crate::cli::scoring::commands;
-use exact::escape::{visible, visible_lines};
-use exact::format::counted;
-use exact::format::fixed;
+use exact::escape::visible;
+use exact::format::{counted, fixed};
 use exact::number::Decimal;
 use report::html;
 use study::{Study, StudyError};
-use trace::episode::Step;
 use trace::renderer::Renderer;
 use trace::replies::ReplyCounts;
-use world::agent::Player;
 use world::agent::vlm::limits::Spend;
-use world::experiment::Experiment;
 use world::record::failures::LostEpisode;
-use world::record::plan::{Key, Subject};
-use world::record::queue::Held;
-use world::record::replies::{Replies, RepliesAnswer, UnreadableReply};
-use world::record::run::Progress;
+use world::record::replies::{RepliesAnswer, UnreadableReply};
 use world::record::shares::Spent;
-use world::sim::config::WorldConfig;
 
 /// The answer of `record --json`.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -63,7 +52,7 @@ pub struct RecordAnswer {
     pub left_out: usize,
     /// The replies of this start.
     pub replies: RepliesAnswer,
-    /// Episodes that were lost for want of an answer: in no trace, listed in `lost.jsonl` of the folder.
+    /// Episodes that were lost without an answer: in no trace, listed in `lost.jsonl` of the folder.
     pub lost: Vec<LostEpisode>,
     /// Episodes under way that a limit of what may be spent has stopped; they are not lost, and go on under a higher limit.
     pub stopped_by_limit: usize,
@@ -79,130 +68,16 @@ pub struct RecordAnswer {
     pub logs: Vec<String>,
 }
 
-/// The interval of progress lines without a terminal.
-const BETWEEN_LINES: Duration = Duration::from_secs(10);
-
-/// The progress: a bar on a terminal. Otherwise occasional lines, for agents that wait for a provider or a program, or
-/// whose replies are unreadable.
-pub(crate) struct Bar<'a> {
-    line: ProgressBar,
-    player: &'a dyn Player,
-    subject: &'a Subject,
-    episodes: usize,
-    ended: AtomicUsize,
-    replies: Replies,
-    budget: BTreeMap<Experiment, u64>,
-    is_shown: bool,
-    told: Mutex<Instant>,
-    is_waiting: AtomicBool,
-}
-
-impl<'a> Bar<'a> {
-    pub(crate) fn new(player: &'a dyn Player, subject: &'a Subject, todo: &[Key], world: &WorldConfig) -> Self {
-        let budget: BTreeMap<Experiment, u64> =
-            todo.iter().map(|key| (key.experiment, u64::from(world.of(key.experiment).episode.steps))).collect();
-        let steps = todo.iter().filter_map(|key| budget.get(&key.experiment)).sum();
-        let episodes = todo.len();
-        let is_shown = io::stderr().is_terminal();
-        let target = if is_shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
-        let line = ProgressBar::with_draw_target(Some(steps), target);
-        let style = ProgressStyle::with_template("{msg} {wide_bar} {pos} steps, {per_sec}, {eta} left");
-        line.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-        let told = Mutex::new(Instant::now());
-        let (ended, is_waiting, replies) = (AtomicUsize::new(0), AtomicBool::new(false), Replies::default());
-        let bar = Self { line, player, subject, episodes, ended, replies, budget, is_shown, told, is_waiting };
-        bar.line.set_message(bar.message());
-        bar
-    }
-
-    pub(crate) fn clear(&self) {
-        self.line.finish_and_clear();
-    }
-
-    pub(crate) fn replies(&self) -> RepliesAnswer {
-        self.replies.answer()
-    }
-
-    fn message(&self) -> String {
-        let unreadable = unreadable(&self.replies.counts()).map_or_else(String::new, |words| format!(", {words}"));
-        let spent = self.player.spend().map_or_else(String::new, |spend| format!(", {}", spent(&spend)));
-        format!("{} of {} episodes{unreadable}{spent}", self.ended.load(Ordering::Relaxed), self.episodes)
-    }
-
-    fn say(&self, line: &str) {
-        self.line.suspend(|| {
-            // If standard error is closed, the message cannot be shown.
-            let _ = writeln!(io::stderr(), "{line}");
-        });
-    }
-
-    fn has_news(&self) -> bool {
-        self.player.waits() || self.replies.counts().all_unreadable() > 0
-    }
-
-    fn write_line(&self) {
-        let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
-        if self.is_shown || told.elapsed() < BETWEEN_LINES || !self.has_news() {
-            return;
-        }
-        *told = Instant::now();
-        let (steps, rate, left) = (self.line.position(), self.line.per_sec(), self.line.eta().as_secs().div_ceil(60));
-        // If standard error is closed, the message cannot be shown.
-        let (message, rate) = (self.message(), fixed(Some(rate), 1));
-        let _ = writeln!(io::stderr(), "{message}, {steps} steps, {rate} a second, about {left} min left");
-    }
-}
-
-impl Progress for Bar<'_> {
-    fn step(&self, episode: Key, t: i32, row: &Step) {
-        self.line.inc(1);
-        if let Some(first) = self.replies.add(self.subject, episode, t, row) {
-            self.say(&format!("a reply could not be read: {}: {}", first.status, first.words()));
-        }
-        if self.is_shown {
-            self.line.set_message(self.message());
-        } else {
-            self.write_line();
-        }
-    }
-
-    fn episode(&self, key: Key, _: &str, steps: usize) {
-        self.ended.fetch_add(1, Ordering::Relaxed);
-        // Steps left unused by an early decision are not remaining work.
-        let budget = self.budget.get(&key.experiment).copied().unwrap_or_default();
-        let unused = budget.saturating_sub(steps as u64);
-        self.line.set_length(self.line.length().unwrap_or_default().saturating_sub(unused));
-        self.line.set_message(self.message());
-    }
-
-    fn model_changed(&self, id: &str, t: i32, before: &str, after: &str) {
-        self.say(&format!(
-            "{}: from step {t} on the provider answers as `{}` and not as `{}`; the episode keeps the first name, the next \
-             one has another fingerprint",
-            visible(id),
-            visible(after),
-            visible(before)
-        ));
-    }
-
-    fn lost(&self, id: &str, reason: &str) {
-        self.say(&format!("lost {}: {}", visible(id), visible_lines(reason)));
-    }
-
-    fn waiting(&self, id: &str, held: Held) {
-        if !self.is_waiting.swap(true, Ordering::Relaxed) {
-            self.say(&waiting(id, held));
-        }
-    }
-}
-
-fn waiting(id: &str, held: Held) -> String {
-    let others = match held.count - 1 {
-        0 => String::new(),
-        more => format!(" and {}", counted(more as u64, "other episode")),
-    };
-    let process = held.process.map_or_else(|| "another process".to_owned(), |process| format!("process {process}"));
-    format!("waiting for {}{others}: {process} records it into the same folder; press Ctrl-C to stop waiting", visible(id))
+/// The result of a recording that reached its end or was stopped.
+#[derive(Debug)]
+pub struct Recorded {
+    /// The outcomes of the episodes.
+    pub answer: RecordAnswer,
+    /// The reason why the agent could not continue, if so.
+    pub gave_up: Option<String>,
+    pub(crate) lost_list: PathBuf,
+    pub(crate) elapsed: Duration,
+    pub(crate) times: Spent,
 }
 
 fn unreadable(counts: &ReplyCounts) -> Option<String> {
@@ -234,13 +109,9 @@ pub(crate) fn dollars(value: f64) -> String {
     number.map_or_else(|| "an unknown number of US dollars".to_owned(), |number| format!("{number} US dollars"))
 }
 
-pub(crate) fn say(
-    answer: &RecordAnswer,
-    (folder, lost_list): (&Path, &Path),
-    files: &[&Path],
-    elapsed: Duration,
-    times: Spent,
-) -> io::Result<()> {
+/// Prints the outcome of a recording into `folder`; `files` are those of its experiments.
+pub(crate) fn say(recorded: &Recorded, folder: &Path, files: &[&Path]) -> io::Result<()> {
+    let Recorded { answer, lost_list, elapsed, times, .. } = recorded;
     let mut out = io::stderr().lock();
     let seconds = elapsed.as_secs_f64();
     #[expect(clippy::cast_precision_loss, reason = "a rate for people")]
@@ -269,7 +140,7 @@ pub(crate) fn say(
         let first = answer.replies.first_unreadable.as_ref().map_or_else(String::new, UnreadableReply::words);
         writeln!(out, "{words}; first: {first}")?;
     }
-    if let Some(shares) = shares(times) {
+    if let Some(shares) = shares(*times) {
         writeln!(out, "time: {shares}")?;
     }
     match answer.renderers.as_slice() {
@@ -278,7 +149,7 @@ pub(crate) fn say(
         all => {
             let names: Vec<String> = all.iter().map(ToString::to_string).collect();
             let (count, names) = (all.len(), names.join("; "));
-            writeln!(out, "frames: drawn by {count} renderers, which a report mixes with --pool alone: {names}")?;
+            writeln!(out, "frames: drawn by {count} renderers, which a report mixes only with --pool: {names}")?;
         }
     }
     if let Some(spend) = &answer.spend {
@@ -288,7 +159,7 @@ pub(crate) fn say(
         let episodes = counted(answer.lost.len() as u64, "episode");
         writeln!(
             out,
-            "lost {episodes} for want of an answer (a crash, a rate limit, a server error, a timeout): in no trace, listed in {}; the \
+            "lost {episodes} without an answer (a crash, a rate limit, a server error, a timeout): in no trace, listed in {}; the \
              same command tries again",
             visible(&lost_list.display().to_string())
         )?;
@@ -348,64 +219,9 @@ fn shares(times: Spent) -> Option<String> {
 mod tests {
     use std::time::Duration;
 
-    use super::{Bar, dollars, shares, spent, waiting};
-    use trace::episode::{Extra, Step};
-    use world::agent::scripted::Scripted;
+    use super::{dollars, shares, spent};
     use world::agent::vlm::limits::Spend;
-    use world::agent::{Player, exec};
-    use world::experiment::Experiment;
-    use world::record::plan::{Key, Subject};
-    use world::record::queue::Held;
-    use world::record::run::Progress as _;
     use world::record::shares::Spent;
-    use world::sim::config::WorldConfig;
-
-    #[test]
-    fn waiting_for_people_is_printed() {
-        let key = Key::first(Experiment::E1, 1, 3);
-        let one = Held { key, process: Some(4711), count: 1 };
-        let expected = "waiting for E1/a/s1/r3: process 4711 records it into the same folder; press Ctrl-C to stop waiting";
-        assert_eq!(waiting("E1/a/s1/r3", one), expected);
-        let more = waiting("E1/a/s1/r3", Held { process: None, count: 3, ..one });
-        assert!(more.starts_with("waiting for E1/a/s1/r3 and 2 other episodes: another process records it"), "{more}");
-    }
-
-    #[test]
-    fn the_progress_tells_of_replies_that_cannot_be_read() {
-        let player = Scripted::named("frozen").unwrap();
-        let subject = Subject::of("frozen");
-        let todo = [1, 2].map(|run| Key::first(Experiment::E1, 1, run));
-        let bar = Bar::new(&player, &subject, &todo, &WorldConfig::default());
-        let row = |status: &str| {
-            let extra = Extra { reply_status: Some(status.to_owned()), ..Extra::default() };
-            Step { action: None, self_color: None, selected_cube: None, mirror_visible: false, extra }
-        };
-        let key = Key::first(Experiment::E1, 1, 1);
-        bar.step(key, 1, &row("ok"));
-        assert_eq!((bar.message().as_str(), bar.has_news()), ("0 of 2 episodes", false));
-        for (t, status) in [(2, "refusal"), (3, "parse_failed"), (4, "refusal")] {
-            bar.step(key, t, &row(status));
-        }
-        let expected = "0 of 2 episodes, 3 of 4 replies could not be read: parse_failed 1, refusal 2";
-        assert_eq!((bar.message().as_str(), bar.has_news()), (expected, true));
-    }
-
-    #[test]
-    fn a_log_tells_of_programs_and_not_of_scripted_agents() {
-        let settings = exec::Settings {
-            model: "own".to_owned(),
-            command: "true".to_owned(),
-            images: exec::Images::Path,
-            timeout: Duration::from_secs(1),
-            scratch: std::env::temp_dir(),
-            standard_error: std::env::temp_dir(),
-        };
-        let (program, scripted) = (exec::Exec::new(settings).unwrap(), Scripted::named("frozen").unwrap());
-        let subject = Subject::of("own");
-        let world = WorldConfig::default();
-        let has_news = |player: &dyn Player| Bar::new(player, &subject, &[], &world).has_news();
-        assert_eq!([has_news(&program), has_news(&scripted)], [true, false]);
-    }
 
     #[test]
     fn unknown_costs_are_printed_as_unknown() {
@@ -423,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn shares_are_of_the_whole_and_need_one() {
+    fn times_print_as_shares_of_their_sum() {
         let spent = Spent {
             rendering: Duration::from_secs(7),
             visibility: Duration::from_secs(2),

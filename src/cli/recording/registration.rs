@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use crate::cli::outcome::Failure;
-use crate::cli::typed::plan::read_plan;
+use crate::cli::Failure;
+use crate::cli::scoring::read_plan;
 use report::plan::register::{NamedHash, RegisteredPlan};
 use trace::declared::Registration;
 use world::agent::prompt;

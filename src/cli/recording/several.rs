@@ -5,38 +5,33 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
-use clap::{Args as _, Command};
+use clap::Command;
 use serde_json::Value;
 use toml::Spanned;
 use toml::de::{DeString, DeTable, DeValue};
 
-use crate::cli::commands::record::{RecordArgs, Recorded};
 use crate::cli::config::{self, OptionFile};
-use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::recording::RecordAnswer;
-use crate::cli::{NAME, Options};
+use crate::cli::recording::{RecordAnswer, Recorded};
+use crate::cli::{Failure, NAME, Options, Outcome};
 use exact::budget::Limit;
 use exact::{input, suggest};
 use toml_spec::{Source, parse_toml};
 
-/// The limit for a study file, which is written by hand.
 const LARGEST: Limit = Limit::new("bytes of a study file", 1 << 20);
-/// The condition without a name.
 const DEFAULT: &str = "default";
 
-/// The command whose options a study file has.
 const RECORD: &str = "record";
 
-/// The options of each recording of a study: options of `record` without dashes. Those for a model override those for a
+/// The options of each recording of a study: options of `record`, which are those of `A`, without dashes. Those for a model override those for a
 /// condition, which override those for all.
-pub fn recordings(path: &Path) -> Result<Vec<Options>, Failure> {
+pub fn recordings<A: clap::Args>(path: &Path) -> Result<Vec<Options>, Failure> {
     let place = path.display();
     let fault =
         |fault: &dyn std::fmt::Display| Failure::input(format!("the study in `{place}` cannot be used: {fault}"));
     let text = input::text(path, LARGEST).map_err(|error| fault(&error))?;
     let source = Arc::new(Source { name: place.to_string(), text });
     let (table, faults) = parse_toml(&source);
-    let command = Command::new(NAME).subcommand(RecordArgs::augment_args(Command::new(RECORD)));
+    let command = Command::new(NAME).subcommand(A::augment_args(Command::new(RECORD)));
     let choices = config::choices(&command, "");
     let mut reader = OptionFile::new(&source, &choices, faults);
     let (mut options, mut conditions, mut models) = (Options::new(), BTreeMap::new(), BTreeMap::new());
@@ -74,7 +69,6 @@ pub fn recordings(path: &Path) -> Result<Vec<Options>, Failure> {
         .collect())
 }
 
-/// The options of each named table.
 fn sections(reader: &mut OptionFile<'_>, table: &DeTable<'_>) -> BTreeMap<String, Options> {
     let mut found = BTreeMap::new();
     for (name, value) in table {
@@ -157,10 +151,14 @@ fn outcome_of(answer: &RecordAnswer) -> Outcome {
 mod tests {
     use serde_json::json;
 
-    use super::recordings;
+    use crate::cli::commands::record::RecordArgs;
+
+    fn recordings(path: &std::path::Path) -> Result<Vec<crate::cli::Options>, crate::cli::Failure> {
+        super::recordings::<RecordArgs>(path)
+    }
 
     #[test]
-    fn a_study_is_options_by_condition_and_model() {
+    fn a_study_file_gives_options_per_condition_and_model() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("study.toml");
         let of = |text: &str| {

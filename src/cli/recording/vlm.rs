@@ -25,65 +25,65 @@ use world::record::plan::slug;
 #[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "With --agent vlm")]
 pub struct VlmArgs {
-    /// The model: a name of the paper's table, an id, or one of --models; of any other agent its name in tables. Several are
-    /// recorded one after the other
+    /// The model: a name of the paper's table, an id, or a name in --models; for any other agent, its name in tables.
+    /// Several are recorded one after the other
     #[arg(long, value_name = "NAME|ID")]
     model: Vec<String>,
     /// A file with more models, in the shape of assets/models.toml
     #[arg(long, value_name = "FILE")]
     models: Option<PathBuf>,
-    /// The provider, instead of the models' file's: openai, openrouter, google, anthropic, compatible
+    /// The provider, overriding the file of models: openai, openrouter, google, anthropic, compatible
     #[arg(long, value_name = "NAME")]
     backend: Option<String>,
     /// The address of a server that takes OpenAI's chat completions, such as `http://localhost:8000/v1`
     #[arg(long, value_name = "URL")]
     base_url: Option<String>,
-    /// Record the answers of this model too, by its id as the provider returns it: else an answer by another model than the one
-    /// asked for stops the recording
+    /// Accept answers of this model too, by the id that the provider returns; otherwise an answer by another model than
+    /// requested stops the recording
     #[arg(long, value_name = "ID")]
     accept_model: Vec<String>,
-    /// Let the prompt alone ask for the reply's shape, and not the provider enforce it
+    /// Ask for the reply's format in the prompt only; the provider does not enforce it
     #[arg(long)]
     prompt_only: bool,
-    /// Stop before more US dollars are spent on all that the model plays into the folder, over all starts; needs both prices of
-    /// the model, or a router that says what an answer cost
+    /// Stop before the model's cost in this folder, over all starts, exceeds this many US dollars; needs both prices of
+    /// the model, or a router that reports the cost of an answer
     #[arg(long, value_name = "USD", value_parser = amount)]
     max_cost: Option<f64>,
-    /// Stop before more tokens are used on all that the model plays into the folder, over all starts
+    /// Stop before the model's tokens in this folder, over all starts, exceed this number
     #[arg(long, value_name = "N")]
     max_tokens: Option<u64>,
-    /// Stop before more requests are sent for all that the model plays into the folder, over all starts
+    /// Stop before the model's requests in this folder, over all starts, exceed this number
     #[arg(long, value_name = "N")]
     max_requests: Option<u64>,
-    /// The most tokens of a reply, those of hidden reasoning included [default: what the models' file says, else 2048, or
-    /// 16384 for a model that is asked to reason]
+    /// The most tokens of a reply, including hidden reasoning [default: from the file of models, else 2048, or 16384
+    /// for a model that is asked to reason]
     #[arg(long, value_name = "N")]
     max_output_tokens: Option<NonZeroU32>,
-    /// How much the model is asked to reason: none, minimal, low, medium, high, xhigh or max, as far as it takes it [default: what
-    /// the models' file says, else what the provider does]
+    /// The reasoning effort: none, minimal, low, medium, high, xhigh or max, if the model supports it [default: from
+    /// the file of models, else the provider's]
     #[arg(long, value_name = "EFFORT", value_parser = effort)]
     reasoning_effort: Option<Effort>,
-    /// Requests that are out at once, at most; fewer where the provider says that it gets too many
+    /// The most concurrent requests; fewer if the provider reports too many
     #[arg(long, value_name = "N", default_value_t = 64)]
     at_once: usize,
-    /// Requests that the account at the provider takes in a minute, over all processes that record into the folder; without it,
-    /// what the provider says counts
+    /// The account's limit of requests per minute, over all processes that record into the folder [default: the limit
+    /// that the provider reports]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
-    requests_per_minute: Option<u32>,
+    pub(crate) requests_per_minute: Option<u32>,
     /// Attempts for one step
     #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u32).range(1..=50))]
     attempts: u32,
-    /// A service tier at half the price: flex of OpenAI and Google, whose answers take minutes; batch of OpenAI, Google and
-    /// Anthropic, where the steps of all episodes under way go as one batch
+    /// A service tier at half the price: flex of OpenAI and Google, whose answers take minutes; batch of OpenAI, Google
+    /// and Anthropic, which sends the current steps of all episodes as one batch
     #[arg(long, value_name = "flex|batch", value_parser = tier)]
     tier: Option<Tier>,
     /// Seconds for one answer [default: 180, or 900 with --tier flex]
     #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..=3_600))]
     timeout: Option<u64>,
-    /// Count a step whose attempts are used up as one without a decision, rather than lose its episode
+    /// If all attempts for a step fail, count a step without a decision instead of losing the episode
     #[arg(long)]
     stand_still_on_outage: bool,
-    /// Play the answers of an earlier recording's journals; nothing is sent
+    /// Replay the answers in an earlier recording's journals; nothing is sent
     #[arg(long, value_name = "DIR")]
     cassette: Option<PathBuf>,
 }
@@ -150,10 +150,6 @@ impl VlmArgs {
         let choice = self.choice()?;
         let provider = self.provider(&choice)?;
         Ok(network()?.block_on(probe(choice, &provider, experiment, view)))
-    }
-
-    pub fn requests_per_minute(&self) -> Option<u32> {
-        self.requests_per_minute
     }
 
     /// Returns true if requests are sent, and not answered from an earlier recording.
@@ -242,7 +238,7 @@ fn effort(text: &str) -> Result<Effort, String> {
 
 /// A model as a player.
 pub struct VlmPlayer {
-    vlm: Arc<Vlm>,
+    pub vlm: Arc<Vlm>,
     at_once: usize,
     network: Option<Runtime>,
     ledger: Option<PathBuf>,
@@ -254,10 +250,6 @@ pub struct VlmPlayer {
 impl VlmPlayer {
     fn of_journals(vlm: Arc<Vlm>, at_once: usize) -> Self {
         Self { vlm, at_once, network: None, ledger: None, slug: String::new(), has_counted: OnceLock::new() }
-    }
-
-    pub fn vlm(&self) -> &Vlm {
-        &self.vlm
     }
 }
 

@@ -51,10 +51,10 @@ pub struct GroupingArgs {
     /// Group episodes by these columns, separated by commas [default: experiment,model, and condition where there are some]
     #[arg(long, value_name = "COLUMNS", value_delimiter = ',')]
     pub by: Option<Vec<String>>,
-    /// Let a cell hold episodes that were recorded differently: in another world, with other prompts, by another agent
+    /// Allow episodes with different settings in one cell: world, prompts or agent
     #[arg(long)]
     pub pool: bool,
-    /// The treatment of episodes that were lost for want of an answer
+    /// How to count episodes that were lost because no answer came
     #[arg(long, value_enum, default_value_t)]
     pub lost: LostArg,
 }
@@ -62,10 +62,10 @@ pub struct GroupingArgs {
 /// The treatment of lost episodes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum LostArg {
-    /// They are in no denominator
+    /// Leave them out
     #[default]
     Excluded,
-    /// They are in the denominator of every rate that each episode has, as failures
+    /// Count them as failures in each rate that every episode has
     AsFailure,
 }
 
@@ -97,7 +97,7 @@ pub struct SparkArgs {
     /// The master of --engine spark: spark://HOST:PORT, yarn, local, ... [default: what your Spark is configured for]
     #[arg(long, value_name = "URL")]
     pub master: Option<String>,
-    /// A setting for --engine spark, as often as needed
+    /// A setting for --engine spark; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
     pub spark_conf: Vec<Setting>,
     /// Give up on Spark after this many seconds [default: never]
@@ -106,4 +106,10 @@ pub struct SparkArgs {
     /// Keep Spark's own log in this file
     #[arg(long, value_name = "FILE")]
     pub spark_log: Option<PathBuf>,
+}
+
+/// Parses a number of an option.
+pub fn number(text: &str, expected: &str, holds: impl Fn(f64) -> bool) -> Result<f64, String> {
+    let value = text.parse::<f64>().ok().filter(|value| holds(*value));
+    value.ok_or_else(|| format!("expected {expected}, found `{text}`"))
 }

@@ -4,6 +4,4 @@ pub mod args;
 pub mod experiments;
 #[cfg(feature = "sim")]
 pub mod options;
-pub mod plan;
 pub mod scoring;
-pub mod spark;

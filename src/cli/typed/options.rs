@@ -5,8 +5,7 @@ use std::ffi::OsString;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use serde_json::{Map, Value};
 
-use crate::cli::NAME;
-use crate::cli::outcome::Failure;
+use crate::cli::{Failure, NAME};
 
 /// Options by name without dashes. `true` sets a flag, `false` and null leave an option out, a list repeats it.
 pub type Options = Map<String, Value>;
@@ -20,7 +19,6 @@ pub fn options_of<A: clap::Args>(verb: &str, options: &Options) -> Result<A, Fai
     parsed.map_err(|error| Failure::input(told(&error)))
 }
 
-/// The names of the options of a command.
 pub fn option_names<A: clap::Args>() -> Vec<String> {
     let command = A::augment_args(clap::Command::new(NAME));
     command.get_arguments().filter_map(|argument| argument.get_long().map(str::to_owned)).collect()

@@ -1,16 +1,19 @@
-//! Converts typed arguments to a study, and the study's errors to messages.
+//! Converts typed arguments to a study, its engine and its plan, and the study's errors to messages.
 
 use std::borrow::Cow;
 use std::ffi::OsString;
 use std::io;
+use std::path::Path;
 
-use crate::cli::args::{EngineArgs, GroupingArgs, LostArg, ScoringArgs, TraceArgs};
-use crate::cli::outcome::Failure;
-use crate::cli::{NAME, output};
+use crate::cli::args::{Engine, EngineArgs, GroupingArgs, LostArg, ScoringArgs, SparkArgs, TraceArgs};
+use crate::cli::{Failure, NAME, output};
+use engines::spark::Cluster;
+use exact::budget::Limit;
 use exact::escape::visible;
+use exact::input;
 use report::html;
-use study::{LostAs, Question, ScoredAlike, Study, StudyError, resolve};
-use toml_spec::Faults;
+use report::plan::register::RegisteredPlan;
+use study::{Backend, LostAs, Question, ScoredAlike, Study, StudyError, resolve};
 use trace::inputs::Input;
 
 impl TraceArgs {
@@ -42,13 +45,37 @@ impl TraceArgs {
     }
 }
 
+impl EngineArgs {
+    pub fn backend(&self) -> Result<Backend, Failure> {
+        self.check()?;
+        Ok(match self.engine {
+            Engine::Native => Backend::Native,
+            Engine::Polars => Backend::Polars,
+            Engine::Spark => Backend::Spark(self.cluster()),
+        })
+    }
+
+    pub fn cluster(&self) -> Cluster {
+        let SparkArgs { master, spark_conf, spark_timeout, spark_log } = self.spark.clone();
+        Cluster { master, settings: spark_conf, timeout_s: spark_timeout, log: spark_log }
+    }
+
+    fn check(&self) -> Result<(), Failure> {
+        let SparkArgs { master, spark_conf, spark_timeout, spark_log } = &self.spark;
+        let typed = master.is_some() || !spark_conf.is_empty() || spark_timeout.is_some() || spark_log.is_some();
+        if self.engine == Engine::Spark || !typed {
+            return Ok(());
+        }
+        Err(Failure::Rendered(
+            "error: --master and --spark-... are words for Spark\n  help: add --engine spark".to_owned(),
+        ))
+    }
+}
+
 impl ScoringArgs {
-    /// The question with this grouping of cells.
     pub fn question(&self, grouping: &GroupingArgs) -> Question {
         Question {
             definitions: self.definitions.clone(),
-            each: false,
-            parts: Vec::new(),
             filter: self.condition.clone(),
             metrics: self.metrics.clone(),
             by: grouping.by.clone(),
@@ -57,6 +84,7 @@ impl ScoringArgs {
                 LostArg::Excluded => LostAs::Nothing,
                 LostArg::AsFailure => LostAs::Failure,
             },
+            ..Question::default()
         }
     }
 }
@@ -66,7 +94,7 @@ impl From<StudyError> for Failure {
         match error.into_io() {
             Ok(error) => Self::Output(error),
             Err(error) => match error.faults() {
-                Some(faults) => Self::of_faults(faults),
+                Some(faults) => Self::Faults(faults.clone()),
                 None => Self::input(error),
             },
         }
@@ -110,9 +138,18 @@ pub(crate) fn commands(typed: &[OsString], groups: &[ScoredAlike]) -> Vec<String
     groups.iter().map(command).collect()
 }
 
-impl Failure {
-    /// The failure for faults of definitions, a filter or a query, underlined.
-    pub fn of_faults(faults: &Faults) -> Self {
-        Self::Faults(faults.clone())
-    }
+const LARGEST: Limit = Limit::new("bytes of a plan", 1 << 20);
+
+pub(crate) fn read_plan(file: &Path) -> Result<RegisteredPlan, Failure> {
+    let shown = file.display();
+    let text = input::text(file, LARGEST)
+        .map_err(|error| Failure::input(format!("{shown}: cannot read the plan: {error}")))?;
+    RegisteredPlan::parse(&text).map_err(|words| Failure::input(format!("{shown}: {words}")))
+}
+
+pub(crate) fn with_plan(study: Study, file: Option<&Path>) -> Result<Study, Failure> {
+    Ok(match file {
+        Some(file) => study.registered(read_plan(file)?),
+        None => study,
+    })
 }

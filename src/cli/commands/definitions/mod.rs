@@ -4,14 +4,13 @@ pub mod sensitivity;
 pub mod sql;
 
 use std::ffi::OsString;
-use std::io::{self, Write as _};
+use std::io;
 use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::output;
+use crate::cli::{Failure, Outcome, output};
 use exact::escape::visible;
 use exact::suggest::nearest;
 use metric::definitions::{Definitions, UnknownMetric};
@@ -44,7 +43,7 @@ pub enum Action {
         #[arg(long)]
         json: bool,
     },
-    /// Say in words how a metric is computed
+    /// Explain in words how a metric is computed
     Explain {
         /// The metric's name
         #[arg(value_name = "METRIC")]
@@ -107,21 +106,19 @@ fn check(file: &Path, traces: &[OsString], json: bool) -> Result<Outcome, Failur
         Ok(definitions) => {
             let catalog = &definitions.catalog;
             let metrics: Vec<&str> = catalog.metric.keys().map(String::as_str).collect();
-            writeln!(
-                io::stdout().lock(),
-                "{}: no fault\n  {} metrics: {}\n  {} named expressions, {} experiments\n  sha256 {}",
+            output::plain(format!(
+                "{}: no fault\n  {} metrics: {}\n  {} named expressions, {} experiments\n  sha256 {}\n",
                 visible(&file.display().to_string()),
                 metrics.len(),
                 visible(&metrics.join(", ")),
                 catalog.lets.len(),
                 catalog.experiment.len(),
                 catalog.hash
-            )?;
-            Ok(Outcome::Done)
+            ))
         }
         Err(FileError::Faults(faults)) if json => {
             output::print_json(&CheckAnswer { ok: false, hash: None, metrics: vec![], faults: faults.records() })?;
-            Err(Failure::of_faults(&faults))
+            Err(Failure::Faults(faults))
         }
         Err(error) => Err(StudyError::from(error).into()),
     }
@@ -142,6 +139,5 @@ fn show(name: &str) -> Result<Outcome, Failure> {
         let names = built_in_names().join(", ");
         return Err(Failure::Rendered(format!("error: no built-in definitions `{name}`; there are {names}")));
     };
-    io::stdout().lock().write_all(text.as_bytes())?;
-    Ok(Outcome::Done)
+    output::plain(text)
 }

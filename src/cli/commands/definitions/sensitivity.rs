@@ -1,16 +1,14 @@
 //! `sensitivity`: how the cells depend on the threshold of mirror evidence, and where a conclusion changes.
 
-use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
 use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
-use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::{output, terminal};
+use crate::cli::{Failure, Outcome, output, terminal};
 use exact::replace::Content;
 use report::figures::FigureFormat;
 use study::{DEFAULT_THRESHOLDS, SensitivityReport, Thresholds};
 
-/// Tell how every cell moves with the threshold of mirror evidence, and where a conclusion changes
+/// Show how every cell depends on the threshold of mirror evidence, and where a conclusion changes
 ///
 /// Needs traces that record `mirror_self_px`. A threshold replaces the `let` named `visible` of the definitions by
 /// `mirror_self_px >= K`.
@@ -23,7 +21,7 @@ pub struct SensitivityArgs {
     pub thresholds: Thresholds,
     #[command(flatten)]
     pub scoring: ScoringArgs,
-    /// Let a cell hold episodes that were recorded differently
+    /// Allow episodes with different settings in one cell
     #[arg(long)]
     pub pool: bool,
     /// Write sensitivity.csv, .md and .tex, and the figure in every format, into this folder
@@ -41,7 +39,6 @@ pub struct SensitivityArgs {
 const TABLES: [&str; 3] = ["sensitivity.csv", "sensitivity.md", "sensitivity.tex"];
 
 impl SensitivityArgs {
-    /// Scores under every threshold, then prints and writes the results.
     pub fn run(self) -> Result<Outcome, Failure> {
         // Refuse an unknown format before a pass over the traces.
         let format = self.figure.as_deref().map(FigureFormat::of).transpose().map_err(Failure::input)?;
@@ -59,11 +56,7 @@ impl SensitivityArgs {
         if let Some(out) = &self.out {
             write(out, &report)?;
         }
-        if self.json {
-            return output::print_json(&report.found);
-        }
-        io::stdout().lock().write_all(report.found.render(terminal::now()).as_bytes())?;
-        Ok(Outcome::Done)
+        output::print_rendered(&report.found, self.json, |found| found.render(terminal::now()))
     }
 }
 

@@ -1,10 +1,9 @@
 //! `sql`: the statement for computing the episode table on another engine.
 
 use std::ffi::OsString;
-use std::io::{self, Write as _};
 
 use crate::cli::args::{GroupingArgs, ScoringArgs};
-use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::{Failure, Outcome, output};
 use metric::sql::{self, Dialect};
 use score::vocabulary::{schema_columns, trace_columns};
 use study::Study;
@@ -17,7 +16,7 @@ pub struct SqlArgs {
     pub traces: Vec<OsString>,
     #[command(flatten)]
     pub scoring: ScoringArgs,
-    /// Whose SQL to write
+    /// The SQL dialect
     #[arg(long, value_enum, default_value_t = DialectArg::Portable)]
     pub dialect: DialectArg,
 }
@@ -29,7 +28,7 @@ pub enum DialectArg {
     Portable,
     /// Spark SQL
     Spark,
-    /// The one of `DuckDB`
+    /// `DuckDB`
     Duckdb,
 }
 
@@ -53,7 +52,6 @@ impl SqlArgs {
             question.resolved(study.traces()?)?.bind_to(&trace_columns(study.traces()?))?
         };
         let statement = sql::lower(&definitions.plan, self.dialect.into()).map_err(Failure::input)?;
-        io::stdout().lock().write_all(statement.as_bytes())?;
-        Ok(Outcome::Done)
+        output::plain(statement)
     }
 }

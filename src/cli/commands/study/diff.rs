@@ -1,12 +1,11 @@
 //! `diff`: the changes under another set of definitions, or between sets of scores.
 
 use std::ffi::OsString;
-use std::io::{self, Write as _};
+use std::io;
 use std::path::PathBuf;
 
 use crate::cli::args::ThreadArgs;
-use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::{output, terminal};
+use crate::cli::{Failure, Outcome, output, terminal};
 use report::cells::diff::Changes;
 use report::cells::group::DEFAULT_BY;
 use report::changes::Limit;
@@ -21,7 +20,7 @@ pub struct DiffArgs {
     /// The definitions after, or scores
     #[arg(value_name = "NEW")]
     pub new: PathBuf,
-    /// The traces to score; between two files of scores, those that tell which timesteps decided
+    /// The traces to score; with two files of scores, the traces that show which timesteps decided
     #[arg(value_name = "TRACES")]
     pub traces: Vec<OsString>,
     /// Only these metrics, separated by commas [default: all]
@@ -70,11 +69,7 @@ impl DiffArgs {
     }
 
     fn print(&self, changes: &Changes) -> Result<Outcome, Failure> {
-        if self.json {
-            output::print_json(changes)?;
-        } else {
-            io::stdout().lock().write_all(changes.render(Limit(self.limit), terminal::width()).as_bytes())?;
-        }
+        output::print_rendered(changes, self.json, |changes| changes.render(Limit(self.limit), terminal::width()))?;
         let failed = self.fail_on_change && !changes.is_empty();
         Ok(if failed { Outcome::CheckFailed } else { Outcome::Done })
     }

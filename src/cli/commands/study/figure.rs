@@ -1,14 +1,12 @@
 //! `mirrorstats figure NAME TRACES...`: one figure, to a file or standard output.
 
-use std::io::{self, Write as _};
 use std::path::PathBuf;
 
 use clap::ValueEnum;
 use clap::builder::PossibleValue;
 
 use crate::cli::args::{EngineArgs, GroupingArgs, ScoringArgs, TraceArgs};
-use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::output;
+use crate::cli::{Failure, Outcome, output};
 use report::figures::{FigureFormat, FigureName, FigureWidth};
 use study::{FigureOptions, MANY_MODELS};
 
@@ -25,19 +23,19 @@ pub struct FigureArgs {
     pub scoring: ScoringArgs,
     #[command(flatten)]
     pub engine: EngineArgs,
-    /// The style whose order of models is taken: `default`, `paper`, or a TOML file
+    /// The style that orders the models: `default`, `paper`, or a TOML file
     #[arg(long, value_name = "STYLE", default_value = "default")]
     pub style: PathBuf,
     /// The metrics shown, in the order of their roles, such as CAAL [default: those of the style]
     #[arg(long, value_name = "METRIC", value_delimiter = ',')]
     pub metric: Option<Vec<String>>,
-    /// A heading of its own
+    /// A title above the figure
     #[arg(long, value_name = "TEXT")]
     pub title: Option<String>,
-    /// The width on paper, such as 8.5cm or 3.3in; text has at least 6 pt there [default: as wide as it is drawn]
+    /// The width on paper, such as 8.5cm or 3.3in, with text of at least 6 pt [default: the drawn width]
     #[arg(long, value_name = "WIDTH")]
     pub width: Option<FigureWidth>,
-    /// Draw only so many models, the best by their means of the first metric over all experiments [default: all]
+    /// Draw only the best N models, by the mean of the first metric over all experiments [default: all]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub top: Option<u16>,
     /// The file format [default: by the ending of FILE; svg on standard output]
@@ -46,7 +44,7 @@ pub struct FigureArgs {
     /// The file to write [default: standard output]
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
-    /// Let a cell hold episodes that were recorded differently
+    /// Allow episodes with different settings in one cell
     #[arg(long)]
     pub pool: bool,
 }
@@ -55,7 +53,6 @@ pub struct FigureArgs {
 #[derive(Clone, Copy, Debug)]
 pub struct Format(FigureFormat);
 
-/// The formats of this build.
 const FORMATS: &[Format] = &[
     Format(FigureFormat::Svg),
     #[cfg(feature = "raster")]
@@ -82,15 +79,11 @@ impl ValueEnum for Format {
 }
 
 impl FigureArgs {
-    /// Scores the traces and draws.
     pub fn run(self) -> Result<Outcome, Failure> {
         // Refuse an unknown extension before a pass over the traces.
         let format = self.format()?;
-        let study = self.traces.study_on(
-            &self.engine,
-            &self.scoring,
-            &GroupingArgs { pool: self.pool, ..GroupingArgs::default() },
-        )?;
+        let grouping = GroupingArgs { pool: self.pool, ..GroupingArgs::default() };
+        let study = self.traces.study_on(&self.engine, &self.scoring, &grouping)?;
         if let Some(path) = &self.output {
             output::check_target(path, study.files_read(Some(&self.style)))?;
         }
@@ -102,10 +95,9 @@ impl FigureArgs {
         }
         let bytes = format.encode(&figure).map_err(Failure::input)?;
         match &self.output {
-            Some(path) => output::write_file(path, &bytes)?,
-            None => io::stdout().lock().write_all(&bytes)?,
+            Some(path) => output::write_file(path, &bytes).map(|()| Outcome::Done),
+            None => output::plain(bytes),
         }
-        Ok(Outcome::Done)
     }
 
     fn format(&self) -> Result<FigureFormat, Failure> {

@@ -1,11 +1,9 @@
 //! `mirrorstats gate`: compares new episodes with old ones; each verdict has an exit code.
 
 use std::ffi::OsString;
-use std::io::{self, Write as _};
 
-use crate::cli::args::{GroupingArgs, ScoringArgs, ThreadArgs, TraceArgs};
-use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::{output, terminal};
+use crate::cli::args::{GroupingArgs, ScoringArgs, ThreadArgs, TraceArgs, number};
+use crate::cli::{Failure, Outcome, output, terminal};
 use report::statistics::{GateFormat, GateOptions, GateVerdict};
 
 /// Compare new episodes with old ones: improved, held, regressed, cannot say
@@ -86,9 +84,9 @@ impl GateArgs {
             Format::Json => None,
         };
         match format {
-            Some(format) => io::stdout().lock().write_all(gate.render(format).as_bytes())?,
-            None => drop(output::print_json(&gate)?),
-        }
+            Some(format) => output::plain(gate.render(format))?,
+            None => output::print_json(&gate)?,
+        };
         Ok(match gate.verdict {
             GateVerdict::Improved | GateVerdict::Held => Outcome::Done,
             GateVerdict::Regressed => Outcome::CheckFailed,
@@ -99,6 +97,5 @@ impl GateArgs {
 }
 
 fn margin(text: &str) -> Result<f64, String> {
-    let value = text.parse().ok().filter(|value: &f64| *value > 0.0 && value.is_finite());
-    value.ok_or_else(|| format!("expected a number above 0 such as 0.1, found `{text}`"))
+    number(text, "a number above 0 such as 0.1", |value| value > 0.0 && value.is_finite())
 }

@@ -3,12 +3,12 @@
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
+use crate::cli::args::number;
 #[cfg(feature = "sim")]
 use crate::cli::commands::world::configured;
-use crate::cli::outcome::{Failure, Outcome};
 #[cfg(feature = "sim")]
 use crate::cli::registration;
-use crate::cli::{output, terminal};
+use crate::cli::{Failure, Outcome, output, terminal};
 use exact::ratio::Ratio;
 use exact::suggest::hint;
 use metric::definitions::Definitions;
@@ -25,7 +25,7 @@ pub struct PlanArgs {
     /// The difference of two rates to show, such as 0.3: how many episodes does it take?
     #[arg(long, value_name = "D", value_parser = share)]
     pub difference: Option<f64>,
-    /// Episodes per model and experiment, as many for each seed: which difference can they show?
+    /// Episodes per model and experiment, equally many for each seed: which difference can they show?
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub episodes: Option<u64>,
     /// The same as runs per seed
@@ -43,13 +43,14 @@ pub struct PlanArgs {
     /// Confidence of the tests; they are at one minus it
     #[arg(long, value_name = "LEVEL", default_value = "0.95", value_parser = within)]
     pub confidence: f64,
-    /// Models, each compared with each
+    /// Models, compared in pairs
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u64).range(2..=1000))]
     pub models: u64,
-    /// Seeds, each with as many runs
+    /// Seeds, all with equally many runs
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u64).range(1..=2000))]
     pub seeds: u64,
-    /// Participants of a crossed study in the place of seeds, each with as many scenes: tests count participants, as `stats` does
+    /// Participants of a crossed study instead of seeds, all with equally many scenes: tests count participants, as
+    /// `stats` does
     #[arg(long, value_name = "N", conflicts_with_all = ["seeds", "sequential", "register", "episodes", "runs"], value_parser = clap::value_parser!(u64).range(1..=2000))]
     pub participants: Option<u64>,
     /// The share of pairs in which one model alone succeeds [default: as if independent, the worst case]
@@ -61,7 +62,7 @@ pub struct PlanArgs {
     /// Look after each run of all seeds with `stats --sequential`, and stop at the first verdict
     #[arg(long, conflicts_with = "icc")]
     pub sequential: bool,
-    /// A level of chance to hold each model against as well, such as 1/3
+    /// A chance level to compare each model with, such as 1/3
     #[arg(long, value_name = "LEVEL", value_parser = chance)]
     pub chance: Option<Ratio>,
     /// Definitions that a registered plan names by their hash: `paper`, `extended`, or a TOML file
@@ -95,7 +96,7 @@ pub struct PlanArgs {
 #[derive(Debug, thiserror::Error)]
 enum UsageError {
     #[error(
-        "--episodes {episodes}: expected as many episodes for each of {seeds} seeds; give a multiple of {seeds}, or --seeds 1"
+        "--episodes {episodes}: expected equally many episodes for each of {seeds} seeds; give a multiple of {seeds}, or --seeds 1"
     )]
     Uneven { episodes: u64, seeds: u64 },
     #[error("--primary {name}: expected a metric of the definitions ({known}), found `{name}`{suggestion}")]
@@ -105,17 +106,12 @@ enum UsageError {
 }
 
 impl PlanArgs {
-    /// Computes and prints the plan, and registers it if requested.
     pub fn run(self) -> Result<Outcome, Failure> {
         let plan = plan(self.request()?).map_err(Failure::input)?;
         if let Some(file) = &self.register {
             self.write(file, &plan)?;
         }
-        if self.json {
-            return output::print_json(&plan);
-        }
-        std::io::stdout().lock().write_all(plan.render(terminal::width()).as_bytes())?;
-        Ok(Outcome::Done)
+        output::print_rendered(&plan, self.json, |plan| plan.render(terminal::width()))
     }
 
     fn request(&self) -> Result<PlanRequest, Failure> {
@@ -189,17 +185,11 @@ impl PlanArgs {
         Ok((vec![world], registration::prompts()))
     }
 
-    /// Returns no hashes, in a program that cannot record.
     #[cfg(not(feature = "sim"))]
     #[expect(clippy::unnecessary_wraps, clippy::unused_self, reason = "a program that records reads a file")]
     fn recorded(&self) -> Result<(Vec<NamedHash>, Vec<NamedHash>), Failure> {
         Ok((Vec::new(), Vec::new()))
     }
-}
-
-fn number(text: &str, expected: &str, holds: impl Fn(f64) -> bool) -> Result<f64, String> {
-    let value = text.parse::<f64>().ok().filter(|value| holds(*value));
-    value.ok_or_else(|| format!("expected {expected}, found `{text}`"))
 }
 
 fn share(text: &str) -> Result<f64, String> {

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crate::cli::args::{ScoringArgs, TraceArgs};
-use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::{Failure, Outcome};
 
 /// Run a SELECT over the tables steps, episodes and cells
 ///
@@ -76,13 +76,12 @@ mod rows {
     use report::tables::Table as Printed;
     use study::StudyError;
 
-    /// The text for null in a table.
     const NULL: &str = "NULL";
 
     pub(super) fn answer(args: &QueryArgs) -> Result<Outcome, Failure> {
         let format = format(args)?;
         // Refuse an invalid query before reading the traces.
-        let query = statement::check(&args.query).map_err(|found| Failure::of_faults(&found))?;
+        let query = statement::check(&args.query).map_err(Failure::Faults)?;
         let study = args.traces.study(&args.scoring, &GroupingArgs::default())?;
         if let Some(path) = &args.output {
             output::check_target(path, study.files_read(None))?;

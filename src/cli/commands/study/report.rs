@@ -7,9 +7,8 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::cli::args::{EngineArgs, GroupingArgs, ScoringArgs, TraceArgs};
-use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::output;
-use crate::cli::typed::plan::with_plan;
+use crate::cli::scoring::with_plan;
+use crate::cli::{Failure, Outcome, output};
 use exact::format::counted;
 use report::bundle::Manifest;
 use study::{Report, ReportOptions, WrittenReport};
@@ -31,10 +30,10 @@ pub struct ReportArgs {
     pub style: PathBuf,
     #[command(flatten)]
     pub grouping: GroupingArgs,
-    /// Write tables, cells and provenance alone: no figures, no report.html
+    /// Write only tables, cells and provenance: no figures and no report.html
     #[arg(long)]
     pub no_figures: bool,
-    /// The registered plan to compare the analysis with: each departure is named
+    /// A registered plan: each departure of the analysis from it is listed
     #[arg(long, value_name = "FILE")]
     pub plan: Option<PathBuf>,
     /// Print what was written as JSON instead of the table

@@ -4,8 +4,8 @@ use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 
 use crate::cli::args::{Engine, EngineArgs, GroupingArgs, ScoringArgs, TraceArgs};
-use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::{output, spark};
+use crate::cli::{Failure, Outcome, output};
+use engines::spark::source::is_uri;
 use exact::format::counted;
 use exact::replace::is_stream;
 use score::format::Format;
@@ -63,7 +63,7 @@ impl ScoreArgs {
                 "error: --explain looks into the steps, which Spark keeps to itself\n  help: leave --engine out";
             return Err(Failure::Rendered(words.to_owned()));
         }
-        if let Some(folder) = self.output.as_deref().filter(|output| spark::is_folder(output)) {
+        if let Some(folder) = self.output.as_deref().filter(|output| is_folder(output)) {
             let name = folder.to_string_lossy();
             let written = self.spark_job()?.write(&name)?;
             let episodes = counted(written.episodes, "episode");
@@ -116,4 +116,10 @@ fn format_of(path: &Path) -> Result<Format, Failure> {
         Err(_) if is_stream(path) => Ok(Format::Csv),
         format => format.map_err(Failure::input),
     }
+}
+
+/// Returns true if an output is a folder that Spark writes, not a file written here.
+fn is_folder(output: &Path) -> bool {
+    let name = output.to_string_lossy();
+    is_uri(&name) || Format::of_name(&name).is_err() && !is_stream(output)
 }

@@ -1,17 +1,14 @@
 //! `mirrorstats stats`: the conclusions that this n allows.
 
-use std::io::Write as _;
 use std::path::PathBuf;
 
-use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
-use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::terminal;
-use crate::cli::typed::plan::with_plan;
+use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs, number};
+use crate::cli::scoring::with_plan;
+use crate::cli::{Failure, Outcome, output, terminal};
 use exact::suggest::hint;
 use report::statistics::text::Length;
 use report::statistics::{Options, Sequential, Statistics};
 
-/// The word for all metrics.
 const ALL: &str = "all";
 
 /// Intervals, tests and comparisons that hold at small n
@@ -36,16 +33,16 @@ pub struct StatsArgs {
     /// Horizon of restricted means, in steps [default: the last step known for every model of an experiment]
     #[arg(long, value_name = "STEPS", value_parser = clap::value_parser!(i64).range(1..))]
     pub horizon: Option<i64>,
-    /// Print every interval, plain means, clusters, and what could have been shown
+    /// Print every interval, plain means, clusters, and the differences that the data could have shown
     #[arg(long)]
     pub full: bool,
-    /// For a study that still runs: intervals and tests of rates that may be looked at after every episode
+    /// Intervals and tests of rates that stay valid if you look after every episode of a running study
     #[arg(long, conflicts_with_all = ["by", "horizon", "full"])]
     pub sequential: bool,
-    /// The registered plan to compare the analysis with: each departure is named
+    /// A registered plan: each departure of the analysis from it is listed
     #[arg(long, value_name = "FILE")]
     pub plan: Option<PathBuf>,
-    /// Print everything as JSON, of every metric
+    /// Print everything as JSON, for every metric
     #[arg(long)]
     pub json: bool,
 }
@@ -67,35 +64,30 @@ impl StatsArgs {
         let study = with_plan(self.traces.study(&scoring, &self.grouping)?, self.plan.as_deref())?;
         let (confidence, horizon, improvements) = (self.confidence, self.horizon, self.full || self.json);
         let options = Options { confidence, horizon, improvements, ..Options::default() };
-        let text = if self.sequential {
-            self.sequential_page(&study.sequential(&options)?)?
+        if self.sequential {
+            self.print_sequential(&study.sequential(&options)?)
         } else {
-            self.page(&study.statistics(&options)?)?
-        };
-        std::io::stdout().lock().write_all(text.as_bytes())?;
-        Ok(Outcome::Done)
+            self.print(&study.statistics(&options)?)
+        }
     }
 
-    const fn length(&self) -> Length {
-        if self.full { Length::Full } else { Length::Short }
-    }
-
-    fn page(&self, statistics: &Statistics) -> Result<String, Failure> {
+    fn print(&self, statistics: &Statistics) -> Result<Outcome, Failure> {
         if self.json {
-            return json(statistics);
+            return output::print_json(statistics);
         }
         let metrics = statistics.cells.iter().map(|cell| cell.metric.as_str());
         let chosen = self.chosen("metric", metrics, &statistics.headline)?;
-        Ok(statistics.render(&chosen, self.length(), terminal::width()))
+        let length = if self.full { Length::Full } else { Length::Short };
+        output::plain(statistics.render(&chosen, length, terminal::width()))
     }
 
-    fn sequential_page(&self, sequential: &Sequential) -> Result<String, Failure> {
+    fn print_sequential(&self, sequential: &Sequential) -> Result<Outcome, Failure> {
         if self.json {
-            return json(sequential);
+            return output::print_json(sequential);
         }
         let rates = sequential.rates.iter().map(|rate| rate.metric.as_str());
         let chosen = self.chosen("rate", rates, &sequential.headline)?;
-        Ok(sequential.render(&chosen, terminal::width()))
+        output::plain(sequential.render(&chosen, terminal::width()))
     }
 
     /// The metrics to print: the requested ones if they are in `all`; the headline ones if none is requested.
@@ -127,14 +119,8 @@ impl StatsArgs {
     }
 }
 
-fn json(statistics: &impl serde::Serialize) -> Result<String, Failure> {
-    Ok(serde_json::to_string_pretty(statistics).map_err(Failure::input)? + "\n")
-}
-
 pub fn confidence(text: &str) -> Result<f64, String> {
-    let fault = || format!("expected a number between 0 and 1 such as 0.95, found `{text}`");
-    let value: f64 = text.parse().map_err(|_| fault())?;
-    if value > 0.0 && value < 1.0 { Ok(value) } else { Err(fault()) }
+    number(text, "a number between 0 and 1 such as 0.95", |value| value > 0.0 && value < 1.0)
 }
 
 #[cfg(test)]

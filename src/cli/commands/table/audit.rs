@@ -1,12 +1,10 @@
 //! `audit`: finds cells of published tables that no data can give.
 
-use std::io::Write as _;
 use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 
-use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::{output, terminal};
+use crate::cli::{Failure, Outcome, output, terminal};
 use exact::rounding::Rounding;
 use report::audit::episodes::Episodes;
 use study::{AuditRequest, audit_tables};
@@ -42,11 +40,7 @@ impl AuditArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
         let Self { episodes, definitions, steps, rounding: roundings, style, .. } = self;
         let found = audit_tables(&self.tables, &AuditRequest { episodes, definitions, steps, roundings, style })?;
-        if self.json {
-            output::print_json(&found)?;
-        } else {
-            std::io::stdout().lock().write_all(found.render(terminal::width()).as_bytes())?;
-        }
+        output::print_rendered(&found, self.json, |found| found.render(terminal::width()))?;
         Ok(if found.holds() { Outcome::Done } else { Outcome::CheckFailed })
     }
 }

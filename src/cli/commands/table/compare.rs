@@ -1,12 +1,9 @@
 //! `compare`: the tables of traces beside the published ones.
 
-use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
 use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
-use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::terminal;
-use report::comparison::Comparison;
+use crate::cli::{Failure, Outcome, output, terminal};
 use report::errata::{Errata, ErrataError};
 
 /// The style that printed the published tables.
@@ -35,7 +32,7 @@ pub struct CompareArgs {
     /// Print the answer as JSON
     #[arg(long)]
     pub json: bool,
-    /// Let a cell hold episodes that were recorded differently
+    /// Allow episodes with different settings in one cell
     #[arg(long)]
     pub pool: bool,
 }
@@ -47,7 +44,7 @@ impl CompareArgs {
         let scoring = ScoringArgs { definitions: self.definitions.clone(), ..ScoringArgs::default() };
         let study = self.traces.study(&scoring, &GroupingArgs { pool: self.pool, ..GroupingArgs::default() })?;
         let comparison = study.compare(&self.published, &self.style, self.table.as_deref(), &errata)?;
-        print(&comparison, self.json)?;
+        output::print_rendered(&comparison, self.json, |found| found.render(terminal::width()))?;
         Ok(if comparison.holds() { Outcome::Done } else { Outcome::CheckFailed })
     }
 
@@ -61,15 +58,4 @@ impl CompareArgs {
             None => Ok(Errata::default()),
         }
     }
-}
-
-fn print(comparison: &Comparison, json: bool) -> Result<(), Failure> {
-    let mut out = io::stdout().lock();
-    if json {
-        serde_json::to_writer_pretty(&mut out, comparison).map_err(io::Error::from)?;
-        writeln!(out)?;
-    } else {
-        out.write_all(comparison.render(terminal::width()).as_bytes())?;
-    }
-    Ok(())
 }

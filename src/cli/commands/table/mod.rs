@@ -3,16 +3,18 @@
 pub mod audit;
 pub mod compare;
 pub mod rescore;
-pub mod verify;
 
-use crate::cli::outcome::{Failure, Outcome};
+use std::path::PathBuf;
+
+use crate::cli::{Failure, Outcome, output};
+use study::verify::verify;
 
 /// Compare and audit published tables; verify and rescore reports
 #[derive(Debug, clap::Subcommand)]
 pub enum TableCommand {
     Compare(compare::CompareArgs),
     Audit(audit::AuditArgs),
-    Verify(verify::VerifyArgs),
+    Verify(VerifyArgs),
     Rescore(rescore::RescoreArgs),
 }
 
@@ -24,5 +26,27 @@ impl TableCommand {
             Self::Verify(args) => args.run(),
             Self::Rescore(args) => args.run(),
         }
+    }
+}
+
+/// Hold the files of a report against the hashes in its manifest
+///
+/// Names every file that was changed, is missing, or is there though the manifest does not list it, and exits with 1 then.
+/// The manifest itself is taken at its word.
+#[derive(Clone, Debug, clap::Args)]
+pub struct VerifyArgs {
+    /// The folder of a report
+    #[arg(value_name = "REPORT")]
+    report: PathBuf,
+    /// Answer as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+impl VerifyArgs {
+    pub fn run(&self) -> Result<Outcome, Failure> {
+        let found = verify(&self.report).map_err(Failure::input)?;
+        output::print(&found, self.json)?;
+        Ok(if found.holds() { Outcome::Done } else { Outcome::CheckFailed })
     }
 }

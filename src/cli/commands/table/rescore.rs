@@ -7,8 +7,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::cli::args::ThreadArgs;
-use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::{output, terminal};
+use crate::cli::{Failure, Outcome, output, terminal};
 use exact::escape::visible;
 use exact::format::counted;
 use report::bundle::Manifest;

@@ -12,9 +12,9 @@ use study::{NotRecorded, QualityCheckAnswer, QualityLimits, Violation};
 
 /// Check the quality of the replies in traces: exits with 1 if any limit is exceeded or cannot be checked
 ///
-/// Shares are of the replies of one cell: an experiment, a model and a condition. A limit cannot be checked where traces do
-/// not record its quantity for every step. Lost episodes are those that the infrastructure ended, and those in `lost.jsonl`
-/// beside the traces.
+/// Shares are of the replies of one cell: an experiment, a model and a condition. A limit cannot be checked if traces
+/// do not record its quantity for every step. Lost episodes are those ended by the infrastructure, and those in
+/// `lost.jsonl` beside the traces.
 #[derive(Clone, Debug, clap::Args)]
 pub struct CheckArgs {
     #[command(flatten)]
@@ -34,7 +34,7 @@ pub struct CheckArgs {
     /// The most lost episodes, over all cells
     #[arg(long, value_name = "N")]
     pub max_lost: Option<u64>,
-    /// The longest time within which 95 % of a cell's replies came, in milliseconds
+    /// The longest 95th percentile of a cell's reply times, in milliseconds
     #[arg(long, value_name = "MS")]
     pub max_latency: Option<i64>,
     /// Answer as JSON

@@ -11,16 +11,16 @@ use trace::import::{Format, Mapping, Text};
 
 /// Make a trace of another harness's steps or logs
 ///
-/// One line or row is one step: its keys are columns of the schema, as `mirrorstats trace schema step` prints them. Other
-/// keys become columns of their own. Rows of an episode may be in any order and in several files. The trace holds every row
-/// and keeps every rule of `mirrorstats trace validate`, or nothing is written. Logs of Inspect, inspect-robots and LeRobot
-/// are read as they are; what they hold that is not a step is counted and named.
+/// One line or row is one step: its keys are columns of the schema, as `mirrorstats trace schema step` prints them.
+/// Other keys become columns of their own. Rows of an episode may be in any order and in several files. The trace holds
+/// every row and keeps every rule of `mirrorstats trace validate`, or nothing is written. Logs of Inspect,
+/// inspect-robots and LeRobot are read directly; content that is not a step is counted and named.
 #[derive(Clone, Debug, clap::Args)]
 pub struct ImportArgs {
     /// Files of steps, or the folder of a LeRobot data set; `-` for standard input
     #[arg(value_name = "FILE", required = true)]
     steps: Vec<PathBuf>,
-    /// The format of the files; by default their names and first bytes tell it
+    /// The format of the files [default: detected from names and first bytes]
     #[arg(long, value_name = "FORMAT", value_parser = formats())]
     from: Option<Format>,
     /// The trace to write
@@ -29,20 +29,19 @@ pub struct ImportArgs {
     /// The definitions whose experiments are known: `paper`, `extended`, or a TOML file
     #[arg(long, value_name = "NAME|FILE", default_value = "paper")]
     definitions: PathBuf,
-    /// The colours that there are, which the trace then declares: names with commas between them, a file of names, or
-    /// `default`, the ten colours of the study
+    /// The possible colours, which the trace then declares: names separated by commas, a file of names, or `default`
+    /// for the ten colours of the study
     #[arg(long, value_name = "NAMES|FILE|default")]
     palette: Option<PathBuf>,
-    /// What episodes share that are more alike than chance: statistics of the trace then take it as a cluster. Episodes with
-    /// an equal `scene` are pairs without a word
+    /// What similar episodes share: statistics treat it as a cluster. Episodes with an equal `scene` are pairs by
+    /// default
     #[arg(long, value_enum, value_name = "COLUMN")]
     cluster: Option<ClusterArg>,
-    /// The steps are rebuilt from published numbers, which leave the rest of them open: statistics take no pairs and no
-    /// clusters from them
+    /// The steps are rebuilt from published numbers, so statistics use no pairs and no clusters
     #[arg(long, conflicts_with = "cluster")]
     reconstruction: bool,
-    /// A column and where its value is in each line: keys with dots between them, positions of lists among them; `+1` behind
-    /// adds to an integer. Lists and objects that no column is taken from are left out, and named
+    /// A column and the path of its value in each line: keys and list positions separated by dots; a trailing `+1` adds
+    /// 1 to an integer. Unused lists and objects are left out and named
     #[arg(long, value_name = "COLUMN=PATH")]
     map: Vec<String>,
     /// A column and its value in every line

@@ -19,11 +19,11 @@ use trace::open::TraceFile;
 use trace::validate::validate;
 use trace::write::OptionalColumns;
 
-/// Make a trace of a log, also of one that was cut off or damaged
+/// Make a trace from a log, even a truncated or damaged one
 ///
-/// Every episode whose end is in the log is in the trace, which is checked against every rule. A trace that is there is
-/// replaced if it is one of the same recording and the log has all its episodes with the same rows. Exits with 3 if anything of the log is
-/// lost, be it the index at its end.
+/// The trace gets every episode that ends in the log, and is checked against every rule. An existing trace is replaced
+/// if it belongs to the same recording and the log has all its episodes with the same rows. Exits with 3 if any part of
+/// the log is lost, even only the index at its end.
 #[derive(Clone, Debug, clap::Args)]
 pub struct RecoverArgs {
     /// The log

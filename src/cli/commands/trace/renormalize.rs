@@ -12,9 +12,9 @@ use trace::renormalize::{RenormalizeAnswer, RenormalizeError, RenormalizedFile, 
 
 /// Recompute the attributions of old traces from the texts of `identification`
 ///
-/// Writes each trace again under its name into another folder, with `self_color` as this program reads the texts, and
-/// prints every step whose attribution changes. Steps without a text, all other columns and the rest of the recording's
-/// metadata stay unchanged. All traces are written, or none.
+/// Writes each trace under its name into another folder, with `self_color` as this version reads the texts, and prints
+/// every step that changes. Steps without a text, all other columns and the rest of the recording's metadata stay
+/// unchanged. All traces are written, or none.
 #[derive(Clone, Debug, clap::Args)]
 pub struct RenormalizeArgs {
     #[command(flatten)]

@@ -4,8 +4,7 @@ use std::ffi::OsString;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::output;
+use crate::cli::{Failure, Outcome, output};
 use report::figures::{Figure, FigureFormat};
 use trace::inputs;
 use world::replay::film_strip::{Steps, Strip};
@@ -18,7 +17,7 @@ pub struct FilmstripArgs {
     /// The episode's id, such as E1/oracle/s1/r1
     #[arg(value_name = "EPISODE")]
     episode: String,
-    /// Logs or traces to look for it in: files, folders or quoted globs
+    /// Logs or traces to search: files, folders or quoted globs
     #[arg(value_name = "RECORDINGS", default_value = "runs")]
     recordings: Vec<OsString>,
     /// The picture to write: .png, .svg or .pdf

@@ -7,10 +7,9 @@ pub mod replay;
 use std::io::{self, Write as _};
 use std::path::PathBuf;
 
-use crate::cli::experiments;
-use crate::cli::outcome::{Failure, Outcome};
 #[cfg(feature = "raster")]
 use crate::cli::output;
+use crate::cli::{Failure, Outcome, experiments};
 use world::record::plan::Experiments;
 use world::sim::config::{ConfigError, WorldConfig};
 #[cfg(feature = "raster")]
@@ -77,7 +76,7 @@ struct SheetArgs {
 pub(super) fn configured(path: Option<&PathBuf>) -> Result<WorldConfig, Failure> {
     let Some(path) = path else { return Ok(WorldConfig::default()) };
     WorldConfig::load(path).map_err(|error| match error {
-        ConfigError::Faults(faults) => Failure::of_faults(&faults),
+        ConfigError::Faults(faults) => Failure::Faults(faults),
         unreadable @ ConfigError::Unreadable { .. } => Failure::input(unreadable),
     })
 }

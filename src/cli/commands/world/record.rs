@@ -13,16 +13,16 @@ use super::configured;
 use crate::cli::args::ThreadArgs;
 use crate::cli::dry_run::{self, ForecastAnswer, RequestForecast};
 use crate::cli::exec::ExecArgs;
-use crate::cli::{Failure, Outcome, experiments, options_of, output};
 #[cfg(feature = "view")]
 use crate::cli::human::HumanArgs;
+pub use crate::cli::recording::Recorded;
 use crate::cli::recording::episodes::Episodes;
 use crate::cli::recording::interrupt::{Playing, stop_at_interrupt};
-pub use crate::cli::recording::Recorded;
 use crate::cli::recording::progress::Bar;
 use crate::cli::recording::{self, RecordAnswer, probe, several};
 use crate::cli::registration::registration;
 use crate::cli::vlm::VlmArgs;
+use crate::cli::{Failure, Outcome, experiments, options_of, output};
 use exact::escape::visible;
 use exact::suggest::hint;
 use world::agent::Player;
@@ -41,9 +41,9 @@ const HUMAN: &str = "human";
 
 /// Record episodes of an agent in the mirror world: step traces for `report`, logs with the frames
 ///
-/// The same command again continues where it stopped. Several at once divide the episodes among themselves. Ctrl-C ends a
-/// recording when the steps under way are done, a second one at once; whole episodes stay. Exits with 1 if episodes were lost for want of an answer,
-/// with 2 if the agent could not go on, and with 130 if it was interrupted.
+/// Run the same command again to continue a recording. Several processes divide the episodes among themselves. Ctrl-C
+/// stops after the current steps, a second Ctrl-C at once; complete episodes stay. Exits with 1 if episodes were lost
+/// because no answer came, with 2 if the agent could not continue, and with 130 if it was interrupted.
 #[derive(Clone, Debug, clap::Args)]
 #[expect(clippy::struct_excessive_bools, reason = "a flag each on the command line")]
 pub struct RecordArgs {
@@ -65,8 +65,7 @@ pub struct RecordArgs {
     /// Runs 1 to this for each seed
     #[arg(long, value_name = "N", default_value_t = 7, value_parser = clap::value_parser!(i32).range(1..=999))]
     runs: i32,
-    /// Play each scene so often: how much verdicts differ from one time to the next is the noise that a difference has to
-    /// exceed
+    /// Record each scene this many times: the variation between repeats is the noise that a difference must exceed
     #[arg(long, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(i32).range(1..=99))]
     repeats: i32,
     /// Record one share of the episodes, such as 3/16; shares may go into one folder
@@ -75,36 +74,36 @@ pub struct RecordArgs {
     /// The folder for traces and logs
     #[arg(short, long, value_name = "DIR", default_value = "runs")]
     out: PathBuf,
-    /// The name of the condition that the study varies besides the model: a column of traces and tables, and part of each episode's id
+    /// The condition that the study varies besides the model: a column of traces and tables, and part of each episode's
+    /// id
     #[arg(long, value_name = "NAME", value_parser = condition)]
     condition: Option<String>,
-    /// A plan that `mirrorstats plan --register` wrote: traces carry its hash, and reports say whether what was analysed is
-    /// what was registered
+    /// A plan written by `mirrorstats plan --register`: traces carry its hash, and reports list departures from it
     #[arg(long, value_name = "FILE")]
     plan: Option<PathBuf>,
-    /// A world configuration in TOML over the built-in one
+    /// A world configuration in TOML, which overrides the built-in one
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// Episodes under way at once [default: as many as the agent makes worth while]; of people always one each
+    /// The number of concurrent episodes [default: depends on the agent]; each person plays one at a time
     #[arg(long, value_name = "N")]
     in_flight: Option<NonZeroUsize>,
     /// Stop after this many replies in a row without a decision
     #[arg(long, value_name = "N", default_value = "20", conflicts_with = "keep_going")]
     max_unusable: NonZeroU32,
-    /// Go on however many replies in a row give no decision
+    /// Never stop because of replies without a decision
     #[arg(long)]
     keep_going: bool,
     /// Write no log
     #[arg(long)]
     no_log: bool,
-    /// Leave the frames out of the log, and draw none for agents that do not look (random, frozen)
+    /// Leave frames out of the log, and draw none for agents that do not look (random, frozen)
     #[arg(long)]
     no_frames: bool,
-    /// Say what would be recorded, and what a model's requests may take and cost; record, write and send nothing
+    /// Print what would be recorded, and the possible tokens and cost of a model; record, write and send nothing
     #[arg(long)]
     dry_run: bool,
-    /// Send one request per model and say what it takes: parameters and schema, which model answers, cost and time; record and
-    /// write nothing
+    /// Send one request per model and print what it accepts: parameters and schema, which model answers, cost and time;
+    /// record and write nothing
     #[arg(long, conflicts_with = "dry_run")]
     probe: bool,
     /// Print the outcomes of the episodes as JSON
@@ -151,14 +150,10 @@ impl RecordArgs {
             all.push(recorded);
         }
         if self.json {
-            self.print_answers(&all)?;
+            let answers: Vec<&RecordAnswer> = all.iter().flatten().map(|recorded| &recorded.answer).collect();
+            self.print_list(&answers)?;
         }
         several::outcome(all, each.len())
-    }
-
-    fn print_answers(&self, all: &[Result<Recorded, Failure>]) -> Result<(), Failure> {
-        let answers: Vec<&RecordAnswer> = all.iter().flatten().map(|recorded| &recorded.answer).collect();
-        self.print_list(&answers)
     }
 
     fn print_list<T: Serialize>(&self, answers: &[T]) -> Result<(), Failure> {
@@ -298,7 +293,7 @@ impl RecordArgs {
         let recording = self.recordings(config, plan, player.as_ref())?;
         let there = RecordingIndex::new(&self.out, subject.clone(), recording);
         let episodes = Episodes::of(plan, |experiment| there.recorded(experiment))?;
-        let limits = (self.settings(player.as_ref()).in_flight.get(), self.vlm.requests_per_minute());
+        let limits = (self.settings(player.as_ref()).in_flight.get(), self.vlm.requests_per_minute);
         let vlm = vlm.filter(|_| self.vlm.sends());
         let requests =
             vlm.map(|vlm| RequestForecast::of(&vlm, &subject, (&episodes.found(), &episodes.todo), config, limits));

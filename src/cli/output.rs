@@ -2,14 +2,14 @@
 //!
 //! A command's files are on the disk when it ends, and no loss of power leaves half of one.
 
-use std::fmt::Display;
+use std::fmt::{self, Display};
 use std::fs::File;
 use std::io::{self, Write as _};
 use std::path::Path;
 
 use serde::Serialize;
 
-use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::{Failure, Outcome};
 use exact::escape::visible_lines;
 use exact::replace::{self, Content, FolderFiles, NewFile};
 use trace::checksums::stale_note;
@@ -21,11 +21,38 @@ pub fn print<T: Display + Serialize>(answer: &T, json: bool) -> Result<Outcome, 
     if json {
         return print_json(answer);
     }
-    writeln!(io::stdout().lock(), "{}", visible_lines(answer.to_string().trim_end()))?;
+    plain(visible_lines(answer.to_string().trim_end()) + "\n")
+}
+
+/// Prints an answer whose text `tell` writes.
+pub fn print_told<T: Serialize>(
+    answer: &T,
+    json: bool,
+    tell: impl FnOnce(&mut String, &T) -> fmt::Result,
+) -> Result<Outcome, Failure> {
+    if json {
+        return print_json(answer);
+    }
+    let mut text = String::new();
+    tell(&mut text, answer).map_err(Failure::input)?;
+    plain(visible_lines(text.trim_end()) + "\n")
+}
+
+/// Prints an answer: a text that may have emphasis, or JSON.
+pub fn print_rendered<T: Serialize>(
+    answer: &T,
+    json: bool,
+    render: impl FnOnce(&T) -> String,
+) -> Result<Outcome, Failure> {
+    if json { print_json(answer) } else { plain(render(answer)) }
+}
+
+/// Prints bytes as they are.
+pub fn plain(text: impl AsRef<[u8]>) -> Result<Outcome, Failure> {
+    io::stdout().lock().write_all(text.as_ref())?;
     Ok(Outcome::Done)
 }
 
-/// Prints an answer as JSON.
 pub fn print_json<T: Serialize>(answer: &T) -> Result<Outcome, Failure> {
     let mut out = io::stdout().lock();
     serde_json::to_writer_pretty(&mut out, answer).map_err(io::Error::from)?;
@@ -33,12 +60,10 @@ pub fn print_json<T: Serialize>(answer: &T) -> Result<Outcome, Failure> {
     Ok(Outcome::Done)
 }
 
-/// Prints a note on standard error, besides answers and faults.
 pub fn note(words: &str) {
     say(&format!("note: {words}"));
 }
 
-/// Prints the limitations of an answer.
 pub fn notes(notes: &[String]) {
     for words in notes {
         note(words);
@@ -56,7 +81,6 @@ pub fn say(words: &str) {
     let _ = writeln!(io::stderr(), "{}", visible_lines(words));
 }
 
-/// Replaces a file by one with these bytes.
 pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     write_file_with(path, |file| Ok(file.write_all(bytes)?))
 }
@@ -78,12 +102,10 @@ pub fn write_folder(folder: &Path, files: &[(&Path, Content<'_>)]) -> Result<(),
     replace::replace_folder(folder, &files).map_err(|error| unwritable(&error.path, error.source))
 }
 
-/// Starts the new content of a file.
 pub fn create(path: &Path) -> Result<NewFile, Failure> {
     NewFile::create(path).map_err(|error| unwritable(path, error))
 }
 
-/// Creates a folder and its parents.
 pub fn make_folder(folder: &Path) -> Result<(), Failure> {
     replace::make_folder(folder).map_err(|error| {
         let words = "help: is there a file of that name, and is the folder above it writable?";
@@ -101,7 +123,6 @@ pub fn check_target<P: AsRef<Path>>(target: &Path, read: impl IntoIterator<Item 
     replace::check_target(target, read, "one that is read").map_err(Failure::input)
 }
 
-/// The failure if a file cannot be written.
 pub fn unwritable(path: &Path, error: io::Error) -> Failure {
     // The reader of a pipe may stop early, even if the pipe has a name.
     if error.kind() == io::ErrorKind::BrokenPipe {

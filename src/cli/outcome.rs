@@ -26,9 +26,7 @@ use trace::diagnostic::{MORE_FILES, is_short_of_files};
 
 /// The form of errors if no option sets it; read before anything is parsed.
 pub const ERRORS_VARIABLE: &str = "MIRRORSTATS_ERRORS";
-/// The exit code for bad usage, input or definitions.
 const BAD_INPUT: u8 = 2;
-/// The exit code if the system refuses memory.
 pub const NO_MEMORY: u8 = 6;
 
 /// The outcome of a command that ran to its end.
@@ -64,7 +62,6 @@ pub enum Failure {
 }
 
 impl Failure {
-    /// The failure for invalid input.
     pub fn input(error: impl Into<Box<dyn Error + Send + Sync>>) -> Self {
         Self::Input(error.into())
     }
@@ -102,7 +99,6 @@ pub struct ErrorAnswer {
 }
 
 impl ErrorAnswer {
-    /// The printed form of a failure.
     pub fn of(failure: &Failure) -> Self {
         let faults = if let Failure::Faults(faults) = failure { faults.records() } else { Vec::new() };
         let text = words(failure, false);

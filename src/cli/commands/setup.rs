@@ -1,16 +1,36 @@
-//! `mirrorstats setup config`: the defaults in effect.
+//! `setup`: settings, completions and manual pages of this program.
 
 use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
 
 use clap::CommandFactory as _;
+use clap_complete::Shell;
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::cli::config::{self, Setting};
-use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::{Cli, output};
+use crate::cli::{Cli, Failure, NAME, Outcome, help, output};
 use exact::escape::visible;
+use exact::replace::Content;
 use report::tables::Table;
+
+/// Show settings, write completions of a shell and manual pages
+#[derive(Debug, clap::Subcommand)]
+pub enum SetupCommand {
+    Config(ConfigArgs),
+    Completions(CompletionsArgs),
+    Man(ManArgs),
+}
+
+impl SetupCommand {
+    pub fn run(self) -> Result<Outcome, Failure> {
+        match self {
+            Self::Config(args) => args.run(),
+            Self::Completions(args) => args.run(),
+            Self::Man(args) => args.run(),
+        }
+    }
+}
 
 /// Show the defaults that hold here, and where they come from
 ///
@@ -73,4 +93,47 @@ impl ConfigArgs {
         write!(out, "{}", table.within(None))?;
         Ok(Outcome::Done)
     }
+}
+
+/// Print completions of command lines for a shell
+#[derive(Clone, Debug, clap::Args)]
+pub struct CompletionsArgs {
+    /// The shell
+    shell: Shell,
+}
+
+impl CompletionsArgs {
+    pub fn run(self) -> Result<Outcome, Failure> {
+        let mut text = Vec::new();
+        clap_complete::generate(self.shell, &mut Cli::command(), NAME, &mut text);
+        output::plain(text)
+    }
+}
+
+/// Write manual pages into a folder, one per command
+#[derive(Clone, Debug, clap::Args)]
+pub struct ManArgs {
+    /// The folder; it is created if it does not exist
+    folder: PathBuf,
+}
+
+impl ManArgs {
+    pub fn run(self) -> Result<Outcome, Failure> {
+        let mut command = help::with_examples_alone(Cli::command());
+        command.build();
+        let mut made = Vec::new();
+        pages(&command, &mut made)?;
+        let files: Vec<_> = made.iter().map(|(name, page)| (Path::new(name), Content::Bytes(page))).collect();
+        output::write_folder(&self.folder, &files)?;
+        output::say(&format!("the pages are in {}", self.folder.display()));
+        Ok(Outcome::Done)
+    }
+}
+
+fn pages(command: &clap::Command, made: &mut Vec<(String, Vec<u8>)>) -> Result<(), Failure> {
+    let name = command.get_display_name().unwrap_or_else(|| command.get_name()).to_owned();
+    let mut page = Vec::new();
+    clap_mangen::Man::new(command.clone()).date("").render(&mut page)?;
+    made.push((format!("{name}.1"), page));
+    command.get_subcommands().filter(|inner| inner.get_name() != "help").try_for_each(|inner| pages(inner, made))
 }

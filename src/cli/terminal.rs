@@ -12,7 +12,6 @@ pub fn width() -> Option<usize> {
     asked.or_else(of_terminal).filter(|width| *width > 0)
 }
 
-/// The properties of standard output that tables need.
 pub fn now() -> Terminal {
     let plain = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
     let shows = io::stdout().is_terminal() && !plain;

@@ -1,0 +1,213 @@
+//! The progress of a recording on standard error.
+
+use std::collections::BTreeMap;
+use std::io::{self, IsTerminal as _, Write as _};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use super::{spent, unreadable};
+use exact::escape::{visible, visible_lines};
+use exact::format::{counted, fixed};
+use trace::episode::Step;
+use world::agent::Player;
+use world::experiment::Experiment;
+use world::record::plan::{Key, Subject};
+use world::record::queue::Held;
+use world::record::replies::{Replies, RepliesAnswer};
+use world::record::run::Progress;
+use world::sim::config::WorldConfig;
+
+const BETWEEN_LINES: Duration = Duration::from_secs(10);
+
+/// The progress: a bar on a terminal. Otherwise occasional lines, for agents that wait for a provider or a program, or
+/// whose replies are unreadable.
+pub(crate) struct Bar<'a> {
+    line: ProgressBar,
+    player: &'a dyn Player,
+    subject: &'a Subject,
+    episodes: usize,
+    ended: AtomicUsize,
+    replies: Replies,
+    budget: BTreeMap<Experiment, u64>,
+    is_shown: bool,
+    told: Mutex<Instant>,
+    is_waiting: AtomicBool,
+}
+
+impl<'a> Bar<'a> {
+    pub(crate) fn new(player: &'a dyn Player, subject: &'a Subject, todo: &[Key], world: &WorldConfig) -> Self {
+        let steps_of = |key: &Key| u64::from(world.of(&key.experiment).episode.steps);
+        let budget: BTreeMap<Experiment, u64> =
+            todo.iter().map(|key| (key.experiment.clone(), steps_of(key))).collect();
+        let steps = todo.iter().filter_map(|key| budget.get(&key.experiment)).sum();
+        let episodes = todo.len();
+        let is_shown = io::stderr().is_terminal();
+        let target = if is_shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        let line = ProgressBar::with_draw_target(Some(steps), target);
+        let style = ProgressStyle::with_template("{msg} {wide_bar} {pos} steps, {per_sec}, {eta} left");
+        line.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        let told = Mutex::new(Instant::now());
+        let (ended, is_waiting, replies) = (AtomicUsize::new(0), AtomicBool::new(false), Replies::default());
+        let bar = Self { line, player, subject, episodes, ended, replies, budget, is_shown, told, is_waiting };
+        bar.line.set_message(bar.message());
+        bar
+    }
+
+    pub(crate) fn clear(&self) {
+        self.line.finish_and_clear();
+    }
+
+    pub(crate) fn replies(&self) -> RepliesAnswer {
+        self.replies.answer()
+    }
+
+    fn message(&self) -> String {
+        let unreadable = unreadable(&self.replies.counts()).map_or_else(String::new, |words| format!(", {words}"));
+        let spent = self.player.spend().map_or_else(String::new, |spend| format!(", {}", spent(&spend)));
+        format!("{} of {} episodes{unreadable}{spent}", self.ended.load(Ordering::Relaxed), self.episodes)
+    }
+
+    fn say(&self, line: &str) {
+        self.line.suspend(|| {
+            // If standard error is closed, the message cannot be shown.
+            let _ = writeln!(io::stderr(), "{line}");
+        });
+    }
+
+    fn has_news(&self) -> bool {
+        self.player.waits() || self.replies.counts().all_unreadable() > 0
+    }
+
+    fn write_line(&self) {
+        let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
+        if self.is_shown || told.elapsed() < BETWEEN_LINES || !self.has_news() {
+            return;
+        }
+        *told = Instant::now();
+        let (steps, rate, left) = (self.line.position(), self.line.per_sec(), self.line.eta().as_secs().div_ceil(60));
+        // If standard error is closed, the message cannot be shown.
+        let (message, rate) = (self.message(), fixed(Some(rate), 1));
+        let _ = writeln!(io::stderr(), "{message}, {steps} steps, {rate} a second, about {left} min left");
+    }
+}
+
+impl Progress for Bar<'_> {
+    fn step(&self, episode: &Key, t: i32, row: &Step) {
+        self.line.inc(1);
+        if let Some(first) = self.replies.add(self.subject, episode, t, row) {
+            self.say(&format!("a reply could not be read: {}: {}", first.status, first.words()));
+        }
+        if self.is_shown {
+            self.line.set_message(self.message());
+        } else {
+            self.write_line();
+        }
+    }
+
+    fn episode(&self, key: &Key, _: &str, steps: usize) {
+        self.ended.fetch_add(1, Ordering::Relaxed);
+        // Steps left unused by an early decision are not remaining work.
+        let budget = self.budget.get(&key.experiment).copied().unwrap_or_default();
+        let unused = budget.saturating_sub(steps as u64);
+        self.line.set_length(self.line.length().unwrap_or_default().saturating_sub(unused));
+        self.line.set_message(self.message());
+    }
+
+    fn model_changed(&self, id: &str, t: i32, before: &str, after: &str) {
+        self.say(&format!(
+            "{}: from step {t} on the provider answers as `{}` and not as `{}`; the episode keeps the first name, the next \
+             one has another fingerprint",
+            visible(id),
+            visible(after),
+            visible(before)
+        ));
+    }
+
+    fn lost(&self, id: &str, reason: &str) {
+        self.say(&format!("lost {}: {}", visible(id), visible_lines(reason)));
+    }
+
+    fn waiting(&self, id: &str, held: &Held) {
+        if !self.is_waiting.swap(true, Ordering::Relaxed) {
+            self.say(&waiting(id, held));
+        }
+    }
+}
+
+fn waiting(id: &str, held: &Held) -> String {
+    let others = match held.count - 1 {
+        0 => String::new(),
+        more => format!(" and {}", counted(more as u64, "other episode")),
+    };
+    let process = held.process.map_or_else(|| "another process".to_owned(), |process| format!("process {process}"));
+    format!(
+        "waiting for {}{others}: {process} records it into the same folder; press Ctrl-C to stop waiting",
+        visible(id)
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::{Bar, waiting};
+    use trace::episode::{Extra, Step};
+    use world::agent::scripted::Scripted;
+    use world::agent::{Player, exec};
+    use world::experiment::Experiment;
+    use world::record::plan::{Key, Subject};
+    use world::record::queue::Held;
+    use world::record::run::Progress as _;
+    use world::sim::config::WorldConfig;
+
+    #[test]
+    fn waiting_for_people_is_printed() {
+        let key = Key::first(Experiment::E1, 1, 3);
+        let one = Held { key, process: Some(4711), count: 1 };
+        let expected =
+            "waiting for E1/a/s1/r3: process 4711 records it into the same folder; press Ctrl-C to stop waiting";
+        assert_eq!(waiting("E1/a/s1/r3", &one), expected);
+        let more = waiting("E1/a/s1/r3", &Held { process: None, count: 3, ..one });
+        assert!(more.starts_with("waiting for E1/a/s1/r3 and 2 other episodes: another process records it"), "{more}");
+    }
+
+    #[test]
+    fn the_progress_counts_unreadable_replies() {
+        let player = Scripted::named("frozen").unwrap();
+        let subject = Subject::of("frozen");
+        let todo = [1, 2].map(|run| Key::first(Experiment::E1, 1, run));
+        let bar = Bar::new(&player, &subject, &todo, &WorldConfig::default());
+        let row = |status: &str| {
+            let extra = Extra { reply_status: Some(status.to_owned()), ..Extra::default() };
+            Step { action: None, self_color: None, selected_cube: None, mirror_visible: false, extra }
+        };
+        let key = Key::first(Experiment::E1, 1, 1);
+        bar.step(&key, 1, &row("ok"));
+        assert_eq!((bar.message().as_str(), bar.has_news()), ("0 of 2 episodes", false));
+        for (t, status) in [(2, "refusal"), (3, "parse_failed"), (4, "refusal")] {
+            bar.step(&key, t, &row(status));
+        }
+        let expected = "0 of 2 episodes, 3 of 4 replies could not be read: parse_failed 1, refusal 2";
+        assert_eq!((bar.message().as_str(), bar.has_news()), (expected, true));
+    }
+
+    #[test]
+    fn a_log_names_programs_but_not_scripted_agents() {
+        let settings = exec::Settings {
+            model: "own".to_owned(),
+            command: "true".to_owned(),
+            images: exec::Images::Path,
+            timeout: Duration::from_secs(1),
+            scratch: std::env::temp_dir(),
+            standard_error: std::env::temp_dir(),
+        };
+        let (program, scripted) = (exec::Exec::new(settings).unwrap(), Scripted::named("frozen").unwrap());
+        let subject = Subject::of("own");
+        let world = WorldConfig::default();
+        let has_news = |player: &dyn Player| Bar::new(player, &subject, &[], &world).has_news();
+        assert_eq!([has_news(&program), has_news(&scripted)], [true, false]);
+    }
+}

@@ -114,7 +114,6 @@ impl Table {
         writer.into_inner()
     }
 
-    /// An HTML table of the first and last rows, with the number of rows.
     fn to_html(&self) -> Result<String, ArrowError> {
         let (rows, schema) = (self.batch.num_rows(), self.batch.schema());
         let options = FormatOptions::default();

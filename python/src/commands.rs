@@ -59,8 +59,7 @@ pub fn import_text(py: Python<'_>, name: &str, lines: &[u8], asked: ImportAsked)
         let text = Text::of_frame(name, lines).map_err(error::of_input)?;
         study::import(vec![text], &request).map_err(error::of_study)
     })?;
-    let words = imported.to_string();
-    answer::of(&imported, words)
+    answer::of(&imported, imported.to_string())
 }
 
 /// The pixels of a PNG file of a frame: height, width, and red, green and blue of each pixel, row by row.

@@ -20,7 +20,6 @@ pub fn of_study(error: StudyError) -> PyErr {
     of_failure(&error.into(), kind)
 }
 
-/// The name of the error class in `mirrorstats`.
 fn kind(error: &StudyError) -> &'static str {
     use StudyError as E;
     if let Some(faults) = error.faults() {
@@ -71,18 +70,15 @@ pub fn of_input(error: impl Into<Box<dyn Error + Send + Sync>>) -> PyErr {
     of_failure(&Failure::input(error), "InputError")
 }
 
-/// The error for an invalid argument value.
 pub fn of_argument(error: impl Into<Box<dyn Error + Send + Sync>>) -> PyErr {
     of_failure(&Failure::input(error), "ArgumentError")
 }
 
-/// The error for a file that cannot be written.
 pub fn of_writing(path: &Path, fault: &io::Error) -> PyErr {
     let help = "is the folder there and writable, and the disk not full?";
     raised("OutputError", &format!("cannot write `{}`: {fault}\n  help: {help}", path.display()), &[])
 }
 
-/// The error with the message of the command line.
 pub fn of_failure(failure: &Failure, kind: &str) -> PyErr {
     let ErrorAnswer { error, faults, .. } = ErrorAnswer::of(failure);
     raised(kind, &error, &faults)

@@ -13,7 +13,6 @@ mod study;
 
 use pyo3::prelude::*;
 
-/// The module.
 #[pymodule]
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;

@@ -59,6 +59,12 @@ impl Asked {
     }
 }
 
+impl Study {
+    fn tables_of(&self, style: String) -> PyResult<mirrorstats::Report> {
+        self.inner.report(&ReportOptions { style: style.into(), figures: false }).map_err(error::of_study)
+    }
+}
+
 #[pymethods]
 impl Study {
     #[new]
@@ -97,22 +103,15 @@ impl Study {
         py.detach(|| Steps::new(Arc::clone(&self.inner), columns))
     }
 
-    #[pyo3(signature = (name, style))]
     fn table(&self, py: Python<'_>, name: &str, style: String) -> PyResult<ReportTable> {
         py.detach(|| {
-            let report =
-                self.inner.report(&ReportOptions { style: style.into(), figures: false }).map_err(error::of_study)?;
+            let report = self.tables_of(style)?;
             Ok(ReportTable::new(report.table(name).map_err(error::of_study)?))
         })
     }
 
-    #[pyo3(signature = (style))]
     fn tables(&self, py: Python<'_>, style: String) -> PyResult<Vec<ReportTable>> {
-        py.detach(|| {
-            let report =
-                self.inner.report(&ReportOptions { style: style.into(), figures: false }).map_err(error::of_study)?;
-            Ok(report.tables.iter().map(ReportTable::new).collect())
-        })
+        py.detach(|| Ok(self.tables_of(style)?.tables.iter().map(ReportTable::new).collect()))
     }
 
     #[pyo3(signature = (name, style, metrics, title, width))]
@@ -133,7 +132,6 @@ impl Study {
         Ok(Figure::new(figure, name.name()))
     }
 
-    #[pyo3(signature = (out, style, figures))]
     fn report(&self, py: Python<'_>, out: &str, style: String, figures: bool) -> PyResult<Answer> {
         let (written, notes) = py.detach(|| {
             let options = ReportOptions { style: style.into(), figures };
@@ -152,13 +150,11 @@ impl Study {
         answer::of(&found, found.render(&found.headline, if full { Length::Full } else { Length::Short }, None))
     }
 
-    #[pyo3(signature = (sql))]
     fn query(&self, py: Python<'_>, sql: &str) -> PyResult<Table> {
         let file = py.detach(|| self.inner.query_parquet(sql).map_err(error::of_study))?;
         Table::from_parquet(file)
     }
 
-    #[pyo3(signature = (other))]
     fn diff(&self, py: Python<'_>, other: &Self) -> PyResult<Answer> {
         let found = py.detach(|| self.inner.diff(&other.inner).map_err(error::of_study))?;
         let shown = found.changes.render(Limit(LISTED), None);
@@ -187,11 +183,9 @@ impl Study {
         answer::of(&gate, gate.render(GateFormat::Text(None)))
     }
 
-    #[pyo3(signature = (episode_id))]
     fn explain(&self, py: Python<'_>, episode_id: &str) -> PyResult<Answer> {
         let found = py.detach(|| self.inner.explain(episode_id).map_err(error::of_study))?;
-        let words = found.to_string();
-        answer::of(&found, words)
+        answer::of(&found, found.to_string())
     }
 }
 

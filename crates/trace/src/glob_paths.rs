@@ -45,8 +45,7 @@ fn each(
     folders: &[PathBuf],
     find: impl Fn(&Path) -> Result<Vec<PathBuf>, GlobError>,
 ) -> Result<Vec<PathBuf>, GlobError> {
-    let found = folders.iter().map(|folder| find(folder)).collect::<Result<Vec<_>, _>>()?;
-    Ok(found.into_iter().flatten().collect())
+    Ok(folders.iter().map(|folder| find(folder)).collect::<Result<Vec<_>, _>>()?.concat())
 }
 
 fn entries(folder: &Path) -> Result<Vec<PathBuf>, GlobError> {

@@ -96,14 +96,12 @@ fn expand(argument: &OsStr) -> Result<Vec<PathBuf>, TraceError> {
         GlobError::Pattern(error) => no_input(error.msg, "correct the glob, or name the files"),
         GlobError::Folder(folder, source) => TraceError::Read { what: folder.display().to_string(), source },
     })?;
-    let mut traces = Vec::new();
-    for path in matches {
-        traces.extend(traces_at(&path)?);
+    match matches.iter().map(|path| traces_at(path)).collect::<Result<Vec<_>, _>>()?.concat() {
+        traces if traces.is_empty() => {
+            Err(no_input("a glob that matches no trace", "check the pattern and the current folder"))
+        }
+        traces => Ok(traces),
     }
-    if traces.is_empty() {
-        return Err(no_input("a glob that matches no trace", "check the pattern and the current folder"));
-    }
-    Ok(traces)
 }
 
 /// A hundred thousand names take some 20 MB.

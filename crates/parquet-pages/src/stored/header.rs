@@ -140,9 +140,8 @@ impl Header {
             Physical::BYTE_ARRAY => self.values.saturating_mul(4),
             physical => self.values.saturating_mul(width(physical, about.width)),
         };
-        let fits = least <= self.whole;
         let found = || (format!("keys for {} bytes of values", self.whole), self.values.to_string());
-        (!fits).then(found)
+        (least > self.whole).then(found)
     }
 }
 

@@ -6,8 +6,6 @@
 //! Rule: a chunk states its unpacked size and is never unpacked beyond that. Before unpacking, the stated size is
 //! compared with the chunk's own bytes and counted against the whole log's budget.
 
-use std::sync::Arc;
-
 use mcap::records::{Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
@@ -23,17 +21,17 @@ pub(super) const FRAME: usize = 9;
 ///
 /// Frames are compressed already, and rows of text shrink about twenty times in a chunk. So a log is far below the
 /// limit, but a chunk of zeros is not.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(super) struct Budgets {
-    unpacked: Arc<Budget>,
-    searched: Arc<Budget>,
+    unpacked: Budget,
+    searched: Budget,
 }
 
 impl Budgets {
     pub(super) fn new(bytes: u64) -> Self {
         let unpacked = Limit::in_proportion("bytes unpacked from a log of its size", 128 << 20, 64, bytes);
         let searched = Limit::in_proportion("bytes looked at for chunks behind damage", 128 << 20, 64, bytes);
-        Self { unpacked: Arc::new(Budget::new(unpacked)), searched: Arc::new(Budget::new(searched)) }
+        Self { unpacked: Budget::new(unpacked), searched: Budget::new(searched) }
     }
 
     fn unpack(&self, chunk: &[u8]) -> Result<(), Exceeded> {

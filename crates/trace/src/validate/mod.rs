@@ -316,8 +316,7 @@ fn with_repeated(
     // Separated rows of one episode: not starting at t = 1 is not another fault.
     let apart = |row| repeated.iter().any(|again| again.row == row && again.finding.code == Code::EpisodeTwice);
     found.retain(|located| located.finding.code != Code::TStart || !apart(located.row));
-    let mut all = repeated;
-    all.extend(found);
+    let mut all: Vec<Located> = repeated.into_iter().chain(found).collect();
     all.sort_by_key(|located| located.row);
     all.into_iter().map(|located| located.finding).collect()
 }

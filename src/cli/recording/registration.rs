@@ -19,32 +19,30 @@ pub(crate) fn prompts() -> Vec<NamedHash> {
 }
 
 pub(crate) fn registration(file: &Path, config: &WorldConfig) -> Result<Registration, Failure> {
-    let shown = file.display();
     let plan = read_plan(file)?;
-    check(&shown.to_string(), &plan, config)?;
+    check(file, &plan, config)?;
     Ok(Registration { sha256: plan.sha256, definitions: Some(plan.definitions.sha256) })
 }
 
-fn check(file: &str, plan: &RegisteredPlan, config: &WorldConfig) -> Result<(), Failure> {
+fn check(file: &Path, plan: &RegisteredPlan, config: &WorldConfig) -> Result<(), Failure> {
+    let short = |hash: &str| hash.chars().take(12).collect::<String>();
     let refused = |what: &str, expected: &str, found: &str| {
+        let (file, expected, found) = (file.display(), short(expected), short(found));
         let help = "record what was registered, or register another plan";
         let words =
             format!("{file}: expected {what} as registered ({expected}), found another ({found})\n  help: {help}");
         Err(Failure::input(words))
     };
-    let short = |hash: &str| hash.chars().take(12).collect::<String>();
     for registered in &plan.prompts {
         let own =
             prompts().into_iter().find(|own| own.name == registered.name).map(|own| own.sha256).unwrap_or_default();
         if own != registered.sha256 {
-            return refused(&format!("the prompt `{}`", registered.name), &short(&registered.sha256), &short(&own));
+            return refused(&format!("the prompt `{}`", registered.name), &registered.sha256, &own);
         }
     }
     let world = config.hash();
     match plan.experiments.iter().find(|experiment| experiment.name == WORLD) {
-        Some(registered) if registered.sha256 != world => {
-            refused("the world", &short(&registered.sha256), &short(&world))
-        }
+        Some(registered) if registered.sha256 != world => refused("the world", &registered.sha256, &world),
         _ => Ok(()),
     }
 }

@@ -2,8 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::ValueEnum;
-use clap::builder::PossibleValue;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use crate::cli::args::{EngineArgs, GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::{Failure, Outcome, output};
@@ -39,43 +38,14 @@ pub struct FigureArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub top: Option<u16>,
     /// The file format [default: by the ending of FILE; svg on standard output]
-    #[arg(long, value_enum)]
-    pub format: Option<Format>,
+    #[arg(long, value_parser = formats())]
+    pub format: Option<FigureFormat>,
     /// The file to write [default: standard output]
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
     /// Allow episodes with different settings in one cell
     #[arg(long)]
     pub pool: bool,
-}
-
-/// A file format, for clap's list.
-#[derive(Clone, Copy, Debug)]
-pub struct Format(FigureFormat);
-
-const FORMATS: &[Format] = &[
-    Format(FigureFormat::Svg),
-    #[cfg(feature = "raster")]
-    Format(FigureFormat::Png),
-    #[cfg(feature = "raster")]
-    Format(FigureFormat::Pdf),
-];
-
-impl ValueEnum for Format {
-    fn value_variants<'a>() -> &'a [Self] {
-        FORMATS
-    }
-
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        let help = match self.0 {
-            FigureFormat::Svg => "Vectors for the web, values on hover",
-            #[cfg(feature = "raster")]
-            FigureFormat::Png => "Pixels, about 300 per inch at a width of 7 inches",
-            #[cfg(feature = "raster")]
-            FigureFormat::Pdf => "Vectors for LaTeX",
-        };
-        Some(PossibleValue::new(self.0.ending()).help(help))
-    }
 }
 
 impl FigureArgs {
@@ -102,7 +72,7 @@ impl FigureArgs {
 
     fn format(&self) -> Result<FigureFormat, Failure> {
         match (self.format, &self.output) {
-            (Some(Format(format)), _) => Ok(format),
+            (Some(format), _) => Ok(format),
             (None, Some(path)) => {
                 let hint = |error| Failure::input(format!("{error}; say which one with --format"));
                 FigureFormat::of(path).map_err(hint)
@@ -110,4 +80,22 @@ impl FigureArgs {
             (None, None) => Ok(FigureFormat::Svg),
         }
     }
+}
+
+fn formats() -> impl TypedValueParser<Value = FigureFormat> {
+    let value = |format: &FigureFormat| {
+        let help = match format {
+            FigureFormat::Svg => "Vectors for the web, values on hover",
+            #[cfg(feature = "raster")]
+            FigureFormat::Png => "Pixels, about 300 per inch at a width of 7 inches",
+            #[cfg(feature = "raster")]
+            FigureFormat::Pdf => "Vectors for LaTeX",
+        };
+        PossibleValue::new(format.ending()).help(help)
+    };
+    let values = PossibleValuesParser::new(FigureFormat::ALL.iter().map(value));
+    values.map(|ending| {
+        let format = FigureFormat::ALL.iter().find(|format| format.ending() == ending);
+        *format.expect("only endings of formats are possible")
+    })
 }

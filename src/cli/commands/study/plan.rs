@@ -92,19 +92,6 @@ pub struct PlanArgs {
     pub json: bool,
 }
 
-/// The error for options that exclude each other.
-#[derive(Debug, thiserror::Error)]
-enum UsageError {
-    #[error(
-        "--episodes {episodes}: expected equally many episodes for each of {seeds} seeds; give a multiple of {seeds}, or --seeds 1"
-    )]
-    Uneven { episodes: u64, seeds: u64 },
-    #[error("--primary {name}: expected a metric of the definitions ({known}), found `{name}`{suggestion}")]
-    Primary { name: String, known: String, suggestion: String },
-    #[error("{file}: a registered plan is not replaced; give the name of a new file")]
-    Registered { file: String },
-}
-
 impl PlanArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
         let plan = plan(self.request()?).map_err(Failure::input)?;
@@ -132,9 +119,9 @@ impl PlanArgs {
         let seeds = self.clusters();
         match (self.difference, self.episodes, self.runs.or(self.scenes)) {
             (Some(difference), ..) => Ok(Given::Difference(difference)),
-            (_, Some(episodes), _) if !episodes.is_multiple_of(seeds) => {
-                Err(Failure::input(UsageError::Uneven { episodes, seeds }))
-            }
+            (_, Some(episodes), _) if !episodes.is_multiple_of(seeds) => Err(Failure::input(format!(
+                "--episodes {episodes}: expected equally many episodes for each of {seeds} seeds; give a multiple of {seeds}, or --seeds 1"
+            ))),
             (_, Some(episodes), _) => Ok(Given::Runs(episodes / seeds)),
             (_, _, runs) => Ok(Given::Runs(runs.expect("one of the four is required"))),
         }
@@ -147,16 +134,15 @@ impl PlanArgs {
     fn write(&self, file: &Path, plan: &Plan) -> Result<(), Failure> {
         let catalog = Definitions::load(&self.definitions, &schema_columns()).map_err(StudyError::from)?.catalog;
         if file.exists() {
-            return Err(Failure::input(UsageError::Registered { file: file.display().to_string() }));
+            return Err(registered_before(file));
         }
         if let Some(name) = self.primary.as_ref().filter(|name| !catalog.metric.contains_key(*name)) {
             let known: Vec<&str> = catalog.metric.keys().map(String::as_str).collect();
             let suggestion = hint(name, known.iter().copied());
-            return Err(Failure::input(UsageError::Primary {
-                name: name.clone(),
-                known: known.join(", "),
-                suggestion,
-            }));
+            let known_names = known.join(", ");
+            return Err(Failure::input(format!(
+                "--primary {name}: expected a metric of the definitions ({known_names}), found `{name}`{suggestion}"
+            )));
         }
         let definitions = NamedHash { name: catalog.name, sha256: catalog.hash };
         let (experiments, prompts) = self.recorded()?;
@@ -173,7 +159,7 @@ impl PlanArgs {
         let written = new.write_all(registered.to_json().as_bytes()).and_then(|()| new.commit_new());
         written.map_err(|error| match error.kind() {
             // Another process has registered a plan meanwhile.
-            io::ErrorKind::AlreadyExists => Failure::input(UsageError::Registered { file: file.display().to_string() }),
+            io::ErrorKind::AlreadyExists => registered_before(file),
             _ => output::unwritable(file, error),
         })
     }
@@ -190,6 +176,10 @@ impl PlanArgs {
     fn recorded(&self) -> Result<(Vec<NamedHash>, Vec<NamedHash>), Failure> {
         Ok((Vec::new(), Vec::new()))
     }
+}
+
+fn registered_before(file: &Path) -> Failure {
+    Failure::input(format!("{}: a registered plan is not replaced; give the name of a new file", file.display()))
 }
 
 fn share(text: &str) -> Result<f64, String> {

@@ -47,16 +47,6 @@ pub struct StatsArgs {
     pub json: bool,
 }
 
-/// The error for a requested metric that the definitions lack.
-#[derive(Debug, thiserror::Error)]
-#[error("no {kind} is named `{name}`; the definitions have {known}{suggestion}")]
-struct UnknownMetric {
-    kind: &'static str,
-    name: String,
-    known: String,
-    suggestion: String,
-}
-
 impl StatsArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
         let scoring =
@@ -112,8 +102,9 @@ impl StatsArgs {
         match self.metrics.iter().find(|name| !known.contains(&name.as_str())) {
             None => Ok(self.metrics.clone()),
             Some(name) => {
-                let suggestion = hint(name, known.iter().copied());
-                Err(Failure::input(UnknownMetric { kind, name: name.clone(), known: known.join(", "), suggestion }))
+                let (known, suggestion) = (known.join(", "), hint(name, known.iter().copied()));
+                let words = format!("no {kind} is named `{name}`; the definitions have {known}{suggestion}");
+                Err(Failure::input(words))
             }
         }
     }

@@ -158,14 +158,10 @@ impl RecordArgs {
 
     fn print_list<T: Serialize>(&self, answers: &[T]) -> Result<(), Failure> {
         match answers {
-            all if self.is_list() => output::print_json(&all).map(drop),
+            all if self.study.is_some() || self.vlm.each().len() > 1 => output::print_json(&all).map(drop),
             [answer, ..] => output::print_json(answer).map(drop),
             [] => Ok(()),
         }
-    }
-
-    fn is_list(&self) -> bool {
-        self.study.is_some() || self.vlm.each().len() > 1
     }
 
     /// One recording per condition and model of a study file, or per `--model`.

@@ -121,6 +121,5 @@ def check_share(name: str, value: Any) -> None:
 
 
 def check_name(name: str, value: Any, known: tuple[str, ...]) -> None:
-    """Accepts only these values."""
     if value not in known:
         raise ArgumentError(f"{name}: expected {', '.join(map(repr, known))}, found {value!r}")

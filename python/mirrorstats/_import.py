@@ -78,7 +78,6 @@ def trace_of(
     clusters_by_seed: bool = False,
     reconstruction: bool = False,
 ) -> Imported:
-    """Makes a trace from rows in JSON lines."""
     asked = {
         "out": out,
         "definitions": definitions,

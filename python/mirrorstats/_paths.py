@@ -50,7 +50,6 @@ class Spool:
         return os.path.join(self.path, name)
 
     def files(self) -> dict[str, bytes]:
-        """All files, by name."""
         found = sorted(os.scandir(self.path), key=lambda file: file.name) if self._folder else []
         files = {}
         for file in found:

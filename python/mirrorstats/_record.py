@@ -111,7 +111,6 @@ def _interrupt(threads: set[int]) -> None:
 
 
 def _check_options(options: dict[str, Any]) -> None:
-    """Refuses keywords that are not options of a recording."""
     import difflib
 
     known = sorted({name.replace("-", "_") for name in _native.record_options()} - {"agent", "json", "dry_run"})
@@ -123,7 +122,6 @@ def _check_options(options: dict[str, Any]) -> None:
 
 
 def _plain(value: Any, spool: Spool) -> Any:
-    """The value of an option for JSON."""
     if isinstance(value, (list, tuple)):
         return [_plain(one, spool) for one in value]
     if value is None or isinstance(value, (bool, int, float, str)):
@@ -181,7 +179,6 @@ def _listener(agent: Any, is_array: bool, playing: set[int]) -> Callable[[str], 
 
 
 def _array(png: str) -> Any:
-    """The pixels of a frame."""
     import base64
 
     import numpy

@@ -375,7 +375,6 @@ class Study:
 
 
 def _again(asked: dict[str, Any], folder: str, files: dict[str, bytes]) -> Study:
-    """Restores a pickled study."""
     spool = Spool(files)
 
     def moved(path: Optional[str]) -> Optional[str]:

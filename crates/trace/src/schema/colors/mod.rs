@@ -2,14 +2,8 @@
 //!
 //! Metrics compare colours byte by byte, so `Red` beside `red` would turn a right answer into a wrong one.
 //!
-//! | file | contents |
-//! |---|---|
-//! | `spelling` | the spelling of a colour |
-//! | `palette` | the palette in a footer |
-//! | `mod` | the allowed values of a column, each by itself |
-//! | `validate::color_set` | checks of the values of all inputs together |
-//!
-//! Rule: the scan, `validate`, `import`, the writer and the check on Spark all use this module.
+//! Rule: the scan, `validate`, `import`, the writer and the check on Spark all use this module. It checks each value by
+//! itself; `validate::color_set` checks those of all inputs together.
 
 pub mod palette;
 pub mod spelling;

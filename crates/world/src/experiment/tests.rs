@@ -154,7 +154,7 @@ fn an_invalid_answer_is_refused_with_its_location() {
     let of = |answer: &str| faults(&format!("{head}answer = [{{ words = \"w\", {answer} }}]")).join("; ");
     for (answer, expected) in [
         ("key = \"Side\", type = \"number\", constant = \"1\"", "a key has 1 to 24 lower-case letters"),
-        ("key = \"action\", type = \"number\", constant = \"1\"", "a reply has a `action` of its own"),
+        ("key = \"action\", type = \"number\", constant = \"1\"", "a reply already has the key `action`"),
         ("key = \"a\", type = \"number\"", "one of `truth`, `constant` and `conditions`, found 0"),
         ("key = \"a\", type = \"number\", constant = \"one\"", "expected a number, found `one`"),
         (

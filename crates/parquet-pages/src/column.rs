@@ -444,7 +444,7 @@ mod tests {
     }
 
     #[test]
-    fn more_than_4_gib_of_one_text_are_put_together_without_writing_it_out() {
+    fn over_4_gib_of_one_text_are_concatenated_without_a_copy() {
         let rows = 35_000;
         let text = "x".repeat(64 * 1024);
         let texts = || Arc::new(StringArray::from(vec![text.as_str()])) as ArrayRef;

@@ -193,7 +193,7 @@ mod tests {
     use super::{Compact, Fault, Field, Wire};
 
     #[test]
-    fn fields_of_a_structure() {
+    fn the_fields_of_a_structure_are_read_or_skipped() {
         // Field 1: i32 -3; field 3: list of two i32; field 20 in the long form: binary of 2 bytes; the end.
         let data = [0x15, 5, 0x29, 0x25, 2, 4, 0x08, 40, 2, 7, 7, 0];
         let mut compact = Compact::new(&data);

@@ -269,7 +269,7 @@ mod tests {
     }
 
     #[test]
-    fn a_name_that_exists_is_no_glob() {
+    fn the_name_of_a_file_is_not_taken_for_a_glob() {
         let (_keep, at) = folder();
         assert_eq!(names(&[&format!("{at}/x[1].parquet")], ""), Ok(vec!["x[1].parquet".into()]));
     }

@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn the_form_is_the_one_that_is_documented() {
+    fn the_hashed_text_has_the_documented_form() {
         let lines = "mirrorstats.episode 1\n\
             column action\n3 9:turn_left\n\
             column body_color\n3 3:red\n\
@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn an_attribution_that_follows_from_a_text_and_the_hash_itself_do_not_count() {
+    fn derived_attributions_and_the_hash_itself_are_not_hashed() {
         let mut with_text = episode();
         with_text.steps[1].extra.identification = Some("red one".into());
         let hash = of(&with_text);
@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn every_value_and_its_row_count() {
+    fn every_value_and_its_row_are_hashed() {
         let hash = of(&episode());
         let change = |change: fn(&mut Episode)| {
             let mut changed = episode();

@@ -85,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pattern_accepts_what_it_says() {
+    fn a_pattern_accepts_matching_names_only() {
         let patterns = ["Gemini-3.*".to_owned(), "own[1]".to_owned()];
         assert!(answers_for("a", "gemini-3.8-flash", &patterns) && answers_for("a", "own[1]", &patterns));
         assert!(!answers_for("a", "gemini-4", &patterns));

@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn a_column_is_absent_where_every_experiment_says_so() {
+    fn a_column_is_absent_if_every_experiment_declares_it_absent() {
         let of = |recording: Value| absent("a.parquet", &recording);
         let both = json!({ "name": "A", "absent": ["selected_cube", "self_color"] });
         let one = json!({ "name": "B", "absent": ["self_color"] });
@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn an_empty_declaration_is_no_fault() {
+    fn a_missing_or_empty_declaration_is_accepted() {
         for text in [
             None,
             Some("no JSON"),
@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn each_member_that_is_not_as_it_must_be_is_named() {
+    fn each_invalid_member_is_named() {
         let of = |key: &str, value: Value| json!({ "experiment": { "name": "E6", key: value } });
         for (recording, words) in [
             (json!({ "experiment": ["E6"] }), "`mirrorstats.recording.experiment` to be an object\n  found `[\"E6\"]`"),

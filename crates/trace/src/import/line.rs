@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn the_remedy_names_pythons_nan_and_cut_lines() {
+    fn help_explains_nan_and_truncated_lines() {
         let help = |line: &str, ended| members(line.as_bytes(), ended).unwrap_err().help;
         for line in [r#"{"a": NaN}"#, r#"{"a": Infinity}"#, r#"{"a": -Infinity}"#] {
             assert!(help(line, true).contains("no NaN"), "{line}: {}", help(line, true));

@@ -407,7 +407,7 @@ mod tests {
     use crate::log::read::{Event, LogReader, png};
 
     #[test]
-    fn the_index_finds_the_frame_that_a_reading_of_all_finds() {
+    fn the_index_finds_every_frame_of_a_full_scan() {
         let log = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/recorded/E1-guesser.mcap"));
         let index = LogIndex::open(log).unwrap().unwrap();
         let mut id = String::new();
@@ -429,7 +429,7 @@ mod tests {
     }
 
     #[test]
-    fn a_log_that_ends_anywhere_is_read_as_far_as_it_is_there() {
+    fn a_truncated_log_has_no_index_but_can_be_read() {
         let log =
             std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/recorded/E1-guesser.mcap")).unwrap();
         let folder = tempfile::tempdir().unwrap();

@@ -102,7 +102,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn numbers_come_back_to_the_last_bit(cost in 0.0..10.0_f64, x in -5.0..5.0_f32) {
+        fn numbers_round_trip_exactly(cost in 0.0..10.0_f64, x in -5.0..5.0_f32) {
             let extra = Extra { cost_usd: Some(cost), pose_x: Some(x), ..Extra::default() };
             let row = Decision::of(1, &Step { extra, ..Step::default() });
             prop_assert_eq!(Decision::parse(json!(row).to_string().as_bytes()).unwrap(), row.clone());

@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn names_are_short() {
+    fn long_names_are_refused() {
         let names = |length: usize| {
             Column::Keys(Keys::new(vec![0_u8].into(), Arc::new(StringArray::from(vec!["x".repeat(length)]))).unwrap())
         };

@@ -116,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn the_constants_of_an_episode_are_these() {
+    fn the_constant_columns_are_the_documented_ones() {
         let constants: Vec<_> = COLUMNS.iter().filter(|c| c.constant).map(|c| c.name).collect();
         let expected =
             ["episode_id", "model", "experiment", "seed", "run", "body_color", "stated_color", "distractors"];
@@ -136,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn every_column_gives_what_was_put_into_its_field() {
+    fn every_column_reads_back_the_value_put_into_it() {
         for column in COLUMNS.iter() {
             let mut episode = Episode { steps: vec![Step::default(); 2], ..Episode::default() };
             let value = match column.stored.kind() {

@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn equal_hashes_of_different_ids_are_no_repetition() {
+    fn different_ids_with_equal_hashes_are_not_duplicates() {
         let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/paper").to_owned();
         let inputs = resolve(&[folder.into()], std::io::empty()).unwrap();
         let set = TraceSet::open(&inputs).unwrap();

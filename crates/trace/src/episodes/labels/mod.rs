@@ -344,7 +344,7 @@ mod tests {
     }
 
     #[test]
-    fn two_lists_put_together_are_a_list() {
+    fn concatenated_lists_are_a_valid_list() {
         let of = |coder: &str| serde_json::to_string(&line(coder, None, Some("loops"), None)).unwrap() + "\n";
         let (both, turned) = (read(&(of("ann") + &of("bob"))).unwrap(), read(&(of("bob") + &of("ann"))).unwrap());
         assert_eq!(both.by_coder(), turned.by_coder());

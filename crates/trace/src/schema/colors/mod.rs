@@ -85,14 +85,14 @@ mod tests {
     ];
 
     #[test]
-    fn every_column_of_colors_is_one_of_the_schema() {
+    fn every_color_column_is_in_the_schema() {
         assert!(columns().all(|color| schema::column(color.name).is_some_and(schema::Column::names)));
         assert!(columns().filter_map(|color| color.word).all(|word| WORDS.contains(&word)));
         assert_eq!(column("action"), None);
     }
 
     #[test]
-    fn a_name_that_differs_by_case_or_white_space_is_none() {
+    fn names_with_other_case_or_white_space_are_refused() {
         for column in columns() {
             for (text, meant) in MISSPELLED {
                 assert!(!column.may_hold(text, None), "{} {text:?}", column.name);
@@ -108,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn a_word_has_its_own_column() {
+    fn each_special_word_is_valid_in_its_own_column() {
         let holds = |name: &str, text| column(name).unwrap().may_hold(text, None);
         for name in ["body_color", "stated_color", "self_color", "selected_cube"] {
             assert_eq!(holds(name, "unknown"), name == "self_color");
@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn a_palette_is_all_there_is() {
+    fn only_colors_of_the_palette_are_valid() {
         let palette = Palette::new(["teal", "magenta"].map(str::to_owned).to_vec());
         let [body, claim] = [column("body_color").unwrap(), column("self_color").unwrap()];
         assert!(claim.may_hold("teal", Some(&palette)) && claim.may_hold("unknown", Some(&palette)));

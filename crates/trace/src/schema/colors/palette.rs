@@ -126,7 +126,7 @@ mod tests {
     use crate::palette::Color;
 
     #[test]
-    fn a_palette_is_read_where_there_is_one() {
+    fn a_declared_palette_is_read() {
         let names = |text| Declared::of("a.parquet", &recording(Some(text))).unwrap().palette.map(|palette| palette.0);
         assert_eq!(
             names(r#"{"world":{},"palette":["teal","dark red"]}"#),
@@ -165,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn a_palette_that_is_none_is_refused() {
+    fn an_invalid_palette_is_refused() {
         for palette in ["[]", "7", "\"red\"", "[1]", "[\"Red\"]", "[\"none\"]", "[\"red \"]", "[\"\"]", "{\"red\":1}"] {
             let text = format!("{{\"palette\":{palette}}}");
             let finding = Declared::of("a.parquet", &recording(Some(&text))).unwrap_err();

@@ -11,9 +11,8 @@ use exact::ratio::Ratio;
 /// With more trials, weights never fit 128 bits.
 const MOST_EXACT: u64 = 128;
 
-/// The two-sided p value of `successes` in `n` trials under the rate `level`; 0 if it underflows.
-///
-/// `None` for n = 0, for more successes than trials, and for a level outside [0, 1].
+/// The two-sided p value of `successes` in `n` trials under the rate `level`; 0 if it underflows. `None` for n = 0, for
+/// more successes than trials, and for a level outside [0, 1].
 pub fn two_sided(successes: u64, n: u64, level: Ratio) -> Option<f64> {
     exact_test(successes, n, level).map(|test| test.p)
 }
@@ -24,9 +23,8 @@ pub fn exact_test(successes: u64, n: u64, level: Ratio) -> Option<ExactTest> {
     Some(exact(successes, n, odds).unwrap_or_else(|| by_recurrence(n, odds).test(successes)))
 }
 
-/// The least p value that [`two_sided`] can give for `n` trials; 0 if it underflows, and for a level of 0 or 1.
-///
-/// `None` for n = 0 and for a level outside [0, 1].
+/// The least p value that [`two_sided`] can give for `n` trials; 0 if it underflows, and for a level of 0 or 1. `None`
+/// for n = 0 and for a level outside [0, 1].
 pub fn least_p(n: u64, level: Ratio) -> Option<f64> {
     let odds = Odds::of(level).filter(|_| n > 0)?;
     Some(exact_least_p(n, odds).unwrap_or_else(|| by_recurrence(n, odds).least_p()))

@@ -32,9 +32,8 @@ pub(super) struct Outcomes {
 }
 
 impl Outcomes {
-    /// The counts from `low` to `high`; `rise(j)` is the probability of `j + 1` divided by that of `j`.
-    ///
-    /// `mode` is the most probable count or close to it, within the bounds.
+    /// The counts from `low` to `high`; `rise(j)` is the probability of `j + 1` divided by that of `j`. `mode` is the
+    /// most probable count or close to it, within the bounds.
     pub fn around(mode: u64, (low, high): (u64, u64), rise: impl Fn(u64) -> f64) -> Self {
         // A product of subnormal numbers may stop shrinking.
         let is_normal = |(_, weight): &(u64, f64)| *weight >= f64::MIN_POSITIVE;

@@ -27,10 +27,9 @@ pub struct Detectable {
     pub likely: Option<f64>,
 }
 
-/// The smallest detectable difference of `n` pairs at `level`; `None` if no outcome reaches it.
-///
-/// A family of m tests under Holm's procedure needs `level / m` for its first rejection.
-/// d pairs in one direction have p = 2^(1-d); the power is a binomial tail, inverted by the beta distribution.
+/// The smallest detectable difference of `n` pairs at `level`; `None` if no outcome reaches it. A family of m tests
+/// under Holm's procedure needs `level / m` for its first rejection. d pairs in one direction have p = 2^(1-d); the
+/// power is a binomial tail, inverted by the beta distribution.
 pub fn detectable(n: u64, level: f64) -> Option<Detectable> {
     let mut p = 1.0;
     let mut pairs = 1;

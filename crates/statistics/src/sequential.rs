@@ -26,9 +26,8 @@ pub struct EValue {
     pub p: f64,
 }
 
-/// The e-value of `successes` in `n` trials against the rate `level`, two-sided.
-///
-/// `None` for n = 0, for more successes than trials, and for a level outside [0, 1]. The cost grows with `n`.
+/// The e-value of `successes` in `n` trials against the rate `level`, two-sided. `None` for n = 0, for more successes
+/// than trials, and for a level outside [0, 1]. The cost grows with `n`.
 pub fn against_level(successes: u64, n: u64, level: Ratio) -> Option<EValue> {
     let failures = n.checked_sub(successes).filter(|_| n > 0)?;
     let hit = u64::try_from(level.numerator()).ok()?;
@@ -41,9 +40,7 @@ pub fn against_level(successes: u64, n: u64, level: Ratio) -> Option<EValue> {
 }
 
 /// The e-value against no difference between two paired rates: a discordant pair favours either side with probability
-/// 1/2. The bet is only on discordant pairs; without any it is still 1.
-///
-/// `None` without pairs.
+/// 1/2. The bet is only on discordant pairs; without any it is still 1. `None` without pairs.
 pub fn discordant(pairs: Pairs) -> Option<EValue> {
     match (pairs.n(), pairs.discordant()) {
         (0, _) => None,
@@ -52,10 +49,9 @@ pub fn discordant(pairs: Pairs) -> Option<EValue> {
     }
 }
 
-/// The confidence sequence of a rate: the levels whose e-value is below 1 / (1 - confidence).
-///
-/// It contains the rate at all numbers of trials at once with a probability of at least `confidence`. `None` for n = 0,
-/// for more successes than trials, and for a confidence outside (0, 1).
+/// The confidence sequence of a rate: the levels whose e-value is below 1 / (1 - confidence). It contains the rate at
+/// all numbers of trials at once with a probability of at least `confidence`. `None` for n = 0, for more successes than
+/// trials, and for a confidence outside (0, 1).
 pub fn confidence_sequence(successes: u64, n: u64, confidence: f64) -> Option<Interval> {
     let failures = n.checked_sub(successes).filter(|_| n > 0)?;
     let least = holm::level(confidence)?.ln() + mixture(successes, failures, [(1, 1); 2]).ln();
@@ -66,10 +62,9 @@ pub fn confidence_sequence(successes: u64, n: u64, confidence: f64) -> Option<In
 }
 
 /// The probability of one sequence of these counts under the mixture, divided by that under the given rates of success
-/// and failure. A rate must not be 0 if its count is positive.
-///
-/// Krichevsky and Trofimov's estimator, trial by trial: after i successes in t trials, the next one succeeds with
-/// probability (i + 1/2) / (t + 1). Plain arithmetic gives the same bits on every machine.
+/// and failure. A rate must not be 0 if its count is positive. Krichevsky and Trofimov's estimator, trial by trial:
+/// after i successes in t trials, the next one succeeds with probability (i + 1/2) / (t + 1). Plain arithmetic gives
+/// the same bits on every machine.
 fn mixture(successes: u64, failures: u64, [success, failure]: [(u64, u64); 2]) -> Scaled {
     let step = |(above, below): (u64, u64), seen: u64, trials: u64| {
         ((2 * seen + 1) as f64 * below as f64) / (2.0 * (trials + 1) as f64 * above as f64)

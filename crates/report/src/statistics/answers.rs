@@ -13,6 +13,7 @@ use super::compare::{Comparison, Sign};
 use super::losses::LOST;
 use super::study::named;
 use super::{ChanceRow, Contrast, Family, Method, Options, Reach, Role, Selection, Statistics, Units, Verdict};
+use exact::format;
 
 /// The most pairs that an experiment's answer names; others are counted.
 const MOST_NAMED: usize = 6;
@@ -49,10 +50,8 @@ pub enum AnswerRole {
 
 impl Answer {
     fn new(question: &str, metric: &str, parts: &[String]) -> Option<Self> {
-        let (question, metric) = (question.to_owned(), metric.to_owned());
-        let answer =
-            || Self { question, metric, answer: parts.join("; "), role: AnswerRole::Secondary, caveats: Vec::new() };
-        (!parts.is_empty()).then(answer)
+        let (question, metric, answer) = (question.to_owned(), metric.to_owned(), parts.join("; "));
+        (!parts.is_empty()).then(|| Self { question, metric, answer, role: AnswerRole::Secondary, caveats: Vec::new() })
     }
 }
 
@@ -88,11 +87,8 @@ fn families(statistics: &Statistics, answers: &[Answer]) -> usize {
 
 fn caveats(statistics: &Statistics, options: &Options) -> Vec<String> {
     let selection = statistics.selection.as_ref().map(Selection::phrase);
-    let lost = match super::warnings::lost(statistics) {
-        0 => None,
-        1 => Some("1 episode lost".to_owned()),
-        lost => Some(format!("{lost} episodes lost")),
-    };
+    let lost = Some(super::warnings::lost(statistics)).filter(|lost| *lost > 0);
+    let lost = lost.map(|lost| format!("{} lost", format::counted(lost, "episode")));
     let replies = statistics.replies.as_ref().filter(|replies| replies.unusable > 0);
     let replies = replies.map(|it| format!("{} of {} replies gave no decision", it.unusable, it.replies));
     let pooled = (!statistics.pooled.is_empty()).then(|| "recordings that differ are pooled".to_owned());
@@ -137,10 +133,9 @@ fn unranked(statistics: &Statistics) -> Vec<Answer> {
 fn unsaid_pairs(reasons: &[String]) -> String {
     let each: BTreeSet<&str> = reasons.iter().map(String::as_str).collect();
     let each = Vec::from_iter(each).join(" or ");
-    match reasons.len() {
+    match reasons.len() as u64 {
         0 => String::new(),
-        1 => format!(", cannot say for 1 pair: {each}"),
-        count => format!(", cannot say for {count} pairs: {each}"),
+        count => format!(", cannot say for {}: {each}", format::counted(count, "pair")),
     }
 }
 

@@ -70,21 +70,26 @@ impl Replies {
         let mut cells: Vec<&UnusableReplies> = self.cells.iter().collect();
         // Compared as fractions, the largest first.
         cells.sort_by_key(|cell| Reverse(u128::from(cell.unusable) * 1_000_000 / u128::from(cell.replies.max(1))));
-        let shown = cells.iter().take(NAMED_CELLS).map(|cell| {
+        let named = cells.iter().map(|cell| {
             let (experiment, model) = (visible(&cell.key.experiment), visible(&cell.key.name()));
             format!("{experiment} {model} {} of {}", cell.unusable, cell.replies)
         });
-        let rest = cells.len().saturating_sub(NAMED_CELLS);
-        let rest = if rest > 0 { format!("; and {rest} more") } else { String::new() };
-        let shown = shown.collect::<Vec<_>>().join("; ");
+        let named = first_named(named, NAMED_CELLS);
         (self.unusable > 0).then(|| {
             let (unusable, replies) = (self.unusable, self.replies);
             format!(
-                "{unusable} of {replies} replies gave no decision ({shown}{rest}): a model that cannot be read is not told \
+                "{unusable} of {replies} replies gave no decision ({named}): a model that cannot be read is not told \
                  from one that fails."
             )
         })
     }
+}
+
+/// The first names, and the number of the others.
+pub(super) fn first_named(names: impl ExactSizeIterator<Item = String>, most: usize) -> String {
+    let rest = names.len().saturating_sub(most);
+    let first = names.take(most).collect::<Vec<_>>().join("; ");
+    if rest > 0 { format!("{first}; and {rest} more") } else { first }
 }
 
 /// A filter over episodes.

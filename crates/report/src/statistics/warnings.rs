@@ -2,9 +2,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::episodes::first_named;
 use super::matching::Matching;
-use super::{CellRow, FEW, Replies, RowKey, Selection, Statistics};
-use exact::format::p_value;
+use super::{CellRow, FEW, Gap, Replies, RowKey, Selection, Statistics};
+use exact::format::{counted, p_value};
 use statistics::clustered::fewest_clusters;
 use statistics::design::{Cluster, DesignKind};
 use statistics::holm::level;
@@ -53,21 +54,19 @@ fn matchings(statistics: &Statistics) -> impl Iterator<Item = &Matching> {
 }
 
 fn pairings(statistics: &Statistics) -> (usize, usize) {
-    let metric = statistics.models.first().map(|family| &family.metric);
-    let models =
-        statistics.models.iter().filter(|family| Some(&family.metric) == metric).flat_map(|family| &family.tests);
-    let metric = statistics.conditions.first().map(|contrast| &contrast.metric);
-    let conditions = statistics.conditions.iter().filter(|contrast| Some(&contrast.metric) == metric);
-    let all: Vec<bool> =
-        models.map(|test| test.matching.paired).chain(conditions.map(|contrast| contrast.matching.paired)).collect();
-    (all.iter().filter(|paired| **paired).count(), all.len())
+    let (models, conditions) = (&statistics.models, &statistics.conditions);
+    let models = models.iter().filter(|family| family.metric == models[0].metric).flat_map(|family| &family.tests);
+    let conditions = conditions.iter().filter(|contrast| contrast.metric == conditions[0].metric);
+    let matchings = models.map(|test| &test.matching).chain(conditions.map(|contrast| &contrast.matching));
+    (matchings.clone().filter(|matching| matching.paired).count(), matchings.count())
 }
 
 pub(super) fn warnings(statistics: &Statistics) -> Vec<String> {
     let chosen = statistics.selection.as_ref().filter(|selection| selection.by_results);
     let found = [
         chosen.map(Selection::sentence),
-        is_undeclared(statistics).then(|| format!("{}.", statistics.design_note)),
+        matches!(statistics.design.kind, None | Some(DesignKind::Reconstruction))
+            .then(|| format!("{}.", statistics.design_note)),
         repeated(statistics),
         few_seeds(statistics),
         few_episodes(statistics),
@@ -76,10 +75,6 @@ pub(super) fn warnings(statistics: &Statistics) -> Vec<String> {
         statistics.replies.as_ref().and_then(Replies::sentence),
     ];
     found.into_iter().flatten().collect()
-}
-
-fn is_undeclared(statistics: &Statistics) -> bool {
-    matches!(statistics.design.kind, None | Some(DesignKind::Reconstruction))
 }
 
 fn repeated(statistics: &Statistics) -> Option<String> {
@@ -100,10 +95,11 @@ fn few_seeds(statistics: &Statistics) -> Option<String> {
     }
     let needed = fewest_clusters(level);
     let fewest = blocks.into_values().min().filter(|&fewest| fewest < needed)?;
-    let seeds = if fewest == 1 { "1 seed is".to_owned() } else { format!("{fewest} seeds are") };
+    let verb = if fewest == 1 { "is" } else { "are" };
     Some(format!(
-        "{seeds} too few for a claim about new seeds: no test over fewer than {needed} can reach p = {}. \
+        "{} {verb} too few for a claim about new seeds: no test over fewer than {needed} can reach p = {}. \
          Tests are by seed; intervals of cells speak of new runs of these seeds.",
+        counted(fewest as u64, "seed"),
         p_value(Some(level)).trim_end_matches('0')
     ))
 }
@@ -122,22 +118,18 @@ fn few_episodes(statistics: &Statistics) -> Option<String> {
 }
 
 fn gaps(statistics: &Statistics) -> Option<String> {
-    let named: Vec<String> = statistics
-        .gaps
-        .iter()
-        .take(NAMED_GAPS)
-        .map(|gap| {
-            let found = if gap.episodes == 0 { "missing".to_owned() } else { format!("{} episodes", gap.episodes) };
-            let scene: String = gap.scene.chars().take(SCENE_SHOWN).collect();
-            format!("{} {} scene {scene} ({found})", gap.key.experiment, gap.key.name())
-        })
-        .collect();
-    let rest = statistics.gaps.len().saturating_sub(named.len());
-    let rest = if rest > 0 { format!("; and {rest} more") } else { String::new() };
-    let places = if statistics.gaps.len() == 1 { "1 scene of a model is" } else { "scenes of models are" };
-    let count = if statistics.gaps.len() == 1 { String::new() } else { format!("{} ", statistics.gaps.len()) };
-    (!named.is_empty())
-        .then(|| format!("{count}{places} not paired, because they do not have exactly one episode each: {}{rest}.", named.join("; ")))
+    let places = match statistics.gaps.len() {
+        0 => return None,
+        1 => "1 scene of a model is".to_owned(),
+        count => format!("{count} scenes of models are"),
+    };
+    let gap = |gap: &Gap| {
+        let found = if gap.episodes == 0 { "missing".to_owned() } else { format!("{} episodes", gap.episodes) };
+        let scene: String = gap.scene.chars().take(SCENE_SHOWN).collect();
+        format!("{} {} scene {scene} ({found})", gap.key.experiment, gap.key.name())
+    };
+    let gaps = first_named(statistics.gaps.iter().map(gap), NAMED_GAPS);
+    Some(format!("{places} not paired, because they do not have exactly one episode each: {gaps}."))
 }
 
 fn losses(statistics: &Statistics) -> Option<String> {

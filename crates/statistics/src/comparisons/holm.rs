@@ -12,10 +12,8 @@ pub fn is_significant(p: f64, confidence: f64) -> bool {
     level(confidence).is_some_and(|level| p <= level)
 }
 
-/// Holm's step-down adjustment (Holm 1979): valid under any dependence between the tests.
-///
-/// Compare an adjusted value with the level of the whole family. Values are in input order; each is at least its own p
-/// value and at most 1.
+/// Holm's step-down adjustment (Holm 1979): valid under any dependence between the tests. Compare an adjusted value
+/// with the level of the whole family. Values are in input order; each is at least its own p value and at most 1.
 pub fn holm(p_values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..p_values.len()).collect();
     order.sort_by(|&a, &b| p_values[a].total_cmp(&p_values[b]));

@@ -25,12 +25,11 @@ pub struct Improvement {
     pub interval: Option<Interval>,
 }
 
-/// The probability that a value of the first side is larger, ties counted half, averaged over the strata
-/// (Agarwal et al. 2021, Deep RL at the edge of the statistical precipice; per stratum Mann and Whitney 1947).
-///
-/// A stratum has the values of the first and of the second side. If less is better, exchange the sides. The interval is
-/// the percentile interval of [`RESAMPLES`] resamples, with each stratum and side drawn separately. The order of values
-/// does not matter. `None` without a stratum, if a stratum lacks values of a side, and for a confidence outside (0, 1).
+/// The probability that a value of the first side is larger, ties counted half, averaged over the strata (Agarwal et
+/// al. 2021, Deep RL at the edge of the statistical precipice; per stratum Mann and Whitney 1947). A stratum has the
+/// values of the first and of the second side. If less is better, exchange the sides. The interval is the percentile
+/// interval of [`RESAMPLES`] resamples, with each stratum and side drawn separately. The order of values does not
+/// matter. `None` without a stratum, if a stratum lacks values of a side, and for a confidence outside (0, 1).
 pub fn probability_of_improvement(strata: &[(&[i64], &[i64])], confidence: f64) -> Option<Improvement> {
     let tail = quantile::tail(confidence)?;
     if strata.is_empty() || strata.iter().any(|(first, second)| first.is_empty() || second.is_empty()) {

@@ -3,10 +3,9 @@
 //! Rule: a set is tied if no two of its members are separated. All maximal tied sets are returned, as in a compact
 //! letter display (Piepho 2004). Sets overlap if separation is not transitive, which is usual at n = 21.
 
-/// All maximal tied sets of `count` members; `separated` is called with the smaller index first.
-///
-/// Members ascend within a set, sets ascend by their members, and each member is in at least one set. The search is the
-/// Bron-Kerbosch algorithm with a pivot (1973), exponential only for contrived ties.
+/// All maximal tied sets of `count` members; `separated` is called with the smaller index first. Members ascend within
+/// a set, sets ascend by their members, and each member is in at least one set. The search is the Bron-Kerbosch
+/// algorithm with a pivot (1973), exponential only for contrived ties.
 pub fn tied_sets(count: usize, separated: impl Fn(usize, usize) -> bool) -> Vec<Vec<usize>> {
     let row = |a: usize| (0..count).map(|b| a != b && !separated(a.min(b), a.max(b))).collect();
     let tied = Ties((0..count).map(row).collect());

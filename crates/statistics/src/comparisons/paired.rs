@@ -48,17 +48,15 @@ impl Pairs {
         (self.n() > 0).then(|| (self.first_only as f64 - self.second_only as f64) / self.n() as f64)
     }
 
-    /// The exact two-sided test of no difference (`McNemar` 1947; as a sign test: Dixon and Mood 1946).
-    ///
-    /// Without a difference, a discordant pair favours either side with probability 1/2. 1 if no pair is discordant;
-    /// `None` without pairs.
+    /// The exact two-sided test of no difference (`McNemar` 1947; as a sign test: Dixon and Mood 1946). Without a
+    /// difference, a discordant pair favours either side with probability 1/2. 1 if no pair is discordant; `None`
+    /// without pairs.
     pub fn mcnemar(self) -> Option<f64> {
         self.test().map(|test| test.p)
     }
 
-    /// The mid-p value of [`Pairs::mcnemar`] (Fagerland, Lydersen and Laake 2013, BMC Med. Res. Methodol. 13:91).
-    ///
-    /// Less conservative and **not guaranteed to keep the level**. 1 if no pair is discordant; `None` without pairs.
+    /// The mid-p value of [`Pairs::mcnemar`] (Fagerland, Lydersen and Laake 2013, BMC Med. Res. Methodol. 13:91). Less
+    /// conservative and **not guaranteed to keep the level**. 1 if no pair is discordant; `None` without pairs.
     pub fn mcnemar_mid_p(self) -> Option<f64> {
         self.test().map(|test| test.mid_p)
     }
@@ -83,10 +81,8 @@ impl Pairs {
         self.first_only + self.second_only
     }
 
-    /// The interval of [`Pairs::difference`]: square and add, with the correlation of the pairs
-    /// (Newcombe 1998, Statistics in Medicine 17:2635, method 10).
-    ///
-    /// `None` without pairs and for a confidence outside (0, 1).
+    /// The interval of [`Pairs::difference`]: square and add, with the correlation of the pairs (Newcombe 1998,
+    /// Statistics in Medicine 17:2635, method 10). `None` without pairs and for a confidence outside (0, 1).
     pub fn interval(self, confidence: f64) -> Option<Interval> {
         let (n, difference) = (self.n(), self.difference()?);
         // The distances from a rate to its Wilson bounds.

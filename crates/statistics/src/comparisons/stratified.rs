@@ -46,11 +46,9 @@ pub struct CochranMantelHaenszel {
     pub p_corrected: f64,
 }
 
-/// The common difference of the rates (Greenland and Robins 1985) and its score interval
-/// (Klingenberg 2014, Statistics in Medicine 33:2968), which inverts the test with Sato's variance (Sato 1989).
-///
-/// `None` if no stratum has episodes of both sides, if a stratum has more successes than episodes, and for a confidence
-/// outside (0, 1).
+/// The common difference of the rates (Greenland and Robins 1985) and its score interval (Klingenberg 2014, Statistics
+/// in Medicine 33:2968), which inverts the test with Sato's variance (Sato 1989). `None` if no stratum has episodes of
+/// both sides, if a stratum has more successes than episodes, and for a confidence outside (0, 1).
 pub fn common_difference(strata: &[Stratum], confidence: f64) -> Option<CommonDifference> {
     let z = quantile::normal(quantile::tail(confidence)?);
     let sums = terms(strata)?.iter().fold(Sums::default(), Sums::with);
@@ -62,9 +60,8 @@ pub fn common_difference(strata: &[Stratum], confidence: f64) -> Option<CommonDi
     Some(CommonDifference { difference, interval: (bounds.low < bounds.high).then_some(bounds) })
 }
 
-/// The test without and with continuity correction (Cochran 1954; Mantel and Haenszel 1959).
-///
-/// `None` as in [`common_difference`], and if no stratum has both a success and a failure.
+/// The test without and with continuity correction (Cochran 1954; Mantel and Haenszel 1959). `None` as in
+/// [`common_difference`], and if no stratum has both a success and a failure.
 pub fn cochran_mantel_haenszel(strata: &[Stratum]) -> Option<CochranMantelHaenszel> {
     let terms = terms(strata)?;
     let variance: f64 = terms.iter().map(Term::variance).sum();
@@ -83,10 +80,9 @@ pub fn cochran_mantel_haenszel(strata: &[Stratum]) -> Option<CochranMantelHaensz
 }
 
 /// The exact conditional test of no difference in any stratum. Given each stratum's margins, the successes of the first
-/// side are a sum of hypergeometric counts (Mehta, Patel and Gray 1985). Two-sided by minimum likelihood.
-///
-/// `mid_p` is less conservative and not guaranteed to keep the level. `None` as in [`common_difference`], and if the
-/// sum has too many values: the asymptotic test then serves better.
+/// side are a sum of hypergeometric counts (Mehta, Patel and Gray 1985). Two-sided by minimum likelihood. `mid_p` is
+/// less conservative and not guaranteed to keep the level. `None` as in [`common_difference`], and if the sum has too
+/// many values: the asymptotic test then serves better.
 pub fn exact(strata: &[Stratum]) -> Option<ExactTest> {
     let terms = terms(strata)?;
     let seen = terms.iter().map(|term| term.stratum.first.0).sum();
@@ -104,9 +100,8 @@ pub fn exact(strata: &[Stratum]) -> Option<ExactTest> {
     Some(sum.test(seen))
 }
 
-/// The pairs of all strata in one table: for matched pairs, its [`Pairs::mcnemar`] is the exact conditional test.
-///
-/// Each pair is a stratum of its own within any larger stratum. Given the margins, a concordant pair is fixed and a
+/// The pairs of all strata in one table: for matched pairs, its [`Pairs::mcnemar`] is the exact conditional test. Each
+/// pair is a stratum of its own within any larger stratum. Given the margins, a concordant pair is fixed and a
 /// discordant one favours either side with probability 1/2. So pooling loses nothing.
 pub fn pooled(strata: &[Pairs]) -> Pairs {
     strata.iter().fold(Pairs::default(), |sum, pairs| Pairs {

@@ -19,9 +19,8 @@ pub struct Trend {
     pub strata: u64,
 }
 
-/// The test over strata of (dose, success), with the variance of permutations within each stratum (Mantel 1963).
-///
-/// `None` if no stratum has two doses and both outcomes, and for a dose that is not finite.
+/// The test over strata of (dose, success), with the variance of permutations within each stratum (Mantel 1963). `None`
+/// if no stratum has two doses and both outcomes, and for a dose that is not finite.
 pub fn cochran_armitage<S: AsRef<[(f64, bool)]>>(strata: &[S]) -> Option<Trend> {
     let (mut excess, mut variance, mut informative) = (0.0, 0.0, 0);
     for stratum in strata.iter().map(AsRef::as_ref) {

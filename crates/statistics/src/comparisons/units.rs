@@ -35,10 +35,9 @@ pub struct Sides {
     pub second: Vec<Moments>,
 }
 
-/// The binomial test of a rate over units. The count is the sum of their means, rounded towards the level.
-///
-/// The sum varies at most as much as one verdict per unit would; a fraction counts in favour of the level. `None`
-/// without units and for a level outside [0, 1].
+/// The binomial test of a rate over units. The count is the sum of their means, rounded towards the level. The sum
+/// varies at most as much as one verdict per unit would; a fraction counts in favour of the level. `None` without units
+/// and for a level outside [0, 1].
 pub fn rate_test(units: &[Moments], level: Ratio) -> Option<(ExactTest, f64)> {
     let (values, denominator) = means(units)?;
     let n = u64::try_from(units.len()).ok()?;
@@ -57,10 +56,9 @@ pub(crate) fn rate_test_of_sum(sum: i128, denominator: i128, n: u64, level: Rati
     Some(if crossed { ExactTest { p: 1.0, mid_p: 1.0 } } else { test })
 }
 
-/// The exact permutation test of two rates: within each shared unit, and among the unshared units.
-///
-/// The statistic is the score: the first side's sum minus its expectation given the margins. `None` unless there is a
-/// shared unit or an unshared unit on each side, and with too many outcomes to enumerate.
+/// The exact permutation test of two rates: within each shared unit, and among the unshared units. The statistic is the
+/// score: the first side's sum minus its expectation given the margins. `None` unless there is a shared unit or an
+/// unshared unit on each side, and with too many outcomes to enumerate.
 pub fn difference_test(Sides { shared, first, second }: &Sides) -> Option<UnitTest> {
     let all: Vec<Moments> =
         shared.iter().flat_map(|&(a, b)| [a, b]).chain(first.iter().chain(second).copied()).collect();

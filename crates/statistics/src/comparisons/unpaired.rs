@@ -6,26 +6,22 @@ use crate::interval::{Interval, student_t_of, wilson};
 use crate::outcomes::{ExactTest, Outcomes};
 use exact::moments::{Moments, StandardError};
 
-/// Fisher's exact test of no difference between two independent rates, two-sided by minimum likelihood
-/// (Fisher 1935; Gibbons and Pratt 1975), each as successes of episodes.
-///
-/// `mid_p` is less conservative and not guaranteed to keep the level. Both are 1 if all episodes or no episodes
-/// succeed. `None` if a side has no episodes, or more successes than episodes. The cost grows with the square root of
-/// the counts: about ten thousand steps for a million episodes.
+/// Fisher's exact test of no difference between two independent rates, two-sided by minimum likelihood (Fisher 1935;
+/// Gibbons and Pratt 1975), each as successes of episodes. `mid_p` is less conservative and not guaranteed to keep the
+/// level. Both are 1 if all episodes or no episodes succeed. `None` if a side has no episodes, or more successes than
+/// episodes. The cost grows with the square root of the counts: about ten thousand steps for a million episodes.
 pub fn fisher(first: (u64, u64), second: (u64, u64)) -> Option<ExactTest> {
     Some(tables(first, second)?.test(first.0))
 }
 
-/// The least p value that [`fisher`] can give with these numbers of episodes and this total of successes.
-///
-/// `None` as in [`fisher`].
+/// The least p value that [`fisher`] can give with these numbers of episodes and this total of successes. `None` as in
+/// [`fisher`].
 pub fn fisher_least_p(first: (u64, u64), second: (u64, u64)) -> Option<f64> {
     Some(tables(first, second)?.least_p())
 }
 
-/// The possible successes of the first side given the margins: the hypergeometric distribution.
-///
-/// `None` if a side has no episodes, or more successes than episodes.
+/// The possible successes of the first side given the margins: the hypergeometric distribution. `None` if a side has no
+/// episodes, or more successes than episodes.
 pub(crate) fn tables((k, m): (u64, u64), (l, n): (u64, u64)) -> Option<Outcomes> {
     if m == 0 || n == 0 || k > m || l > n {
         return None;
@@ -41,10 +37,8 @@ pub(crate) fn tables((k, m): (u64, u64), (l, n): (u64, u64)) -> Option<Outcomes>
     Some(Outcomes::around(mode, (low, high), rise))
 }
 
-/// The interval of a difference of two independent rates, the first minus the second: square and add
-/// (Newcombe 1998, Statistics in Medicine 17:873, method 10).
-///
-/// `None` if either rate has no interval.
+/// The interval of a difference of two independent rates, the first minus the second: square and add (Newcombe 1998,
+/// Statistics in Medicine 17:873, method 10). `None` if either rate has no interval.
 pub fn newcombe(first: (u64, u64), second: (u64, u64), confidence: f64) -> Option<Interval> {
     let (a, b) = (wilson(first.0, first.1, confidence)?, wilson(second.0, second.1, confidence)?);
     let (p, q) = (first.0 as f64 / first.1 as f64, second.0 as f64 / second.1 as f64);
@@ -55,10 +49,9 @@ pub fn newcombe(first: (u64, u64), second: (u64, u64), confidence: f64) -> Optio
     })
 }
 
-/// The interval of a difference of two independent means, variances unequal (Welch 1938; degrees of
-/// freedom by Satterthwaite 1946).
-///
-/// Always from sample standard errors. `None` if either side has fewer than two values, or if neither has a spread.
+/// The interval of a difference of two independent means, variances unequal (Welch 1938; degrees of freedom by
+/// Satterthwaite 1946). Always from sample standard errors. `None` if either side has fewer than two values, or if
+/// neither has a spread.
 pub fn welch(first: &Moments, second: &Moments, confidence: f64) -> Option<Interval> {
     let difference = first.mean()? - second.mean()?;
     let part = |moments: &Moments| moments.se(StandardError::Sample).map(|se| (se * se, (moments.n - 1) as f64));

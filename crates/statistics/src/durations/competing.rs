@@ -30,10 +30,9 @@ struct Point {
     is_wrong: f64,
 }
 
-/// The contribution of each kind of episode to a restricted mean: the derivative by the episode's weight.
-///
-/// The sum of squares over the episodes is the variance by the infinitesimal jackknife (Jaeckel 1972; Efron 1982,
-/// chapter 6); for a single cause it is Greenwood's.
+/// The contribution of each kind of episode to a restricted mean: the derivative by the episode's weight. The sum of
+/// squares over the episodes is the variance by the infinitesimal jackknife (Jaeckel 1972; Efron 1982, chapter 6); for
+/// a single cause it is Greenwood's.
 #[derive(Clone, Debug)]
 pub(crate) struct Influence {
     points: BTreeMap<i64, [f64; 3]>,
@@ -72,9 +71,8 @@ impl Incidence {
 
     /// The mean number of steps to a correct decision; later than `horizon` and never both count as `horizon`. It
     /// equals the horizon minus the area under the curve (Andersen 2013). Its standard error is the infinitesimal
-    /// jackknife's times sqrt(n / (n - 1)).
-    ///
-    /// `None` for a horizon not positive or beyond the known part of the curve, and for a confidence outside (0, 1).
+    /// jackknife's times sqrt(n / (n - 1)). `None` for a horizon not positive or beyond the known part of the curve,
+    /// and for a confidence outside (0, 1).
     pub fn restricted_mean(&self, horizon: i64, confidence: f64) -> Option<RestrictedMean> {
         if horizon <= 0 || self.known_until().is_some_and(|known| known < horizon) {
             return None;

@@ -35,9 +35,8 @@ pub struct Difference {
     pub p: Option<f64>,
 }
 
-/// The difference between two independent sets of episodes (Royston and Parmar 2013; degrees of freedom by Satterthwaite 1946).
-///
-/// `None` if either curve is not known up to the horizon, and for a confidence outside (0, 1).
+/// The difference between two independent sets of episodes (Royston and Parmar 2013; degrees of freedom by
+/// Satterthwaite 1946). `None` if either curve is not known up to the horizon, and for a confidence outside (0, 1).
 pub fn independent(first: &[Ending], second: &[Ending], horizon: i64, confidence: f64) -> Option<Difference> {
     let (difference, [a, b]) = means(first, second, horizon, confidence)?;
     let squares = |influence: &Influence, endings: &[Ending]| -> f64 {
@@ -59,7 +58,6 @@ pub fn paired(pairs: &[(Ending, Ending)], horizon: i64, confidence: f64) -> Opti
 }
 
 /// The difference over units of analysis, such as scenes of several episodes, if all times up to the horizon are known.
-///
 /// A unit counts once, as the mean of its times. Uses Student's t over the shared units, if these are at least half of
 /// each side's; Welch's t if the sides share no unit. `None` in between, and as in [`independent`].
 pub fn by_units(units: &Sides, horizon: i64, confidence: f64) -> Option<Difference> {

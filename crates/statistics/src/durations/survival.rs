@@ -157,10 +157,9 @@ impl Survival {
         self.points.last().map(|point| point.steps)
     }
 
-    /// The mean duration up to `horizon` (Irwin 1949; Royston and Parmar 2013), its variance by Greenwood's
-    /// formula (Klein and Moeschberger 2003, equation 4.5.2).
-    ///
-    /// `None` for a horizon not positive or beyond the known part of the curve, and for a confidence outside (0, 1).
+    /// The mean duration up to `horizon` (Irwin 1949; Royston and Parmar 2013), its variance by Greenwood's formula
+    /// (Klein and Moeschberger 2003, equation 4.5.2). `None` for a horizon not positive or beyond the known part of the
+    /// curve, and for a confidence outside (0, 1).
     pub fn restricted_mean(&self, horizon: i64, confidence: f64) -> Option<RestrictedMean> {
         if horizon <= 0 || self.known_until().is_some_and(|known| known < horizon) {
             return None;
@@ -179,9 +178,8 @@ impl Survival {
     }
 
     /// The possible steps of the median (Brookmeyer and Crowley 1982): one half is in the pointwise interval of the
-    /// curve there, Greenwood's after the transformation log(-log) (Borgan and Liestol 1990).
-    ///
-    /// `None` if not even the lower bound is observed, and for a confidence outside (0, 1).
+    /// curve there, Greenwood's after the transformation log(-log) (Borgan and Liestol 1990). `None` if not even the
+    /// lower bound is observed, and for a confidence outside (0, 1).
     pub fn median_interval(&self, confidence: f64) -> Option<MedianInterval> {
         let z = quantile::normal(quantile::tail(confidence)?);
         let (mut sum, mut low) = (0.0, None);

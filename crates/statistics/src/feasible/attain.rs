@@ -84,9 +84,8 @@ impl Search {
     }
 }
 
-/// The smallest and the largest sum of squares of `count` integers from `low` to `high` with this sum.
-///
-/// `None` if no such integers have the sum.
+/// The smallest and the largest sum of squares of `count` integers from `low` to `high` with this sum. `None` if no
+/// such integers have the sum.
 pub(crate) fn ends(count: i128, (low, high): (i128, i128), sum: i128) -> Option<(i128, i128)> {
     let shifted = sum - count * low;
     if count < 0 || low > high || shifted < 0 || shifted > count * (high - low) {

@@ -15,11 +15,10 @@ pub const MOST_VALUES: usize = 2_000;
 
 pub const SEED: u64 = 0x6d69_7272_6f72;
 
-/// The bias-corrected and accelerated interval of the mean (Efron 1987), from [`RESAMPLES`] resamples:
-/// Efron and Tibshirani 1993, equations 14.9, 14.10, 14.14 and 14.15.
-///
-/// `None` for fewer than two values, for more than [`MOST_VALUES`], and for a confidence outside (0, 1). The bounds
-/// coincide if all values are equal: resampling has no more information.
+/// The bias-corrected and accelerated interval of the mean (Efron 1987), from [`RESAMPLES`] resamples: Efron and
+/// Tibshirani 1993, equations 14.9, 14.10, 14.14 and 14.15. `None` for fewer than two values, for more than
+/// [`MOST_VALUES`], and for a confidence outside (0, 1). The bounds coincide if all values are equal: resampling has no
+/// more information.
 pub fn mean(values: &[i64], confidence: f64) -> Option<Interval> {
     let tail = quantile::tail(confidence)?;
     let n = values.len();

@@ -10,11 +10,9 @@ use crate::interval::{Interval, student_t_of};
 use crate::quantile;
 use exact::moments::Moments;
 
-/// The fewest clusters with which a test can reach a level.
-///
-/// Reversing the signs of C cluster means gives 2^C equally likely outcomes under no effect, hence no
-/// two-sided p below 2^(1-C): 0.0625 for five clusters, 0.031 for six. Cluster-robust inference is known to
-/// fail well above that number too (Cameron and Miller 2015, section VI).
+/// The fewest clusters with which a test can reach a level. Reversing the signs of C cluster means gives 2^C equally
+/// likely outcomes under no effect, hence no two-sided p below 2^(1-C): 0.0625 for five clusters, 0.031 for six.
+/// Cluster-robust inference is known to fail well above that number too (Cameron and Miller 2015, section VI).
 pub fn fewest_clusters(level: f64) -> usize {
     let reach = |clusters: &usize| 0.5f64.powi(i32::try_from(*clusters).unwrap_or(i32::MAX) - 1) <= level;
     // For smaller levels the power underflows, and no number of clusters reaches them.
@@ -42,10 +40,8 @@ pub struct Clustered {
     pub design_effect: Option<f64>,
 }
 
-/// The clustered statistics of one cell from the moments of its clusters.
-///
-/// Clusters without values do not count. `None` for fewer than two clusters, for a confidence outside (0, 1), and if
-/// 128 bits do not suffice.
+/// The clustered statistics of one cell from the moments of its clusters. Clusters without values do not count. `None`
+/// for fewer than two clusters, for a confidence outside (0, 1), and if 128 bits do not suffice.
 pub fn clustered(clusters: &[Moments], confidence: f64) -> Option<Clustered> {
     let parts: Vec<Moments> = clusters.iter().copied().filter(|part| part.n > 0).collect();
     let between = parts.len().checked_sub(1).filter(|&between| between > 0)? as f64;
@@ -80,7 +76,6 @@ pub fn clustered_rate(clusters: &[Moments], confidence: f64) -> Option<Clustered
 }
 
 /// The variance between clusters, at least 0, and the variance within them, by analysis of variance (Donner 1986).
-///
 /// `None` for fewer than two clusters, and if each has one value.
 pub fn variance_components(clusters: &[Moments]) -> Option<(f64, f64)> {
     let parts: Vec<Moments> = clusters.iter().copied().filter(|part| part.n > 0).collect();

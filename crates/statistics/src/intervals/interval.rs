@@ -40,11 +40,9 @@ impl Interval {
     }
 }
 
-/// The score interval of a rate (Wilson 1927; Brown et al. 2001, equation 4).
-///
-/// The default: its coverage stays near the nominal one at n = 21, also close to 0 and 1. The lower bound without
-/// successes is exactly 0, the upper bound without failures exactly 1. `None` for n = 0, for more successes than n, and
-/// for a confidence outside (0, 1).
+/// The score interval of a rate (Wilson 1927; Brown et al. 2001, equation 4). The default: its coverage stays near the
+/// nominal one at n = 21, also close to 0 and 1. The lower bound without successes is exactly 0, the upper bound
+/// without failures exactly 1. `None` for n = 0, for more successes than n, and for a confidence outside (0, 1).
 pub fn wilson(successes: u64, n: u64, confidence: f64) -> Option<Interval> {
     let failures = counted(successes, n)?;
     let z = quantile::normal(quantile::tail(confidence)?);
@@ -56,17 +54,14 @@ pub fn wilson(successes: u64, n: u64, confidence: f64) -> Option<Interval> {
     Some(Interval { low, high })
 }
 
-/// The exact interval of a rate (Clopper and Pearson 1934): covers at least the nominal share, often more.
-///
-/// Bounds are quantiles of beta distributions (Brown et al. 2001, section 4.2.1). Ends and `None` as in [`wilson`].
+/// The exact interval of a rate (Clopper and Pearson 1934): covers at least the nominal share, often more. Bounds are
+/// quantiles of beta distributions (Brown et al. 2001, section 4.2.1). Ends and `None` as in [`wilson`].
 pub fn clopper_pearson(successes: u64, n: u64, confidence: f64) -> Option<Interval> {
     equal_tails(successes, n, confidence, [(0.0, 1.0), (1.0, 0.0)])
 }
 
-/// The equal-tailed credible interval of a rate under the Jeffreys prior Beta(1/2, 1/2)
-/// (Brown et al. 2001, section 3.1.3, with their ends: 0 for no success, 1 for no failure).
-///
-/// `None` as in [`wilson`].
+/// The equal-tailed credible interval of a rate under the Jeffreys prior Beta(1/2, 1/2) (Brown et al. 2001, section
+/// 3.1.3, with their ends: 0 for no success, 1 for no failure). `None` as in [`wilson`].
 pub fn jeffreys(successes: u64, n: u64, confidence: f64) -> Option<Interval> {
     equal_tails(successes, n, confidence, [(0.5, 0.5), (0.5, 0.5)])
 }
@@ -80,11 +75,9 @@ fn equal_tails(successes: u64, n: u64, confidence: f64, prior: [(f64, f64); 2]) 
     Some(Interval { low: if successes == 0 { 0.0 } else { low() }, high: if failures == 0 { 1.0 } else { high() } })
 }
 
-/// Student's interval of a mean: mean plus and minus t(n - 1) standard errors (Student 1908).
-///
-/// `form` is the standard error that the metric's definition asks for. `None` for n < 2, where neither form can
-/// estimate a spread, and for a confidence outside (0, 1). The bounds coincide if all values are equal: the method has
-/// no more information.
+/// Student's interval of a mean: mean plus and minus t(n - 1) standard errors (Student 1908). `form` is the standard
+/// error that the metric's definition asks for. `None` for n < 2, where neither form can estimate a spread, and for a
+/// confidence outside (0, 1). The bounds coincide if all values are equal: the method has no more information.
 pub fn student_t(moments: &Moments, form: StandardError, confidence: f64) -> Option<Interval> {
     let freedom = moments.n.checked_sub(1)?;
     student_t_of(moments.mean()?, moments.se(form)?, freedom as f64, confidence)

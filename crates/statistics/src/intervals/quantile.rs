@@ -14,9 +14,7 @@ pub fn tail(confidence: f64) -> Option<f64> {
     (confidence > 0.0 && confidence < 1.0).then(|| settled((1.0 - confidence) / 2.0))
 }
 
-/// The normal deviate with `tail` above it: 1.96 for 0.025.
-///
-/// Expects 0 < `tail` <= 1/2, as [`tail`] gives.
+/// The normal deviate with `tail` above it: 1.96 for 0.025. Expects 0 < `tail` <= 1/2, as [`tail`] gives.
 pub fn normal(tail: f64) -> f64 {
     settled(-Normal::standard().inverse_cdf(tail))
 }
@@ -26,18 +24,16 @@ pub(crate) fn normal_below(deviate: f64) -> f64 {
     settled(Normal::standard().cdf(deviate))
 }
 
-/// The share of the chi-squared distribution with 1 degree of freedom above `statistic`, which is not negative.
-///
-/// By the incomplete gamma function: the library's error function is accurate to only ten digits.
+/// The share of the chi-squared distribution with 1 degree of freedom above `statistic`, which is not negative. By the
+/// incomplete gamma function: the library's error function is accurate to only ten digits.
 pub(crate) fn chi_squared_above(statistic: f64) -> f64 {
     settled(ChiSquared::new(1.0).expect("one degree of freedom is positive").sf(statistic))
 }
 
-/// The deviate of Student's t with `tail` above it, for `freedom` > 0 degrees of freedom.
-///
-/// The library's inverse is improved by Newton steps on its distribution function. For large `freedom` the incomplete
-/// beta function loses digits, so the Cornish-Fisher expansion is used (Abramowitz and Stegun 1964, 26.7.5). Degrees of
-/// freedom may be fractional, as Welch's are.
+/// The deviate of Student's t with `tail` above it, for `freedom` > 0 degrees of freedom. The library's inverse is
+/// improved by Newton steps on its distribution function. For large `freedom` the incomplete beta function loses
+/// digits, so the Cornish-Fisher expansion is used (Abramowitz and Stegun 1964, 26.7.5). Degrees of freedom may be
+/// fractional, as Welch's are.
 pub(crate) fn student(tail: f64, freedom: f64) -> f64 {
     if freedom >= EXPANSION_FROM {
         return settled(student_expansion(-Normal::standard().inverse_cdf(tail), freedom));
@@ -65,9 +61,8 @@ fn student_expansion(z: f64, freedom: f64) -> f64 {
     z + terms.iter().rev().fold(0.0, |sum, term| (sum + term) / freedom)
 }
 
-/// The point of the beta distribution with shapes `a` and `b` that has `tail` below it.
-///
-/// The library's inverse is improved by Newton steps on its distribution function; a step outside (0, 1) is not taken.
+/// The point of the beta distribution with shapes `a` and `b` that has `tail` below it. The library's inverse is
+/// improved by Newton steps on its distribution function; a step outside (0, 1) is not taken.
 pub(crate) fn beta(tail: f64, a: f64, b: f64) -> f64 {
     let distribution = Beta::new(a, b).expect("shapes are positive");
     let start = distribution.inverse_cdf(tail);

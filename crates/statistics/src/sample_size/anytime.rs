@@ -7,9 +7,8 @@ use exact::ratio::Ratio;
 /// The most episodes of a plan with looks; the outcomes grow with the third power.
 pub const MOST_AT_LOOKS: u64 = 600;
 
-/// An anytime-valid test with a look after each `every` episodes.
-///
-/// An outcome is a loss, a tie or a win: for pairs, which model alone succeeds; for one model, failure or success.
+/// An anytime-valid test with a look after each `every` episodes. An outcome is a loss, a tie or a win: for pairs,
+/// which model alone succeeds; for one model, failure or success.
 #[derive(Clone, Debug)]
 pub struct Anytime {
     level: f64,

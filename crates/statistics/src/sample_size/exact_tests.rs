@@ -15,9 +15,8 @@ pub struct McNemar {
 }
 
 impl McNemar {
-    /// Pairs with the discordant share `discordance`, so that the rates are `difference` apart.
-    ///
-    /// The discordance is at least the difference.
+    /// Pairs with the discordant share `discordance`, so that the rates are `difference` apart. The discordance is at
+    /// least the difference.
     pub fn new(level: f64, difference: f64, discordance: f64) -> Self {
         let share = if discordance > 0.0 { difference / discordance } else { 0.0 };
         Self { level, discordance, favours: f64::midpoint(1.0, share).min(1.0), rejects: Vec::new() }

@@ -43,9 +43,7 @@ pub struct Rates {
 
 impl Rates {
     /// Rates that are `difference` apart: from `baseline` up, or by default around 1/2, where a difference is hardest
-    /// to show.
-    ///
-    /// `None` if they are outside [0, 1].
+    /// to show. `None` if they are outside [0, 1].
     pub fn apart(difference: f64, baseline: Option<f64>) -> Option<Self> {
         let lower = baseline.unwrap_or((1.0 - difference) / 2.0);
         let rates = Self { lower, higher: lower + difference };
@@ -98,9 +96,7 @@ impl Clusters {
     }
 
     /// The fewest runs per seed with power of at least `wanted`; `None` if no number of episodes up to [`Power::most`]
-    /// suffices.
-    ///
-    /// Doubling and bisection find a candidate; then runs are tried one by one from 20, or a fifth, below it.
+    /// suffices. Doubling and bisection find a candidate; then runs are tried one by one from 20, or a fifth, below it.
     pub fn runs_for(self, wanted: f64, test: &mut dyn Power) -> Option<u64> {
         const NEAR: u64 = 20;
         let most = test.most() / self.seeds.max(1);
@@ -118,9 +114,7 @@ impl Clusters {
 }
 
 /// The smallest argument in [0, `most`] with `power` of at least `wanted`, by bisection; `None` if even `most` has
-/// less.
-///
-/// `power` must rise with its argument. Forty halvings leave an error below 10^-12.
+/// less. `power` must rise with its argument. Forty halvings leave an error below 10^-12.
 pub fn smallest(wanted: f64, most: f64, mut power: impl FnMut(f64) -> f64) -> Option<f64> {
     if power(most) < wanted {
         return None;

@@ -20,9 +20,8 @@ pub enum BySeed {
     Rate { chance: Ratio, rate: f64 },
 }
 
-/// A test over seeds with equal numbers of runs.
-///
-/// An episode takes its seed's outcome with probability sqrt(intraclass correlation), otherwise its own.
+/// A test over seeds with equal numbers of runs. An episode takes its seed's outcome with probability sqrt(intraclass
+/// correlation), otherwise its own.
 #[derive(Clone, Copy, Debug)]
 pub struct Seeds {
     pub test: BySeed,

@@ -126,9 +126,8 @@ pub(in crate::statistics) struct Sides {
 }
 
 impl Sides {
-    /// The sides of all strata together: a unit of several strata counts once.
-    ///
-    /// `None` if each episode is its own unit, or all units are pairs of one episode each.
+    /// The sides of all strata together: a unit of several strata counts once. `None` if each episode is its own unit,
+    /// or all units are pairs of one episode each.
     pub fn of(study: &Study, column: &MetricColumn, strata: &[(&Block, &Block)]) -> Option<Self> {
         if !study.has_units() {
             return None;

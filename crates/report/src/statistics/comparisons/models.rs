@@ -1,6 +1,7 @@
 //! Compares models in one experiment: paired or not, with tied sets instead of ranks.
 
 use std::cmp::Ordering;
+use std::collections::BTreeSet;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -73,36 +74,30 @@ pub struct Gap {
     pub episodes: usize,
 }
 
-/// All pairs of blocks of an experiment, matched once for all metrics.
-pub(in crate::statistics) struct Field<'s, 'a> {
+/// All blocks of an experiment, each matched with each once for all metrics.
+struct Field<'s, 'a> {
     study: &'s Study<'a>,
     blocks: &'s [Block<'a>],
     scenes: Vec<Scenes>,
-    matched: Vec<Matched>,
+    matched: Vec<Vec<Matched>>,
 }
 
 impl<'s, 'a> Field<'s, 'a> {
-    pub fn of(study: &'s Study<'a>, experiment: &'s Experiment<'a>) -> Self {
+    fn of(study: &'s Study<'a>, experiment: &'s Experiment<'a>) -> Self {
         let scenes: Vec<Scenes> = experiment.blocks.iter().map(|block| Scenes::of(study, block)).collect();
-        let mut matched = Vec::new();
-        for (at, first) in scenes.iter().enumerate() {
-            matched.extend(scenes[at + 1..].iter().map(|second| Matched::of(first, second)));
-        }
-        Self { study, blocks: &experiment.blocks, scenes, matched }
+        let of_first = |first| scenes.iter().map(|second| Matched::of(first, second)).collect();
+        Self { study, blocks: &experiment.blocks, matched: scenes.iter().map(of_first).collect(), scenes }
     }
 
-    fn matched(&self, first: usize, second: usize) -> Matched {
-        let found = &self.matched[triangle(self.blocks.len(), first.min(second), first.max(second))];
-        let turned = |&(a, b): &(usize, usize)| if first < second { (a, b) } else { (b, a) };
-        let pairs = found.pairs.as_ref().map(|pairs| pairs.iter().map(turned).collect());
-        Matched { matching: found.matching, pairs }
-    }
-
-    fn test(&self, column: &MetricColumn, (first, second): (usize, usize), ask: Asked) -> PairTest {
-        let matched = self.matched(first, second);
+    fn test(
+        &self,
+        column: &MetricColumn,
+        (first, second): (usize, usize),
+        (horizon, confidence): (Option<i64>, f64),
+    ) -> PairTest {
+        let (study, matched) = (self.study, &self.matched[first][second]);
         let (first, second) = (&self.blocks[first], &self.blocks[second]);
-        let (study, Asked { horizon, confidence }) = (self.study, ask);
-        let compared = Compared { study, first, second, matched: &matched, horizon, confidence };
+        let compared = Compared { study, first, second, matched, horizon, confidence };
         let comparison = compared.under(column).unless(study.incomparable(first, second));
         PairTest { first: first.name(), second: second.name(), matching: matched.matching, comparison }
     }
@@ -110,16 +105,14 @@ impl<'s, 'a> Field<'s, 'a> {
     fn gaps(&self) -> Vec<Gap> {
         let mut gaps = Vec::new();
         for (at, block) in self.blocks.iter().enumerate() {
-            let partners = (0..self.blocks.len()).filter(|&other| other != at).filter(|&other| {
-                self.matched[triangle(self.blocks.len(), at.min(other), at.max(other))].matching.paired
-            });
-            let mut scenes: Vec<usize> = partners.flat_map(|other| self.scenes[other].rows.keys().copied()).collect();
+            let is_partner = |other: &usize| *other != at && self.matched[at][*other].matching.paired;
+            let partners = (0..self.blocks.len()).filter(is_partner);
+            let mut scenes: BTreeSet<usize> =
+                partners.flat_map(|other| self.scenes[other].rows.keys().copied()).collect();
             if scenes.is_empty() {
                 continue;
             }
             scenes.extend(self.scenes[at].rows.keys());
-            scenes.sort_unstable();
-            scenes.dedup();
             gaps.extend(scenes.into_iter().filter_map(|scene| self.gap(block, at, scene)));
         }
         gaps
@@ -136,13 +129,6 @@ impl<'s, 'a> Field<'s, 'a> {
     }
 }
 
-/// Options shared by all comparisons.
-#[derive(Clone, Copy)]
-struct Asked {
-    horizon: Option<i64>,
-    confidence: f64,
-}
-
 /// The index of a pair among the pairs of `count` members, listed row by row of the upper triangle.
 fn triangle(count: usize, a: usize, b: usize) -> usize {
     a * (2 * count - a - 1) / 2 + (b - a - 1)
@@ -156,9 +142,9 @@ pub(in crate::statistics) fn compared(study: &Study, horizon: Option<i64>, confi
             if is_duration(study, &column.name) {
                 // Models are ordered and compared up to one horizon, the one in the table of durations.
                 let horizon = horizon.or_else(|| durations::horizon_of(study, experiment, column));
-                families.push(Family::of(experiment.name, column, &field, Asked { horizon, confidence }));
+                families.push(Family::of(experiment.name, column, &field, (horizon, confidence)));
             } else if study.kind(&column.name) == Kind::Rate {
-                families.push(Family::of(experiment.name, column, &field, Asked { horizon: None, confidence }));
+                families.push(Family::of(experiment.name, column, &field, (None, confidence)));
             }
         }
         gaps.extend(field.gaps());
@@ -167,13 +153,13 @@ pub(in crate::statistics) fn compared(study: &Study, horizon: Option<i64>, confi
 }
 
 impl Family {
-    fn of(experiment: &str, column: &MetricColumn, field: &Field, ask: Asked) -> Self {
-        let order = best_first(field, column, ask.horizon);
+    fn of(experiment: &str, column: &MetricColumn, field: &Field, asked: (Option<i64>, f64)) -> Self {
+        let order = best_first(field, column, asked.0);
         let mut tests = Vec::new();
         for (at, &first) in order.iter().enumerate() {
-            tests.extend(order[at + 1..].iter().map(|&second| field.test(column, (first, second), ask)));
+            tests.extend(order[at + 1..].iter().map(|&second| field.test(column, (first, second), asked)));
         }
-        adjust(tests.iter_mut().map(|test| &mut test.comparison), ask.confidence);
+        adjust(tests.iter_mut().map(|test| &mut test.comparison), asked.1);
         let models: Vec<String> = order.iter().map(|&at| field.blocks[at].name()).collect();
         let tied = tied_sets(models.len(), |a, b| tests[triangle(models.len(), a, b)].comparison.separated);
         Self {
@@ -181,7 +167,7 @@ impl Family {
             metric: column.name.clone(),
             tied: tied.into_iter().map(|set| set.into_iter().map(|member| models[member].clone()).collect()).collect(),
             models,
-            detectable: Reach::of(&tests, ask.confidence),
+            detectable: Reach::of(&tests, asked.1),
             tests,
         }
     }

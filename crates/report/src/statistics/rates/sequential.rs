@@ -124,9 +124,8 @@ pub struct SequentialPair {
 }
 
 impl Sequential {
-    /// The statistics of `table`, the episodes so far.
-    ///
-    /// For a confidence outside (0, 1), sequences and verdicts are undefined.
+    /// The statistics of `table`, the episodes so far. For a confidence outside (0, 1), sequences and verdicts are
+    /// undefined.
     pub fn of(table: &EpisodeTable, options: &Options) -> Result<Self, MomentOverflow> {
         let mut study = Study::of(table, options.design, None)?;
         study.pool = options.pooled.is_some();

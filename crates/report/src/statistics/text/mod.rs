@@ -22,9 +22,8 @@ pub enum Length {
 }
 
 impl Statistics {
-    /// The text, with tables for these metrics only, in lines of at most `width` columns.
-    ///
-    /// Empty tables are omitted. [`Statistics::headline`] has the metrics for a reader who did not choose.
+    /// The text, with tables for these metrics only, in lines of at most `width` columns. Empty tables are omitted.
+    /// [`Statistics::headline`] has the metrics for a reader who did not choose.
     pub fn render(&self, metrics: &[String], length: Length, width: Option<usize>) -> String {
         let statistics = self;
         let shown = |metric: &str| metrics.iter().any(|name| name == metric);

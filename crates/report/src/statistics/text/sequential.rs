@@ -18,9 +18,8 @@ const METHODS: [&str; 5] = [
 ];
 
 impl Sequential {
-    /// The whole text, for these metrics only, in lines of at most `width` columns.
-    ///
-    /// Pairs of models that are not separated are counted.
+    /// The whole text, for these metrics only, in lines of at most `width` columns. Pairs of models that are not
+    /// separated are counted.
     pub fn render(&self, metrics: &[String], width: Option<usize>) -> String {
         let sequential = self;
         let shown = |metric: &str| metrics.iter().any(|name| name == metric);

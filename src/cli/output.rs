@@ -2,7 +2,7 @@
 //!
 //! A command's files are on the disk when it ends, and no loss of power leaves half of one.
 
-use std::fmt::{self, Display};
+use std::fmt::{self, Display, Write as _};
 use std::fs::File;
 use std::io::{self, Write as _};
 use std::path::Path;
@@ -18,10 +18,7 @@ use trace::open::TraceFile;
 
 /// Prints an answer: text for people or JSON for programs.
 pub fn print<T: Display + Serialize>(answer: &T, json: bool) -> Result<Outcome, Failure> {
-    if json {
-        return print_json(answer);
-    }
-    plain(visible_lines(answer.to_string().trim_end()) + "\n")
+    print_told(answer, json, |text, answer| write!(text, "{answer}"))
 }
 
 /// Prints an answer whose text `tell` writes.

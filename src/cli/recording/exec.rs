@@ -22,7 +22,6 @@ pub struct ExecArgs {
     exec_timeout: u64,
 }
 
-/// The passing of frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 enum ExecImages {
     /// A PNG file, kept until the episode ends

@@ -59,7 +59,6 @@ pub struct GroupingArgs {
     pub lost: LostArg,
 }
 
-/// The treatment of lost episodes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum LostArg {
     /// Leave them out
@@ -79,7 +78,6 @@ pub struct EngineArgs {
     pub spark: SparkArgs,
 }
 
-/// The engines by name.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum Engine {
     /// The program's own kernels

@@ -21,7 +21,6 @@ pub struct SqlArgs {
     pub dialect: DialectArg,
 }
 
-/// The dialects by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum DialectArg {
     /// The common subset of all engines

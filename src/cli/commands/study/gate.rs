@@ -46,7 +46,6 @@ pub struct GateArgs {
     pub threads: ThreadArgs,
 }
 
-/// The formats by name.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum Format {
     /// A table, then the flipped episodes

@@ -30,7 +30,6 @@ pub struct QueryArgs {
     pub rows: usize,
 }
 
-/// The formats by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum AnswerFormat {
     /// For people: names, types, the first and the last rows

@@ -52,7 +52,6 @@ pub struct ImportArgs {
     json: bool,
 }
 
-/// The cluster's unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum ClusterArg {
     /// The episodes of one seed

@@ -26,7 +26,6 @@ pub struct SchemaCommand {
     json: bool,
 }
 
-/// A schema that is printed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum Name {
     /// A trace: its columns, footer and rules

@@ -109,16 +109,12 @@ pub struct RecordArgs {
     /// Print the outcomes of the episodes as JSON
     #[arg(long)]
     json: bool,
-    /// The number of threads.
     #[command(flatten)]
     threads: ThreadArgs,
-    /// A model behind a provider.
     #[command(flatten)]
     vlm: VlmArgs,
-    /// A program of one's own.
     #[command(flatten)]
     exec: ExecArgs,
-    /// People.
     #[cfg(feature = "view")]
     #[command(flatten)]
     human: HumanArgs,

@@ -23,7 +23,6 @@ pub(super) fn number(query: &Query, key: &str) -> Result<Option<usize>, ViewErro
     value(query, key).map(parse).transpose()
 }
 
-/// The value of a required key.
 pub(super) fn required<'q>(query: &'q Query, key: &str) -> Result<&'q str, ViewError> {
     value(query, key).ok_or_else(|| ViewError::Request(format!("expected `{key}` in the request")))
 }
@@ -48,7 +47,6 @@ const OTHERS: &str = "is";
 pub(super) const STATUS: &str = "reply_status";
 
 impl Filter {
-    /// Parses a request.
     pub fn of(query: &Query) -> Self {
         let mut chosen: Vec<Chosen> = Vec::new();
         for (key, value) in query {
@@ -75,7 +73,6 @@ impl Filter {
         *self == Self::default()
     }
 
-    /// The search words.
     pub fn words(&self) -> Option<&str> {
         self.words.as_deref()
     }
@@ -140,7 +137,6 @@ fn quoted(text: &str) -> String {
     format!("'{}'", text.replace('\'', "''"))
 }
 
-/// Chosen values as a condition.
 fn sql_of((column, values): &Chosen) -> String {
     let name = format!("\"{}\"", column.replace('"', "\"\""));
     let is_text = COLUMNS.contains(&column.as_str()) || [PARTICIPANT, STATUS].contains(&column.as_str());

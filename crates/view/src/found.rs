@@ -166,7 +166,6 @@ impl Found {
         Ok((Self { traces, parts, logs, unfinished: Vec::new() }, renamed))
     }
 
-    /// The stamps of the label lists beside the traces.
     pub fn label_stamps(&self) -> Vec<Stamp> {
         let traces = self.traces.iter().chain(&self.parts).map(|input| list_beside(&input.path));
         traces.collect::<BTreeSet<_>>().iter().map(|list| stamp(list)).collect()

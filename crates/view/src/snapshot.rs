@@ -33,7 +33,6 @@ pub(super) struct Snapshot {
     pub running: Vec<Running>,
     /// The reasons why other episodes under way cannot be shown.
     pub unreadable: Vec<String>,
-    /// The stamps of the files.
     pub stamps: Vec<Stamp>,
     pub label_stamps: Vec<Stamp>,
     pub logs: Logs,
@@ -70,12 +69,10 @@ pub(super) struct Together {
 }
 
 impl Snapshot {
-    /// Reads the current state of the recordings.
     pub fn open(options: &Options, generation: u64) -> Result<Self, ViewError> {
         Self::of_found(options, Found::of(&options.runs)?, generation)
     }
 
-    /// The state of these files.
     pub fn of_found(options: &Options, found: Found, generation: u64) -> Result<Self, ViewError> {
         report::style::Style::load(&options.style).map_err(StudyError::from)?;
         let (stamps, label_stamps) = (found.stamps(), found.label_stamps());
@@ -134,7 +131,6 @@ impl Snapshot {
         }
     }
 
-    /// The steps of the episodes under way.
     pub fn steps_under_way(&self) -> u64 {
         self.running.iter().map(|running| running.episode.steps.len() as u64).sum()
     }
@@ -152,7 +148,6 @@ impl Snapshot {
         }
     }
 
-    /// The number of finished episodes.
     pub fn episodes(&self) -> usize {
         self.scored.as_ref().map_or(0, |scored| scored.results.episodes.len())
     }
@@ -168,7 +163,6 @@ impl Snapshot {
         self.scored.as_deref().ok_or_else(|| ViewError::Absent("no episode is whole yet".to_owned()))
     }
 
-    /// The bytes of the files.
     pub fn bytes(&self) -> u64 {
         self.stamps.iter().map(|(_, bytes, _)| bytes).sum()
     }
@@ -220,7 +214,6 @@ impl Snapshot {
         rows.iter().map(|rows| opened(rows, &some.input, is_mirror)).collect()
     }
 
-    /// An episode by its id.
     pub fn episode(&self, id: &str) -> Result<Opened, ViewError> {
         if let Some(scored) = &self.scored
             && let Some(place) = scored.places.get(id)

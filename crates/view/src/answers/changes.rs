@@ -7,7 +7,6 @@ use exact::escape::visible;
 use report::cells::diff::Flip;
 use study::{DiffRequest, Side, diff};
 
-/// Compares the definitions in view with those of `--against`.
 pub(crate) fn answer(snapshot: &Snapshot) -> Result<Value, ViewError> {
     let options = &snapshot.options;
     let Some(against) = &options.against else {

@@ -12,7 +12,6 @@ use trace::schema::domain::is_identity;
 use trace::schema::{COLUMNS, Column, Value as Cell};
 use world::replay::moments::{Moment, moments};
 
-/// The maximum number of episodes of a scene on one page.
 const MOST_OF_A_SCENE: usize = 60;
 
 /// Columns that differ between any two recordings and do not describe behaviour.

@@ -30,7 +30,6 @@ pub(crate) fn of_episode(snapshot: &Snapshot, id: &str) -> Value {
     labels.map_or_else(|| json!([]), |labels| labels.of_episode(id).map(told).collect())
 }
 
-/// The labels of a row of the table.
 pub(crate) fn of_row(table: &EpisodeTable, row: usize) -> Vec<&str> {
     let put = table.labels.iter().filter(|label| label.values.get(row) == Some("true"));
     put.filter_map(|label| label.name.strip_prefix(PREFIX)).collect()

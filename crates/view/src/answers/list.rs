@@ -66,7 +66,6 @@ fn with_keys(table: &EpisodeTable, row: usize) -> Value {
     told
 }
 
-/// The ids before and after an episode in the same list.
 pub(crate) fn neighbours(snapshot: &Snapshot, query: &Query, id: &str) -> Result<Value, ViewError> {
     let Some(scored) = &snapshot.scored else { return Ok(json!({})) };
     let rows = sorted(snapshot, query)?;

@@ -12,7 +12,6 @@ use exact::escape::visible;
 use exact::format::fixed;
 use trace::replies::ReplyCounts;
 
-/// The minimum time between two scans of the files.
 const PAUSE: Duration = Duration::from_millis(400);
 /// The time over which the rate of steps is measured.
 const SPAN: Duration = Duration::from_secs(10);
@@ -50,7 +49,6 @@ impl View {
         })
     }
 
-    /// Scans the files now.
     pub(crate) fn refresh(&self) -> Result<(), ViewError> {
         let mut watch = self.watch.lock().unwrap_or_else(PoisonError::into_inner);
         self.look(&mut watch);

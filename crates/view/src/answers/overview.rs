@@ -105,7 +105,6 @@ fn ranking(episodes: &EpisodeTable) -> Value {
     })
 }
 
-/// Sections of the report on the filtered episodes.
 pub(crate) fn sections(snapshot: &Snapshot, query: &Query, part: Part) -> Result<Value, ViewError> {
     let scored = snapshot.table()?;
     let filter = Filter::of(query);

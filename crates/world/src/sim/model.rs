@@ -94,34 +94,6 @@ pub enum Item {
     Hand,
 }
 
-impl Item {
-    /// The number of items apart from panes: the room, then bodies, cubes, marks, the hand, the double.
-    pub(super) const COUNT: usize = 1 + AGENTS + MOST_CUBES + MOST_MARKS + 2;
-
-    /// Its number below [`Item::COUNT`]; a pane has that of the room.
-    pub(super) const fn number(self) -> usize {
-        match self {
-            Self::Room | Self::Pane(_) => 0,
-            Self::Agent(agent) => 1 + agent,
-            Self::Cube(cube) => 1 + AGENTS + cube,
-            Self::Mark(mark) => 1 + AGENTS + MOST_CUBES + mark,
-            Self::Hand => Self::COUNT - 2,
-            Self::Double => Self::COUNT - 1,
-        }
-    }
-
-    pub(super) const fn of_number(number: usize) -> Self {
-        match number {
-            0 => Self::Room,
-            _ if number < 1 + AGENTS => Self::Agent(number - 1),
-            _ if number < 1 + AGENTS + MOST_CUBES => Self::Cube(number - 1 - AGENTS),
-            _ if number < Self::COUNT - 2 => Self::Mark(number - 1 - AGENTS - MOST_CUBES),
-            _ if number == Self::COUNT - 2 => Self::Hand,
-            _ => Self::Double,
-        }
-    }
-}
-
 /// The look of a stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Look {

@@ -6,8 +6,9 @@ use mujoco_rs::prelude::MjtObjBase;
 use super::super::angle::{Heading, Quaternion};
 use super::super::config::WorldConfig;
 use super::super::scene::{Cube, HandShape, HandStart, HungPane, Scene, WornMark};
-use super::{BARS, Item, Look, group, shadow};
-use crate::experiment::spec::PaneKind;
+use super::{AGENTS, BARS, Item, Look, group, shadow};
+use crate::experiment::spec::{MOST_MARKS, PaneKind};
+use crate::sim::scene::MOST_CUBES;
 use trace::palette::Color;
 
 /// Half the depth of a pane, m.
@@ -96,6 +97,34 @@ const LABEL_GREEN: f32 = 0.001;
 
 fn step(number: usize) -> u8 {
     u8::try_from(STEP * number).expect("a world holds fewer than 30 things")
+}
+
+impl Item {
+    /// The number of items apart from panes: the room, then bodies, cubes, marks, the hand, the double.
+    pub(in crate::sim) const COUNT: usize = 1 + AGENTS + MOST_CUBES + MOST_MARKS + 2;
+
+    /// Its number below [`Item::COUNT`]; a pane has that of the room.
+    pub(in crate::sim) const fn number(self) -> usize {
+        match self {
+            Self::Room | Self::Pane(_) => 0,
+            Self::Agent(agent) => 1 + agent,
+            Self::Cube(cube) => 1 + AGENTS + cube,
+            Self::Mark(mark) => 1 + AGENTS + MOST_CUBES + mark,
+            Self::Hand => Self::COUNT - 2,
+            Self::Double => Self::COUNT - 1,
+        }
+    }
+
+    pub(in crate::sim) const fn of_number(number: usize) -> Self {
+        match number {
+            0 => Self::Room,
+            _ if number < 1 + AGENTS => Self::Agent(number - 1),
+            _ if number < 1 + AGENTS + MOST_CUBES => Self::Cube(number - 1 - AGENTS),
+            _ if number < Self::COUNT - 2 => Self::Mark(number - 1 - AGENTS - MOST_CUBES),
+            _ if number == Self::COUNT - 2 => Self::Hand,
+            _ => Self::Double,
+        }
+    }
 }
 
 /// The meaning of the label with this red and green, regardless of what a pane shows; `None` for no label.

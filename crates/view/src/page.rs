@@ -10,23 +10,14 @@ const BODY: &str = include_str!("../../../assets/view/body.html");
 /// The style of the application; the style of reports precedes it.
 const STYLE: &str = include_str!("../../../assets/view/view.css");
 
+macro_rules! modules {
+    ($($name:literal)*) => { [$(($name, include_str!(concat!("../../../assets/view/", $name)))),*] };
+}
+
 /// The modules in order of dependency.
-const MODULES: [(&str, &str); 15] = [
-    ("dom.js", include_str!("../../../assets/view/dom.js")),
-    ("where.js", include_str!("../../../assets/view/where.js")),
-    ("data.js", include_str!("../../../assets/view/data.js")),
-    ("state.js", include_str!("../../../assets/view/state.js")),
-    ("filters.js", include_str!("../../../assets/view/filters.js")),
-    ("overview.js", include_str!("../../../assets/view/overview.js")),
-    ("labels.js", include_str!("../../../assets/view/labels.js")),
-    ("list.js", include_str!("../../../assets/view/list.js")),
-    ("values.js", include_str!("../../../assets/view/values.js")),
-    ("map.js", include_str!("../../../assets/view/map.js")),
-    ("timeline.js", include_str!("../../../assets/view/timeline.js")),
-    ("episode.js", include_str!("../../../assets/view/episode.js")),
-    ("compare.js", include_str!("../../../assets/view/compare.js")),
-    ("live.js", include_str!("../../../assets/view/live.js")),
-    ("main.js", include_str!("../../../assets/view/main.js")),
+const MODULES: [(&str, &str); 15] = modules![
+    "dom.js" "where.js" "data.js" "state.js" "filters.js" "overview.js" "labels.js" "list.js"
+    "values.js" "map.js" "timeline.js" "episode.js" "compare.js" "live.js" "main.js"
 ];
 
 pub(super) fn file(name: &str) -> Option<(String, &'static str)> {

@@ -152,10 +152,9 @@ impl Guard {
         let name = name.to_ascii_lowercase();
         let ip = name.trim_start_matches('[').trim_end_matches(']').parse::<IpAddr>().ok();
         // A name can be made to point anywhere, an address cannot.
-        let is_address =
-            ip.is_some_and(|ip| if self.address.ip().is_unspecified() { true } else { ip == self.address.ip() });
-        is_address
-            || name == "localhost" && (self.address.ip().is_loopback() || self.address.ip().is_unspecified())
+        let own = self.address.ip();
+        ip.is_some_and(|ip| own.is_unspecified() || ip == own)
+            || name == "localhost" && (own.is_loopback() || own.is_unspecified())
             || self.name.as_ref() == Some(&name)
     }
 

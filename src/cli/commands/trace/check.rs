@@ -44,14 +44,8 @@ pub struct CheckArgs {
 
 impl CheckArgs {
     pub fn run(&self) -> Result<Outcome, Failure> {
-        let limits = QualityLimits {
-            max_unreadable: self.max_unreadable,
-            max_refused: self.max_refused,
-            max_truncated: self.max_truncated,
-            max_repaired: self.max_repaired,
-            max_lost: self.max_lost,
-            max_latency: self.max_latency,
-        };
+        let &Self { max_unreadable, max_refused, max_truncated, max_repaired, max_lost, max_latency, .. } = self;
+        let limits = QualityLimits { max_unreadable, max_refused, max_truncated, max_repaired, max_lost, max_latency };
         if limits.is_empty() {
             let words = "expected a limit to check, found none\n  help: name one, such as --max-unreadable 0.05";
             return Err(Failure::input(words));

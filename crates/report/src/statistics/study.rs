@@ -271,15 +271,6 @@ impl<'a> Block<'a> {
     pub fn moments(&self, column: &MetricColumn) -> Moments {
         self.moments[column.name.as_str()]
     }
-
-    /// The rows of each seed.
-    pub fn seeds(&self, table: &EpisodeTable) -> Vec<Vec<usize>> {
-        let mut seeds: BTreeMap<i32, Vec<usize>> = BTreeMap::new();
-        for row in self.rows() {
-            seeds.entry(table.keys.seed(row)).or_default().push(row);
-        }
-        seeds.into_values().collect()
-    }
 }
 
 pub(super) fn named(model: &str, condition: Option<&str>) -> String {

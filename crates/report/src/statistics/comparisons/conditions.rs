@@ -77,11 +77,16 @@ impl Contrast {
                 let matched = Matched::of(&Scenes::of(study, first), &Scenes::of(study, second));
                 let compared = Compared { study, first, second, matched: &matched, horizon, confidence };
                 let incomparable = study.incomparable(first, second);
-                let under = |column| {
-                    let comparison = compared.under(column).unless(incomparable.clone());
-                    Self::of(first, second, &matched, column, comparison)
+                let under = |column: &MetricColumn| Self {
+                    model: first.model.to_owned(),
+                    condition: first.condition(),
+                    metric: column.name.clone(),
+                    baseline: first.experiment.to_owned(),
+                    against: second.experiment.to_owned(),
+                    matching: matched.matching,
+                    comparison: compared.under(column).unless(incomparable.clone()),
                 };
-                family.extend(columns.iter().copied().map(under));
+                family.extend(columns.iter().map(|column| under(column)));
             }
             for column in columns {
                 let of_metric = family.iter_mut().filter(|it: &&mut Self| it.metric == column.name);
@@ -106,17 +111,5 @@ impl Contrast {
             Some(format!("{against} is not contrasted with {baseline}: {why}."))
         };
         Pair::all(study).into_iter().filter_map(sentence).collect()
-    }
-
-    fn of(first: &Block, second: &Block, matched: &Matched, column: &MetricColumn, comparison: Comparison) -> Self {
-        Self {
-            model: first.model.to_owned(),
-            condition: first.condition(),
-            metric: column.name.clone(),
-            baseline: first.experiment.to_owned(),
-            against: second.experiment.to_owned(),
-            matching: matched.matching,
-            comparison,
-        }
     }
 }

@@ -12,7 +12,7 @@ use crate::statistics::study::{Block, RowKey, Study};
 use exact::moments::Moments;
 use metric::catalog::{Kind, Metric, StandardError};
 use score::lost_counts::LostCounts;
-use score::table::{CONDITION, EpisodeTable, MetricColumn};
+use score::table::{CONDITION, MetricColumn};
 use statistics::bootstrap;
 use statistics::clustered::{Clustered, clustered, clustered_rate};
 use statistics::coverage::{self, Withheld};
@@ -103,7 +103,9 @@ impl CellRow {
 
     /// All cells, by group and metric.
     pub(in crate::statistics) fn all(study: &Study, cells: &Cells, confidence: f64) -> Vec<Self> {
-        let rows = rows_by_group(study.table, cells);
+        let mut rows = vec![Vec::new(); cells.groups.len()];
+        let members = membership(study.table, &cells.by).expect("the cells are grouped by columns of this table");
+        members.into_iter().zip(0..).for_each(|(group, row)| rows[group].push(row));
         let groups = cells.groups.iter().zip(&rows);
         groups.flat_map(|(group, rows)| Self::of_group(study, cells, group, rows, confidence)).collect()
     }
@@ -167,23 +169,15 @@ impl Intervals {
         let range = study.range(name);
         // 10,000 resamples are drawn only if their interval may be shown.
         let resampled = (moments.n >= coverage::BOOTSTRAP && moments.has_spread())
-            .then(|| bootstrap::mean(&values(study, name, rows), confidence))
+            .then(|| {
+                let values = study.column(name)?;
+                bootstrap::mean(&rows.iter().filter_map(|&row| values.get(row)).collect::<Vec<_>>(), confidence)
+            })
             .flatten();
         let (student_t, student_t_withheld) = cell_interval(moments, metric, range, confidence);
         let (bootstrap, bootstrap_withheld) = bounded(resampled, moments, range, coverage::BOOTSTRAP);
         Self::Quantity { student_t, student_t_withheld, bootstrap, bootstrap_withheld }
     }
-}
-
-fn values(study: &Study, metric: &str, rows: &[usize]) -> Vec<i64> {
-    study.column(metric).map_or_else(Vec::new, |column| rows.iter().filter_map(|&row| column.get(row)).collect())
-}
-
-fn rows_by_group(table: &EpisodeTable, cells: &Cells) -> Vec<Vec<usize>> {
-    let mut rows = vec![Vec::new(); cells.groups.len()];
-    let groups = membership(table, &cells.by).expect("the cells are grouped by columns of this table");
-    groups.into_iter().zip(0..).for_each(|(group, row)| rows[group].push(row));
-    rows
 }
 
 /// The seeds of one cell.
@@ -217,7 +211,8 @@ impl ClusterRow {
     }
 
     fn of(study: &Study, block: &Block, column: &MetricColumn, confidence: f64) -> Self {
-        let seeds = by_seed(study.table, block, column);
+        // The units are seeds, as declared.
+        let seeds: Vec<Moments> = study.by_unit(block, |row| column.get(row)).into_values().collect();
         let whole = block.moments(column);
         let found = match study.kind(&column.name) {
             Kind::Rate => clustered_rate(&seeds, confidence),
@@ -238,10 +233,4 @@ impl ClusterRow {
             withheld,
         }
     }
-}
-
-fn by_seed(table: &EpisodeTable, block: &Block, column: &MetricColumn) -> Vec<Moments> {
-    let add = |sum: Moments, value| sum.with(value).expect("a part of a block that was summed whole");
-    let of_seed = |rows: Vec<usize>| rows.into_iter().filter_map(|row| column.get(row)).fold(Moments::default(), add);
-    block.seeds(table).into_iter().map(of_seed).filter(|moments| moments.n > 0).collect()
 }

@@ -47,10 +47,9 @@ impl RankRow {
         let mut rows: Vec<Self> = families.iter().flat_map(Self::of_family).collect();
         for rows_of in overall.chunk_by(|a, b| a.metric == b.metric) {
             let models: BTreeSet<&str> = rows_of.iter().flat_map(|row| [&*row.first, &*row.second]).collect();
-            let models: Vec<&str> = models.into_iter().collect();
-            let shown: Vec<(&str, &str)> =
-                rows_of.iter().filter(|row| row.separated).map(|row| (&*row.first, &*row.second)).collect();
-            rows.extend(ranks(None, &rows_of[0].metric, &models, &shown));
+            let separated = rows_of.iter().filter(|row| row.separated);
+            let shown: Vec<(&str, &str)> = separated.map(|row| (&*row.first, &*row.second)).collect();
+            rows.extend(ranks(None, &rows_of[0].metric, &Vec::from_iter(models), &shown));
         }
         rows
     }

@@ -95,91 +95,57 @@ fn heading(statistics: &Statistics) -> String {
 
 fn sections(statistics: &Statistics, shown: tables::Shown, length: Length, percent: &str) -> Vec<(String, Table)> {
     let is_full = length == Length::Full;
-    let always = [
-        (
-            if is_full {
-                format!("Rates, {percent} intervals")
-            } else {
-                format!("Rates, {percent} score intervals (Wilson)")
-            },
-            tables::rates(statistics, shown, is_full),
-        ),
-        (
-            format!(
-                "Against chance: exact binomial test, two-sided by minimum likelihood; Holm over the models{}",
-                if is_full { "; mid-p need not keep the level" } else { "" }
-            ),
-            tables::chance(statistics, shown, is_full),
-        ),
-        (
-            format!(
-                "Models told apart: exact tests two-sided by minimum likelihood (McNemar of pairs, Fisher of independent \
-                 episodes), t tests of restricted means; Holm over all pairs; {percent} intervals (Newcombe) not adjusted"
-            ),
-            tables::separated(statistics, shown, is_full),
-        ),
-        (
-            format!(
-                "Models over all experiments: exact conditional test with the Mantel-Haenszel difference and Klingenberg's \
-                 {percent} interval, McNemar's over the pairs of all, or permutation by scene or cluster; two-sided by minimum likelihood; Holm over all pairs"
-            ),
-            tables::overall(statistics, shown, is_full),
-        ),
-        (
-            format!(
-                "Between conditions: first experiment minus the other, by the same methods; Holm over the models; {percent} \
-                 intervals not adjusted"
-            ),
-            tables::conditions(statistics, shown, is_full),
-        ),
-        (
-            "Rates against a dose: Cochran-Armitage test within each scene or other unit (Mantel 1963); Holm over the models"
-                .to_owned(),
-            tables::trends(statistics, shown),
-        ),
-        (
-            format!(
-                "Durations: unfinished episodes censored (Kaplan-Meier); medians by Brookmeyer and Crowley, restricted means on \
-                 the log-odds scale, {percent} intervals"
-            ),
-            tables::durations(statistics, shown),
-        ),
-        (
-            "The same scene played again: verdicts that differ by chance alone, which a difference has to exceed"
-                .to_owned(),
-            tables::retests(statistics, shown),
-        ),
-        ("Lost to infrastructure".to_owned(), tables::losses(statistics, shown)),
-    ];
-    let further = || {
-        [
-            (
-                "Ranks that the tests leave open: one more than the models shown to be better, to all but those shown to be worse"
-                    .to_owned(),
-                tables::ranks(statistics, shown),
-            ),
-            (
-                format!(
-                    "How often one model decides earlier than another, averaged over experiments; who never decides is the \
-                     latest; stratified bootstrap, {percent} percentile intervals"
-                ),
-                tables::improvements(statistics, shown),
-            ),
-            (
-                format!("Time to a correct decision: a wrong one competes (Aalen-Johansen); {percent} intervals"),
-                tables::correct(statistics, shown),
-            ),
-            (
-                format!("Quantities, {percent} intervals of the plain mean: Student's t, seeded BCa bootstrap"),
-                tables::quantities(statistics, shown),
-            ),
-            (
-                "By seed: cluster-robust standard errors, t(seeds - 1), of rates on the log-odds scale".to_owned(),
-                tables::clusters(statistics, shown),
-            ),
-        ]
-    };
-    always.into_iter().chain(is_full.then(further).into_iter().flatten()).collect()
+    let mut sections = Vec::new();
+    let mut add = |title: String, table: Table| sections.push((title, table));
+    let title = if is_full { "intervals" } else { "score intervals (Wilson)" };
+    add(format!("Rates, {percent} {title}"), tables::rates(statistics, shown, is_full));
+    let mid_p = if is_full { "; mid-p need not keep the level" } else { "" };
+    let title = "Against chance: exact binomial test, two-sided by minimum likelihood; Holm over the models";
+    add(format!("{title}{mid_p}"), tables::chance(statistics, shown, is_full));
+    let title = format!(
+        "Models told apart: exact tests two-sided by minimum likelihood (McNemar of pairs, Fisher of independent \
+         episodes), t tests of restricted means; Holm over all pairs; {percent} intervals (Newcombe) not adjusted"
+    );
+    add(title, tables::separated(statistics, shown, is_full));
+    let title = format!(
+        "Models over all experiments: exact conditional test with the Mantel-Haenszel difference and Klingenberg's \
+         {percent} interval, McNemar's over the pairs of all, or permutation by scene or cluster; two-sided by minimum \
+         likelihood; Holm over all pairs"
+    );
+    add(title, tables::overall(statistics, shown, is_full));
+    let title = format!(
+        "Between conditions: first experiment minus the other, by the same methods; Holm over the models; {percent} \
+         intervals not adjusted"
+    );
+    add(title, tables::conditions(statistics, shown, is_full));
+    let title = "Rates against a dose: Cochran-Armitage test within each scene or other unit (Mantel 1963); Holm over the models";
+    add(title.to_owned(), tables::trends(statistics, shown));
+    let title = format!(
+        "Durations: unfinished episodes censored (Kaplan-Meier); medians by Brookmeyer and Crowley, restricted means on \
+         the log-odds scale, {percent} intervals"
+    );
+    add(title, tables::durations(statistics, shown));
+    let title = "The same scene played again: verdicts that differ by chance alone, which a difference has to exceed";
+    add(title.to_owned(), tables::retests(statistics, shown));
+    add("Lost to infrastructure".to_owned(), tables::losses(statistics, shown));
+    if !is_full {
+        return sections;
+    }
+    let title = "Ranks that the tests leave open: one more than the models shown to be better, to all but those shown to be \
+                 worse";
+    add(title.to_owned(), tables::ranks(statistics, shown));
+    let title = format!(
+        "How often one model decides earlier than another, averaged over experiments; who never decides is the latest; \
+         stratified bootstrap, {percent} percentile intervals"
+    );
+    add(title, tables::improvements(statistics, shown));
+    let title = format!("Time to a correct decision: a wrong one competes (Aalen-Johansen); {percent} intervals");
+    add(title, tables::correct(statistics, shown));
+    let title = format!("Quantities, {percent} intervals of the plain mean: Student's t, seeded BCa bootstrap");
+    add(title, tables::quantities(statistics, shown));
+    let title = "By seed: cluster-robust standard errors, t(seeds - 1), of rates on the log-odds scale";
+    add(title.to_owned(), tables::clusters(statistics, shown));
+    sections
 }
 
 fn list(text: &mut String, title: &str, sentences: &[String], width: Option<usize>) {

@@ -133,7 +133,7 @@ pub async fn play(
         };
         let start = Instant::now();
         let visibility = world.visibility();
-        stage.shares.visibility(start);
+        stage.shares.visibility.add(start);
         let reply =
             agent.decide(&observation).await.map_err(|lost| RecordError::Lost { step: lost.step.or(Some(t)), lost })?;
         let action = reply.action;
@@ -156,7 +156,7 @@ pub async fn play(
         observer.seen(&Seen { t, world, frame: frame.as_ref(), visibility: &visibility })?;
         let start = Instant::now();
         bumped = world.act(action).bumped;
-        stage.shares.visibility(start);
+        stage.shares.visibility.add(start);
         // Dropping the observation first avoids a copy.
         drop(observation);
         Arc::make_mut(&mut past).push(Past { action, bumped, thought: own_thought });
@@ -175,7 +175,7 @@ fn look(stage: &Stage<'_>, world: &World) -> Result<Option<Arc<Frame>>, RecordEr
     let Some(eye) = stage.eye else { return Ok(None) };
     let start = Instant::now();
     let frame = eye.borrow_mut().frame(world).map_err(RecordError::fatal)?;
-    stage.shares.rendering(start);
+    stage.shares.rendering.add(start);
     Ok(Some(Arc::new(frame)))
 }
 

@@ -158,7 +158,7 @@ impl Recording<'_> {
     fn thread(&self, queue: &Queue<'_>, unusable: &Unusable, each: usize) -> Result<Tally, RecordError> {
         let start = Instant::now();
         let result = self.episodes(queue, unusable, each);
-        self.shares.thread(start);
+        self.shares.all.add(start);
         if result.is_err() {
             self.stop.store(true, Ordering::Relaxed);
         }
@@ -170,7 +170,7 @@ impl Recording<'_> {
         let start = Instant::now();
         let eyes =
             is_needed.then(|| Eyes::of(self.config, queue.experiments())).transpose().map_err(RecordError::fatal)?;
-        self.shares.rendering(start);
+        self.shares.rendering.add(start);
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(RecordError::fatal)?;
         let mut tally = Tally::default();
         runtime.block_on(async {
@@ -250,7 +250,7 @@ impl Recording<'_> {
         let mut episode = rollout::head(self.config, &scene, key, self.subject);
         let task = rollout::task(self.config, &scene, key);
         let mut world = World::new(self.config, scene).map_err(RecordError::fatal)?;
-        self.shares.visibility(start);
+        self.shares.visibility.add(start);
         let agent = self.player.agent(task, &episode.episode_id);
         let mut agent = agent.map_err(|lost| RecordError::Lost { step: None, lost })?;
         episode.participant = agent.participant().map(str::to_owned);
@@ -299,7 +299,7 @@ impl Recording<'_> {
         if let (Some(before), Some((t, after))) = (&played.model, &played.other_model) {
             self.progress.model_changed(&episode.episode_id, *t, before, after);
         }
-        self.shares.writing(start);
+        self.shares.writing.add(start);
         Ok(())
     }
 
@@ -375,7 +375,7 @@ impl Observer for Observers<'_> {
             let frame = seen.frame.filter(|_| self.recording.settings.frames);
             log.seen(&Seen { frame, ..*seen }).map_err(RecordError::fatal)?;
         }
-        self.recording.shares.writing(start);
+        self.recording.shares.writing.add(start);
         Ok(())
     }
 
@@ -390,7 +390,7 @@ impl Observer for Observers<'_> {
         if let Some(log) = &mut self.log {
             log.done(t, row).map_err(RecordError::fatal)?;
         }
-        shares.writing(start);
+        shares.writing.add(start);
         Ok(())
     }
 }

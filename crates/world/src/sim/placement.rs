@@ -78,26 +78,22 @@ pub fn crowded(config: &WorldConfig, experiment: &Experiment) -> Option<DoesNotF
             mirror: Some(at),
         });
     }
-    let crowded = study().find_map(|(seed, run)| Scene::draw(config, experiment.clone(), seed, run).err())?;
-    if let Some(Hand { least, most, step_mm, .. }) = experiment.hand {
-        return Some(DoesNotFit {
-            what: format!(
-                "no place for the hand {least} to {most} steps of {} m from the mark, of seed {} and run {}",
-                metres(step_mm),
-                crowded.seed,
-                crowded.run
+    let Crowded { seed, run, .. } =
+        study().find_map(|(seed, run)| Scene::draw(config, experiment.clone(), seed, run).err())?;
+    let (what, help) = match experiment.hand {
+        Some(Hand { least, most, step_mm, .. }) => (
+            format!(
+                "no place for the hand {least} to {most} steps of {} m from the mark, of seed {seed} and run {run}",
+                metres(step_mm)
             ),
-            help:
-                "hands begin at most 6 steps ahead of the mark, 5 aside and 5 above: another `step`, `least` or `most`"
-                    .to_owned(),
-            mirror: None,
-        });
-    }
-    Some(DoesNotFit {
-        what: format!("no room for the cubes and others of seed {} and run {}", crowded.seed, crowded.run),
-        help: "fewer cubes or others, or a larger `room.size` in the world's configuration".to_owned(),
-        mirror: None,
-    })
+            "hands begin at most 6 steps ahead of the mark, 5 aside and 5 above: another `step`, `least` or `most`",
+        ),
+        None => (
+            format!("no room for the cubes and others of seed {seed} and run {run}"),
+            "fewer cubes or others, or a larger `room.size` in the world's configuration",
+        ),
+    };
+    Some(DoesNotFit { what, help: help.to_owned(), mirror: None })
 }
 
 /// The seeds and runs of a study, whose scenes serve to check an experiment.

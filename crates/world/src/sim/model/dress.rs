@@ -1,7 +1,6 @@
 //! A scene's changes to the model: the places of panes, its cubes, bodies and marks, and all colours.
 
-use mujoco_rs::prelude::MjModel;
-use mujoco_rs::prelude::MjtObjBase;
+use mujoco_rs::prelude::{MjModel, MjtObjBase};
 
 use super::super::angle::{Heading, Quaternion};
 use super::super::config::WorldConfig;

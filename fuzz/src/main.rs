@@ -40,9 +40,13 @@ fn main() -> std::process::ExitCode {
             let number = |text: &&str| text.parse().expect("a number");
             return campaign::run(number(count), number(seed), number(threads));
         }
+        ["mutate", target, corpus, count, seed] => {
+            let number = |text: &str| text.parse().expect("a number");
+            return campaign::run_mutated(target, corpus.as_ref(), number(count), number(seed));
+        }
         _ => {
             eprintln!(
-                "usage: mirrorstats-fuzz targets | seeds FOLDER | run TARGET FILE... | pages MUTANTS SEED THREADS"
+                "usage: mirrorstats-fuzz targets | seeds FOLDER | run TARGET FILE... | pages MUTANTS SEED THREADS | mutate TARGET CORPUS MUTANTS SEED"
             );
             return std::process::ExitCode::from(2);
         }

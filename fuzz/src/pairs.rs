@@ -26,7 +26,8 @@ pub fn joined(first: &[u8], second: &[u8]) -> Vec<u8> {
     [&length, first, second].concat()
 }
 
-fn parted(data: &[u8]) -> Option<(&[u8], &[u8])> {
+/// The two inputs; `None` if the data is shorter than the first.
+pub fn parted(data: &[u8]) -> Option<(&[u8], &[u8])> {
     let (length, rest) = data.split_first_chunk()?;
     rest.split_at_checked(usize::from(u16::from_le_bytes(*length)))
 }

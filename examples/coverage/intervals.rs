@@ -30,8 +30,8 @@ pub fn common_differences() {
                 let counted = [
                     interval.is_some_and(|interval| interval.contains(difference)),
                     interval.is_none(),
-                    is_shown(cmh.map(|cmh| cmh.p)),
-                    is_shown(cmh.map(|cmh| cmh.p_corrected)),
+                    is_shown(cmh.map(|[(_, p), _]| p)),
+                    is_shown(cmh.map(|[_, (_, p)]| p)),
                     is_shown(test.map(|test| test.p)),
                     is_shown(test.map(|test| test.mid_p)),
                 ];

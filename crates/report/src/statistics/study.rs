@@ -27,7 +27,7 @@ const PARTICIPANT: &str = "participant";
 
 /// The unit of analysis: episodes within it depend on each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Unit {
+pub(crate) enum Unit {
     Seed(i32),
     Participant(usize),
     Scene(usize),
@@ -35,7 +35,7 @@ pub(super) enum Unit {
 }
 
 /// An episode table and its blocks, ordered by the catalog's experiments, then by model and condition.
-pub(super) struct Study<'a> {
+pub(crate) struct Study<'a> {
     pub table: &'a EpisodeTable,
     pub design: Design,
     pub experiments: Vec<Experiment<'a>>,
@@ -64,13 +64,13 @@ impl RowKey {
     }
 }
 
-pub(super) struct Experiment<'a> {
+pub(crate) struct Experiment<'a> {
     pub name: &'a str,
     pub blocks: Vec<Block<'a>>,
 }
 
 /// The episodes of one model in one experiment under one condition, and the moments of their metrics.
-pub(super) struct Block<'a> {
+pub(crate) struct Block<'a> {
     pub experiment: &'a str,
     pub model: &'a str,
     /// The condition; `None` if all episodes of the table have the default one.
@@ -273,7 +273,7 @@ impl<'a> Block<'a> {
     }
 }
 
-pub(super) fn named(model: &str, condition: Option<&str>) -> String {
+pub(crate) fn named(model: &str, condition: Option<&str>) -> String {
     condition.map_or_else(|| model.to_owned(), |condition| format!("{model} [{condition}]"))
 }
 

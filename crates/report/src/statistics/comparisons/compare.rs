@@ -90,7 +90,7 @@ pub struct Comparison {
 }
 
 /// Two blocks and their comparison.
-pub(in crate::statistics) struct Compared<'s, 'a> {
+pub(crate) struct Compared<'s, 'a> {
     pub study: &'s Study<'a>,
     pub first: &'s Block<'a>,
     pub second: &'s Block<'a>,
@@ -334,7 +334,7 @@ impl Comparison {
         Self { method, n, ..Self::default() }
     }
 
-    pub(in crate::statistics) fn unless(self, incomparable: Option<String>) -> Self {
+    pub(crate) fn unless(self, incomparable: Option<String>) -> Self {
         if incomparable.is_none() {
             return self;
         }
@@ -366,7 +366,7 @@ impl Comparison {
     }
 
     /// The units, pairs or episodes that are too few for a verdict, or the lost episodes that decide it; else `None`.
-    pub(in crate::statistics) fn unsaid(&self, confidence: f64) -> Option<Units> {
+    pub(crate) fn unsaid(&self, confidence: f64) -> Option<Units> {
         if let Some(units) = &self.units {
             return units.too_few.then(|| units.clone()).or_else(|| LossCases::unsettled(self.losses.as_ref()));
         }
@@ -409,7 +409,7 @@ pub enum Sign {
     Lower,
 }
 
-pub(in crate::statistics) fn adjust<'c>(family: impl Iterator<Item = &'c mut Comparison>, confidence: f64) {
+pub(crate) fn adjust<'c>(family: impl Iterator<Item = &'c mut Comparison>, confidence: f64) {
     let mut tested: Vec<&mut Comparison> = family.filter(|comparison| comparison.p.is_some()).collect();
     let seen = |it: &Comparison| LossCase { difference: it.difference, p: it.p };
     let settled = settle(tested.iter_mut().map(|it| (seen(it), &mut it.losses)), confidence);

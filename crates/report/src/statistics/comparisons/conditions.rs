@@ -32,7 +32,7 @@ pub struct Contrast {
 }
 
 /// Two experiments to contrast.
-pub(in crate::statistics) struct Pair<'s, 'a> {
+pub(crate) struct Pair<'s, 'a> {
     baseline: &'s Experiment<'a>,
     against: &'s Experiment<'a>,
     /// The declared metrics; all if empty.
@@ -59,7 +59,7 @@ impl<'s, 'a> Pair<'s, 'a> {
     }
 
     /// The blocks of one model and condition in both experiments.
-    pub(in crate::statistics) fn couples(&self) -> impl Iterator<Item = (&'s Block<'a>, &'s Block<'a>)> {
+    pub(crate) fn couples(&self) -> impl Iterator<Item = (&'s Block<'a>, &'s Block<'a>)> {
         let firsts = &self.baseline.blocks;
         let same = move |second: &'s Block<'a>| {
             firsts.iter().filter(|first| second.is_same_subject(first)).map(move |first| (first, second))
@@ -69,7 +69,7 @@ impl<'s, 'a> Pair<'s, 'a> {
 }
 
 impl Contrast {
-    pub(in crate::statistics) fn all(study: &Study, horizon: Option<i64>, confidence: f64) -> Vec<Self> {
+    pub(crate) fn all(study: &Study, horizon: Option<i64>, confidence: f64) -> Vec<Self> {
         let mut contrasts = Vec::new();
         for pair in Self::pairs(study) {
             let (mut family, columns) = (Vec::new(), pair.columns(study));
@@ -98,13 +98,13 @@ impl Contrast {
     }
 
     /// The pairs of experiments with similar tasks.
-    pub(in crate::statistics) fn pairs<'s, 'a>(study: &'s Study<'a>) -> Vec<Pair<'s, 'a>> {
+    pub(crate) fn pairs<'s, 'a>(study: &'s Study<'a>) -> Vec<Pair<'s, 'a>> {
         let catalog = &study.table.catalog;
         let is_like = |pair: &Pair| tasks_differ(catalog, pair.baseline.name, pair.against.name).is_none();
         Pair::all(study).into_iter().filter(is_like).collect()
     }
 
-    pub(in crate::statistics) fn left_out(study: &Study) -> Vec<String> {
+    pub(crate) fn left_out(study: &Study) -> Vec<String> {
         let sentence = |pair: Pair| {
             let (baseline, against) = (pair.baseline.name, pair.against.name);
             let why = tasks_differ(&study.table.catalog, baseline, against)?;

@@ -10,7 +10,7 @@ use statistics::holm::{holm, is_significant};
 use statistics::losses::{Lossy, bounds};
 
 /// The name of lost episodes that decide a verdict.
-pub(in crate::statistics) const LOST: &str = "lost episodes";
+pub(crate) const LOST: &str = "lost episodes";
 
 /// Losses, or that nothing is known of them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -34,7 +34,7 @@ pub struct LossRow {
 }
 
 impl Losses {
-    pub(in crate::statistics) fn of(study: &Study, recorded: bool, confidence: f64) -> Self {
+    pub(crate) fn of(study: &Study, recorded: bool, confidence: f64) -> Self {
         let rows = study.blocks().flat_map(|block| of_block(study, block, confidence)).collect();
         Self { recorded, rows }
     }
@@ -64,7 +64,7 @@ pub struct LossCase {
 
 /// The assumed result of lost episodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::statistics) enum Toward {
+pub(crate) enum Toward {
     Lowest,
     Highest,
 }
@@ -86,17 +86,17 @@ impl Toward {
 
 impl LossCases {
     /// Both cases; `None` without lost episodes.
-    pub(in crate::statistics) fn of(lost: u64, case: impl Fn(Toward) -> LossCase) -> Option<Self> {
+    pub(crate) fn of(lost: u64, case: impl Fn(Toward) -> LossCase) -> Option<Self> {
         let both = || Self { lost, lowest: case(Toward::Lowest), highest: case(Toward::Highest), agree: true };
         (lost > 0).then(both)
     }
 
-    pub(in crate::statistics) fn turned(self) -> Self {
+    pub(crate) fn turned(self) -> Self {
         let turned = |case: LossCase| LossCase { difference: case.difference.map(|it| -it), ..case };
         Self { lowest: turned(self.highest), highest: turned(self.lowest), ..self }
     }
 
-    pub(in crate::statistics) fn unsettled(cases: Option<&Self>) -> Option<Units> {
+    pub(crate) fn unsettled(cases: Option<&Self>) -> Option<Units> {
         let units = |cases: &Self| Units { n: cases.lost, name: LOST.to_owned(), too_few: true };
         cases.filter(|cases| !cases.agree).map(units)
     }
@@ -104,7 +104,7 @@ impl LossCases {
 
 /// The p value of each test of a family, adjusted by Holm's method, and whether it shows a difference, with the lost
 /// episodes too.
-pub(in crate::statistics) fn settle<'c>(
+pub(crate) fn settle<'c>(
     family: impl Iterator<Item = (LossCase, &'c mut Option<LossCases>)>,
     confidence: f64,
 ) -> Vec<(f64, bool)> {

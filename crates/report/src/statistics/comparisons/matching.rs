@@ -34,21 +34,21 @@ pub struct Matching {
 }
 
 /// The episodes of one block by scene.
-pub(in crate::statistics) struct Scenes {
+pub(crate) struct Scenes {
     /// The rows of each scene, by its number in the table.
     pub rows: BTreeMap<usize, Vec<usize>>,
     undeclared: u64,
 }
 
 /// Two blocks' pairs, as rows of the table, in the order of the scenes.
-pub(in crate::statistics) struct Matched {
+pub(crate) struct Matched {
     pub matching: Matching,
     /// The pairs if they are compared; otherwise `None`.
     pub pairs: Option<Vec<(usize, usize)>>,
 }
 
 /// The 2x2 table of a rate over pairs of rows; pairs with an undefined value do not count.
-pub(in crate::statistics) fn outcomes(column: &MetricColumn, pairs: &[(usize, usize)]) -> Pairs {
+pub(crate) fn outcomes(column: &MetricColumn, pairs: &[(usize, usize)]) -> Pairs {
     Pairs::of(pairs.iter().filter_map(|&(a, b)| Some((column.get(a)?, column.get(b)?))))
 }
 
@@ -101,7 +101,7 @@ pub struct Units {
 }
 
 impl Units {
-    pub(in crate::statistics) fn new(study: &Study, block: &Block, n: usize, least: f64, confidence: f64) -> Self {
+    pub(crate) fn new(study: &Study, block: &Block, n: usize, least: f64, confidence: f64) -> Self {
         Self { n: n as u64, name: study.unit_name(block).to_owned(), too_few: too_few(n, least, confidence) }
     }
 
@@ -116,12 +116,12 @@ impl Units {
 }
 
 /// True if no symmetric test with this number of units or episodes, or with this least p value, can reach the level.
-pub(in crate::statistics) fn too_few(n: usize, least: f64, confidence: f64) -> bool {
+pub(crate) fn too_few(n: usize, least: f64, confidence: f64) -> bool {
     level(confidence).is_none_or(|level| least > level || n < fewest_clusters(level))
 }
 
 /// The values of two sides by unit.
-pub(in crate::statistics) struct Sides {
+pub(crate) struct Sides {
     units: BTreeMap<Unit, (Moments, Moments)>,
 }
 

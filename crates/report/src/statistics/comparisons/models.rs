@@ -134,7 +134,7 @@ fn triangle(count: usize, a: usize, b: usize) -> usize {
     a * (2 * count - a - 1) / 2 + (b - a - 1)
 }
 
-pub(in crate::statistics) fn compared(study: &Study, horizon: Option<i64>, confidence: f64) -> (Vec<Family>, Vec<Gap>) {
+pub(crate) fn compared(study: &Study, horizon: Option<i64>, confidence: f64) -> (Vec<Family>, Vec<Gap>) {
     let (mut families, mut gaps) = (Vec::new(), Vec::new());
     for experiment in study.experiments.iter().filter(|experiment| experiment.blocks.len() > 1) {
         let field = Field::of(study, experiment);
@@ -201,7 +201,7 @@ fn best_first(field: &Field, column: &MetricColumn, horizon: Option<i64>) -> Vec
     order
 }
 
-pub(in crate::statistics) fn by_mean(a: Option<f64>, b: Option<f64>, better: Better) -> Ordering {
+pub(crate) fn by_mean(a: Option<f64>, b: Option<f64>, better: Better) -> Ordering {
     match (a, b) {
         (Some(a), Some(b)) if better == Better::Lower => a.total_cmp(&b),
         (Some(a), Some(b)) => b.total_cmp(&a),

@@ -44,7 +44,7 @@ pub struct RetestRow {
 }
 
 impl RetestRow {
-    pub(in crate::statistics) fn all(study: &Study) -> Vec<Self> {
+    pub(crate) fn all(study: &Study) -> Vec<Self> {
         if !study.design.has_pairs() {
             return Vec::new();
         }
@@ -100,7 +100,7 @@ fn times(study: &Study, block: &Block) -> Times {
     times
 }
 
-pub(in crate::statistics) fn repeat_variance(study: &Study, block: &Block, column: &MetricColumn) -> Option<f64> {
+pub(crate) fn repeat_variance(study: &Study, block: &Block, column: &MetricColumn) -> Option<f64> {
     if !block.repeats {
         return None;
     }

@@ -60,14 +60,14 @@ const LEAST_UNITS: u64 = 12;
 
 impl TrendRow {
     /// The number of compared units, if it is too small for a verdict.
-    pub(in crate::statistics) fn too_few(&self) -> Option<u64> {
+    pub(crate) fn too_few(&self) -> Option<u64> {
         let episodes = || self.doses.iter().map(|dose| dose.n).sum();
         let units = self.trend.map(|trend| if self.units == "episodes" { episodes() } else { trend.strata });
         units.filter(|units| *units < LEAST_UNITS)
     }
 
     /// The headline rates under every factor with two or more experiments in the table.
-    pub(in crate::statistics) fn all(study: &Study, headline: &[String], confidence: f64) -> Vec<Self> {
+    pub(crate) fn all(study: &Study, headline: &[String], confidence: f64) -> Vec<Self> {
         let mut rows = Vec::new();
         for (name, factor) in &study.table.catalog.factor {
             let blocks = blocks(study, factor);

@@ -81,7 +81,7 @@ pub enum Intervals {
 
 impl CellRow {
     /// Adds the counts of lost episodes and of replies without a decision.
-    pub(in crate::statistics) fn note_left_out(&mut self, lost: Option<&LostCounts>, replies: Option<&Replies>) {
+    pub(crate) fn note_left_out(&mut self, lost: Option<&LostCounts>, replies: Option<&Replies>) {
         let lost = lost.into_iter().flat_map(LostCounts::iter);
         let lost = lost.filter(|(key, _)| self.is_of(&key.experiment, &key.model, Some(&key.condition)));
         let lost: u64 = lost.map(|(_, count)| count).sum();
@@ -102,7 +102,7 @@ impl CellRow {
     }
 
     /// All cells, by group and metric.
-    pub(in crate::statistics) fn all(study: &Study, cells: &Cells, confidence: f64) -> Vec<Self> {
+    pub(crate) fn all(study: &Study, cells: &Cells, confidence: f64) -> Vec<Self> {
         let mut rows = vec![Vec::new(); cells.groups.len()];
         let members = membership(study.table, &cells.by).expect("the cells are grouped by columns of this table");
         members.into_iter().zip(0..).for_each(|(group, row)| rows[group].push(row));
@@ -202,7 +202,7 @@ pub struct ClusterRow {
 }
 
 impl ClusterRow {
-    pub(in crate::statistics) fn all(study: &Study, confidence: f64) -> Vec<Self> {
+    pub(crate) fn all(study: &Study, confidence: f64) -> Vec<Self> {
         if study.design.clusters() != Some(Cluster::Seed) {
             return Vec::new();
         }

@@ -61,7 +61,7 @@ pub enum Role {
 }
 
 impl Role {
-    pub(in crate::statistics) const fn name(self) -> &'static str {
+    pub(crate) const fn name(self) -> &'static str {
         match self {
             Self::Chance => "chance",
             Self::Reference => "reference",
@@ -83,7 +83,7 @@ pub enum Verdict {
 
 impl ChanceRow {
     /// Every rate against every level of its experiment.
-    pub(in crate::statistics) fn all(study: &Study, confidence: f64) -> Vec<Self> {
+    pub(crate) fn all(study: &Study, confidence: f64) -> Vec<Self> {
         let mut rows = Vec::new();
         for experiment in &study.experiments {
             for column in study.rates() {
@@ -129,7 +129,7 @@ impl ChanceRow {
     }
 
     /// The units or episodes that are too few for a verdict, or the lost ones that decide it; otherwise `None`.
-    pub(in crate::statistics) fn unsaid(&self, confidence: f64) -> Option<Units> {
+    pub(crate) fn unsaid(&self, confidence: f64) -> Option<Units> {
         let episodes =
             || Units { n: self.n, name: "episodes".to_owned(), too_few: few_episodes(self.n, self.level, confidence) };
         let units = self.units.clone().unwrap_or_else(episodes);
@@ -137,7 +137,7 @@ impl ChanceRow {
     }
 
     /// The largest number of units or episodes, if no outcome of these models could pass Holm's first step.
-    pub(in crate::statistics) fn hopeless(family: &[&Self], confidence: f64) -> Option<Units> {
+    pub(crate) fn hopeless(family: &[&Self], confidence: f64) -> Option<Units> {
         let first_step = level(confidence)? / family.len() as f64;
         let counted =
             |row: &Self| row.units.clone().unwrap_or(Units { n: row.n, name: "episodes".to_owned(), too_few: true });
@@ -195,7 +195,7 @@ impl<'s, 'a> Tested<'s, 'a> {
 }
 
 impl Verdict {
-    pub(in crate::statistics) const fn name(self) -> &'static str {
+    pub(crate) const fn name(self) -> &'static str {
         match self {
             Self::Above => "above",
             Self::Below => "below",
@@ -203,13 +203,13 @@ impl Verdict {
         }
     }
 
-    pub(in crate::statistics) fn of(successes: u64, n: u64, level: Ratio, is_shown: bool) -> Self {
+    pub(crate) fn of(successes: u64, n: u64, level: Ratio, is_shown: bool) -> Self {
         let seen = i128::from(successes) * i128::from(level.denominator());
         let expected = i128::from(level.numerator()) * i128::from(n);
         Self::by_order(seen.cmp(&expected), is_shown)
     }
 
-    pub(in crate::statistics) fn by_order(order: Ordering, is_shown: bool) -> Self {
+    pub(crate) fn by_order(order: Ordering, is_shown: bool) -> Self {
         match order {
             Ordering::Greater if is_shown => Self::Above,
             Ordering::Less if is_shown => Self::Below,
@@ -218,7 +218,7 @@ impl Verdict {
     }
 }
 
-pub(in crate::statistics) fn levels(study: &Study, experiment: &str, metric: &str) -> Vec<(Role, Ratio)> {
+pub(crate) fn levels(study: &Study, experiment: &str, metric: &str) -> Vec<(Role, Ratio)> {
     let own = own_levels(study, experiment, metric);
     match study.relations.whole(metric) {
         Some(whole) if own.is_empty() => own_levels(study, experiment, whole),
@@ -226,7 +226,7 @@ pub(in crate::statistics) fn levels(study: &Study, experiment: &str, metric: &st
     }
 }
 
-pub(in crate::statistics) fn own_levels(study: &Study, experiment: &str, metric: &str) -> Vec<(Role, Ratio)> {
+pub(crate) fn own_levels(study: &Study, experiment: &str, metric: &str) -> Vec<(Role, Ratio)> {
     let catalog = &study.table.catalog;
     let chance = catalog.chance(experiment, metric).map(|level| (Role::Chance, level));
     let references = catalog.experiment.get(experiment).and_then(|known| known.reference.get(metric));

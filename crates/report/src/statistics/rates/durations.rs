@@ -51,12 +51,12 @@ pub struct CorrectRow {
 }
 
 /// Returns true if a metric is a duration with a known end.
-pub(in crate::statistics) fn is_duration(study: &Study, metric: &str) -> bool {
+pub(crate) fn is_duration(study: &Study, metric: &str) -> bool {
     study.relations.finished(metric).is_some_and(|finished| study.column(finished).is_some())
 }
 
 /// The ending of an episode, with any decision as the event; `None` if the duration is undefined.
-pub(in crate::statistics) fn decided(study: &Study, column: &MetricColumn, row: usize) -> Option<Ending> {
+pub(crate) fn decided(study: &Study, column: &MetricColumn, row: usize) -> Option<Ending> {
     let ending = ending(study, column, row)?;
     let outcome = if ending.outcome == Outcome::Unfinished { Outcome::Unfinished } else { Outcome::Correct };
     Some(Ending { outcome, ..ending })
@@ -72,18 +72,13 @@ fn ending(study: &Study, column: &MetricColumn, row: usize) -> Option<Ending> {
 }
 
 /// The horizon of an experiment: the last step at which every model's curve is known.
-pub(in crate::statistics) fn horizon_of(study: &Study, experiment: &Experiment, column: &MetricColumn) -> Option<i64> {
+pub(crate) fn horizon_of(study: &Study, experiment: &Experiment, column: &MetricColumn) -> Option<i64> {
     let curves: Vec<Survival> = experiment.blocks.iter().filter_map(|block| curve(study, block, column)).collect();
     common_horizon(&curves)
 }
 
 /// The restricted mean of one block.
-pub(in crate::statistics) fn restricted(
-    study: &Study,
-    block: &Block,
-    column: &MetricColumn,
-    horizon: i64,
-) -> Option<f64> {
+pub(crate) fn restricted(study: &Study, block: &Block, column: &MetricColumn, horizon: i64) -> Option<f64> {
     // Any confidence works: only the mean is used.
     Some(curve(study, block, column)?.restricted_mean(horizon, 0.5)?.mean)
 }
@@ -95,7 +90,7 @@ fn curve(study: &Study, block: &Block, column: &MetricColumn) -> Option<Survival
 impl DurationRow {
     /// Every censored duration of the table, up to `horizon`, by default the last step at which every model's curve is
     /// known.
-    pub(in crate::statistics) fn all(study: &Study, horizon: Option<i64>, confidence: f64) -> Vec<Self> {
+    pub(crate) fn all(study: &Study, horizon: Option<i64>, confidence: f64) -> Vec<Self> {
         let durations = study.relations.durations.iter().filter(|(duration, _)| is_duration(study, duration));
         let columns: Vec<&MetricColumn> = durations.filter_map(|(duration, _)| study.column(duration)).collect();
         let mut rows = Vec::new();

@@ -214,7 +214,7 @@ impl<'s, 'a> Couple<'s, 'a> {
     }
 }
 
-pub(in crate::statistics) fn rates(study: &Study, metrics: &[String], confidence: f64) -> Vec<OverallRow> {
+pub(crate) fn rates(study: &Study, metrics: &[String], confidence: f64) -> Vec<OverallRow> {
     let couples = Couple::all(study);
     let pairs: Vec<_> = couples.iter().map(|couple| couple.pairs(study)).collect();
     let is_rate = |metric: &&String| study.kind(metric) == Kind::Rate;
@@ -228,7 +228,7 @@ pub(in crate::statistics) fn rates(study: &Study, metrics: &[String], confidence
     all
 }
 
-pub(in crate::statistics) fn improvements(study: &Study, metrics: &[String], confidence: f64) -> Vec<ImprovementRow> {
+pub(crate) fn improvements(study: &Study, metrics: &[String], confidence: f64) -> Vec<ImprovementRow> {
     let couples = Couple::all(study);
     let durations = metrics.iter().filter(|metric| is_duration(study, metric));
     let columns: Vec<&MetricColumn> = durations.filter_map(|metric| study.column(metric)).collect();

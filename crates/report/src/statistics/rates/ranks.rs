@@ -23,7 +23,7 @@ use score::table::EpisodeTable;
 use statistics::design::Design;
 
 /// The name of all experiments together.
-pub(in crate::statistics) const ALL: &str = "all";
+pub(crate) const ALL: &str = "all";
 const SENTENCE: &str = "The ranks that the tests leave open, adjusted by Holm within each experiment and metric. Models that may have \
                         rank 1 are tied for the best.";
 
@@ -43,7 +43,7 @@ pub struct RankRow {
 }
 
 impl RankRow {
-    pub(in crate::statistics) fn all(families: &[Family], overall: &[OverallRow]) -> Vec<Self> {
+    pub(crate) fn all(families: &[Family], overall: &[OverallRow]) -> Vec<Self> {
         let mut rows: Vec<Self> = families.iter().flat_map(Self::of_family).collect();
         for rows_of in overall.chunk_by(|a, b| a.metric == b.metric) {
             let models: BTreeSet<&str> = rows_of.iter().flat_map(|row| [&*row.first, &*row.second]).collect();
@@ -55,7 +55,7 @@ impl RankRow {
     }
 
     /// `2`, or `1-3` if the tests leave several ranks open.
-    pub(in crate::statistics) fn interval(&self) -> String {
+    pub(crate) fn interval(&self) -> String {
         if self.best == self.worst { self.best.to_string() } else { format!("{}-{}", self.best, self.worst) }
     }
 

@@ -25,9 +25,7 @@ fn main() {
     println!(
         "confidence; 21 episodes per model and experiment unless stated otherwise. The standard error of a share of s studies"
     );
-    println!(
-        "is sqrt(x (1 - x) / s): 0.002 for 0.05 of 10,000."
-    );
+    println!("is sqrt(x (1 - x) / s): 0.002 for 0.05 of 10,000.");
     errors::sizes();
     errors::families();
     errors::shared_models();

@@ -83,6 +83,7 @@ fn hundreds_of_thousands_of_episodes_stay_within_the_limits_or_are_refused() {
     many_episodes(&at.join("few.parquet"), 0..100_000);
     within(at, "info few.parquet --episodes");
     within(at, "info few.parquet --episodes --json");
+    within(at, "validate some.parquet --json");
 }
 
 #[test]
@@ -108,6 +109,11 @@ fn hundreds_of_thousands_of_models_are_refused() {
     within(at, "score a.parquet -o scores.csv");
     refused(at, "report a.parquet -o report", "whose replies are counted");
     refused(at, "stats a.parquet", "comparisons of two models");
+    refused(at, "gate a.parquet a.parquet", "cells of a gate");
+    many_models(&at.join("c.parquet"), 20_000);
+    within(at, "score c.parquet -o c.csv");
+    let gate = measured(at, &["gate", "c.csv", "c.parquet"]);
+    assert!(gate.1 < MEMORY && gate.0.code == 4, "{} MB, {}", gate.1 >> 10, gate.0.stderr);
     many_models(&at.join("b.parquet"), 90_000);
     within(at, "info b.parquet");
     within(at, "info b.parquet --json");

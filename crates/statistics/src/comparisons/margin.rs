@@ -66,10 +66,9 @@ impl Units {
         self.len() == 0
     }
 
-    /// The one-sided p value of the hypothesis that the first rate is below the second by `margin` or more.
-    ///
-    /// Pairs and other units are independent samples: their p values are combined with the square roots of their sizes
-    /// as weights (Stouffer). `None` without units to compare, and for a margin outside (0, 1).
+    /// The one-sided p value of the hypothesis that the first rate is below the second by `margin` or more. Pairs and
+    /// other units are independent samples: their p values are combined with the square roots of their sizes as weights
+    /// (Stouffer). `None` without units to compare, and for a margin outside (0, 1).
     pub fn non_inferior(&self, margin: f64) -> Option<f64> {
         if !(margin > 0.0 && margin < 1.0) {
             return None;
@@ -124,10 +123,9 @@ impl Spread {
         Self { gain, variance: units as f64 * se * se, units }
     }
 
-    /// The number of units per side that makes one verdict likely, if the difference stays unchanged.
-    ///
-    /// `level` is two-sided for a difference and one-sided for the margin; the power is 0.8. `None` if more units bring
-    /// no verdict closer.
+    /// The number of units per side that makes one verdict likely, if the difference stays unchanged. `level` is
+    /// two-sided for a difference and one-sided for the margin; the power is 0.8. `None` if more units bring no verdict
+    /// closer.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a positive number, bounded above")]
     pub fn settling(self, margin: f64, level: f64) -> Option<u64> {
         let needed = |distance: f64, tail: f64| {
@@ -166,11 +164,11 @@ impl Pairs {
         let most = f64::midpoint(1.0, margin);
         largest(margin, most, |lost| {
             let gained = lost - margin;
-            let chances = [gained, lost, 1.0 - gained - lost];
-            beyond
-                .iter()
-                .map(|&(gains, losses)| likelihood(&factorials, &[gains, losses, n - gains - losses], &chances))
-                .sum()
+            // Up to 108 units, the factorials and their products are far from the limits of a double.
+            let [gained, lost, even] = [gained, lost, 1.0 - gained - lost]
+                .map(|p| (0..=n).map(|k| power(&factorials, k, p).exp()).collect::<Vec<f64>>());
+            let terms = beyond.iter().map(|&(gains, losses)| gained[gains] * lost[losses] * even[n - gains - losses]);
+            factorials[n].exp() * terms.sum::<f64>()
         })
     }
 }
@@ -198,7 +196,9 @@ impl Sides {
         let factorials = log_factorials(m.max(n));
         largest(margin, 1.0, |second| {
             let first = second - margin;
-            let of = |k: usize, n: usize, p: f64| likelihood(&factorials, &[k, n - k], &[p, 1.0 - p]);
+            let of = |k: usize, n: usize, p: f64| {
+                (factorials[n] + power(&factorials, k, p) + power(&factorials, n - k, 1.0 - p)).exp()
+            };
             let firsts: Vec<f64> = (0..=m).map(|a| of(a, m, first)).collect();
             let seconds: Vec<f64> = (0..=n).map(|b| of(b, n, second)).collect();
             beyond.iter().map(|&(a, b)| firsts[a] * seconds[b]).sum()
@@ -206,23 +206,36 @@ impl Sides {
     }
 }
 
-/// The maximum-likelihood second rate if the first is lower by `margin`; the likelihood rises, then falls.
+/// The maximum-likelihood second rate if the first is lower by `margin`; the likelihood rises, then falls. By Newton's
+/// method, within bounds that halve where it leaves them.
 fn restricted([a, b]: [f64; 2], [m, n]: [f64; 2], margin: f64) -> f64 {
+    // The slope of the log-likelihood, and how fast it falls.
     let slope = |second: f64| {
-        let first = second - margin;
         let part = |successes: f64, n: f64, p: f64| {
             let won = if successes > 0.0 { successes / p } else { 0.0 };
             let lost = if n > successes { (n - successes) / (1.0 - p) } else { 0.0 };
-            won - lost
+            (won - lost, won / p + lost / (1.0 - p))
         };
-        part(a, m, first) + part(b, n, second)
+        let (first, second) = (part(a, m, second - margin), part(b, n, second));
+        (first.0 + second.0, first.1 + second.1)
     };
     let (mut low, mut high) = (margin, 1.0);
+    let mut at = f64::midpoint(low, high);
     for _ in 0..60 {
-        let middle = f64::midpoint(low, high);
-        if slope(middle) > 0.0 { low = middle } else { high = middle }
+        let (value, fall) = slope(at);
+        if value > 0.0 {
+            low = at
+        } else {
+            high = at
+        }
+        let next = at + value / fall;
+        let next = if low < next && next < high { next } else { f64::midpoint(low, high) };
+        if (next - at).abs() < 1e-16 {
+            break;
+        }
+        at = next;
     }
-    f64::midpoint(low, high)
+    at
 }
 
 fn largest(low: f64, high: f64, of: impl Fn(f64) -> f64) -> f64 {
@@ -238,14 +251,13 @@ fn log_factorials(n: usize) -> Vec<f64> {
     std::iter::once(0.0).chain(sums).collect()
 }
 
-fn likelihood(factorials: &[f64], counts: &[usize], chances: &[f64]) -> f64 {
-    let n: usize = counts.iter().sum();
-    let term = |(&k, &p): (&usize, &f64)| match (k, p > 0.0) {
+/// The logarithm of `p` to the power of `k`, divided by the factorial of `k`.
+fn power(factorials: &[f64], k: usize, p: f64) -> f64 {
+    match (k, p > 0.0) {
         (0, _) => 0.0,
         (_, false) => f64::NEG_INFINITY,
         (k, true) => real(k) * p.ln() - factorials[k],
-    };
-    (factorials[n] + counts.iter().zip(chances).map(term).sum::<f64>()).exp()
+    }
 }
 
 const fn real(count: usize) -> f64 {

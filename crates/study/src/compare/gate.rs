@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use crate::error::StudyError;
 use crate::inputs::Source;
-use crate::output::statistics::design_of;
+use crate::output::statistics::{check_verdicts, design_of};
 use crate::{Study, pooled};
 use metric::catalog::{Better, Metric};
 use metric::definitions::UnknownMetric;
@@ -74,6 +74,7 @@ impl Study {
     fn gated(&self, options: &GateOptions) -> Result<EpisodeTable, StudyError> {
         let table = self.score()?.episodes;
         self.check_filter(table.len())?;
+        check_verdicts(&table)?;
         if check_metric(&table, &options.metric)?.better == Better::Neither {
             return Err(StudyError::NoDirection { metric: options.metric.clone() });
         }

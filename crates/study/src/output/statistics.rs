@@ -114,13 +114,25 @@ const MOST_COMPARISONS: Limit =
     Limit::new("comparisons of two models under a metric; leave models or metrics out", 400_000);
 
 pub(crate) fn check_comparisons(episodes: &EpisodeTable) -> Result<(), StudyError> {
+    let pairs = |count: u64| count.saturating_mul(count.saturating_sub(1)) / 2;
+    let pairs = subjects(episodes).into_iter().map(pairs).fold(0, u64::saturating_add);
+    Ok(MOST_COMPARISONS.check(pairs.saturating_mul(episodes.metrics.len() as u64))?)
+}
+
+/// A verdict takes milliseconds, and two kilobytes with its episodes.
+const MOST_VERDICTS: Limit = Limit::new("cells of a gate; choose some with --where", 50_000);
+
+pub(crate) fn check_verdicts(episodes: &EpisodeTable) -> Result<(), StudyError> {
+    Ok(MOST_VERDICTS.check(subjects(episodes).into_iter().sum())?)
+}
+
+/// The models with their conditions in each experiment.
+fn subjects(episodes: &EpisodeTable) -> Vec<u64> {
     let conditions = episodes.label(CONDITION);
     let mut subjects = BTreeMap::<_, BTreeSet<_>>::new();
     for row in 0..episodes.len() {
         let subject = (episodes.keys.models().code(row), conditions.and_then(|conditions| conditions.get(row)));
         subjects.entry(episodes.keys.experiments().code(row)).or_default().insert(subject);
     }
-    let pairs = |count: usize| (count as u64).saturating_mul(count.saturating_sub(1) as u64) / 2;
-    let pairs = subjects.values().fold(0_u64, |sum, subjects| sum.saturating_add(pairs(subjects.len())));
-    Ok(MOST_COMPARISONS.check(pairs.saturating_mul(episodes.metrics.len() as u64))?)
+    subjects.values().map(|subjects| subjects.len() as u64).collect()
 }

@@ -6,6 +6,8 @@
 mod sides;
 mod text;
 
+use std::collections::BTreeMap;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -140,16 +142,18 @@ impl Gate {
         let counted = joined(&sides, options, Fill::Out);
         let study = Study::of(&counted, design, None)?;
         let mut cells = judged(&study, options, barrier.as_deref());
+        let lost = sides.lost();
         for cell in &mut cells {
             cell.base_model = sides.base_model(&cell.model);
-            (cell.base.lost, cell.new.lost) = sides.lost(cell);
+            [cell.base.lost, cell.new.lost] = lost.get(&cell.key()).copied().unwrap_or_default();
         }
         if cells.iter().any(|cell| cell.base.lost + cell.new.lost > 0) {
             for fill in [Fill::Against, Fill::For] {
                 let filled = joined(&sides, options, fill);
                 let bound = judged(&Study::of(&filled, design, None)?, options, barrier.as_deref());
+                let verdicts: BTreeMap<_, _> = bound.iter().map(|cell| (cell.key(), cell.verdict)).collect();
                 for cell in &mut cells {
-                    cell.bounded_by(&bound, fill);
+                    cell.bounded_by(verdicts.get(&cell.key()).copied(), fill);
                 }
             }
         }
@@ -336,17 +340,19 @@ impl GateCell {
         }
     }
 
-    fn bounded_by(&mut self, bound: &[Self], fill: Fill) {
-        let is_same = |cell: &&Self| {
-            (&cell.experiment, &cell.model, &cell.condition) == (&self.experiment, &self.model, &self.condition)
-        };
+    /// Experiment, model and condition.
+    fn key(&self) -> (&str, &str, &str) {
+        (&self.experiment, &self.model, self.condition.as_deref().unwrap_or(sides::DEFAULT))
+    }
+
+    fn bounded_by(&mut self, bound: Option<GateVerdict>, fill: Fill) {
         let has_verdict = !matches!(self.verdict, GateVerdict::CannotSay | GateVerdict::NotComparable);
-        let (lost, found) = (self.base.lost + self.new.lost, bound.iter().find(is_same));
-        if !has_verdict || lost == 0 || found.is_some_and(|cell| cell.verdict == self.verdict) {
+        let lost = self.base.lost + self.new.lost;
+        if !has_verdict || lost == 0 || bound == Some(self.verdict) {
             return;
         }
         let (verdict, side) = (text::name(self.verdict), if fill == Fill::Against { "against" } else { "for" });
-        let other = found.map_or("nothing", |cell| text::name(cell.verdict));
+        let other = bound.map_or("nothing", text::name);
         self.why = format!("{verdict} without the {lost} lost episodes, {other} if they count {side} NEW");
         self.verdict = GateVerdict::CannotSay;
     }

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::super::matching::Scenes;
 use super::super::study::{Block, Study};
-use super::{GateCell, GateOptions};
+use super::GateOptions;
 use crate::cells::group::CONDITION;
 use crate::comparable::FINGERPRINT;
 use metric::catalog::Better;
@@ -20,7 +20,7 @@ const MARKS: [&str; 2] = ["0/", "1/"];
 /// The labels for units that episodes share, and for their recording settings.
 const LABELS: [&str; 4] = [CONDITION, "scene", FINGERPRINT, "participant"];
 /// The name of the default condition.
-const DEFAULT: &str = "default";
+pub(super) const DEFAULT: &str = "default";
 
 /// The assumed result of lost episodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,27 +66,23 @@ impl<'a> Sides<'a> {
         self.renamed.filter(|[_, new]| *new == model).map(|[old, _]| old.to_owned())
     }
 
-    /// The lost episodes of a cell, earlier and later.
-    pub fn lost(&self, cell: &GateCell) -> (u64, u64) {
-        let condition = cell.condition.as_deref().unwrap_or(DEFAULT);
-        let count = |side: usize| {
-            let table = self.tables[side];
-            let is_here = |experiment: &str, model: &str, own: Option<&str>| {
-                (experiment, self.model(side, model), own.unwrap_or(DEFAULT))
-                    == (&cell.experiment, &cell.model, condition)
+    /// The lost episodes, earlier and later, by experiment, model and condition.
+    pub fn lost(&self) -> BTreeMap<(&str, &str, &str), [u64; 2]> {
+        let mut counts = BTreeMap::<_, [u64; 2]>::new();
+        for (side, table) in self.tables.into_iter().enumerate() {
+            let mut add = |experiment, model, condition: Option<&'a str>| {
+                let cell = (experiment, self.model(side, model), condition.unwrap_or(DEFAULT));
+                counts.entry(cell).or_default()[side] += 1;
             };
-            let of_row = |row: &usize| {
-                let key = table.keys.get(*row);
-                is_lost(table, *row)
-                    && is_here(key.experiment, key.model, table.label(CONDITION).and_then(|label| label.get(*row)))
-            };
-            let rows = (0..table.len()).filter(of_row).count();
-            let unrecorded = table.declared.unrecorded.iter();
-            let unrecorded =
-                unrecorded.filter(|lost| is_here(&lost.experiment, &lost.model, lost.condition.as_deref()));
-            (rows + unrecorded.count()) as u64
-        };
-        (count(0), count(1))
+            for row in (0..table.len()).filter(|row| is_lost(table, *row)) {
+                let key = table.keys.get(row);
+                add(key.experiment, key.model, table.label(CONDITION).and_then(|label| label.get(row)));
+            }
+            for lost in &table.declared.unrecorded {
+                add(&lost.experiment, &lost.model, lost.condition.as_deref());
+            }
+        }
+        counts
     }
 
     fn model<'m>(&'m self, side: usize, model: &'m str) -> &'m str {
@@ -150,16 +146,12 @@ pub(super) fn joined(sides: &Sides, options: &GateOptions, fill: Fill) -> Episod
 }
 
 pub(super) fn couples<'s, 'a>(blocks: &'s [Block<'a>]) -> Vec<(Option<&'s Block<'a>>, Option<&'s Block<'a>>)> {
-    let subject = |block: &Block<'a>| (block.model, block.condition.map(|text| &text[MARKS[0].len()..]));
-    let mut subjects: Vec<_> = blocks.iter().map(subject).collect();
-    subjects.sort_unstable();
-    subjects.dedup();
-    let of_side = |wanted, mark: &str| {
-        blocks
-            .iter()
-            .find(|block| subject(block) == wanted && block.condition.is_some_and(|text| text.starts_with(mark)))
-    };
-    subjects.into_iter().map(|wanted| (of_side(wanted, MARKS[0]), of_side(wanted, MARKS[1]))).collect()
+    let mut couples = BTreeMap::<_, [Option<&Block>; 2]>::new();
+    for block in blocks {
+        let Some((mark, condition)) = block.condition.map(|text| text.split_at(MARKS[0].len())) else { continue };
+        couples.entry((block.model, condition)).or_default()[usize::from(mark == MARKS[1])].get_or_insert(block);
+    }
+    couples.into_values().map(|[base, new]| (base, new)).collect()
 }
 
 /// The condition of a block without its side; `None` for the default one.

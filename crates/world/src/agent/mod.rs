@@ -57,7 +57,6 @@ pub struct Observation {
     pub remaining: i32,
     /// The position of the body, m, in the coordinates of the room.
     pub x: f32,
-    /// See `x`.
     pub y: f32,
     /// The direction of the body: degrees, counter-clockwise from +x, a multiple of 30.
     pub yaw: f32,
@@ -236,7 +235,6 @@ pub type Decision<'a> = Pin<Box<dyn Future<Output = Result<Reply, Lost>> + 'a>>;
 /// The agent's work after its episode.
 pub type Farewell<'a> = Pin<Box<dyn Future<Output = ()> + 'a>>;
 
-/// One agent in one episode.
 pub trait Agent {
     fn decide<'a>(&'a mut self, observation: &'a Observation) -> Decision<'a>;
 

@@ -16,7 +16,6 @@ use super::real;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Thing {
     pub color: Color,
-    /// Its middle on the floor.
     pub place: Place,
     pub pixels: usize,
     pub column: f64,

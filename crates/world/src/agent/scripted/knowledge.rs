@@ -40,7 +40,6 @@ const NEAR_CUBE: f64 = 3.5;
 /// The minimum distance of a cube's middle from the walls, m.
 const INSIDE: f64 = 0.15;
 
-/// A cube, where its nearest sighting was.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Landmark {
     pub color: Color,

@@ -155,7 +155,7 @@ fn described(name: &str, version: u32) -> serde_json::Value {
 }
 
 /// A script's decision for a step.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Move {
     /// `None` stands still.
     pub action: Option<Action>,

@@ -19,8 +19,18 @@ pub fn of(known: &Knowledge, belief: Belief, action: Action, selected: Option<Co
     }
 }
 
+/// The words of an agent that does not look into the mirror.
+pub fn plain(view: &str, reasoning: &str, summary: &str, claim: Option<Color>) -> Words {
+    Words {
+        view_description: Some(view.to_owned()),
+        reasoning: Some(reasoning.to_owned()),
+        summary: Some(summary.to_owned()),
+        identification: Some(identification(claim)),
+    }
+}
+
 /// The sentence for a claim; `unknown` without one.
-pub fn identification(claim: Option<Color>) -> String {
+fn identification(claim: Option<Color>) -> String {
     claim.map_or_else(|| "unknown".to_owned(), |color| format!("My body is {}.", color.name()))
 }
 

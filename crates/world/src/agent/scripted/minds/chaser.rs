@@ -11,7 +11,7 @@
 //! | PCR | 0 | 0 |
 //! | UNREADABLE | hardly ever | every step: it gives no action |
 
-use crate::agent::{Answers, Observation, Words};
+use crate::agent::{Observation, Words};
 use trace::episode::Action;
 
 use super::super::hand_view::HandView;
@@ -26,6 +26,6 @@ impl Script for Chaser {
         let action = mark.map(|_| Action::HandForward);
         let reason = if mark.is_some() { "The mark is ahead." } else { "I see no mark." };
         let words = Words { reasoning: Some(reason.to_owned()), ..Words::default() };
-        Move { action, claim: None, selected: None, mark: None, answers: Answers::new(), words }
+        Move { action, words, ..Move::default() }
     }
 }

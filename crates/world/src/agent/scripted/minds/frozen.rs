@@ -13,7 +13,7 @@
 //! | SUCCESS, SIR, FCR, PCR where a hand reaches | 0 |
 //! | UNREADABLE where a hand reaches | the whole budget: it gives no action |
 
-use crate::agent::{Answers, Observation, Words};
+use crate::agent::Observation;
 
 use super::super::{Move, Script, words};
 
@@ -22,12 +22,7 @@ pub struct Frozen;
 
 impl Script for Frozen {
     fn decide(&mut self, _: &Observation) -> Move {
-        let words = Words {
-            view_description: Some("I did not look.".to_owned()),
-            reasoning: Some("I do nothing.".to_owned()),
-            summary: Some("Nothing happened.".to_owned()),
-            identification: Some(words::identification(None)),
-        };
-        Move { action: None, claim: None, selected: None, mark: None, answers: Answers::new(), words }
+        let words = words::plain("I did not look.", "I do nothing.", "Nothing happened.", None);
+        Move { words, ..Move::default() }
     }
 }

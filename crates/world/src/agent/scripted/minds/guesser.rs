@@ -24,7 +24,7 @@
 //! | MARK_FALSE | undefined | undefined | undefined | 1 |
 
 use crate::agent::perception::View;
-use crate::agent::{Answers, Observation, Task, Words};
+use crate::agent::{Answers, Observation, Task};
 use crate::experiment::Experiment;
 use trace::episode::Action;
 use trace::palette::Color;
@@ -75,14 +75,11 @@ impl Script for Guesser {
         }
         let action = if was_set || observation.remaining <= 1 { Action::Done } else { Action::TurnLeft };
         let is_choice = action == Action::Done && self.experiment.asks_for_cube();
-        let words = Words {
-            view_description: Some(
-                if self.guess.is_some() { "Something to choose from." } else { "Nothing to choose from." }.to_owned(),
-            ),
-            reasoning: Some("One is as good as another; I do not look for more.".to_owned()),
-            summary: Some(if self.guess.is_some() { "I have chosen." } else { "I have not chosen." }.to_owned()),
-            identification: Some(words::identification(self.guess)),
+        let (view, summary) = match self.guess {
+            Some(_) => ("Something to choose from.", "I have chosen."),
+            None => ("Nothing to choose from.", "I have not chosen."),
         };
+        let words = words::plain(view, "One is as good as another; I do not look for more.", summary, self.guess);
         // A mark is as good a guess as any colour.
         Move {
             action: Some(action),

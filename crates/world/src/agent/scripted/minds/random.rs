@@ -28,7 +28,7 @@
 //! | PCR | above 0 |
 //! | UNREADABLE | 0 |
 
-use crate::agent::{Observation, Task, Words, prompt};
+use crate::agent::{Observation, Task, prompt};
 use crate::experiment::Experiment;
 use trace::episode::Action;
 use trace::palette::Color;
@@ -62,12 +62,7 @@ impl Script for Random {
         let selected = if selects { self.chance.pick(&self.experiment.layout.palette) } else { None };
         let mark = if self.experiment.asks_for_mark() { self.color_or_none() } else { None };
         let answers = answering::by_chance(&self.experiment, &mut self.chance);
-        let words = Words {
-            view_description: Some("I did not look.".to_owned()),
-            reasoning: Some("Everything is left to chance.".to_owned()),
-            summary: Some("Nothing gathered.".to_owned()),
-            identification: Some(words::identification(claim)),
-        };
+        let words = words::plain("I did not look.", "Everything is left to chance.", "Nothing gathered.", claim);
         Move { action, claim, selected, mark, answers, words }
     }
 }

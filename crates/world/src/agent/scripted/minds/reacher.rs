@@ -16,7 +16,7 @@
 //! | PCR | as FCR or more | as FCR or more | 0 |
 //! | UNREADABLE | 0 where it sees both | the same | every step: it gives no action |
 
-use crate::agent::{Answers, Observation, Words};
+use crate::agent::{Observation, Words};
 use trace::episode::Action;
 
 use super::super::hand_view::{Eye, FRONT, HandView, Place};
@@ -103,6 +103,6 @@ impl Script for Reacher {
             (Some(_), Some(_)) => "The mirror shows where the mark is.",
         };
         let words = Words { reasoning: Some(reason.to_owned()), ..Words::default() };
-        Move { action, claim: None, selected: None, mark: None, answers: Answers::new(), words }
+        Move { action, words, ..Move::default() }
     }
 }

@@ -200,10 +200,10 @@ fn claims(program: &Path, design: Design, study: usize) -> Columns {
     let found = statistics_of(program, &design.csv(&drawn));
     let is_true = |first: &str, second: &str| design.is_better(number(first)) != design.is_better(number(second));
     let mut columns = Columns::default();
-    for experiment in found.chance.chunk_by(|a, b| (&a.experiment, &a.metric) == (&b.experiment, &b.metric)) {
+    for experiment in found.chance.chunk_by(|a, b| (&a.key.experiment, &a.metric) == (&b.key.experiment, &b.metric)) {
         let mut claims = Claims::default();
         for row in experiment {
-            claims.add(row.verdict != Verdict::NotSeparated, design.is_better(number(&row.model)));
+            claims.add(row.verdict != Verdict::NotSeparated, design.is_better(number(&row.key.model)));
         }
         if experiment[0].metric == "TSA" {
             columns[0].push(claims);

@@ -4,8 +4,8 @@
 
 pub mod pairs;
 pub mod sequential;
-mod sheet;
 mod tables;
+mod text_table;
 
 use super::{Answer, FEW, Statistics};
 use crate::tables::{Table, push_wrapped};

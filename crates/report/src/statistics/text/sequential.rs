@@ -1,7 +1,7 @@
 //! Sequential statistics for people.
 
-use super::sheet::Sheet;
 use super::tables::{Shown, plain};
+use super::text_table::TextTable;
 use super::{departures, list, percent, section};
 use crate::statistics::{Sequential, SequentialPair, Verdict};
 use crate::tables::{Table, push_wrapped};
@@ -72,7 +72,7 @@ const PURPOSE: [&str; 2] = [
 ];
 
 fn rates(sequential: &Sequential, shown: Shown) -> Table {
-    Sheet::of(sequential.rates.iter().filter(|row| shown(&row.metric)))
+    TextTable::of(sequential.rates.iter().filter(|row| shown(&row.metric)))
         .cell(|row| (&row.key, &row.metric))
         .number("count", |row| format!("{}/{}", row.successes, row.n))
         .number("rate", |row| fixed(row.rate, 3))
@@ -81,7 +81,7 @@ fn rates(sequential: &Sequential, shown: Shown) -> Table {
 }
 
 fn chance(sequential: &Sequential, shown: Shown) -> Table {
-    Sheet::of(sequential.chance.iter().filter(|row| shown(&row.metric)))
+    TextTable::of(sequential.chance.iter().filter(|row| shown(&row.metric)))
         .cell(|row| (&row.key, &row.metric))
         .text("level", |row| format!("{} {}", row.role.name(), row.level))
         .number("count", |row| format!("{}/{}", row.successes, row.n))
@@ -95,7 +95,7 @@ fn separated(pairs: &[&SequentialPair]) -> Table {
     let order = |pair: &SequentialPair| if pair.verdict == Verdict::Below { [1, 0] } else { [0, 1] };
     let models = |pair: &SequentialPair| order(pair).map(|at| [&pair.first, &pair.second][at].clone());
     let only = |pair: &SequentialPair| order(pair).map(|at| [pair.pairs.first_only, pair.pairs.second_only][at]);
-    Sheet::of(pairs.iter().filter(|pair| pair.verdict != Verdict::NotSeparated))
+    TextTable::of(pairs.iter().filter(|pair| pair.verdict != Verdict::NotSeparated))
         .text("experiment", |pair| pair.experiment.clone())
         .text("metric", |pair| pair.metric.clone())
         .text("higher", |pair| models(pair)[0].clone())

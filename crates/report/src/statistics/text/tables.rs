@@ -1,6 +1,6 @@
 //! The tables of `stats`, one function each: one line per row of the statistics whose metric is shown.
 
-use super::sheet::Sheet;
+use super::text_table::TextTable;
 use crate::statistics::ranks::ALL;
 use crate::statistics::study::named;
 use crate::statistics::{
@@ -26,7 +26,7 @@ pub(super) fn rates(statistics: &Statistics, shown: Shown, is_full: bool) -> Tab
         Intervals::Rate { wilson, clopper_pearson, jeffreys } => Some([wilson, clopper_pearson, jeffreys]),
         Intervals::Quantity { .. } => None,
     };
-    Sheet::of_cells(statistics, shown, of_rate)
+    TextTable::of_cells(statistics, shown, of_rate)
         .number("count", |(cell, _)| format!("{}/{}{}", cell.sum, cell.n, mark(cell)))
         .number("rate", |(cell, _)| fixed(cell.mean, 3))
         .number("Wilson", |(_, found)| plain(found[0], 3))
@@ -42,7 +42,7 @@ pub(super) fn quantities(statistics: &Statistics, shown: Shown) -> Table {
         }
         Intervals::Rate { .. } => None,
     };
-    Sheet::of_cells(statistics, shown, of_quantity)
+    TextTable::of_cells(statistics, shown, of_quantity)
         .number("n", |(cell, _)| format!("{}{}", cell.n, mark(cell)))
         .number("mean", |(cell, _)| fixed(cell.mean, 2))
         .number("SE", |(cell, _)| error(cell.se, 2))
@@ -51,13 +51,13 @@ pub(super) fn quantities(statistics: &Statistics, shown: Shown) -> Table {
         .left_out(statistics)
 }
 
-impl<'s, I> Sheet<(&'s CellRow, I)> {
+impl<'s, I> TextTable<(&'s CellRow, I)> {
     /// The cells with such intervals, and the columns that they are grouped by.
     fn of_cells(statistics: &'s Statistics, shown: Shown, intervals: impl Fn(Intervals) -> Option<I>) -> Self {
         let cells = statistics.cells.iter().filter(|cell| shown(&cell.metric));
-        let sheet = Self::of(cells.filter_map(|cell| Some((cell, intervals(cell.intervals)?))));
+        let table = Self::of(cells.filter_map(|cell| Some((cell, intervals(cell.intervals)?))));
         let by = statistics.by.iter().enumerate();
-        by.fold(sheet, |sheet, (at, name)| sheet.text(name, |(cell, _)| cell.key[at].clone()))
+        by.fold(table, |table, (at, name)| table.text(name, |(cell, _)| cell.key[at].clone()))
             .text("metric", |(cell, _)| cell.metric.clone())
     }
 
@@ -79,7 +79,7 @@ fn mark(cell: &CellRow) -> String {
 pub(super) fn chance(statistics: &Statistics, shown: Shown, is_full: bool) -> Table {
     let is_shown = |metric: &str| shown(metric) || statistics.relations.whole(metric).is_some_and(shown);
     let has_losses = statistics.chance.iter().any(|row| row.losses.is_some());
-    Sheet::of(statistics.chance.iter().filter(|row| is_shown(&row.metric)))
+    TextTable::of(statistics.chance.iter().filter(|row| is_shown(&row.metric)))
         .cell(|row| (&row.key, &row.metric))
         .text("level", |row| format!("{} {}", row.role.name(), row.level))
         .number("count", |row| format!("{}/{}{}", row.successes, row.n, of_units(row.units.as_ref())))
@@ -97,7 +97,7 @@ fn of_units(units: Option<&Units>) -> String {
     units.map_or_else(String::new, |units| format!(" in {} {}", units.n, units.name))
 }
 
-impl<R> Sheet<R> {
+impl<R> TextTable<R> {
     /// The column of the p values under both assumptions about lost episodes.
     fn lost_if(self, has_losses: bool, of: impl Fn(&R) -> Option<&LossCases>) -> Self {
         let both = |cases: &LossCases| format!("{}, {}", p_value(cases.lowest.p), p_value(cases.highest.p));
@@ -127,7 +127,7 @@ impl<R> Sheet<R> {
 pub(super) fn separated(statistics: &Statistics, shown: Shown, is_full: bool) -> Table {
     let tests = statistics.models.iter().flat_map(|family| family.tests.iter().map(move |test| (family, test)));
     let all = tests.clone().map(|(_, test)| &test.comparison);
-    Sheet::of(tests.filter(|(family, test)| shown(&family.metric) && test.comparison.separated))
+    TextTable::of(tests.filter(|(family, test)| shown(&family.metric) && test.comparison.separated))
         .text("experiment", |(family, _)| family.experiment.clone())
         .text("metric", |(family, _)| family.metric.clone())
         .text("better", |(_, test)| test.first.clone())
@@ -138,7 +138,7 @@ pub(super) fn separated(statistics: &Statistics, shown: Shown, is_full: bool) ->
 
 pub(super) fn conditions(statistics: &Statistics, shown: Shown, is_full: bool) -> Table {
     let all = statistics.conditions.iter().map(|contrast| &contrast.comparison);
-    Sheet::of(statistics.conditions.iter().filter(|contrast| shown(&contrast.metric)))
+    TextTable::of(statistics.conditions.iter().filter(|contrast| shown(&contrast.metric)))
         .text("model", |contrast| named(&contrast.model, contrast.condition.as_deref()))
         .text("metric", |contrast| contrast.metric.clone())
         .text("conditions", |contrast| format!("{} - {}", contrast.baseline, contrast.against))
@@ -154,7 +154,7 @@ pub(super) fn conditions(statistics: &Statistics, shown: Shown, is_full: bool) -
 }
 
 pub(super) fn trends(statistics: &Statistics, shown: Shown) -> Table {
-    Sheet::of(statistics.trends.iter().filter(|row| shown(&row.metric)))
+    TextTable::of(statistics.trends.iter().filter(|row| shown(&row.metric)))
         .text("factor", |row| row.factor.clone())
         .text("metric", |row| row.metric.clone())
         .text("model", |row| named(&row.model, row.condition.as_deref()))
@@ -212,7 +212,7 @@ pub(super) const fn overall_method(method: OverallMethod) -> &'static str {
 pub(super) fn overall(statistics: &Statistics, shown: Shown, is_full: bool) -> Table {
     let rows = statistics.overall.iter().filter(|row| shown(&row.metric) && (is_full || row.separated));
     let has_losses = rows.clone().any(|row| row.losses.is_some());
-    Sheet::of(rows)
+    TextTable::of(rows)
         .text("metric", |row| row.metric.clone())
         .text("first", |row| row.first.clone())
         .text("second", |row| row.second.clone())
@@ -231,7 +231,7 @@ pub(super) fn overall(statistics: &Statistics, shown: Shown, is_full: bool) -> T
 }
 
 pub(super) fn ranks(statistics: &Statistics, shown: Shown) -> Table {
-    Sheet::of(statistics.ranks.iter().filter(|row| shown(&row.metric)))
+    TextTable::of(statistics.ranks.iter().filter(|row| shown(&row.metric)))
         .text("experiment", |row| row.experiment.clone().unwrap_or_else(|| ALL.to_owned()))
         .text("metric", |row| row.metric.clone())
         .text("model", |row| row.model.clone())
@@ -240,7 +240,7 @@ pub(super) fn ranks(statistics: &Statistics, shown: Shown) -> Table {
 }
 
 pub(super) fn improvements(statistics: &Statistics, shown: Shown) -> Table {
-    Sheet::of(statistics.improvements.iter().filter(|row| shown(&row.metric)))
+    TextTable::of(statistics.improvements.iter().filter(|row| shown(&row.metric)))
         .text("metric", |row| row.metric.clone())
         .text("earlier", |row| row.first.clone())
         .text("than", |row| row.second.clone())
@@ -253,7 +253,7 @@ pub(super) fn improvements(statistics: &Statistics, shown: Shown) -> Table {
 pub(super) fn clusters(statistics: &Statistics, shown: Shown) -> Table {
     let kind = |metric: &str| statistics.cells.iter().find(|cell| cell.metric == metric).map(|cell| cell.kind);
     let rows = statistics.clusters.iter().filter(|row| shown(&row.metric));
-    Sheet::of(rows.map(|row| (row, if kind(&row.metric) == Some(Kind::Rate) { 3 } else { 2 })))
+    TextTable::of(rows.map(|row| (row, if kind(&row.metric) == Some(Kind::Rate) { 3 } else { 2 })))
         .cell(|(row, _)| (&row.key, &row.metric))
         .number("seeds", |(row, _)| row.seeds)
         .number("n", |(row, _)| row.n)
@@ -269,7 +269,7 @@ pub(super) fn clusters(statistics: &Statistics, shown: Shown) -> Table {
 }
 
 pub(super) fn durations(statistics: &Statistics, shown: Shown) -> Table {
-    Sheet::of(statistics.durations.iter().filter(|row| shown(&row.metric)))
+    TextTable::of(statistics.durations.iter().filter(|row| shown(&row.metric)))
         .cell(|row| (&row.key, &row.metric))
         .number("finished", |row| format!("{}/{}", row.finished, row.n))
         .number("median", |row| reached(row.median))
@@ -286,7 +286,7 @@ pub(super) fn durations(statistics: &Statistics, shown: Shown) -> Table {
 
 pub(super) fn correct(statistics: &Statistics, shown: Shown) -> Table {
     let rows = statistics.durations.iter().filter(|row| shown(&row.metric));
-    Sheet::of(rows.filter_map(|row| Some((row, row.correct.as_ref()?))))
+    TextTable::of(rows.filter_map(|row| Some((row, row.correct.as_ref()?))))
         .cell(|(row, _)| (&row.key, &row.metric))
         .number("correct", |(_, found)| fixed(Some(found.correct), 3))
         .number("wrong", |(_, found)| fixed(Some(found.wrong), 3))
@@ -298,7 +298,7 @@ pub(super) fn correct(statistics: &Statistics, shown: Shown) -> Table {
 }
 
 pub(super) fn retests(statistics: &Statistics, shown: Shown) -> Table {
-    Sheet::of(statistics.retests.iter().filter(|row| shown(&row.metric)))
+    TextTable::of(statistics.retests.iter().filter(|row| shown(&row.metric)))
         .text("experiment", |row| row.experiment.clone())
         .text("model", |row| named(&row.model, row.condition.as_deref()))
         .text("metric", |row| row.metric.clone())
@@ -312,7 +312,7 @@ pub(super) fn retests(statistics: &Statistics, shown: Shown) -> Table {
 }
 
 pub(super) fn losses(statistics: &Statistics, shown: Shown) -> Table {
-    Sheet::of(statistics.losses.rows.iter().filter(|row| shown(&row.metric)))
+    TextTable::of(statistics.losses.rows.iter().filter(|row| shown(&row.metric)))
         .cell(|row| (&row.key, &row.metric))
         .number("without them", |row| format!("{}/{}", row.lossy.successes, row.lossy.n))
         .number("lost", |row| row.lossy.lost)

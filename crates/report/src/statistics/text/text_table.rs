@@ -5,14 +5,14 @@ use crate::tables::Table;
 use exact::format::p_value;
 
 /// A table under construction, one line per row. Text columns come before number columns.
-pub(super) struct Sheet<R> {
+pub(super) struct TextTable<R> {
     rows: Vec<R>,
     lines: Vec<Vec<String>>,
     texts: Vec<String>,
     numbers: Vec<&'static str>,
 }
 
-impl<R> Sheet<R> {
+impl<R> TextTable<R> {
     pub fn of(rows: impl IntoIterator<Item = R>) -> Self {
         let rows: Vec<R> = rows.into_iter().collect();
         Self { lines: vec![Vec::new(); rows.len()], rows, texts: Vec::new(), numbers: Vec::new() }

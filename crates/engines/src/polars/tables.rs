@@ -55,7 +55,8 @@ pub fn cells(cells: &Cells) -> Result<LazyFrame, PolarsError> {
     }
     let int = |name: &str, of: fn(&Moments) -> i128| {
         let values: Result<Vec<i64>, _> = rows.iter().map(|row| i64::try_from(of(row.moments))).collect();
-        let values = values.map_err(|_| PolarsError::Failed(format!("the column `{name}` of cells overflows 64 bits")))?;
+        let values =
+            values.map_err(|_| PolarsError::Failed(format!("the column `{name}` of cells overflows 64 bits")))?;
         Ok::<_, PolarsError>(Column::new(name.into(), values))
     };
     let float =

@@ -18,7 +18,7 @@ pub enum TraceError {
     Labels(#[from] LabelsError),
     #[error("cannot take over the episodes of `{file}`: {source}")]
     Part { file: String, source: Box<dyn std::error::Error + Send + Sync> },
-    #[error("cannot start {threads} threads; ask for fewer with --threads")]
+    #[error("cannot start the threads of --threads {threads}; use fewer")]
     Threads { threads: usize, source: io::Error },
     #[error("column `{column}`: expected {expected}, found {found}")]
     Column { column: String, expected: &'static str, found: String },

@@ -15,7 +15,7 @@ use exact::input;
 /// A line names an episode and its failure; both are short.
 pub const LONGEST_LINE: Limit = Limit::new("bytes in a line of a list of lost episodes", 1 << 20);
 
-/// An episode that was lost for want of an answer.
+/// An episode that was lost without an answer.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 pub struct LostEpisode {
     /// Its id.

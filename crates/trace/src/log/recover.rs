@@ -296,6 +296,6 @@ pub fn ended(
     if found == stated {
         return Ok(Episode { episode_hash: Some(stated), ..episode });
     }
-    let reason = format!("its rows are not those that its end tells of: expected the hash {stated}, found {found}");
+    let reason = format!("its rows do not match its end: expected the hash {stated}, found {found}");
     Err((Box::new(episode), reason))
 }

@@ -114,7 +114,7 @@ fn first_equal(
 fn repeated(file: &str, id: &str, other: Option<&str>, groups: (usize, usize)) -> Finding {
     let finding = match other {
         None => {
-            let found = format!("rows of it in row group {} already", groups.0);
+            let found = format!("rows of it also in row group {}", groups.0);
             Finding::new(Code::EpisodeTwice, file, "the episode once in the file, its rows together", found)
         }
         Some(other) => {

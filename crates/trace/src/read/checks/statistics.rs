@@ -113,11 +113,11 @@ impl Seen {
     pub(crate) fn fault(&self, declared: &Chunk) -> Option<(String, String)> {
         let nulls = declared.nulls.filter(|nulls| *nulls != self.nulls);
         if let Some(nulls) = nulls {
-            return Some((format!("{nulls} nulls, as the statistics of the footer say"), self.nulls.to_string()));
+            return Some((format!("{nulls} nulls, as in the footer's statistics"), self.nulls.to_string()));
         }
         if let Some(bytes) = declared.bytes.filter(|bytes| *bytes != self.bytes) {
             return Some((
-                format!("texts of {bytes} bytes, as the statistics of the footer say"),
+                format!("texts of {bytes} bytes, as in the footer's statistics"),
                 self.bytes.to_string(),
             ));
         }
@@ -131,7 +131,7 @@ impl Seen {
             // Some row must have a bound that is not cut, unless it is that of a dictionary.
             let may_be_absent = matches!(declared, Value::Text(text)
                 if text.len() >= CUT || self.entries.as_ref().is_some_and(|ends| ends.contains(text)));
-            let expected = || format!("{} as the {word} value, as the statistics of the footer say", declared.words());
+            let expected = || format!("{} as the {word} value, as in the footer's statistics", declared.words());
             let is_wrong = order == beyond || order != Ordering::Equal && !may_be_absent;
             is_wrong.then(|| (expected(), found.words()))
         })

@@ -24,7 +24,7 @@ pub enum TraceError {
     Column { column: String, expected: &'static str, found: String },
     #[error("cannot hold the rows in memory; report this as a fault of mirrorstats")]
     Memory(#[source] ArrowError),
-    #[error("episode `{episode}`: expected {expected}, found {found}; nothing of it was written")]
+    #[error("episode `{episode}`: expected {expected}, found {found}; the episode was not written")]
     Refused { episode: String, expected: String, found: String },
     #[error("cannot write the trace {file}, and left no file behind: is the folder writable, and the disk not full?")]
     Write { file: String, source: Box<dyn std::error::Error + Send + Sync> },

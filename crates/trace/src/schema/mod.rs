@@ -57,7 +57,7 @@ pub const METADATA: &[MetadataKey] = &[
     },
     MetadataKey {
         key: "mirrorstats.recording.domain",
-        doc: "What the episodes are about: `mirror`, or any other name, where the columns of the mirror mean nothing. A file \
+        doc: "What the episodes are about: `mirror`, or any other name, where the columns of the mirror have no meaning. A file \
               without it that has none of these columns is of its own domain.",
     },
     MetadataKey {

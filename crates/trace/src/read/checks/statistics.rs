@@ -116,10 +116,7 @@ impl Seen {
             return Some((format!("{nulls} nulls, as in the footer's statistics"), self.nulls.to_string()));
         }
         if let Some(bytes) = declared.bytes.filter(|bytes| *bytes != self.bytes) {
-            return Some((
-                format!("texts of {bytes} bytes, as in the footer's statistics"),
-                self.bytes.to_string(),
-            ));
+            return Some((format!("texts of {bytes} bytes, as in the footer's statistics"), self.bytes.to_string()));
         }
         let bounds = [
             (&declared.least, &self.least, Ordering::Less, "least"),

@@ -51,7 +51,7 @@ impl Random {
             match self.below(6) {
                 0 if at < end => data[at] ^= 1 << self.below(8),
                 1 if at < end => {
-                    data[at] = [0, 1, 0x7f, 0x80, 0xff, b'0', b'9', b'-', b'"', b'(', b' ', b','][self.below(12)]
+                    data[at] = [0, 1, 0x7f, 0x80, 0xff, b'0', b'9', b'-', b'"', b'(', b' ', b','][self.below(12)];
                 }
                 2 => drop(data.drain(at..end)),
                 3 => {

@@ -223,11 +223,8 @@ fn restricted([a, b]: [f64; 2], [m, n]: [f64; 2], margin: f64) -> f64 {
     let mut at = f64::midpoint(low, high);
     for _ in 0..60 {
         let (value, fall) = slope(at);
-        if value > 0.0 {
-            low = at
-        } else {
-            high = at
-        }
+        let bound = if value > 0.0 { &mut low } else { &mut high };
+        *bound = at;
         let next = at + value / fall;
         let next = if low < next && next < high { next } else { f64::midpoint(low, high) };
         if (next - at).abs() < 1e-16 {

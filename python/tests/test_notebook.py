@@ -210,7 +210,7 @@ def test_errors_have_specific_types_and_name_arguments(paper, tmp_path):
     assert "`full=True`" in str(study.stats()) or "--full" not in str(study.stats())
     steps = tmp_path / "steps.csv"
     pandas.DataFrame(random_rows(7)).to_csv(steps, index=False)
-    with pytest.raises(ms.InputError, match="found steps: there is a column `t`"):
+    with pytest.raises(ms.InputError, match="found steps .a column `t` exists."):
         ms.open(steps).cells
 
 

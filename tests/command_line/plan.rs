@@ -25,7 +25,7 @@ fn the_first_line_is_the_answer() {
 #[test]
 fn conflicting_options_are_refused() {
     for (options, expected) in [
-        (vec!["--episodes", "20"], "expected as many episodes for each of 3 seeds"),
+        (vec!["--episodes", "20"], "expected equally many episodes for each of 3 seeds"),
         (vec!["--difference", "0.6", "--baseline", "0.5"], "expected rates from 0 to 1, found 1.100"),
         (vec!["--difference", "0.3", "--discordance", "0.2"], "expected a share from 0.300 to 1.000"),
     ] {

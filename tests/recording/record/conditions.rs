@@ -186,7 +186,7 @@ fn a_registered_plan_is_in_the_trace_and_reports_say_whether_it_was_followed() {
         "{followed}"
     );
     let other = run(at, &["report", "runs", "--out", "out", "--definitions", "extended"]).ends(0).stderr;
-    assert!(other.contains("the definitions are others"), "{other}");
+    assert!(other.contains("differ from those that it names"), "{other}");
     // Another plan, or no plan, does not continue the recording. A changed plan and another world are refused.
     let refused = |out: &str, words: &str| {
         let answer = bench.record(out, words).output().unwrap();

@@ -247,7 +247,7 @@ fn a_room_too_small_for_all_is_refused_with_a_remedy() {
     let error = Scene::draw(&config, Experiment::E5, 1, 2).unwrap_err().to_string();
     assert_eq!(
         error,
-        "E5 of seed 1 and run 2 finds no place for all that stands in its room after 2000 drawings: give it a larger \
-         `room.size`, or fewer or smaller cubes and others"
+        "E5 of seed 1 and run 2 has no room for all its objects after 2000 attempts: use a larger `room.size`, \
+         or fewer or smaller cubes and others"
     );
 }

@@ -81,7 +81,7 @@ fn a_manifest_with_impossible_entries_is_refused() {
     let at = folder.path();
     let sound: Value = serde_json::from_slice(&fs::read(at.join("mine/manifest.json")).unwrap()).unwrap();
     let output = |path: &str| json!({"path": path, "sha256": "0".repeat(64), "bytes": 1});
-    let outside = "no path inside of its folder";
+    let outside = "not a path inside its folder";
     let cases = [
         (json!([output("/etc/passwd")]), outside),
         (json!([output("../secret")]), outside),

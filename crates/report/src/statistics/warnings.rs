@@ -129,7 +129,7 @@ fn gaps(statistics: &Statistics) -> Option<String> {
         format!("{} {} scene {scene} ({found})", gap.key.experiment, gap.key.name())
     };
     let gaps = first_named(statistics.gaps.iter().map(gap), NAMED_GAPS);
-    Some(format!("{places} not paired, because they do not have exactly one episode each: {gaps}."))
+    Some(format!("{places} not paired, as pairs need exactly one episode per scene: {gaps}."))
 }
 
 fn losses(statistics: &Statistics) -> Option<String> {

@@ -76,7 +76,7 @@ pub fn explained(experiment: &Experiment) -> String {
         line("look", "panelled walls, soft shadows, mirrors with a frame and a slight tint".to_owned());
     }
     let at = if experiment.hand.is_some() { "at the end" } else { "at `done`" };
-    line("decision", format!("{} {at}, held against {}", experiment.decision.name(), experiment.truth.name()));
+    line("decision", format!("{} {at}, compared with {}", experiment.decision.name(), experiment.truth.name()));
     line("scored by", visible(experiment.definitions.as_deref().unwrap_or("the default definitions")));
     let steps = match (experiment.hand, experiment.steps) {
         (Some(hand), None) => format!("those from the start to the mark, and {} more", hand.extra_steps),

@@ -33,7 +33,7 @@ pub(super) fn relations(spec: &Spec, at: &At<'_>, faults: &mut Vec<Fault>) {
     }
     if (spec.decision == Decision::TargetDistance) != has_hand || (spec.truth == Truth::StartDistance) != has_hand {
         refuse(
-            "a hand is held against its distance to the mark, and nothing else is",
+            "a hand is compared with its distance to the mark, and nothing else is",
             "leave `decision` and `truth` out",
         );
     }

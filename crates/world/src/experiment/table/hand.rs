@@ -33,7 +33,7 @@ pub(super) fn relations(spec: &Spec, at: &At<'_>, faults: &mut Vec<Fault>) {
     }
     if (spec.decision == Decision::TargetDistance) != has_hand || (spec.truth == Truth::StartDistance) != has_hand {
         refuse(
-            "a hand is compared with its distance to the mark, and nothing else is",
+            "the decision of a hand is its distance to the mark, and only a hand has this decision",
             "leave `decision` and `truth` out",
         );
     }

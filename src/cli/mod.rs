@@ -27,6 +27,7 @@ use commands::Command;
 use exact::budget;
 use exact::escape::visible;
 use outcome::{ErrorFormat, Outcome};
+use trace::catch_panic::caught;
 
 pub use answers::{printed_schema, schemas};
 pub use outcome::{ErrorAnswer, Failure};
@@ -93,7 +94,8 @@ pub fn run_to_code(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let format = ErrorFormat::asked_for(&arguments);
     outcome::set_format(format);
     memory::on_refusal(end_without_memory);
-    let answer = execute(arguments.clone()).map_err(|failure| scoring::with_commands(failure, &arguments));
+    let answer = caught(|| execute(arguments.clone())).unwrap_or_else(|fault| Err(Failure::Fault(fault)));
+    let answer = answer.map_err(|failure| scoring::with_commands(failure, &arguments));
     let code = outcome::exit_code(answer.and_then(flushed), format);
     // Show what was printed before a failure.
     let _ = io::stdout().flush();

@@ -9,6 +9,7 @@
 //! | 4 | `gate`: no regression, but some cells allow no verdict |
 //! | 5 | `gate`: no regression, but some cells are not comparable |
 //! | 6 | the system refused memory |
+//! | 101 | a fault of the program |
 //! | 130 | interrupted (`record`); finished work stays |
 
 use std::error::Error;
@@ -28,6 +29,8 @@ use trace::diagnostic::{MORE_FILES, is_short_of_files};
 pub const ERRORS_VARIABLE: &str = "MIRRORSTATS_ERRORS";
 const BAD_INPUT: u8 = 2;
 pub const NO_MEMORY: u8 = 6;
+/// As Rust's own after a panic.
+const FAULT: u8 = 101;
 
 /// The outcome of a command that ran to its end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,6 +58,11 @@ pub enum Failure {
     Output(#[from] io::Error),
     #[error(transparent)]
     Input(Box<dyn Error + Send + Sync>),
+    #[error(
+        "the program stopped at a fault: {0}\n  \
+         help: is there enough memory? If so, report the command and this message"
+    )]
+    Fault(String),
     #[error("{0}")]
     Rendered(String),
     #[error("{0}")]
@@ -102,8 +110,12 @@ impl ErrorAnswer {
     pub fn of(failure: &Failure) -> Self {
         let faults = if let Failure::Faults(faults) = failure { faults.records() } else { Vec::new() };
         let text = words(failure, false);
-        Self { error: text.trim_end().trim_start_matches("error: ").to_owned(), code: BAD_INPUT, faults }
+        Self { error: text.trim_end().trim_start_matches("error: ").to_owned(), code: failure_code(failure), faults }
     }
+}
+
+const fn failure_code(failure: &Failure) -> u8 {
+    if matches!(failure, Failure::Fault(_)) { FAULT } else { BAD_INPUT }
 }
 
 /// Prints a failure on standard error and returns the exit code.
@@ -119,7 +131,7 @@ pub fn exit_code(result: Result<Outcome, Failure>, format: ErrorFormat) -> u8 {
         Err(Failure::Output(error)) if error.kind() == io::ErrorKind::BrokenPipe => 0,
         Err(failure) => {
             say(&failure, format);
-            BAD_INPUT
+            failure_code(&failure)
         }
     }
 }

@@ -2,12 +2,15 @@
 
 use std::cell::Cell;
 use std::panic::{self, AssertUnwindSafe};
-use std::sync::Once;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, Once};
 
 thread_local! {
     static CONTAINING: Cell<bool> = const { Cell::new(false) };
 }
+
+/// The file and line of the last contained panic.
+static PLACE: Mutex<String> = Mutex::new(String::new());
 
 /// The number of running calls that contain panics of all threads.
 static EVERYWHERE: AtomicUsize = AtomicUsize::new(0);
@@ -27,12 +30,19 @@ pub fn contained<R>(decode: impl FnOnce() -> R) -> Result<R, String> {
 }
 
 /// Like [`contained`], for a library with its own threads: panics are not printed on any thread.
-#[cfg(feature = "polars")]
 pub fn contained_on_all_threads<R>(run: impl FnOnce() -> R) -> Result<R, String> {
     EVERYWHERE.fetch_add(1, Ordering::SeqCst);
     let result = contained(run);
     EVERYWHERE.fetch_sub(1, Ordering::SeqCst);
     result
+}
+
+/// Like [`contained_on_all_threads`], for a whole command. The message ends with the file and line of the panic.
+pub fn caught<R>(run: impl FnOnce() -> R) -> Result<R, String> {
+    contained_on_all_threads(run).map_err(|text| {
+        let place = PLACE.lock().map(|place| place.clone()).unwrap_or_default();
+        format!("{text} ({place})")
+    })
 }
 
 fn silence_contained_panics() {
@@ -42,6 +52,9 @@ fn silence_contained_panics() {
         panic::set_hook(Box::new(move |info| {
             if !CONTAINING.get() && EVERYWHERE.load(Ordering::SeqCst) == 0 {
                 report(info);
+            } else if let (Some(location), Ok(mut place)) = (info.location(), PLACE.lock()) {
+                let file = location.file().rsplit(['/', '\\']).next().unwrap_or_default();
+                *place = format!("{file}:{}", location.line());
             }
         }));
     });
@@ -49,12 +62,14 @@ fn silence_contained_panics() {
 
 #[cfg(test)]
 mod tests {
-    use super::contained;
+    use super::{caught, contained};
 
     #[test]
     fn a_panic_becomes_its_message() {
         assert_eq!(contained(|| 7), Ok(7));
         let empty: Vec<i32> = Vec::new();
         assert!(contained(|| empty[3]).unwrap_err().contains("out of bounds"));
+        let words = caught(|| empty[3]).unwrap_err();
+        assert!(words.contains("out of bounds") && words.contains("(catch_panic.rs:"), "{words}");
     }
 }

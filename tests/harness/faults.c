@@ -179,7 +179,7 @@ static ssize_t written(int fd, const char *bytes, size_t length, off_t at) {
     if (is_failing) length /= 2;
     ssize_t done = at < 0 ? syscall(SYS_write, fd, bytes, length) : syscall(SYS_pwrite64, fd, bytes, length, at);
     if (done > 0 && log_fd >= 0) {
-        char *hex = malloc(2 * done + 1);
+        char *hex = __libc_malloc(2 * done + 1);
         for (ssize_t i = 0; i < done; i++) sprintf(hex + 2 * i, "%02x", (unsigned char)bytes[i]);
         note("write\t%lu\t%ld\t", (unsigned long)about.st_ino, (long)start);
         put(hex, 2 * done);

@@ -25,7 +25,11 @@ pub fn contained<R>(decode: impl FnOnce() -> R) -> Result<R, String> {
     CONTAINING.set(before);
     result.map_err(|payload| {
         let text = payload.downcast_ref::<&str>().map(ToString::to_string);
-        text.or_else(|| payload.downcast_ref::<String>().cloned()).unwrap_or_else(|| "the decoder gave up".into())
+        let text = text.or_else(|| payload.downcast_ref::<String>().cloned());
+        // zstd panics where it gets no memory.
+        let is_memory = |text: &String| text.contains("null pointer when creating new context");
+        let text = text.map(|text| if is_memory(&text) { "not enough memory for the decoder".into() } else { text });
+        text.unwrap_or_else(|| "the decoder gave up".into())
     })
 }
 

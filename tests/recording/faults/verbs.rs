@@ -221,7 +221,9 @@ fn check_memory(most: usize) {
     let prepared = prepared();
     let ended = AtomicUsize::new(0);
     let tried = AtomicUsize::new(0);
-    all_at_once(VERBS, |verb| {
+    // MuJoCo ends the process by itself if memory is refused to it.
+    let verbs: Vec<&Verb> = VERBS.iter().filter(|verb| !verb.words.starts_with("replay")).collect();
+    all_at_once(&verbs, |verb| {
         let case = Case::new(prepared.path(), verb);
         let mut rounds: Vec<usize> = (1..=case.allocations()).collect();
         sample(&mut rounds, most);
@@ -230,7 +232,7 @@ fn check_memory(most: usize) {
         ended.fetch_add(by_it, Ordering::Relaxed);
     });
     let (ended, tried) = (ended.into_inner(), tried.into_inner());
-    println!("{tried} refused allocations in {} verbs, {ended} of which ended the program", VERBS.len());
+    println!("{tried} refused allocations in {} verbs, {ended} of which ended the program", verbs.len());
     assert!(ended * 2 > tried, "{ended} of {tried}: the faults do not reach the program");
 }
 

@@ -149,7 +149,7 @@ impl Browser {
             let answer = self.receive();
             if answer["id"] == json!(id) {
                 assert!(answer.get("error").is_none(), "{method}: {}", answer["error"]);
-                if method == "Emulation.setEmulatedMedia" {
+                if method.starts_with("Emulation.set") {
                     self.settle();
                 }
                 return answer["result"].clone();
@@ -157,8 +157,8 @@ impl Browser {
         }
     }
 
-    /// Waits for two frames and a task, so that the page has seen earlier commands: media change events arrive with a
-    /// frame, not with the command.
+    /// Waits for two frames and a task, so that the page has seen earlier commands: media change events and a new
+    /// size arrive with a frame, not with the command.
     fn settle(&mut self) {
         let frame = "(done) => requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(done, 0, 0)))";
         self.value(&format!("new Promise({frame})"));

@@ -28,5 +28,5 @@ installed=$(mktemp -d)
 trap 'rm -rf "$installed"' EXIT
 python3 -m venv "$installed"
 "$installed/bin/pip" install --quiet --disable-pip-version-check --no-index "$wheel"
-MIRRORSTATS_TEST_PROGRAMS=$installed/bin cargo test --quiet --workspace --all-features --test command_line readme
+TEST_PROGRAMS=$installed/bin cargo test --quiet --workspace --all-features --test command_line readme
 echo "release-check: all passed; tag v$version"

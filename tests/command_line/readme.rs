@@ -141,7 +141,7 @@ fn output_of(command: &str, folder: &Path) -> String {
     // `make bless` sets these variables for the tests.
     shell.env_remove("MIRRORSTATS_WRITE_SCHEMAS").env_remove("MIRRORSTATS_WRITE_REFERENCE");
     // A folder with another build of the program, such as an installed wheel: `make release-check`.
-    let installed = std::env::var_os("MIRRORSTATS_TEST_PROGRAMS").map(PathBuf::from);
+    let installed = std::env::var_os("TEST_PROGRAMS").map(PathBuf::from);
     let programs = installed.unwrap_or_else(|| Path::new(PROGRAM).parent().unwrap().to_owned());
     let path = std::env::var_os("PATH").unwrap_or_default();
     let all = std::env::join_paths([programs].into_iter().chain(std::env::split_paths(&path))).unwrap();

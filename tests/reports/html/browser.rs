@@ -149,7 +149,7 @@ impl Browser {
             let answer = self.receive();
             if answer["id"] == json!(id) {
                 assert!(answer.get("error").is_none(), "{method}: {}", answer["error"]);
-                if method.starts_with("Emulation.set") {
+                if ["Emulation.setEmulatedMedia", "Emulation.setDeviceMetricsOverride"].contains(&method) {
                     self.settle();
                 }
                 return answer["result"].clone();

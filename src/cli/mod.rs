@@ -94,7 +94,7 @@ pub fn run_to_code(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let format = ErrorFormat::asked_for(&arguments);
     outcome::set_format(format);
     memory::on_refusal(end_without_memory);
-    let answer = caught(|| execute(arguments.clone())).unwrap_or_else(|fault| Err(Failure::Fault(fault)));
+    let answer = caught(|| execute(arguments.clone())).unwrap_or_else(|fault| Err(Failure::Panic(fault)));
     let answer = answer.map_err(|failure| scoring::with_commands(failure, &arguments));
     let code = outcome::exit_code(answer.and_then(flushed), format);
     // Show what was printed before a failure.

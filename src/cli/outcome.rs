@@ -9,7 +9,7 @@
 //! | 4 | `gate`: no regression, but some cells allow no verdict |
 //! | 5 | `gate`: no regression, but some cells are not comparable |
 //! | 6 | the system refused memory |
-//! | 101 | a fault of the program |
+//! | 101 | an internal error |
 //! | 130 | interrupted (`record`); finished work stays |
 
 use std::error::Error;
@@ -30,7 +30,7 @@ pub const ERRORS_VARIABLE: &str = "MIRRORSTATS_ERRORS";
 const BAD_INPUT: u8 = 2;
 pub const NO_MEMORY: u8 = 6;
 /// As Rust's own after a panic.
-const FAULT: u8 = 101;
+const PANIC: u8 = 101;
 
 /// The outcome of a command that ran to its end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,10 +59,10 @@ pub enum Failure {
     #[error(transparent)]
     Input(Box<dyn Error + Send + Sync>),
     #[error(
-        "the program stopped at a fault: {0}\n  \
+        "internal error: {0}\n  \
          help: is there enough memory? If so, report the command and this message"
     )]
-    Fault(String),
+    Panic(String),
     #[error("{0}")]
     Rendered(String),
     #[error("{0}")]
@@ -115,7 +115,7 @@ impl ErrorAnswer {
 }
 
 const fn failure_code(failure: &Failure) -> u8 {
-    if matches!(failure, Failure::Fault(_)) { FAULT } else { BAD_INPUT }
+    if matches!(failure, Failure::Panic(_)) { PANIC } else { BAD_INPUT }
 }
 
 /// Prints a failure on standard error and returns the exit code.
@@ -147,10 +147,10 @@ pub fn set_format(format: ErrorFormat) {
 pub fn say_no_memory(bytes: usize) {
     let help = "use fewer --threads, or raise the memory limit (ulimit -v, a container's limit)";
     let _ = if IS_JSON.load(Ordering::Relaxed) {
-        let error = format_args!("out of memory: the system refused {bytes} bytes\\nhelp: {help}");
+        let error = format_args!("out of memory: the system refused {bytes} bytes\\n  help: {help}");
         writeln!(io::stderr(), r#"{{"error":"{error}","code":{NO_MEMORY}}}"#)
     } else {
-        writeln!(io::stderr(), "error: out of memory: the system refused {bytes} bytes\nhelp: {help}")
+        writeln!(io::stderr(), "error: out of memory: the system refused {bytes} bytes\n  help: {help}")
     };
 }
 

@@ -1,7 +1,6 @@
 //! The strings by which a thread's OpenGL context identifies itself: vendor, renderer, version.
 //!
-//! Rule: the program's only unsafe code is the function here that asks the driver. It reads three strings and changes
-//! nothing.
+//! Rule: only the function here that asks the driver is unsafe. It reads three strings and changes nothing.
 //!
 //! ```
 //! // A thread has no current context before it makes one.

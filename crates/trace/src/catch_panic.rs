@@ -1,13 +1,17 @@
 //! Turns a panic in a third-party decoder into an error of the file that caused it.
 
 use std::cell::Cell;
+use std::io::{self, Write as _};
 use std::panic::{self, AssertUnwindSafe};
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, Once};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Mutex, Once, PoisonError};
 
 thread_local! {
     static CONTAINING: Cell<bool> = const { Cell::new(false) };
 }
+
+/// True in a process that runs a command.
+static IN_COMMAND: AtomicBool = AtomicBool::new(false);
 
 /// The file and line of the last contained panic.
 static PLACE: Mutex<String> = Mutex::new(String::new());
@@ -34,6 +38,7 @@ pub fn contained<R>(decode: impl FnOnce() -> R) -> Result<R, String> {
 }
 
 /// Like [`contained`], for a library with its own threads: panics are not printed on any thread.
+#[cfg(feature = "polars")]
 pub fn contained_on_all_threads<R>(run: impl FnOnce() -> R) -> Result<R, String> {
     EVERYWHERE.fetch_add(1, Ordering::SeqCst);
     let result = contained(run);
@@ -41,10 +46,12 @@ pub fn contained_on_all_threads<R>(run: impl FnOnce() -> R) -> Result<R, String>
     result
 }
 
-/// Like [`contained_on_all_threads`], for a whole command. The message ends with the file and line of the panic.
+/// Like [`contained`], for a whole command. The message ends with the file and line of the panic. A panic of another
+/// thread is printed as an error at once, since nothing may wait for the thread.
 pub fn caught<R>(run: impl FnOnce() -> R) -> Result<R, String> {
-    contained_on_all_threads(run).map_err(|text| {
-        let place = PLACE.lock().map(|place| place.clone()).unwrap_or_default();
+    IN_COMMAND.store(true, Ordering::SeqCst);
+    contained(run).map_err(|text| {
+        let place = PLACE.lock().unwrap_or_else(PoisonError::into_inner).clone();
         format!("{text} ({place})")
     })
 }
@@ -54,11 +61,17 @@ fn silence_contained_panics() {
     ONCE.call_once(|| {
         let report = panic::take_hook();
         panic::set_hook(Box::new(move |info| {
-            if !CONTAINING.get() && EVERYWHERE.load(Ordering::SeqCst) == 0 {
-                report(info);
-            } else if let (Some(location), Ok(mut place)) = (info.location(), PLACE.lock()) {
+            let place = info.location().map_or_else(String::new, |location| {
                 let file = location.file().rsplit(['/', '\\']).next().unwrap_or_default();
-                *place = format!("{file}:{}", location.line());
+                format!("{file}:{}", location.line())
+            });
+            if CONTAINING.get() || EVERYWHERE.load(Ordering::SeqCst) > 0 {
+                *PLACE.lock().unwrap_or_else(PoisonError::into_inner) = place;
+            } else if IN_COMMAND.load(Ordering::SeqCst) {
+                let text = info.payload_as_str().unwrap_or("no message");
+                let _ = writeln!(io::stderr(), "error: internal error: {text} ({place})");
+            } else {
+                report(info);
             }
         }));
     });

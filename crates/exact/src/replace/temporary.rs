@@ -18,7 +18,7 @@ use super::place::{RANDOM, checksum};
 /// The characters of random names: no capitals, since some file systems ignore case.
 const CHARACTERS: &[u8; 36] = b"abcdefghijklmnopqrstuvwxyz0123456789";
 
-/// What this process has created and not yet renamed or removed.
+/// The temporary files and folders of this process.
 static PRESENT: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
 fn forget(path: &Path) {

@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use report::statistics::{Gate, GateVerdict};
+use report::gate::{Gate, GateVerdict};
 use statistics::random::SplitMix64;
 
 const SEED: u64 = 20_261_124;

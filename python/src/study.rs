@@ -9,8 +9,8 @@ use mirrorstats::{FigureName, FigureOptions, ReportOptions, StatisticsOptions};
 use pyo3::prelude::*;
 use report::changes::Limit;
 use report::figures::InvalidWidth;
+use report::gate::{GateFormat, GateOptions};
 use report::statistics::text::Length;
-use report::statistics::{GateFormat, GateOptions};
 use study::{LostAs, Question};
 
 use crate::answer::{self, Answer};

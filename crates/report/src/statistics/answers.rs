@@ -11,8 +11,8 @@ use serde::{Deserialize, Serialize};
 
 use super::compare::{Comparison, Sign};
 use super::losses::LOST;
-use super::study::named;
 use super::{ChanceRow, Contrast, Family, Method, Options, Reach, Role, Selection, Statistics, Units, Verdict};
+use crate::study::named;
 use exact::format;
 
 /// The most pairs that an experiment's answer names; others are counted.

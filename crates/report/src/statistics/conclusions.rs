@@ -3,8 +3,8 @@
 use indexmap::IndexMap;
 
 use super::chance::own_levels;
-use super::study::Study;
 use super::{ChanceRow, DurationRow, Family, Method, Reach, Role, Selection, Statistics, Verdict};
+use crate::study::Study;
 use exact::format::fixed;
 use statistics::power::Detectable;
 

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::study::RowKey;
+use crate::study::RowKey;
 use exact::escape::visible;
 use score::table::{CONDITION, EpisodeTable, UNUSABLE_REPLIES};
 

@@ -9,18 +9,18 @@
 
 mod answers;
 mod apart;
-mod comparisons {
-    pub(super) mod compare;
+pub(crate) mod comparisons {
+    pub(crate) mod compare;
     pub(super) mod conditions;
     pub(super) mod losses;
-    pub(super) mod matching;
+    pub(crate) mod matching;
     pub(super) mod models;
     pub(super) mod retest;
     pub(super) mod trends;
 }
 mod conclusions;
 mod episodes;
-mod gate;
+mod options;
 mod rates {
     pub(super) mod cells;
     pub(super) mod chance;
@@ -29,7 +29,6 @@ mod rates {
     pub(super) mod ranks;
     pub(super) mod sequential;
 }
-mod study;
 pub mod text;
 mod warnings;
 
@@ -45,68 +44,26 @@ pub use compare::{Comparison, Method, Sign};
 pub use conditions::Contrast;
 pub use durations::{CorrectRow, DurationRow};
 pub use episodes::{Replies, Selection, UnusableReplies};
-pub use gate::{FlippedPair, Gate, GateCell, GateFormat, GateOptions, GateVerdict, Played};
 pub use losses::{LossCase, LossCases, LossRow, Losses};
 pub use matching::{Matching, Units};
 pub use models::{Family, Gap, PairTest, Reach};
+pub use options::Options;
 pub use overall::{ImprovementRow, OverallMethod, OverallRow};
 pub use ranks::{RankRow, Ranks};
 pub use retest::RetestRow;
 pub use sequential::{Sequential, SequentialChance, SequentialPair, SequentialRate};
-pub use study::RowKey;
 pub use trends::{Dose, TrendRow};
+
+pub use crate::study::RowKey;
 
 use self::comparisons::{compare, conditions, losses, matching, models, retest, trends};
 use self::rates::{cells, chance, durations, overall, ranks, sequential};
 use crate::cells::Cells;
-use crate::cells::interval::CONFIDENCE;
+use crate::study::Study;
 use exact::moments::MomentOverflow;
 use metric::relations::Relations;
-use score::lost_counts::LostCounts;
 use score::table::EpisodeTable;
 use statistics::design::Design;
-use study::Study;
-
-#[derive(Clone, Debug, PartialEq)]
-pub struct Options {
-    /// The confidence of every interval, and one minus the level of every test; between 0 and 1.
-    pub confidence: f64,
-    /// The horizon of restricted means in steps; by default the last step known for every model.
-    pub horizon: Option<i64>,
-    /// The number of lost episodes besides those given; `None` if the traces do not record it.
-    pub lost: Option<LostCounts>,
-    /// The declared design; empty by default.
-    pub design: Design,
-    /// The selection of episodes; all by default.
-    pub selection: Option<Selection>,
-    /// The settings that cells pool, one sentence each; `None` without pooling.
-    pub pooled: Option<Vec<String>>,
-    /// The number of replies without a decision; `None` if not recorded.
-    pub replies: Option<Replies>,
-    /// Further caveats of every answer, such as lost episodes that count as failures.
-    pub caveats: Vec<String>,
-    /// The metric of the primary question in a registered plan; the first headline metric by default.
-    pub primary: Option<String>,
-    /// True to compute probabilities of improvement, each of which resamples all episodes of two models.
-    pub improvements: bool,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            confidence: CONFIDENCE,
-            horizon: None,
-            lost: None,
-            design: Design::default(),
-            selection: None,
-            pooled: None,
-            replies: None,
-            caveats: Vec::new(),
-            primary: None,
-            improvements: false,
-        }
-    }
-}
 
 /// All statistics of a set of episodes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -203,7 +160,7 @@ impl Statistics {
             by: cells.by.clone(),
             episodes: table.len(),
             selection: options.selection.clone(),
-            pooled: pooled(&study, options),
+            pooled: options.pooled_in(&study),
             design: options.design,
             cells: CellRow::all(&study, cells, confidence),
             chance: ChanceRow::all(&study, confidence),
@@ -235,21 +192,4 @@ impl Statistics {
         statistics.warnings.extend(Contrast::left_out(&study));
         Ok(statistics)
     }
-}
-
-fn pooled(study: &Study, options: &Options) -> Vec<String> {
-    let Some(mut sentences) = options.pooled.clone() else { return Vec::new() };
-    let models = study.experiments.iter().flat_map(|experiment| {
-        let blocks = &experiment.blocks;
-        (0..blocks.len()).flat_map(move |at| blocks[at + 1..].iter().map(move |other| (&blocks[at], other)))
-    });
-    let contrasts = Contrast::pairs(study).into_iter().flat_map(|pair| pair.couples().collect::<Vec<_>>());
-    for (first, second) in models.chain(contrasts) {
-        let Some(setting) = study.setting_apart(first, second) else { continue };
-        let sentence = format!("Compared though they differ (--pool): {setting}.");
-        if !sentences.contains(&sentence) {
-            sentences.push(sentence);
-        }
-    }
-    sentences
 }

@@ -13,7 +13,7 @@ use crate::output::statistics::{check_verdicts, design_of};
 use crate::{Study, pooled};
 use metric::catalog::{Better, Metric};
 use metric::definitions::UnknownMetric;
-use report::statistics::{Gate, GateOptions, Played};
+use report::gate::{FlippedPair, Gate, GateOptions, Played};
 use score::evidence;
 use score::table::EpisodeTable;
 use trace::inputs::{self, Input};
@@ -38,7 +38,7 @@ impl Study {
             gate.caveats.extend(study.copies(table)?.map(|copies| format!("{side}: {}", copies.sentence)));
         }
         let flips = || gate.cells.iter().flat_map(|cell| &cell.flips);
-        let ids = |of: fn(&report::statistics::FlippedPair) -> &Played| {
+        let ids = |of: fn(&FlippedPair) -> &Played| {
             flips().map(|flip| of(flip).episode_id.clone()).collect::<BTreeSet<String>>()
         };
         let (before, after) = (ids(|flip| &flip.base), ids(|flip| &flip.new));
@@ -47,7 +47,7 @@ impl Study {
             before.add_to(&mut flip.base);
             after.add_to(&mut flip.new);
         }
-        let unshown = |of: fn(&report::statistics::FlippedPair) -> &Played| {
+        let unshown = |of: fn(&FlippedPair) -> &Played| {
             gate.cells.iter().flat_map(|cell| &cell.flips).any(|flip| of(flip).timesteps.is_none())
         };
         let sides = [("base", base, unshown(|flip| &flip.base)), ("new", self, unshown(|flip| &flip.new))];

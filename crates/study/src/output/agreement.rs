@@ -6,8 +6,9 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::{Study, StudyError};
-use statistics::agreement::{FEWEST, PairCounts};
+use statistics::agreement::{FEWEST, Kappa};
 use statistics::interval::Interval;
+use statistics::paired::Pairs;
 
 /// The labels of some traces and how far coders agree.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -50,7 +51,7 @@ pub struct PairAgreement {
     /// The episodes that both coded.
     pub n: u64,
     #[serde(flatten)]
-    pub counts: PairCounts,
+    pub counts: Pairs,
     /// The share of episodes on which they agree; null without an episode.
     pub agreement: Option<f64>,
     /// Cohen's kappa; null if it cannot be said.
@@ -63,8 +64,8 @@ pub struct PairAgreement {
 
 impl PairAgreement {
     #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
-    fn new(label: &str, coders: [&str; 2], counts: PairCounts, confidence: f64) -> Self {
-        let (n, kappa) = (counts.n(), counts.kappa(confidence));
+    fn new(label: &str, coders: [&str; 2], counts: Pairs, confidence: f64) -> Self {
+        let (n, kappa) = (counts.n(), Kappa::of(counts, confidence));
         let interval = kappa.and_then(|kappa| kappa.interval);
         let cannot_say = match (kappa, interval) {
             (None, _) if n < FEWEST => Some(format!("{n} episodes coded by both, expected {FEWEST}")),
@@ -77,7 +78,7 @@ impl PairAgreement {
             coders: coders.map(str::to_owned),
             n,
             counts,
-            agreement: (n > 0).then(|| counts.agreed() as f64 / n as f64),
+            agreement: (n > 0).then(|| (counts.both + counts.neither) as f64 / n as f64),
             kappa: kappa.map(|kappa| kappa.value),
             interval,
             cannot_say,
@@ -108,12 +109,9 @@ impl Study {
         for label in &words {
             for pair in &pairs {
                 let [first, second] = pair.map(|name| &coders[name]);
-                let mut counts = PairCounts::default();
-                for (id, own) in first {
-                    if let Some(other) = second.get(id) {
-                        counts.add(own.contains(label), other.contains(label));
-                    }
-                }
+                let both = first.iter().filter_map(|(id, own)| Some((own, second.get(id)?)));
+                let counts =
+                    Pairs::of(both.map(|(own, other)| (own.contains(label).into(), other.contains(label).into())));
                 agreement.push(PairAgreement::new(label, *pair, counts, confidence));
             }
         }

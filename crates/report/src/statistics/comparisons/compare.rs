@@ -9,7 +9,7 @@ use crate::statistics::durations::{decided, is_duration};
 use crate::statistics::losses::{LossCase, LossCases, Toward, settle};
 use crate::statistics::matching::{Matched, Sides, Units, outcomes};
 use crate::statistics::retest::repeat_variance;
-use crate::statistics::study::{Block, Study, Unit};
+use crate::study::{Block, Study, Unit};
 use exact::moments::Moments;
 use metric::catalog::{Kind, StandardError};
 use score::table::MetricColumn;

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::comparable::tasks_differ;
 use crate::statistics::compare::{Compared, Comparison, adjust};
 use crate::statistics::matching::{Matched, Matching, Scenes};
-use crate::statistics::study::{Block, Experiment, Study};
+use crate::study::{Block, Experiment, Study};
 use score::table::MetricColumn;
 
 /// The difference of a model's mean between two experiments, by pairs if their scenes agree.

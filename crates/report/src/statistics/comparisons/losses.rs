@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::statistics::matching::Units;
-use crate::statistics::study::{Block, RowKey, Study};
+use crate::study::{Block, RowKey, Study};
 use exact::moments::Moments;
 use statistics::holm::{holm, is_significant};
 use statistics::losses::{Lossy, bounds};

@@ -10,7 +10,7 @@ use std::mem::discriminant;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::statistics::study::{Block, Study, Unit};
+use crate::study::{Block, Study, Unit};
 use exact::moments::Moments;
 use score::table::MetricColumn;
 use statistics::clustered::fewest_clusters;

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use crate::statistics::compare::{Compared, Comparison, Method, adjust};
 use crate::statistics::durations::{self, is_duration};
 use crate::statistics::matching::{Matched, Matching, Scenes};
-use crate::statistics::study::{Block, Experiment, RowKey, Study};
+use crate::study::{Block, Experiment, RowKey, Study};
 use metric::catalog::{Better, Kind};
 use score::table::MetricColumn;
 use statistics::holm::level;

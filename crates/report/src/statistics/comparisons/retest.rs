@@ -9,7 +9,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::statistics::matching::Scenes;
-use crate::statistics::study::{Block, Study};
+use crate::study::{Block, Study};
 use exact::moments::Moments;
 use score::table::MetricColumn;
 use statistics::clustered::variance_components;

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::statistics::Verdict;
-use crate::statistics::study::{Block, Study, Unit};
+use crate::statistics::chance::Verdict;
+use crate::study::{Block, Study, Unit};
 use metric::catalog::Factor;
 use score::table::MetricColumn;
 use statistics::holm::{holm, is_significant};

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::statistics::losses::{LossCase, LossCases, Toward, settle};
 use crate::statistics::matching::{Units, too_few};
-use crate::statistics::study::{Block, Experiment, RowKey, Study};
+use crate::study::{Block, Experiment, RowKey, Study};
 use exact::moments::Moments;
 use exact::ratio::Ratio;
 use score::table::MetricColumn;

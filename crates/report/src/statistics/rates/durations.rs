@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::statistics::study::{Block, Experiment, RowKey, Study};
+use crate::study::{Block, Experiment, RowKey, Study};
 use score::table::MetricColumn;
 use statistics::competing::{Ending, Incidence, Outcome};
 use statistics::coverage::{self, Withheld};

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::statistics::durations::{decided, is_duration};
 use crate::statistics::losses::{LossCase, LossCases, Toward, settle};
 use crate::statistics::matching::{Matched, Scenes, Sides, outcomes};
-use crate::statistics::study::{Block, Study};
+use crate::study::{Block, Study};
 use metric::catalog::Kind;
 use score::table::MetricColumn;
 use statistics::clustered::fewest_clusters;

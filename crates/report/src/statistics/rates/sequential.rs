@@ -8,11 +8,12 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::statistics::chance::levels;
+use crate::statistics::chance::{Role, Verdict, levels};
 use crate::statistics::conclusions::headline;
+use crate::statistics::episodes::Selection;
 use crate::statistics::models::by_mean;
-use crate::statistics::study::{Block, Experiment, RowKey, Study, Unit};
-use crate::statistics::{Options, Role, Selection, Verdict};
+use crate::statistics::options::Options;
+use crate::study::{Block, Experiment, RowKey, Study, Unit};
 use exact::moments::{MomentOverflow, Moments};
 use exact::ratio::Ratio;
 use metric::catalog::Kind;
@@ -137,7 +138,7 @@ impl Sequential {
             episodes: table.len(),
             selection: options.selection.clone(),
             departures: None,
-            pooled: crate::statistics::pooled(&study, options),
+            pooled: options.pooled_in(&study),
             headline: headline_rates(&study),
             chance: SequentialChance::all(&study, &rates, options.confidence),
             models: SequentialPair::all(&study, options.confidence),

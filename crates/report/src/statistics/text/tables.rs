@@ -2,10 +2,10 @@
 
 use super::text_table::TextTable;
 use crate::statistics::ranks::ALL;
-use crate::statistics::study::named;
 use crate::statistics::{
     CellRow, Comparison, Intervals, LossCases, Method, OverallMethod, Sign, Statistics, Units, Verdict,
 };
+use crate::study::named;
 use crate::tables::Table;
 use exact::format::{UNDEFINED, bounds, fixed, p_value};
 use metric::catalog::Kind;

@@ -1,6 +1,6 @@
 //! A table that is written column by column, each heading beside its cells.
 
-use crate::statistics::study::RowKey;
+use crate::study::RowKey;
 use crate::tables::Table;
 use exact::format::p_value;
 

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::{FlippedPair, Gate, GateCell, GateSide, GateVerdict, Played};
-use crate::statistics::study::named;
+use crate::study::named;
 use crate::tables::{Table, push_wrapped};
 use exact::escape::visible;
 use exact::format::{UNDEFINED, fixed};
@@ -42,7 +42,12 @@ impl Gate {
     }
 
     fn title(&self) -> String {
-        format!("{}, margin {}, {} confidence", self.metric, self.margin, super::super::text::percent(self.confidence))
+        format!(
+            "{}, margin {}, {} confidence",
+            self.metric,
+            self.margin,
+            crate::statistics::text::percent(self.confidence)
+        )
     }
 
     fn table(&self) -> Table {

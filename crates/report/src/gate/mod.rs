@@ -3,6 +3,8 @@
 //! Rule: a loss within the margin is accepted, so `held` comes before `regressed`. Every verdict is Holm-adjusted over
 //! the cells, based on the unit of analysis, and valid for every outcome of the lost episodes.
 
+#![expect(clippy::cast_precision_loss, reason = "counts of tests are far below 2^53")]
+
 mod sides;
 mod text;
 
@@ -15,11 +17,11 @@ pub use sides::{FlippedPair, Played};
 pub use text::GateFormat;
 
 use self::sides::{Fill, Sides, joined};
-use super::Replies;
-use super::compare::{Compared, Comparison};
-use super::matching::{Matched, Scenes, Units};
-use super::study::{Block, Study};
 use crate::comparable::Varied;
+use crate::statistics::Replies;
+use crate::statistics::comparisons::compare::{Compared, Comparison};
+use crate::statistics::comparisons::matching::{Matched, Scenes, Units};
+use crate::study::{Block, Study};
 use exact::format::{fixed, p_value};
 use exact::moments::{MomentOverflow, Moments};
 use metric::catalog::{Better, Kind};

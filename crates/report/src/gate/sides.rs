@@ -6,11 +6,11 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::super::matching::Scenes;
-use super::super::study::{Block, Study};
 use super::GateOptions;
 use crate::cells::group::CONDITION;
 use crate::comparable::FINGERPRINT;
+use crate::statistics::comparisons::matching::Scenes;
+use crate::study::{Block, Study};
 use metric::catalog::Better;
 use score::builder::TableBuilder;
 use score::table::{EpisodeTable, Header, KeyRef, LOST, MetricColumn};

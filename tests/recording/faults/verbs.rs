@@ -242,9 +242,9 @@ fn refused_memory_ends_with_a_message_and_leaves_old_or_new_outputs() {
 }
 
 #[test]
-#[ignore = "soak: two thousand allocations of every verb"]
+#[ignore = "soak: two hundred allocations of every verb"]
 fn soak_refused_memory_ends_with_a_message_and_leaves_old_or_new_outputs() {
-    check_memory(2000);
+    check_memory(200);
 }
 
 fn command(home: &Path, words: &str) -> Command {

@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
 """What is compiled in, and under which terms.
 
-supply-chain.py check          licences, sources and duplicates of all packages, by the lists of deny.toml
+supply-chain.py check          licences, sources and duplicates of all packages, by the lists of deny.toml; known faults
+                               of their versions, by advisories.toml
 supply-chain.py sbom FILE      the packages of the wheel as CycloneDX JSON; the same bytes for the same Cargo.lock
 supply-chain.py unsafe         docs/reference/unsafe.md: `unsafe` in packages that touch the bytes of others
 
-`check` needs no network. Where cargo-deny is installed it runs as well, with its database of advisories.
+`check` needs no network. Where cargo-deny is installed it runs as well, with its newer database of advisories.
 """
 
 import hashlib
@@ -102,13 +103,51 @@ def check():
             faults.append(f"{name} is there as {', '.join(unknown)}: give the reason in deny.toml, or update")
     known = {f"{package['name']}@{package['version']}" for package in packages}
     faults += [f"deny.toml skips {name}, which is not there" for name in sorted(skipped - known)]
+    found, uncovered = advised(foreign)
+    faults += found
     if faults:
         fail("\n  ".join(faults))
     print(f"supply-chain: {len(foreign)} packages, licences allowed, {len(twice)} in several versions with reasons")
     if shutil.which("cargo-deny"):
         subprocess.run(["cargo", "deny", "--all-features", "check"], cwd=ROOT, check=True)
     else:
-        print("supply-chain: cargo-deny is not installed: advisories were not checked")
+        print("supply-chain: advisories by advisories.toml alone, as cargo-deny is not installed")
+    if uncovered:
+        print(f"supply-chain: not in advisories.toml: {', '.join(uncovered)}")
+
+
+def numbers(version):
+    return tuple(int(number) for number in re.findall(r"\d+", re.split(r"[-+]", version)[0]))
+
+
+def meets(version, requirement):
+    """Returns true if a version meets each part of a requirement such as `>= 1.2.3, < 1.3` or `^0.4.2`."""
+    found = numbers(version)
+    for part in requirement.split(","):
+        sign, wanted = re.fullmatch(r"\s*(>=|<=|>|<|=|\^|~)?\s*([\w.+-]+)\s*", part).groups()
+        wanted = (numbers(wanted) + (0, 0))[:3]
+        if sign in (None, "^", "~"):
+            # What may change: the numbers behind the first that is not 0, or behind the second.
+            kept = 2 if sign == "~" else next((at + 1 for at, number in enumerate(wanted) if number), 3)
+            is_met = found >= wanted and found[:kept] == wanted[:kept]
+        else:
+            is_met = {">=": found >= wanted, "<=": found <= wanted, ">": found > wanted, "<": found < wanted,
+                      "=": found == wanted}[sign]
+        if not is_met:
+            return False
+    return True
+
+
+def advised(foreign):
+    """Versions with a known fault that advisories.toml does not accept, and packages that it does not cover."""
+    snapshot = tomllib.loads((ROOT / "advisories.toml").read_text())
+    faults = []
+    for entry in snapshot["advisory"]:
+        for package in foreign:
+            is_safe = any(meets(package["version"], good) for good in entry["patched"] + entry.get("unaffected", []))
+            if package["name"] == entry["package"] and not is_safe and "accepted" not in entry:
+                faults.append(f"{package['name']} {package['version']}: {entry['id']}, {entry['title']}: update, or accept it in advisories.toml")
+    return faults, sorted({package["name"] for package in foreign} - set(snapshot["packages"].split()))
 
 
 def compiled_in(data):

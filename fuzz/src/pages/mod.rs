@@ -35,6 +35,8 @@ pub enum Outcome {
     /// Both read the same rows, the library only as keys of a dictionary: as texts it reads ahead into the bytes behind
     /// the last value.
     AgreedOnKeys,
+    /// The program reads all rows. The library would also read a header of a size for which it is not asked.
+    NotAsked,
     /// Both refuse.
     Refused(Depth),
     /// The program refuses what the library reads.
@@ -49,7 +51,7 @@ pub fn bases() -> usize {
 /// The target.
 pub fn target(data: &[u8]) {
     reached(match outcome(data) {
-        Outcome::Agreed | Outcome::AgreedOnKeys => "rows",
+        Outcome::Agreed | Outcome::AgreedOnKeys | Outcome::NotAsked => "rows",
         Outcome::Stricter(_) => "stricter",
         Outcome::Refused(Depth::Header) => "header",
         Outcome::Refused(Depth::Body) => "body",
@@ -75,6 +77,7 @@ pub fn outcome(data: &[u8]) -> Outcome {
         (Ok(ours), Err(_)) if *ours.data_type() == DataType::Utf8 && is_read_as_keys(&mutant, &ours) => {
             Outcome::AgreedOnKeys
         }
+        (Ok(_), Err(error)) if error.contains(reference::TOO_LARGE) => Outcome::NotAsked,
         (Ok(ours), Err(error)) => panic!("the library refuses what is read: {error}; read: {}", shown(&ours)),
         (Err(refusal), Err(_)) => Outcome::Refused(depth(&refusal)),
         (Err(refusal), Ok(theirs)) => {

@@ -22,6 +22,9 @@ use super::thrift::Header;
 /// dictionary before reading its values.
 const MOST: i64 = 1 << 22;
 
+/// The refusal of a larger page.
+pub const TOO_LARGE: &str = "larger than the reference is asked for";
+
 /// The bytes, and the start of the header that was read last.
 struct Stored(Bytes, Mutex<usize>);
 
@@ -48,7 +51,7 @@ impl ChunkReader for Stored {
         let at = self.place(start);
         *self.1.lock().expect("one thread") = at;
         if Header::read(&self.0[at..]).is_some_and(|(header, _)| header.whole > MOST || header.get(1) > MOST) {
-            return Err(refused("larger than the reference is asked for"));
+            return Err(refused(TOO_LARGE));
         }
         Ok(self.0.slice(at..).reader())
     }

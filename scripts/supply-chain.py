@@ -146,7 +146,8 @@ def advised(foreign):
         for package in foreign:
             is_safe = any(meets(package["version"], good) for good in entry["patched"] + entry.get("unaffected", []))
             if package["name"] == entry["package"] and not is_safe and "accepted" not in entry:
-                faults.append(f"{package['name']} {package['version']}: {entry['id']}, {entry['title']}: update, or accept it in advisories.toml")
+                name = f"{package['name']} {package['version']}"
+                faults.append(f"{name}: {entry['id']}, {entry['title']}: update it, or accept this in advisories.toml")
     return faults, sorted({package["name"] for package in foreign} - set(snapshot["packages"].split()))
 
 

@@ -11,7 +11,7 @@
 //! Rule: this crate knows no traces and no plans, only cells and the episode table. A [`style`] defines how numbers
 //! look, [`layout`] makes [`tables::Table`]s of cells under it, [`tables`] formats them, [`figures`] draws, [`html`]
 //! makes the page from all of these, [`bundle`] writes the folder. [`audit`] checks whether any data gives published
-//! tables, [`plan`] how many episodes a comparison needs.
+//! tables, [`plan`] how many episodes a comparison needs, [`gate`] whether later episodes are worse than earlier ones.
 
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 

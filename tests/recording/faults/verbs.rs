@@ -226,7 +226,10 @@ fn check_memory(most: usize) {
     all_at_once(&verbs, |verb| {
         let case = Case::new(prepared.path(), verb);
         let mut rounds: Vec<usize> = (1..=case.allocations()).collect();
-        sample(&mut rounds, most);
+        // Two allocations of its decoder, refused, once looked like a damaged chunk.
+        if !verb.words.starts_with("recover") {
+            sample(&mut rounds, most);
+        }
         tried.fetch_add(rounds.len(), Ordering::Relaxed);
         let by_it = rounds.iter().filter(|at| case.check_memory(**at)).count();
         ended.fetch_add(by_it, Ordering::Relaxed);

@@ -6,6 +6,7 @@
 //! Rule: a chunk states its unpacked size and is never unpacked beyond that. Before unpacking, the stated size is
 //! compared with the chunk's own bytes and counted against the whole log's budget.
 
+use mcap::McapError;
 use mcap::records::{Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
@@ -119,7 +120,7 @@ fn unpacked(
     let mut reader = LinearReader::new_with_options(options.with_record_length_limit(size_unpacked(chunk)));
     let mut rest = chunk;
     while let Some(event) = reader.next_event() {
-        match event.map_err(|fault| fault.to_string())? {
+        match event.map_err(|fault| fault_of(&fault))? {
             LinearReadEvent::ReadRequest(wanted) => {
                 let (now, later) = rest.split_at(wanted.min(rest.len()));
                 reader.insert(now.len()).copy_from_slice(now);
@@ -130,6 +131,13 @@ fn unpacked(
         }
     }
     Ok(())
+}
+
+/// The words of a fault. Refused memory is not damage: it ends the program, as it does in zstd's own library.
+fn fault_of(fault: &McapError) -> String {
+    let words = fault.to_string();
+    assert!(!words.contains("not enough memory"), "{words}");
+    words
 }
 
 /// The complete records of an uncompressed chunk, if the next record claims more bytes than are left.

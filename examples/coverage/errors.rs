@@ -1,12 +1,12 @@
 //! The rates at which tests and families of tests reject true hypotheses.
 
-use crate::tarone::{Attained, tarone_holm};
+use crate::tarone::{Attained, fisher_least_p, mcnemar_least_p, tarone_holm};
 use exact::ratio::Ratio;
 use statistics::chance;
 use statistics::holm::holm;
 use statistics::paired::Pairs;
 use statistics::random::SplitMix64;
-use statistics::unpaired::{fisher, fisher_least_p};
+use statistics::unpaired::fisher;
 
 use crate::{LEVEL, N, SEED, binomial, happens, heading, largest, rates, row, share, successes};
 
@@ -38,7 +38,10 @@ pub fn sizes() {
             (0u64..).zip(binomial(n, rate)).map(given).sum::<f64>()
         };
         let found = |p: &dyn Fn(Pairs) -> Option<f64>| largest(rates().map(|rate| error(p, 2.0 * rate)));
-        row(&format!("McNemar, {n} pairs"), &[found(&Pairs::mcnemar), found(&Pairs::mcnemar_mid_p)]);
+        row(
+            &format!("McNemar, {n} pairs"),
+            &[found(&Pairs::mcnemar), found(&|pairs: Pairs| pairs.test().map(|test| test.mid_p))],
+        );
     }
     for (n, (above, below)) in [(7, (1, 3)), (N, (1, 3)), (50, (1, 3)), (N, (1, 10))] {
         let level = Ratio::new(above, below).expect("a fraction");
@@ -76,7 +79,7 @@ fn mcnemar_family(random: &mut SplitMix64, rates: [f64; 8]) -> Vec<Test> {
         let [both, first_only, second_only, neither] =
             [[true, true], [true, false], [false, true], [false, false]].map(count);
         let pairs = Pairs { both, first_only, second_only, neither };
-        let found = pairs.mcnemar().zip(pairs.mcnemar_least_p());
+        let found = pairs.mcnemar().zip(mcnemar_least_p(pairs));
         found.map(|(p, least)| Attained { p, least }).expect("there are scenes")
     })
 }

@@ -7,6 +7,9 @@
 //! exists; `benches/COVERAGE.md` shows the simulated error. Use exact p values only, because a mid-p value may be below
 //! the least p value.
 
+use statistics::paired::Pairs;
+use statistics::unpaired::fisher;
+
 /// The tolerance for reaching a least p value, because the same number may be computed in different ways.
 const TIE: f64 = 1e-12;
 
@@ -15,9 +18,24 @@ const TIE: f64 = 1e-12;
 pub struct Attained {
     /// The exact p value.
     pub p: f64,
-    /// The least attainable p value, at most `p`: [`statistics::chance::least_p`],
-    /// [`statistics::paired::Pairs::mcnemar_least_p`], [`statistics::unpaired::fisher_least_p`].
+    /// The least attainable p value, at most `p`: [`statistics::chance::least_p`], [`mcnemar_least_p`],
+    /// [`fisher_least_p`].
     pub least: f64,
+}
+
+/// The least p value that [`Pairs::mcnemar`] can give with d discordant pairs: 2^(1 - d), at most 1; `None` without
+/// pairs.
+pub fn mcnemar_least_p(pairs: Pairs) -> Option<f64> {
+    let discordant = pairs.first_only + pairs.second_only;
+    let halvings = i32::try_from(discordant.saturating_sub(1)).unwrap_or(i32::MAX);
+    (pairs.n() > 0).then(|| 0.5f64.powi(halvings))
+}
+
+/// The least p value that [`fisher`] can give with these numbers of episodes and this total of successes.
+pub fn fisher_least_p((k, m): (u64, u64), (l, n): (u64, u64)) -> Option<f64> {
+    let all = k + l;
+    let [fewest, most] = [all.saturating_sub(n), m.min(all)].map(|first| fisher((first, m), (all - first, n)));
+    Some(fewest?.p.min(most?.p))
 }
 
 /// Adjusted p values in input order; a test is rejected if its value is at most the level.

@@ -27,7 +27,8 @@ pub fn exact_test(successes: u64, n: u64, level: Ratio) -> Option<ExactTest> {
 /// for n = 0 and for a level outside [0, 1].
 pub fn least_p(n: u64, level: Ratio) -> Option<f64> {
     let odds = Odds::of(level).filter(|_| n > 0)?;
-    Some(exact_least_p(n, odds).unwrap_or_else(|| by_recurrence(n, odds).least_p()))
+    let ends = exact(0, n, odds).zip(exact(n, n, odds));
+    Some(ends.map_or_else(|| by_recurrence(n, odds).least_p(), |(none, all)| none.p.min(all.p)))
 }
 
 /// `hit` to `miss`: the level 1/3 is 1 to 2.
@@ -56,13 +57,6 @@ fn exact(successes: u64, n: u64, odds: Odds) -> Option<ExactTest> {
     // At a level of 0 or 1 only one count is possible, and it is no evidence.
     let mid_p = if seen == total { 1.0 } else { (as_extreme as f64 - tied as f64 / 2.0) / total as f64 };
     Some(ExactTest { p, mid_p })
-}
-
-fn exact_least_p(n: u64, odds: Odds) -> Option<f64> {
-    let (weights, total) = exact_weights(n, odds)?;
-    let least = *weights.iter().min()?;
-    let as_extreme: u128 = weights.iter().filter(|&&weight| weight == least).sum();
-    Some(as_extreme as f64 / total as f64)
 }
 
 /// Counts weigh `C(n, j) * hit^j * miss^(n - j)`; and their sum. `None` if one does not fit 128 bits.

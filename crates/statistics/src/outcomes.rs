@@ -63,33 +63,45 @@ impl Outcomes {
 
     /// The least p value of any count; 0 if it underflows.
     pub fn least_p(&self) -> f64 {
-        let [low, high] = [self.weights.first(), self.weights.last()].map(|weight| weight.copied().unwrap_or(0.0));
-        let total: f64 = self.weights.iter().sum();
-        match (self.whole, (low - high).abs() <= TIE * low.max(high)) {
-            (false, _) => 0.0,
-            (true, true) if self.weights.len() > 1 => (low + high) / total,
-            (true, _) => low.min(high) / total,
-        }
+        let last = self.first + self.weights.len() as u64 - 1;
+        if self.whole { self.test(self.first).p.min(self.test(last).p) } else { 0.0 }
     }
 
     pub fn len(&self) -> usize {
         self.weights.len()
     }
 
+    /// The probability of each count from 0 to `last`; 0 if it underflows.
+    pub fn probabilities(&self, last: u64) -> Vec<f64> {
+        let total: f64 = self.weights.iter().sum();
+        let mut all = vec![0.0; size(last + 1)];
+        all[size(self.first)..].iter_mut().zip(&self.weights).for_each(|(all, weight)| *all = weight / total);
+        all
+    }
+
     /// The sum of two independent counts.
     pub(crate) fn plus(&self, other: &Self) -> Self {
-        let mut weights = vec![0.0; self.len() + other.len() - 1];
-        for (i, a) in self.weights.iter().enumerate() {
-            for (sum, b) in weights[i..].iter_mut().zip(&other.weights) {
-                *sum += a * b;
-            }
-        }
+        let mut weights = convolved(&self.weights, &other.weights);
         let largest = weights.iter().copied().fold(0.0, f64::max);
         for weight in &mut weights {
             *weight /= largest;
         }
         Self { first: self.first + other.first, weights, whole: self.whole && other.whole }
     }
+}
+
+/// The probabilities, or weights, of each sum of two independent counts.
+pub(super) fn convolved(a: &[f64], b: &[f64]) -> Vec<f64> {
+    let mut sums = vec![0.0; a.len() + b.len() - 1];
+    for (i, x) in a.iter().enumerate() {
+        sums[i..].iter_mut().zip(b).for_each(|(sum, y)| *sum += x * y);
+    }
+    sums
+}
+
+/// A count of episodes as an index.
+pub(super) fn size(count: u64) -> usize {
+    usize::try_from(count).expect("counts of episodes are far below the address space")
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::feasible::first_not;
 use super::quantile;
 use super::unpaired::fisher;
 
@@ -31,16 +32,9 @@ pub struct Detectable {
 /// under Holm's procedure needs `level / m` for its first rejection. d pairs in one direction have p = 2^(1-d); the
 /// power is a binomial tail, inverted by the beta distribution.
 pub fn detectable(n: u64, level: f64) -> Option<Detectable> {
-    let mut p = 1.0;
-    let mut pairs = 1;
-    while p > level {
-        p /= 2.0;
-        pairs += 1;
-        if pairs > n {
-            return None;
-        }
-    }
-    (n > 0).then(|| Detectable {
+    let p_values = std::iter::successors(Some(1.0), |p| Some(p / 2.0));
+    let (pairs, _) = (1..=n).zip(p_values).find(|(_, p)| *p <= level)?;
+    Some(Detectable {
         n,
         level,
         pairs,
@@ -52,15 +46,9 @@ pub fn detectable(n: u64, level: f64) -> Option<Detectable> {
 /// The same for two independent samples of `n` episodes each by Fisher's exact test: k successes against zero.
 pub fn detectable_unpaired(n: u64, level: f64) -> Option<Detectable> {
     let is_enough = |k: u64| fisher((k, n), (0, n)).is_some_and(|test| test.p <= level);
-    if n == 0 || !is_enough(n) {
-        return None;
-    }
     // The p value falls with k.
-    let (mut least, mut enough) = (0, n);
-    while enough - least > 1 {
-        let middle = least + (enough - least) / 2;
-        if is_enough(middle) { enough = middle } else { least = middle }
-    }
+    let enough = first_not((1, n.into()), |k| !u64::try_from(k).is_ok_and(is_enough));
+    let enough = u64::try_from(enough).ok().filter(|enough| *enough <= n)?;
     Some(Detectable { n, level, pairs: enough, smallest: enough as f64 / n as f64, likely: None })
 }
 

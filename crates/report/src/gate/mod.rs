@@ -178,47 +178,39 @@ impl Gate {
 
 fn apart(study: &Study) -> Vec<String> {
     let couples = study.experiments.iter().flat_map(|experiment| sides::couples(&experiment.blocks));
-    let both = couples.filter_map(|(base, new)| Some((base?, new?)));
-    both.filter_map(|(base, new)| study.setting_between(base, new, Varied::Model)).collect()
+    couples.filter_map(|[base, new]| study.setting_between(base?, new?, Varied::Model)).collect()
 }
 
 fn judged(study: &Study, options: &GateOptions, barrier: Option<&str>) -> Vec<GateCell> {
     let Some(column) = study.column(&options.metric) else { return Vec::new() };
     let couples: Vec<_> = study.experiments.iter().flat_map(|experiment| sides::couples(&experiment.blocks)).collect();
-    let setting = |couple: &(Option<&Block>, Option<&Block>)| match couple {
-        (Some(base), Some(new)) if !options.pool => {
+    let setting = |couple: &[Option<&Block>; 2]| match couple {
+        [Some(base), Some(new)] if !options.pool => {
             barrier.map(str::to_owned).or_else(|| study.setting_between(base, new, Varied::Model))
         }
-        (Some(_), Some(_)) => None,
-        (None, _) => Some("BASE has no episode".to_owned()),
-        (_, None) => Some("NEW has no episode".to_owned()),
+        [Some(_), Some(_)] => None,
+        [None, _] => Some("BASE has no episode".to_owned()),
+        [_, None] => Some("NEW has no episode".to_owned()),
     };
     let settings: Vec<Option<String>> = couples.iter().map(setting).collect();
     let tests = settings.iter().filter(|setting| setting.is_none()).count();
-    let tried = couples.iter().zip(&settings).map(|(couple, setting)| {
-        let (base, new) = (couple.0?, couple.1?);
-        setting.is_none().then(|| Tried::of(study, column, [base, new], options, tests))
+    let tried = couples.iter().zip(&settings).map(|(&[base, new], setting)| {
+        let blocks = [base?, new?];
+        setting.is_none().then(|| (Tried::of(study, column, blocks, options, tests), blocks))
     });
-    let tried: Vec<Option<Tried>> = tried.collect();
+    let tried: Vec<Option<(Tried, [&Block; 2])>> = tried.collect();
     let adjusted = |of: fn(&Tried) -> Option<f64>| {
-        let p_values: Vec<f64> = tried.iter().flatten().filter_map(of).collect();
-        let mut values = holm(&p_values).into_iter();
-        tried.iter().map(|tried| tried.as_ref().and_then(of).and_then(|_| values.next())).collect::<Vec<_>>()
+        holm(&tried.iter().flatten().filter_map(|(tried, _)| of(tried)).collect::<Vec<_>>()).into_iter()
     };
-    let adjusted = adjusted(|tried| tried.comparison.p).into_iter().zip(adjusted(|tried| tried.held));
-    let parts = couples.iter().zip(settings).zip(tried.iter().zip(adjusted));
-    parts
-        .map(|((couple, setting), (tried, adjusted))| {
-            let cell = GateCell::blank(study, column, *couple, setting);
-            match (tried, couple) {
-                (Some(tried), (Some(base), Some(new))) => {
-                    let cell = GateCell { flips: sides::flips(study, column, [base, new]), ..cell };
-                    cell.decided(tried, adjusted, tests, options, (study, new))
-                }
-                _ => cell,
-            }
-        })
-        .collect()
+    let (mut apart, mut held) = (adjusted(|tried| tried.comparison.p), adjusted(|tried| tried.held));
+    let cells = couples.iter().zip(settings).zip(&tried).map(|((couple, setting), tried)| {
+        let cell = GateCell::blank(study, column, *couple, setting);
+        let Some((tried, blocks)) = tried else { return cell };
+        let adjusted = (tried.comparison.p.and_then(|_| apart.next()), tried.held.and_then(|_| held.next()));
+        let cell = GateCell { flips: sides::flips(study, column, *blocks), ..cell };
+        cell.decided(tried, adjusted, tests, options, (study, blocks[1]))
+    });
+    cells.collect()
 }
 
 impl Tried {
@@ -268,12 +260,7 @@ fn units(study: &Study, column: &MetricColumn, [base, new]: [&Block; 2]) -> marg
 }
 
 impl GateCell {
-    fn blank(
-        study: &Study,
-        column: &MetricColumn,
-        (base, new): (Option<&Block>, Option<&Block>),
-        setting: Option<String>,
-    ) -> Self {
+    fn blank(study: &Study, column: &MetricColumn, [base, new]: [Option<&Block>; 2], setting: Option<String>) -> Self {
         let (model, experiment) = new.or(base).map_or(("", ""), |block| (block.model, block.experiment));
         let side = |block: Option<&Block>| {
             let moments = block.map(|block| block.moments(column)).unwrap_or_default();

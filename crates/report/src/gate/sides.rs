@@ -145,13 +145,13 @@ pub(super) fn joined(sides: &Sides, options: &GateOptions, fill: Fill) -> Episod
     EpisodeTable { declared, ..builder.finish() }
 }
 
-pub(super) fn couples<'s, 'a>(blocks: &'s [Block<'a>]) -> Vec<(Option<&'s Block<'a>>, Option<&'s Block<'a>>)> {
+pub(super) fn couples<'s, 'a>(blocks: &'s [Block<'a>]) -> Vec<[Option<&'s Block<'a>>; 2]> {
     let mut couples = BTreeMap::<_, [Option<&Block>; 2]>::new();
     for block in blocks {
         let Some((mark, condition)) = block.condition.map(|text| text.split_at(MARKS[0].len())) else { continue };
         couples.entry((block.model, condition)).or_default()[usize::from(mark == MARKS[1])].get_or_insert(block);
     }
-    couples.into_values().map(|[base, new]| (base, new)).collect()
+    couples.into_values().collect()
 }
 
 /// The condition of a block without its side; `None` for the default one.

@@ -3,8 +3,9 @@
 use std::fmt::Write as _;
 
 use super::{FlippedPair, Gate, GateCell, GateSide, GateVerdict, Played};
+use crate::statistics::text::percent;
 use crate::study::named;
-use crate::tables::{Table, push_wrapped};
+use crate::tables::{Table, escape_markdown, push_wrapped};
 use exact::escape::visible;
 use exact::format::{UNDEFINED, fixed};
 
@@ -20,14 +21,19 @@ pub enum GateFormat {
     Junit,
 }
 
-pub(super) const fn name(verdict: GateVerdict) -> &'static str {
+/// The verdict for people, as a workflow command, and as an element of `JUnit`.
+const fn spelled(verdict: GateVerdict) -> [&'static str; 3] {
     match verdict {
-        GateVerdict::Improved => "improved",
-        GateVerdict::Held => "held",
-        GateVerdict::CannotSay => "cannot say",
-        GateVerdict::NotComparable => "not comparable",
-        GateVerdict::Regressed => "regressed",
+        GateVerdict::Improved => ["improved", "notice", "system-out"],
+        GateVerdict::Held => ["held", "notice", "system-out"],
+        GateVerdict::CannotSay => ["cannot say", "warning", "skipped"],
+        GateVerdict::NotComparable => ["not comparable", "error", "error"],
+        GateVerdict::Regressed => ["regressed", "error", "failure"],
     }
+}
+
+pub(super) const fn name(verdict: GateVerdict) -> &'static str {
+    spelled(verdict)[0]
 }
 
 impl Gate {
@@ -42,12 +48,11 @@ impl Gate {
     }
 
     fn title(&self) -> String {
-        format!(
-            "{}, margin {}, {} confidence",
-            self.metric,
-            self.margin,
-            crate::statistics::text::percent(self.confidence)
-        )
+        format!("{}, margin {}, {} confidence", self.metric, self.margin, percent(self.confidence))
+    }
+
+    fn count(&self, verdict: GateVerdict) -> usize {
+        self.cells.iter().filter(|cell| cell.verdict == verdict).count()
     }
 
     fn table(&self) -> Table {
@@ -80,38 +85,32 @@ impl Gate {
     fn markdown(&self) -> String {
         let mut text = self.table().titled(self.title()).markdown();
         let cells = self.cells.iter().flat_map(|cell| cell.flips.iter().map(move |flip| (cell, flip)));
-        let escape = crate::tables::escape_markdown;
         for (at, (cell, flip)) in cells.enumerate() {
             let about = format!("{}, {}: {}", cell.experiment, cell.name(), words(flip));
-            let _ = writeln!(text, "{}- {}", if at == 0 { "\n" } else { "" }, escape(&visible(&about)));
+            let _ = writeln!(text, "{}- {}", if at == 0 { "\n" } else { "" }, escape_markdown(&visible(&about)));
         }
         for sentence in &self.caveats {
-            let _ = writeln!(text, "\n{}", escape(&visible(sentence)));
+            let _ = writeln!(text, "\n{}", escape_markdown(&visible(sentence)));
         }
         text + "\n" + &self.sum() + "\n"
     }
 
     fn workflow_command(&self, cell: &GateCell) -> String {
-        let command = match cell.verdict {
-            GateVerdict::Regressed | GateVerdict::NotComparable => "error",
-            GateVerdict::CannotSay => "warning",
-            GateVerdict::Held | GateVerdict::Improved => "notice",
-        };
+        let [name, command, _] = spelled(cell.verdict);
         let data = |text: &str| text.replace('%', "%25").replace('\r', "%0D").replace('\n', "%0A");
         let property = |text: &str| data(text).replace(':', "%3A").replace(',', "%2C");
-        let title = format!("{} {} {}: {}", cell.experiment, cell.name(), self.metric, name(cell.verdict));
+        let title = format!("{} {} {}: {name}", cell.experiment, cell.name(), self.metric);
         let message: Vec<String> = std::iter::once(self.sentence(cell)).chain(cell.flips.iter().map(words)).collect();
         format!("::{command} title={}::{}\n", property(&visible(&title)), data(&message.join("\n")))
     }
 
     fn junit(&self) -> String {
-        let count = |verdict| self.cells.iter().filter(|cell| cell.verdict == verdict).count();
         let counts = format!(
             "tests=\"{}\" failures=\"{}\" errors=\"{}\" skipped=\"{}\"",
             self.cells.len(),
-            count(GateVerdict::Regressed),
-            count(GateVerdict::NotComparable),
-            count(GateVerdict::CannotSay)
+            self.count(GateVerdict::Regressed),
+            self.count(GateVerdict::NotComparable),
+            self.count(GateVerdict::CannotSay)
         );
         let cases: String = self.cells.iter().map(|cell| self.test_case(cell)).collect();
         let title = xml(&self.title());
@@ -128,12 +127,7 @@ impl Gate {
             xml(&cell.name()),
             xml(&self.metric)
         );
-        let element = match cell.verdict {
-            GateVerdict::Regressed => "failure",
-            GateVerdict::NotComparable => "error",
-            GateVerdict::CannotSay => "skipped",
-            GateVerdict::Held | GateVerdict::Improved => "system-out",
-        };
+        let [.., element] = spelled(cell.verdict);
         let flips: Vec<String> = cell.flips.iter().map(|flip| xml(&words(flip))).collect();
         let sentence = xml(&self.sentence(cell));
         let inner = if element == "system-out" {
@@ -157,8 +151,8 @@ impl Gate {
             GateVerdict::NotComparable,
             GateVerdict::CannotSay,
         ];
-        let count = |verdict| self.cells.iter().filter(|cell| cell.verdict == verdict).count();
-        let counts = order.into_iter().map(|verdict| (count(verdict), name(verdict))).filter(|(count, _)| *count > 0);
+        let counts =
+            order.into_iter().map(|verdict| (self.count(verdict), name(verdict))).filter(|(count, _)| *count > 0);
         let counts: Vec<String> = counts.map(|(count, name)| format!("{count} {name}")).collect();
         format!("verdict: {}; cells: {}", name(self.verdict), counts.join(", "))
     }

@@ -14,12 +14,6 @@ pub fn fisher(first: (u64, u64), second: (u64, u64)) -> Option<ExactTest> {
     Some(tables(first, second)?.test(first.0))
 }
 
-/// The least p value that [`fisher`] can give with these numbers of episodes and this total of successes. `None` as in
-/// [`fisher`].
-pub fn fisher_least_p(first: (u64, u64), second: (u64, u64)) -> Option<f64> {
-    Some(tables(first, second)?.least_p())
-}
-
 /// The possible successes of the first side given the margins: the hypergeometric distribution. `None` if a side has no
 /// episodes, or more successes than episodes.
 pub(crate) fn tables((k, m): (u64, u64), (l, n): (u64, u64)) -> Option<Outcomes> {
@@ -71,8 +65,13 @@ pub(crate) fn satterthwaite(sides: [(f64, f64); 2]) -> (f64, f64) {
 mod tests {
     use proptest::prelude::*;
 
-    use super::{Interval, fisher, fisher_least_p, newcombe, welch};
+    use super::{Interval, fisher, newcombe, tables, welch};
     use exact::moments::Moments;
+
+    /// The least p value that [`fisher`] can give with these numbers of episodes and this total of successes.
+    fn fisher_least_p(first: (u64, u64), second: (u64, u64)) -> Option<f64> {
+        Some(tables(first, second)?.least_p())
+    }
 
     fn close(found: f64, expected: f64) {
         assert!((found / expected - 1.0).abs() < 1e-9, "found {found}, expected {expected}");

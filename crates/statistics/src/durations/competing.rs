@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 
 pub use crate::survival::{Ending, Outcome};
-use crate::survival::{RestrictedMean, RiskSet, risk_sets};
+use crate::survival::{Point, RestrictedMean, is_known, points};
 
 /// The tolerance around one half, for rounding only.
 const HALF: f64 = 0.5 - 1e-12;
@@ -15,19 +15,6 @@ const HALF: f64 = 0.5 - 1e-12;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Incidence {
     points: Vec<Point>,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Point {
-    steps: i64,
-    at_risk: f64,
-    correct: f64,
-    wrong: f64,
-    censored: f64,
-    /// The share undecided before this step.
-    before: f64,
-    is_correct: f64,
-    is_wrong: f64,
 }
 
 /// The contribution of each kind of episode to a restricted mean: the derivative by the episode's weight. The sum of
@@ -41,32 +28,27 @@ pub(crate) struct Influence {
 impl Incidence {
     /// The curve of these episodes; `None` without any.
     pub fn of(endings: &[Ending]) -> Option<Self> {
-        let (mut is_correct, mut is_wrong) = (0.0, 0.0);
-        let of_step = |RiskSet { steps, at_risk, ended, before, .. }: RiskSet| {
-            let at_risk = at_risk as f64;
-            let [correct, wrong, censored] = ended.map(|count| count as f64);
-            is_correct += before * correct / at_risk;
-            is_wrong += before * wrong / at_risk;
-            Point { steps, at_risk, correct, wrong, censored, before, is_correct, is_wrong }
-        };
-        let points: Vec<Point> = risk_sets(endings).into_iter().map(of_step).collect();
-        (!points.is_empty()).then_some(Self { points })
+        Some(Self { points: points(endings)? })
+    }
+
+    /// Each step, and the shares decided correctly and wrongly by its end.
+    fn curve(&self) -> impl Iterator<Item = (i64, [f64; 2])> {
+        self.points.iter().scan([0.0; 2], |shares, point| {
+            let [correct, wrong, _] = point.counts();
+            let more = [correct, wrong].map(|ended| point.before * ended / point.at_risk as f64);
+            *shares = [shares[0] + more[0], shares[1] + more[1]];
+            Some((point.steps, *shares))
+        })
     }
 
     /// The shares decided correctly and wrongly by the end of a step; the remainder is undecided.
     pub fn shares(&self, steps: i64) -> [f64; 2] {
-        let last = self.points.iter().rev().find(|point| point.steps <= steps);
-        last.map_or([0.0; 2], |point| [point.is_correct, point.is_wrong])
+        self.curve().take_while(|(at, _)| *at <= steps).last().map_or([0.0; 2], |(_, shares)| shares)
     }
 
     /// The first step by which at least half of all episodes are decided correctly; `None` if that never happens.
     pub fn median(&self) -> Option<i64> {
-        self.points.iter().find(|point| point.is_correct >= HALF).map(|point| point.steps)
-    }
-
-    /// The last step at which the curve is known; `None` if all are decided, so that it is known forever.
-    pub(crate) fn known_until(&self) -> Option<i64> {
-        self.points.last().filter(|last| last.at_risk > last.correct + last.wrong).map(|last| last.steps)
+        self.curve().find(|(_, [correct, _])| *correct >= HALF).map(|(steps, _)| steps)
     }
 
     /// The mean number of steps to a correct decision; later than `horizon` and never both count as `horizon`. It
@@ -74,31 +56,29 @@ impl Incidence {
     /// jackknife's times sqrt(n / (n - 1)). `None` for a horizon not positive or beyond the known part of the curve,
     /// and for a confidence outside (0, 1).
     pub fn restricted_mean(&self, horizon: i64, confidence: f64) -> Option<RestrictedMean> {
-        if horizon <= 0 || self.known_until().is_some_and(|known| known < horizon) {
+        if !is_known(&self.points, horizon) {
             return None;
         }
         let variance = self.variance(&self.influence(horizon));
         RestrictedMean::of(horizon, self.mean(horizon), variance, self.n(), confidence)
     }
 
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count")]
     pub fn n(&self) -> u64 {
-        self.points.first().map_or(0, |first| first.at_risk as u64)
+        self.points[0].at_risk
     }
 
     fn mean(&self, horizon: i64) -> f64 {
         let early = self.points.iter().take_while(|point| point.steps < horizon);
-        let area: f64 = early.map(|point| point.gain(horizon) * point.correct / point.at_risk).sum();
+        let area: f64 = early.map(|point| point.gain(horizon) * point.counts()[0] / point.at_risk as f64).sum();
         horizon as f64 - area
     }
 
     fn variance(&self, influence: &Influence) -> f64 {
         let of_point = |point: &Point| {
             let [taken, correct, wrong] = influence.points[&point.steps];
-            let square = |x: f64| x * x;
-            point.correct * square(correct - taken)
-                + point.wrong * square(wrong - taken)
-                + point.censored * square(taken)
+            let squares = [correct - taken, wrong - taken, taken].map(|x| x * x);
+            let [correct, wrong, censored] = point.counts();
+            correct * squares[0] + wrong * squares[1] + censored * squares[2]
         };
         self.points.iter().map(of_point).sum()
     }
@@ -110,16 +90,18 @@ impl Incidence {
         let mut slopes = Vec::with_capacity(self.points.len());
         for point in self.points.iter().rev() {
             let gain = if point.steps < horizon { point.gain(horizon) } else { 0.0 };
-            let left = 1.0 - (point.correct + point.wrong) / point.at_risk;
+            let left = 1.0 - point.decided as f64 / point.at_risk as f64;
             let lost = if left > 0.0 { later / left } else { 0.0 };
             slopes.push([lost - gain, lost]);
-            later += gain * point.correct / point.at_risk;
+            later += gain * point.counts()[0] / point.at_risk as f64;
         }
         let mut taken = 0.0;
         let mut points = BTreeMap::new();
         for (point, slopes) in self.points.iter().zip(slopes.into_iter().rev()) {
-            let [correct, wrong] = slopes.map(|slope| slope / point.at_risk);
-            taken += (correct * point.correct + wrong * point.wrong) / point.at_risk;
+            let at_risk = point.at_risk as f64;
+            let [correct, wrong] = slopes.map(|slope| slope / at_risk);
+            let [are_correct, are_wrong, _] = point.counts();
+            taken += (correct * are_correct + wrong * are_wrong) / at_risk;
             points.insert(point.steps, [taken, correct, wrong]);
         }
         Influence { points }
@@ -127,6 +109,11 @@ impl Incidence {
 }
 
 impl Point {
+    /// The episodes that ended in this step, by [`Outcome`].
+    fn counts(&self) -> [f64; 3] {
+        self.ended.map(|count| count as f64)
+    }
+
     fn gain(&self, horizon: i64) -> f64 {
         self.before * (horizon - self.steps) as f64
     }
@@ -148,7 +135,7 @@ impl Influence {
 #[expect(clippy::unreadable_literal, reason = "reference values as their sources print them")]
 pub(super) mod tests {
     use super::{Ending, Incidence, Outcome};
-    use crate::survival::Survival;
+    use crate::survival::{Survival, known_until};
 
     /// Endings: the steps, and `c` for correct, `w` for wrong, `-` for unfinished.
     pub(crate) fn endings(written: &str) -> Vec<Ending> {
@@ -187,7 +174,7 @@ pub(super) mod tests {
             close(found_correct, correct);
             close(found_wrong, wrong);
         }
-        assert_eq!((curve.median(), curve.known_until(), curve.n()), (None, Some(100), 15));
+        assert_eq!((curve.median(), known_until(&curve.points), curve.n()), (None, Some(100), 15));
         assert_eq!(Incidence::of(&endings("7c 9c 11w 100-")).unwrap().median(), Some(9));
     }
 

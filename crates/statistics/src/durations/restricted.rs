@@ -9,7 +9,7 @@ use crate::clustered::fewest_clusters;
 use crate::competing::{Ending, Incidence, Influence};
 use crate::interval::{Interval, student_t_of};
 use crate::quantile;
-use crate::survival::{has_spread, small_sample};
+use crate::survival::{Survival, common_horizon, has_spread, small_sample};
 use crate::units::Sides;
 use crate::unpaired::satterthwaite;
 use exact::moments::Moments;
@@ -83,8 +83,8 @@ fn mean_of(values: &[f64]) -> (f64, (f64, f64)) {
 
 /// The last step at which both curves are known; the longest episode if both are known forever.
 pub fn shared_horizon(first: &[Ending], second: &[Ending]) -> Option<i64> {
-    let known = [first, second].into_iter().filter_map(|side| Incidence::of(side)?.known_until()).min();
-    known.or_else(|| first.iter().chain(second).map(|ending| ending.steps).max())
+    let curves: Vec<Survival> = [first, second].into_iter().filter_map(Survival::of).collect();
+    common_horizon(&curves)
 }
 
 /// The difference of the means of two sides, and the influences of their episodes.

@@ -34,34 +34,46 @@ pub enum Outcome {
 
 /// The episodes at one step in which some ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct RiskSet {
+pub struct Point {
     pub steps: i64,
     /// The episodes that lasted until this step.
     pub at_risk: u64,
+    pub decided: u64,
     /// The episodes that ended in this step, by [`Outcome`].
-    pub ended: [u64; 3],
+    pub(crate) ended: [u64; 3],
     /// The share undecided before this step.
-    pub before: f64,
+    pub(crate) before: f64,
     /// The share undecided after this step.
-    pub after: f64,
+    pub undecided: f64,
 }
 
-/// The steps in which an episode ended, ascending. A decision in a step comes before censoring in that step.
-pub(crate) fn risk_sets(endings: &[Ending]) -> Vec<RiskSet> {
+/// The steps in which an episode ended, ascending; `None` without episodes. A decision in a step comes before censoring
+/// in that step.
+pub(crate) fn points(endings: &[Ending]) -> Option<Vec<Point>> {
     let mut ends: BTreeMap<i64, [u64; 3]> = BTreeMap::new();
     for ending in endings {
         ends.entry(ending.steps).or_default()[ending.outcome as usize] += 1;
     }
     let (mut at_risk, mut before) = (endings.len() as u64, 1.0);
     let of_step = |(steps, ended): (i64, [u64; 3])| {
-        let undecided = at_risk - ended[Outcome::Correct as usize] - ended[Outcome::Wrong as usize];
-        let after = before * (undecided as f64 / at_risk as f64);
-        let set = RiskSet { steps, at_risk, ended, before, after };
+        let decided = ended[Outcome::Correct as usize] + ended[Outcome::Wrong as usize];
+        let undecided = before * ((at_risk - decided) as f64 / at_risk as f64);
+        let point = Point { steps, at_risk, decided, ended, before, undecided };
         at_risk -= ended.iter().sum::<u64>();
-        before = after;
-        set
+        before = undecided;
+        point
     };
-    ends.into_iter().map(of_step).collect()
+    (!ends.is_empty()).then(|| ends.into_iter().map(of_step).collect())
+}
+
+/// The last step at which a curve is known; `None` if all are decided, so that it is known forever.
+pub(crate) fn known_until(points: &[Point]) -> Option<i64> {
+    points.last().filter(|last| last.at_risk > last.decided).map(|last| last.steps)
+}
+
+/// Returns true if a restricted mean up to the horizon is defined.
+pub(crate) fn is_known(points: &[Point], horizon: i64) -> bool {
+    horizon > 0 && known_until(points).is_none_or(|known| known >= horizon)
 }
 
 /// A Kaplan-Meier curve (Kaplan and Meier 1958): the share of episodes undecided after each step.
@@ -69,16 +81,6 @@ pub(crate) fn risk_sets(endings: &[Ending]) -> Vec<RiskSet> {
 pub struct Survival {
     /// The steps in which an episode ended, ascending.
     pub points: Vec<Point>,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Point {
-    pub steps: i64,
-    /// The episodes that lasted until this step.
-    pub at_risk: u64,
-    pub decided: u64,
-    /// The share undecided after this step.
-    pub undecided: f64,
 }
 
 /// The mean duration up to a horizon.
@@ -134,12 +136,7 @@ impl Survival {
     /// The curve of these episodes, with any decision as the event; `None` without any. It is the share that the
     /// Aalen-Johansen curves of both decisions leave undecided.
     pub fn of(endings: &[Ending]) -> Option<Self> {
-        let point = |RiskSet { steps, at_risk, ended, after, .. }: RiskSet| {
-            let decided = ended[Outcome::Correct as usize] + ended[Outcome::Wrong as usize];
-            Point { steps, at_risk, decided, undecided: after }
-        };
-        let points: Vec<Point> = risk_sets(endings).into_iter().map(point).collect();
-        (!points.is_empty()).then_some(Self { points })
+        Some(Self { points: points(endings)? })
     }
 
     /// The first step by which at least half are decided; `None` if the curve stays above one half.
@@ -147,21 +144,11 @@ impl Survival {
         self.points.iter().find(|point| point.undecided <= HALF).map(|point| point.steps)
     }
 
-    /// The last step at which the curve is known; `None` if all are decided, so that it is known forever.
-    pub(crate) fn known_until(&self) -> Option<i64> {
-        self.points.last().filter(|point| point.undecided > 0.0).map(|point| point.steps)
-    }
-
-    /// The longest observed duration, decided or not.
-    pub fn longest(&self) -> Option<i64> {
-        self.points.last().map(|point| point.steps)
-    }
-
     /// The mean duration up to `horizon` (Irwin 1949; Royston and Parmar 2013), its variance by Greenwood's formula
     /// (Klein and Moeschberger 2003, equation 4.5.2). `None` for a horizon not positive or beyond the known part of the
     /// curve, and for a confidence outside (0, 1).
     pub fn restricted_mean(&self, horizon: i64, confidence: f64) -> Option<RestrictedMean> {
-        if horizon <= 0 || self.known_until().is_some_and(|known| known < horizon) {
+        if !is_known(&self.points, horizon) {
             return None;
         }
         let (mut area, mut variance, mut later) = (0.0, 0.0, horizon);
@@ -210,14 +197,15 @@ fn log_log(share: f64, sum: f64, z: f64) -> Interval {
 /// The last step at which every curve is known: restricted means up to it are comparable. The longest duration of all if
 /// every curve is known forever; `None` without curves.
 pub fn common_horizon<'a>(curves: impl IntoIterator<Item = &'a Survival> + Clone) -> Option<i64> {
-    let known = curves.clone().into_iter().filter_map(Survival::known_until).min();
-    known.or_else(|| curves.into_iter().filter_map(Survival::longest).max())
+    let curves = || curves.clone().into_iter().map(|curve| &*curve.points);
+    let known = curves().filter_map(known_until).min();
+    known.or_else(|| curves().filter_map(|points| Some(points.last()?.steps)).max())
 }
 
 #[cfg(test)]
 #[expect(clippy::unreadable_literal, reason = "reference values as their sources print them")]
 mod tests {
-    use super::{Ending, MedianInterval, Outcome, Survival, common_horizon};
+    use super::{Ending, MedianInterval, Outcome, Survival, common_horizon, known_until};
 
     fn curve(durations: &[i64]) -> Survival {
         let outcome = |steps: i64| if steps > 0 { Outcome::Correct } else { Outcome::Unfinished };
@@ -243,7 +231,7 @@ mod tests {
         close(at(23).undecided, 0.44817927170868327);
         assert_eq!((at(10).at_risk, at(10).decided), (15, 1));
         assert_eq!(curve.median(), Some(23));
-        assert_eq!((curve.known_until(), curve.longest()), (Some(35), Some(35)));
+        assert_eq!((known_until(&curve.points), common_horizon([&curve])), (Some(35), Some(35)));
     }
 
     // lifelines 0.30.3: restricted_mean_survival_time(km, t=tau); standard errors by exact fractions in Python:

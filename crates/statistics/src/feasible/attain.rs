@@ -9,6 +9,8 @@
 
 use std::collections::HashSet;
 
+use super::first_not;
+
 /// `count` integers from 0 to `most`, their sum and the sum of their squares.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 struct Question {
@@ -99,12 +101,8 @@ pub(crate) fn ends(count: i128, (low, high): (i128, i128), sum: i128) -> Option<
 /// on, the smallest sum of squares of it and the others grows with it.
 fn largest_that_leaves(count: i128, most: i128, sum: i128, squares: i128) -> i128 {
     let leaves = |largest: i128| largest * largest + least_squares(count - 1, sum - largest) <= squares;
-    let (mut low, mut high) = ((sum + count - 1) / count, most);
-    while low < high {
-        let middle = low + (high - low + 1) / 2;
-        if leaves(middle) { low = middle } else { high = middle - 1 }
-    }
-    low
+    let mean = (sum + count - 1) / count;
+    first_not((mean + 1, most), leaves) - 1
 }
 
 fn least_squares(count: i128, sum: i128) -> i128 {

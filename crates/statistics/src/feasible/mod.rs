@@ -131,7 +131,7 @@ fn compare(printed: Option<Decimal>, target: Decimal) -> Ordering {
 }
 
 /// The first integer of a span for which `holds` is false; one past its end if there is none.
-fn first_not((mut low, high): Span, holds: impl Fn(i128) -> bool) -> i128 {
+pub(crate) fn first_not((mut low, high): Span, holds: impl Fn(i128) -> bool) -> i128 {
     let mut beyond = (high + 1).max(low);
     while low < beyond {
         let middle = low + (beyond - low) / 2;

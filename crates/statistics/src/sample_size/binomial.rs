@@ -2,14 +2,17 @@
 //!
 //! Rule: only additions, products and quotients, so all machines get the same bits. Underflow gives 0.
 
+use crate::outcomes::Outcomes;
+
 /// The probability of each number of successes in `n` trials with this rate.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "counts of episodes")]
 pub(crate) fn probabilities(n: u64, rate: f64) -> Vec<f64> {
     let rate = rate.clamp(0.0, 1.0);
     let mode = (((n + 1) as f64 * rate) as u64).min(n);
     let odds = rate / (1.0 - rate);
-    // P(k + 1) / P(k) = (n - k) / (k + 1) * odds; if success is certain, only n is possible.
-    from_mode(n, mode, |k| if rate < 1.0 { (n - k) as f64 / (k + 1) as f64 * odds } else { 0.0 })
+    // If success is certain, only n is possible.
+    let fewest = if rate < 1.0 { 0 } else { n };
+    Outcomes::around(mode, (fewest, n), |k| (n - k) as f64 / (k + 1) as f64 * odds).probabilities(n)
 }
 
 /// The counts whose probabilities add up to 1 at printed precision.
@@ -19,23 +22,6 @@ pub(super) fn likely(probabilities: &[f64]) -> std::ops::RangeInclusive<u64> {
     let first = probabilities.iter().position(is_likely).unwrap_or(0);
     let last = probabilities.iter().rposition(is_likely).unwrap_or(0);
     first as u64..=last as u64
-}
-
-/// The probabilities of 0 to `last`, from the ratio of each to the previous: `ratio(k)` = P(k + 1) / P(k).
-pub(super) fn from_mode(last: u64, mode: u64, ratio: impl Fn(u64) -> f64) -> Vec<f64> {
-    let length = usize::try_from(last + 1).expect("counts of episodes are far below the address space");
-    let at = usize::try_from(mode).expect("no more than the last");
-    let mut weights = vec![0.0; length];
-    weights[at] = 1.0;
-    for (k, up) in (mode..last).zip(at..) {
-        weights[up + 1] = weights[up] * ratio(k);
-    }
-    for down in (0..at).rev() {
-        let step = ratio(down as u64);
-        weights[down] = if step > 0.0 { weights[down + 1] / step } else { 0.0 };
-    }
-    let total: f64 = weights.iter().sum();
-    weights.iter().map(|weight| weight / total).collect()
 }
 
 #[cfg(test)]

@@ -1,8 +1,10 @@
 //! The exact tests of fixed size: pairs (`McNemar`), unpaired episodes (Fisher), one rate against a level (binomial).
 
-use super::binomial::{from_mode, likely, probabilities};
+use super::binomial::{likely, probabilities};
 use super::{Power, Rates, TIE};
 use crate::chance;
+use crate::outcomes::size;
+use crate::unpaired::tables;
 use exact::ratio::Ratio;
 
 /// The exact two-sided test of no difference over pairs, whose power depends only on the discordant pairs.
@@ -65,26 +67,18 @@ impl Power for Fisher {
             let rejects = rejections(n, total, self.level);
             let from = (*of_first.start()).max(total.saturating_sub(*of_second.end()));
             let to = (*of_first.end()).min(total.saturating_sub(*of_second.start()));
-            let counts = (from..=to).filter(|successes| rejects[at(successes - fewest)]);
-            counts.map(|successes| first[at(successes)] * second[at(total - successes)]).sum()
+            let counts = (from..=to).filter(|successes| rejects[size(successes - fewest)]);
+            counts.map(|successes| first[size(successes)] * second[size(total - successes)]).sum()
         };
         (of_first.start() + of_second.start()..=of_first.end() + of_second.end()).map(rejected).sum()
     }
 }
 
-fn at(count: u64) -> usize {
-    usize::try_from(count).expect("a count of episodes")
-}
-
+/// Which tables with this total are extreme, from the fewest possible successes on the first side.
 fn rejections(n: u64, total: u64, level: f64) -> Vec<bool> {
-    let first = total.saturating_sub(n);
-    let last = total.min(n);
-    // P(x + 1) / P(x) of the hypergeometric distribution with both samples of n.
-    let ratio = |at: u64| {
-        let x = first + at;
-        ((n - x) as f64 * (total - x) as f64) / ((x + 1) as f64 * (n + x + 1 - total) as f64)
-    };
-    let probabilities = from_mode(last - first, (total / 2).clamp(first, last) - first, ratio);
+    let (first, last) = (total.saturating_sub(n), total.min(n));
+    let tables = tables((last, n), (total - last, n)).expect("no more successes than episodes");
+    let probabilities = &tables.probabilities(last)[size(first)..];
     // The least probable first: both tails fall away from the mode, so the next is the smaller of the two ends.
     let mut rejects = vec![false; probabilities.len()];
     let (mut low, mut beyond, mut sum) = (0, probabilities.len(), 0.0);
@@ -124,6 +118,6 @@ impl Power for OneRate {
         let probabilities = probabilities(n, self.rate);
         let rejects = |successes: &u64| chance::two_sided(*successes, n, self.chance).is_some_and(|p| p <= self.level);
         let counts = likely(&probabilities).filter(rejects);
-        counts.map(|successes| probabilities[at(successes)]).sum()
+        counts.map(|successes| probabilities[size(successes)]).sum()
     }
 }

@@ -1,6 +1,7 @@
 //! Seeds with similar episodes: the tests of `units`, which count each seed once.
 
 use super::{McNemar, Power};
+use crate::outcomes::{convolved, size};
 use crate::random::SplitMix64;
 use crate::units::{Sides, difference_test, rate_test_of_sum};
 use exact::moments::Moments;
@@ -77,18 +78,6 @@ impl Seeds {
         let rejected = (0..STUDIES).filter(|_| study()).count();
         f64::from(u32::try_from(rejected).unwrap_or(STUDIES)) / f64::from(STUDIES)
     }
-}
-
-fn size(runs: u64) -> usize {
-    usize::try_from(runs).expect("a count of episodes")
-}
-
-fn convolved(a: &[f64], b: &[f64]) -> Vec<f64> {
-    let mut sums = vec![0.0; a.len() + b.len() - 1];
-    for (i, x) in a.iter().enumerate() {
-        b.iter().enumerate().for_each(|(j, y)| sums[i + j] += x * y);
-    }
-    sums
 }
 
 fn drawn(probabilities: &[f64], at: f64) -> usize {

@@ -102,83 +102,40 @@ pub(crate) struct Compared<'s, 'a> {
 impl Compared<'_, '_> {
     /// The comparison under one metric, before adjustment.
     pub(crate) fn under(&self, column: &MetricColumn) -> Comparison {
-        let rates = self.study.kind(&column.name) == Kind::Rate;
         let sides = Sides::of(self.study, column, &[(self.first, self.second)]);
-        let found = match &sides {
-            Some(sides) if rates => self.rates_by_unit(column, sides),
-            _ if !rates && self.is_dependent() => self.quantity_by_unit(column),
-            _ => self.of_episodes(column),
-        };
-        let lost = if found.p.is_some() { self.first.lost + self.second.lost } else { 0 };
-        let losses = LossCases::of(lost, |toward| self.with_lost(column, &found, sides.as_ref(), toward));
+        let found = self.assuming(None, column, sides.as_ref());
+        let lost = if found.p.is_some() { self.lost() } else { 0 };
+        let losses = LossCases::of(lost, |toward| {
+            let Comparison { difference, p, .. } = self.assuming(Some(toward), column, sides.as_ref());
+            LossCase { difference, p }
+        });
         let noise = |block| repeat_variance(self.study, block, column);
         let repeat_se = noise(self.first).zip(noise(self.second)).map(|(a, b)| (a + b).sqrt());
         Comparison { repeat_se, losses, ..found }
     }
 
-    /// The test including the lost episodes of both sides. In a comparison by pairs or units, each lost episode is a
-    /// pair against a known outcome, which is its largest possible effect.
-    fn with_lost(&self, column: &MetricColumn, seen: &Comparison, sides: Option<&Sides>, toward: Toward) -> LossCase {
-        let is_highest = toward == Toward::Highest;
-        let lost = self.first.lost + self.second.lost;
-        let rate = |block: &Block, is_first| toward.moments(block.moments(column), block.lost, is_first);
-        let (a, b) = (rate(self.first, true), rate(self.second, false));
-        let difference = a.mean().zip(b.mean()).map(|(a, b)| a - b);
-        match seen.method {
-            Method::Mcnemar => {
-                let mut pairs = seen.pairs.unwrap_or_default();
-                *(if is_highest { &mut pairs.first_only } else { &mut pairs.second_only }) += lost;
-                LossCase { difference: pairs.difference(), p: pairs.mcnemar() }
-            }
-            Method::Fisher => {
-                let test = a.counts().zip(b.counts()).and_then(|(a, b)| fisher(a, b));
-                LossCase { difference, p: test.map(|test| test.p) }
-            }
-            Method::Units => {
-                let test = sides.and_then(|sides| sides.test(&toward.units(lost)));
-                LossCase { difference, p: test.map(|test| test.p) }
-            }
-            Method::RestrictedMeanPaired | Method::RestrictedMean => {
-                let found = seen.horizon.and_then(|horizon| match seen.units {
-                    Some(_) => by_units(
-                        &self.lost_units(self.times(column, horizon)?, horizon, toward),
-                        horizon,
-                        self.confidence,
-                    ),
-                    None => self.restricted(&self.lost_endings(column, horizon, toward), horizon),
-                });
-                LossCase { difference: found.map(|it| it.difference), p: found.and_then(|it| it.p) }
-            }
-            Method::StudentPaired | Method::Welch => LossCase::default(),
+    /// The comparison without the lost episodes of both sides, or with them. In a comparison by pairs or units, each
+    /// lost episode is a pair against a known outcome, which is its largest possible effect.
+    fn assuming(&self, lost: Option<Toward>, column: &MetricColumn, sides: Option<&Sides>) -> Comparison {
+        let rates = self.study.kind(&column.name) == Kind::Rate;
+        match sides {
+            Some(sides) if rates => self.rates_by_unit(lost, column, sides),
+            _ if !rates && self.is_dependent() => self.quantity_by_unit(lost, column),
+            _ => self.of_episodes(lost, column),
         }
     }
 
-    /// The endings of both sides, with each lost episode decided at once or never.
-    fn lost_endings(&self, column: &MetricColumn, horizon: i64, toward: Toward) -> [Vec<Ending>; 2] {
-        let fast = Ending { steps: 1, outcome: Outcome::Correct };
-        let slow = Ending { steps: horizon, outcome: Outcome::Unfinished };
-        let ends = if toward == Toward::Highest { [slow, fast] } else { [fast, slow] };
-        let mut sides = self.endings(column);
-        let lost = self.first.lost + self.second.lost;
-        let counts = if self.matched.pairs.is_some() { [lost; 2] } else { [self.first.lost, self.second.lost] };
-        for ((side, end), count) in sides.iter_mut().zip(ends).zip(counts) {
-            side.extend((0..count).map(|_| end));
-        }
-        sides
+    /// The lost episodes of both sides.
+    fn lost(&self) -> u64 {
+        self.first.lost + self.second.lost
     }
 
-    /// The same for units: each lost episode is its own unit.
-    fn lost_units(&self, mut sides: units::Sides, horizon: i64, toward: Toward) -> units::Sides {
-        let one = |steps: i64| Moments::default().with(steps).unwrap_or_default();
-        let ends = if toward == Toward::Highest { [one(horizon), one(1)] } else { [one(1), one(horizon)] };
-        let lost = [self.first.lost, self.second.lost];
-        if sides.shared.is_empty() {
-            sides.first.extend((0..lost[0]).map(|_| ends[0]));
-            sides.second.extend((0..lost[1]).map(|_| ends[1]));
-        } else {
-            sides.shared.extend((0..lost[0] + lost[1]).map(|_| (ends[0], ends[1])));
-        }
-        sides
+    /// The moments of a rate of both sides.
+    fn moments(&self, lost: Option<Toward>, column: &MetricColumn) -> [Moments; 2] {
+        [(self.first, true), (self.second, false)].map(|(block, is_first)| {
+            let known = block.moments(column);
+            lost.map_or(known, |toward| toward.moments(known, block.lost, is_first))
+        })
     }
 
     /// Returns true if a unit occurs more than once in the comparison of episodes.
@@ -190,9 +147,9 @@ impl Compared<'_, '_> {
         units.len() < pairs.len()
     }
 
-    fn rates_by_unit(&self, column: &MetricColumn, sides: &Sides) -> Comparison {
-        let (a, b) = (self.first.moments(column), self.second.moments(column));
-        let test = sides.test(&[]);
+    fn rates_by_unit(&self, lost: Option<Toward>, column: &MetricColumn, sides: &Sides) -> Comparison {
+        let [a, b] = self.moments(lost, column);
+        let test = sides.test(&lost.map_or_else(Vec::new, |toward| toward.units(self.lost())));
         let least = test.map_or(1.0, |test| test.least);
         let pairs = self.matched.pairs.as_ref().filter(|_| !self.is_dependent());
         Comparison {
@@ -207,8 +164,8 @@ impl Compared<'_, '_> {
     }
 
     /// Compares a duration by unit if all its times up to the horizon are known; other quantities have no test.
-    fn quantity_by_unit(&self, column: &MetricColumn) -> Comparison {
-        let seen = self.of_episodes(column);
+    fn quantity_by_unit(&self, lost: Option<Toward>, column: &MetricColumn) -> Comparison {
+        let seen = self.of_episodes(None, column);
         let seen = Comparison { interval: None, withheld: Some(Withheld::Dependent), p: None, ..seen };
         if !is_duration(self.study, &column.name) {
             return seen;
@@ -224,7 +181,10 @@ impl Compared<'_, '_> {
             let units = Units { n: unknown, name: "interrupted episodes".to_owned(), too_few: true };
             return Comparison { units: Some(units), ..seen };
         }
-        let Some(sides) = self.times(column, horizon) else { return seen };
+        let Some(mut sides) = self.times(column, horizon) else { return seen };
+        if let Some(toward) = lost {
+            self.add_lost(&mut sides, horizon, toward);
+        }
         let is_paired = !sides.shared.is_empty();
         let n = if is_paired { sides.shared.len() } else { sides.first.len().min(sides.second.len()) };
         let found = by_units(&sides, horizon, self.confidence);
@@ -241,24 +201,37 @@ impl Compared<'_, '_> {
         Sides::by(self.study, &[(self.first, self.second)], time).divided()
     }
 
-    fn of_episodes(&self, column: &MetricColumn) -> Comparison {
-        if is_duration(self.study, &column.name) {
-            return self.durations(column);
-        }
-        let rates = self.study.kind(&column.name) == Kind::Rate;
-        match &self.matched.pairs {
-            Some(pairs) if rates => self.paired_rate(column, pairs),
-            Some(pairs) => self.paired_quantity(column, pairs),
-            None => self.independent(column, rates),
+    /// Adds each lost episode as its own unit, decided at once or never.
+    fn add_lost(&self, sides: &mut units::Sides, horizon: i64, toward: Toward) {
+        let one = |steps: i64| Moments::default().with(steps).unwrap_or_default();
+        let [first, second] = toward.ends([1, horizon]).map(one);
+        if sides.shared.is_empty() {
+            sides.first.extend((0..self.first.lost).map(|_| first));
+            sides.second.extend((0..self.second.lost).map(|_| second));
+        } else {
+            sides.shared.extend((0..self.lost()).map(|_| (first, second)));
         }
     }
 
-    fn paired_rate(&self, column: &MetricColumn, rows: &[(usize, usize)]) -> Comparison {
-        let pairs = outcomes(column, rows);
+    fn of_episodes(&self, lost: Option<Toward>, column: &MetricColumn) -> Comparison {
+        if is_duration(self.study, &column.name) {
+            return self.durations(lost, column);
+        }
+        let rates = self.study.kind(&column.name) == Kind::Rate;
+        match &self.matched.pairs {
+            Some(pairs) if rates => self.paired_rate(lost, column, pairs),
+            Some(pairs) => self.paired_quantity(column, pairs),
+            None => self.independent(lost, column, rates),
+        }
+    }
+
+    fn paired_rate(&self, lost: Option<Toward>, column: &MetricColumn, rows: &[(usize, usize)]) -> Comparison {
+        let seen = outcomes(column, rows);
+        let pairs = lost.map_or(seen, |toward| toward.pairs(seen, self.lost()));
         Comparison {
             successes: Some([pairs.both + pairs.first_only, pairs.both + pairs.second_only]),
             pairs: Some(pairs),
-            undefined: rows.len() as u64 - pairs.n(),
+            undefined: rows.len() as u64 - seen.n(),
             difference: pairs.difference(),
             interval: pairs.interval(self.confidence),
             ..Comparison::of(Method::Mcnemar, [pairs.n(); 2]).tested(pairs.test())
@@ -281,8 +254,8 @@ impl Compared<'_, '_> {
         }
     }
 
-    fn independent(&self, column: &MetricColumn, rates: bool) -> Comparison {
-        let (a, b) = (self.first.moments(column), self.second.moments(column));
+    fn independent(&self, lost: Option<Toward>, column: &MetricColumn, rates: bool) -> Comparison {
+        let [a, b] = self.moments(lost.filter(|_| rates), column);
         let difference = a.mean().zip(b.mean()).map(|(a, b)| a - b);
         let counted = rates.then(|| a.counts().zip(b.counts())).flatten();
         if let Some((first, second)) = counted {
@@ -299,15 +272,25 @@ impl Compared<'_, '_> {
         Comparison { difference, interval, withheld, ..Comparison::of(Method::Welch, [a.n, b.n]) }
     }
 
-    fn durations(&self, column: &MetricColumn) -> Comparison {
-        let sides = self.endings(column);
-        let horizon = self.horizon.or_else(|| shared_horizon(&sides[0], &sides[1]));
-        let found = horizon.and_then(|horizon| self.restricted(&sides, horizon));
-        let n = sides.map(|side| side.len() as u64);
+    fn durations(&self, lost: Option<Toward>, column: &MetricColumn) -> Comparison {
+        let mut sides = self.endings(column);
         let (method, undefined) = match &self.matched.pairs {
-            Some(pairs) => (Method::RestrictedMeanPaired, pairs.len() as u64 - n[0]),
+            Some(pairs) => (Method::RestrictedMeanPaired, (pairs.len() - sides[0].len()) as u64),
             None => (Method::RestrictedMean, 0),
         };
+        let horizon = self.horizon.or_else(|| shared_horizon(&sides[0], &sides[1]));
+        if let Some((toward, horizon)) = lost.zip(horizon) {
+            // Decided at once or never.
+            let [fast, slow] = [(1, Outcome::Correct), (horizon, Outcome::Unfinished)];
+            let ends = toward.ends([fast, slow]).map(|(steps, outcome)| Ending { steps, outcome });
+            let is_paired = self.matched.pairs.is_some();
+            let counts = if is_paired { [self.lost(); 2] } else { [self.first.lost, self.second.lost] };
+            for ((side, end), count) in sides.iter_mut().zip(ends).zip(counts) {
+                side.extend((0..count).map(|_| end));
+            }
+        }
+        let found = horizon.and_then(|horizon| self.restricted(&sides, horizon));
+        let n = sides.map(|side| side.len() as u64);
         Comparison { undefined, ..Comparison::of_durations(method, n, found, self.confidence) }
     }
 

@@ -6,8 +6,10 @@ use serde::{Deserialize, Serialize};
 use crate::statistics::matching::Units;
 use crate::study::{Block, RowKey, Study};
 use exact::moments::Moments;
+use score::table::MetricColumn;
 use statistics::holm::{holm, is_significant};
 use statistics::losses::{Lossy, bounds};
+use statistics::paired::Pairs;
 
 /// The name of lost episodes that decide a verdict.
 pub(crate) const LOST: &str = "lost episodes";
@@ -77,6 +79,19 @@ impl Toward {
         known.with_truths(zeros, ones).unwrap_or(known)
     }
 
+    /// The pairs including the lost episodes of both sides.
+    pub fn pairs(self, known: Pairs, lost: u64) -> Pairs {
+        match self {
+            Self::Lowest => Pairs { second_only: known.second_only + lost, ..known },
+            Self::Highest => Pairs { first_only: known.first_only + lost, ..known },
+        }
+    }
+
+    /// The smallest and the largest possible time, as those of the first and of the second side.
+    pub fn ends<T>(self, [fast, slow]: [T; 2]) -> [T; 2] {
+        if self == Self::Highest { [slow, fast] } else { [fast, slow] }
+    }
+
     /// Each lost episode of either side as a shared unit, against the outcome that gives it its largest effect.
     pub fn units(self, lost: u64) -> Vec<(Moments, Moments)> {
         let one = |is_first| self.moments(Moments::default(), 1, is_first);
@@ -129,13 +144,10 @@ pub(crate) fn settle<'c>(
 }
 
 fn of_block(study: &Study, block: &Block, confidence: f64) -> Vec<LossRow> {
-    let row = |metric: &str, lossy| LossRow { key: block.key(), metric: metric.to_owned(), lossy };
-    study
-        .rates()
-        .filter_map(|column| {
-            let values = block.rows().filter_map(|row| column.get(row));
-            bounds(values, block.lost, confidence).map(|lossy| row(&column.name, lossy))
-        })
-        .filter(|row| row.lossy.lost > 0)
-        .collect()
+    let of_rate = |column: &MetricColumn| {
+        let values = block.rows().filter_map(|row| column.get(row));
+        let lossy = bounds(values, block.lost, confidence)?;
+        Some(LossRow { key: block.key(), metric: column.name.clone(), lossy })
+    };
+    if block.lost > 0 { study.rates().filter_map(of_rate).collect() } else { Vec::new() }
 }

@@ -167,12 +167,8 @@ impl<'s, 'a> Couple<'s, 'a> {
             ..OverallRow::default()
         };
         if let Some(strata) = pairs {
-            let mut all = pooled(&strata.iter().map(|rows| outcomes(column, rows)).collect::<Vec<_>>());
-            match toward {
-                Some(Toward::Lowest) => all.second_only += self.lost(),
-                Some(Toward::Highest) => all.first_only += self.lost(),
-                None => {}
-            }
+            let seen = pooled(&strata.iter().map(|rows| outcomes(column, rows)).collect::<Vec<_>>());
+            let all = toward.map_or(seen, |toward| toward.pairs(seen, self.lost()));
             return row(OverallMethod::PooledMcnemar, all.difference(), all.interval(confidence), all.test());
         }
         let strata: Vec<Stratum> = self

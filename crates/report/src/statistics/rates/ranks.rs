@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::cells::KeyValue;
 use crate::cells::interval::CONFIDENCE;
 use crate::statistics::conclusions::headline;
-use crate::statistics::models::{Family, compared};
+use crate::statistics::models::{Family, PairTest, compared};
 use crate::statistics::overall::{self, OverallRow};
 use crate::study::Study;
 use crate::tables::{Column, ListTable, Look, Table, key_field};
@@ -44,7 +44,15 @@ pub struct RankRow {
 
 impl RankRow {
     pub(crate) fn all(families: &[Family], overall: &[OverallRow]) -> Vec<Self> {
-        let mut rows: Vec<Self> = families.iter().flat_map(Self::of_family).collect();
+        let comparable = |test: &PairTest| test.comparison.incomparable.is_none();
+        let of_family = |family: &Family| {
+            let models: Vec<&str> = family.models.iter().map(String::as_str).collect();
+            let separated = family.tests.iter().filter(|test| test.comparison.separated);
+            let shown: Vec<(&str, &str)> = separated.map(|test| (&*test.first, &*test.second)).collect();
+            ranks(Some(&family.experiment), &family.metric, &models, &shown)
+        };
+        let families = families.iter().filter(|family| family.tests.iter().all(comparable));
+        let mut rows: Vec<Self> = families.flat_map(of_family).collect();
         for rows_of in overall.chunk_by(|a, b| a.metric == b.metric) {
             let models: BTreeSet<&str> = rows_of.iter().flat_map(|row| [&*row.first, &*row.second]).collect();
             let separated = rows_of.iter().filter(|row| row.separated);
@@ -57,16 +65,6 @@ impl RankRow {
     /// `2`, or `1-3` if the tests leave several ranks open.
     pub(crate) fn interval(&self) -> String {
         if self.best == self.worst { self.best.to_string() } else { format!("{}-{}", self.best, self.worst) }
-    }
-
-    fn of_family(family: &Family) -> Vec<Self> {
-        if family.tests.iter().any(|test| test.comparison.incomparable.is_some()) {
-            return Vec::new();
-        }
-        let models: Vec<&str> = family.models.iter().map(String::as_str).collect();
-        let separated = family.tests.iter().filter(|test| test.comparison.separated);
-        let shown: Vec<(&str, &str)> = separated.map(|test| (&*test.first, &*test.second)).collect();
-        ranks(Some(&family.experiment), &family.metric, &models, &shown)
     }
 }
 

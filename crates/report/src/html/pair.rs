@@ -29,11 +29,9 @@ pub(super) fn pairs(statistics: Option<&Statistics>) -> Json {
     }
     let place = |list: &[&str], name: &str| list.binary_search(&name).unwrap_or_default();
     let told = |test: &PairText<'_>| {
-        let PairText { first, second, counts, differing, difference, interval, .. } = test;
-        let two = [counts, differing, difference, interval].into_iter().flatten().map(|text| json!(text));
-        let places = [place(&models, first), place(&models, second), place(&methods, test.test)].map(|at| json!(at));
-        let last = [json!(test.p), json!(test.p_adjusted), json!(test.verdict as u8)];
-        places.into_iter().chain(two).chain(last).collect::<Json>()
+        let places = [place(&models, test.first), place(&models, test.second), place(&methods, test.test)];
+        let texts = test.sides.iter().flatten().chain(&test.p).map(|text| json!(text));
+        places.into_iter().map(Json::from).chain(texts).chain([json!(test.verdict)]).collect::<Json>()
     };
     let family = |family: &FamilyText<'_>| {
         json!({

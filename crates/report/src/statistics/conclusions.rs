@@ -56,22 +56,18 @@ fn reach_sentence(reach: Reach, names: &[String]) -> String {
     };
     let when = if is_paired { "if every disagreement points the same way" } else { "against a model without success" };
     let least = |found: Detectable| format!("{}/{} ({})", found.pairs, found.n, fixed(Some(found.smallest), 2));
-    match (reach.single, reach.family) {
-        (None, _) => format!("{about}: {with} cannot show any difference between two models, whatever the outcomes."),
-        (Some(single), None) => format!(
-            "{about}: with {with}, the smallest difference between two models that could have been shown is {} in one \
-             comparison, {when}; as the first of {} under Holm none could have been.",
-            least(single),
-            reach.tests
-        ),
-        (Some(single), Some(family)) => format!(
-            "{about}: with {with}, the smallest difference between two models that could have been shown is {} in one \
-             comparison and {} as the first of {} under Holm, {when}.",
-            least(single),
-            least(family),
-            reach.tests
-        ),
-    }
+    let Some(single) = reach.single.map(least) else {
+        return format!("{about}: {with} cannot show any difference between two models, whatever the outcomes.");
+    };
+    let first = format!("as the first of {} under Holm", reach.tests);
+    let rest = match reach.family.map(least) {
+        None => format!(", {when}; {first} none could have been."),
+        Some(family) => format!(" and {family} {first}, {when}."),
+    };
+    format!(
+        "{about}: with {with}, the smallest difference between two models that could have been shown is {single} in one \
+         comparison{rest}"
+    )
 }
 
 fn against_levels(rows: &[ChanceRow]) -> Vec<String> {

@@ -157,9 +157,9 @@ impl Pairs {
         if (n + 1) * (n + 2) / 2 > MOST_ENUMERATED {
             return normal_below(-seen);
         }
-        let at = |gains: usize, losses: usize| Self { gains: real(gains), losses: real(losses), n: self.n };
+        let score = |gains, losses| Self { gains: real(gains), losses: real(losses), n: self.n }.score(margin);
         let all = (0..=n).flat_map(|gains| (0..=n - gains).map(move |losses| (gains, losses)));
-        let beyond: Vec<_> = all.filter(|&(gains, losses)| at(gains, losses).score(margin) >= seen).collect();
+        let beyond: Vec<_> = all.filter(|&(gains, losses)| score(gains, losses) >= seen).collect();
         let factorials = log_factorials(n);
         let most = f64::midpoint(1.0, margin);
         largest(margin, most, |lost| {

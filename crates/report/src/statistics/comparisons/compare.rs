@@ -130,12 +130,9 @@ impl Compared<'_, '_> {
         self.first.lost + self.second.lost
     }
 
-    /// The moments of a rate of both sides.
     fn moments(&self, lost: Option<Toward>, column: &MetricColumn) -> [Moments; 2] {
-        [(self.first, true), (self.second, false)].map(|(block, is_first)| {
-            let known = block.moments(column);
-            lost.map_or(known, |toward| toward.moments(known, block.lost, is_first))
-        })
+        [(self.first, true), (self.second, false)]
+            .map(|(block, is_first)| Toward::assumed(lost, block, column, is_first))
     }
 
     /// Returns true if a unit occurs more than once in the comparison of episodes.

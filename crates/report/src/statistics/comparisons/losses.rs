@@ -79,6 +79,12 @@ impl Toward {
         known.with_truths(zeros, ones).unwrap_or(known)
     }
 
+    /// The moments of one side's rate without its lost episodes, or with them.
+    pub fn assumed(lost: Option<Self>, block: &Block, column: &MetricColumn, is_first: bool) -> Moments {
+        let known = block.moments(column);
+        lost.map_or(known, |toward| toward.moments(known, block.lost, is_first))
+    }
+
     /// The pairs including the lost episodes of both sides.
     pub fn pairs(self, known: Pairs, lost: u64) -> Pairs {
         match self {

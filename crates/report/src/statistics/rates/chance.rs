@@ -16,7 +16,6 @@ use exact::ratio::Ratio;
 use score::table::MetricColumn;
 use statistics::chance::{exact_test, least_p};
 use statistics::holm::level;
-use statistics::outcomes::ExactTest;
 use statistics::units::rate_test;
 
 /// One rate against one level.
@@ -102,30 +101,59 @@ impl ChanceRow {
         (role, chance): (Role, Ratio),
         confidence: f64,
     ) -> Vec<Self> {
-        let mut tested: Vec<_> = experiment
-            .blocks
-            .iter()
-            .filter_map(|block| Tested::of(study, block, column, (chance, confidence)))
-            .collect();
-        let settled = settle(tested.iter_mut().map(|tested| (tested.seen, &mut tested.losses)), confidence);
-        let row = |(Tested { block, successes, n, test, units, losses, .. }, (p_adjusted, is_shown)): (Tested, _)| {
-            let too_few = units.as_ref().map_or_else(|| few_episodes(n, chance, confidence), |units| units.too_few);
-            Self {
-                key: block.key(),
-                metric: column.name.clone(),
-                role,
-                level: chance,
-                successes,
-                n,
-                p: test.p,
-                mid_p: test.mid_p,
-                p_adjusted,
-                verdict: Verdict::of(successes, n, chance, is_shown && !too_few),
-                units,
-                losses,
-            }
+        let of = |block: &Block| Self::of(study, block, column, (role, chance), confidence);
+        let (seen, mut rows): (Vec<LossCase>, Vec<Self>) = experiment.blocks.iter().filter_map(of).unzip();
+        let settled = settle(seen.into_iter().zip(rows.iter_mut().map(|row| &mut row.losses)), confidence);
+        for (row, (p_adjusted, is_shown)) in rows.iter_mut().zip(settled) {
+            let units = row.units.as_ref().map(|units| units.too_few);
+            let too_few = units.unwrap_or_else(|| few_episodes(row.n, chance, confidence));
+            row.p_adjusted = p_adjusted;
+            row.verdict = Verdict::of(row.successes, row.n, chance, is_shown && !too_few);
+        }
+        rows
+    }
+
+    /// One rate of one block, before adjustment.
+    fn of(
+        study: &Study,
+        block: &Block,
+        column: &MetricColumn,
+        (role, chance): (Role, Ratio),
+        confidence: f64,
+    ) -> Option<(LossCase, Self)> {
+        let (successes, n) = block.moments(column).counts()?;
+        let of_units: Option<Vec<Moments>> =
+            block.repeats.then(|| study.by_unit(block, |row| column.get(row)).into_values().collect());
+        let with_lost = |toward| Toward::assumed(toward, block, column, true);
+        let tested = |toward: Option<Toward>| {
+            let Some(units) = &of_units else {
+                let (successes, n) = with_lost(toward).counts()?;
+                return Some((exact_test(successes, n, chance)?, least_p(n, chance)?));
+            };
+            let lost = toward.map_or_else(Vec::new, |toward| toward.units(block.lost));
+            let lost = lost.into_iter().map(|(one, _)| one);
+            rate_test(&units.iter().copied().chain(lost).collect::<Vec<_>>(), chance)
         };
-        tested.into_iter().zip(settled).map(row).collect()
+        let case = |toward| LossCase {
+            difference: with_lost(toward).mean().map(|mean| mean - chance.value()),
+            p: tested(toward).map(|(test, _)| test.p),
+        };
+        let (test, least) = tested(None)?;
+        let row = Self {
+            key: block.key(),
+            metric: column.name.clone(),
+            role,
+            level: chance,
+            successes,
+            n,
+            p: test.p,
+            mid_p: test.mid_p,
+            p_adjusted: test.p,
+            verdict: Verdict::NotSeparated,
+            units: of_units.as_ref().map(|units| Units::new(study, block, units.len(), least, confidence)),
+            losses: LossCases::of(block.lost, |toward| case(Some(toward))),
+        };
+        Some((case(None), row))
     }
 
     /// The units or episodes that are too few for a verdict, or the lost ones that decide it; otherwise `None`.
@@ -149,49 +177,6 @@ impl ChanceRow {
 
 fn few_episodes(n: u64, level: Ratio, confidence: f64) -> bool {
     least_p(n, level).is_none_or(|least| too_few(usize::try_from(n).unwrap_or(usize::MAX), least, confidence))
-}
-
-/// One rate of one block against one level.
-struct Tested<'s, 'a> {
-    block: &'s Block<'a>,
-    successes: u64,
-    n: u64,
-    test: ExactTest,
-    units: Option<Units>,
-    seen: LossCase,
-    losses: Option<LossCases>,
-}
-
-impl<'s, 'a> Tested<'s, 'a> {
-    fn of(
-        study: &Study,
-        block: &'s Block<'a>,
-        column: &MetricColumn,
-        (chance, confidence): (Ratio, f64),
-    ) -> Option<Self> {
-        let known = block.moments(column);
-        let (successes, n) = known.counts()?;
-        let of_units: Option<Vec<Moments>> =
-            block.repeats.then(|| study.by_unit(block, |row| column.get(row)).into_values().collect());
-        let with_lost = |toward: Option<Toward>| toward.map_or(known, |it| it.moments(known, block.lost, true));
-        let tested = |toward: Option<Toward>| {
-            let Some(units) = &of_units else {
-                let (successes, n) = with_lost(toward).counts()?;
-                return Some((exact_test(successes, n, chance)?, least_p(n, chance)?));
-            };
-            let lost = toward.map_or_else(Vec::new, |toward| toward.units(block.lost));
-            let lost = lost.into_iter().map(|(one, _)| one);
-            rate_test(&units.iter().copied().chain(lost).collect::<Vec<_>>(), chance)
-        };
-        let case = |toward| LossCase {
-            difference: with_lost(toward).mean().map(|mean| mean - chance.value()),
-            p: tested(toward).map(|(test, _)| test.p),
-        };
-        let (test, least) = tested(None)?;
-        let units = of_units.as_ref().map(|units| Units::new(study, block, units.len(), least, confidence));
-        let losses = LossCases::of(block.lost, |toward| case(Some(toward)));
-        Some(Self { block, successes, n, test, units, seen: case(None), losses })
-    }
 }
 
 impl Verdict {

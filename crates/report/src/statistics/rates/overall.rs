@@ -86,6 +86,8 @@ struct Couple<'s, 'a> {
     first: String,
     second: String,
     strata: Vec<(&'s Block<'a>, &'s Block<'a>)>,
+    /// The pairs of each stratum, if all strata have them.
+    pairs: Option<Vec<Vec<(usize, usize)>>>,
 }
 
 impl<'s, 'a> Couple<'s, 'a> {
@@ -102,7 +104,9 @@ impl<'s, 'a> Couple<'s, 'a> {
                 let both = here.iter().filter_map(|(experiment, &block)| Some((block, *there.get(experiment)?)));
                 let strata: Vec<_> = both.filter(|(a, b)| study.incomparable(a, b).is_none()).collect();
                 if strata.len() > 1 {
-                    couples.push(Self { first: first.clone(), second: second.clone(), strata });
+                    let scenes = |block| Scenes::of(study, block);
+                    let pairs = strata.iter().map(|(a, b)| Matched::of(&scenes(a), &scenes(b)).pairs).collect();
+                    couples.push(Self { first: first.clone(), second: second.clone(), strata, pairs });
                 }
             }
         }
@@ -113,23 +117,10 @@ impl<'s, 'a> Couple<'s, 'a> {
         self.strata.iter().map(|(block, _)| block.experiment.to_owned()).collect()
     }
 
-    fn pairs(&self, study: &Study) -> Option<Vec<Vec<(usize, usize)>>> {
-        let matched = |(first, second): &(&Block, &Block)| {
-            Matched::of(&Scenes::of(study, first), &Scenes::of(study, second)).pairs
-        };
-        self.strata.iter().map(matched).collect()
-    }
-
-    fn rate(
-        &self,
-        study: &Study,
-        column: &MetricColumn,
-        pairs: Option<&[Vec<(usize, usize)>]>,
-        confidence: f64,
-    ) -> OverallRow {
+    fn rate(&self, study: &Study, column: &MetricColumn, confidence: f64) -> OverallRow {
         let sides = Sides::of(study, column, &self.strata);
         let of = |toward: Option<Toward>| {
-            let row = self.by_episodes(column, pairs, toward, confidence);
+            let row = self.by_episodes(column, toward, confidence);
             let Some(sides) = &sides else { return row };
             let few = level(confidence).is_none_or(|level| sides.len() < fewest_clusters(level));
             let lost = toward.map_or_else(Vec::new, |toward| toward.units(self.lost()));
@@ -147,13 +138,7 @@ impl<'s, 'a> Couple<'s, 'a> {
         self.strata.iter().map(|(a, b)| a.lost + b.lost).sum()
     }
 
-    fn by_episodes(
-        &self,
-        column: &MetricColumn,
-        pairs: Option<&[Vec<(usize, usize)>]>,
-        toward: Option<Toward>,
-        confidence: f64,
-    ) -> OverallRow {
+    fn by_episodes(&self, column: &MetricColumn, toward: Option<Toward>, confidence: f64) -> OverallRow {
         let row = |method, difference, interval, test: Option<ExactTest>| OverallRow {
             metric: column.name.clone(),
             first: self.first.clone(),
@@ -166,23 +151,14 @@ impl<'s, 'a> Couple<'s, 'a> {
             mid_p: test.map(|test| test.mid_p),
             ..OverallRow::default()
         };
-        if let Some(strata) = pairs {
+        if let Some(strata) = &self.pairs {
             let seen = pooled(&strata.iter().map(|rows| outcomes(column, rows)).collect::<Vec<_>>());
             let all = toward.map_or(seen, |toward| toward.pairs(seen, self.lost()));
             return row(OverallMethod::PooledMcnemar, all.difference(), all.interval(confidence), all.test());
         }
-        let strata: Vec<Stratum> = self
-            .strata
-            .iter()
-            .filter_map(|(a, b)| {
-                let side = |block: &Block, is_first| {
-                    let known = block.moments(column);
-                    toward.map_or(known, |toward| toward.moments(known, block.lost, is_first)).counts()
-                };
-                Some(Stratum { first: side(a, true)?, second: side(b, false)? })
-            })
-            .filter(|stratum| stratum.first.1 > 0 && stratum.second.1 > 0)
-            .collect();
+        let side = |block: &Block, is_first| Toward::assumed(toward, block, column, is_first).counts();
+        let stratum = |(a, b): &(&Block, &Block)| Some(Stratum { first: side(a, true)?, second: side(b, false)? });
+        let strata: Vec<Stratum> = self.strata.iter().filter_map(stratum).collect();
         let common = common_difference(&strata, confidence);
         row(
             OverallMethod::MantelHaenszel,
@@ -212,12 +188,10 @@ impl<'s, 'a> Couple<'s, 'a> {
 
 pub(crate) fn rates(study: &Study, metrics: &[String], confidence: f64) -> Vec<OverallRow> {
     let couples = Couple::all(study);
-    let pairs: Vec<_> = couples.iter().map(|couple| couple.pairs(study)).collect();
     let is_rate = |metric: &&String| study.kind(metric) == Kind::Rate;
     let mut all = Vec::new();
     for column in metrics.iter().filter(is_rate).filter_map(|metric| study.column(metric)) {
-        let of = |(couple, pairs): (&Couple, &Option<Vec<_>>)| couple.rate(study, column, pairs.as_deref(), confidence);
-        let mut rows: Vec<OverallRow> = couples.iter().zip(&pairs).map(of).collect();
+        let mut rows: Vec<OverallRow> = couples.iter().map(|it| it.rate(study, column, confidence)).collect();
         adjust(&mut rows, confidence);
         all.extend(rows.into_iter().map(|row| row.better_first(study)));
     }

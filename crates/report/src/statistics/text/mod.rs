@@ -7,7 +7,7 @@ pub mod sequential;
 mod tables;
 mod text_table;
 
-use super::{Answer, FEW, Statistics};
+use super::{Answer, FEW, Selection, Statistics};
 use crate::tables::{Table, push_wrapped};
 use exact::escape::visible;
 use exact::format::fixed;
@@ -33,12 +33,7 @@ impl Statistics {
             statistics.episodes,
             visible(&statistics.definitions)
         );
-        if let Some(selection) = &statistics.selection {
-            push_wrapped(&mut text, &selection.sentence(), width, 0);
-        }
-        for sentence in &statistics.pooled {
-            push_wrapped(&mut text, &visible(sentence), width, 0);
-        }
+        episodes(&mut text, statistics.selection.as_ref(), &statistics.pooled, width);
         push_wrapped(&mut text, &format!("Design: {}.", visible(&statistics.design_note)), width, 0);
         departures(&mut text, statistics.departures.as_deref(), width);
         list(&mut text, &heading(statistics), &answers(&statistics.answers), width);
@@ -72,6 +67,13 @@ fn answers(answers: &[Answer]) -> Vec<String> {
         format!("{} {}: {}{caveats}.", answer.question, answer.metric, answer.answer)
     };
     answers.iter().map(line).collect()
+}
+
+/// The filter that chose the episodes, and the settings that they pool.
+fn episodes(text: &mut String, selection: Option<&Selection>, pooled: &[String], width: Option<usize>) {
+    let pooled = pooled.iter().map(|sentence| visible(sentence));
+    let sentences = selection.map(Selection::sentence).into_iter().chain(pooled);
+    sentences.for_each(|sentence| push_wrapped(text, &sentence, width, 0));
 }
 
 fn departures(text: &mut String, found: Option<&[String]>, width: Option<usize>) {

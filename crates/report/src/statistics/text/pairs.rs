@@ -2,27 +2,15 @@
 //!
 //! Rule: texts that depend on the order of the two models are stored for both orders, so that nothing is recomputed.
 
-use super::super::{Comparison, OverallRow, PairTest, Statistics};
+use super::super::{Comparison, Statistics};
 use super::tables::{held, method, overall_method};
 use exact::format::{UNDEFINED, fixed, p_value};
-use statistics::coverage::Withheld;
 use statistics::interval::Interval;
 
 /// Decimals of a difference of rates.
 const RATE_PLACES: usize = 3;
 
-/// The result of a test, in the order of a page's columns.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Verdict {
-    /// The first is better, after adjustment.
-    FirstIsBetter,
-    /// The test does not separate the two.
-    NotToldApart,
-    /// There is no test.
-    NoTest,
-}
-
-/// One model against another, as texts; an array has the text from the first and from the second model's view.
+/// One model against another, as texts.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct PairText<'a> {
     /// The model with the better mean.
@@ -30,18 +18,14 @@ pub(crate) struct PairText<'a> {
     pub second: &'a str,
     /// The name of the test.
     pub test: &'static str,
-    /// The counts of each side: `11/21`, or `n = 21` for a duration.
-    pub counts: [String; 2],
-    /// The discordant pairs, `2 : 6 of 21`: in favour of this side, in favour of the other, of all pairs.
-    pub differing: [String; 2],
-    /// One side minus the other.
-    pub difference: [String; 2],
-    /// Its interval, or why it has none.
-    pub interval: [String; 2],
-    pub p: String,
-    /// The p value, adjusted by Holm's method.
-    pub p_adjusted: String,
-    pub verdict: Verdict,
+    /// Each text from the first and from the second model's view: the counts of a side, `11/21`, or `n = 21` for a
+    /// duration; the discordant pairs in favour of this side, of the other, and all, `2 : 6 of 21`; one side minus the
+    /// other; its interval, or why it has none.
+    pub sides: [[String; 2]; 4],
+    /// The p value, and the same adjusted by Holm's method.
+    pub p: [String; 2],
+    /// 0 if the first is better after adjustment, 1 if the test does not separate the two, 2 without a test.
+    pub verdict: u8,
 }
 
 /// All tests under one metric in one experiment; over all experiments if `experiment` is `None`.
@@ -55,61 +39,46 @@ pub(crate) struct FamilyText<'a> {
 
 /// All families: by experiment, then those over all experiments.
 pub(crate) fn families(statistics: &Statistics) -> Vec<FamilyText<'_>> {
-    let single = statistics.models.iter().map(|family| FamilyText {
-        experiment: Some(&family.experiment),
-        metric: &family.metric,
-        tests: family.tests.iter().map(PairText::of).collect(),
+    let single = statistics.models.iter().map(|family| {
+        let tests = family.tests.iter().map(|it| {
+            let counts = counts(&it.comparison);
+            PairText::of([&it.first, &it.second], method(it.comparison.method), counts, &it.comparison)
+        });
+        FamilyText { experiment: Some(&family.experiment), metric: &family.metric, tests: tests.collect() }
     });
-    let mut families: Vec<FamilyText<'_>> = single.collect();
-    for rows in statistics.overall.chunk_by(|a, b| a.metric == b.metric) {
-        let tests = rows.iter().map(PairText::overall).collect();
-        families.push(FamilyText { experiment: None, metric: &rows[0].metric, tests });
-    }
-    families
+    let overall = statistics.overall.chunk_by(|a, b| a.metric == b.metric).map(|rows| {
+        let tests = rows.iter().map(|row| {
+            let (difference, interval, separated) = (row.difference, row.interval, row.separated);
+            let (p, p_adjusted) = (row.p, row.p_adjusted);
+            let found = Comparison { difference, interval, separated, p, p_adjusted, ..Comparison::default() };
+            PairText::of([&row.first, &row.second], (overall_method(row.method), RATE_PLACES), undefined(), &found)
+        });
+        FamilyText { experiment: None, metric: &rows[0].metric, tests: tests.collect() }
+    });
+    single.chain(overall).collect()
 }
 
 impl<'a> PairText<'a> {
-    fn of(PairTest { first, second, comparison, .. }: &'a PairTest) -> Self {
-        let (test, places) = method(comparison.method);
-        Self {
-            test,
-            counts: counts(comparison),
-            differing: differing(comparison),
-            difference: difference(comparison.difference, places),
-            interval: interval(comparison.interval, comparison.withheld, places),
-            p: p_value(comparison.p),
-            p_adjusted: p_value(comparison.p_adjusted),
-            verdict: Verdict::of(comparison.separated, comparison.p),
-            first,
-            second,
-        }
-    }
-
-    fn overall(row: &'a OverallRow) -> Self {
-        let OverallRow { first, second, .. } = row;
-        Self {
-            test: overall_method(row.method),
-            counts: [UNDEFINED, UNDEFINED].map(str::to_owned),
-            differing: [UNDEFINED, UNDEFINED].map(str::to_owned),
-            difference: difference(row.difference, RATE_PLACES),
-            interval: interval(row.interval, None, RATE_PLACES),
-            p: p_value(row.p),
-            p_adjusted: p_value(row.p_adjusted),
-            verdict: Verdict::of(row.separated, row.p),
-            first,
-            second,
-        }
+    fn of(
+        [first, second]: [&'a str; 2],
+        (test, places): (&'static str, usize),
+        counts: [String; 2],
+        found: &Comparison,
+    ) -> Self {
+        let difference = [found.difference, found.difference.map(|it| -it)].map(|it| fixed(it, places));
+        let interval = [found.interval, found.interval.map(Interval::negated)];
+        let interval = interval.map(|it| held(it, found.withheld, places));
+        let verdict = match found.p {
+            None => 2,
+            Some(_) => u8::from(!found.separated),
+        };
+        let p = [found.p, found.p_adjusted].map(p_value);
+        Self { first, second, test, sides: [counts, differing(found), difference, interval], p, verdict }
     }
 }
 
-impl Verdict {
-    fn of(separated: bool, p: Option<f64>) -> Self {
-        match p {
-            None => Self::NoTest,
-            Some(_) if separated => Self::FirstIsBetter,
-            Some(_) => Self::NotToldApart,
-        }
-    }
+fn undefined() -> [String; 2] {
+    [UNDEFINED, UNDEFINED].map(str::to_owned)
 }
 
 fn counts(found: &Comparison) -> [String; 2] {
@@ -121,15 +90,7 @@ fn counts(found: &Comparison) -> [String; 2] {
 }
 
 fn differing(found: &Comparison) -> [String; 2] {
-    let Some(pairs) = found.pairs else { return [UNDEFINED, UNDEFINED].map(str::to_owned) };
+    let Some(pairs) = found.pairs else { return undefined() };
     let (first, second, all) = (pairs.first_only, pairs.second_only, pairs.n());
     [format!("{first} : {second} of {all}"), format!("{second} : {first} of {all}")]
-}
-
-fn difference(difference: Option<f64>, places: usize) -> [String; 2] {
-    [difference, difference.map(|difference| -difference)].map(|difference| fixed(difference, places))
-}
-
-fn interval(interval: Option<Interval>, withheld: Option<Withheld>, places: usize) -> [String; 2] {
-    [interval, interval.map(Interval::negated)].map(|interval| held(interval, withheld, places))
 }

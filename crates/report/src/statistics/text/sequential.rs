@@ -2,7 +2,7 @@
 
 use super::tables::{Shown, plain};
 use super::text_table::TextTable;
-use super::{departures, list, percent, section};
+use super::{departures, episodes, list, percent, section};
 use crate::statistics::{Sequential, SequentialPair, Verdict};
 use crate::tables::{Table, push_wrapped};
 use exact::escape::visible;
@@ -31,12 +31,7 @@ impl Sequential {
         );
         let mut text = String::new();
         push_wrapped(&mut text, &opening, width, 0);
-        if let Some(selection) = &sequential.selection {
-            push_wrapped(&mut text, &selection.sentence(), width, 0);
-        }
-        for sentence in &sequential.pooled {
-            push_wrapped(&mut text, &visible(sentence), width, 0);
-        }
+        episodes(&mut text, sequential.selection.as_ref(), &sequential.pooled, width);
         departures(&mut text, sequential.departures.as_deref(), width);
         list(&mut text, "What this is for", &PURPOSE.map(str::to_owned), width);
         let pairs: Vec<&SequentialPair> = sequential.models.iter().filter(|pair| shown(&pair.metric)).collect();

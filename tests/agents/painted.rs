@@ -92,7 +92,7 @@ impl Painted {
                 remaining: task.step_budget - t + 1,
                 x: pose.place.x as f32,
                 y: pose.place.y as f32,
-                yaw: 30.0 * f32::from(pose.heading.twelfths()),
+                yaw: 30.0 * f32::from(pose.heading.thirties()),
                 bumped,
                 history: history.take(),
                 frame: Arc::new(self.frame(pose)),

@@ -30,7 +30,7 @@ fn reflecting(room: &Painted, pose: Pose, reflected: Place) -> Observation {
         remaining: 100,
         x: pose.place.x as f32,
         y: pose.place.y as f32,
-        yaw: 30.0 * f32::from(pose.heading.twelfths()),
+        yaw: 30.0 * f32::from(pose.heading.thirties()),
         bumped: false,
         history: None,
         frame: Arc::new(room.frame_reflecting(pose, reflected)),

@@ -225,7 +225,7 @@ impl Lost {
 
 /// Locks a mutex. No holder leaves its value half changed, so a panic of another thread does no harm.
 #[cfg(feature = "sim")]
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+pub(crate) fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 

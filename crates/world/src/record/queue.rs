@@ -5,14 +5,14 @@
 //! complete, and returned once, when all of its episodes are recorded, by any process, or lost.
 
 use std::collections::{BTreeMap, VecDeque};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, PoisonError};
 
 use super::error::StoreError;
 use super::failures::LostEpisode;
 use super::lock::EpisodeLock;
 use super::plan::Key;
 use super::store::{Claim, Store};
-use crate::agent::Turn;
+use crate::agent::{Turn, locked};
 use crate::sim::Experiment;
 
 /// The episodes of a recording that no thread has taken yet.
@@ -104,12 +104,12 @@ impl<'a> Queue<'a> {
     }
 
     pub(super) fn experiments(&self) -> Vec<Experiment> {
-        self.waiting().experiments.keys().cloned().collect()
+        locked(&self.waiting).experiments.keys().cloned().collect()
     }
 
     /// The next playable episode, with its lock.
     pub fn next(&self, turn: impl Fn(&Key) -> Turn) -> Result<Next, StoreError> {
-        let mut waiting = self.waiting();
+        let mut waiting = locked(&self.waiting);
         let (mut held, mut at, mut is_later) = (None, 0, false);
         for _ in 0..waiting.keys.len() {
             let Some(key) = waiting.keys.get(at).cloned() else { break };
@@ -145,17 +145,17 @@ impl<'a> Queue<'a> {
 
     /// Returns an episode whose player has left to the queue.
     pub fn again(&self, key: Key) {
-        self.waiting().keys.push_back(key);
+        locked(&self.waiting).keys.push_back(key);
     }
 
     /// Notes that a taken episode is recorded or lost.
     pub fn ended(&self, key: &Key, lost: Option<LostEpisode>) {
-        self.waiting().end(key, lost);
+        locked(&self.waiting).end(key, lost);
     }
 
     /// The experiments completed since the last call.
     pub fn complete(&self) -> Vec<Complete> {
-        std::mem::take(&mut self.waiting().complete)
+        std::mem::take(&mut locked(&self.waiting).complete)
     }
 
     /// Once no thread uses the queue: the episodes that other processes have recorded in the meantime, the number
@@ -163,9 +163,5 @@ impl<'a> Queue<'a> {
     pub(super) fn into_rest(self) -> (Vec<Key>, usize, bool) {
         let rest = self.waiting.into_inner().unwrap_or_else(PoisonError::into_inner);
         (rest.elsewhere, rest.left_out, !rest.keys.is_empty())
-    }
-
-    fn waiting(&self) -> MutexGuard<'_, Waiting> {
-        self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

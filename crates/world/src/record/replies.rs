@@ -5,14 +5,14 @@
 //! of arrival. With one episode under way the second count includes the first. With several, the first is independent
 //! of other episodes; which ones are complete at the second is not.
 
-use std::fmt;
 use std::num::NonZeroU32;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::Mutex;
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::plan::{Key, Subject};
+use crate::agent::locked;
 use exact::escape::visible;
 use trace::episode::Step;
 use trace::replies::ReplyCounts;
@@ -59,7 +59,7 @@ impl Replies {
     /// Adds the reply of a step. Returns it if it is the first to arrive without a decision.
     pub fn add(&self, subject: &Subject, key: &Key, step: i32, row: &Step) -> Option<UnreadableReply> {
         let status = row.extra.reply_status.as_deref()?;
-        let mut found = self.found();
+        let mut found = locked(&self.0);
         found.counts.add(status, 1);
         let comes_before = |(first, at, _): &(Key, i32, UnreadableReply)| (key, step) < (first, *at);
         if ReplyCounts::is_read(status) || !found.first.as_ref().is_none_or(comes_before) {
@@ -72,19 +72,15 @@ impl Replies {
     }
 
     pub fn counts(&self) -> ReplyCounts {
-        self.found().counts.clone()
+        locked(&self.0).counts.clone()
     }
 
     pub fn answer(&self) -> RepliesAnswer {
-        let found = self.found();
+        let found = locked(&self.0);
         RepliesAnswer {
             counts: found.counts.clone(),
             first_unreadable: found.first.as_ref().map(|(_, _, reply)| reply.clone()),
         }
-    }
-
-    fn found(&self) -> MutexGuard<'_, Found> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -117,26 +113,19 @@ fn beginning(text: &str) -> String {
 }
 
 /// A recording that was given up because of consecutive unusable replies.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "the agent `{}` gave {in_a_row} replies in a row without a decision; the last: {}: {}\n  \
+     help: --max-unusable N allows more in a row, --keep-going any number; whole episodes stay, and the same \
+     command continues",
+    visible(model),
+    last.status,
+    last.words()
+)]
 pub struct GivenUp {
     pub model: String,
     pub in_a_row: u32,
     pub last: UnreadableReply,
-}
-
-impl fmt::Display for GivenUp {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { model, in_a_row, last } = self;
-        write!(
-            f,
-            "the agent `{}` gave {in_a_row} replies in a row without a decision; the last: {}: {}\n  \
-             help: --max-unusable N allows more in a row, --keep-going any number; whole episodes stay, and the same \
-             command continues",
-            visible(model),
-            last.status,
-            last.words()
-        )
-    }
 }
 
 /// The consecutive unusable replies of a recording.
@@ -162,7 +151,7 @@ impl Unusable {
     /// true if the recording is to stop.
     pub(super) fn add(&self, subject: &Subject, key: &Key, t: i32, row: &Step, in_episode: &mut u32) -> bool {
         let Some(status) = row.extra.reply_status.as_deref() else { return false };
-        let mut found = self.found.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut found = locked(&self.found);
         if ReplyCounts::is_read(status) {
             (*in_episode, found.in_a_row) = (0, 0);
             return false;
@@ -179,7 +168,7 @@ impl Unusable {
     }
 
     pub(super) fn given_up(&self) -> Option<GivenUp> {
-        self.found.lock().unwrap_or_else(PoisonError::into_inner).given_up.clone()
+        locked(&self.found).given_up.clone()
     }
 }
 

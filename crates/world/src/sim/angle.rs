@@ -5,7 +5,7 @@
 use serde::{Deserialize, Serialize};
 
 /// The direction of an upright body: multiples of 30 degrees counter-clockwise from +x, 0 to 11.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(transparent)]
 pub struct Heading(#[schemars(range(max = 11))] u8);
 
@@ -39,6 +39,12 @@ impl Heading {
         Self(thirties % HEADINGS)
     }
 
+    /// The heading nearest to a yaw in degrees.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0..12 after rem_euclid")]
+    pub fn nearest(yaw: f64) -> Self {
+        Self((yaw / 30.0).round().rem_euclid(f64::from(HEADINGS)) as u8)
+    }
+
     /// Steps of 30 degrees from +x, 0 to 11.
     pub const fn thirties(self) -> u8 {
         self.0
@@ -54,6 +60,12 @@ impl Heading {
     pub fn turned(self, thirties: i8) -> Self {
         let turned = (i16::from(self.0) + i16::from(thirties)).rem_euclid(i16::from(HEADINGS));
         Self(u8::try_from(turned).expect("a remainder of 12 is less than 12"))
+    }
+
+    /// Steps to the left that lead to `goal`, -5..=6.
+    pub fn turns_to(self, goal: Self) -> i32 {
+        let turns = (i32::from(goal.0) - i32::from(self.0)).rem_euclid(12);
+        if turns > 6 { turns - 12 } else { turns }
     }
 
     pub fn direction(self) -> [f64; 2] {
@@ -143,5 +155,14 @@ mod tests {
         let step = Heading::new(1).rotation();
         let turned = (0..24).fold(Quaternion([1.0, 0.0, 0.0, 0.0]), |sum, _| step.after(sum));
         assert!((turned.0[0] - 1.0).abs() < 1e-12, "{turned:?}");
+    }
+
+    #[test]
+    fn turns_take_the_shorter_way() {
+        assert_eq!(Heading(11).turns_to(Heading(1)), 2);
+        assert_eq!(Heading(1).turns_to(Heading(11)), -2);
+        assert_eq!(Heading(0).turns_to(Heading(6)), 6);
+        assert_eq!(Heading::nearest(-30.0), Heading(11));
+        assert_eq!(Heading::nearest(359.9), Heading(0));
     }
 }

@@ -30,7 +30,6 @@ const GLANCE: Duration = Duration::from_millis(2);
 const SHOWN: usize = 100;
 
 #[derive(Debug, thiserror::Error)]
-#[expect(missing_docs, reason = "the messages say it")]
 pub enum Failure {
     #[error("the program cannot be started: {0}")]
     Start(io::Error),

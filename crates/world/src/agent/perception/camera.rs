@@ -5,6 +5,7 @@
 
 use super::real;
 use crate::agent::Observation;
+pub use crate::sim::angle::Heading;
 use crate::sim::angle::sine_cosine;
 
 /// The eye above the floor, m.
@@ -27,55 +28,8 @@ impl Place {
     /// `reach` metres from here in the direction of a heading.
     #[must_use]
     pub fn ahead(self, heading: Heading, reach: f64) -> Self {
-        let (x, y) = heading.direction();
+        let [x, y] = heading.direction();
         Self { x: self.x + reach * x, y: self.y + reach * y }
-    }
-}
-
-/// The direction of a body: twelfths of a turn, counter-clockwise from +x.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct Heading(u8);
-
-impl Heading {
-    pub const COUNT: u8 = 12;
-    pub const ALL: [Self; 12] =
-        [Self(0), Self(1), Self(2), Self(3), Self(4), Self(5), Self(6), Self(7), Self(8), Self(9), Self(10), Self(11)];
-
-    /// The heading nearest to a yaw in degrees.
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0..12 after rem_euclid")]
-    pub fn nearest(yaw_degrees: f64) -> Self {
-        Self((yaw_degrees / 30.0).round().rem_euclid(f64::from(Self::COUNT)) as u8)
-    }
-
-    /// Twelfths of a turn, 0..12.
-    pub const fn twelfths(self) -> u8 {
-        self.0
-    }
-
-    /// After a turn by 30 degrees, counter-clockwise.
-    #[must_use]
-    pub const fn left(self) -> Self {
-        Self((self.0 + 1) % Self::COUNT)
-    }
-
-    /// After a turn by 30 degrees, clockwise.
-    #[must_use]
-    pub const fn right(self) -> Self {
-        Self((self.0 + Self::COUNT - 1) % Self::COUNT)
-    }
-
-    /// Turns of 30 degrees to the left that lead to `goal`, -5..=6.
-    pub fn turns_to(self, goal: Self) -> i32 {
-        let turns = (i32::from(goal.0) - i32::from(self.0)).rem_euclid(12);
-        if turns > 6 { turns - 12 } else { turns }
-    }
-
-    /// The unit vector; a table, so that it is the same on every machine.
-    pub fn direction(self) -> (f64, f64) {
-        const HALF_ROOT_3: f64 = 0.866_025_403_784_438_6;
-        const COSINE: [f64; 12] =
-            [1.0, HALF_ROOT_3, 0.5, 0.0, -0.5, -HALF_ROOT_3, -1.0, -HALF_ROOT_3, -0.5, 0.0, 0.5, HALF_ROOT_3];
-        (COSINE[usize::from(self.0)], COSINE[usize::from((self.0 + 9) % 12)])
     }
 }
 
@@ -121,9 +75,11 @@ impl Camera {
 
     /// The number of headings to either side of its own that are in the picture, 0 to 2.
     pub fn headings_aside(&self) -> i32 {
-        let (next, second) = (Heading(1).direction(), Heading(2).direction());
-        let shows = |(cosine, sine): (f64, f64)| self.focal * sine <= self.half_width * cosine;
-        i32::from(shows(next)) + i32::from(shows(second))
+        let shows = |turns: u8| {
+            let [cosine, sine] = Heading::new(turns).direction();
+            self.focal * sine <= self.half_width * cosine
+        };
+        i32::from(shows(1)) + i32::from(shows(2))
     }
 
     /// The number of pixels per metre at a distance of `ahead` metres.
@@ -132,7 +88,7 @@ impl Camera {
     }
 
     pub fn bearing(&self, place: Place) -> Bearing {
-        let (cosine, sine) = self.heading.direction();
+        let [cosine, sine] = self.heading.direction();
         let (dx, dy) = (place.x - self.eye.x, place.y - self.eye.y);
         Bearing { ahead: dx * cosine + dy * sine, right: dx * sine - dy * cosine }
     }
@@ -161,7 +117,7 @@ impl Camera {
     /// The place in a column, `ahead` metres away.
     pub fn place(&self, column: f64, ahead: f64) -> Place {
         let right = (column - self.half_width) * ahead / self.focal;
-        let (cosine, sine) = self.heading.direction();
+        let [cosine, sine] = self.heading.direction();
         Place { x: self.eye.x + ahead * cosine + right * sine, y: self.eye.y + ahead * sine - right * cosine }
     }
 }
@@ -170,12 +126,12 @@ impl Camera {
 mod tests {
     use super::*;
 
-    fn camera(twelfths: u8) -> Camera {
-        camera_of(twelfths, 110.0)
+    fn camera(thirties: u8) -> Camera {
+        camera_of(thirties, 110.0)
     }
 
-    fn camera_of(twelfths: u8, fov_y: f64) -> Camera {
-        Camera::new(Pose { place: Place { x: 1.0, y: -2.0 }, heading: Heading(twelfths) }, 640, 480, fov_y)
+    fn camera_of(thirties: u8, fov_y: f64) -> Camera {
+        Camera::new(Pose { place: Place { x: 1.0, y: -2.0 }, heading: Heading::new(thirties) }, 640, 480, fov_y)
     }
 
     #[test]
@@ -187,8 +143,8 @@ mod tests {
 
     #[test]
     fn projection_and_bearing_are_inverse() {
-        for heading in Heading::ALL {
-            let camera = camera(heading.twelfths());
+        for thirties in 0..12 {
+            let camera = camera(thirties);
             for (column, ahead) in [(0.5, 0.7), (320.0, 3.0), (600.25, 8.0)] {
                 let bearing = camera.bearing(camera.place(column, ahead));
                 assert!((bearing.ahead - ahead).abs() < 1e-9);
@@ -211,15 +167,5 @@ mod tests {
     fn things_to_the_left_of_the_heading_are_drawn_on_the_left() {
         let ahead_and_left = Place { x: 4.0, y: 0.0 };
         assert!(camera(0).column(camera(0).bearing(ahead_and_left)) < 320.0);
-    }
-
-    #[test]
-    fn turns_take_the_shorter_way() {
-        assert_eq!(Heading(11).turns_to(Heading(1)), 2);
-        assert_eq!(Heading(1).turns_to(Heading(11)), -2);
-        assert_eq!(Heading(0).turns_to(Heading(6)), 6);
-        assert_eq!(Heading::nearest(-30.0), Heading(11));
-        assert_eq!(Heading::nearest(359.9), Heading(0));
-        assert_eq!(Heading(0).left().right(), Heading(0));
     }
 }

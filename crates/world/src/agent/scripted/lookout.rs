@@ -6,6 +6,7 @@
 //! Rule: the first lookout is the starting place; the others are spread over the known part of the room.
 
 use crate::agent::perception::camera::{Heading, Place, Pose};
+use crate::sim::angle::HEADINGS;
 use trace::episode::Action;
 
 use super::knowledge::Knowledge;
@@ -70,8 +71,8 @@ impl Lookouts {
         }
         self.seen.push(pose.heading);
         let is_seen =
-            |heading: &Heading| self.seen.iter().any(|seen| seen.turns_to(*heading).abs() <= known.headings_aside);
-        (!Heading::ALL.iter().all(is_seen)).then_some(Action::TurnLeft)
+            |heading: Heading| self.seen.iter().any(|seen| seen.turns_to(heading).abs() <= known.headings_aside);
+        (!(0..HEADINGS).map(Heading::new).all(is_seen)).then_some(Action::TurnLeft)
     }
 
     fn finish(&mut self, known: &Knowledge) {

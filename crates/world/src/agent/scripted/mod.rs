@@ -47,7 +47,6 @@ use trace::palette::Color;
 use minds::{answering, chaser, confabulator, frozen, guesser, gullible, mimic, oracle, random, reacher};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-#[expect(missing_docs, reason = "each is described in the module of its name")]
 pub enum Scripted {
     Oracle,
     Random,

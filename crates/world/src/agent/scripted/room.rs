@@ -51,7 +51,7 @@ impl Side {
 
     /// The heading that faces this wall at a right angle.
     pub const fn heading(self) -> Heading {
-        Heading::ALL[3 * self as usize]
+        Heading::new(3 * self as u8)
     }
 }
 

@@ -99,8 +99,8 @@ pub fn after(pose: Pose, action: Action, step: f64) -> Pose {
     match action {
         Action::MoveForward => Pose { place: pose.place.ahead(pose.heading, step), ..pose },
         Action::MoveBackward => Pose { place: pose.place.ahead(pose.heading, -step), ..pose },
-        Action::TurnLeft => Pose { heading: pose.heading.left(), ..pose },
-        Action::TurnRight => Pose { heading: pose.heading.right(), ..pose },
+        Action::TurnLeft => Pose { heading: pose.heading.turned(1), ..pose },
+        Action::TurnRight => Pose { heading: pose.heading.turned(-1), ..pose },
         // A hand moves no body.
         _ => pose,
     }

@@ -122,7 +122,6 @@ pub struct Journal {
 }
 
 #[derive(Debug, thiserror::Error)]
-#[expect(missing_docs, reason = "the messages say it")]
 pub enum JournalError {
     #[error("cannot use the journal `{}`: {source}", path.display())]
     Io { path: PathBuf, source: io::Error },

@@ -212,7 +212,6 @@ pub struct Choice {
 }
 
 #[derive(Debug, thiserror::Error)]
-#[expect(missing_docs, reason = "the messages say it")]
 pub enum ModelsError {
     #[error("cannot read the models in `{}`: {source}", path.display())]
     Unreadable { path: PathBuf, source: std::io::Error },

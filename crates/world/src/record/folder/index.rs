@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use serde_json::Value;
 
@@ -13,6 +13,7 @@ use super::super::error::StoreError;
 use super::super::lock::{is_at, parts_of};
 use super::super::metadata::{Recordings, difference};
 use super::super::plan::Subject;
+use crate::agent::locked;
 use crate::sim::Experiment;
 use trace::error::TraceError;
 use trace::inputs::Input;
@@ -88,7 +89,7 @@ impl RecordingIndex {
     /// The episodes in the trace of an experiment, read again only if the trace was replaced.
     pub(in crate::record) fn in_trace(&self, experiment: &Experiment) -> Result<Places, StoreError> {
         let path = self.trace(experiment);
-        let mut traces = self.traces.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut traces = locked(&self.traces);
         if let Some(known) = traces.get(experiment).filter(|known| is_at(&known.file, &path)) {
             return Ok(Arc::clone(&known.places));
         }
@@ -141,14 +142,11 @@ pub(in crate::record) fn narrow(value: i64) -> i32 {
 
 pub(in crate::record) fn recording_of(path: &Path) -> Result<Value, StoreError> {
     let input = Input { name: path.display().to_string(), path: path.to_owned() };
+    let unopened = || StoreError::io("read", path)(io::Error::other("the file cannot be opened as a trace"));
     let file = TraceFile::open(&input)
-        .map_err(|findings| TraceError::of(findings).map_or_else(|| unreachable_fault(path), StoreError::Trace))?;
+        .map_err(|findings| TraceError::of(findings).map_or_else(unopened, StoreError::Trace))?;
     let text = file.metadata_value(RECORDING_KEY).unwrap_or("{}");
     Ok(serde_json::from_str(text).unwrap_or(Value::Null))
-}
-
-fn unreachable_fault(path: &Path) -> StoreError {
-    StoreError::io("read", path)(io::Error::other("the file cannot be opened as a trace"))
 }
 
 fn places(episodes: &[EpisodeRows]) -> BTreeSet<Place> {

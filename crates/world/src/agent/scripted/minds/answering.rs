@@ -23,7 +23,6 @@ pub fn by_evidence(
     policy: &mut impl Policy,
     (belief, mark): (Belief, Option<Color>),
 ) -> Answers {
-    let yaw = 30 * u16::from(known.pose.heading.twelfths());
     let text = |text: &str| Some(Answered::Text(text.to_owned()));
     let mut answered = |answer: &Answer| match answer.truth? {
         Fact::BodyColor => text(belief.claim?.name()),
@@ -34,7 +33,7 @@ pub fn by_evidence(
         }
         Fact::PoseX => Some(Answered::Number(known.pose.place.x)),
         Fact::PoseY => Some(Answered::Number(known.pose.place.y)),
-        Fact::PoseYaw => Some(Answered::Number(f64::from(yaw))),
+        Fact::PoseYaw => Some(Answered::Number(known.pose.heading.degrees())),
         Fact::MirrorVisible | Fact::Others => None,
     };
     let mut or_unknown =

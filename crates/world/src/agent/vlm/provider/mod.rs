@@ -94,7 +94,6 @@ pub struct Provider {
 }
 
 #[derive(Debug, thiserror::Error)]
-#[expect(missing_docs, reason = "the messages say it")]
 pub enum SetupError {
     #[error("`{url}` is no base address: {fault}\n  help: it looks like https://host/v1")]
     Address { url: String, fault: String },

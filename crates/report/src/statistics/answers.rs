@@ -12,7 +12,6 @@ use serde::{Deserialize, Serialize};
 use super::compare::{Comparison, Sign};
 use super::losses::LOST;
 use super::{ChanceRow, Contrast, Family, Method, Options, Reach, Role, Selection, Statistics, Units, Verdict};
-use crate::study::named;
 use exact::format;
 
 /// The most pairs that an experiment's answer names; others are counted.
@@ -271,7 +270,7 @@ fn changes(contrasts: &[Contrast], metric: &str, confidence: f64) -> Vec<String>
 fn changed(baseline: &str, against: &str, group: &[&Contrast], confidence: f64) -> String {
     let those = |sign| -> Vec<String> {
         let found = group.iter().filter(|contrast| contrast.comparison.sign() == sign);
-        found.map(|contrast| named(&contrast.model, contrast.condition.as_deref())).collect()
+        found.map(|contrast| contrast.name()).collect()
     };
     let phrase = |what: &str, sign| {
         let models = those(Some(sign));
@@ -291,7 +290,7 @@ fn changed(baseline: &str, against: &str, group: &[&Contrast], confidence: f64) 
         (rest, _) => Some(format!("no change shown for {rest} more")),
     };
     let unsaid = unsaid.into_iter().map(|contrast| {
-        let model = named(&contrast.model, contrast.condition.as_deref());
+        let model = contrast.name();
         let why = contrast.comparison.unsaid(confidence).map_or_else(|| "not tested".to_owned(), |it| counted(&it));
         format!("cannot say for {model}: {why}")
     });

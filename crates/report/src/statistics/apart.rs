@@ -5,7 +5,6 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Statistics;
-use crate::study::named;
 
 /// A setting in which recordings differ.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -30,16 +29,16 @@ impl SettingApart {
     pub(super) fn all(statistics: &Statistics) -> Vec<Self> {
         let models = statistics.models.iter().flat_map(|family| {
             let of_test = |test: &super::PairTest| {
-                let between =
-                    [test.first.clone().min(test.second.clone()), test.first.clone().max(test.second.clone())];
+                let mut between = [test.first.clone(), test.second.clone()];
+                between.sort();
                 (test.comparison.incomparable.clone(), family.experiment.clone(), between)
             };
             family.tests.iter().map(of_test)
         });
-        let conditions = statistics.conditions.iter().map(|it| {
-            let within = named(&it.model, it.condition.as_deref());
-            (it.comparison.incomparable.clone(), within, [it.baseline.clone(), it.against.clone()])
-        });
+        let conditions = statistics
+            .conditions
+            .iter()
+            .map(|it| (it.comparison.incomparable.clone(), it.name(), [it.baseline.clone(), it.against.clone()]));
         let mut found: IndexMap<String, Vec<ComparisonApart>> = IndexMap::new();
         for (setting, within, between) in models.chain(conditions) {
             let Some(setting) = setting else { continue };

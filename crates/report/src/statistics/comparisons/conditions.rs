@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::comparable::tasks_differ;
 use crate::statistics::compare::{Compared, Comparison, adjust};
 use crate::statistics::matching::{Matched, Matching, Scenes};
-use crate::study::{Block, Experiment, Study};
+use crate::study::{Block, Experiment, Study, named};
 use score::table::MetricColumn;
 
 /// The difference of a model's mean between two experiments, by pairs if their scenes agree.
@@ -69,6 +69,11 @@ impl<'s, 'a> Pair<'s, 'a> {
 }
 
 impl Contrast {
+    /// The model, with its condition if there are several.
+    pub(crate) fn name(&self) -> String {
+        named(&self.model, self.condition.as_deref())
+    }
+
     pub(crate) fn all(study: &Study, horizon: Option<i64>, confidence: f64) -> Vec<Self> {
         let mut contrasts = Vec::new();
         for pair in Self::pairs(study) {

@@ -56,30 +56,19 @@ impl RetestRow {
     }
 
     fn of(block: &Block, times: &Times, column: &MetricColumn) -> Option<Self> {
-        let (mut count, mut episodes, mut unstable, mut flipped) = (0, 0, 0, 0.0);
-        let mut parts = Vec::new();
-        for rows in times.values() {
-            let values: Vec<i64> = rows.iter().filter_map(|row| column.get(*row)).collect();
-            let (times, successes) = (values.len() as u64, values.iter().filter(|value| **value == 1).count() as u64);
-            if times < 2 {
-                continue;
-            }
-            count += 1;
-            let (ones, all) = (usize::try_from(successes).ok()?, values.len());
-            parts.push(Moments::default().with_truths(all - ones, ones).ok()?);
-            episodes += times;
-            unstable += u64::from(successes > 0 && successes < times);
-            flipped += (2 * successes * (times - successes)) as f64 / (times * (times - 1)) as f64;
-        }
-        let components = variance_components(&parts);
+        let mut scenes = sums(times, |row| column.get(row).map(|value| i64::from(value == 1)));
+        scenes.retain(|scene| scene.n > 1);
+        let components = variance_components(&scenes);
+        let (count, counts) = (scenes.len() as u64, || scenes.iter().filter_map(|scene| scene.counts()));
+        let flipped: f64 = counts().map(|(k, m)| (2 * k * (m - k)) as f64 / (m * (m - 1)) as f64).sum();
         (count > 0).then(|| Self {
             experiment: block.experiment.to_owned(),
             model: block.model.to_owned(),
-            condition: block.condition.map(str::to_owned),
+            condition: block.condition(),
             metric: column.name.clone(),
             scenes: count,
-            episodes,
-            unstable,
+            episodes: scenes.iter().map(|scene| scene.n).sum(),
+            unstable: counts().filter(|(k, m)| 0 < *k && k < m).count() as u64,
             flipped: flipped / count as f64,
             between_scenes: components.map(|(between, _)| between),
             within_scenes: components.map(|(_, within)| within),
@@ -100,15 +89,18 @@ fn times(study: &Study, block: &Block) -> Times {
     times
 }
 
+/// The moments of each scene, separately for each person.
+fn sums(times: &Times, value: impl Fn(usize) -> Option<i64>) -> Vec<Moments> {
+    let add = |sum: Moments, value| sum.with(value).expect("a part of a block that was summed whole");
+    let moments = |rows: &Vec<usize>| rows.iter().filter_map(|row| value(*row)).fold(Moments::default(), add);
+    times.values().map(moments).collect()
+}
+
 pub(crate) fn repeat_variance(study: &Study, block: &Block, column: &MetricColumn) -> Option<f64> {
     if !block.repeats {
         return None;
     }
-    let moments = |rows: Vec<usize>| {
-        let values = rows.into_iter().filter_map(|row| column.get(row));
-        values.fold(Moments::default(), |sum, value| sum.with(value).expect("a part of a block that was summed whole"))
-    };
-    let parts: Vec<Moments> = times(study, block).into_values().map(moments).collect();
+    let parts = sums(&times(study, block), |row| column.get(row));
     let n: u64 = parts.iter().map(|part| part.n).sum();
     Some(variance_components(&parts)?.1 / n as f64)
 }

@@ -110,10 +110,7 @@ impl DurationRow {
         let n = endings.len() as u64;
         let curve = Survival::of(&endings);
         let restricted = curve.as_ref().zip(horizon).and_then(|(curve, at)| curve.restricted_mean(at, confidence));
-        let (restricted, withheld) = restricted.map_or((None, None), |found| {
-            let (found, withheld) = held(found, n);
-            (Some(found), withheld)
-        });
+        let (restricted, withheld) = restricted.map(|found| held(found, n)).unzip();
         let median_interval = curve.as_ref().and_then(|curve| curve.median_interval(confidence));
         Self {
             key: block.key(),
@@ -124,7 +121,7 @@ impl DurationRow {
             median: curve.as_ref().and_then(Survival::median),
             median_interval: median_interval.filter(|_| n >= coverage::MEDIAN),
             restricted,
-            withheld,
+            withheld: withheld.flatten(),
             correct: horizon.and_then(|at| CorrectRow::of(&endings, at, confidence)),
         }
     }

@@ -139,7 +139,7 @@ pub(super) fn separated(statistics: &Statistics, shown: Shown, is_full: bool) ->
 pub(super) fn conditions(statistics: &Statistics, shown: Shown, is_full: bool) -> Table {
     let all = statistics.conditions.iter().map(|contrast| &contrast.comparison);
     TextTable::of(statistics.conditions.iter().filter(|contrast| shown(&contrast.metric)))
-        .text("model", |contrast| named(&contrast.model, contrast.condition.as_deref()))
+        .text("model", |contrast| contrast.name())
         .text("metric", |contrast| contrast.metric.clone())
         .text("conditions", |contrast| format!("{} - {}", contrast.baseline, contrast.against))
         .comparison(all, is_full, |contrast| &contrast.comparison)

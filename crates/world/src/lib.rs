@@ -23,6 +23,8 @@
 pub mod agent;
 pub mod experiment;
 #[cfg(feature = "sim")]
+mod json_lines;
+#[cfg(feature = "sim")]
 pub mod record;
 pub mod replay;
 #[cfg(feature = "sim")]

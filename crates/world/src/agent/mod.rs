@@ -128,7 +128,6 @@ pub struct Usage {
 }
 
 impl Usage {
-    /// The usage of a reply that took this time.
     #[cfg(feature = "sim")]
     fn of_time(latency: Duration) -> Self {
         Self { latency_ms: Some(milliseconds(latency)), ..Self::default() }
@@ -200,7 +199,6 @@ pub enum LostKind {
 }
 
 impl Lost {
-    /// Lost to something other than a reply.
     pub fn because(cause: impl Into<String>) -> Self {
         Self { status: None, cause: cause.into(), step: None, kind: LostKind::Failure }
     }
@@ -208,6 +206,12 @@ impl Lost {
     /// Lost to the failure of a reply, which counts as this status.
     pub fn counted_as(status: Status, cause: impl Into<String>) -> Self {
         Self { status: Some(status), ..Self::because(cause) }
+    }
+
+    /// Lost to an observation that cannot be made.
+    #[cfg(feature = "sim")]
+    fn unobservable(fault: impl std::fmt::Display) -> Self {
+        Self::because(format!("the observation cannot be made: {fault}"))
     }
 
     pub fn by_limit(cause: impl Into<String>) -> Self {
@@ -312,7 +316,6 @@ pub trait Player: Send + Sync {
         usize::MAX
     }
 
-    /// Receives the planned episodes before the first one begins.
     fn plans(&self, _planned: &[Planned]) {}
 
     fn turn(&self, _episode_id: &str) -> Turn {

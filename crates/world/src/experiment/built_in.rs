@@ -1,5 +1,3 @@
-//! The built-in experiments, one file each.
-
 use super::Experiment;
 use super::file;
 use toml_spec::Source;

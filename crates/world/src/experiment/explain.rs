@@ -1,5 +1,3 @@
-//! An experiment in words.
-
 use std::fmt::Write as _;
 
 use super::Experiment;
@@ -9,7 +7,6 @@ use super::spec::{
 };
 use exact::escape::visible;
 
-/// The output of `explain`: what an experiment shows, asks and decides.
 pub fn explained(experiment: &Experiment) -> String {
     let mut text = format!("{}: {}\n", experiment.name(), visible(&experiment.title));
     let mut line = |name: &str, words: String| {

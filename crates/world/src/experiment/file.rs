@@ -29,7 +29,6 @@ pub enum FileError {
     Faults(#[from] Faults),
 }
 
-/// Loads the experiments of a file, which may use the scenes of built-in ones.
 pub fn load(path: &Path) -> Result<Vec<Loaded>, FileError> {
     let text = input::text(path, LARGEST).map_err(|source| FileError::Unreadable { path: path.to_owned(), source })?;
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));

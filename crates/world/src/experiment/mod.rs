@@ -51,7 +51,6 @@ enum Origin {
     },
 }
 
-/// The content of an experiment.
 struct Known {
     spec: Spec,
     /// Its prompt; empty if it comes from a trace's footer, which has only the hash.
@@ -124,7 +123,6 @@ impl Experiment {
         }
     }
 
-    /// Its name in traces and files.
     pub fn name(&self) -> &str {
         &self.known().spec.name
     }

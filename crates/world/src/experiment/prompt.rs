@@ -96,7 +96,6 @@ impl Templates {
         BUILT_IN.iter().map(|(name, _)| *name).collect()
     }
 
-    /// The prompt of a folder `name` inside `folder`.
     pub fn read(folder: &Path, name: &str) -> Result<Self, String> {
         let relative = Path::new(name);
         if !relative.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir)) {

@@ -34,11 +34,9 @@ pub struct Loaded {
     pub mirrors: Vec<Place>,
 }
 
-/// The context for reading an experiment.
 pub(super) struct Beside<'a> {
     /// The folder of its file; `None` for a built-in one.
     pub folder: Option<&'a Path>,
-    /// Its place in its file.
     pub place: usize,
     /// The experiments whose scenes it may use: earlier ones of its file, and built-in ones.
     pub before: &'a [&'a Spec],

@@ -1,5 +1,3 @@
-//! Errors of a recording's folder, and of episodes that did not finish.
-
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -47,7 +45,6 @@ pub enum StoreError {
 }
 
 impl StoreError {
-    /// The file at `path` was recorded with other settings.
     pub(super) fn different(path: &Path, Difference { what, expected, found }: Difference) -> Self {
         let path = path.to_owned();
         match what.as_str() {
@@ -78,7 +75,6 @@ pub enum RecordError {
 }
 
 impl RecordError {
-    /// A failure that affects every episode.
     pub fn fatal(error: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Self {
         Self::Fatal(error.into())
     }

@@ -58,7 +58,6 @@ impl Fingerprint {
     }
 }
 
-/// The hash of a value, with the keys of objects sorted.
 fn hash_of(value: &Value) -> String {
     hash::of_bytes(sorted(value).to_string().as_bytes())
 }

@@ -22,7 +22,6 @@ pub(super) const VERSION_KEY: &str = "version";
 /// of another version is not continued, since its episodes were compared by other rules.
 const VERSION: u32 = 3;
 
-/// The metadata of several experiments' recordings.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Recordings(BTreeMap<Experiment, Value>);
 

@@ -1,5 +1,3 @@
-//! The episodes of a recording.
-
 use std::collections::BTreeSet;
 use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};

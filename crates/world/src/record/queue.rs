@@ -30,21 +30,12 @@ struct Waiting {
     /// The number of episodes without a player.
     left_out: usize,
     experiments: BTreeMap<Experiment, Outcomes>,
-    complete: Vec<Complete>,
+    complete: Vec<(Experiment, Outcomes)>,
 }
 
-/// The outcomes of an experiment's episodes so far.
 #[derive(Debug, Default)]
-struct Outcomes {
+pub struct Outcomes {
     left: usize,
-    recorded: Vec<Key>,
-    lost: Vec<(Key, LostEpisode)>,
-}
-
-/// An experiment without remaining episodes.
-#[derive(Debug)]
-pub struct Complete {
-    pub experiment: Experiment,
     pub recorded: Vec<Key>,
     pub lost: Vec<(Key, LostEpisode)>,
 }
@@ -63,13 +54,11 @@ impl Waiting {
         let outcomes = self.experiments.entry(experiment.clone()).or_default();
         outcomes.left = outcomes.left.saturating_sub(1);
         if outcomes.left == 0 {
-            let Outcomes { recorded, lost, .. } = std::mem::take(outcomes);
-            self.complete.push(Complete { experiment: experiment.clone(), recorded, lost });
+            self.complete.push((experiment.clone(), std::mem::take(outcomes)));
         }
     }
 }
 
-/// The next work of a thread.
 #[derive(Debug)]
 pub enum Next {
     Play(Key, EpisodeLock),
@@ -81,7 +70,6 @@ pub enum Next {
     Nothing,
 }
 
-/// Episodes held by other processes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Held {
     /// One of them.
@@ -107,7 +95,6 @@ impl<'a> Queue<'a> {
         locked(&self.waiting).experiments.keys().cloned().collect()
     }
 
-    /// The next playable episode, with its lock.
     pub fn next(&self, turn: impl Fn(&Key) -> Turn) -> Result<Next, StoreError> {
         let mut waiting = locked(&self.waiting);
         let (mut held, mut at, mut is_later) = (None, 0, false);
@@ -148,13 +135,12 @@ impl<'a> Queue<'a> {
         locked(&self.waiting).keys.push_back(key);
     }
 
-    /// Notes that a taken episode is recorded or lost.
     pub fn ended(&self, key: &Key, lost: Option<LostEpisode>) {
         locked(&self.waiting).end(key, lost);
     }
 
     /// The experiments completed since the last call.
-    pub fn complete(&self) -> Vec<Complete> {
+    pub fn complete(&self) -> Vec<(Experiment, Outcomes)> {
         std::mem::take(&mut locked(&self.waiting).complete)
     }
 

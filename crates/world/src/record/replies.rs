@@ -91,7 +91,6 @@ impl UnreadableReply {
         Self { episode_id: key.episode_id(subject), step, status: status.to_owned(), text, fault }
     }
 
-    /// The reply, its location, and the reason for the missing decision, in words.
     pub fn words(&self) -> String {
         let text = self.text.as_ref().map_or_else(|| "no text".to_owned(), |text| format!("`{text}`"));
         let fault = self.fault.as_ref().map_or_else(String::new, |fault| format!(": {fault}"));
@@ -128,7 +127,6 @@ pub struct GivenUp {
     pub last: UnreadableReply,
 }
 
-/// The consecutive unusable replies of a recording.
 #[derive(Debug)]
 pub(super) struct Unusable {
     most: Option<NonZeroU32>,

@@ -25,7 +25,6 @@ use trace::frame::Frame;
 use trace::palette::Color;
 use trace::renderer::Renderer;
 
-/// An observer of an episode: writes a log, counts steps.
 pub trait Observer {
     fn seen(&mut self, _: &Seen<'_>) -> Result<(), RecordError> {
         Ok(())
@@ -41,7 +40,6 @@ pub struct Nobody;
 
 impl Observer for Nobody {}
 
-/// The setting of an episode, besides its key.
 pub struct Stage<'a> {
     pub config: &'a WorldConfig,
     /// The thread's camera; `None` if no pictures are needed.
@@ -89,7 +87,6 @@ pub fn head(config: &WorldConfig, scene: &Scene, key: &Key, subject: &Subject) -
     }
 }
 
-/// An episode played to its end.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Played {
     pub episode: Episode,
@@ -128,7 +125,7 @@ pub async fn play(
             bumped,
             history: history.take(),
             past: Arc::clone(&past),
-            frame: frame.clone().unwrap_or_else(nothing),
+            frame: frame.clone().unwrap_or_else(|| Arc::new(Frame::new(0, 0, Vec::new()))),
             fov_y: world.config().eye.fovy,
         };
         let start = Instant::now();
@@ -177,10 +174,6 @@ fn look(stage: &Stage<'_>, world: &World) -> Result<Option<Arc<Frame>>, RecordEr
     let frame = eye.borrow_mut().frame(world).map_err(RecordError::fatal)?;
     stage.shares.rendering.add(start);
     Ok(Some(Arc::new(frame)))
-}
-
-fn nothing() -> Arc<Frame> {
-    Arc::new(Frame::new(0, 0, Vec::new()))
 }
 
 /// The row of a step, without `bumped`.

@@ -17,7 +17,7 @@ use super::eyes::Eyes;
 use super::failures::{LostEpisode, lost_episode};
 use super::lock::EpisodeLock;
 use super::plan::{Key, Subject};
-use super::queue::{Complete, Held, Next, Queue};
+use super::queue::{Held, Next, Outcomes, Queue};
 use super::replies::{GivenUp, Unusable};
 use super::rollout::{self, Nobody, Observer, Played, Stage};
 use super::shares::Shares;
@@ -32,7 +32,6 @@ use trace::diagnostic::MORE_FILES;
 use trace::episode::{Action, Episode, Step};
 use trace::episode_hash;
 
-/// Events of a running recording, reported by its threads.
 pub trait Progress: Sync {
     /// Receives a played step of an episode: its number, from 1, and its row.
     fn step(&self, episode: &Key, t: i32, row: &Step);
@@ -90,7 +89,6 @@ pub struct Tally {
     pub given_up: Option<GivenUp>,
 }
 
-/// One recording under way: the shared state of its threads.
 pub struct Recording<'a> {
     pub config: &'a WorldConfig,
     pub player: &'a dyn Player,
@@ -154,7 +152,6 @@ impl Recording<'_> {
         Ok(tally)
     }
 
-    /// One thread: its camera, and up to `each` episodes under way.
     fn thread(&self, queue: &Queue<'_>, unusable: &Unusable, each: usize) -> Result<Tally, RecordError> {
         let start = Instant::now();
         let result = self.episodes(queue, unusable, each);
@@ -203,7 +200,7 @@ impl Recording<'_> {
 
     /// Assembles the newly complete experiments, so that they can be viewed while others are played.
     fn assemble(&self, queue: &Queue<'_>) {
-        for Complete { experiment, recorded, lost } in queue.complete() {
+        for (experiment, Outcomes { recorded, lost, .. }) in queue.complete() {
             // Failures here are retried and reported at the end of the recording; no episode need be lost.
             let _ = self.store.note_lost(&recorded, lost);
             let _ = self.store.assemble(&experiment);

@@ -1,5 +1,3 @@
-//! The time of a recording by activity.
-
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 

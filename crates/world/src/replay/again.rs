@@ -1,5 +1,3 @@
-//! Rebuilds a trace's worlds and repeats its actions in them.
-
 use serde_json::Value as Json;
 
 use super::error::{Divergence, ReplayError};
@@ -17,7 +15,6 @@ use trace::schema::{self, Value};
 /// The maximum number of rays per row and per column of the visibility grid.
 pub const MOST_RAYS: u32 = 4096;
 
-/// The part of a trace's metadata that a replay needs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recipe {
     pub experiment: Experiment,
@@ -28,7 +25,6 @@ pub struct Recipe {
 }
 
 impl Recipe {
-    /// Parses the value of `mirrorstats.recording`.
     pub fn of(recording: &Json) -> Result<Self, ReplayError> {
         // This check is first: a world of another version may lack values that this one has.
         let version = recording.get("scene_version").ok_or(ReplayError::NoRecipe)?;
@@ -49,7 +45,6 @@ impl Recipe {
         Ok(Self { experiment: Experiment::of_footer(spec), config, eye })
     }
 
-    /// The world of an episode at its start, with this configuration of the eye.
     pub fn world(&self, episode: &Episode, eye: &WorldConfig) -> Result<World, ReplayError> {
         let fault = |fault: String| ReplayError::World { episode: episode.episode_id.clone(), fault };
         let name = self.experiment.name();

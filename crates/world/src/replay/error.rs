@@ -1,5 +1,3 @@
-//! Errors of a replay, and its difference from a trace.
-
 use std::path::{Path, PathBuf};
 
 use crate::sim::scene::SCENE_VERSIONS;

@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::again::{Recipe, again};
+use super::again::Recipe;
 use super::error::ReplayError;
+use super::frames::rendered;
 use super::moments::{chosen, moments};
-use crate::sim::camera::Camera;
 use exact::budget::Limit;
 use report::figures::Figure;
 use report::figures::film_strip::{Still, film_strip};
@@ -31,7 +31,6 @@ pub struct Strip {
 pub enum Steps {
     /// This number of steps, chosen to tell the story.
     Chosen(usize),
-    /// These steps.
     Named(Vec<i32>),
 }
 
@@ -42,7 +41,6 @@ struct Reel {
 }
 
 impl Strip {
-    /// Draws the episode from the log that has it, with its frames; `traces` may have it too.
     pub fn from_logs(&self, logs: &[PathBuf], traces: &[Input]) -> Result<Option<Figure>, ReplayError> {
         for log in logs {
             if let Some(reel) = self.in_log(log)? {
@@ -53,7 +51,6 @@ impl Strip {
         Ok(None)
     }
 
-    /// Renders the episode again from the trace that has it, and draws it.
     pub fn from_traces(&self, traces: &[Input]) -> Result<Option<Figure>, ReplayError> {
         self.in_traces(traces)?.map(|reel| self.draw(&reel)).transpose()
     }
@@ -138,16 +135,8 @@ impl Strip {
 
     fn rendered(&self, recipe: &Recipe, episode: Episode) -> Result<Reel, ReplayError> {
         let wanted = self.chosen(&episode)?;
-        let mut camera = Camera::new(&recipe.config).map_err(ReplayError::other)?;
-        let mut frames = BTreeMap::new();
-        let divergence = again(recipe, &recipe.eye, &episode, |t, world, _, _| {
-            if wanted.contains(&t) {
-                let frame = camera.frame(world).map_err(ReplayError::other)?;
-                frames.insert(t, frame.to_png().map_err(ReplayError::other)?.to_vec());
-            }
-            Ok::<(), ReplayError>(())
-        })?;
-        divergence.map_or(Ok(Reel { episode, frames }), |parted| Err(ReplayError::Diverged(parted)))
+        let frames = rendered(recipe, &recipe.eye, &episode, i32::MAX, |t| wanted.contains(&t))?;
+        Ok(Reel { episode, frames })
     }
 }
 

@@ -1,5 +1,3 @@
-//! Frames of an episode, rendered again if no log has them.
-
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
@@ -8,6 +6,7 @@ use serde_json::Value;
 use super::again::{Recipe, again};
 use super::error::ReplayError;
 use crate::sim::camera::Camera;
+use crate::sim::config::WorldConfig;
 use trace::episode::Episode;
 
 /// The rows of rays for visibility here, where the counts are unused: counting takes most of a replay's time.
@@ -32,16 +31,27 @@ pub fn frames(
     steps: &RangeInclusive<i32>,
 ) -> Result<BTreeMap<i32, Vec<u8>>, ReplayError> {
     let recipe = Recipe::of(recording.unwrap_or(&Value::Null))?;
-    let mut camera = Camera::new(&recipe.config).map_err(ReplayError::other)?;
-    let mut frames = BTreeMap::new();
     let mut eye = recipe.eye.clone();
     let columns = eye.eye.width * RAYS / eye.eye.height_px.max(1);
     (eye.eye.width, eye.eye.height_px) = (columns.max(1), RAYS);
-    let ended = again(&recipe, &eye, episode, |t, world, _, _| {
-        if t > *steps.end() {
+    rendered(&recipe, &eye, episode, *steps.end(), |t| steps.contains(&t))
+}
+
+/// Replays an episode up to a step, and returns the wanted frames as PNG, by t.
+pub(super) fn rendered(
+    recipe: &Recipe,
+    eye: &WorldConfig,
+    episode: &Episode,
+    last: i32,
+    is_wanted: impl Fn(i32) -> bool,
+) -> Result<BTreeMap<i32, Vec<u8>>, ReplayError> {
+    let mut camera = Camera::new(&recipe.config).map_err(ReplayError::other)?;
+    let mut frames = BTreeMap::new();
+    let ended = again(recipe, eye, episode, |t, world, _, _| {
+        if t > last {
             return Err(Halt::Done);
         }
-        if steps.contains(&t) {
+        if is_wanted(t) {
             let frame = camera.frame(world).map_err(ReplayError::other)?;
             frames.insert(t, frame.to_png().map_err(ReplayError::other)?.to_vec());
         }

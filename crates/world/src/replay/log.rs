@@ -16,7 +16,6 @@ use trace::log::write::{EpisodeLog, Form, Solid, View};
 
 static CENSUS: LazyLock<Value> = LazyLock::new(|| schema_for!(Visibility).to_value());
 
-/// A step as seen by an observer.
 pub struct Seen<'a> {
     pub t: i32,
     /// The world before the action.
@@ -45,7 +44,6 @@ impl Log {
         Self { file: self.file.in_large_chunks(), ..self }
     }
 
-    /// Adds the view before a step.
     pub fn seen(&mut self, seen: &Seen<'_>) -> Result<(), LogFault> {
         let png = seen.frame.map(|frame| frame.to_png()).transpose()?;
         let snapshot = seen.world.snapshot();

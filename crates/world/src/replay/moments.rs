@@ -1,8 +1,5 @@
-//! The key steps of an episode.
-
 use trace::episode::{Action, Episode};
 
-/// The role of a step in the story.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Moment {
     /// Mirror evidence is in view for the first time.

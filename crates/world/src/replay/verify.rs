@@ -33,7 +33,6 @@ pub struct Recorded {
 
 #[derive(Clone, Debug, Default)]
 pub struct Outputs {
-    /// The folder for the frame of every step.
     pub frames: Option<PathBuf>,
     pub log: Option<PathBuf>,
     /// The trace with recomputed visibility.
@@ -86,7 +85,6 @@ pub struct FramesAnswer {
 }
 
 impl Recorded {
-    /// Opens traces, or one of their episodes.
     pub fn open(files: &[Input], episode: Option<&str>) -> Result<Vec<Self>, ReplayError> {
         let set = TraceSet::open(files).map_err(ReplayError::other)?;
         let mut traces = Vec::new();
@@ -138,13 +136,10 @@ impl Recorded {
         }
         Ok(())
     }
-}
 
-impl Recorded {
-    /// The camera, if frames are to be written or compared.
     fn camera(&self, outputs: &Outputs, answer: &mut ReplayAnswer) -> Result<Option<Camera>, ReplayError> {
         let is_written = outputs.frames.is_some() || outputs.log.is_some();
-        let is_compared = has_digests(&self.recording) && !outputs.skip_frames;
+        let is_compared = self.recording["frame_digest"].is_string() && !outputs.skip_frames;
         if !is_written && !is_compared {
             return Ok(None);
         }
@@ -162,7 +157,6 @@ impl Recorded {
 }
 
 impl FramesAnswer {
-    /// Adds a trace: the recorded and the current renderer of its frames.
     fn add_trace(&mut self, recording: &Value, drawn_with: Option<&Renderer>) {
         self.tolerance = TOLERANCE;
         self.drawn_with = drawn_with.cloned();
@@ -173,7 +167,6 @@ impl FramesAnswer {
         }
     }
 
-    /// Compares a frame; returns the divergence if the picture differs.
     fn add(&mut self, (episode_id, t): (&str, i32), recorded: &str, frame: &Frame) -> Option<Divergence> {
         let drawn = frame.digest();
         match likeness(recorded, &drawn) {
@@ -192,11 +185,6 @@ impl FramesAnswer {
         }
         None
     }
-}
-
-/// Returns true if the trace has digests of its agents' frames.
-fn has_digests(recording: &Value) -> bool {
-    recording["frame_digest"].is_string()
 }
 
 impl Recount {
@@ -221,7 +209,6 @@ struct Player<'a> {
 }
 
 impl Player<'_> {
-    /// Replays one episode, with its log at `part`.
     fn episode<E: From<ReplayError>>(
         &mut self,
         episode: &Episode,
@@ -260,7 +247,6 @@ impl Player<'_> {
     }
 }
 
-/// The new counts, one value per step.
 #[derive(Default)]
 struct Counts {
     px: Vec<(&'static str, Vec<i32>)>,

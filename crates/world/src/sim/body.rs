@@ -12,7 +12,6 @@ use crate::experiment::spec::Body;
 use exact::names;
 
 impl Body {
-    /// Its parts, in MuJoCo's format.
     pub(super) const fn xml(self) -> &'static str {
         match self {
             Self::Mannequin => include_str!("../../../../assets/world/mannequin.xml"),
@@ -88,7 +87,6 @@ pub struct Figure {
 }
 
 impl Figure {
-    /// A body that has not moved yet.
     pub const fn standing(pose: Pose) -> Self {
         Self { pose, stride: Stride::Standing, steps: 0 }
     }

@@ -66,7 +66,6 @@ pub fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
     (dx * dx + dy * dy).sqrt()
 }
 
-/// The fixed things: walls and cubes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FloorPlan {
     /// The largest distance of a body's axis from the centre along each axis, m.

@@ -30,7 +30,6 @@ pub const AGENTS: usize = 1 + MOST_OTHERS;
 /// Humanoids in every model: those of the room, then one for each pane, which only that pane shows.
 pub const BODIES: usize = AGENTS + MOST_PANES;
 
-/// The agent's eye as a camera.
 pub const EYE_CAMERA: &str = "eye";
 
 /// The camera for a pane: the eye's mirror image, or the eye in the second room.
@@ -39,7 +38,6 @@ pub const BEYOND_CAMERA: &str = "beyond";
 /// The hand's body, and the prefix of its shapes' names.
 pub const HAND: &str = "hand";
 
-/// The square mark on the front of a body that stands still.
 pub const PATCH: &str = "patch";
 
 pub const TOP_CAMERA: &str = "top";
@@ -69,7 +67,6 @@ const PANELS: &str = r#"<texture name="panels" type="2d" builtin="flat" mark="ed
 /// Bars of a frame: top, bottom and both sides.
 pub(super) const BARS: usize = 4;
 
-/// The paint of a model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Paint {
     /// Lit, as the agent sees it.
@@ -78,7 +75,6 @@ pub enum Paint {
     Labels,
 }
 
-/// The owner of a geom.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Item {
     /// The surface of a mirror or window of the scene.
@@ -94,7 +90,6 @@ pub enum Item {
     Hand,
 }
 
-/// The look of a stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Look {
     /// Directly by the eye: panes are blank.
@@ -120,7 +115,6 @@ pub struct Moment {
 #[error("mujoco cannot build the world: {0}; the configuration or the library is at fault")]
 pub struct ModelError(#[from] MjEditError);
 
-/// A model adapted to a scene, and its state.
 pub struct Stage {
     pub(super) data: MjData<Arc<MjModel>>,
     model: Arc<MjModel>,

@@ -96,7 +96,6 @@ pub fn crowded(config: &WorldConfig, experiment: &Experiment) -> Option<DoesNotF
     Some(DoesNotFit { what, help: help.to_owned(), mirror: None })
 }
 
-/// The seeds and runs of a study, whose scenes serve to check an experiment.
 fn study() -> impl Iterator<Item = (i32, i32)> {
     (1..=3).flat_map(|seed| (1..=7).map(move |run| (seed, run)))
 }

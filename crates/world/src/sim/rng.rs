@@ -5,7 +5,6 @@
 use rand::Rng as _;
 use rand_pcg::Pcg64;
 
-/// A stream of draws.
 #[derive(Clone, Debug)]
 pub struct Rng(Pcg64);
 
@@ -16,7 +15,6 @@ impl Rng {
         Self::of_number(mixed(episode) ^ purpose)
     }
 
-    /// The stream of one number.
     pub fn of_number(number: u64) -> Self {
         // Neighbouring numbers must not give neighbouring states, which would be noticeable at first.
         let [low, high] = [mixed(number), mixed(mixed(number))];
@@ -52,7 +50,6 @@ impl Rng {
         self.below(100) < percent
     }
 
-    /// One of `choices`.
     pub fn one_of<T: Copy>(&mut self, choices: &[T]) -> T {
         choices[self.below(u32::try_from(choices.len()).unwrap_or(u32::MAX)) as usize]
     }

@@ -16,12 +16,10 @@ pub struct Snapshot {
     pub solids: Vec<Solid>,
 }
 
-/// A visible shape.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Solid {
     /// Unique among the shapes, such as `pane0`, `cube0` or `agent0_head`.
     pub name: String,
-    /// The item that this shape is part of.
     pub item: Item,
     pub shape: Shape,
     /// Of its centre, m.

@@ -93,14 +93,8 @@ impl World {
         self.past.get(at).cloned().unwrap_or_default()
     }
 
-    /// The body that only this pane shows.
     pub fn double(&self, pane: usize) -> Option<Figure> {
         self.doubles[pane].as_ref().map(|double| double.figure)
-    }
-
-    /// Returns true if a pane shows a body that nothing else shows.
-    pub fn has_double(&self) -> bool {
-        self.doubles.iter().any(Option::is_some)
     }
 
     /// Returns true if the own body wears a mark at any step.
@@ -113,17 +107,14 @@ impl World {
         self.t
     }
 
-    /// The eye's direct view: the model and its state.
     pub const fn stage(&self) -> &Stage {
         &self.stage
     }
 
-    /// The eye's view through each pane.
     pub fn beyond(&self) -> &[Stage] {
         &self.beyond
     }
 
-    /// The position and direction of the eye behind a pane.
     pub fn eye_beyond(&self, pane: usize) -> Pose {
         passage::eye(&self.config, &self.scene.panes[pane], self.ego.pose)
     }
@@ -231,15 +222,8 @@ impl World {
             return;
         }
         for at in 0..self.others.len() {
-            let bodies: Vec<[f64; 2]> = std::iter::once(self.ego.pose.spot())
-                .chain(
-                    self.others
-                        .iter()
-                        .enumerate()
-                        .filter(|(other, _)| *other != at)
-                        .map(|(_, other)| other.figure.pose.spot()),
-                )
-                .collect();
+            let mut bodies: Vec<[f64; 2]> = self.figures().iter().map(|figure| figure.pose.spot()).collect();
+            bodies.remove(1 + at);
             self.others[at].tick(&self.config.others, &self.plan, &bodies);
         }
     }

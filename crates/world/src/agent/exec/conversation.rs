@@ -1,6 +1,5 @@
 //! The messages to a program or a function in one episode: the words and the frame that a model gets.
 
-use std::fmt;
 use std::path::Path;
 
 use base64::Engine as _;
@@ -25,11 +24,11 @@ pub(crate) struct Conversation {
 impl Conversation {
     /// The conversation of an episode; frame files are below `scratch`.
     pub(crate) fn new(task: Task, episode_id: &str, images: Images, scratch: &Path) -> Result<Self, Lost> {
-        let prompt = Prompt::of(&task.experiment).map_err(unusable)?;
+        let prompt = Prompt::of(&task.experiment).map_err(Lost::unobservable)?;
         let frames = match images {
             Images::Path => {
                 let made = std::path::absolute(scratch).and_then(|folder| TemporaryFolder::create(&folder, "frames"));
-                Some(made.map_err(unusable)?)
+                Some(made.map_err(Lost::unobservable)?)
             }
             Images::Base64 => None,
         };
@@ -38,7 +37,7 @@ impl Conversation {
 
     /// The task, only before the first observation, and the observation.
     pub(crate) fn messages(&self, observation: &Observation) -> Result<(Option<Message>, Message), Lost> {
-        let Rendered { system, user } = self.prompt.render(&self.task, observation).map_err(unusable)?;
+        let Rendered { system, user } = self.prompt.render(&self.task, observation).map_err(Lost::unobservable)?;
         let task = (observation.t == 1).then(|| self.task_message(system));
         Ok((task, self.observation_message(observation, user)?))
     }
@@ -59,7 +58,7 @@ impl Conversation {
     }
 
     fn observation_message(&self, observation: &Observation, user_prompt: String) -> Result<Message, Lost> {
-        let png = observation.frame.to_png().map_err(unusable)?;
+        let png = observation.frame.to_png().map_err(Lost::unobservable)?;
         let image = match &self.frames {
             Some(folder) => Image::Path(kept(folder.path(), observation.t, png)?),
             None => Image::Base64(STANDARD.encode(png)),
@@ -83,15 +82,13 @@ impl Conversation {
     }
 }
 
-pub(super) fn unusable(fault: impl fmt::Display) -> Lost {
-    Lost::because(format!("the observation cannot be made: {fault}"))
-}
-
 /// Writes a frame as a file; returns its path.
 fn kept(folder: &Path, t: i32, png: &[u8]) -> Result<String, Lost> {
     let path = folder.join(format!("{t:03}.png"));
-    std::fs::write(&path, png).map_err(unusable)?;
+    std::fs::write(&path, png).map_err(Lost::unobservable)?;
     path.into_os_string().into_string().map_err(|_| {
-        unusable("the folder's name is not UTF-8, which JSON cannot hold\n  help: --exec-images base64 needs no file")
+        Lost::unobservable(
+            "the folder's name is not UTF-8, which JSON cannot hold\n  help: --exec-images base64 needs no file",
+        )
     })
 }

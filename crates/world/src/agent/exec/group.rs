@@ -33,7 +33,6 @@ impl Groups {
     }
 }
 
-/// One group; killed when it is dropped.
 #[derive(Debug)]
 pub struct Group {
     id: Option<i32>,

@@ -18,6 +18,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use crate::agent::Ended;
+use crate::json_lines;
 
 /// The version of the messages and of the order they come in.
 pub const PROTOCOL: u32 = 1;
@@ -110,8 +111,6 @@ pub struct EndMessage {
 
 impl Message {
     pub fn line(&self) -> serde_json::Result<Vec<u8>> {
-        let mut line = serde_json::to_vec(self)?;
-        line.push(b'\n');
-        Ok(line)
+        json_lines::line(self)
     }
 }

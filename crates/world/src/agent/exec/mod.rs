@@ -26,7 +26,7 @@ use std::path::PathBuf;
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
-use self::conversation::{Conversation, unusable};
+use self::conversation::Conversation;
 use self::files::Unreadable;
 use self::group::Groups;
 use self::message::{EndMessage, Message, PROTOCOL};
@@ -165,11 +165,10 @@ impl ExecAgent {
         }
     }
 
-    /// The task, only before the first observation, and the observation.
     fn lines(&self, observation: &Observation) -> Result<(Option<Vec<u8>>, Vec<u8>), Lost> {
         let (task, question) = self.conversation.messages(observation)?;
         let task = task.map(|task| task.line()).transpose();
-        Ok((task.map_err(unusable)?, question.line().map_err(unusable)?))
+        Ok((task.map_err(Lost::unobservable)?, question.line().map_err(Lost::unobservable)?))
     }
 
     fn read(&self, line: &[u8], latency: Duration) -> Reply {

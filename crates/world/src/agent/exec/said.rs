@@ -82,7 +82,6 @@ pub struct Kept {
 }
 
 impl Kept {
-    /// The future standard error of an episode's program, for a file in this folder.
     pub fn new(folder: &Path, episode_id: &str, secrets: Arc<[Secret]>) -> Self {
         let path = folder.join(format!("{}.log", episode_id.replace('/', "-")));
         Self { said: Arc::default(), path, secrets }

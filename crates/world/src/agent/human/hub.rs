@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::{Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
@@ -17,7 +17,6 @@ use super::design::{Design, Schedule};
 use super::journal::{Entry, Journal, Leaving};
 use super::seat::{Asked, End, Given, LISTENING, Question, Seat, Terms};
 use crate::agent::{Planned, Turn, locked};
-use trace::frame::Frame;
 
 /// Removes the episodes of a code from a folder; returns their ids.
 pub type Eraser = fn(&Path, &str) -> Result<BTreeSet<String>, String>;
@@ -78,10 +77,11 @@ impl Hub {
 
     /// Deals the episodes: begun ones to their players, those of people who left to others if the design permits.
     pub(super) fn deal(&self, planned: &[Planned]) {
+        let begun_by = |id: &str| (0..self.seats()).find(|seat| self.has_begun(*seat, id));
         let mut left_over = Vec::new();
         for (at, lane) in self.schedule.lanes(planned, self.seats()).into_iter().enumerate() {
             for episode in lane {
-                let own = if self.schedule.design == Design::Split { self.begun_by(&episode.episode_id) } else { None };
+                let own = if self.schedule.design == Design::Split { begun_by(&episode.episode_id) } else { None };
                 let at = own.unwrap_or(at);
                 let mut seat = self.seat(at);
                 match (episode.is_recorded, seat.left) {
@@ -96,10 +96,6 @@ impl Hub {
         }
         self.deal_again(left_over);
         (0..self.seats()).for_each(|seat| self.seat(seat).is_dealt = true);
-    }
-
-    fn begun_by(&self, episode_id: &str) -> Option<usize> {
-        (0..self.seats()).find(|seat| self.has_begun(*seat, episode_id))
     }
 
     fn has_begun(&self, seat: usize, episode_id: &str) -> bool {
@@ -150,10 +146,6 @@ impl Hub {
 
     pub(super) fn keep(&self, entry: Entry) -> io::Result<()> {
         locked(&self.journal).keep(entry)
-    }
-
-    pub(super) fn has_practised(&self, seat: usize) -> bool {
-        self.seat(seat).has_practised
     }
 
     /// The practice is over: the person is informed, and steps count only after the start.
@@ -231,10 +223,6 @@ impl Hub {
         self.seat(seat).told(&self.terms)
     }
 
-    pub(super) fn frame(&self, seat: usize) -> Option<Arc<Frame>> {
-        self.seat(seat).frame(&self.terms)
-    }
-
     pub(super) fn agree(&self, seat: usize) -> io::Result<()> {
         let code = self.code(seat);
         locked(&self.journal).agreed(&code, self.terms.consent.as_deref().unwrap_or_default())?;
@@ -279,15 +267,7 @@ impl Hub {
         Ok(locked(&self.deleted).clone())
     }
 
-    pub(super) fn pause(&self, seat: usize, is_on: bool) {
-        self.seat(seat).pause(is_on);
-    }
-
-    pub(super) fn answer(&self, seat: usize, number: u64, reply: String) -> bool {
-        self.seat(seat).answer(&self.terms, number, reply)
-    }
-
-    fn seat(&self, seat: usize) -> MutexGuard<'_, Seat> {
+    pub(super) fn seat(&self, seat: usize) -> MutexGuard<'_, Seat> {
         locked(&self.seats[seat])
     }
 }

@@ -8,9 +8,9 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use crate::json_lines;
 use exact::budget::Limit;
 use exact::hash;
-use exact::input;
 use exact::replace;
 
 const NAME: &str = "participants.jsonl";
@@ -58,7 +58,6 @@ enum Line {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Leaving {
-    /// They did not agree.
     Declined,
     /// They stopped; their data stays.
     Stopped,
@@ -86,11 +85,10 @@ pub struct Journal {
 }
 
 impl Journal {
-    /// Opens the journal in a folder, creating the folder if necessary.
     pub fn open(folder: &Path) -> io::Result<Self> {
         replace::make_folder(folder)?;
         let path = path(folder);
-        let lines = read(&path)?;
+        let lines = json_lines::read(&path, LONGEST_LINE)?;
         let mut file = appending(&path)?;
         if !lines.is_empty() {
             // Ends a line that was cut off, so that a new one begins.
@@ -168,9 +166,7 @@ impl Journal {
     fn write(&self, line: &Line) -> io::Result<()> {
         let Some(folder) = &self.folder else { return Ok(()) };
         let mut file = appending(&path(folder))?;
-        let mut bytes = serde_json::to_vec(line)?;
-        bytes.push(b'\n');
-        file.write_all(&bytes)?;
+        file.write_all(&json_lines::line(line)?)?;
         file.sync_data()
     }
 }
@@ -182,18 +178,11 @@ pub fn remove(folder: &Path, code: &str) -> io::Result<usize> {
 
 /// Keeps some lines of a journal; returns the number of removed lines.
 fn keep(path: &Path, stays: impl Fn(&Line) -> bool) -> io::Result<usize> {
-    let lines = read(path)?;
+    let lines: Vec<Line> = json_lines::read(path, LONGEST_LINE)?;
     let kept: Vec<&Line> = lines.iter().filter(|line| stays(line)).collect();
     let removed = lines.len() - kept.len();
     if removed > 0 {
-        let mut bytes = Vec::new();
-        for line in kept {
-            serde_json::to_writer(&mut bytes, line)?;
-            bytes.push(b'\n');
-        }
-        let mut file = replace::NewFile::create(path)?;
-        file.as_file_mut().write_all(&bytes)?;
-        file.commit()?;
+        json_lines::replace(path, &kept)?;
     }
     Ok(removed)
 }
@@ -204,18 +193,6 @@ fn appending(path: &Path) -> io::Result<File> {
 
 fn path(folder: &Path) -> PathBuf {
     folder.join(NAME)
-}
-
-fn read(path: &Path) -> io::Result<Vec<Line>> {
-    let lines = match input::lines(path, LONGEST_LINE) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
-        lines => lines?,
-    };
-    let mut found = Vec::new();
-    for line in lines {
-        found.extend(serde_json::from_slice(&line?).ok());
-    }
-    Ok(found)
 }
 
 #[cfg(test)]

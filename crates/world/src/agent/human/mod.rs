@@ -160,7 +160,7 @@ impl Agent for HumanAgent {
     }
 
     fn wants_practice(&self) -> bool {
-        !self.hub.has_practised(self.seat)
+        !self.hub.seat(self.seat).has_practised
     }
 
     fn practise(&mut self, task: Option<Task>) {
@@ -178,9 +178,7 @@ impl HumanAgent {
         if let Some(entry) = self.hub.answered(self.seat, &self.episode_id, observation.t).filter(|_| !is_practice) {
             return Ok(read(&entry.reply, task, entry.latency_ms));
         }
-        let unusable = |fault: String| Lost::because(format!("the observation cannot be made: {fault}"));
-        let Rendered { system, user } =
-            self.prompt.render(task, observation).map_err(|fault| unusable(fault.to_string()))?;
+        let Rendered { system, user } = self.prompt.render(task, observation).map_err(Lost::unobservable)?;
         let question = Question {
             frame: Arc::clone(&observation.frame),
             system,

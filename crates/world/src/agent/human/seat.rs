@@ -19,7 +19,6 @@ pub(super) const LISTENING: Duration = Duration::from_secs(3);
 /// A page that is silent for longer is closed or disconnected, and its clock stops.
 const AWAY: Duration = Duration::from_secs(10);
 
-/// The question of a step, as a model gets it.
 #[derive(Clone, Debug)]
 pub struct Question {
     pub frame: Arc<Frame>,

@@ -87,8 +87,8 @@ fn routes(hub: Arc<Hub>) -> Router {
         .route("/decline", post(|State(hub), Query(link)| leave(hub, link, Leaving::Declined)))
         .route("/withdraw", post(withdraw))
         .route("/begin", post(|hub, link| async { state_after(hub, link, Hub::begin) }))
-        .route("/pause", post(|hub, link| async { state_after(hub, link, |hub, seat| hub.pause(seat, true)) }))
-        .route("/resume", post(|hub, link| async { state_after(hub, link, |hub, seat| hub.pause(seat, false)) }))
+        .route("/pause", post(|hub, link| async { state_after(hub, link, |hub, seat| hub.seat(seat).pause(true)) }))
+        .route("/resume", post(|hub, link| async { state_after(hub, link, |hub, seat| hub.seat(seat).pause(false)) }))
         .route("/reply", post(reply))
         .layer(DefaultBodyLimit::max(LONGEST))
         // Pages poll constantly: a kept connection would make another page wait.
@@ -115,7 +115,6 @@ fn stranger() -> Response {
     (StatusCode::UNAUTHORIZED, "open the link that you were given").into_response()
 }
 
-/// Does something for a person, and returns what their page then shows.
 fn state_after(State(hub): State<Arc<Hub>>, Query(link): Query<Link>, does: fn(&Hub, usize)) -> Response {
     for_person(&hub, &link, |seat| {
         does(&hub, seat);
@@ -125,7 +124,7 @@ fn state_after(State(hub): State<Arc<Hub>>, Query(link): Query<Link>, does: fn(&
 
 async fn frame(State(hub): State<Arc<Hub>>, Query(link): Query<Link>) -> Response {
     for_person(&hub, &link, |seat| {
-        let frame = hub.frame(seat);
+        let frame = hub.seat(seat).frame(&hub.terms);
         match frame.as_ref().and_then(|frame| frame.to_png().ok()) {
             Some(png) => ([(header::CONTENT_TYPE, "image/png")], png.to_vec()).into_response(),
             None => (StatusCode::NOT_FOUND, "no frame").into_response(),
@@ -167,7 +166,7 @@ async fn reply(State(hub): State<Arc<Hub>>, Query(link): Query<Link>, body: Byte
         let Ok(Sent { number, reply }) = serde_json::from_slice(&body) else {
             return (StatusCode::BAD_REQUEST, "no reply").into_response();
         };
-        let taken = hub.answer(seat, number, Value::Object(reply).to_string());
+        let taken = hub.seat(seat).answer(&hub.terms, number, Value::Object(reply).to_string());
         told(&json!({ "taken": taken }))
     })
 }

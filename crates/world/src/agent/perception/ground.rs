@@ -17,7 +17,6 @@ const SAME_SHADE: i16 = 1;
 /// Columns between two examined feet.
 const STRIDE: usize = 4;
 
-/// The foot of the wall that one column shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Foot {
     /// Its apparent place: beyond the room if seen in a mirror.

@@ -7,7 +7,6 @@ use trace::palette::Color;
 
 use super::{paint, real};
 
-/// Connected pixels of one colour, and the box around them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Patch {
     pub color: Color,
@@ -46,7 +45,6 @@ impl Patch {
     }
 }
 
-/// All patches of at least `least` pixels.
 pub fn patches(frame: &Frame, least: usize) -> Vec<Patch> {
     let runs = runs(frame);
     let roots = connect(&runs);

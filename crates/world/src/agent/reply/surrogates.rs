@@ -1,7 +1,6 @@
 //! Escapes of characters beyond U+FFFF in JSON: two halves, `\ud83d\ude00`. A single half is no character, and strict
 //! parsers reject the whole text. Models write one if a limit or a filter cuts between the halves.
 
-/// The escape of U+FFFD, the replacement character.
 const REPLACEMENT: &str = "\\ufffd";
 /// The bytes of `\uXXXX`.
 const ESCAPE: usize = 6;

@@ -18,7 +18,6 @@ pub mod chance;
 pub mod hand_view;
 pub mod knowledge;
 pub mod lookout;
-pub mod policy;
 pub mod reflection;
 pub mod room;
 pub mod route;
@@ -120,7 +119,6 @@ impl Player for Scripted {
     }
 }
 
-/// A script under another name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Renamed {
     pub script: Scripted,
@@ -153,7 +151,6 @@ fn described(name: &str, version: u32) -> serde_json::Value {
     description
 }
 
-/// A script's decision for a step.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Move {
     /// `None` stands still.

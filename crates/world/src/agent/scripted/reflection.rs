@@ -69,7 +69,6 @@ pub struct Reflection {
     misses: [usize; LATEST + 1],
 }
 
-/// The result of looking at a possible place of the own reflection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Test {
     /// Too far aside, too small, or occluded.

@@ -9,7 +9,6 @@ use crate::agent::perception::View;
 use crate::agent::perception::camera::{Heading, Place};
 use crate::agent::perception::ground::Foot;
 
-/// One of the four walls, by direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Side {
     East,
@@ -49,7 +48,6 @@ impl Side {
         }
     }
 
-    /// The heading that faces this wall at a right angle.
     pub const fn heading(self) -> Heading {
         Heading::new(3 * self as u8)
     }

@@ -17,6 +17,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use crate::agent::Status;
+use crate::json_lines;
 use exact::budget::Limit;
 use exact::input;
 use exact::replace::{folder_of, make_folder, sync_folder};
@@ -143,7 +144,6 @@ impl Drop for Journal {
 }
 
 impl Journal {
-    /// Opens the journal of an episode to continue it.
     pub fn open(path: &Path) -> Result<Self, JournalError> {
         let failed = |source| JournalError::Io { path: path.to_owned(), source };
         make_folder(folder_of(path)).map_err(failed)?;
@@ -162,7 +162,6 @@ impl Journal {
         Ok(journal)
     }
 
-    /// Opens the journal of an episode as a read-only cassette.
     pub fn cassette(path: &Path) -> Result<Self, JournalError> {
         match Self::read(path) {
             Ok((journal, _)) => Ok(journal),
@@ -195,8 +194,7 @@ impl Journal {
         let Some(mut file) = self.file.take() else {
             return Err(failed(io::Error::other("a cassette is played, not written")));
         };
-        let mut line = serde_json::to_vec(entry).map_err(|fault| failed(fault.into()))?;
-        line.push(b'\n');
+        let line = json_lines::line(entry).map_err(|fault| failed(fault.into()))?;
         let before = file.metadata().map_err(failed)?.len();
         if let Err(error) = file.write_all(&line).and_then(|()| file.sync_data()) {
             // If the partial line cannot be removed, it is dropped when the file is opened again.

@@ -27,7 +27,6 @@ pub enum OnOutage {
     StandStill,
 }
 
-/// The source of earlier answers.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Memory {
     /// A folder of journals to continue.
@@ -81,7 +80,7 @@ pub struct Vlm {
     pub(super) on_outage: OnOutage,
     stop: OnceLock<Lost>,
     stopped: Notify,
-    is_known: AtomicBool,
+    pub(super) is_known: AtomicBool,
     first: tokio::sync::Mutex<()>,
     learned: Mutex<Learned>,
     /// True once the model has answered a request of this recording; later rejections are specific to a request.
@@ -149,10 +148,6 @@ impl Vlm {
         (!is_over()).then_some(turn)
     }
 
-    pub(super) fn note_known(&self) {
-        self.is_known.store(true, Ordering::Relaxed);
-    }
-
     pub(super) fn check_model(&self, returned: Option<&str>) -> Result<(), Lost> {
         let Some(other) = returned.filter(|returned| !self.choice.model.takes_answer_of(returned)) else {
             return Ok(());
@@ -181,7 +176,6 @@ impl Vlm {
         self.choice.model.max_output_tokens()
     }
 
-    /// The spending over all starts of the run.
     pub fn spend(&self) -> Spend {
         self.account.spend()
     }

@@ -261,7 +261,6 @@ const PROTOCOL: [&str; 7] = ["model", "messages", "system", "contents", "systemI
 const LARGEST: Limit = Limit::new("bytes of a list of models", 1 << 20);
 
 impl Models {
-    /// The built-in models, extended and overridden by those of a user's file.
     pub fn load(file: Option<&Path>) -> Result<Self, ModelsError> {
         let mut models = Self::default();
         models.add("assets/models.toml", BUILT_IN)?;

@@ -64,7 +64,6 @@ pub struct ProbedParameter {
 }
 
 impl ProbeAnswer {
-    /// Returns true if a recording with these settings would work.
     pub fn is_good(&self) -> bool {
         self.fault.is_none() && self.is_model && self.parameters.iter().all(|parameter| parameter.taken == Some(true))
     }
@@ -110,7 +109,6 @@ impl ProbeAnswer {
     }
 }
 
-/// Asks a model once, with a frame of this width and height and the schema of an experiment.
 pub async fn probe(mut choice: Choice, provider: &Provider, experiment: &Spec, view: [u32; 2]) -> ProbeAnswer {
     let schema = reply::structure(experiment);
     let words = Rendered {

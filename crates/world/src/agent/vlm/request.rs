@@ -1,5 +1,3 @@
-//! One request of a model: its body, and the cost of its answer.
-
 use serde_json::Value;
 
 use super::models::{Choice, Contract, Prices, merge};
@@ -25,7 +23,6 @@ pub struct NoTier {
 }
 
 impl Choice {
-    /// Selects a tier at half the price.
     pub fn use_tier(&mut self, tier: Tier) -> Result<(), NoTier> {
         match (tier, self.backend.dialect.tier_key(), self.backend.dialect) {
             (Tier::Flex, Some(key), _) => drop(self.model.extra_body.insert(key.to_owned(), "flex".into())),

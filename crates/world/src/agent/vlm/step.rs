@@ -41,15 +41,14 @@ impl From<Lost> for Ended {
     }
 }
 
-fn is_too_long(failure: &Failure, provider: &Provider) -> bool {
-    failure.kind.is_busy() && failure.after.is_some_and(|asked| asked > provider.patience().longest_wait)
-}
-
 impl Step {
     pub(super) async fn ask(self) -> Result<Asked, Lost> {
         let Some(provider) = &self.vlm.provider else {
             return Err(Lost::because("nothing is sent from a cassette".to_owned()));
         };
+        let longest_wait = provider.patience().longest_wait;
+        let is_too_long =
+            |failure: &Failure| failure.kind.is_busy() && failure.after.is_some_and(|asked| asked > longest_wait);
         let mut waiting = Waiting::new(provider.patience());
         let mut attempt = 0;
         loop {
@@ -62,7 +61,7 @@ impl Step {
             };
             match waiting.next(&failure) {
                 Some(wait) => self.vlm.unless_stopped(tokio::time::sleep(wait)).await?,
-                None if is_too_long(&failure, provider) => return Err(self.put_off(&failure)),
+                None if is_too_long(&failure) => return Err(self.put_off(&failure)),
                 None => return self.give_up(attempt, &failure),
             }
         }
@@ -86,7 +85,7 @@ impl Step {
     async fn attempt(&self, provider: &Provider, attempt: u32) -> Result<Asked, Ended> {
         let first = self.vlm.turn_of_first().await;
         let ended = self.exchange(provider, attempt).await;
-        self.vlm.note_known();
+        self.vlm.is_known.store(true, Ordering::Relaxed);
         drop(first);
         ended
     }

@@ -134,7 +134,6 @@ impl Answer {
         if self.kind == AnswerType::Number { number() } else { None }
     }
 
-    /// The accepted values, for people.
     pub fn expected(&self) -> String {
         let own = match self.kind {
             AnswerType::Color => "a colour of the palette".to_owned(),
@@ -148,11 +147,6 @@ impl Answer {
     fn cell(&self, answered: &Answered) -> Option<Answered> {
         let is_number = matches!(answered, Answered::Number(_));
         (is_number == (self.kind == AnswerType::Number)).then(|| answered.clone())
-    }
-
-    /// The true value in an episode of a condition, if the file states it.
-    pub fn stated_truth(&self, condition: &str) -> Option<Answered> {
-        self.read(self.constant.as_ref().or_else(|| self.conditions.get(condition))?)
     }
 }
 

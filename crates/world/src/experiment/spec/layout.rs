@@ -1,5 +1,3 @@
-//! The layout of a scene: bodies, cubes, walls.
-
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -1,5 +1,3 @@
-//! Marks on bodies.
-
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -1,5 +1,3 @@
-//! Mirrors and windows.
-
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

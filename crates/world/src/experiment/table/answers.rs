@@ -1,5 +1,3 @@
-//! Checks of the answers that an experiment declares.
-
 use super::super::spec::{Answer, AnswerType, Fact, PaneKind, ReplyKey, Spec, UNKNOWN};
 use toml_spec::{At, Fault};
 use trace::answers::{MOST_ANSWERS, columns_of};

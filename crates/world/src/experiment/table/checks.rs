@@ -11,7 +11,6 @@ use trace::palette::Color;
 /// The words before a prompt's list of reply keys.
 const EXACTLY: &str = "exactly these keys";
 
-/// Checks that a prompt's list of reply keys matches the reply.
 pub(super) fn prompt(spec: &Spec, templates: &Templates, at: &At<'_>, faults: &mut Vec<Fault>) {
     let texts: String = templates.all.iter().map(|(_, text)| text.as_str()).collect::<Vec<_>>().join("\n");
     let Some((_, list)) = texts.split_once(EXACTLY) else { return };

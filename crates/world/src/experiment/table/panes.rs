@@ -1,11 +1,8 @@
-//! Mirrors and windows.
-
 use super::millimetres;
 use crate::experiment::schema::MirrorTable;
 use crate::experiment::spec::{BodyShown, Paint, Pane, PaneKind, Wall};
 use toml_spec::{At, Fault};
 
-/// The `[[experiment.NAME.mirror]]` tables.
 pub(super) fn panes(tables: &[MirrorTable], list: &At<'_>, faults: &mut Vec<Fault>) -> Vec<Pane> {
     let mut panes: Vec<Pane> = Vec::new();
     for (n, table) in tables.iter().enumerate() {

@@ -49,7 +49,6 @@ pub(in crate::record) fn check(
     Err(StoreError::ForeignLog { path: log.to_owned(), fault, help })
 }
 
-/// The reason why a log does not belong to these episodes.
 fn fault_of(
     found: &Recovered,
     trace: &Path,

@@ -5,17 +5,15 @@
 
 use std::collections::BTreeSet;
 use std::fs;
-use std::io::{self, Write as _};
 use std::path::Path;
 
 use super::super::error::StoreError;
 use super::super::plan::{Key, Subject};
 use crate::agent::Lost;
-use exact::input;
-use exact::replace::NewFile;
+use crate::json_lines;
+use trace::lost::LONGEST_LINE;
 pub use trace::lost::{LostEpisode, list_of};
 
-/// The entry of a key's episode, lost at this step.
 pub fn lost_episode(key: &Key, subject: &Subject, step: Option<i32>, lost: Lost) -> LostEpisode {
     LostEpisode {
         episode_id: key.episode_id(subject),
@@ -41,30 +39,12 @@ pub fn update(path: &Path, recorded: &BTreeSet<String>, lost: &[LostEpisode]) ->
     match listed.as_slice() {
         [] if before.is_empty() => Ok(()),
         [] => fs::remove_file(path).map_err(StoreError::io("remove", path)),
-        listed => write(path, listed).map_err(StoreError::io("write", path)),
+        listed => json_lines::replace(path, listed).map_err(StoreError::io("write", path)),
     }
 }
 
 fn read(path: &Path) -> Result<Vec<LostEpisode>, StoreError> {
-    let lines = match input::lines(path, trace::lost::LONGEST_LINE) {
-        Ok(lines) => lines,
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
-        Err(error) => return Err(StoreError::io("read", path)(error)),
-    };
-    let mut listed = Vec::new();
-    for line in lines {
-        listed.extend(serde_json::from_slice::<LostEpisode>(&line.map_err(StoreError::io("read", path))?).ok());
-    }
-    Ok(listed)
-}
-
-fn write(path: &Path, episodes: &[&LostEpisode]) -> io::Result<()> {
-    let mut file = NewFile::create(path)?;
-    for episode in episodes {
-        serde_json::to_writer(&mut file, episode)?;
-        file.write_all(b"\n")?;
-    }
-    file.commit()
+    json_lines::read(path, LONGEST_LINE).map_err(StoreError::io("read", path))
 }
 
 #[cfg(test)]

@@ -64,7 +64,6 @@ impl RecordingIndex {
         self.trace(experiment).with_extension("mcap")
     }
 
-    /// The recorded episodes of an experiment, in the trace or as parts.
     pub fn recorded(&self, experiment: &Experiment) -> Result<BTreeSet<Place>, StoreError> {
         let episodes = self.episodes(experiment)?;
         self.check_log(experiment, &episodes)?;

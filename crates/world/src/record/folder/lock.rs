@@ -151,7 +151,6 @@ pub enum Attempt {
 }
 
 impl EpisodeLock {
-    /// Tries to lock `path` without waiting.
     pub fn attempt(path: &Path) -> Result<Attempt, StoreError> {
         loop {
             let file = File::options().read(true).write(true).create(true).truncate(false).open(path);

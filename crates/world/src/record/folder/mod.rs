@@ -1,5 +1,3 @@
-//! The folder of a recording: its files, locks and participants.
-
 pub(super) mod continued;
 pub mod failures;
 pub mod index;

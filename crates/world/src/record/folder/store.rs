@@ -34,7 +34,6 @@ use trace::merge;
 use trace::renderer::{self, Renderer};
 use trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
 
-/// The folder of a recording, for one model.
 #[derive(Debug)]
 pub struct Store {
     folder_lock: FolderLock,
@@ -53,7 +52,6 @@ pub enum Claim {
 }
 
 impl Store {
-    /// Opens the folder, creating it if necessary.
     pub fn open(folder: &Path, subject: Subject, recordings: Recordings) -> Result<Self, StoreError> {
         Ok(Self { folder_lock: FolderLock::stake(folder)?, index: RecordingIndex::new(folder, subject, recordings) })
     }
@@ -79,7 +77,6 @@ impl Store {
         self.part(key).with_extension("mcap")
     }
 
-    /// The recorded episodes of an experiment, in the trace or as parts.
     pub fn recorded(&self, experiment: &Experiment) -> Result<BTreeSet<Place>, StoreError> {
         // While another process moves a part into the trace, the episode may be in neither.
         let _lock = self.folder_lock.lock()?;

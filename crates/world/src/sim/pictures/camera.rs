@@ -16,7 +16,6 @@ use super::super::label_image::{LabelImage, Rectangle};
 use super::super::model::{
     BEYOND_CAMERA, EYE_CAMERA, Item, ModelError, Paint, Stage, TOP_CAMERA, compile, group, labelled,
 };
-use super::super::passage;
 use super::super::scene::{HungPane, Scene};
 use super::super::visibility::{self, Shown};
 use super::super::world::World;
@@ -76,7 +75,6 @@ impl Camera {
         self.draws_all = all;
     }
 
-    /// Draws the agent's view: the room, overlaid with the image of each pane.
     pub fn frame(&mut self, world: &World) -> Result<Frame, CameraError> {
         let size = [self.width, self.height];
         let whole = Rectangle { left: 0, right: self.width, top: 0, bottom: self.height };
@@ -108,7 +106,7 @@ impl Camera {
 
     fn through(&mut self, stage: &Stage, pane: &HungPane, in_view: Option<&[bool]>) -> Result<Frame, CameraError> {
         let frame = self.draw(stage, BEYOND_CAMERA, in_view)?;
-        Ok(if passage::is_flipped(pane) { flipped(&frame) } else { frame })
+        Ok(if pane.kind == PaneKind::Window { frame } else { flipped(&frame) })
     }
 
     /// The room from above, without its ceiling.

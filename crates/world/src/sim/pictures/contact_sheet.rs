@@ -127,7 +127,6 @@ fn compose(rows: &[Vec<Picture>]) -> Result<Vec<u8>, ContactSheetError> {
     sheet.encode_png().map_err(|error| ContactSheetError::Png(error.to_string()))
 }
 
-/// Puts a picture on the sheet; each pixel is the mean of a block.
 fn paste(sheet: &mut Pixmap, frame: &Frame, corner: [usize; 2]) {
     let stride = sheet.width() as usize;
     for y in 0..frame.height / SHRINK {

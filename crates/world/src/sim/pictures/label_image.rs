@@ -1,5 +1,3 @@
-//! A picture of labels: the content of each pixel of a view, as a code.
-
 /// The label of every pixel, row by row from the top.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LabelImage {

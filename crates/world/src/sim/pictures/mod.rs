@@ -1,5 +1,3 @@
-//! Pictures of the world: cameras, panes, labels.
-
 pub mod camera;
 #[cfg(feature = "raster")]
 pub mod contact_sheet;

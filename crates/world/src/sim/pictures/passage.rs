@@ -28,11 +28,6 @@ pub fn eye(config: &WorldConfig, pane: &HungPane, body: Pose) -> Pose {
     Pose { x: eye.x + away * out_x, y: eye.y + away * out_y, heading }
 }
 
-/// Returns true if pictures through a pane are flipped.
-pub const fn is_flipped(pane: &HungPane) -> bool {
-    !matches!(pane.kind, PaneKind::Window)
-}
-
 /// The distance of the second room from the first, m: from a pane's face to the face of one on the wall across.
 pub fn shift(config: &WorldConfig) -> f64 {
     config.room.size - 2.0 * config.mirror.gap

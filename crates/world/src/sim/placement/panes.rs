@@ -69,10 +69,9 @@ impl Layout<'_> {
     /// A hand in neither the body's nor its mark's colour, which starts on the near side of the mirror, outside the
     /// body; `None` if no such place has the required distance.
     fn hand(&self, task: Hand, marks: &[WornMark], chance: &mut Rng) -> Option<HandStart> {
-        let taken = |color: Color| color == self.scene.body_color || marks.iter().any(|mark| mark.color == color);
+        let free = self.other_colors(|color| marks.iter().all(|mark| mark.color != color));
         let palette = &self.scene.experiment.layout.palette;
-        let free: Vec<Color> = palette.iter().copied().filter(|color| !taken(*color)).collect();
-        let color = if free.is_empty() { chance.one_of(palette) } else { chance.one_of(&free) };
+        let color = chance.one_of(if free.is_empty() { palette } else { &free });
         let shape = chance.one_of(&HandShape::ALL);
         let half_mm = 10 * chance.between(4, 5);
         let patch = marks.iter().find_map(|mark| mark.patch)?;
@@ -92,11 +91,7 @@ impl Layout<'_> {
 
     /// A colour other than those of the body, its mark and the hand, which would be invisible on a body of that colour.
     fn color_beside(&self, hand: HandStart, marks: &[WornMark], chance: &mut Rng) -> Color {
-        let taken = |color: Color| {
-            color == self.scene.body_color || color == hand.color || marks.iter().any(|mark| mark.color == color)
-        };
-        let palette = &self.scene.experiment.layout.palette;
-        let free: Vec<Color> = palette.iter().copied().filter(|color| !taken(*color)).collect();
+        let free = self.other_colors(|color| color != hand.color && marks.iter().all(|mark| mark.color != color));
         if free.is_empty() { self.any_other_color(chance) } else { chance.one_of(&free) }
     }
 
@@ -108,9 +103,13 @@ impl Layout<'_> {
     }
 
     fn any_other_color(&self, chance: &mut Rng) -> Color {
-        let palette = &self.scene.experiment.layout.palette;
-        let colors: Vec<Color> = palette.iter().copied().filter(|color| *color != self.scene.body_color).collect();
-        chance.one_of(&colors)
+        chance.one_of(&self.other_colors(|_| true))
+    }
+
+    /// The colours of the palette without the body's, as far as they are free.
+    fn other_colors(&self, is_free: impl Fn(Color) -> bool) -> Vec<Color> {
+        let palette = self.scene.experiment.layout.palette.iter().copied();
+        palette.filter(|color| *color != self.scene.body_color && is_free(*color)).collect()
     }
 
     fn place(&self, pane: &Pane, before: &[HungPane], chance: &mut Rng) -> MirrorPlace {
@@ -185,10 +184,8 @@ impl Layout<'_> {
             Wearer::Other => (1, self.scene.others.first()?.color),
         };
         let is_free = |color: Color| color != body && color != self.scene.body_color;
-        let palette = &self.scene.experiment.layout.palette;
-        let free: Vec<Color> = palette.iter().copied().filter(|color| is_free(*color)).collect();
-        let unused: Vec<Color> =
-            free.iter().copied().filter(|color| before.iter().all(|other| other.color != *color)).collect();
+        let free = self.other_colors(is_free);
+        let unused = self.other_colors(|color| is_free(color) && before.iter().all(|other| other.color != color));
         let drawn = if unused.is_empty() { &free } else { &unused };
         let color = match mark.color {
             MarkColor::Named(color) if is_free(color) => color,

@@ -6,13 +6,11 @@ use super::super::world::World;
 use super::shape::{Part, solid};
 use super::view::{Shown, View};
 
-/// A part and its bounding rectangle.
 struct Candidate {
     part: Part,
     rectangle: Rectangle,
 }
 
-/// One of the views, and its candidates.
 struct Pass {
     view: View,
     candidates: Vec<Candidate>,

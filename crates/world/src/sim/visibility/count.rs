@@ -76,7 +76,6 @@ pub struct Sighting {
     pub mirror_px: u32,
 }
 
-/// The counts from a tally of codes.
 pub(super) fn of_tally(tally: &[u32; 256], scene: &Scene) -> Visibility {
     let counts = Counts { tally, scene };
     let others: Vec<Sighting> =
@@ -106,7 +105,6 @@ pub(super) fn of_tally(tally: &[u32; 256], scene: &Scene) -> Visibility {
     }
 }
 
-/// A tally and the meaning of its codes.
 struct Counts<'a> {
     tally: &'a [u32; 256],
     scene: &'a Scene,
@@ -167,7 +165,7 @@ pub fn by_column(world: &World, seen: &Visibility) -> Vec<(&'static str, i32)> {
     if world.has_own_mark() {
         counts.push(("mirror_mark_px", seen.mark_px));
     }
-    if world.has_double() {
+    if scene.panes.iter().any(|pane| pane.double.is_some()) {
         counts.push(("mirror_double_px", seen.double_px));
     }
     // A pane shows the own body or another one, never both.

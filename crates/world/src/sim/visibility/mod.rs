@@ -30,7 +30,6 @@ impl World {
         self.labels.get_or_init(|| labels(self, eye.width as usize, eye.height_px as usize))
     }
 
-    /// The visible pixels of everything, directly and in the mirror.
     pub fn visibility(&self) -> Visibility {
         let mut tally = [0_u32; 256];
         for code in &self.labels().codes {
@@ -61,7 +60,6 @@ pub(in crate::sim) fn in_view(world: &World, stage: &Stage, size: [usize; 2], wi
     stage.items().iter().enumerate().map(is_in_view).collect()
 }
 
-/// The label of every pixel of a view of this size.
 pub fn labels(world: &World, width: usize, height: usize) -> LabelImage {
     let mut codes = Vec::with_capacity(width * height);
     cast::rows(world, width, height, |row| codes.extend_from_slice(row));

@@ -7,7 +7,6 @@ use super::super::label_image::Rectangle;
 use super::super::model::Stage;
 use super::view::{Vector, View, dot, minus, plus};
 
-/// One convex part of a thing.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Part {
     /// The label code of its thing in this view.

@@ -1,5 +1,3 @@
-//! The true answers of an experiment at a step.
-
 use std::collections::BTreeMap;
 
 use super::super::world::World;
@@ -13,7 +11,7 @@ impl World {
     pub fn truths(&self, condition: &str, visibility: &Visibility) -> BTreeMap<String, Answered> {
         let truth = |answer: &Answer| match answer.truth {
             Some(fact) => self.fact(answer, fact, visibility),
-            None => answer.stated_truth(condition),
+            None => answer.read(answer.constant.as_ref().or_else(|| answer.conditions.get(condition))?),
         };
         let answers = &self.scene().experiment.answers;
         answers.iter().filter_map(|answer| Some((answer.key.clone(), truth(answer)?))).collect()

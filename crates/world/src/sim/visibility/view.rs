@@ -2,13 +2,12 @@
 
 use super::super::angle::sine_cosine;
 use super::super::label_image::LabelImage;
-use super::super::model::{Item, Stage, group};
+use super::super::model::{Item, Stage};
 use super::super::passage;
 use super::super::scene::HungPane;
 use super::super::world::World;
 use crate::experiment::spec::PaneKind;
 
-/// The content of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Shown {
     /// A thing that the eye sees directly: the room, a body, a cube, a mark.
@@ -33,7 +32,6 @@ impl Shown {
         look.checked_sub(1).map_or(Self::Direct(Item::of_number(at)), |pane| Self::Through(pane, Item::of_number(at)))
     }
 
-    /// The pane through which the thing is seen.
     pub const fn pane(self) -> Option<usize> {
         match self {
             Self::Direct(_) => None,
@@ -78,7 +76,6 @@ pub(super) fn middle(at: usize, count: usize) -> f64 {
 }
 
 impl View {
-    /// The agent's eye, with a view of this size and the same shape.
     pub fn of_eye(world: &World, width: usize, height: usize) -> Self {
         let eye = &world.config().eye;
         let pose = world.pose();
@@ -128,15 +125,17 @@ impl View {
     }
 }
 
+/// The groups of geoms that rays meet: room, things, own body and ceiling, but not the hidden ones.
+const SHOWN: [u8; 6] = [1, 1, 1, 1, 0, 0];
+
 pub(super) fn by_mujoco(world: &World, stages: &mut (Stage, Vec<Stage>), width: usize, height: usize) -> LabelImage {
     let view = View::of_eye(world, width, height);
-    let all = groups(&[group::ROOM, group::CEILING, group::THINGS, group::EGO]);
     let (stage, beyond) = stages;
     let mut codes = Vec::with_capacity(width * height);
     for y in 0..height {
         for x in 0..width {
             let ray = view.ray(x, y);
-            let (geom, distance) = stage.data.ray(&view.origin, &ray, Some(&all), true, None, None);
+            let (geom, distance) = stage.data.ray(&view.origin, &ray, Some(&SHOWN), true, None, None);
             let shown = match geom.map_or(Item::Room, |geom| stage.items()[geom]) {
                 Item::Pane(pane) => {
                     let met = plus(view.origin, distance, ray);
@@ -158,18 +157,9 @@ fn onwards(world: &World, stage: &mut Stage, pane: usize, met: Vector, ray: Vect
         PaneKind::Window => (plus(met, -passage::shift(world.config()), out), ray),
         _ => (met, plus(ray, -2.0 * dot(ray, out), out)),
     };
-    let all = groups(&[group::ROOM, group::CEILING, group::THINGS, group::EGO]);
     let from = plus(from, 1e-9, ray);
-    let (geom, _) = stage.data.ray(&from, &ray, Some(&all), true, None, None);
+    let (geom, _) = stage.data.ray(&from, &ray, Some(&SHOWN), true, None, None);
     geom.map_or(Item::Room, |geom| stage.items()[geom])
-}
-
-fn groups(shown: &[i32]) -> [u8; 6] {
-    let mut groups = [0; 6];
-    for group in shown {
-        groups[usize::try_from(*group).expect("groups are 0 to 5")] = 1;
-    }
-    groups
 }
 
 impl LabelImage {

@@ -6,16 +6,15 @@
 use std::io;
 use std::path::Path;
 use std::sync::{Mutex, OnceLock};
-use std::time::{Duration, SystemTime};
+use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use tokio::sync::Semaphore;
 use tokio::time::sleep;
 
 use crate::agent::locked;
-use crate::agent::vlm::spending::shared_file::SharedFile;
+use crate::agent::vlm::spending::shared_file::{SharedFile, now};
 
-/// The concurrency of one provider, shared by all episodes.
 #[derive(Debug)]
 pub struct Pace {
     permits: Semaphore,
@@ -56,7 +55,6 @@ impl Pace {
         Self { permits: Semaphore::new(most), state: Mutex::new(state), interval, shared: OnceLock::new() }
     }
 
-    /// Shares the time of the next request with other processes, by a file.
     pub fn share(&self, path: &Path) -> io::Result<()> {
         let file = SharedFile::open(path)?;
         // A second call has no effect.
@@ -132,10 +130,6 @@ impl Pace {
             self.permits.add_permits(1);
         }
     }
-}
-
-fn now() -> Duration {
-    SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default()
 }
 
 impl Drop for Turn<'_> {

@@ -14,7 +14,6 @@ const SEES: &str = "\n  help: choose a model that sees; a server of one's own ma
 const TOMORROW: &str = "\n  help: the same command continues when the quota is renewed, or with a higher one; what was \
                         answered is not asked again";
 
-/// A request without an answer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Failure {
     pub kind: FailureKind,

@@ -8,22 +8,10 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
 
-/// The unit, remaining amount, renewal time and size of each limit: `OpenAI` and compatible servers, then Anthropic.
-const LIMITS: [[&str; 4]; 4] = [
-    ["requests", "x-ratelimit-remaining-requests", "x-ratelimit-reset-requests", "x-ratelimit-limit-requests"],
-    ["tokens", "x-ratelimit-remaining-tokens", "x-ratelimit-reset-tokens", "x-ratelimit-limit-tokens"],
-    [
-        "requests",
-        "anthropic-ratelimit-requests-remaining",
-        "anthropic-ratelimit-requests-reset",
-        "anthropic-ratelimit-requests-limit",
-    ],
-    [
-        "tokens",
-        "anthropic-ratelimit-tokens-remaining",
-        "anthropic-ratelimit-tokens-reset",
-        "anthropic-ratelimit-tokens-limit",
-    ],
+/// The name of a limit's header, by the unit that it counts: `OpenAI` and compatible servers, then Anthropic.
+const HEADERS: [fn(&str, &str) -> String; 2] = [
+    |counts, what| format!("x-ratelimit-{what}-{counts}"),
+    |counts, what| format!("anthropic-ratelimit-{counts}-{what}"),
 ];
 
 /// A rate limit of the account, as the headers of an answer have it.
@@ -40,13 +28,17 @@ pub struct RateLimit {
 }
 
 pub(super) fn stated(headers: &HeaderMap) -> Vec<RateLimit> {
-    let text = |name: &str| headers.get(name)?.to_str().ok().map(str::trim);
-    let number = |name: &str| text(name)?.parse().ok().filter(|number: &f64| number.is_finite());
-    let limit = |[counts, remaining, renewed, limit]: [&str; 4]| {
-        let (remaining, renewed) = (number(remaining)?, text(renewed).map(str::to_owned));
-        Some(RateLimit { counts: counts.to_owned(), remaining, limit: number(limit), renewed })
+    let limit = |header: fn(&str, &str) -> String, counts: &str| {
+        let text = |what: &str| headers.get(header(counts, what))?.to_str().ok().map(str::trim);
+        let number = |what: &str| text(what)?.parse().ok().filter(|number: &f64| number.is_finite());
+        let (remaining, renewed) = (number("remaining")?, text("reset").map(str::to_owned));
+        Some(RateLimit { counts: counts.to_owned(), remaining, limit: number("limit"), renewed })
     };
-    LIMITS.into_iter().filter_map(limit).collect()
+    HEADERS
+        .into_iter()
+        .flat_map(|header| ["requests", "tokens"].map(|counts| limit(header, counts)))
+        .flatten()
+        .collect()
 }
 
 /// The time until all used-up limits are renewed; `None` if no limit is used up.

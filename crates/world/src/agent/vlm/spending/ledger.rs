@@ -8,12 +8,12 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::io;
 use std::path::Path;
-use std::time::{Duration, SystemTime};
+use std::time::Duration;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::shared_file::SharedFile;
+use super::shared_file::{SharedFile, now};
 
 /// The spending.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -101,9 +101,8 @@ impl Ledger {
         patience: Duration,
         journals: impl FnOnce() -> Result<Spend, E>,
     ) -> Result<Self, E> {
-        let (file, live) = (SharedFile::open(path)?, SharedFile::open(&path.with_extension("live"))?.into_file());
-        let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
-        let process = format!("{}-{}", std::process::id(), since.as_nanos());
+        let (file, live) = (SharedFile::open(path)?, SharedFile::open(&path.with_extension("live"))?.0);
+        let process = format!("{}-{}", std::process::id(), now().as_nanos());
         let ledger = Self { file, live, process, patience };
         ledger.file.locked(|| {
             if ledger.live.try_lock().is_ok() {
@@ -127,7 +126,7 @@ impl Ledger {
             let mut page = self.file.read::<Page>().ok();
             let (outcome, mut entry) = decide(page.as_ref().map(|page| self.others(page)));
             if let Some(page) = &mut page {
-                entry.until = now() + self.patience.as_secs();
+                entry.until = now().as_secs() + self.patience.as_secs();
                 page.processes.insert(self.process.clone(), entry);
                 let _ = self.file.write(page);
             }
@@ -140,12 +139,8 @@ impl Ledger {
         for (_, entry) in page.processes.iter().filter(|(process, _)| **process != self.process) {
             others.spend.add(&entry.spend);
             others.reserved_usd += entry.reserved_usd;
-            others.is_waiting |= entry.in_flight > 0 && entry.until >= now();
+            others.is_waiting |= entry.in_flight > 0 && entry.until >= now().as_secs();
         }
         others
     }
-}
-
-fn now() -> u64 {
-    SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default().as_secs()
 }

@@ -76,7 +76,6 @@ pub struct Begun {
 const AGAIN: Duration = Duration::from_millis(200);
 
 impl Account {
-    /// An account that starts with the spending of the run's earlier starts.
     pub fn new(limits: Limits, spent: Spend) -> Self {
         let others = Others { spend: spent, ..Others::default() };
         Self { limits, state: Mutex::new(State { others, ..State::default() }), ..Self::default() }

@@ -1,8 +1,7 @@
-//! A file for sharing numbers between processes.
-
 use std::fs::{File, OpenOptions};
 use std::io::{self, Read as _, Seek as _, Write as _};
 use std::path::Path;
+use std::time::{Duration, SystemTime};
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -12,16 +11,12 @@ use exact::replace::{folder_of, make_folder};
 /// A small file that all processes of a folder read and write under its lock. Without file locks, each process is on
 /// its own.
 #[derive(Debug)]
-pub(crate) struct SharedFile(File);
+pub(crate) struct SharedFile(pub(super) File);
 
 impl SharedFile {
     pub(crate) fn open(path: &Path) -> io::Result<Self> {
         make_folder(folder_of(path))?;
         OpenOptions::new().create(true).truncate(false).read(true).write(true).open(path).map(Self)
-    }
-
-    pub(crate) fn into_file(self) -> File {
-        self.0
     }
 
     pub(crate) fn locked<T>(&self, work: impl FnOnce() -> T) -> T {
@@ -47,4 +42,9 @@ impl SharedFile {
         file.rewind()?;
         file.write_all(&text)
     }
+}
+
+/// The time since 1970, which processes share.
+pub(crate) fn now() -> Duration {
+    SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default()
 }

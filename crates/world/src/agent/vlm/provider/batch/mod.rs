@@ -23,8 +23,8 @@ use super::{Patience, Received, received};
 use crate::agent::locked;
 use crate::agent::vlm::secrets::Secret;
 use crate::agent::vlm::wire_format::Dialect;
+use crate::json_lines;
 use exact::budget::Limit;
-use exact::input;
 use exact::replace::{folder_of, make_folder, sync_folder};
 use service::{Ended, Service, unpaid};
 
@@ -75,15 +75,9 @@ impl Batches {
 
     pub(super) fn share(&self, path: &Path) -> io::Result<()> {
         make_folder(folder_of(path))?;
-        let lines = match input::lines(path, LONGEST_LINE) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => None,
-            lines => Some(lines?),
-        };
+        let notes: Vec<Note> = json_lines::read(path, LONGEST_LINE)?;
         let mut state = locked(&self.state);
-        for line in lines.into_iter().flatten() {
-            // A line that was cut off names no batch.
-            let Ok(note) = serde_json::from_slice::<Note>(&line?) else { continue };
-            let note = Arc::new(note);
+        for note in notes.into_iter().map(Arc::new) {
             state.earlier.extend(note.requests.iter().map(|id| (id.clone(), Arc::clone(&note))));
         }
         let _ = self.notes.set(path.to_owned());
@@ -155,7 +149,6 @@ impl Batches {
         }
     }
 
-    /// Waits for the end of a batch, and distributes the results of these requests.
     async fn follow(self: Arc<Self>, note: Arc<Note>, ids: Vec<String>) {
         let (start, mut wait) = (Instant::now(), self.patience.first_delay);
         let ended = loop {
@@ -205,11 +198,10 @@ impl Batches {
     /// If the note cannot be written, this start still gets its answers; the journal reports the disk.
     fn note(&self, note: &Note) {
         let Some(path) = self.notes.get() else { return };
-        let mut line = serde_json::json!(note).to_string();
-        line.push('\n');
+        let Ok(line) = json_lines::line(note) else { return };
         let file = OpenOptions::new().create(true).append(true).open(path);
         let _ = file.and_then(|mut file| {
-            file.write_all(line.as_bytes()).and_then(|()| file.sync_data()).and_then(|()| sync_folder(folder_of(path)))
+            file.write_all(&line).and_then(|()| file.sync_data()).and_then(|()| sync_folder(folder_of(path)))
         });
     }
 }

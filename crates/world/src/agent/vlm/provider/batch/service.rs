@@ -175,7 +175,6 @@ impl Service {
         if status.is_success() { Ok(text) } else { Err(failed(status, after.or_else(|| retry_info(&text)), &text)) }
     }
 
-    /// The address of a path after the base address.
     fn at(&self, path: &[&str]) -> Url {
         let mut url = self.url.clone();
         if let Ok(mut segments) = url.path_segments_mut() {

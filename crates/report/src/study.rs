@@ -16,13 +16,11 @@ use score::table::{CONDITION, EpisodeTable, MetricColumn, TextColumn};
 use statistics::design::{Cluster, Design};
 use statistics::interval::Interval;
 
-/// The name of the default condition.
 const DEFAULT_CONDITION: &str = "default";
 
 /// The label of the scene: room, body, cubes, start.
 const SCENE: &str = "scene";
 
-/// The label of the person who played.
 const PARTICIPANT: &str = "participant";
 
 /// The unit of analysis: episodes within it depend on each other.
@@ -158,7 +156,6 @@ impl<'a> Study<'a> {
         self.participant(row).map(Unit::Participant).or_else(scene).unwrap_or(Unit::Episode(row))
     }
 
-    /// The person who played the row's episode.
     pub fn participant(&self, row: usize) -> Option<usize> {
         self.table.label(PARTICIPANT).filter(|_| self.design.has_pairs()).and_then(|label| label.code(row))
     }
@@ -216,7 +213,6 @@ impl<'a> Study<'a> {
         self.table.catalog.metric.get(name)
     }
 
-    /// The better direction of a metric.
     pub fn better(&self, metric: &str) -> Better {
         self.metric(metric).map_or(Better::Neither, |metric| metric.better)
     }
@@ -257,17 +253,14 @@ impl<'a> Block<'a> {
         RowKey { experiment: self.experiment.to_owned(), model: self.model.to_owned(), condition: self.condition() }
     }
 
-    /// The condition for table rows.
     pub fn condition(&self) -> Option<String> {
         self.condition.map(str::to_owned)
     }
 
-    /// The rows of the table.
     pub fn rows(&self) -> impl Iterator<Item = usize> + Clone + '_ {
         self.rows.iter().cloned().flatten()
     }
 
-    /// The exact moments of a metric in the block.
     pub fn moments(&self, column: &MetricColumn) -> Moments {
         self.moments[column.name.as_str()]
     }

@@ -31,7 +31,6 @@ use statistics::holm::{holm, level};
 use statistics::interval::Interval;
 use statistics::margin;
 
-/// The options of the gate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GateOptions {
     /// The metric, which both sides need, with a better direction.
@@ -129,7 +128,6 @@ pub struct GateSide {
     pub lost: u64,
 }
 
-/// One cell before its verdict.
 struct Tried {
     comparison: Comparison,
     spread: Option<margin::Spread>,
@@ -329,7 +327,6 @@ impl GateCell {
         }
     }
 
-    /// Experiment, model and condition.
     fn key(&self) -> (&str, &str, &str) {
         (&self.experiment, &self.model, self.condition.as_deref().unwrap_or(sides::DEFAULT))
     }

@@ -19,7 +19,6 @@ use score::table::{EpisodeTable, Header, KeyRef, LOST, MetricColumn};
 const MARKS: [&str; 2] = ["0/", "1/"];
 /// The labels for units that episodes share, and for their recording settings.
 const LABELS: [&str; 4] = [CONDITION, "scene", FINGERPRINT, "participant"];
-/// The name of the default condition.
 pub(super) const DEFAULT: &str = "default";
 
 /// The assumed result of lost episodes.
@@ -33,7 +32,6 @@ pub(super) enum Fill {
     For,
 }
 
-/// Earlier and later episodes.
 pub(super) struct Sides<'a> {
     tables: [&'a EpisodeTable; 2],
     renamed: Option<[&'a str; 2]>,
@@ -61,7 +59,6 @@ impl<'a> Sides<'a> {
         (kind(base) != kind(new)).then(|| format!("kind is {} and {}", kind(base), kind(new)))
     }
 
-    /// The earlier name of a renamed model.
     pub(crate) fn base_model(&self, model: &str) -> Option<String> {
         self.renamed.filter(|[_, new]| *new == model).map(|[old, _]| old.to_owned())
     }

@@ -9,7 +9,6 @@ use crate::tables::{Table, escape_markdown, push_wrapped};
 use exact::escape::visible;
 use exact::format::{UNDEFINED, fixed};
 
-/// The output format of verdicts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GateFormat {
     /// A table for a terminal of this width, and the flipped episodes.

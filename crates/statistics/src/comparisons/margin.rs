@@ -61,7 +61,6 @@ impl Units {
         (self.shared.len() + self.first.len().min(self.second.len())) as u64
     }
 
-    /// Returns true if there are no units to compare.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

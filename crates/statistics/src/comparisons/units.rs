@@ -18,7 +18,6 @@ const MOST_DENOMINATOR: i128 = 1 << 40;
 /// A test over units: its p value, and the least p value of any outcome.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UnitTest {
-    /// The two-sided p value.
     pub p: f64,
     /// The least p value for the same number of units.
     pub least: f64,
@@ -27,11 +26,8 @@ pub struct UnitTest {
 /// The units of two sides, each with the sums of its episodes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sides {
-    /// The units of both sides.
     pub shared: Vec<(Moments, Moments)>,
-    /// The units of the first side alone.
     pub first: Vec<Moments>,
-    /// The units of the second side alone.
     pub second: Vec<Moments>,
 }
 

@@ -13,7 +13,6 @@ use crate::quantile;
 /// The tolerance around one half, for rounding only.
 const HALF: f64 = 0.5 + 1e-12;
 
-/// One episode: the number of steps until it ended, and its outcome.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ending {
     /// The steps until the decision, or until the recording stopped.
@@ -21,7 +20,6 @@ pub struct Ending {
     pub outcome: Outcome,
 }
 
-/// The outcome of an episode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// A correct decision, the awaited event.
@@ -79,7 +77,6 @@ pub(crate) fn is_known(points: &[Point], horizon: i64) -> bool {
 /// A Kaplan-Meier curve (Kaplan and Meier 1958): the share of episodes undecided after each step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Survival {
-    /// The steps in which an episode ended, ascending.
     pub points: Vec<Point>,
 }
 

@@ -21,7 +21,6 @@ pub struct Sample {
     pub n: u64,
     /// The smallest and the largest possible value.
     pub range: (i64, i64),
-    /// The printed standard error.
     pub form: StandardError,
 }
 

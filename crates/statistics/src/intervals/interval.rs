@@ -19,7 +19,6 @@ pub struct Interval {
 }
 
 impl Interval {
-    /// No bounds.
     pub const UNBOUNDED: Self = Self { low: f64::NEG_INFINITY, high: f64::INFINITY };
 
     /// The part between `least` and `most`; bounds beyond them are meaningless.

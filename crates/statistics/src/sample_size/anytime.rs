@@ -27,7 +27,6 @@ impl Anytime {
         Some(Self::new(level, every, [worse, 1.0 - discordance, better], Ratio::new(1, 2)?))
     }
 
-    /// One rate against a level of chance.
     pub fn rate(level: f64, every: u64, chance: Ratio, rate: f64) -> Self {
         Self::new(level, every, [1.0 - rate, 0.0, rate], chance)
     }

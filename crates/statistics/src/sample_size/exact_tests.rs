@@ -52,9 +52,7 @@ impl Power for McNemar {
 /// is extreme if it is at most as probable as the observed one, given the totals.
 #[derive(Clone, Copy, Debug)]
 pub struct Fisher {
-    /// The level that p must not exceed.
     pub level: f64,
-    /// The true rates.
     pub rates: Rates,
 }
 
@@ -105,11 +103,8 @@ fn rejections(n: u64, total: u64, level: f64) -> Vec<bool> {
 /// The exact two-sided test of one rate against a level of chance.
 #[derive(Clone, Copy, Debug)]
 pub struct OneRate {
-    /// The level that p must not exceed.
     pub level: f64,
-    /// The rate under the null hypothesis.
     pub chance: Ratio,
-    /// The true rate.
     pub rate: f64,
 }
 

@@ -50,7 +50,6 @@ impl Rates {
         (difference >= 0.0 && lower >= 0.0 && rates.higher <= 1.0 + TIE).then_some(rates)
     }
 
-    /// The higher rate minus the lower.
     pub fn difference(self) -> f64 {
         self.higher - self.lower
     }

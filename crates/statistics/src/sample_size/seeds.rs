@@ -26,7 +26,6 @@ pub enum BySeed {
 #[derive(Clone, Copy, Debug)]
 pub struct Seeds {
     pub test: BySeed,
-    /// The level that p must not exceed.
     pub level: f64,
     pub seeds: u64,
     pub icc: f64,

@@ -89,7 +89,6 @@ pub struct Comparison {
     pub incomparable: Option<String>,
 }
 
-/// Two blocks and their comparison.
 pub(crate) struct Compared<'s, 'a> {
     pub study: &'s Study<'a>,
     pub first: &'s Block<'a>,
@@ -125,7 +124,6 @@ impl Compared<'_, '_> {
         }
     }
 
-    /// The lost episodes of both sides.
     fn lost(&self) -> u64 {
         self.first.lost + self.second.lost
     }
@@ -375,17 +373,13 @@ impl Comparison {
     }
 }
 
-/// The fewest units of a test of durations.
 fn fewest_of(confidence: f64) -> u64 {
     level(confidence).map_or(u64::MAX, |level| fewest(level) as u64)
 }
 
-/// The sign of a difference between two models.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sign {
-    /// The first is above the second.
     Higher,
-    /// The first is below the second.
     Lower,
 }
 

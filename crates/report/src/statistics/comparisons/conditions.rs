@@ -31,7 +31,6 @@ pub struct Contrast {
     pub comparison: Comparison,
 }
 
-/// Two experiments to contrast.
 pub(crate) struct Pair<'s, 'a> {
     baseline: &'s Experiment<'a>,
     against: &'s Experiment<'a>,

@@ -11,7 +11,6 @@ use statistics::holm::{holm, is_significant};
 use statistics::losses::{Lossy, bounds};
 use statistics::paired::Pairs;
 
-/// The name of lost episodes that decide a verdict.
 pub(crate) const LOST: &str = "lost episodes";
 
 /// Losses, or that nothing is known of them.
@@ -64,7 +63,6 @@ pub struct LossCase {
     pub p: Option<f64>,
 }
 
-/// The assumed result of lost episodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Toward {
     Lowest,

@@ -33,7 +33,6 @@ pub struct Matching {
     pub paired: bool,
 }
 
-/// The episodes of one block by scene.
 pub(crate) struct Scenes {
     /// The rows of each scene, by its number in the table.
     pub rows: BTreeMap<usize, Vec<usize>>,
@@ -120,7 +119,6 @@ pub(crate) fn too_few(n: usize, least: f64, confidence: f64) -> bool {
     level(confidence).is_none_or(|level| least > level || n < fewest_clusters(level))
 }
 
-/// The values of two sides by unit.
 pub(crate) struct Sides {
     units: BTreeMap<Unit, (Moments, Moments)>,
 }
@@ -163,7 +161,6 @@ impl Sides {
         self.counts().into_iter().min().unwrap_or_default()
     }
 
-    /// The units on each side.
     fn counts(&self) -> [usize; 2] {
         let has = |[first, second]: [usize; 2], (a, b): &(Moments, Moments)| {
             [first + usize::from(a.n > 0), second + usize::from(b.n > 0)]

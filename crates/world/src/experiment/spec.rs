@@ -264,8 +264,6 @@ pub enum Stated {
     Random,
 }
 
-names!(Stated { None: "none", Candidate: "candidate", Random: "random" });
-
 /// The agent's actions.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -276,8 +274,6 @@ pub enum Actions {
     /// Steps of a hand: up, down, left, right, away from the camera and towards it. The body stands still.
     Hand,
 }
-
-names!(Actions { Walk: "walk", Hand: "hand" });
 
 /// The agent's camera.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -291,8 +287,6 @@ pub enum Camera {
     Behind,
 }
 
-names!(Camera { Eye: "eye", Behind: "behind" });
-
 /// How the room and its mirrors look. What is visible is the same.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -303,8 +297,6 @@ pub enum Look {
     /// Walls of panels, soft shadows, mirrors with a frame of wood and a slight tint.
     Textured,
 }
-
-names!(Look { Plain: "plain", Textured: "textured" });
 
 /// The shape of all bodies.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]

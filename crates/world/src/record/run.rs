@@ -48,14 +48,6 @@ const PRACTICE_SEED: i32 = 9_000;
 /// The interval of checks for episodes held by other processes.
 const AGAIN: Duration = Duration::from_millis(50);
 
-/// The handling of episodes that a thread could not take: ask again, or not.
-#[derive(Clone, Debug, PartialEq, Eq)]
-enum Wait {
-    No,
-    Later,
-    Held(Held),
-}
-
 #[derive(Clone, Copy, Debug)]
 pub struct Settings {
     pub threads: NonZeroUsize,
@@ -180,16 +172,17 @@ impl Recording<'_> {
             };
             let mut under_way = FuturesUnordered::new();
             loop {
-                let wait = self.take_up(queue, each, &mut under_way, play)?;
+                let next = self.take_up(queue, each, &mut under_way, play)?;
+                let is_last = matches!(next, Next::Nothing);
                 self.assemble(queue);
-                let ended = match wait {
-                    Wait::No => under_way.next().await,
-                    _ if under_way.is_empty() => self.wait(&wait).await,
+                let ended = match next {
+                    Next::Nothing => under_way.next().await,
+                    _ if under_way.is_empty() => self.wait(&next).await,
                     _ => tokio::time::timeout(AGAIN, under_way.next()).await.unwrap_or_default(),
                 };
                 match ended {
                     Some((key, result)) => self.note(queue, key, result, &mut tally)?,
-                    None if wait == Wait::No => break,
+                    None if is_last => break,
                     None => {}
                 }
             }
@@ -207,28 +200,26 @@ impl Recording<'_> {
         }
     }
 
-    /// Takes episodes up to the limit under way; returns whether to ask again for the remaining ones.
+    /// Takes episodes up to the limit under way; returns why it took no more.
     fn take_up<F>(
         &self,
         queue: &Queue<'_>,
         each: usize,
         under_way: &mut FuturesUnordered<F>,
         play: impl Fn(Key, EpisodeLock) -> F,
-    ) -> Result<Wait, RecordError> {
+    ) -> Result<Next, RecordError> {
         let turn = |key: &Key| self.player.turn(&key.episode_id(self.subject));
         while under_way.len() < each && !self.stop.load(Ordering::Relaxed) {
             match queue.next(turn).map_err(RecordError::fatal)? {
                 Next::Play(key, lock) => under_way.push(play(key, lock)),
-                Next::Held(held) => return Ok(Wait::Held(held)),
-                Next::Later => return Ok(Wait::Later),
-                Next::Nothing => break,
+                rest => return Ok(rest),
             }
         }
-        Ok(Wait::No)
+        Ok(Next::Nothing)
     }
 
-    async fn wait<T>(&self, wait: &Wait) -> Option<T> {
-        if let Wait::Held(held) = wait {
+    async fn wait<T>(&self, next: &Next) -> Option<T> {
+        if let Next::Held(held) = next {
             self.progress.waiting(&held.key.episode_id(self.subject), held);
         }
         tokio::time::sleep(AGAIN).await;

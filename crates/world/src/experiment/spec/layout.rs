@@ -2,7 +2,6 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{Paint, is_default};
-use exact::names;
 use trace::palette::Color;
 
 /// The draws from seed and run, the same for all experiments that share scenes.
@@ -33,8 +32,6 @@ pub enum Colors {
     /// Each alone.
     Random,
 }
-
-names!(Colors { Balanced: "balanced", Random: "random" });
 
 /// The cubes of a world.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -85,8 +82,6 @@ pub enum Occluders {
     Random,
 }
 
-names!(Occluders { BeforeMirror: "before_mirror", Random: "random" });
-
 /// The other agents of a world.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -123,8 +118,6 @@ pub enum Behavior {
     Stand,
 }
 
-names!(Behavior { Walk: "walk", Stand: "stand" });
-
 /// The agent's pose at the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -137,8 +130,6 @@ pub enum Start {
     /// Two metres before the middle of the first pane, or of its place, facing it.
     BeforeMirror,
 }
-
-names!(Start { FacingAway: "facing_away", Any: "any", BeforeMirror: "before_mirror" });
 
 /// A wall of the room.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -158,8 +149,6 @@ pub enum Wall {
     /// At -y.
     South,
 }
-
-names!(Wall { Random: "random", Opposite: "opposite", East: "east", North: "north", West: "west", South: "south" });
 
 impl Wall {
     /// Quarter turns counter-clockwise from the wall at +x; `None` if it is drawn.

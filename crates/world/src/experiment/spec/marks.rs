@@ -68,5 +68,3 @@ pub enum Wearer {
     #[serde(rename = "other")]
     Other,
 }
-
-names!(Wearer { Own: "self", Other: "other" });

@@ -74,5 +74,3 @@ pub enum BodyShown {
     /// Its own: it walks about, whatever the agent does.
     Independent,
 }
-
-names!(BodyShown { Own: "own", Independent: "independent" });

@@ -33,14 +33,14 @@ pub fn least_p(n: u64, level: Ratio) -> Option<f64> {
 
 /// `hit` to `miss`: the level 1/3 is 1 to 2.
 #[derive(Clone, Copy)]
-struct Odds {
-    hit: u64,
-    miss: u64,
+pub(crate) struct Odds {
+    pub hit: u64,
+    pub miss: u64,
 }
 
 impl Odds {
     /// `None` outside [0, 1].
-    fn of(level: Ratio) -> Option<Self> {
+    pub fn of(level: Ratio) -> Option<Self> {
         let hit = u64::try_from(level.numerator()).ok()?;
         let all = u64::try_from(level.denominator()).ok()?;
         Some(Self { hit, miss: all.checked_sub(hit)? })

@@ -12,6 +12,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::chance::Odds;
 use super::interval::Interval;
 use super::paired::Pairs;
 use super::{holm, quantile};
@@ -30,13 +31,11 @@ pub struct EValue {
 /// than trials, and for a level outside [0, 1]. The cost grows with `n`.
 pub fn against_level(successes: u64, n: u64, level: Ratio) -> Option<EValue> {
     let failures = n.checked_sub(successes).filter(|_| n > 0)?;
-    let hit = u64::try_from(level.numerator()).ok()?;
-    let all = u64::try_from(level.denominator()).ok()?;
-    let miss = all.checked_sub(hit)?;
+    let Odds { hit, miss } = Odds::of(level)?;
     if (hit == 0 && successes > 0) || (miss == 0 && failures > 0) {
         return Some(EValue { e: f64::MAX, p: 0.0 });
     }
-    Some(mixture(successes, failures, [(hit, all), (miss, all)]).evidence())
+    Some(mixture(successes, failures, [(hit, hit + miss), (miss, hit + miss)]).evidence())
 }
 
 /// The e-value against no difference between two paired rates: a discordant pair favours either side with probability

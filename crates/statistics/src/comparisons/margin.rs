@@ -5,14 +5,13 @@
 //! maximum over the rate that the null hypothesis leaves open (Chan 1998). Beyond, it is the normal approximation.
 
 use crate::interval::Interval;
+use crate::power::POWER;
 use crate::quantile::{normal, normal_below};
 
 /// The most outcomes that are enumerated.
 const MOST_ENUMERATED: usize = 6000;
 /// The number of values tried for the rate that the null hypothesis leaves open.
 const NUISANCE: u32 = 100;
-/// The power for which a number of units is planned.
-const POWER: f64 = 0.8;
 /// The tolerance for equal statistics.
 const TIE: f64 = 1e-9;
 

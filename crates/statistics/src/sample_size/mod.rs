@@ -4,7 +4,6 @@
 //! by seed. The power of an exact test rises in a sawtooth, so sizes are tried one by one from below.
 
 mod anytime;
-mod binomial;
 mod exact_tests;
 mod seeds;
 
@@ -15,9 +14,7 @@ pub use self::anytime::{Anytime, MOST_AT_LOOKS};
 pub use self::exact_tests::{Fisher, McNemar, OneRate};
 pub use self::seeds::{BySeed, SEED, STUDIES, Seeds};
 pub use super::quantile::settled;
-
-/// The tolerance between a p value and the level, only for rounding of sums.
-const TIE: f64 = 1e-12;
+use crate::outcomes::TIE;
 
 /// The most episodes per arm in a search.
 pub const MOST_EPISODES: u64 = 2_000;

@@ -2,7 +2,8 @@
 //! `fisher_exact` and `binomtest`. Sizes are found by trying each, smallest differences by `brentq`.
 #![expect(clippy::unreadable_literal, reason = "reference values as their source prints them")]
 
-use super::{Anytime, BySeed, Clusters, Fisher, McNemar, OneRate, Power, Rates, Seeds, binomial, smallest};
+use super::exact_tests::probabilities;
+use super::{Anytime, BySeed, Clusters, Fisher, McNemar, OneRate, Power, Rates, Seeds, smallest};
 use crate::paired::Pairs;
 use crate::unpaired::fisher;
 use exact::ratio::Ratio;
@@ -95,12 +96,12 @@ fn power_agrees_with_the_tests_of_statistics() {
             pairs.mcnemar().unwrap() <= level
         });
         let multinomial = |(a, b): (u64, u64)| {
-            let decided = binomial::probabilities(n, discordance)[usize::try_from(a + b).unwrap()];
-            decided * binomial::probabilities(a + b, 0.9)[usize::try_from(a).unwrap()]
+            let decided = probabilities(n, discordance)[usize::try_from(a + b).unwrap()];
+            decided * probabilities(a + b, 0.9)[usize::try_from(a).unwrap()]
         };
         close(McNemar::new(level, difference, discordance).power(n), rejected.map(multinomial).sum());
         let (rates, mut sum) = (rates(0.2, 0.8), 0.0);
-        let [lower, higher] = [rates.lower, rates.higher].map(|rate| binomial::probabilities(n, rate));
+        let [lower, higher] = [rates.lower, rates.higher].map(|rate| probabilities(n, rate));
         for (a, p) in (0..).zip(&lower) {
             for (b, q) in (0..).zip(&higher) {
                 sum += if fisher((a, n), (b, n)).unwrap().p <= level { p * q } else { 0.0 };

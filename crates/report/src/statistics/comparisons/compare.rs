@@ -176,7 +176,9 @@ impl Compared<'_, '_> {
             let units = Units { n: unknown, name: "interrupted episodes".to_owned(), too_few: true };
             return Comparison { units: Some(units), ..seen };
         }
-        let Some(mut sides) = self.times(column, horizon) else { return seen };
+        let time = |row| decided(self.study, column, row).map(|end| end.steps.min(horizon));
+        let times = Sides::by(self.study, &[(self.first, self.second)], time).divided();
+        let Some(mut sides) = times else { return seen };
         if let Some(toward) = lost {
             self.add_lost(&mut sides, horizon, toward);
         }
@@ -188,12 +190,6 @@ impl Compared<'_, '_> {
         let method = if is_paired { Method::RestrictedMeanPaired } else { Method::RestrictedMean };
         let tested = Comparison::of_durations(method, [n as u64; 2], found, self.confidence);
         Comparison { n: seen.n, units: Some(units), ..tested }
-    }
-
-    /// The times of both sides, limited to the horizon, by unit.
-    fn times(&self, column: &MetricColumn, horizon: i64) -> Option<units::Sides> {
-        let time = |row| decided(self.study, column, row).map(|end| end.steps.min(horizon));
-        Sides::by(self.study, &[(self.first, self.second)], time).divided()
     }
 
     /// Adds each lost episode as its own unit, decided at once or never.

@@ -76,7 +76,7 @@ fn families(statistics: &Statistics, answers: &[Answer]) -> usize {
     let chance = statistics.chance.iter().filter(|row| of_chance(&row.metric));
     let levels: BTreeSet<_> = chance.map(|row| (&row.key.experiment, &row.metric, row.level.to_string())).collect();
     let models = statistics.models.iter().filter(|family| is_answered(&family.metric));
-    let models = models.filter(|family| family.tests.iter().any(|test| test.comparison.p.is_some())).count();
+    let models = models.filter(|family| family.comparisons().any(|it| it.p.is_some())).count();
     let overall = statistics.overall.iter().filter(|row| is_answered(&row.metric) && row.p.is_some());
     let overall: BTreeSet<_> = overall.map(|row| &row.metric).collect();
     let tested = statistics.conditions.iter().filter(|it| is_answered(&it.metric) && it.comparison.p.is_some());
@@ -215,7 +215,7 @@ fn apart(comparisons: &[&Comparison]) -> Option<String> {
 
 /// The reason why no test of a family can show a difference.
 fn unsayable(family: &Family, confidence: f64) -> Option<String> {
-    let comparisons: Vec<&Comparison> = family.tests.iter().map(|test| &test.comparison).collect();
+    let comparisons: Vec<&Comparison> = family.comparisons().collect();
     untested(&comparisons, confidence).or_else(|| match family.detectable {
         Some(Reach { method, n, tests, family: None, .. }) => {
             let name = if method == Method::Mcnemar { "pairs" } else { "episodes" };
@@ -229,7 +229,7 @@ fn differing_in(family: &Family, confidence: f64) -> String {
     if let Some(why) = unsayable(family, confidence) {
         return format!("{} {why}", family.experiment);
     }
-    let comparisons: Vec<&Comparison> = family.tests.iter().map(|test| &test.comparison).collect();
+    let comparisons: Vec<&Comparison> = family.comparisons().collect();
     let separated = family.tests.iter().filter(|test| test.comparison.separated);
     let is_silent = |it: &&Comparison| !it.separated && it.incomparable.is_none();
     let reason = |it: &Comparison| match it.unsaid(confidence) {

@@ -153,6 +153,10 @@ pub(crate) fn compared(study: &Study, horizon: Option<i64>, confidence: f64) -> 
 }
 
 impl Family {
+    pub(crate) fn comparisons(&self) -> impl Iterator<Item = &Comparison> {
+        self.tests.iter().map(|test| &test.comparison)
+    }
+
     fn of(experiment: &str, column: &MetricColumn, field: &Field, asked: (Option<i64>, f64)) -> Self {
         let order = best_first(field, column, asked.0);
         let mut tests = Vec::new();

@@ -119,7 +119,11 @@ impl CellRow {
             let definition = study.metric(metric);
             let se = definition.map_or(StandardError::Sample, |definition| definition.se);
             let intervals = match (definition, kind, moments.counts()) {
-                (_, Kind::Rate, Some((k, n))) => Intervals::rate(k, n, confidence),
+                (_, Kind::Rate, Some((k, n))) => Intervals::Rate {
+                    wilson: wilson(k, n, confidence),
+                    clopper_pearson: clopper_pearson(k, n, confidence),
+                    jeffreys: jeffreys(k, n, confidence),
+                },
                 (None, ..) => Intervals::NONE,
                 (Some(definition), ..) => Intervals::quantity(study, (metric, definition), moments, rows, confidence),
             };
@@ -150,14 +154,6 @@ impl Intervals {
         bootstrap: None,
         bootstrap_withheld: Some(Withheld::Undefined),
     };
-
-    fn rate(successes: u64, n: u64, confidence: f64) -> Self {
-        Self::Rate {
-            wilson: wilson(successes, n, confidence),
-            clopper_pearson: clopper_pearson(successes, n, confidence),
-            jeffreys: jeffreys(successes, n, confidence),
-        }
-    }
 
     fn quantity(
         study: &Study,

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::cells::KeyValue;
 use crate::cells::interval::CONFIDENCE;
 use crate::statistics::conclusions::headline;
-use crate::statistics::models::{Family, PairTest, compared};
+use crate::statistics::models::{Family, compared};
 use crate::statistics::overall::{self, OverallRow};
 use crate::study::Study;
 use crate::tables::{Column, ListTable, Look, Table, key_field};
@@ -44,14 +44,13 @@ pub struct RankRow {
 
 impl RankRow {
     pub(crate) fn all(families: &[Family], overall: &[OverallRow]) -> Vec<Self> {
-        let comparable = |test: &PairTest| test.comparison.incomparable.is_none();
         let of_family = |family: &Family| {
             let models: Vec<&str> = family.models.iter().map(String::as_str).collect();
             let separated = family.tests.iter().filter(|test| test.comparison.separated);
             let shown: Vec<(&str, &str)> = separated.map(|test| (&*test.first, &*test.second)).collect();
             ranks(Some(&family.experiment), &family.metric, &models, &shown)
         };
-        let families = families.iter().filter(|family| family.tests.iter().all(comparable));
+        let families = families.iter().filter(|family| family.comparisons().all(|it| it.incomparable.is_none()));
         let mut rows: Vec<Self> = families.flat_map(of_family).collect();
         for rows_of in overall.chunk_by(|a, b| a.metric == b.metric) {
             let models: BTreeSet<&str> = rows_of.iter().flat_map(|row| [&*row.first, &*row.second]).collect();

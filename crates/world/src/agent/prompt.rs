@@ -51,46 +51,38 @@ impl Prompt {
         let fill = |name: &str, values: Value| -> Result<String, Error> {
             environment.get_template(name)?.render(values).map(|text| text.trim_end().to_owned())
         };
-        let system = fill(
-            "system",
-            context! {
-                stated_color => task.stated_color.as_deref(),
-                reply_keys => task.experiment.keys().iter().map(|key| format!("\"{key}\"")).collect::<Vec<_>>().join(", "),
-                answers => task.experiment.answers.iter().map(answer).collect::<Vec<_>>(),
-            },
-        )?;
+        let values = context! {
+            stated_color => task.stated_color.as_deref(),
+            reply_keys => task.experiment.keys().iter().map(|key| format!("\"{key}\"")).collect::<Vec<_>>().join(", "),
+            answers => task.experiment.answers.iter().map(answer).collect::<Vec<_>>(),
+        };
+        let system = fill("system", values)?;
         let history = observation.history.as_ref();
-        let history_text = fill(
-            "history",
-            context! {
-                first => history.is_none(),
-                action => history.and_then(|(action, _)| action.map(letter)),
-                thought => history.and_then(|(_, thought)| thought.as_deref().map(one_line)),
-                steps => observation.past.iter().map(step).collect::<Vec<_>>(),
-            },
-        )?;
-        let position_text = fill(
-            "position",
-            context! {
-                x => rounded(observation.x, 2),
-                y => rounded(observation.y, 2),
-                yaw => rounded(observation.yaw, 0),
-                remaining => observation.remaining,
-                budget => task.step_budget,
-            },
-        )?;
+        let values = context! {
+            first => history.is_none(),
+            action => history.and_then(|(action, _)| action.map(letter)),
+            thought => history.and_then(|(_, thought)| thought.as_deref().map(one_line)),
+            steps => observation.past.iter().map(step).collect::<Vec<_>>(),
+        };
+        let history_text = fill("history", values)?;
+        let values = context! {
+            x => rounded(observation.x, 2),
+            y => rounded(observation.y, 2),
+            yaw => rounded(observation.yaw, 0),
+            remaining => observation.remaining,
+            budget => task.step_budget,
+        };
+        let position_text = fill("position", values)?;
         let warning = fill("warning", context! {})?;
-        let user = fill(
-            "user",
-            context! {
-                history_text,
-                position_text,
-                bumped => observation.bumped,
-                warning_if_bumped_wall => warning,
-                remaining => observation.remaining,
-                budget => task.step_budget,
-            },
-        )?;
+        let values = context! {
+            history_text,
+            position_text,
+            bumped => observation.bumped,
+            warning_if_bumped_wall => warning,
+            remaining => observation.remaining,
+            budget => task.step_budget,
+        };
+        let user = fill("user", values)?;
         Ok(Rendered { system, user })
     }
 }

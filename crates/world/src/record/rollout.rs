@@ -11,7 +11,6 @@ use std::time::Instant;
 use super::error::RecordError;
 use super::plan::{Key, Subject};
 use super::shares::Shares;
-use crate::agent::reply::Repair;
 use crate::agent::{Agent, Observation, Past, Reply, Task};
 use crate::experiment::spec::Side;
 use crate::replay::log::{Seen, frame_time};
@@ -177,12 +176,12 @@ fn look(stage: &Stage<'_>, world: &World) -> Result<Option<Arc<Frame>>, RecordEr
 }
 
 /// The row of a step, without `bumped`.
-fn row(world: &World, key: &Key, t: i32, visibility: &Visibility, reply: Reply) -> Step {
+fn row(world: &World, key: &Key, t: i32, visibility: &Visibility, mut reply: Reply) -> Step {
     let counts = by_column(world, visibility);
     let px = |column: &str| counts.iter().find(|(name, _)| *name == column).map(|(_, px)| *px);
     let cube = reply.selected_cube.as_deref().and_then(Color::named);
     let pose = world.pose();
-    let mut extra = Extra {
+    let extra = Extra {
         mirror_self_px: px("mirror_self_px"),
         mirror_other_px: px("mirror_other_px"),
         mirror_px: px("mirror_px"),
@@ -191,15 +190,7 @@ fn row(world: &World, key: &Key, t: i32, visibility: &Visibility, reply: Reply) 
         pose_y: Some(narrowed(pose.y)),
         pose_yaw: Some(narrowed(pose.heading.degrees())),
         cube_distance: cube.and_then(|color| world.distance_to_cube(color)).map(narrowed),
-        reply_status: Some(reply.status.name().to_owned()),
-        reply_repair: Repair::joined(&reply.repairs),
-        reply_fault: reply.fault,
-        view_description: reply.words.view_description,
-        reasoning: reply.words.reasoning,
-        summary: reply.words.summary,
-        identification: reply.words.identification,
         mark_color: world.scene().own_mark_at(world.t()).map(|color| color.name().to_owned()),
-        mark_report: reply.mark_report,
         mirror_mark_px: px("mirror_mark_px"),
         mirror_double_px: px("mirror_double_px"),
         shown_px: px("shown_px"),
@@ -211,7 +202,7 @@ fn row(world: &World, key: &Key, t: i32, visibility: &Visibility, reply: Reply) 
         mark2_px: px("mark2_px"),
         mark3_px: px("mark3_px"),
         mark4_px: px("mark4_px"),
-        reply: reply.raw,
+        reply: reply.raw.take(),
         latency_ms: reply.usage.latency_ms,
         prompt_tokens: reply.usage.prompt_tokens,
         completion_tokens: reply.usage.completion_tokens,
@@ -219,14 +210,10 @@ fn row(world: &World, key: &Key, t: i32, visibility: &Visibility, reply: Reply) 
         frame_time: Some(frame_time(key.seed, key.run, key.repetition, t)),
         ..Extra::default()
     };
-    world.scene().experiment.put(Side::Answer, &reply.answers, &mut extra);
-    Step {
-        action: reply.action,
-        self_color: reply.self_color,
-        selected_cube: reply.selected_cube,
-        mirror_visible: world.is_mirror_visible(visibility),
-        extra,
-    }
+    let (action, mirror_visible) = (reply.action, world.is_mirror_visible(visibility));
+    let mut step = Step { action, self_color: None, selected_cube: None, mirror_visible, extra };
+    reply.put(&world.scene().experiment, &mut step);
+    step
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "seven digits of a room's metres are micrometres")]

@@ -11,7 +11,6 @@ use serde_json::Value;
 
 use crate::agent::reply::{self, Ending, Repair};
 use crate::agent::{Reply, Status};
-use crate::experiment::spec::Side;
 use crate::experiment::{Experiment, Spec};
 use trace::answers::{Answered, columns_of};
 use trace::episode::{Action, Episode, Step};
@@ -116,7 +115,11 @@ impl ReparseAnswer {
                 self.diverged.push(Diverged { episode_id: id.clone(), t: at + 1, recorded, parsed });
             }
             let before = compared(step, experiment);
-            put(step, reading, experiment);
+            if step.selected_cube != reading.selected_cube {
+                // The recorded distance was to the recorded cube.
+                step.extra.cube_distance = None;
+            }
+            reading.put(experiment, step);
             for ((column, before), (_, after)) in before.into_iter().zip(compared(step, experiment)) {
                 if before != after {
                     self.changes.push(Change { episode_id: id.clone(), t: at + 1, column, before, after });
@@ -169,23 +172,4 @@ fn compared(step: &Step, experiment: &Spec) -> Vec<(String, Option<String>)> {
         ("reply_status", &extra.reply_status),
     ];
     fixed.into_iter().map(|(column, value)| (column.to_owned(), value.clone())).chain(answers).collect()
-}
-
-fn put(step: &mut Step, reading: Reply, experiment: &Spec) {
-    let extra = &mut step.extra;
-    if step.selected_cube != reading.selected_cube {
-        // The recorded distance was to the recorded cube.
-        extra.cube_distance = None;
-    }
-    step.self_color = reading.self_color;
-    step.selected_cube = reading.selected_cube;
-    extra.mark_report = reading.mark_report;
-    experiment.put(Side::Answer, &reading.answers, extra);
-    extra.reply_status = Some(reading.status.name().to_owned());
-    extra.reply_repair = Repair::joined(&reading.repairs);
-    extra.reply_fault = reading.fault;
-    extra.view_description = reading.words.view_description;
-    extra.reasoning = reading.words.reasoning;
-    extra.summary = reading.words.summary;
-    extra.identification = reading.words.identification;
 }

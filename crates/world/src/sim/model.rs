@@ -142,19 +142,15 @@ impl Stage {
         if paint == Paint::Labels {
             dress::label(&mut model, &items);
         }
-        let pieces = (0..BODIES)
-            .flat_map(|body| Piece::ALL.map(|piece| format!("{}_{}", body_name(body), piece.name())))
-            .map(|name| {
-                let body = model.name_to_id(MjtObjBase::mjOBJ_BODY, &name).expect("the humanoid has this piece");
-                let mocap = usize::try_from(model.body_mocapid()[body]).expect("each piece is moved from outside");
-                (mocap, model.body_pos()[body])
-            })
-            .collect();
         let moved = |name: &str| {
-            let body = model.name_to_id(MjtObjBase::mjOBJ_BODY, name).expect("the room has this body");
-            usize::try_from(model.body_mocapid()[body]).expect("it is moved from outside")
+            let body = model.name_to_id(MjtObjBase::mjOBJ_BODY, name).expect("every model has this body");
+            let mocap = usize::try_from(model.body_mocapid()[body]).expect("it is moved from outside");
+            (mocap, model.body_pos()[body])
         };
-        let (beyond, hand) = (moved(BEYOND_CAMERA), moved(HAND));
+        let names =
+            (0..BODIES).flat_map(|body| Piece::ALL.map(|piece| format!("{}_{}", body_name(body), piece.name())));
+        let pieces = names.map(|name| moved(&name)).collect();
+        let (beyond, hand) = (moved(BEYOND_CAMERA).0, moved(HAND).0);
         let model = Arc::new(model);
         Self { data: MjData::new(Arc::clone(&model)), model, items, pieces, look, beyond, hand, marks_at: 1 }
     }
@@ -237,12 +233,14 @@ fn body_name(body: usize) -> String {
     body.checked_sub(AGENTS).map_or_else(|| format!("agent{body}"), |pane| format!("double{pane}"))
 }
 
+/// The number of a thing in its name, after this prefix.
+fn numbered(name: &str, prefix: &str) -> Option<usize> {
+    name.strip_prefix(prefix)?.split('_').next()?.parse().ok()
+}
+
 fn item(model: &MjModel, geom: usize, scene: &Scene) -> Item {
     let name = model.id_to_name(MjtObjBase::mjOBJ_GEOM, geom).unwrap_or_default();
-    let numbered = |prefix: &str| {
-        let digits = name.strip_prefix(prefix)?.split('_').next()?;
-        digits.parse::<usize>().ok()
-    };
+    let numbered = |prefix| numbered(name, prefix);
     let marked = |wearer: usize| {
         let part = name.split_once("_mark_")?.1;
         scene.marks.iter().position(|mark| mark.wearer == wearer && mark.part.name() == part)

@@ -191,11 +191,9 @@ impl World {
 
     fn walk(&mut self, length: f64) -> Moved {
         let (from, to) = (self.ego.pose, self.ego.pose.ahead(length));
-        let is_clear = self.plan.is_passable(from.spot(), to.spot())
-            && self
-                .others
-                .iter()
-                .all(|other| !self.plan.is_blocked_by(from.spot(), to.spot(), other.figure.pose.spot()));
+        let is_in_the_way =
+            |other: &Distractor| self.plan.is_blocked_by(from.spot(), to.spot(), other.figure.pose.spot());
+        let is_clear = self.plan.is_passable(from.spot(), to.spot()) && !self.others.iter().any(is_in_the_way);
         if is_clear {
             self.ego.step_to(to);
         } else {

@@ -26,10 +26,10 @@ pub(crate) use surrogates::without_lone_surrogates;
 
 use super::{Answers, Reply, Status, Usage, Words, prompt};
 use crate::experiment::Spec;
-use crate::experiment::spec::{Actions, Answer, AnswerType, ReplyKey};
+use crate::experiment::spec::{Actions, Answer, AnswerType, ReplyKey, Side};
 use trace::answers::Answered;
 use trace::colors::spelling;
-use trace::episode::Action;
+use trace::episode::{Action, Step};
 use trace::identification;
 use trace::palette::Color;
 
@@ -71,6 +71,21 @@ impl Reply {
             self.status = Status::Repaired;
         }
         self
+    }
+
+    /// Stores what was read in the columns of a step; its action, text and cost are left out.
+    pub(crate) fn put(self, experiment: &Spec, step: &mut Step) {
+        let extra = &mut step.extra;
+        experiment.put(Side::Answer, &self.answers, extra);
+        (step.self_color, step.selected_cube) = (self.self_color, self.selected_cube);
+        extra.mark_report = self.mark_report;
+        extra.reply_status = Some(self.status.name().to_owned());
+        extra.reply_repair = Repair::joined(&self.repairs);
+        extra.reply_fault = self.fault;
+        extra.view_description = self.words.view_description;
+        extra.reasoning = self.words.reasoning;
+        extra.summary = self.words.summary;
+        extra.identification = self.words.identification;
     }
 
     /// Adds the text that was read, and its cost.

@@ -164,10 +164,7 @@ impl Reflection {
 
     /// The colour of a patch on the own body, once seen often enough; the latest if there are several.
     pub fn own_mark(&self) -> Option<Color> {
-        let last = *self.patches.last()?;
-        let is_tested = self.own_color().is_some_and(|own| own != last);
-        let sightings = self.patches.iter().filter(|patch| **patch == last).count();
-        (is_tested && sightings >= SIGHTINGS).then_some(last)
+        repeated(&self.patches).filter(|last| self.own_color().is_some_and(|own| own != *last))
     }
 
     /// The number of tests that found a body in the place of the own reflection.
@@ -247,6 +244,12 @@ pub fn patch_at(view: &View, double: Place, body: Color) -> Option<Color> {
         let (color, share) = commonest(&pixels, Some(body))?;
         (count(&pixels, color) >= PATCH.0 && share >= PATCH.1).then_some(color)
     })
+}
+
+/// The last patch, if enough views had it.
+pub fn repeated(patches: &[Color]) -> Option<Color> {
+    let last = *patches.last()?;
+    (patches.iter().filter(|patch| **patch == last).count() >= SIGHTINGS).then_some(last)
 }
 
 /// The most frequent colour and its share of the pixels.

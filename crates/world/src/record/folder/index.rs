@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use super::super::continued;
 use super::super::error::StoreError;
-use super::super::lock::{is_at, parts_of};
+use super::super::lock::{entries_of, is_at, parts_of};
 use super::super::metadata::{Recordings, difference};
 use super::super::plan::Subject;
 use crate::agent::locked;
@@ -121,15 +121,13 @@ impl RecordingIndex {
             return Ok(Vec::new());
         }
         let prefix = format!("{}-{}-s", experiment.name(), self.subject.slug());
-        let mut found = Vec::new();
-        for entry in fs::read_dir(&parts).map_err(StoreError::io("read", &parts))? {
-            let path = entry.map_err(StoreError::io("read", &parts))?.path();
+        let is_own = |path: &PathBuf| {
             let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
             let rest = name.strip_prefix(&prefix).and_then(|rest| rest.strip_suffix(".parquet"));
-            if rest.is_some_and(|rest| rest.bytes().all(|byte| byte.is_ascii_digit() || b"-rx".contains(&byte))) {
-                found.push(path);
-            }
-        }
+            rest.is_some_and(|rest| rest.bytes().all(|byte| byte.is_ascii_digit() || b"-rx".contains(&byte)))
+        };
+        let entries = entries_of(&parts)?;
+        let mut found: Vec<PathBuf> = entries.iter().map(fs::DirEntry::path).filter(is_own).collect();
         found.sort();
         Ok(found)
     }

@@ -114,9 +114,12 @@ fn is_alone(present: &File, path: &Path) -> Result<bool, StoreError> {
     }
 }
 
+pub(in crate::record) fn entries_of(folder: &Path) -> Result<Vec<fs::DirEntry>, StoreError> {
+    fs::read_dir(folder).and_then(Iterator::collect).map_err(StoreError::io("read", folder))
+}
+
 fn clear(parts: &Path) -> Result<(), StoreError> {
-    let entries = fs::read_dir(parts).and_then(Iterator::collect::<io::Result<Vec<_>>>);
-    for entry in entries.map_err(StoreError::io("read", parts))? {
+    for entry in entries_of(parts)? {
         let path = entry.path();
         if is_unfinished(&path) {
             // The frames of an external program are a folder.

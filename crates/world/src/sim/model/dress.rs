@@ -5,7 +5,7 @@ use mujoco_rs::prelude::{MjModel, MjtObjBase};
 use super::super::angle::{Heading, Quaternion};
 use super::super::config::WorldConfig;
 use super::super::scene::{Cube, HandShape, HandStart, HungPane, Scene, WornMark};
-use super::{AGENTS, BARS, Item, Look, group, shadow};
+use super::{AGENTS, BARS, Item, Look, group, numbered, shadow};
 use crate::experiment::spec::{MOST_MARKS, PaneKind};
 use crate::sim::scene::MOST_CUBES;
 use trace::palette::Color;
@@ -41,7 +41,8 @@ pub(super) fn dress(model: &mut MjModel, items: &[Item], config: &WorldConfig, s
                 paint_body(model, geom, color, if agent == 0 { group::EGO } else { group::THINGS }, neutral);
             }
             Item::Double => {
-                let own = pane.filter(|(at, _)| is_of_double(model, geom, *at));
+                let name = model.id_to_name(MjtObjBase::mjOBJ_GEOM, geom).unwrap_or_default();
+                let own = pane.filter(|(at, _)| numbered(name, "double") == Some(*at));
                 let color = own.and_then(|(_, pane)| pane.double).map(|double| double.color);
                 paint_body(model, geom, color, group::THINGS, neutral);
             }
@@ -170,7 +171,7 @@ const HALF_BAR: f64 = 0.03;
 /// Puts a frame's bar beside its pane, flush with it, so that it hides nothing; only direct views show frames.
 fn frame(model: &mut MjModel, geom: usize, scene: &Scene, look: Look, config: &WorldConfig) {
     let name = model.id_to_name(MjtObjBase::mjOBJ_GEOM, geom).unwrap_or_default();
-    let Some(number) = name.strip_prefix("frame").and_then(|digits| digits.parse::<usize>().ok()) else { return };
+    let Some(number) = numbered(name, "frame") else { return };
     let pane = scene.panes.get(number / BARS).filter(|_| look == Look::Direct);
     let Some(pane) = pane else { return hide(model, geom) };
     let [x, y] = pane.place.center(config);
@@ -246,13 +247,6 @@ fn paint_body(model: &mut MjModel, geom: usize, color: Option<Color>, shown: i32
     if let (Some(color), false) = (color, is_neutral) {
         model.geom_rgba_mut()[geom] = paint(color.rgb());
     }
-}
-
-fn is_of_double(model: &MjModel, geom: usize, pane: usize) -> bool {
-    let name = model.id_to_name(MjtObjBase::mjOBJ_GEOM, geom).unwrap_or_default();
-    name.strip_prefix("double")
-        .and_then(|rest| rest.strip_prefix(&pane.to_string()))
-        .is_some_and(|rest| rest.starts_with('_'))
 }
 
 fn paint(rgb: [u8; 3]) -> [f32; 4] {

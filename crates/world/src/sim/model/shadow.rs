@@ -4,7 +4,7 @@
 
 use mujoco_rs::prelude::{MjEditError, MjModel, MjSpec, MjtGeomBase, SpecItem};
 
-use super::{AGENTS, BODIES, body_name, group};
+use super::{AGENTS, BODIES, body_name, group, numbered};
 use crate::experiment::spec::PaneKind;
 use crate::sim::scene::{HungPane, MOST_CUBES, Scene};
 
@@ -68,13 +68,13 @@ pub(super) fn dress(model: &mut MjModel, geom: usize, name: &str, scene: &Scene,
     let Some((owner, layer)) = name.split_once(NAMED) else { return };
     let layer: usize = layer.parse().unwrap_or(0);
     let is_window = pane.is_some_and(|(_, pane)| pane.kind == PaneKind::Window);
-    let number = |prefix: &str| owner.strip_prefix(prefix).and_then(|digits| digits.parse::<usize>().ok());
-    let is_shown = if let Some(agent) = number("agent") {
+    let is_shown = if let Some(agent) = numbered(owner, "agent") {
         agent < AGENTS && scene.agent_color(agent, pane.map(|(_, pane)| pane)).is_some()
-    } else if let Some(double) = number("double") {
+    } else if let Some(double) = numbered(owner, "double") {
         pane.is_some_and(|(at, pane)| at == double && pane.double.is_some())
     } else {
-        let cube = number("cube").and_then(|at| scene.cubes.get(at)).filter(|cube| cube.base <= 0.0 && !is_window);
+        let cube =
+            numbered(owner, "cube").and_then(|at| scene.cubes.get(at)).filter(|cube| cube.base <= 0.0 && !is_window);
         if let Some(cube) = cube {
             let half = cube.edge / 2.0 + RIMS[layer.min(RIMS.len() - 1)];
             model.geom_pos_mut()[geom] = [cube.x, cube.y, height(layer)];

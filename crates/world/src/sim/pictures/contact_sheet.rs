@@ -90,13 +90,10 @@ fn before_mirror(world: &World, away: f64, aside: f64) -> Pose {
     let [out_x, out_y] = heading.direction();
     let wanted = Pose { x: x - aside * out_y, y: y + aside * out_x, heading }.ahead(-away);
     let places = (0..40).map(|at| wanted.ahead(-0.1 * f64::from(at)));
-    let is_free = |pose: &Pose| {
-        let others = world.figures();
-        world.floor_plan().admits(pose.spot(), 0.0)
-            && others[1..]
-                .iter()
-                .all(|other| !world.floor_plan().is_blocked_by(pose.spot(), pose.spot(), other.pose.spot()))
-    };
+    let (plan, figures) = (world.floor_plan(), world.figures());
+    let touches = |spot: [f64; 2], other: &Figure| plan.is_blocked_by(spot, spot, other.pose.spot());
+    let is_free =
+        |pose: &Pose| plan.admits(pose.spot(), 0.0) && !figures[1..].iter().any(|other| touches(pose.spot(), other));
     places.into_iter().find(is_free).unwrap_or(wanted)
 }
 

@@ -27,13 +27,11 @@
 use trace::palette::Color;
 
 use super::super::knowledge::Knowledge;
+use super::super::reflection;
 use super::super::seeker::{Belief, Policy};
 
 /// The minimum pixels of a body to imitate.
 const LEAST: usize = 150;
-
-/// The number of views with the same patch that make a mark.
-const SIGHTINGS: usize = 2;
 
 #[derive(Clone, Debug, Default)]
 pub struct Mimic {
@@ -58,7 +56,6 @@ impl Policy for Mimic {
     fn mark(&mut self, known: &Knowledge) -> Option<Color> {
         let own = known.patched.iter().filter(|(body, _)| Some(*body) == self.first);
         self.patches.extend(own.map(|(_, patch)| *patch));
-        let last = *self.patches.last()?;
-        (self.patches.iter().filter(|patch| **patch == last).count() >= SIGHTINGS).then_some(last)
+        reflection::repeated(&self.patches)
     }
 }

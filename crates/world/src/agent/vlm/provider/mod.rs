@@ -115,17 +115,6 @@ pub enum SetupError {
     Client(String),
 }
 
-impl SetupError {
-    fn without(self, secret: Option<&Secret>) -> Self {
-        match (self, secret) {
-            (Self::Address { url, fault }, Some(secret)) => {
-                Self::Address { url: secret.without(&url), fault: secret.without(&fault) }
-            }
-            (other, _) => other,
-        }
-    }
-}
-
 /// Rejects an unencrypted address for a key, unless it is local or the backend permits it.
 pub fn check_transport(base_url: &str, backend: &Backend) -> Result<(), SetupError> {
     // Errors in an address are reported where it is used.
@@ -148,7 +137,11 @@ impl Provider {
         patience: Patience,
         at_once: usize,
     ) -> Result<Self, SetupError> {
-        let url = address(base_url, &dialect.path(model)).map_err(|fault| fault.without(secret.as_ref()))?;
+        let shown = |text: String| secret.as_ref().map_or_else(|| text.clone(), |secret| secret.without(&text));
+        let url = address(base_url, &dialect.path(model)).map_err(|error| match error {
+            SetupError::Address { url, fault } => SetupError::Address { url: shown(url), fault: shown(fault) },
+            other => other,
+        })?;
         // Fails if the process already has a provider, which serves as well.
         let _ = rustls::crypto::ring::default_provider().install_default();
         let client = Client::builder()

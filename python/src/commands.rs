@@ -56,7 +56,7 @@ pub fn import_text(py: Python<'_>, name: &str, lines: &[u8], asked: ImportAsked)
     let ImportAsked { out, definitions, palette, clusters_by_seed, reconstruction } = asked;
     let request = ImportRequest { out, definitions, palette, clusters_by_seed, reconstruction };
     let imported = py.detach(|| {
-        let text = Text::of_frame(name, lines).map_err(error::of_input)?;
+        let text = Text::spool(name, lines).map_err(error::of_input)?;
         study::import(vec![text], &request).map_err(error::of_study)
     })?;
     answer::of(&imported, imported.to_string())

@@ -42,7 +42,7 @@ impl Painted {
     /// The view at `pose` if the mirror shows the own body at another place.
     pub fn frame_reflecting(&self, pose: Pose, reflected: Place) -> Frame {
         let (width, height) = SIZE;
-        let (cosine, sine) = pose.heading.direction();
+        let [cosine, sine] = pose.heading.direction();
         let eye = [pose.place.x + EYE.0 * cosine, pose.place.y + EYE.0 * sine, EYE.1];
         let focal = height as f64 / 2.0 / HALF_VIEW;
         let pixel = |at: usize| {

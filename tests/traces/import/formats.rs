@@ -69,6 +69,27 @@ fn a_csv_column_has_the_type_that_fits_all_cells() {
 }
 
 #[test]
+fn whole_numbers_with_a_point_are_integers() {
+    let folder = folder();
+    let at = folder.path();
+    let as_integers = "frame,episode,success,latency_ms,seed\n0,7,true,120,3\n1,7,true,,3\n";
+    let as_floats = "frame,episode,success,latency_ms,seed\n0.0,7,true,120.0,3.0\n1.0,7,true,,3.0\n";
+    let json = "{\"t\":1.0,\"episode_id\":\"7\",\"success\":true,\"latency_ms\":120.0,\"seed\":3.0,\"run\":7.0}\n\
+                {\"t\":2e0,\"episode_id\":\"7\",\"success\":true,\"latency_ms\":null,\"seed\":3,\"run\":7}\n";
+    let set = ["--set", "model=act", "--set", "experiment=reach"];
+    let mapped = ["--map", "episode_id=episode", "--map", "t=frame+1", "--map", "run=episode"];
+    let trace = |file: &str, text: &str, more: &[&str]| {
+        fs::write(at.join(file), text).unwrap();
+        run(at, &import(file, &[&set[..], more].concat())).done();
+        run(at, &["score", "x.parquet", "--definitions", "arms.toml"]).done()
+    };
+    let expected = trace("integers.csv", as_integers, &mapped);
+    assert!(expected.contains("act") && expected.contains(",3,7,"), "{expected}");
+    assert_eq!(trace("floats.csv", as_floats, &mapped), expected);
+    assert_eq!(trace("floats.jsonl", json, &[]), expected);
+}
+
+#[test]
 fn csv_that_is_not_a_table_is_refused_with_its_line() {
     let folder = folder();
     let at = folder.path();

@@ -37,8 +37,10 @@ fn a_value_of_the_wrong_type_or_range_is_refused() {
     let int32 = "an integer from -2147483648 to 2147483647";
     let t = "an integer from 1 to 2147483647";
     let count = "an integer from 0 to 2147483647, or null";
-    let no_point = "write it without a point and without an exponent";
-    check(json!({ "t": 2.0 }), t, "2.0", no_point);
+    let whole = "write a whole number";
+    check(json!({ "t": 2.5 }), t, "2.5", whole);
+    check(json!({ "t": 0.0 }), t, "0", "number the steps from 1");
+    check(json!({ "seed": 1e16 }), int32, "1e16", "correct the number, or use smaller ones");
     check(json!({ "t": 0 }), t, "0", "number the steps from 1");
     check(json!({ "t": "2" }), t, "the text `2`", SEE);
     check(json!({ "t": null }), t, "null", "give the step its value; nothing is filled in");
@@ -48,7 +50,7 @@ fn a_value_of_the_wrong_type_or_range_is_refused() {
     check(json!({ "mirror_visible": 1 }), "true or false", "1", SEE);
     check(json!({ "mirror_visible": "true" }), "true or false", "the text `true`", SEE);
     check(json!({ "latency_ms": -1 }), count, "-1", "correct the number");
-    check(json!({ "latency_ms": 1.5 }), count, "1.5", no_point);
+    check(json!({ "latency_ms": 1.5 }), count, "1.5", whole);
     check(json!({ "cost_usd": -0.5 }), "a number from 0, or null", "-0.5", "correct the number");
     check(json!({ "pose_x": 1e39 }), "a number, or null", "1e39", "correct the number");
     check(json!({ "pose_x": "NaN" }), "a number, or null", "the text `NaN`", SEE);

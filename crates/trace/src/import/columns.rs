@@ -162,8 +162,10 @@ fn misfit(column: &Column, value: &Value, limits: Limits<'_>) -> Option<Fault> {
             refused(if column.name == "t" { "number the steps from 1" } else { "correct the number" })
         }
         (Kind::Int, Value::Int(value)) if column.stored.range().is_none_or(|(_, highest)| *value <= highest) => None,
-        (Kind::Int, Value::Int(_) | Value::LargeInt(_)) => refused("correct the number, or use smaller ones"),
-        (Kind::Int, Value::Float(_)) => refused("write it without a point and without an exponent"),
+        (Kind::Int, Value::Float(value)) if value.fract() != 0.0 => refused("write a whole number"),
+        (Kind::Int, Value::Int(_) | Value::LargeInt(_) | Value::Float(_)) => {
+            refused("correct the number, or use smaller ones")
+        }
         (Kind::Float, _) if is_held(column, value) => None,
         (Kind::Float, Value::Int(_) | Value::LargeInt(_) | Value::Float(_)) => refused("correct the number"),
         (Kind::String, Value::Text(text)) => {

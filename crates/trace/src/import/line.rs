@@ -1,6 +1,7 @@
 //! Parses one line as a flat JSON object: keys and plain values, in the order of the line.
 //!
-//! Rule: strict JSON, unique keys, no nested values. Numbers keep their written type: `1` is an integer, `1.0` is not.
+//! Rule: strict JSON, unique keys, no nested values. Numbers of other columns keep their written type: `1` is an
+//! integer, `1.0` is not. Columns of integers take `1.0`, as data frames write it if a row of the column has no value.
 
 use std::collections::HashSet;
 use std::fmt;
@@ -8,6 +9,7 @@ use std::fmt;
 use serde::de::{Deserialize, DeserializeSeed, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
 
 use super::error::Fault;
+use crate::schema::{self, Kind};
 use exact::escape::{exact, visible};
 
 pub(super) const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
@@ -29,17 +31,6 @@ pub enum Value {
 pub(super) type Members = Vec<(String, Value)>;
 
 impl Value {
-    #[expect(clippy::cast_possible_truncation, reason = "it is whole and within 2^53")]
-    pub(super) fn make_integer(&mut self) {
-        const EXACT: f64 = 9_007_199_254_740_992.0;
-        if let Self::Float(value) = *self
-            && value.fract() == 0.0
-            && value.abs() <= EXACT
-        {
-            *self = Self::Int(value as i64);
-        }
-    }
-
     pub(super) fn shown(&self) -> String {
         const LONGEST: usize = 60;
         match self {
@@ -65,10 +56,27 @@ pub(super) fn members(bytes: &[u8], ended: bool) -> Result<Members, Box<Fault>> 
         Box::new(Fault::new("text in UTF-8", found, "write the file as UTF-8"))
     })?;
     match serde_json::from_str(text.trim_end()) {
-        Ok(Value::Object(members)) => unique(members),
+        Ok(Value::Object(members)) => Ok(with_integers(unique(members)?)),
         Ok(other) => Err(Box::new(Fault::new("a JSON object, one step", other.shown(), "write one object a line"))),
         Err(error) => Err(Box::new(no_json(text.trim_end(), ended, &error))),
     }
+}
+
+/// The integer that a number with a point equals, as in `2.0`.
+#[expect(clippy::cast_possible_truncation, reason = "it is whole and within 2^53")]
+pub(super) fn whole(number: f64) -> Option<i64> {
+    const EXACT: f64 = 9_007_199_254_740_992.0;
+    (number.fract() == 0.0 && number.abs() <= EXACT).then_some(number as i64)
+}
+
+fn with_integers(mut members: Members) -> Members {
+    let is_integer = |key: &str| schema::column(key).is_some_and(|column| column.stored.kind() == Kind::Int);
+    for (_, value) in members.iter_mut().filter(|(key, _)| is_integer(key)) {
+        if let Value::Float(number) = *value {
+            *value = whole(number).map_or(Value::Float(number), Value::Int);
+        }
+    }
+    members
 }
 
 fn unique(members: Members) -> Result<Members, Box<Fault>> {

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde_json::{Map, Value, json};
 
+use super::line;
 use crate::schema::domain::is_general;
 use crate::schema::{Kind, column};
 use exact::escape::visible;
@@ -113,7 +114,8 @@ impl Path {
     fn value(&self, name: &str, row: &Row<'_>) -> Value {
         let member = |key: &str| row.iter().find(|(name, _)| *name == key).map(|(_, value)| *value);
         let found = within(member, &self.keys).cloned().unwrap_or_default();
-        let found = match found.as_i64().and_then(|number| number.checked_add(self.added)) {
+        let number = found.as_i64().or_else(|| found.as_f64().and_then(line::whole)).filter(|_| self.added != 0);
+        let found = match number.and_then(|number| number.checked_add(self.added)) {
             Some(number) => Value::from(number),
             None => found,
         };

@@ -127,7 +127,7 @@ fn survey(
     text.rewind()?;
     while let Some(line) = text.next_line()? {
         is_empty = false;
-        let members = match text.members(&line.bytes, line.ended) {
+        let members = match line::members(&line.bytes, line.ended) {
             Ok(members) => members,
             Err(fault) => {
                 faults.add(fault.at(&line.place));
@@ -174,7 +174,7 @@ fn write(
         for step in episode {
             let text = &mut texts[step.text];
             let bytes = text.line_at(step.offset)?;
-            let members = text.members(&bytes, true).map_err(|_| ImportError::changed(&text.name))?;
+            let members = line::members(&bytes, true).map_err(|_| ImportError::changed(&text.name))?;
             add(&mut rows, &members).map_err(|()| ImportError::changed(&text.name))?;
         }
         file.end_episode(&mut rows).map_err(failed)?;

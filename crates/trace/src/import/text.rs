@@ -10,13 +10,12 @@ use std::sync::Arc;
 
 use serde_json::Value;
 
-use super::error::{Fault, ImportError, Place};
+use super::error::{ImportError, Place};
 use super::format::lerobot::data_set;
 use super::format::{Format, Rows};
-use super::line::{self, BYTE_ORDER_MARK, Members};
+use super::line::BYTE_ORDER_MARK;
 use super::mapping::Mapping;
 use crate::inputs::Input;
-use crate::schema::{self, Kind};
 use exact::budget::Limit;
 use exact::{hash, input};
 
@@ -28,8 +27,6 @@ pub struct Text {
     /// The position of the reader, in bytes from the start.
     offset: u64,
     lines: u64,
-    /// True if the lines are rows of a data frame, which stores integers beside nulls as floats.
-    is_frame: bool,
     pub(super) source: Option<Source>,
 }
 
@@ -93,11 +90,6 @@ impl Text {
         Ok(Self::of_file(name, file))
     }
 
-    /// The rows of a data frame as lines; whole numbers become integers in the schema's integer columns.
-    pub fn of_frame(name: &str, rows: &[u8]) -> Result<Self, ImportError> {
-        Ok(Self { is_frame: true, ..Self::spool(name, rows)? })
-    }
-
     /// The rows of a file of this format as lines of flat steps, in a temporary file.
     pub fn mapped(mut self, format: Format, mapping: &mut Mapping) -> Result<Self, ImportError> {
         if format == Format::JsonLines && mapping.is_empty() {
@@ -115,16 +107,7 @@ impl Text {
 
     fn of_file(name: &str, file: File) -> Self {
         let reader = BufReader::new(file);
-        Self { name: name.into(), noun: "line", reader, offset: 0, lines: 0, is_frame: false, source: None }
-    }
-
-    pub(super) fn members(&self, bytes: &[u8], ended: bool) -> Result<Members, Box<Fault>> {
-        let mut members = line::members(bytes, ended)?;
-        if self.is_frame {
-            let is_integer = |key: &str| schema::column(key).is_some_and(|column| column.stored.kind() == Kind::Int);
-            members.iter_mut().filter(|(key, _)| is_integer(key)).for_each(|(_, value)| value.make_integer());
-        }
-        Ok(members)
+        Self { name: name.into(), noun: "line", reader, offset: 0, lines: 0, source: None }
     }
 
     pub(super) fn place(&self, line: u64) -> Place {

@@ -30,8 +30,8 @@ pub(super) fn pairs(statistics: Option<&Statistics>) -> Json {
     let place = |list: &[&str], name: &str| list.binary_search(&name).unwrap_or_default();
     let told = |test: &PairText<'_>| {
         let places = [place(&models, test.first), place(&models, test.second), place(&methods, test.test)];
-        let texts = test.sides.iter().flatten().chain(&test.p).map(|text| json!(text));
-        places.into_iter().map(Json::from).chain(texts).chain([json!(test.verdict)]).collect::<Json>()
+        let spelled = test.sides.iter().flatten().chain(&test.p).map(|text| json!(text));
+        places.into_iter().map(Json::from).chain(spelled).chain([json!(test.verdict)]).collect::<Json>()
     };
     let family = |family: &FamilyText<'_>| {
         json!({

@@ -38,7 +38,7 @@ pub struct CommonDifference {
 /// difference d. `None` if no stratum has episodes of both sides, if a stratum has more successes than episodes, and
 /// for a confidence outside (0, 1).
 pub fn common_difference(strata: &[Stratum], confidence: f64) -> Option<CommonDifference> {
-    let z = quantile::normal(quantile::tail(confidence)?);
+    let deviate = quantile::normal(quantile::tail(confidence)?);
     let [mut weight, mut excess, mut slope, mut constant] = [0.0; 4];
     for Stratum { first, second } in comparable(strata)? {
         let [x, m, y, n] = [first.0, first.1, second.0, second.1].map(|count| count as f64);
@@ -49,7 +49,7 @@ pub fn common_difference(strata: &[Stratum], confidence: f64) -> Option<CommonDi
         constant += (x * (n - y) + y * (m - x)) / (2.0 * all);
     }
     let difference = excess / weight;
-    let scale = z * z / (weight * weight);
+    let scale = deviate * deviate / (weight * weight);
     let middle = difference + scale * slope / 2.0;
     let reach = (middle * middle - difference * difference + scale * constant).max(0.0).sqrt();
     let bounds = Interval { low: middle - reach, high: middle + reach }.within(-1.0, 1.0);

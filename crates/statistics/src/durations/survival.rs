@@ -194,9 +194,8 @@ fn log_log(share: f64, sum: f64, z: f64) -> Interval {
 /// The last step at which every curve is known: restricted means up to it are comparable. The longest duration of all if
 /// every curve is known forever; `None` without curves.
 pub fn common_horizon<'a>(curves: impl IntoIterator<Item = &'a Survival> + Clone) -> Option<i64> {
-    let curves = || curves.clone().into_iter().map(|curve| &*curve.points);
-    let known = curves().filter_map(known_until).min();
-    known.or_else(|| curves().filter_map(|points| Some(points.last()?.steps)).max())
+    let known = curves.clone().into_iter().filter_map(|curve| known_until(&curve.points)).min();
+    known.or_else(|| curves.into_iter().filter_map(|curve| Some(curve.points.last()?.steps)).max())
 }
 
 #[cfg(test)]

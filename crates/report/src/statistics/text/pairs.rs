@@ -50,7 +50,7 @@ pub(crate) fn families(statistics: &Statistics) -> Vec<FamilyText<'_>> {
         let tests = rows.iter().map(|row| {
             let (difference, interval, separated) = (row.difference, row.interval, row.separated);
             let (p, p_adjusted) = (row.p, row.p_adjusted);
-            let found = Comparison { difference, interval, separated, p, p_adjusted, ..Comparison::default() };
+            let found = Comparison { difference, interval, p, p_adjusted, separated, ..Comparison::default() };
             PairText::of([&row.first, &row.second], (overall_method(row.method), RATE_PLACES), undefined(), &found)
         });
         FamilyText { experiment: None, metric: &rows[0].metric, tests: tests.collect() }

@@ -1,16 +1,9 @@
 //! Prompts as folders of templates.
 //!
-//! | file | what it says | values |
-//! |---|---|---|
-//! | `system.txt` | the system prompt | `stated_color`, `reply_keys`, `answers` |
-//! | `user.txt` | the user prompt | `history_text`, `position_text`, `bumped`, `warning_if_bumped_wall`, `remaining`, `budget` |
-//! | `history.txt` | the step before, or all of them | `first`, `action`, `thought`, `steps` |
-//! | `position.txt` | pose and budget | `x`, `y`, `yaw`, `remaining`, `budget` |
-//! | `warning.txt` | the last move was stopped | none |
+//! Among the values of the templates, `answers` have `key`, `words` and `expected`; `steps`, in order, have `action`,
+//! `name`, `bumped` and `thought`.
 //!
-//! `answers` have `key`, `words` and `expected`; `steps`, in order, have `action`, `name`, `bumped` and `thought`.
-//!
-//! Every folder needs the first two; the other three have shared defaults. The templates of the paper's two prompts are
+//! Every folder needs `system.txt` and `user.txt`; the other three templates have shared defaults. Those of the paper's two prompts are
 //! verbatim (appendix, "Prompt Templates"). The three of the dynamic context are ours, since the paper states their
 //! content but not their wording.
 //!
@@ -117,7 +110,7 @@ impl Templates {
                 if !is_inside {
                     return Err(format!("`{}` is a link that leads out of the folder", path.display()));
                 }
-                own.push((name.to_owned(), text_of(&path)?));
+                own.push((name.to_owned(), input::text(&path, LARGEST).map_err(|error| unreadable(&path, &error))?));
             }
         }
         let templates = Self::of(&own);
@@ -148,9 +141,4 @@ impl Templates {
         }
         Ok(())
     }
-}
-
-fn text_of(path: &Path) -> Result<String, String> {
-    let unreadable = |error: std::io::Error| format!("cannot read `{}`: {error}", path.display());
-    input::text(path, LARGEST).map_err(unreadable)
 }

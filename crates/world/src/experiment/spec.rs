@@ -316,7 +316,6 @@ pub(crate) fn is_default<T: Default + PartialEq>(value: &T) -> bool {
 }
 
 impl Spec {
-    /// Returns true if one of several cubes is to be selected.
     pub const fn has_candidates(&self) -> bool {
         matches!(self.layout.cubes, Cubes::Candidates { .. })
     }

@@ -79,7 +79,8 @@ fn recording(
     recording
 }
 
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{what}: expected {expected}, found {found}")]
 pub(super) struct Difference {
     pub what: String,
     pub expected: String,

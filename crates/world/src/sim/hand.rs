@@ -54,7 +54,6 @@ impl<'a> Place<'a> {
         self.task.step_mm * from_mark.iter().map(|steps| steps.unsigned_abs()).sum::<u32>()
     }
 
-    /// Returns true if the mark counts as reached from this position.
     pub fn is_reached(&self, from_mark: [i32; 3]) -> bool {
         self.distance_mm(from_mark) <= self.task.within * self.task.step_mm
     }

@@ -182,11 +182,6 @@ impl Stage {
         self.data.model()
     }
 
-    /// A geom's name, such as `mirror`, `cube3` or `agent0_head`.
-    pub fn geom_name(&self, geom: usize) -> &str {
-        self.data.model().id_to_name(MjtObjBase::mjOBJ_GEOM, geom).unwrap_or_default()
-    }
-
     pub fn is_shown(&self, geom: usize) -> bool {
         self.data.model().geom_group()[geom] != group::HIDDEN
     }

@@ -313,6 +313,11 @@ impl Scene {
         }
     }
 
+    /// The cubes to select from.
+    pub(super) fn candidates(&self) -> &[Cube] {
+        if self.experiment.has_candidates() { &self.cubes } else { &[] }
+    }
+
     pub fn floor_plan(&self, config: &WorldConfig) -> FloorPlan {
         floor_plan(config, &self.cubes)
     }

@@ -1,6 +1,6 @@
 //! Everything in a world as shapes with places and colours, for drawing by a log.
 
-use mujoco_rs::prelude::MjtGeomBase;
+use mujoco_rs::prelude::{MjtGeomBase, MjtObjBase};
 
 use super::angle::Quaternion;
 use super::body::Piece;
@@ -79,7 +79,7 @@ fn solids(stage: &Stage) -> Vec<Solid> {
         // Only shadows are translucent.
         .filter(|geom| stage.is_shown(*geom) && model.geom_rgba()[*geom][3] >= 1.0)
         .map(|geom| Solid {
-            name: stage.geom_name(geom).to_owned(),
+            name: model.id_to_name(MjtObjBase::mjOBJ_GEOM, geom).unwrap_or_default().to_owned(),
             item: stage.items()[geom],
             shape: shape(stage.items()[geom], model.geom_type()[geom], model.geom_size()[geom]),
             position: stage.data.geom_xpos()[geom],

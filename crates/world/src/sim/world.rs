@@ -13,7 +13,7 @@ use super::hand::{self, Place};
 use super::label_image::LabelImage;
 use super::model::{AGENTS, BODIES, Look, ModelError, Moment, Paint, Stage};
 use super::passage;
-use super::scene::{Cube, Scene};
+use super::scene::Scene;
 use crate::experiment::spec::{Behavior, PaneKind};
 use trace::episode::Action;
 use trace::palette::Color;
@@ -278,12 +278,7 @@ impl World {
     /// The distance that the agent's body could still walk before it touches the candidate of a colour, m; `None` if
     /// there is no such candidate, as always in E5.
     pub fn distance_to_cube(&self, color: Color) -> Option<f64> {
-        let cube = self.candidate(color)?;
+        let cube = self.scene.candidates().iter().find(|cube| cube.color == color)?;
         Some((cube.square().distance(self.ego.pose.spot()) - self.plan.radius).max(0.0))
-    }
-
-    fn candidate(&self, color: Color) -> Option<&Cube> {
-        let candidates = if self.scene.experiment.has_candidates() { self.scene.cubes.as_slice() } else { &[] };
-        candidates.iter().find(|cube| cube.color == color)
     }
 }

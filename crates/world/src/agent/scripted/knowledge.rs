@@ -164,7 +164,6 @@ impl Knowledge {
             .min_by(|one, other| one.nearest.total_cmp(&other.nearest))
     }
 
-    /// Returns true if walls permit a body's axis at a place.
     pub fn is_open(&self, place: Place) -> bool {
         self.room.holds(place, GIRTH)
     }

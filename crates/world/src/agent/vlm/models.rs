@@ -314,23 +314,15 @@ impl Models {
         let backend = backend.or_else(|| if is_known { None } else { backend_of(name) });
         let (title, mut model) = match (known, backend) {
             (Some((title, model)), _) => (title.clone(), model.clone()),
-            (None, Some(backend)) => (
-                name.to_owned(),
-                Model {
-                    vendor: None,
-                    backend: backend.to_owned(),
-                    id: name.to_owned(),
-                    prices: Prices::default(),
-                    contract: Contract::default(),
-                    max_output_tokens: None,
-                    reasoning_effort: None,
-                    temperature: paper_temperature(),
-                    extra_body: Map::new(),
+            (None, Some(backend)) => {
+                let own = serde_json::json!({ "backend": backend, "id": name });
+                let mut model: Model = serde_json::from_value(own).expect("all other keys of a model have defaults");
+                if backend == OWN_SERVER {
                     // A local server may call its only model by any name.
-                    answers_as: if backend == OWN_SERVER { vec!["*".to_owned()] } else { Vec::new() },
-                    accepted: Vec::new(),
-                },
-            ),
+                    model.answers_as = vec!["*".to_owned()];
+                }
+                (name.to_owned(), model)
+            }
             (None, None) => return Err(self.unknown(name)),
         };
         if let Some(backend) = backend {

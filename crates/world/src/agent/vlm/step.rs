@@ -30,16 +30,8 @@ pub(super) enum Asked {
     GivenUp(Status),
 }
 
-enum Ended {
-    Failed(Failure),
-    Stopped(Lost),
-}
-
-impl From<Lost> for Ended {
-    fn from(lost: Lost) -> Self {
-        Self::Stopped(lost)
-    }
-}
+/// A request's answer or its failure; the error ends the episode.
+type Exchanged = Result<Result<Asked, Failure>, Lost>;
 
 impl Step {
     pub(super) async fn ask(self) -> Result<Asked, Lost> {
@@ -53,11 +45,10 @@ impl Step {
         let mut attempt = 0;
         loop {
             attempt += 1;
-            let failure = match self.attempt(provider, attempt).await {
+            let failure = match self.attempt(provider, attempt).await? {
                 Ok(asked) => return Ok(asked),
-                Err(Ended::Stopped(lost)) => return Err(lost),
-                Err(Ended::Failed(failure)) if !failure.kind.may_pass() => return Err(self.rejected(&failure)),
-                Err(Ended::Failed(failure)) => failure,
+                Err(failure) if !failure.kind.may_pass() => return Err(self.rejected(&failure)),
+                Err(failure) => failure,
             };
             match waiting.next(&failure) {
                 Some(wait) => self.vlm.unless_stopped(tokio::time::sleep(wait)).await?,
@@ -82,7 +73,7 @@ impl Step {
         self.vlm.halt(Lost::because(failure.explained(&self.vlm.choice.name)))
     }
 
-    async fn attempt(&self, provider: &Provider, attempt: u32) -> Result<Asked, Ended> {
+    async fn attempt(&self, provider: &Provider, attempt: u32) -> Exchanged {
         let first = self.vlm.turn_of_first().await;
         let ended = self.exchange(provider, attempt).await;
         self.vlm.is_known.store(true, Ordering::Relaxed);
@@ -90,7 +81,7 @@ impl Step {
         ended
     }
 
-    async fn exchange(&self, provider: &Provider, attempt: u32) -> Result<Asked, Ended> {
+    async fn exchange(&self, provider: &Provider, attempt: u32) -> Exchanged {
         let turn = self.vlm.unless_stopped(provider.turn()).await?;
         let reserved = self.vlm.account.reserve(self.vlm.cost_of(self.at_most));
         let reserved = self.vlm.unless_stopped(reserved).await?;
@@ -100,7 +91,7 @@ impl Step {
         let (frame, at_most) = (self.frame.clone(), Some(self.at_most));
         if let Err(lost) = self.write(&Entry::Request { t, attempt, question: question.clone(), frame, at_most }) {
             reserved.refused();
-            return Err(lost.into());
+            return Err(lost);
         }
         match provider.ask(turn, &self.id, &self.body).await {
             Ok(received) => {
@@ -113,7 +104,7 @@ impl Step {
                 self.vlm.note_answered();
                 self.vlm.check_model(answer.model.as_deref())?;
                 self.vlm.check_cost(&answer)?;
-                Ok(Asked::Answer { answer, latency_ms })
+                Ok(Ok(Asked::Answer { answer, latency_ms }))
             }
             Err(failure) => {
                 if !failure.may_be_paid {
@@ -122,7 +113,7 @@ impl Step {
                 let status = failure.kind.status().name().to_owned();
                 let (detail, may_be_paid) = (failure.detail.clone(), failure.may_be_paid);
                 self.write(&Entry::Failure { t, attempt, status, detail, is_final: false, may_be_paid, question })?;
-                Err(Ended::Failed(failure))
+                Ok(Err(failure))
             }
         }
     }

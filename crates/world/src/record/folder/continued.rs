@@ -55,8 +55,8 @@ fn fault_of(
     recording: &Value,
     episodes: &[EpisodeRows],
 ) -> Result<Option<String>, TraceError> {
-    if let Some(Difference { what, expected, found }) = difference_of(found, recording) {
-        return Ok(Some(format!("it was recorded with another {what}: expected {expected}, found {found}")));
+    if let Some(difference) = difference_of(found, recording) {
+        return Ok(Some(format!("it was recorded with another {difference}")));
     }
     let rows: BTreeMap<&str, &EpisodeRows> = episodes.iter().map(|rows| (rows.episode_id.as_str(), rows)).collect();
     let columns = OptionalColumns::recorded(recording);
@@ -90,20 +90,15 @@ fn parted(own: &Episode, logged: &Episode) -> Option<String> {
     if own == logged {
         return None;
     }
-    if let Some(words) = differs(&json!(own), &json!(logged)) {
-        return Some(words);
+    if let Some(difference) = difference(&json!(own), &json!(logged)) {
+        return Some(difference.to_string());
     }
     for (t, (own, logged)) in (1..).zip(own.steps.iter().zip(&logged.steps)) {
-        if let Some(words) = differs(&json!(Decision::of(t, own)), &json!(Decision::of(t, logged))) {
-            return Some(format!("at t = {t}, {words}"));
+        if let Some(difference) = difference(&json!(Decision::of(t, own)), &json!(Decision::of(t, logged))) {
+            return Some(format!("at t = {t}, {difference}"));
         }
     }
     Some(format!("expected {} steps, found {}", own.steps.len(), logged.steps.len()))
-}
-
-fn differs(own: &Value, logged: &Value) -> Option<String> {
-    difference(own, logged)
-        .map(|Difference { what, expected, found }| format!("{what}: expected {expected}, found {found}"))
 }
 
 #[cfg(test)]

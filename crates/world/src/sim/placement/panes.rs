@@ -96,9 +96,8 @@ impl Layout<'_> {
     }
 
     fn another_color(&self, chance: &mut Rng) -> Color {
-        let candidates = if self.scene.experiment.has_candidates() { self.scene.cubes.as_slice() } else { &[] };
         let colors: Vec<Color> =
-            candidates.iter().map(|cube| cube.color).filter(|c| *c != self.scene.body_color).collect();
+            self.scene.candidates().iter().map(|cube| cube.color).filter(|c| *c != self.scene.body_color).collect();
         if colors.is_empty() { self.any_other_color(chance) } else { chance.one_of(&colors) }
     }
 

@@ -51,7 +51,6 @@ impl FailureKind {
         }
     }
 
-    /// Returns true if another attempt may succeed.
     pub const fn may_pass(self) -> bool {
         self.is_busy() || matches!(self, Self::Server | Self::Timeout)
     }

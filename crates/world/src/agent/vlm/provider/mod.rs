@@ -137,7 +137,10 @@ impl Provider {
         patience: Patience,
         at_once: usize,
     ) -> Result<Self, SetupError> {
-        let shown = |text: String| secret.as_ref().map_or_else(|| text.clone(), |secret| secret.without(&text));
+        let shown = |text: String| match &secret {
+            Some(secret) => secret.without(&text),
+            None => text,
+        };
         let url = address(base_url, &dialect.path(model)).map_err(|error| match error {
             SetupError::Address { url, fault } => SetupError::Address { url: shown(url), fault: shown(fault) },
             other => other,

@@ -39,14 +39,9 @@ pub fn load(path: &Path) -> Result<Vec<Loaded>, FileError> {
 /// Parses the experiments of a text, which may use the scenes of `known` ones. Their own prompts are folders in
 /// `folder`; a text without a folder is built in.
 pub fn read(source: Source, folder: Option<&Path>, known: &[&Spec]) -> Result<Vec<Loaded>, Faults> {
+    let help = "`mirrorstats trace schema experiments` says what each key may be";
+    let with_help = |fault: Fault| if fault.help.is_some() { fault } else { fault.help(help) };
     entries(source, folder, known).map_err(|faults| Faults(faults.0.into_iter().map(with_help).collect()))
-}
-
-fn with_help(fault: Fault) -> Fault {
-    if fault.help.is_some() {
-        return fault;
-    }
-    fault.help("`mirrorstats trace schema experiments` says what each key may be")
 }
 
 fn entries(source: Source, folder: Option<&Path>, known: &[&Spec]) -> Result<Vec<Loaded>, Faults> {

@@ -24,15 +24,12 @@ pub struct Unreadable {
 /// cannot parse it.
 pub(super) fn fingerprint(command: &str) -> Result<Option<String>, Unreadable> {
     let files = words(command).into_iter().filter(|(_, word)| Path::new(word).is_file());
-    let lines: Vec<String> = files.map(|(place, word)| line(place, word)).collect::<Result<_, _>>()?;
-    Ok((!lines.is_empty()).then(|| hash::of_bytes(lines.concat().as_bytes())))
-}
-
-fn line(place: usize, word: String) -> Result<String, Unreadable> {
-    match File::open(&word).and_then(hash::of_reader) {
+    let line = |(place, word): (usize, String)| match File::open(&word).and_then(hash::of_reader) {
         Ok(contents) => Ok(format!("{place} {contents}\n")),
         Err(source) => Err(Unreadable { word, source }),
-    }
+    };
+    let lines: Vec<String> = files.map(line).collect::<Result<_, _>>()?;
+    Ok((!lines.is_empty()).then(|| hash::of_bytes(lines.concat().as_bytes())))
 }
 
 /// The words of a command that may name files to read, each with its position from 1.

@@ -81,9 +81,10 @@ fn an_unrequested_line_loses_the_episode() {
 
 #[test]
 fn a_banner_read_as_a_reply_is_named() {
-    // The banner comes before the reply. At the second observation the program can tell the two apart.
+    // The banner comes before the reply, in one write. At the second observation the program can tell the two apart.
     let bench = Bench::new();
-    bench.program(&format!("[ $n = 1 ] && echo 'loading the model'; echo '{FORWARD}'"));
+    let first = format!("printf '%s\\n%s\\n' 'loading the model' '{FORWARD}'");
+    bench.program(&format!("if [ $n = 1 ]; then {first}; else echo '{FORWARD}'; fi"));
     let (code, found, said) = outcome(&bench.record(&[]).output().unwrap());
     assert_eq!(code, Some(1), "{said}");
     let lost = &found["lost"][0];

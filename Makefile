@@ -34,7 +34,7 @@ needed:
 # The member `fuzz` replays its corpora; chosen together, both use one build of the program. Many tests wait for other
 # processes, so more tests run than there are processors.
 unit: needed
-	RUST_TEST_THREADS=$${RUST_TEST_THREADS:-$$(( $$(nproc) * 3 / 2 ))} cargo test --workspace --all-features --no-fail-fast
+	RUST_TEST_THREADS=$${RUST_TEST_THREADS:-$$(( $$(getconf _NPROCESSORS_ONLN) * 3 / 2 ))} cargo test --workspace --all-features --no-fail-fast
 
 ## The campaigns that are too long for CI, with their full numbers of rounds: benches/SOAK.md.
 soak: needed

@@ -1,6 +1,6 @@
 //! The rates at which tests and families of tests reject true hypotheses.
 
-use crate::tarone::{Attained, fisher_least_p, mcnemar_least_p, tarone_holm};
+use crate::tarone::{Attained, check_mcnemar_least_p, fisher_least_p, mcnemar_least_p, tarone_holm};
 use exact::ratio::Ratio;
 use statistics::chance;
 use statistics::holm::holm;
@@ -125,6 +125,7 @@ pub fn families() {
     let note = "10,000 studies each: shares with any false rejection, and true differences found per study.";
     let columns = ["family", "error, Holm", "error, Tarone-Holm", "found, Holm", "found, Tarone-Holm"];
     heading("Error of a family of tests", note, &columns);
+    check_mcnemar_least_p();
     let mut random = SplitMix64::seeded(SEED + 1);
     let third = 1.0 / 3.0;
     let chance = |random: &mut SplitMix64, high: f64| {

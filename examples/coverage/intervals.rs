@@ -26,14 +26,38 @@ fn cochran_mantel_haenszel(strata: &[Stratum]) -> Option<[f64; 2]> {
     (variance > 0.0).then(|| [statistic(excess.abs()), statistic((excess.abs() - 0.5).max(0.0))])
 }
 
-/// statsmodels 0.15.0: `StratifiedTable(tables).test_null_odds(correction)`.
+/// statsmodels 0.15.0: `StratifiedTable(tables).test_null_odds(correction)`. The third are the admissions at Berkeley in
+/// 1973, from R's `UCBAdmissions`.
 fn check_cochran_mantel_haenszel() {
-    let counts = [((15, 21), (9, 21)), ((12, 21), (8, 20)), ((18, 21), (14, 19))];
-    let found = cochran_mantel_haenszel(&counts.map(|(first, second)| Stratum { first, second }));
-    let expected = [5.145_414_138_110_284, 4.317_784_713_811_399];
-    let is_close =
-        |found: [f64; 2]| found.iter().zip(expected).all(|(found, expected)| (found / expected - 1.0).abs() < 1e-9);
-    assert!(found.is_some_and(is_close), "{found:?}");
+    type Counts = ((u64, u64), (u64, u64));
+    let known: [(&[Counts], [f64; 2]); 4] = [
+        (
+            &[((15, 21), (9, 21)), ((12, 21), (8, 20)), ((18, 21), (14, 19))],
+            [5.145_414_138_110_284, 4.317_784_713_811_399],
+        ),
+        (
+            &[((1, 2), (0, 3)), ((2, 2), (1, 4)), ((0, 1), (0, 2)), ((3, 4), (1, 3))],
+            [4.740_606_936_416_186, 2.913_475_433_526_012_5],
+        ),
+        (
+            &[
+                ((512, 825), (89, 108)),
+                ((353, 560), (17, 25)),
+                ((120, 325), (202, 593)),
+                ((138, 417), (131, 375)),
+                ((53, 191), (94, 393)),
+                ((22, 373), (24, 341)),
+            ],
+            [1.524_606_660_443_435_6, 1.426_946_228_586_688_3],
+        ),
+        (&[((21, 21), (0, 21)), ((7, 7), (0, 9))], [55.993_227_990_970_65, 52.182_066_204_962_05]),
+    ];
+    for (counts, expected) in known {
+        let strata: Vec<Stratum> = counts.iter().map(|&(first, second)| Stratum { first, second }).collect();
+        let found = cochran_mantel_haenszel(&strata).expect("each has successes and failures");
+        let is_close = found.iter().zip(expected).all(|(found, expected)| (found / expected - 1.0).abs() < 1e-9);
+        assert!(is_close, "{counts:?}: {found:?}");
+    }
 }
 
 pub fn common_differences() {

@@ -31,6 +31,14 @@ pub fn mcnemar_least_p(pairs: Pairs) -> Option<f64> {
     (pairs.n() > 0).then(|| 0.5f64.powi(halvings))
 }
 
+/// Python: the sum of comb(d, j) / 2**d over j = 0 and j = d.
+pub fn check_mcnemar_least_p() {
+    for (first_only, second_only, least) in [(0, 0, 1.0), (1, 0, 1.0), (5, 0, 0.0625), (8, 1, 0.003_906_25)] {
+        let found = mcnemar_least_p(Pairs { both: 3, first_only, second_only, neither: 4 });
+        assert_eq!(found, Some(least), "{first_only}-{second_only}");
+    }
+}
+
 /// The least p value that [`fisher`] can give with these numbers of episodes and this total of successes.
 pub fn fisher_least_p((k, m): (u64, u64), (l, n): (u64, u64)) -> Option<f64> {
     let all = k + l;

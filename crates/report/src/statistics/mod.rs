@@ -20,6 +20,7 @@ pub(crate) mod comparisons {
 }
 mod conclusions;
 mod episodes;
+mod options;
 mod rates {
     pub(super) mod cells;
     pub(super) mod chance;
@@ -46,6 +47,7 @@ pub use episodes::{Replies, Selection, UnusableReplies};
 pub use losses::{LossCase, LossCases, LossRow, Losses};
 pub use matching::{Matching, Units};
 pub use models::{Family, Gap, PairTest, Reach};
+pub use options::Options;
 pub use overall::{ImprovementRow, OverallMethod, OverallRow};
 pub use ranks::{RankRow, Ranks};
 pub use retest::RetestRow;
@@ -57,11 +59,9 @@ pub use crate::study::RowKey;
 use self::comparisons::{compare, conditions, losses, matching, models, retest, trends};
 use self::rates::{cells, chance, durations, overall, ranks, sequential};
 use crate::cells::Cells;
-use crate::cells::interval::CONFIDENCE;
 use crate::study::Study;
 use exact::moments::MomentOverflow;
 use metric::relations::Relations;
-use score::lost_counts::LostCounts;
 use score::table::EpisodeTable;
 use statistics::design::Design;
 
@@ -191,67 +191,5 @@ impl Statistics {
         statistics.warnings.extend(statistics.pooled.iter().cloned());
         statistics.warnings.extend(Contrast::left_out(&study));
         Ok(statistics)
-    }
-}
-
-/// The design, the level and what was left out, for [`Statistics`] and [`Sequential`].
-#[derive(Clone, Debug, PartialEq)]
-pub struct Options {
-    /// The confidence of every interval, and one minus the level of every test; between 0 and 1.
-    pub confidence: f64,
-    /// The horizon of restricted means in steps; by default the last step known for every model.
-    pub horizon: Option<i64>,
-    /// The number of lost episodes besides those given; `None` if the traces do not record it.
-    pub lost: Option<LostCounts>,
-    /// The declared design; empty by default.
-    pub design: Design,
-    /// The selection of episodes; all by default.
-    pub selection: Option<Selection>,
-    /// The settings that cells pool, one sentence each; `None` without pooling.
-    pub pooled: Option<Vec<String>>,
-    /// The number of replies without a decision; `None` if not recorded.
-    pub replies: Option<Replies>,
-    /// Further caveats of every answer, such as lost episodes that count as failures.
-    pub caveats: Vec<String>,
-    /// The metric of the primary question in a registered plan; the first headline metric by default.
-    pub primary: Option<String>,
-    /// True to compute probabilities of improvement, each of which resamples all episodes of two models.
-    pub improvements: bool,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            confidence: CONFIDENCE,
-            horizon: None,
-            lost: None,
-            design: Design::default(),
-            selection: None,
-            pooled: None,
-            replies: None,
-            caveats: Vec::new(),
-            primary: None,
-            improvements: false,
-        }
-    }
-}
-
-impl Options {
-    /// The settings that cells pool or that compared blocks differ in, one sentence each; empty without pooling.
-    fn pooled_in(&self, study: &Study) -> Vec<String> {
-        let Some(mut sentences) = self.pooled.clone() else { return Vec::new() };
-        let models = study.experiments.iter().flat_map(|experiment| {
-            let blocks = &experiment.blocks;
-            (0..blocks.len()).flat_map(move |at| blocks[at + 1..].iter().map(move |other| (&blocks[at], other)))
-        });
-        let contrasts = Contrast::pairs(study).into_iter().flat_map(|pair| pair.couples().collect::<Vec<_>>());
-        for (first, second) in models.chain(contrasts) {
-            let Some(setting) = study.setting_apart(first, second) else { continue };
-            let sentence = format!("Compared though they differ (--pool): {setting}.");
-            if !sentences.contains(&sentence) {
-                sentences.push(sentence);
-            }
-        }
-        sentences
     }
 }

@@ -71,7 +71,7 @@ impl Power for Fisher {
     }
 }
 
-/// Which tables with this total are extreme, from the fewest possible successes on the first side.
+/// Returns true for each extreme table with this total. The tables begin with the fewest successes of the first side.
 fn rejections(n: u64, total: u64, level: f64) -> Vec<bool> {
     let (first, last) = (total.saturating_sub(n), total.min(n));
     let tables = tables((last, n), (total - last, n)).expect("no more successes than episodes");

@@ -1,7 +1,7 @@
 //! Parses one line as a flat JSON object: keys and plain values, in the order of the line.
 //!
-//! Rule: strict JSON, unique keys, no nested values. Numbers of other columns keep their written type: `1` is an
-//! integer, `1.0` is not. Columns of integers take `1.0`, as data frames write it if a row of the column has no value.
+//! Rule: strict JSON, unique keys, no nested values. Numbers keep their written type: `1` is an integer, `1.0` is not.
+//! But a column of integers takes `1.0` too: data frames write it beside missing values.
 
 use std::collections::HashSet;
 use std::fmt;

@@ -16,8 +16,8 @@ pub fn document() -> Value {
         "title": "A step of an episode",
         "description": "One line of the JSON lines that `mirrorstats import` reads. Lines of an episode may be in any \
                         order and in several files; t says where a step belongs, and runs 1..T without a gap. \
-                        An integer may be written with a point, as `2.0`. Other keys become columns of their own: in all lines \
-                        true or false, numbers, or text; null anywhere.",
+                        An integer may be written with a point, as `2.0`. Other keys become columns of their own: in \
+                        all lines true or false, numbers, or text; null anywhere.",
         "type": "object",
         "properties": properties,
         "required": required,

@@ -8,11 +8,11 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::statistics::Options;
 use crate::statistics::chance::{Role, Verdict, levels};
 use crate::statistics::conclusions::headline;
 use crate::statistics::episodes::Selection;
 use crate::statistics::models::by_mean;
+use crate::statistics::options::Options;
 use crate::study::{Block, Experiment, RowKey, Study, Unit};
 use exact::moments::{MomentOverflow, Moments};
 use exact::ratio::Ratio;

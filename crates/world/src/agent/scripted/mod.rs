@@ -18,6 +18,7 @@ pub mod chance;
 pub mod hand_view;
 pub mod knowledge;
 pub mod lookout;
+pub mod policy;
 pub mod reflection;
 pub mod room;
 pub mod route;

@@ -19,6 +19,7 @@ use trace::palette::Color;
 use super::chance::Chance;
 use super::knowledge::{Knowledge, Landmark};
 use super::lookout::Lookouts;
+use super::policy::{Belief, Policy};
 use super::room::Side;
 use super::route::{self, Ground, Obstacle};
 use super::words;
@@ -36,35 +37,6 @@ const LAST_LOOKS: i32 = 10;
 const BEFORE_MIRROR: (f64, f64) = (0.9, 2.8);
 /// The distance between places for looking into the mirror, m.
 const APART: f64 = 0.3;
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Belief {
-    /// The colour that it claims; `None` is `unknown`.
-    pub claim: Option<Color>,
-    /// True if it acts on the claim.
-    pub settled: bool,
-}
-
-impl Belief {
-    pub const UNKNOWN: Self = Self { claim: None, settled: false };
-
-    pub const fn settled(color: Color) -> Self {
-        Self { claim: Some(color), settled: true }
-    }
-}
-
-pub trait Policy {
-    fn belief(&mut self, known: &Knowledge) -> Belief;
-
-    fn mark(&mut self, known: &Knowledge) -> Option<Color> {
-        known.reflection.own_mark()
-    }
-
-    /// The number of bodies to the left of the own one among `count` in the mirror, if it believes it knows.
-    fn place(&mut self, known: &Knowledge, belief: Belief, count: usize) -> Option<usize> {
-        known.mirror_place(count).filter(|_| belief.settled)
-    }
-}
 
 pub struct Seeker<C> {
     policy: C,

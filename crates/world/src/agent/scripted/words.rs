@@ -6,7 +6,7 @@ use trace::episode::Action;
 use trace::palette::Color;
 
 use super::knowledge::Knowledge;
-use super::seeker::Belief;
+use super::policy::Belief;
 
 pub fn of(known: &Knowledge, belief: Belief, action: Action, selected: Option<Color>) -> Words {
     let cubes = named(&known.cubes_in_view, "cube", "cubes");

@@ -105,7 +105,7 @@ impl Layout<'_> {
         chance.one_of(&self.other_colors(|_| true))
     }
 
-    /// The colours of the palette without the body's, as far as they are free.
+    /// The free colours of the palette, without that of the body.
     fn other_colors(&self, is_free: impl Fn(Color) -> bool) -> Vec<Color> {
         let palette = self.scene.experiment.layout.palette.iter().copied();
         palette.filter(|color| *color != self.scene.body_color && is_free(*color)).collect()

@@ -11,7 +11,7 @@ use trace::palette::Color;
 
 use super::super::chance::Chance;
 use super::super::knowledge::Knowledge;
-use super::super::seeker::{Belief, Policy};
+use super::super::policy::{Belief, Policy};
 
 /// The bound of randomly drawn whole numbers.
 const NUMBERS: u32 = 10;

@@ -30,7 +30,7 @@ use trace::palette::Color;
 use super::super::chance::Chance;
 use super::super::knowledge::Knowledge;
 use super::super::oracle::Oracle;
-use super::super::seeker::{Belief, Policy};
+use super::super::policy::{Belief, Policy};
 
 /// The numbers to draw from, taken modulo the number of bodies; most small numbers divide 12.
 const SIDES: [usize; 12] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11];

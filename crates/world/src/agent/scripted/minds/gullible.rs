@@ -19,7 +19,7 @@ use trace::palette::Color;
 
 use super::super::knowledge::Knowledge;
 use super::super::oracle::Oracle;
-use super::super::seeker::{Belief, Policy};
+use super::super::policy::{Belief, Policy};
 
 #[derive(Clone, Copy, Debug)]
 pub struct Gullible {

@@ -27,8 +27,8 @@
 use trace::palette::Color;
 
 use super::super::knowledge::Knowledge;
+use super::super::policy::{Belief, Policy};
 use super::super::reflection;
-use super::super::seeker::{Belief, Policy};
 
 /// The minimum pixels of a body to imitate.
 const LEAST: usize = 150;

@@ -30,7 +30,7 @@
 //! | MARK_FALSE | undefined | undefined | undefined | undefined | 0 |
 
 use super::super::knowledge::Knowledge;
-use super::super::seeker::{Belief, Policy};
+use super::super::policy::{Belief, Policy};
 
 #[derive(Clone, Copy, Debug)]
 pub struct Oracle;

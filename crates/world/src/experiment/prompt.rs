@@ -1,9 +1,16 @@
 //! Prompts as folders of templates.
 //!
-//! Among the values of the templates, `answers` have `key`, `words` and `expected`; `steps`, in order, have `action`,
-//! `name`, `bumped` and `thought`.
+//! | file | what it says | values |
+//! |---|---|---|
+//! | `system.txt` | the system prompt | `stated_color`, `reply_keys`, `answers` |
+//! | `user.txt` | the user prompt | `history_text`, `position_text`, `bumped`, `warning_if_bumped_wall`, `remaining`, `budget` |
+//! | `history.txt` | the step before, or all of them | `first`, `action`, `thought`, `steps` |
+//! | `position.txt` | pose and budget | `x`, `y`, `yaw`, `remaining`, `budget` |
+//! | `warning.txt` | the last move was stopped | none |
 //!
-//! Every folder needs `system.txt` and `user.txt`; the other three templates have shared defaults. Those of the paper's two prompts are
+//! `answers` have `key`, `words` and `expected`; `steps`, in order, have `action`, `name`, `bumped` and `thought`.
+//!
+//! Every folder needs the first two; the other three have shared defaults. The templates of the paper's two prompts are
 //! verbatim (appendix, "Prompt Templates"). The three of the dynamic context are ours, since the paper states their
 //! content but not their wording.
 //!

@@ -1,5 +1,14 @@
 //! Agents that are external programs: any command that reads and writes JSON lines.
 //!
+//! | file | what it knows |
+//! |---|---|
+//! | [`message`] | the lines to a program |
+//! | `conversation` | the lines of an episode, and the reading of replies |
+//! | [`program`] | running it, and its failures |
+//! | [`said`] | its standard error |
+//! | [`group`] | the cleanup of its processes |
+//! | [`files`] | the files that the command names, by content |
+//!
 //! One process plays one episode. Its replies are read like a model's: any other text than the requested object is no
 //! decision. A program that ends, hangs or speaks out of turn loses its episode, like a broken network.
 //!

@@ -1,5 +1,13 @@
 //! A person as the agent: the same frame, words and reply as for a model, in a browser.
 //!
+//! | file | what it knows |
+//! |---|---|
+//! | [`design`] | the distribution and order of episodes |
+//! | [`hub`] | the participants, their open questions, and withdrawals |
+//! | [`seat`] | one person: question, clock, and content of the page |
+//! | [`server`] | the pages for participants, and nothing else |
+//! | [`journal`] | the answers, so that an interrupted recording continues in the middle of an episode |
+//!
 //! Rule: a person gets what a model gets and nothing else: no body colour, no pixel count, no id. Each person has a
 //! link and a code; no other personal data is stored.
 

@@ -2,7 +2,7 @@
 
 use super::super::angle::sine_cosine;
 use super::super::label_image::LabelImage;
-use super::super::model::{Item, Stage};
+use super::super::model::{Item, Stage, group};
 use super::super::passage;
 use super::super::scene::HungPane;
 use super::super::world::World;
@@ -125,17 +125,24 @@ impl View {
     }
 }
 
-/// The groups of geoms that rays meet: room, things, own body and ceiling, but not the hidden ones.
-const SHOWN: [u8; 6] = [1, 1, 1, 1, 0, 0];
+/// The groups of geoms that rays meet.
+fn shown_groups() -> [u8; 6] {
+    let mut groups = [0; 6];
+    for group in [group::ROOM, group::CEILING, group::THINGS, group::EGO] {
+        groups[usize::try_from(group).expect("groups are 0 to 5")] = 1;
+    }
+    groups
+}
 
 pub(super) fn by_mujoco(world: &World, stages: &mut (Stage, Vec<Stage>), width: usize, height: usize) -> LabelImage {
     let view = View::of_eye(world, width, height);
     let (stage, beyond) = stages;
     let mut codes = Vec::with_capacity(width * height);
+    let groups = shown_groups();
     for y in 0..height {
         for x in 0..width {
             let ray = view.ray(x, y);
-            let (geom, distance) = stage.data.ray(&view.origin, &ray, Some(&SHOWN), true, None, None);
+            let (geom, distance) = stage.data.ray(&view.origin, &ray, Some(&groups), true, None, None);
             let shown = match geom.map_or(Item::Room, |geom| stage.items()[geom]) {
                 Item::Pane(pane) => {
                     let met = plus(view.origin, distance, ray);
@@ -158,7 +165,7 @@ fn onwards(world: &World, stage: &mut Stage, pane: usize, met: Vector, ray: Vect
         _ => (met, plus(ray, -2.0 * dot(ray, out), out)),
     };
     let from = plus(from, 1e-9, ray);
-    let (geom, _) = stage.data.ray(&from, &ray, Some(&SHOWN), true, None, None);
+    let (geom, _) = stage.data.ray(&from, &ray, Some(&shown_groups()), true, None, None);
     geom.map_or(Item::Room, |geom| stage.items()[geom])
 }
 

@@ -52,7 +52,7 @@ pub struct Difference {
     /// The computed text.
     pub computed: String,
     /// The reason why that is the publication's slip, where errata say so.
-    pub excused_by: Option<String>,
+    pub(crate) excused_by: Option<String>,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

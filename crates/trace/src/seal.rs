@@ -33,7 +33,7 @@ pub struct SealAnswer {
     /// Its rows.
     pub steps: u64,
     /// What the trace had before: `present`, `none` or `stale`.
-    pub checksums_before: Checksums,
+    pub(crate) checksums_before: Checksums,
     /// The SHA-256 of the copy.
     pub sha256: String,
 }

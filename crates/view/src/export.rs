@@ -24,7 +24,7 @@ use exact::replace::{Content, FolderError, FolderFiles, TemporaryFolder, folder_
 use study::Part;
 
 /// Instructions for crawlers.
-pub const ROBOTS: &str = "# Recordings of evaluations: not for training.\nUser-agent: *\nDisallow: /\n";
+pub(crate) const ROBOTS: &str = "# Recordings of evaluations: not for training.\nUser-agent: *\nDisallow: /\n";
 
 /// The notice to people and programs that get the files.
 const NOTICE: &str = "These files hold recordings of an evaluation: its scenes, its questions and the answers of models and people.\n\

@@ -104,7 +104,7 @@ impl View {
     }
 
     /// Adds a label sent by a page as JSON; returns the labels of its episode.
-    pub fn put_label(&self, body: &[u8]) -> Result<Vec<u8>, ViewError> {
+    pub(crate) fn put_label(&self, body: &[u8]) -> Result<Vec<u8>, ViewError> {
         labels::put(self, body).map(|value| value.to_string().into_bytes())
     }
 

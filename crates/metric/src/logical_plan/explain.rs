@@ -50,7 +50,7 @@ pub struct NamedExpression {
     /// Its name.
     pub name: String,
     /// True if it has one value per step; else it has one per episode.
-    pub every_step: bool,
+    pub(crate) every_step: bool,
     /// The expression as written.
     pub expression: String,
     /// The same in words.

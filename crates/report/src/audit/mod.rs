@@ -57,13 +57,13 @@ pub struct Audit {
     /// Cells that print zero where no episode counts, as the style says that their table does.
     pub undefined_as_zero: Vec<ZeroCell>,
     /// Printed standard errors of durations and other quantities: whole numbers give almost any, so that a wrong one is seldom found.
-    pub unbounded_errors: usize,
+    pub(crate) unbounded_errors: usize,
     /// Each table.
     pub tables: Vec<AuditedTable>,
     /// The name of the definitions.
     pub definitions: String,
     /// Their hash.
-    pub definitions_sha256: String,
+    pub(crate) definitions_sha256: String,
     /// The name of the style.
     pub style: String,
 }
@@ -109,7 +109,7 @@ pub struct InfeasibleCell {
     /// The nearest feasible prints, below and above.
     pub nearest: Vec<String>,
     /// Other roundings under which the cell alone is feasible, and with which more cells of its table are not.
-    pub feasible_rounded: Vec<Rounding>,
+    pub(crate) feasible_rounded: Vec<Rounding>,
 }
 
 /// A cell whose zero represents an undefined value.

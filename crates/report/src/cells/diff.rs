@@ -73,9 +73,9 @@ pub struct Overlap<T> {
     /// The number of items of both sides.
     pub both: u64,
     /// The items of the old scoring only.
-    pub only_before: Vec<T>,
+    pub(crate) only_before: Vec<T>,
     /// The items of the new scoring only.
-    pub only_after: Vec<T>,
+    pub(crate) only_after: Vec<T>,
 }
 
 /// The name of an episode.

@@ -79,7 +79,7 @@ pub struct FigureSheet {
     pub caption: Option<String>,
 }
 
-pub type FigureSheets = IndexMap<String, FigureSheet>;
+pub(crate) type FigureSheets = IndexMap<String, FigureSheet>;
 
 pub static SHOWN: LazyLock<FigureSheets> =
     LazyLock::new(|| toml::from_str(FIGURES).expect("the file comes with the program"));

@@ -105,7 +105,7 @@ pub struct GateCell {
     /// The two-sided p value of the difference, adjusted by Holm's method over the cells; null for quantities.
     pub p_adjusted: Option<f64>,
     /// The one-sided p value of a loss of the margin or more, adjusted likewise; null for quantities.
-    pub p_held: Option<f64>,
+    pub(crate) p_held: Option<f64>,
     /// The units of analysis where some have several episodes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub units: Option<Units>,

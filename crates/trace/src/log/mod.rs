@@ -39,9 +39,9 @@ pub const METADATA_KEY: &str = "recording";
 
 pub mod topic {
     pub const EPISODE: &str = "/episode";
-    pub const CAMERA: &str = "/camera";
-    pub const TRANSFORMS: &str = "/tf";
+    pub(crate) const CAMERA: &str = "/camera";
+    pub(crate) const TRANSFORMS: &str = "/tf";
     pub const SCENE: &str = "/scene";
     pub const CENSUS: &str = "/census";
-    pub const DECISION: &str = "/decision";
+    pub(crate) const DECISION: &str = "/decision";
 }

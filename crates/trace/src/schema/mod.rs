@@ -23,7 +23,7 @@ pub const SCHEMA_VERSION: u32 = 2;
 
 /// The required columns without a meaning in some tasks. A trace may lack one if every experiment in its footer
 /// declares so (`absent`); its rows then have no value.
-pub fn of_some_tasks() -> impl Iterator<Item = &'static str> {
+pub(crate) fn of_some_tasks() -> impl Iterator<Item = &'static str> {
     COLUMNS.iter().filter(|column| column.is_of_some_tasks).map(|column| column.name)
 }
 

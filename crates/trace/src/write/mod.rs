@@ -5,7 +5,7 @@
 //! one. The optional columns of a file are declared when it is created, so that memory stays flat. Values for
 //! undeclared columns are refused, never dropped.
 
-pub mod decode_episode;
+pub(crate) mod decode_episode;
 pub mod merge;
 pub mod renormalize;
 pub(super) mod rewrite;

@@ -30,7 +30,7 @@ pub type Listener = Box<dyn FnMut(&Message) -> Result<String, String> + Send>;
 const GLANCE: Duration = Duration::from_millis(20);
 
 /// Makes the function of each episode, or returns the reason why it cannot.
-pub type Listeners = dyn Fn() -> Result<Listener, String> + Send + Sync;
+pub(crate) type Listeners = dyn Fn() -> Result<Listener, String> + Send + Sync;
 
 pub struct Function {
     pub model: String,

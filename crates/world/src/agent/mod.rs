@@ -204,7 +204,7 @@ impl Lost {
     }
 
     /// Lost to the failure of a reply, which counts as this status.
-    pub fn counted_as(status: Status, cause: impl Into<String>) -> Self {
+    pub(crate) fn counted_as(status: Status, cause: impl Into<String>) -> Self {
         Self { status: Some(status), ..Self::because(cause) }
     }
 
@@ -218,11 +218,11 @@ impl Lost {
         Self { kind: LostKind::Limit, ..Self::because(cause) }
     }
 
-    pub fn by_stop() -> Self {
+    pub(crate) fn by_stop() -> Self {
         Self { kind: LostKind::Stop, ..Self::because("the recording is being stopped") }
     }
 
-    pub fn by_leaving() -> Self {
+    pub(crate) fn by_leaving() -> Self {
         Self { kind: LostKind::Leaving, ..Self::because("the participant has left the study") }
     }
 }
@@ -237,7 +237,7 @@ pub(crate) fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 pub type Decision<'a> = Pin<Box<dyn Future<Output = Result<Reply, Lost>> + 'a>>;
 
 /// The agent's work after its episode.
-pub type Farewell<'a> = Pin<Box<dyn Future<Output = ()> + 'a>>;
+pub(crate) type Farewell<'a> = Pin<Box<dyn Future<Output = ()> + 'a>>;
 
 pub trait Agent {
     fn decide<'a>(&'a mut self, observation: &'a Observation) -> Decision<'a>;

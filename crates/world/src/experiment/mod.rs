@@ -13,7 +13,7 @@
 //!
 //! Rule: an experiment draws nothing, renders nothing and knows no agent; `sim` and `agent` read it.
 
-pub mod balance;
+pub(crate) mod balance;
 mod built_in;
 pub mod explain;
 pub mod file;
@@ -90,7 +90,7 @@ impl Experiment {
     }
 
     /// The experiment that a trace's footer declares: the equal built-in one, or one without a prompt.
-    pub fn of_footer(spec: Spec) -> Self {
+    pub(crate) fn of_footer(spec: Spec) -> Self {
         // Older footers, which lack the definitions, differ in nothing else.
         let unnamed = |known: &Spec| spec.definitions.is_none() && Spec { definitions: None, ..known.clone() } == spec;
         match BUILT_IN.iter().position(|known| **known == spec || unnamed(known)) {
@@ -145,7 +145,7 @@ fn built_in_specs() -> Vec<&'static Spec> {
 }
 
 /// A number derived from a name: the beginning of its SHA-256.
-pub fn number_of(name: &str) -> u64 {
+pub(crate) fn number_of(name: &str) -> u64 {
     let hash = exact::hash::of_bytes(name.as_bytes());
     u64::from_str_radix(&hash[..16], 16).unwrap_or_default()
 }

@@ -17,9 +17,9 @@ pub use marks::{Mark, MarkColor, Part, Wearer};
 pub use panes::{BodyShown, Paint, Pane, PaneKind};
 
 /// The maximum number of glass panes (mirrors and windows) in a room.
-pub const MOST_PANES: usize = 4;
+pub(crate) const MOST_PANES: usize = 4;
 
-pub const MOST_MARKS: usize = 4;
+pub(crate) const MOST_MARKS: usize = 4;
 
 /// An experiment: what its world shows, what its agent is asked, and how the answer is decided.
 ///
@@ -74,7 +74,7 @@ pub struct Spec {
     pub steps: Option<u32>,
     /// The length of the agent's own steps, mm; the world's if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub step_length_mm: Option<u32>,
+    pub(crate) step_length_mm: Option<u32>,
     /// Mirrors and windows, the first of which is where the layout has its own; none is a bare wall.
     #[serde(default, rename = "mirror", skip_serializing_if = "Vec::is_empty")]
     pub panes: Vec<Pane>,
@@ -125,7 +125,7 @@ impl AbsentColumn {
 #[serde(deny_unknown_fields)]
 pub struct Hand {
     /// The length of its steps, mm.
-    pub step_mm: u32,
+    pub(crate) step_mm: u32,
     /// Steps from the mark at the start at least, along the three directions together.
     pub least: u32,
     /// The same at most.
@@ -316,7 +316,7 @@ pub(crate) fn is_default<T: Default + PartialEq>(value: &T) -> bool {
 }
 
 impl Spec {
-    pub const fn has_candidates(&self) -> bool {
+    pub(crate) const fn has_candidates(&self) -> bool {
         matches!(self.layout.cubes, Cubes::Candidates { .. })
     }
 
@@ -330,11 +330,11 @@ impl Spec {
         self.reply.contains(&ReplyKey::SelectedCube)
     }
 
-    pub fn asks_for_identification(&self) -> bool {
+    pub(crate) fn asks_for_identification(&self) -> bool {
         self.reply.contains(&ReplyKey::Identification)
     }
 
-    pub fn asks_for_mark(&self) -> bool {
+    pub(crate) fn asks_for_mark(&self) -> bool {
         self.reply.contains(&ReplyKey::Mark)
     }
 }

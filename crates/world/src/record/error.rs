@@ -75,7 +75,7 @@ pub enum RecordError {
 }
 
 impl RecordError {
-    pub fn fatal(error: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Self {
+    pub(crate) fn fatal(error: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Self {
         Self::Fatal(error.into())
     }
 }

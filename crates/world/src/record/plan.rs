@@ -70,7 +70,7 @@ impl Key {
     }
 
     /// The seed of the agent's randomness: differs between episodes, and from the world's seeds.
-    pub fn agent_seed(&self) -> u64 {
+    pub(crate) fn agent_seed(&self) -> u64 {
         let part = |value: i32| u64::from(value.unsigned_abs());
         // Rotated, not shifted: the number of a user's own experiment has all bits.
         let experiment = self.experiment.number().rotate_left(56);

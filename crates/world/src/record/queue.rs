@@ -17,7 +17,7 @@ use crate::sim::Experiment;
 
 /// The episodes of a recording that no thread has taken yet.
 #[derive(Debug)]
-pub struct Queue<'a> {
+pub(crate) struct Queue<'a> {
     store: &'a Store,
     waiting: Mutex<Waiting>,
 }

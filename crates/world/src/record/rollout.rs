@@ -92,7 +92,7 @@ pub struct Played {
     /// The model's id as the provider returned it with the first answer; `None` if no id was returned.
     pub model: Option<String>,
     /// A different id later in the episode, and the step of its first answer.
-    pub other_model: Option<(i32, String)>,
+    pub(crate) other_model: Option<(i32, String)>,
     /// True if a hand has reached its mark, which ends an episode.
     pub is_reached: bool,
 }

@@ -24,7 +24,7 @@ pub struct Seen<'a> {
     pub visibility: &'a Visibility,
 }
 
-pub type LogFault = Box<dyn std::error::Error + Send + Sync>;
+pub(crate) type LogFault = Box<dyn std::error::Error + Send + Sync>;
 
 pub struct Log {
     /// The seed, run and repetition.

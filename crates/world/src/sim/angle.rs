@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 pub struct Heading(#[schemars(range(max = 11))] u8);
 
 /// Headings in a full turn.
-pub const HEADINGS: u8 = 12;
+pub(crate) const HEADINGS: u8 = 12;
 
 /// sin of 0, 15, 30, 45, 60, 75 and 90 degrees.
 const SINES: [f64; 7] = [
@@ -63,7 +63,7 @@ impl Heading {
     }
 
     /// Steps to the left that lead to `goal`, -5..=6.
-    pub fn turns_to(self, goal: Self) -> i32 {
+    pub(crate) fn turns_to(self, goal: Self) -> i32 {
         let turns = (i32::from(goal.0) - i32::from(self.0)).rem_euclid(12);
         if turns > 6 { turns - 12 } else { turns }
     }
@@ -81,7 +81,7 @@ impl Heading {
 }
 
 /// sin and cos of an angle between -90 and 90 degrees, by series.
-pub fn sine_cosine(degrees: f64) -> (f64, f64) {
+pub(crate) fn sine_cosine(degrees: f64) -> (f64, f64) {
     let x = degrees * (std::f64::consts::PI / 180.0);
     let (mut sine, mut cosine) = (0.0, 0.0);
     let mut term = 1.0;
@@ -103,7 +103,7 @@ pub struct Quaternion(pub [f64; 4]);
 
 impl Quaternion {
     /// The rotation about +y by an angle between -90 and 90 degrees: a hanging limb swings back if positive.
-    pub fn about_y(degrees: f64) -> Self {
+    pub(crate) fn about_y(degrees: f64) -> Self {
         let (sine, cosine) = sine_cosine(degrees / 2.0);
         Self([cosine, 0.0, sine, 0.0])
     }

@@ -92,7 +92,7 @@ impl Figure {
     }
 
     /// Moves to a pose, with the next half of a stride.
-    pub const fn step_to(&mut self, pose: Pose) {
+    pub(crate) const fn step_to(&mut self, pose: Pose) {
         self.steps = self.steps.wrapping_add(1);
         self.stride = if self.steps % 2 == 1 { Stride::Left } else { Stride::Right };
         self.pose = pose;

@@ -9,7 +9,7 @@ use super::rng::Rng;
 use super::scene::Other;
 
 #[derive(Clone, Debug)]
-pub struct Distractor {
+pub(crate) struct Distractor {
     pub figure: Figure,
     chance: Rng,
     /// Turns to make before it walks on; negative to the right.

@@ -50,7 +50,7 @@ impl Square {
 }
 
 /// The distance of a point from a line between two others, m.
-pub fn distance_to_line(point: [f64; 2], from: [f64; 2], to: [f64; 2]) -> f64 {
+pub(crate) fn distance_to_line(point: [f64; 2], from: [f64; 2], to: [f64; 2]) -> f64 {
     let along = [to[0] - from[0], to[1] - from[1]];
     let length = along[0] * along[0] + along[1] * along[1];
     let offset = [point[0] - from[0], point[1] - from[1]];
@@ -84,13 +84,13 @@ impl FloorPlan {
     }
 
     /// Returns true if a body may go straight from one point to another.
-    pub fn is_passable(&self, from: [f64; 2], to: [f64; 2]) -> bool {
+    pub(crate) fn is_passable(&self, from: [f64; 2], to: [f64; 2]) -> bool {
         to.iter().all(|at| at.abs() <= self.reach)
             && self.squares.iter().all(|square| square.distance_to_line(from, to) >= self.radius)
     }
 
     /// Returns true if a body moving straight from one point to another touches a body at `other`.
-    pub fn is_blocked_by(&self, from: [f64; 2], to: [f64; 2], other: [f64; 2]) -> bool {
+    pub(crate) fn is_blocked_by(&self, from: [f64; 2], to: [f64; 2], other: [f64; 2]) -> bool {
         distance_to_line(other, from, to) < 2.0 * self.radius
     }
 }

@@ -28,27 +28,27 @@ use crate::experiment::spec::{MOST_MARKS, MOST_PANES, Part};
 pub const AGENTS: usize = 1 + MOST_OTHERS;
 
 /// Humanoids in every model: those of the room, then one for each pane, which only that pane shows.
-pub const BODIES: usize = AGENTS + MOST_PANES;
+pub(crate) const BODIES: usize = AGENTS + MOST_PANES;
 
-pub const EYE_CAMERA: &str = "eye";
+pub(crate) const EYE_CAMERA: &str = "eye";
 
 /// The camera for a pane: the eye's mirror image, or the eye in the second room.
-pub const BEYOND_CAMERA: &str = "beyond";
+pub(crate) const BEYOND_CAMERA: &str = "beyond";
 
 /// The hand's body, and the prefix of its shapes' names.
 pub const HAND: &str = "hand";
 
-pub const PATCH: &str = "patch";
+pub(crate) const PATCH: &str = "patch";
 
-pub const TOP_CAMERA: &str = "top";
+pub(crate) const TOP_CAMERA: &str = "top";
 
 /// Groups for MuJoCo's pictures and rays.
 pub mod group {
     /// Walls, floor and panes.
     pub const ROOM: i32 = 0;
     /// Cubes and other agents.
-    pub const THINGS: i32 = 1;
-    pub const EGO: i32 = 2;
+    pub(crate) const THINGS: i32 = 1;
+    pub(crate) const EGO: i32 = 2;
     /// The ceiling, which the view from above excludes.
     pub const CEILING: i32 = 3;
     /// The geom group of things that a scene lacks; MuJoCo does not draw it by default.

@@ -15,7 +15,7 @@ impl Rng {
         Self::of_number(mixed(episode) ^ purpose)
     }
 
-    pub fn of_number(number: u64) -> Self {
+    pub(crate) fn of_number(number: u64) -> Self {
         // Neighbouring numbers must not give neighbouring states, which would be noticeable at first.
         let [low, high] = [mixed(number), mixed(mixed(number))];
         Self(Pcg64::new((u128::from(high) << 64) | u128::from(low), 0))

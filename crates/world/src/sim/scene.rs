@@ -27,7 +27,7 @@ const ROOMS_VERSION: u32 = 2;
 const HUMANOIDS_VERSION: u32 = 3;
 
 /// The versions that this program draws.
-pub const SCENE_VERSIONS: [u32; 2] = [ROOMS_VERSION, HUMANOIDS_VERSION];
+pub(crate) const SCENE_VERSIONS: [u32; 2] = [ROOMS_VERSION, HUMANOIDS_VERSION];
 
 /// The version of the scenes of a configuration. Recordings of mannequins go on with version 2.
 pub const fn scene_version(config: &WorldConfig) -> u32 {
@@ -43,8 +43,8 @@ const FINGERPRINT_DIGITS: usize = 16;
 /// The distance of an agent that starts before the mirror, m.
 pub(super) const BEFORE_MIRROR: f64 = 2.0;
 
-pub const MOST_OTHERS: usize = 6;
-pub const MOST_CUBES: usize = 12;
+pub(crate) const MOST_OTHERS: usize = 6;
+pub(crate) const MOST_CUBES: usize = 12;
 
 /// An episode's world at its start.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -111,18 +111,18 @@ pub struct WornMark {
     pub wearer: usize,
     /// The patch of the front, if it is one.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub patch: Option<Patch>,
+    pub(crate) patch: Option<Patch>,
 }
 
 /// A square on the front of a body that stands still.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Patch {
     /// Of its middle from that of the body, to the left of the body where positive, mm.
-    pub aside_mm: i32,
+    pub(crate) aside_mm: i32,
     /// Of its middle above the floor, mm.
-    pub height_mm: i32,
+    pub(crate) height_mm: i32,
     /// Of its sides, mm.
-    pub edge_mm: i32,
+    pub(crate) edge_mm: i32,
 }
 
 /// The shape of a hand.
@@ -143,7 +143,7 @@ pub struct HandStart {
     /// Its shape.
     pub shape: HandShape,
     /// Half of its width, mm.
-    pub half_mm: i32,
+    pub(crate) half_mm: i32,
     /// From the mark, in steps: away from the camera, to the left of the picture, up.
     pub from_mark: [i32; 3],
 }
@@ -264,7 +264,7 @@ impl Scene {
     }
 
     /// The marks present at a step, counted from 1.
-    pub fn marks_at(&self, t: u32) -> impl Iterator<Item = (usize, &WornMark)> {
+    pub(crate) fn marks_at(&self, t: u32) -> impl Iterator<Item = (usize, &WornMark)> {
         self.marks.iter().enumerate().filter(move |(_, mark)| mark.from_t <= t)
     }
 

@@ -98,7 +98,7 @@ impl World {
     }
 
     /// Returns true if the own body wears a mark at any step.
-    pub fn has_own_mark(&self) -> bool {
+    pub(crate) fn has_own_mark(&self) -> bool {
         self.scene.marks.iter().any(|mark| mark.wearer == 0)
     }
 
@@ -252,7 +252,7 @@ impl World {
     }
 
     /// Updates stages of the same scene to the state of this world.
-    pub fn show_on(&self, (stage, beyond): &mut (Stage, Vec<Stage>)) {
+    pub(crate) fn show_on(&self, (stage, beyond): &mut (Stage, Vec<Stage>)) {
         for stage in std::iter::once(stage).chain(beyond) {
             let moment = self.moment(stage.look());
             stage.show(&self.config, &self.scene, &moment);

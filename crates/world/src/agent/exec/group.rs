@@ -26,7 +26,7 @@ struct Running {
 
 impl Groups {
     /// Kills all of them, and prevents further starts.
-    pub fn kill_all(&self) {
+    pub(crate) fn kill_all(&self) {
         let mut running = locked(&self.0);
         running.is_over = true;
         running.marks.iter().for_each(|(id, mark)| kill(*id, mark));

@@ -21,7 +21,7 @@ use crate::agent::Ended;
 use crate::json_lines;
 
 /// The version of the messages and of the order they come in.
-pub const PROTOCOL: u32 = 1;
+pub(crate) const PROTOCOL: u32 = 1;
 
 /// One line to the program.
 #[derive(Clone, Debug, Serialize, JsonSchema)]

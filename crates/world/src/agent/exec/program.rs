@@ -20,7 +20,7 @@ use tokio::time::timeout;
 use super::group::{Group, Groups};
 use super::said::Said;
 
-pub const LONGEST_REPLY: u64 = 1 << 20;
+pub(crate) const LONGEST_REPLY: u64 = 1 << 20;
 /// The time for a program to exit after its standard input was closed.
 const FAREWELL: Duration = Duration::from_secs(5);
 /// The time between the end of a process's output and its own end.
@@ -61,7 +61,7 @@ pub enum Failure {
 }
 
 #[derive(Debug)]
-pub struct Program {
+pub(crate) struct Program {
     child: Child,
     group: Group,
     input: ChildStdin,

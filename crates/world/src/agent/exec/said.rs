@@ -13,13 +13,13 @@ use crate::agent::vlm::secrets::Secret;
 use exact::replace::{folder_of, make_folder, replace};
 
 /// The maximum size of an episode's file in bytes.
-pub const IN_FILE: usize = 256 * 1024;
+pub(crate) const IN_FILE: usize = 256 * 1024;
 const IN_MESSAGE: usize = 2_000;
 /// Extra bytes before those of the file: longer than any key, since the cut may split one.
 const MARGIN: usize = 4_096;
 
 #[derive(Debug, Default)]
-pub struct Said(Mutex<Tail>);
+pub(crate) struct Said(Mutex<Tail>);
 
 #[derive(Debug, Default)]
 struct Tail {
@@ -53,7 +53,7 @@ impl Said {
     }
 
     /// The last lines, indented, each whole if there are several; `None` without output.
-    pub fn last_words(&self, secrets: &[Secret]) -> Option<String> {
+    pub(crate) fn last_words(&self, secrets: &[Secret]) -> Option<String> {
         let bytes = self.bytes(secrets);
         let text = String::from_utf8_lossy(last_lines(&bytes)).replace('\t', "    ");
         let lines = text.lines().map(str::trim_end).filter(|line| !line.is_empty());
@@ -75,7 +75,7 @@ pub fn without(secrets: &[Secret], text: &str) -> String {
 
 /// The file of an episode, written on drop: whether the episode is recorded, lost or stopped.
 #[derive(Debug)]
-pub struct Kept {
+pub(crate) struct Kept {
     pub(super) said: Arc<Said>,
     path: PathBuf,
     secrets: Arc<[Secret]>,

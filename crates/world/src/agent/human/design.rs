@@ -41,7 +41,7 @@ pub struct Schedule {
 
 impl Schedule {
     /// Deals planned episodes to `people` participants, each in the order of play.
-    pub fn lanes<'a>(&self, planned: &'a [Planned], people: usize) -> Vec<Vec<&'a Planned>> {
+    pub(crate) fn lanes<'a>(&self, planned: &'a [Planned], people: usize) -> Vec<Vec<&'a Planned>> {
         let mut lanes = vec![Vec::new(); people];
         for (at, episode) in planned.iter().enumerate() {
             let own = match self.design {

@@ -63,7 +63,7 @@ impl Hub {
         Self { terms, schedule, seats, tokens, answers, journal, eraser, owners, deleted, is_stopping }
     }
 
-    pub fn seats(&self) -> usize {
+    pub(crate) fn seats(&self) -> usize {
         self.seats.len()
     }
 

@@ -57,7 +57,7 @@ enum Line {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Leaving {
+pub(crate) enum Leaving {
     Declined,
     /// They stopped; their data stays.
     Stopped,

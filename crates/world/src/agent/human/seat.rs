@@ -26,7 +26,7 @@ pub struct Question {
     pub user: String,
     /// The step, from 1.
     pub t: i32,
-    pub is_practice: bool,
+    pub(crate) is_practice: bool,
     pub experiment: Experiment,
     /// The letters or numbers of the available actions.
     pub actions: Vec<&'static str>,
@@ -51,7 +51,7 @@ pub struct Terms {
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct End {
-    pub is_complete: bool,
+    pub(crate) is_complete: bool,
     pub is_told: bool,
 }
 
@@ -75,15 +75,15 @@ impl Asked {
 pub(super) struct Seat {
     pub code: String,
     /// The episodes still to be played, in order, including the one under way.
-    pub lane: VecDeque<String>,
+    pub(crate) lane: VecDeque<String>,
     /// Episodes of this participant that are recorded.
     pub played: usize,
-    pub is_dealt: bool,
+    pub(crate) is_dealt: bool,
     pub episode: Option<String>,
-    pub has_agreed: bool,
-    pub has_practised: bool,
+    pub(crate) has_agreed: bool,
+    pub(crate) has_practised: bool,
     /// The next episode waits for the person to begin it.
-    pub is_ready: bool,
+    pub(crate) is_ready: bool,
     pub left: Option<Leaving>,
     pub is_deleted: bool,
     pub asked: Option<Asked>,

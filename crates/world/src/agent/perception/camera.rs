@@ -9,7 +9,7 @@ pub use crate::sim::angle::Heading;
 use crate::sim::angle::sine_cosine;
 
 /// The eye above the floor, m.
-pub const EYE_HEIGHT: f64 = 1.52;
+pub(crate) const EYE_HEIGHT: f64 = 1.52;
 /// The eye ahead of the body's axis, m.
 const EYE_AHEAD: f64 = 0.14;
 
@@ -74,7 +74,7 @@ impl Camera {
     }
 
     /// The number of headings to either side of its own that are in the picture, 0 to 2.
-    pub fn headings_aside(&self) -> i32 {
+    pub(crate) fn headings_aside(&self) -> i32 {
         let shows = |turns: u8| {
             let [cosine, sine] = Heading::new(turns).direction();
             self.focal * sine <= self.half_width * cosine
@@ -87,7 +87,7 @@ impl Camera {
         self.focal / ahead
     }
 
-    pub fn bearing(&self, place: Place) -> Bearing {
+    pub(crate) fn bearing(&self, place: Place) -> Bearing {
         let [cosine, sine] = self.heading.direction();
         let (dx, dy) = (place.x - self.eye.x, place.y - self.eye.y);
         Bearing { ahead: dx * cosine + dy * sine, right: dx * sine - dy * cosine }
@@ -104,7 +104,7 @@ impl Camera {
     }
 
     /// The distance of the floor in a row, m; `None` at and above the horizon.
-    pub fn floor_ahead(&self, row: f64) -> Option<f64> {
+    pub(crate) fn floor_ahead(&self, row: f64) -> Option<f64> {
         let below = row - self.half_height;
         (below > 0.5).then(|| self.focal * EYE_HEIGHT / below)
     }

@@ -11,7 +11,7 @@
 pub mod camera;
 pub mod ground;
 pub mod paint;
-pub mod patches;
+pub(crate) mod patches;
 pub mod things;
 
 use std::sync::Arc;

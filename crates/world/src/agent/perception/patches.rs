@@ -45,7 +45,7 @@ impl Patch {
     }
 }
 
-pub fn patches(frame: &Frame, least: usize) -> Vec<Patch> {
+pub(crate) fn patches(frame: &Frame, least: usize) -> Vec<Patch> {
     let runs = runs(frame);
     let roots = connect(&runs);
     let mut found: Vec<Option<Patch>> = vec![None; runs.len()];

@@ -59,11 +59,11 @@ pub struct Knowledge {
     /// Bodies in view with a patch of another colour: the body's colour and the patch's.
     pub patched: Vec<(Color, Color)>,
     /// The cubes in view, including reflections.
-    pub cubes_in_view: Vec<Thing>,
+    pub(crate) cubes_in_view: Vec<Thing>,
     /// The length of one step, m.
     pub step: f64,
     /// Headings to either side of the own one that are in view.
-    pub headings_aside: i32,
+    pub(crate) headings_aside: i32,
     /// All cubes that were seen, reflections included, in the order in which they were first seen.
     landmarks: Vec<Landmark>,
     passing: Vec<(Obstacle, i32)>,
@@ -114,7 +114,7 @@ impl Knowledge {
         self.pose = pose;
     }
 
-    pub fn in_mirrors(&self) -> Vec<Thing> {
+    pub(crate) fn in_mirrors(&self) -> Vec<Thing> {
         let crossed = |body: &Thing| self.room.crossing(self.pose.place, body.place).map(|(side, _)| side);
         let is_through =
             |body: &&Thing| crossed(body).is_some_and(|side| self.room.mirrors().any(|mirror| mirror == side));
@@ -189,7 +189,7 @@ impl Knowledge {
     }
 
     /// The sides whose wall is a mirror right across from a place.
-    pub fn mirrors_across(&self, place: Place) -> impl Iterator<Item = Side> + '_ {
+    pub(crate) fn mirrors_across(&self, place: Place) -> impl Iterator<Item = Side> + '_ {
         let is_mirror = move |side: &Side| self.room.is_mirror(*side, side.along(place));
         Side::ALL.into_iter().filter(is_mirror)
     }

@@ -20,7 +20,7 @@ const ARRIVED: f64 = 0.5;
 const PATIENCE: u32 = 16;
 
 #[derive(Clone, Debug, Default)]
-pub struct Lookouts {
+pub(crate) struct Lookouts {
     done: Vec<Place>,
     /// The next lookout; `None` if it is the current place.
     goal: Option<Place>,
@@ -47,7 +47,7 @@ impl Lookouts {
         None
     }
 
-    pub fn are_over(&self) -> bool {
+    pub(crate) fn are_over(&self) -> bool {
         self.done.len() >= LOOKOUTS
     }
 

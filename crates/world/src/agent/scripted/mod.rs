@@ -15,19 +15,19 @@
 //! rectangular room. It knows its own body (eye position, width), but no positions of things.
 
 pub mod chance;
-pub mod hand_view;
+pub(crate) mod hand_view;
 pub mod knowledge;
-pub mod lookout;
+pub(crate) mod lookout;
 pub mod policy;
 pub mod reflection;
 pub mod room;
 pub mod route;
-pub mod seeker;
+pub(crate) mod seeker;
 pub mod words;
 
 mod minds {
     pub mod answering;
-    pub mod chaser;
+    pub(crate) mod chaser;
     pub mod confabulator;
     pub mod frozen;
     pub mod guesser;
@@ -35,7 +35,7 @@ mod minds {
     pub mod mimic;
     pub mod oracle;
     pub mod random;
-    pub mod reacher;
+    pub(crate) mod reacher;
 }
 
 use crate::agent::{Agent, Answers, Decision, Lost, Observation, Player, Reply, Status, Task, Words};

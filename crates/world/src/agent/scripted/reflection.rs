@@ -20,7 +20,7 @@ use super::room::{Room, Side};
 
 /// A test that found a body in the place of the own reflection.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Match {
+pub(crate) struct Match {
     pub side: Side,
     pub color: Color,
     pub place: Place,
@@ -144,7 +144,7 @@ impl Reflection {
     }
 
     /// The current place of the own reflection behind the mirror, once it was found.
-    pub fn own_place(&self, room: &Room) -> Option<Place> {
+    pub(crate) fn own_place(&self, room: &Room) -> Option<Place> {
         let (color, lag) = self.tested()?;
         let side = self.matches.iter().rfind(|found| found.color == color && found.lag == lag)?.side;
         let place = *self.trail.get(self.trail.len().checked_sub(1 + lag)?)?;
@@ -163,7 +163,7 @@ impl Reflection {
     }
 
     /// The colour of a patch on the own body, once seen often enough; the latest if there are several.
-    pub fn own_mark(&self) -> Option<Color> {
+    pub(crate) fn own_mark(&self) -> Option<Color> {
         repeated(&self.patches).filter(|last| self.own_color().is_some_and(|own| own != *last))
     }
 
@@ -237,7 +237,7 @@ fn body_at(view: &View, double: Place) -> Test {
 }
 
 /// The colour of a patch on the head or the chest of the body at `double`, other than the body's.
-pub fn patch_at(view: &View, double: Place, body: Color) -> Option<Color> {
+pub(crate) fn patch_at(view: &View, double: Place, body: Color) -> Option<Color> {
     let bearing = view.camera.bearing(double);
     PATCHES.iter().find_map(|(heights, half)| {
         let pixels = Window::at(&view.camera, bearing, (-half, *half), *heights).pixels(view);

@@ -127,7 +127,7 @@ impl Room {
     }
 
     /// The first crossing of a wall between `from` and `to`.
-    pub fn crossing(&self, from: Place, to: Place) -> Option<(Side, f64)> {
+    pub(crate) fn crossing(&self, from: Place, to: Place) -> Option<(Side, f64)> {
         let crossed = |side: Side| {
             let (start, end) = (side.out(from), side.out(to));
             let wall = self.wall(side).filter(|&wall| end > wall && end > start)?;

@@ -39,7 +39,7 @@ const PATIENCE: usize = 6_000;
 /// The first action on the way from `start` to a pose that `is_goal`; `None` if there is no way or no need for one.
 ///
 /// `far` is a lower bound of the metres from a place to the goal; zero is always valid, but slow.
-pub fn first_action(
+pub(crate) fn first_action(
     start: Pose,
     ground: &Ground<'_>,
     is_goal: &dyn Fn(Pose) -> bool,

@@ -132,7 +132,7 @@ pub(super) fn merge(into: &mut Value, from: &Value) {
 
 impl Model {
     /// Returns true if an answer with this model id comes from this model or an accepted one.
-    pub fn takes_answer_of(&self, returned: &str) -> bool {
+    pub(crate) fn takes_answer_of(&self, returned: &str) -> bool {
         self.accepted.iter().any(|accepted| accepted == returned) || answers_for(&self.id, returned, &self.answers_as)
     }
 

@@ -49,7 +49,7 @@ impl Secret {
 
     /// The text of an answer without the key. For servers without keys, users set words such as `EMPTY` or `none`;
     /// these are not secrets, and removing them would change the model's words.
-    pub fn without_in_answer(&self, text: &str) -> String {
+    pub(crate) fn without_in_answer(&self, text: &str) -> String {
         const SHORTEST_KEY: usize = 6;
         if self.0.expose_secret().len() < SHORTEST_KEY { text.to_owned() } else { self.without(text) }
     }
@@ -65,7 +65,7 @@ impl Secret {
 
 /// The values of all environment variables whose names indicate a key: these are removed from a program's output, since
 /// it inherits them. Values too short for a key are ignored, since they may be ordinary words.
-pub fn from_every_key_variable() -> Vec<Secret> {
+pub(crate) fn from_every_key_variable() -> Vec<Secret> {
     const SHORTEST: usize = 8;
     let held = std::env::vars_os().filter(|(name, _)| names_a_key(&name.to_string_lossy()));
     let values = held.filter_map(|(_, value)| value.into_string().ok()).map(|value| value.trim().to_owned());

@@ -25,13 +25,13 @@ pub struct Pane {
     pub wall: Wall,
     /// Along the wall, mm; the world's if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub width_mm: Option<u32>,
+    pub(crate) width_mm: Option<u32>,
     /// mm; the world's if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub height_mm: Option<u32>,
+    pub(crate) height_mm: Option<u32>,
     /// Its lower edge above the floor, mm; about the world's height of centres if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub bottom_mm: Option<u32>,
+    pub(crate) bottom_mm: Option<u32>,
 }
 
 /// The kind of a pane.

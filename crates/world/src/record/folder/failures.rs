@@ -14,7 +14,7 @@ use crate::json_lines;
 use trace::lost::LONGEST_LINE;
 pub use trace::lost::{LostEpisode, list_of};
 
-pub fn lost_episode(key: &Key, subject: &Subject, step: Option<i32>, lost: Lost) -> LostEpisode {
+pub(crate) fn lost_episode(key: &Key, subject: &Subject, step: Option<i32>, lost: Lost) -> LostEpisode {
     LostEpisode {
         episode_id: key.episode_id(subject),
         model: subject.model.clone(),

@@ -28,7 +28,7 @@ pub struct Removed {
     pub label_lines: usize,
 }
 
-pub type RemovalError = Box<dyn Error + Send + Sync>;
+pub(crate) type RemovalError = Box<dyn Error + Send + Sync>;
 
 /// Removes all data of the person with this code from a folder. No process may record into it meanwhile; writes in
 /// progress are awaited.

@@ -73,7 +73,7 @@ impl Store {
     }
 
     /// The path of a committed log of an episode.
-    pub fn log_part(&self, key: &Key) -> PathBuf {
+    pub(crate) fn log_part(&self, key: &Key) -> PathBuf {
         self.part(key).with_extension("mcap")
     }
 

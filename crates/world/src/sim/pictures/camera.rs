@@ -65,7 +65,7 @@ impl Camera {
         Ok(Self { width, height, data: MjData::new(model), renderer, draws_all: false, drawn_by })
     }
 
-    pub const fn drawn_by(&self) -> &Renderer {
+    pub(crate) const fn drawn_by(&self) -> &Renderer {
         &self.drawn_by
     }
 
@@ -110,7 +110,7 @@ impl Camera {
     }
 
     /// The room from above, without its ceiling.
-    pub fn top_view(&mut self, world: &World) -> Result<Frame, CameraError> {
+    pub(crate) fn top_view(&mut self, world: &World) -> Result<Frame, CameraError> {
         self.draw(world.stage(), TOP_CAMERA, None)
     }
 

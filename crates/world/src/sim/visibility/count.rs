@@ -36,7 +36,7 @@ pub struct Visibility {
     pub mark_px: u32,
     /// Of bodies that a pane alone shows: in place of the own one, or behind a window.
     #[serde(default, skip_serializing_if = "is_default")]
-    pub double_px: u32,
+    pub(crate) double_px: u32,
     /// The hand of a reaching task.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub hand: Option<Sighting>,
@@ -59,7 +59,7 @@ pub struct PaneSighting {
     /// Of other agents of the room in it.
     pub other_px: u32,
     /// Of the body that it alone shows.
-    pub double_px: u32,
+    pub(crate) double_px: u32,
     /// Of marks on the own body in it.
     pub mark_px: u32,
 }
@@ -154,7 +154,7 @@ const PANES: [&str; MOST_PANES] = ["pane1_body_px", "pane2_body_px", "pane3_body
 const MARKS: [&str; MOST_MARKS] = ["mark1_px", "mark2_px", "mark3_px", "mark4_px"];
 
 /// The counts of a scene: those of panes if there are several, those of marks if the own body wears several.
-pub fn by_column(world: &World, seen: &Visibility) -> Vec<(&'static str, i32)> {
+pub(crate) fn by_column(world: &World, seen: &Visibility) -> Vec<(&'static str, i32)> {
     let scene = world.scene();
     let mut counts = vec![
         ("mirror_self_px", seen.self_px),

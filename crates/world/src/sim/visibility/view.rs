@@ -76,7 +76,7 @@ pub(super) fn middle(at: usize, count: usize) -> f64 {
 }
 
 impl View {
-    pub fn of_eye(world: &World, width: usize, height: usize) -> Self {
+    pub(crate) fn of_eye(world: &World, width: usize, height: usize) -> Self {
         let eye = &world.config().eye;
         let pose = world.pose();
         let [x, y] = pose.heading.direction();

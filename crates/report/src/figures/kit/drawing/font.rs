@@ -20,7 +20,7 @@ const REGULAR_WEB: &[u8] = include_bytes!("../../../../../../assets/fonts/Mirror
 const SEMIBOLD_WEB: &[u8] = include_bytes!("../../../../../../assets/fonts/MirrorstatsSans-Semibold.woff2");
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Weight {
+pub(crate) enum Weight {
     #[default]
     Regular,
     Semibold,

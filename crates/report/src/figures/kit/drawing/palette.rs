@@ -16,9 +16,9 @@ pub(crate) static PALETTE: LazyLock<Palette> = LazyLock::new(|| {
 #[serde(deny_unknown_fields)]
 pub struct Palette {
     /// The models with a fixed style: the one at their index.
-    pub pinned: Vec<String>,
+    pub(crate) pinned: Vec<String>,
     pub surface: Surface,
-    pub ramp: Ramps,
+    pub(crate) ramp: Ramps,
     pub outcome: Outcome,
     pub gaze: Gaze,
     pub style: Vec<ModelStyle>,
@@ -33,16 +33,16 @@ pub struct Surface {
     pub rule: Rgb,
     pub axis: Rgb,
     pub paper: Rgb,
-    pub hatch: Rgb,
+    pub(crate) hatch: Rgb,
     pub chance: Rgb,
     pub reference: Rgb,
 }
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Ramps {
+pub(crate) struct Ramps {
     /// From the worst to the best.
-    pub goodness: Ramp,
+    pub(crate) goodness: Ramp,
     /// From zero to the largest rise.
     pub rise: Ramp,
     /// From zero to the largest fall.
@@ -73,10 +73,10 @@ pub struct Gaze {
 #[serde(deny_unknown_fields)]
 pub struct ModelStyle {
     pub color: Rgb,
-    pub marker: Shape,
+    pub(crate) marker: Shape,
     #[serde(default)]
     pub hollow: bool,
-    pub dash: Vec<f64>,
+    pub(crate) dash: Vec<f64>,
 }
 
 impl ModelStyle {
@@ -102,7 +102,7 @@ pub enum Shape {
 
 /// Colours at even distances, with linear interpolation.
 #[derive(Debug, Deserialize)]
-pub struct Ramp(Vec<Rgb>);
+pub(crate) struct Ramp(Vec<Rgb>);
 
 impl Ramp {
     /// The colour at `share` of the range, clamped to [0, 1].

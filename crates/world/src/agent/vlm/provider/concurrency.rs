@@ -16,7 +16,7 @@ use crate::agent::locked;
 use crate::agent::vlm::spending::shared_file::{SharedFile, now};
 
 #[derive(Debug)]
-pub struct Pace {
+pub(crate) struct Pace {
     permits: Semaphore,
     state: Mutex<State>,
     interval: Duration,

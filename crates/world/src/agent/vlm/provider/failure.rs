@@ -51,12 +51,12 @@ impl FailureKind {
         }
     }
 
-    pub const fn may_pass(self) -> bool {
+    pub(crate) const fn may_pass(self) -> bool {
         self.is_busy() || matches!(self, Self::Server | Self::Timeout)
     }
 
     /// Returns true if the provider only postpones the request.
-    pub const fn is_busy(self) -> bool {
+    pub(crate) const fn is_busy(self) -> bool {
         matches!(self, Self::RateLimited | Self::Overloaded)
     }
 }

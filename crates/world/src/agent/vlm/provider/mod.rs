@@ -183,7 +183,7 @@ impl Provider {
         self.patience
     }
 
-    pub fn without_secret(&self, text: &str) -> String {
+    pub(crate) fn without_secret(&self, text: &str) -> String {
         self.secret.as_ref().map_or_else(|| text.to_owned(), |secret| secret.without(text))
     }
 

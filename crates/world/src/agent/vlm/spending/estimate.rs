@@ -26,7 +26,7 @@ pub fn prompt_tokens(choice: &Choice, experiment: &Experiment, view: [u32; 2]) -
 }
 
 /// The tokens of a frame of this width and height.
-pub fn frame_tokens(dialect: Dialect, [width, height]: [u32; 2]) -> u64 {
+pub(crate) fn frame_tokens(dialect: Dialect, [width, height]: [u32; 2]) -> u64 {
     let (width, height) = (u64::from(width), u64::from(height));
     match dialect {
         // 85, plus 170 per tile of 512 x 512 after the shorter side is scaled down to at most 768.

@@ -33,12 +33,12 @@ pub struct Spend {
 }
 
 impl Spend {
-    pub fn add_unanswered(&mut self, at_most_usd: f64) {
+    pub(crate) fn add_unanswered(&mut self, at_most_usd: f64) {
         self.unanswered += 1;
         self.uncosted_usd_at_most += at_most_usd;
     }
 
-    pub fn add_answer(&mut self, tokens: u64, cost_usd: Option<f64>, at_most_usd: f64) {
+    pub(crate) fn add_answer(&mut self, tokens: u64, cost_usd: Option<f64>, at_most_usd: f64) {
         self.tokens = self.tokens.saturating_add(tokens);
         if let Some(cost) = cost_usd {
             self.cost_usd += cost;
@@ -57,7 +57,7 @@ impl Spend {
         self.requests += other.requests;
     }
 
-    pub fn cost_at_most(&self) -> f64 {
+    pub(crate) fn cost_at_most(&self) -> f64 {
         self.cost_usd + self.uncosted_usd_at_most
     }
 }

@@ -135,7 +135,7 @@ impl Account {
     }
 
     /// Continues an episode that an earlier start began; it does not wait for others.
-    pub fn go_on(self: &Arc<Self>, steps: u64) -> Begun {
+    pub(crate) fn go_on(self: &Arc<Self>, steps: u64) -> Begun {
         locked(&self.state).add_episode(steps);
         Begun { account: Arc::clone(self), left: steps }
     }
@@ -244,7 +244,7 @@ impl Drop for Reserved {
 }
 
 impl Begun {
-    pub fn note_left(&mut self, steps: u64) {
+    pub(crate) fn note_left(&mut self, steps: u64) {
         let mut state = locked(&self.account.state);
         state.steps_left = state.steps_left + steps - self.left;
         self.left = steps;

@@ -37,7 +37,7 @@ pub struct Question<'a> {
     pub system: &'a str,
     pub user: &'a str,
     /// The frame as PNG in base64.
-    pub png_base64: &'a str,
+    pub(crate) png_base64: &'a str,
     /// The JSON Schema for the provider to enforce; `None` if only the prompt describes it.
     pub schema: Option<&'a Value>,
     /// The sampling temperature (0.2 in the paper); `None` leaves it to the provider.
@@ -107,7 +107,7 @@ impl Dialect {
     }
 
     /// The name of the header with the key, and the prefix of its value.
-    pub const fn key_header(self) -> (&'static str, &'static str) {
+    pub(crate) const fn key_header(self) -> (&'static str, &'static str) {
         match self {
             Self::OpenaiChat | Self::OpenaiCompatible => ("authorization", "Bearer "),
             Self::Gemini => ("x-goog-api-key", ""),
@@ -117,7 +117,7 @@ impl Dialect {
 
     /// The service tier's key, for `flex` at half price: <https://platform.openai.com/docs/guides/flex-processing>,
     /// <https://ai.google.dev/gemini-api/docs/flex-inference>.
-    pub const fn tier_key(self) -> Option<&'static str> {
+    pub(crate) const fn tier_key(self) -> Option<&'static str> {
         match self {
             Self::OpenaiChat => Some("service_tier"),
             Self::Gemini => Some("serviceTier"),

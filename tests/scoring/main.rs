@@ -3,6 +3,8 @@
 mod arrow_columns;
 mod author;
 mod by_hand;
+#[path = "../spark/mod.rs"]
+mod by_spark;
 mod changes;
 mod definitions;
 #[cfg(feature = "polars")]

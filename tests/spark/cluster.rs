@@ -74,6 +74,7 @@ fn daemon(home: &Path, folder: &Path, name: &str, arguments: &[&str]) -> Running
         command.env_remove(variable);
     }
     command.env("SPARK_HOME", home).env("SPARK_LOCAL_IP", "127.0.0.1").env("SPARK_DAEMON_MEMORY", "256m");
+    command.env("SPARK_DAEMON_JAVA_OPTS", "-XX:TieredStopAtLevel=1 -XX:+UseSerialGC");
     let child = command.stdin(Stdio::null()).stdout(log.try_clone().unwrap()).stderr(log).spawn();
     Running(child.unwrap())
 }

@@ -9,10 +9,10 @@ use serde_json::Value;
 use trace::episode::{Episode, Extra};
 use trace::write::OptionalColumns;
 
-use crate::cluster::{Cluster, get, word_after};
+use super::cluster::{Cluster, get, word_after};
+use super::{Answer, answer, episode, fixture, program, write};
 use crate::harness::files::{assert_same, contents};
 use crate::harness::program::{Running, wait_for};
-use crate::{Answer, answer, episode, fixture, program, write};
 
 /// Features that engines may implement differently: texts, patterns, 64 bits, nested windows, reserved words.
 const DEFINITIONS: &str = r#"
@@ -35,10 +35,12 @@ value = "count(pose_x > 100) * 10 + count(pose_x = 0)"
 value = "last(t < coalesce(first(self_color = at(selected_cube, first(mirror_visible))), 99) and self_color is distinct from at(self_color, last(action = 'done') - 1))"
 "#;
 
-/// Settings that keep a cluster of tests small.
-const SMALL: [&str; 6] = [
+/// Settings that keep a cluster of tests small, and its processes quick to start.
+const SMALL: [&str; 8] = [
     "spark.driver.memory=512m",
     "spark.executor.memory=512m",
+    "spark.driver.extraJavaOptions=-XX:TieredStopAtLevel=1 -XX:+UseSerialGC",
+    "spark.executor.extraJavaOptions=-XX:TieredStopAtLevel=1 -XX:+UseSerialGC",
     "spark.driver.host=127.0.0.1",
     "spark.driver.bindAddress=127.0.0.1",
     "spark.sql.shuffle.partitions=2",

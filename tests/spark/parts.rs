@@ -7,9 +7,9 @@ use std::sync::Arc;
 use arrow::array::{ArrayRef, Float64Array, Int32Array, Int64Array, RecordBatch, StringArray};
 use trace::write::OptionalColumns;
 
+use super::{episode, write};
 use crate::harness::program::run;
 use crate::harness::traces::write_rows;
-use crate::{episode, write};
 
 fn parquet(path: &Path, columns: Vec<(&str, ArrayRef)>) {
     fs::create_dir_all(path.parent().unwrap()).unwrap();

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use trace::write::{OptionalColumns, write_episodes};
 
-use crate::{Answer, answer, episode, program, write};
+use super::{Answer, answer, episode, program, write};
 
 /// A folder with a trace and a Spark with this script as `spark-submit`; `$place` is the submission's folder.
 fn folder(script: &str) -> tempfile::TempDir {

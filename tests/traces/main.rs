@@ -1,6 +1,7 @@
 //! Traces: writing, importing, reading, checking, and damage.
 
 mod damaged;
+mod foreign;
 #[path = "../harness/mod.rs"]
 mod harness;
 mod import;
@@ -10,4 +11,3 @@ mod trace_commands;
 mod trace_scan;
 mod trace_validate;
 mod trace_write;
-mod writers;

@@ -4,15 +4,13 @@
 //! The cluster needs Java and pyspark: `scripts/get-spark.sh` fetches both.
 
 mod cluster;
-#[path = "../harness/mod.rs"]
-mod harness;
 mod on_cluster;
 mod parts;
 mod stand_in;
 
-use harness::files::fixture;
-use harness::program::{Answer, answer, program};
-use harness::traces::write_trace as write;
+use crate::harness::files::fixture;
+use crate::harness::program::{Answer, answer, program};
+use crate::harness::traces::write_trace as write;
 use trace::episode::{Action, Episode, Extra, Step};
 
 /// An episode with texts that are easy to get wrong; seen at t = 2, decided at t = 3.
@@ -38,6 +36,6 @@ fn episode(id: &str, experiment: &str, run: i32) -> Episode {
         run,
         body_color: "blue".into(),
         stated_color: (run == 1).then(|| "red".into()),
-        ..harness::traces::episode(id, steps)
+        ..crate::harness::traces::episode(id, steps)
     }
 }

@@ -62,7 +62,7 @@ const OF_THE_FILE: [&[&str]; 5] = [
 fn written(folder: &Path) -> BTreeMap<PathBuf, PathBuf> {
     let packages = std::env::join_paths([need::writers(), need::spark()]).unwrap();
     let mut command = clean(std::process::Command::new(need::python()), folder);
-    succeeds(command.env("PYTHONPATH", packages).arg(repository().join("tests/traces/writers/write.py")).arg(folder));
+    succeeds(command.env("PYTHONPATH", packages).arg(repository().join("tests/traces/foreign/write.py")).arg(folder));
     let mut files = BTreeMap::new();
     for entry in fs::read_dir(folder).unwrap() {
         let content = entry.unwrap().path();
@@ -79,7 +79,7 @@ fn written(folder: &Path) -> BTreeMap<PathBuf, PathBuf> {
 }
 
 fn scores(path: &Path) -> Result<Vec<Vec<String>>, Box<StudyError>> {
-    scores_by(path, repository().join("tests/traces/writers/definitions.toml").to_str().unwrap())
+    scores_by(path, repository().join("tests/traces/foreign/definitions.toml").to_str().unwrap())
 }
 
 fn scores_by(path: &Path, definitions: &str) -> Result<Vec<Vec<String>>, Box<StudyError>> {
@@ -113,7 +113,7 @@ fn every_command_notes_a_trace_rewritten_by_another_program() {
     let own = fixture("recorded/E1-guesser.parquet");
     fs::create_dir(at.join("again")).unwrap();
     let mut command = clean(std::process::Command::new(need::python()), at);
-    let script = repository().join("tests/traces/writers/write.py");
+    let script = repository().join("tests/traces/foreign/write.py");
     command.env("PYTHONPATH", need::writers()).arg(script).arg(&own).arg("again");
     succeeds(&mut command);
     let expected = scores_by(&own, "paper").unwrap();
@@ -232,7 +232,7 @@ fn soak_changed_bytes_of_files_without_checksums_are_counted() {
     let at = folder.path();
     fs::create_dir(at.join("again")).unwrap();
     let mut command = clean(std::process::Command::new(need::python()), at);
-    let script = repository().join("tests/traces/writers/write.py");
+    let script = repository().join("tests/traces/foreign/write.py");
     let own = fixture("recorded/E1-guesser.parquet");
     succeeds(command.env("PYTHONPATH", need::writers()).arg(script).arg(&own).arg("again"));
     let (mut all, mut silent, mut draws) = (0, 0, crate::harness::faults::Draws::new(38));

@@ -266,6 +266,7 @@ def with_java(matrix):
 
     spark = (
         SparkSession.builder.master("local[2]").config("spark.ui.enabled", "false")
+        .config("spark.driver.extraJavaOptions", "-XX:TieredStopAtLevel=1 -XX:+UseSerialGC")
         .config("spark.sql.shuffle.partitions", "1").config("spark.log.level", "ERROR").getOrCreate()
     )
     types = {"string": "string", "int32": "int", "int64": "bigint", "bool": "boolean", "float": "float", "double": "double"}

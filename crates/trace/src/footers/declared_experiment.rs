@@ -25,7 +25,7 @@ pub struct DeclaredExperiment {
     pub definitions: Option<String>,
     /// SHA-256 of the definition file, if it is the user's own.
     pub definitions_hash: Option<String>,
-    /// Columns of [`of_some_tasks`] without a meaning in its task, in this order.
+    /// Columns of `of_some_tasks` without a meaning in its task, in this order.
     pub absent: Vec<&'static str>,
     pub answers: Vec<DeclaredColumn>,
 }

@@ -40,7 +40,7 @@ pub const METADATA_KEY: &str = "recording";
 pub mod topic {
     pub const EPISODE: &str = "/episode";
     pub(crate) const CAMERA: &str = "/camera";
-    pub(crate) const TRANSFORMS: &str = "/tf";
+    pub const TRANSFORMS: &str = "/tf";
     pub const SCENE: &str = "/scene";
     pub const CENSUS: &str = "/census";
     pub(crate) const DECISION: &str = "/decision";

@@ -204,7 +204,7 @@ impl Lost {
     }
 
     /// Lost to the failure of a reply, which counts as this status.
-    pub(crate) fn counted_as(status: Status, cause: impl Into<String>) -> Self {
+    pub fn counted_as(status: Status, cause: impl Into<String>) -> Self {
         Self { status: Some(status), ..Self::because(cause) }
     }
 
@@ -218,11 +218,11 @@ impl Lost {
         Self { kind: LostKind::Limit, ..Self::because(cause) }
     }
 
-    pub(crate) fn by_stop() -> Self {
+    pub fn by_stop() -> Self {
         Self { kind: LostKind::Stop, ..Self::because("the recording is being stopped") }
     }
 
-    pub(crate) fn by_leaving() -> Self {
+    pub fn by_leaving() -> Self {
         Self { kind: LostKind::Leaving, ..Self::because("the participant has left the study") }
     }
 }

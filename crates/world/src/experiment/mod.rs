@@ -6,13 +6,14 @@
 //! ```
 //!
 //! `table` reads one `[experiment.NAME]` key by key; [`schema`] has the same shape as types, for the JSON Schema;
-//! [`explain`] describes a [`Spec`] in words; [`balance`] distributes colours equally.
+//! [`explain`] describes a [`Spec`] in words; `balance` distributes colours equally.
 //!
 //! The paper's five experiments are such files. A trace has the whole [`Spec`] in its footer, so replays and reports
 //! need no file.
 //!
 //! Rule: an experiment draws nothing, renders nothing and knows no agent; `sim` and `agent` read it.
 
+#[cfg(feature = "sim")]
 pub(crate) mod balance;
 mod built_in;
 pub mod explain;

@@ -330,11 +330,11 @@ impl Spec {
         self.reply.contains(&ReplyKey::SelectedCube)
     }
 
-    pub(crate) fn asks_for_identification(&self) -> bool {
+    pub fn asks_for_identification(&self) -> bool {
         self.reply.contains(&ReplyKey::Identification)
     }
 
-    pub(crate) fn asks_for_mark(&self) -> bool {
+    pub fn asks_for_mark(&self) -> bool {
         self.reply.contains(&ReplyKey::Mark)
     }
 }

@@ -118,11 +118,11 @@ pub struct WornMark {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Patch {
     /// Of its middle from that of the body, to the left of the body where positive, mm.
-    pub(crate) aside_mm: i32,
+    pub aside_mm: i32,
     /// Of its middle above the floor, mm.
-    pub(crate) height_mm: i32,
+    pub height_mm: i32,
     /// Of its sides, mm.
-    pub(crate) edge_mm: i32,
+    pub edge_mm: i32,
 }
 
 /// The shape of a hand.

@@ -1,6 +1,6 @@
 //! A program running for one episode: lines in, lines out, and failures.
 //!
-//! Rule: no process outlives its [`Program`]: dropping the value kills its process group, including processes started
+//! Rule: no process outlives its `Program`: dropping the value kills its process group, including processes started
 //! meanwhile. Standard error is read continuously.
 //!
 //! A line is a reply if the program had begun to read the question when it wrote the line. Where the system reports the

@@ -238,7 +238,7 @@ fn property(answer: &Answer) -> Value {
 }
 
 /// SHA-256 of the structure and of its own answers' words, if any; 64 hexadecimal digits, for recordings.
-pub(crate) fn structure_hash(experiment: &Spec) -> String {
+pub fn structure_hash(experiment: &Spec) -> String {
     let words: String = experiment.answers.iter().flat_map(|answer| ["\n", answer.words.as_str()]).collect();
     exact::hash::of_bytes(format!("{}{words}", structure(experiment)).as_bytes())
 }

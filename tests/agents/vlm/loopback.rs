@@ -329,19 +329,14 @@ fn in_batches(server: usize, model: &str) {
     assert!((cost - 24.0 * 0.001_64 / 2.0).abs() < 1e-9, "{cost}");
 }
 
+/// All at once, as they mostly wait.
 #[test]
-fn anthropic_batches_are_not_paid_twice_after_a_kill() {
-    in_batches(1, "Sonnet");
-}
-
-#[test]
-fn openai_batches_are_not_paid_twice_after_a_kill() {
-    in_batches(0, "GPT 5.1");
-}
-
-#[test]
-fn google_batches_are_not_paid_twice_after_a_kill() {
-    in_batches(2, "Flash");
+fn batches_are_not_paid_twice_after_a_kill() {
+    std::thread::scope(|scope| {
+        for (server, model) in [(0, "GPT 5.1"), (1, "Sonnet"), (2, "Flash")] {
+            scope.spawn(move || in_batches(server, model));
+        }
+    });
 }
 
 #[test]

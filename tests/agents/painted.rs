@@ -8,7 +8,7 @@ use std::sync::Arc;
 use trace::episode::Action;
 use trace::frame::Frame;
 use trace::palette::Color;
-use world::agent::perception::camera::{Heading, Place, Pose};
+use world::agent::perception::camera::{Heading, Place, Viewpoint};
 use world::agent::scripted::Scripted;
 use world::agent::{Observation, Reply, Task};
 use world::experiment::Experiment;
@@ -35,12 +35,12 @@ pub struct Painted {
 
 impl Painted {
     /// The view of a body's eye at `pose`.
-    pub fn frame(&self, pose: Pose) -> Frame {
+    pub fn frame(&self, pose: Viewpoint) -> Frame {
         self.frame_reflecting(pose, pose.place)
     }
 
     /// The view at `pose` if the mirror shows the own body at another place.
-    pub fn frame_reflecting(&self, pose: Pose, reflected: Place) -> Frame {
+    pub fn frame_reflecting(&self, pose: Viewpoint, reflected: Place) -> Frame {
         let (width, height) = SIZE;
         let [cosine, sine] = pose.heading.direction();
         let eye = [pose.place.x + EYE.0 * cosine, pose.place.y + EYE.0 * sine, EYE.1];
@@ -82,7 +82,7 @@ impl Painted {
     }
 
     /// Plays an episode of a scripted agent: returns its replies and its place at the last one.
-    pub fn play(&self, agent: Scripted, task: &Task, start: Pose) -> (Vec<Reply>, Place) {
+    pub fn play(&self, agent: Scripted, task: &Task, start: Viewpoint) -> (Vec<Reply>, Place) {
         let mut agent = agent.agent(task);
         let (mut pose, mut bumped, mut history) = (start, false, None);
         let mut replies: Vec<Reply> = Vec::new();
@@ -127,11 +127,11 @@ pub fn task(experiment: Experiment, seed: u64) -> Task {
     Task { experiment, stated_color: None, step_budget: 100, seed }
 }
 
-pub fn pose(x: f64, y: f64, yaw: f64) -> Pose {
-    Pose { place: Place { x, y }, heading: Heading::nearest(yaw) }
+pub fn pose(x: f64, y: f64, yaw: f64) -> Viewpoint {
+    Viewpoint { place: Place { x, y }, heading: Heading::nearest(yaw) }
 }
 
-fn moved(pose: Pose, action: Action) -> Pose {
+fn moved(pose: Viewpoint, action: Action) -> Viewpoint {
     world::agent::scripted::route::after(pose, action, STEP)
 }
 

@@ -12,7 +12,7 @@ use trace::write::OptionalColumns;
 use world::agent::scripted::Scripted;
 use world::experiment::spec::Body;
 use world::record::plan::{Key, Subject};
-use world::record::rollout::{Nobody, Stage, head, play, task};
+use world::record::rollout::{EpisodeStage, Nobody, head, play, task};
 use world::record::shares::Shares;
 use world::sim::camera::Camera;
 use world::sim::config::WorldConfig;
@@ -29,7 +29,7 @@ fn record(config: &WorldConfig, eye: Option<&RefCell<Camera>>, agent: Scripted, 
     let mut player = agent.agent(&task(config, &scene, key));
     let episode = head(config, &scene, key, &Subject::of(agent.name()));
     let mut world = World::new(config, scene).unwrap();
-    let stage = Stage { config, eye, looks: true, stop: &AtomicBool::new(false), shares: &Shares::default() };
+    let stage = EpisodeStage { config, eye, looks: true, stop: &AtomicBool::new(false), shares: &Shares::default() };
     ready(Box::pin(play(&stage, &mut world, player.as_mut(), key, episode, &mut Nobody))).unwrap().episode
 }
 

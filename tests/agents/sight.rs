@@ -5,9 +5,9 @@ use std::sync::Arc;
 use trace::palette::Color;
 use world::agent::Observation;
 use world::agent::perception::View;
-use world::agent::perception::camera::{Place, Pose};
+use world::agent::perception::camera::{Place, Viewpoint};
 use world::agent::scripted::knowledge::Knowledge;
-use world::agent::scripted::room::Side;
+use world::agent::scripted::room::WallSide;
 
 use crate::painted::{Painted, pose};
 
@@ -19,12 +19,12 @@ fn room() -> Painted {
     Painted { own: Color::Green, has_mirror: true, cubes: Vec::new(), others: Vec::new() }
 }
 
-fn observation(room: &Painted, pose: Pose) -> Observation {
+fn observation(room: &Painted, pose: Viewpoint) -> Observation {
     reflecting(room, pose, pose.place)
 }
 
 /// The view at a pose, with the own body reflected as if at another place.
-fn reflecting(room: &Painted, pose: Pose, reflected: Place) -> Observation {
+fn reflecting(room: &Painted, pose: Viewpoint, reflected: Place) -> Observation {
     Observation {
         t: 1,
         remaining: 100,
@@ -39,12 +39,12 @@ fn reflecting(room: &Painted, pose: Pose, reflected: Place) -> Observation {
     }
 }
 
-fn view(room: &Painted, pose: Pose) -> View {
+fn view(room: &Painted, pose: Viewpoint) -> View {
     View::of(&observation(room, pose))
 }
 
 /// The knowledge after a look from each of `poses`.
-fn known(room: &Painted, poses: &[Pose]) -> Knowledge {
+fn known(room: &Painted, poses: &[Viewpoint]) -> Knowledge {
     let mut known = Knowledge::new(&observation(room, poses[0]));
     for &pose in poses {
         known.see(&observation(room, pose));
@@ -53,7 +53,7 @@ fn known(room: &Painted, poses: &[Pose]) -> Knowledge {
 }
 
 /// Poses in front of the mirror: three views from two places.
-fn before_the_mirror() -> [Pose; 4] {
+fn before_the_mirror() -> [Viewpoint; 4] {
     [pose(0.0, 0.3, 60.0), pose(2.0, 0.3, 0.0), pose(2.3, 0.3, 0.0), pose(2.3, 0.3, 30.0)]
 }
 
@@ -97,19 +97,19 @@ fn feet_are_on_walls_or_behind_the_mirror() {
 #[test]
 fn a_mirror_is_found_at_its_place() {
     let known = known(&room(), &before_the_mirror());
-    let wall = known.room.wall(Side::East).unwrap();
+    let wall = known.room.wall(WallSide::East).unwrap();
     assert!((wall - 4.0).abs() < 0.15, "{wall}");
-    assert!(known.room.is_mirror(Side::East, 0.0));
-    assert!(!known.room.is_mirror(Side::East, 2.5));
-    assert_eq!(known.room.mirrors().collect::<Vec<_>>(), [Side::East]);
+    assert!(known.room.is_mirror(WallSide::East, 0.0));
+    assert!(!known.room.is_mirror(WallSide::East, 2.5));
+    assert_eq!(known.room.mirrors().collect::<Vec<_>>(), [WallSide::East]);
 }
 
 #[test]
 fn no_mirror_is_found_in_a_room_without_one() {
     let room = Painted { has_mirror: false, ..room() };
-    let poses: Vec<Pose> = (0..12).map(|twelfth| pose(0.7, -0.4, 30.0 * f64::from(twelfth))).collect();
+    let poses: Vec<Viewpoint> = (0..12).map(|twelfth| pose(0.7, -0.4, 30.0 * f64::from(twelfth))).collect();
     let known = known(&room, &poses);
-    assert!(Side::ALL.into_iter().all(|side| known.room.wall(side).is_some_and(|wall| (wall - 4.0).abs() < 0.2)));
+    assert!(WallSide::ALL.into_iter().all(|side| known.room.wall(side).is_some_and(|wall| (wall - 4.0).abs() < 0.2)));
     assert!(!known.room.has_mirror());
     assert_eq!(known.reflection.own_color(), None);
 }
@@ -142,14 +142,14 @@ fn the_own_body_is_recognised_among_others_by_its_place() {
 }
 
 /// A walk along the mirror and back at two metres, after a look around.
-fn along_the_mirror() -> Vec<Pose> {
+fn along_the_mirror() -> Vec<Viewpoint> {
     let steps = [-3, -2, -1, 0, 1, 2, 3, 2, 1, 0, -1, -2, -3];
     let walk = steps.map(|step| pose(2.0, 0.4 * f64::from(step), 0.0));
     [pose(0.0, 0.3, 60.0)].into_iter().chain(walk).collect()
 }
 
 /// The knowledge after all steps, with the body in the mirror at the place of `reflected`.
-fn known_of(poses: &[Pose], reflected: impl Fn(usize) -> Place) -> Knowledge {
+fn known_of(poses: &[Viewpoint], reflected: impl Fn(usize) -> Place) -> Knowledge {
     let room = room();
     let mut known = Knowledge::new(&observation(&room, poses[0]));
     for (at, &pose) in poses.iter().enumerate() {

@@ -2,7 +2,7 @@
 
 use trace::episode::Action;
 use trace::palette::Color;
-use world::agent::perception::camera::{Place, Pose};
+use world::agent::perception::camera::{Place, Viewpoint};
 use world::agent::scripted::Scripted;
 use world::agent::{Reply, Task};
 use world::experiment::Experiment;
@@ -17,7 +17,7 @@ fn room() -> Painted {
     Painted { own: Color::Green, has_mirror: true, cubes, others: Vec::new() }
 }
 
-fn start() -> Pose {
+fn start() -> Viewpoint {
     pose(0.0, 2.8, 90.0)
 }
 

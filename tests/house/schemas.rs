@@ -9,14 +9,14 @@ use mirrorstats::cli::printed_schema;
 use report::audit::Audit;
 use report::bundle::Manifest;
 use report::cells::diff::Changes;
-use report::comparison::Comparison;
+use report::comparison::PublishedComparison;
 use report::errata::Errata;
 use report::gate::Gate;
 use report::plan::Plan;
 use report::plan::register::RegisteredPlan;
 use report::sensitivity::Sensitivity;
 use report::statistics::{Sequential, Statistics};
-use report::style::Sheet;
+use report::style::StyleSheet;
 use schemars::schema_for;
 use score::evidence::Evidence;
 use serde_json::{Value, json};
@@ -41,7 +41,7 @@ fn current() -> Vec<(&'static str, Value)> {
     let mut schemas = vec![
         ("audit", json!(schema_for!(Audit))),
         ("check", json!(schema_for!(QualityCheckAnswer))),
-        ("comparison", json!(schema_for!(Comparison))),
+        ("comparison", json!(schema_for!(PublishedComparison))),
         ("decision", json!(schema_for!(Decision))),
         ("definitions-explain", json!(schema_for!(Explanation))),
         ("definitions", json!(schema_for!(DefinitionFile))),
@@ -62,7 +62,7 @@ fn current() -> Vec<(&'static str, Value)> {
         ("sensitivity", json!(schema_for!(Sensitivity))),
         ("stats", printed_schema::<Statistics>()),
         ("stats-sequential", json!(schema_for!(Sequential))),
-        ("style", json!(schema_for!(Sheet))),
+        ("style", json!(schema_for!(StyleSheet))),
         ("trace", json!(SchemaDocument::current())),
         ("validation", printed_schema::<Validation>()),
         ("verify", json!(schema_for!(Verification))),

@@ -75,7 +75,7 @@ fn check_thresholds(label: &str, cast: &Cast, px: &[u32]) {
     let stages: Vec<_> = px.map(|px| sensitivity::Stage { px, cells: &cast.cells }).collect();
     let metrics = ["MCR", "CR", "TTD", "MTATO"].map(str::to_owned);
     let reference = "recorded (60 and 1000 px)";
-    let input = sensitivity::Input { stages: &stages, metrics: &metrics, order: &[], reference };
+    let input = sensitivity::SensitivityInput { stages: &stages, metrics: &metrics, order: &[], reference };
     let svg = sensitivity::draw(&input).unwrap().inline_svg();
     check_texts(&format!("sensitivity {label}"), &svg);
     let known = cast.cells.groups.iter().flat_map(|group| cast.cells.metrics.iter().zip(&group.moments));

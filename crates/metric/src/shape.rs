@@ -70,7 +70,7 @@ pub struct ExperimentShape {
     pub order: Option<i64>,
     /// Chance levels by metric, as fractions such as `1/3`; `none` where a metric's own level does not apply.
     #[serde(default)]
-    pub chance: IndexMap<String, Level>,
+    pub chance: IndexMap<String, ChanceLevel>,
     /// Reference levels by metric, where no chance level applies.
     #[serde(default)]
     pub reference: IndexMap<String, Vec<Fraction>>,
@@ -115,8 +115,9 @@ pub struct MetricShape {
 
 /// A chance level.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[schemars(rename = "Level")]
 #[serde(untagged)]
-pub enum Level {
+pub enum ChanceLevel {
     /// No level.
     None(NoLevel),
     /// The level.

@@ -32,11 +32,11 @@ const UNCOUNTED: usize = 64 << 10;
 pub struct Expansion {
     inflated: Budget,
     written_out: Budget,
-    read: Mutex<HashMap<(Kind, usize, usize), u64>>,
+    read: Mutex<HashMap<(ExpansionKind, usize, usize), u64>>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-enum Kind {
+enum ExpansionKind {
     Page,
     PageTexts,
     Rows,
@@ -58,24 +58,24 @@ impl Expansion {
 
     /// A page of `bytes` that starts at `offset` of the file, in a column of a row group.
     pub(crate) fn page(&self, place: (usize, usize), offset: u64, bytes: usize) -> Result<(), Exceeded> {
-        if self.is_new(Kind::Page, place, offset + 1) { self.inflated.spend(bytes as u64) } else { Ok(()) }
+        if self.is_new(ExpansionKind::Page, place, offset + 1) { self.inflated.spend(bytes as u64) } else { Ok(()) }
     }
 
     /// A page at `offset` whose written-out texts take `bytes`.
     pub(crate) fn texts(&self, place: (usize, usize), offset: u64, bytes: u64) -> Result<(), Exceeded> {
-        if self.is_new(Kind::PageTexts, place, offset + 1) { self.written_out.spend(bytes) } else { Ok(()) }
+        if self.is_new(ExpansionKind::PageTexts, place, offset + 1) { self.written_out.spend(bytes) } else { Ok(()) }
     }
 
     /// Rows from `first` on of a column of a row group.
     pub fn rows(&self, place: (usize, usize), first: usize, column: &Column) -> Result<(), Exceeded> {
         let bytes = bytes_of_texts(column);
-        if bytes == 0 || !self.is_new(Kind::Rows, place, (first + column.len()) as u64) {
+        if bytes == 0 || !self.is_new(ExpansionKind::Rows, place, (first + column.len()) as u64) {
             return Ok(());
         }
         self.written_out.spend(bytes)
     }
 
-    fn is_new(&self, kind: Kind, (row_group, column): (usize, usize), at: u64) -> bool {
+    fn is_new(&self, kind: ExpansionKind, (row_group, column): (usize, usize), at: u64) -> bool {
         let mut read = self.read.lock().unwrap_or_else(PoisonError::into_inner);
         let last = read.entry((kind, row_group, column)).or_default();
         let is_new = at > *last;

@@ -8,7 +8,7 @@
 use bytes::Bytes;
 use parquet::file::reader::ChunkReader;
 
-use crate::thrift::{Compact, Fault, Wire};
+use crate::thrift::{Compact, ThriftFault, Wire};
 
 /// The fields of a structure, from number 1.
 type Shape = &'static [Value];
@@ -106,11 +106,11 @@ pub fn footer_bytes(file: &impl ChunkReader) -> Option<(u64, Bytes)> {
     file.get_bytes(start, usize::try_from(length).ok()?).ok().map(|bytes| (start, bytes))
 }
 
-fn check(footer: &[u8]) -> Result<(), Fault> {
+fn check(footer: &[u8]) -> Result<(), ThriftFault> {
     walk(&mut Compact::new(footer), FILE)
 }
 
-fn walk(compact: &mut Compact<'_>, shape: Shape) -> Result<(), Fault> {
+fn walk(compact: &mut Compact<'_>, shape: Shape) -> Result<(), ThriftFault> {
     let mut last = 0;
     while let Some(field) = compact.field(last)? {
         last = field.id;
@@ -122,7 +122,7 @@ fn walk(compact: &mut Compact<'_>, shape: Shape) -> Result<(), Fault> {
             (Struct(fields), Wire::Struct) => walk(compact, fields)?,
             (List(wanted), Wire::List) => elements(compact, *wanted, |compact| compact.skip(*wanted))?,
             (Structs(fields), Wire::List) => elements(compact, Wire::Struct, |compact| walk(compact, fields))?,
-            _ => return Err(Fault::Invalid("a field of another type")),
+            _ => return Err(ThriftFault::Invalid("a field of another type")),
         }
     }
     Ok(())
@@ -131,11 +131,11 @@ fn walk(compact: &mut Compact<'_>, shape: Shape) -> Result<(), Fault> {
 fn elements<'a>(
     compact: &mut Compact<'a>,
     wanted: Wire,
-    mut walk: impl FnMut(&mut Compact<'a>) -> Result<(), Fault>,
-) -> Result<(), Fault> {
+    mut walk: impl FnMut(&mut Compact<'a>) -> Result<(), ThriftFault>,
+) -> Result<(), ThriftFault> {
     let (element, count) = compact.list()?;
     if count > 0 && element != wanted {
-        return Err(Fault::Invalid("a list of another type"));
+        return Err(ThriftFault::Invalid("a list of another type"));
     }
     (0..count).try_for_each(|_| walk(compact))
 }
@@ -143,15 +143,15 @@ fn elements<'a>(
 #[cfg(test)]
 mod tests {
     use super::check;
-    use crate::thrift::Fault;
+    use crate::thrift::ThriftFault;
 
     #[test]
     fn a_field_of_another_type_than_its_number_is_refused() {
         // Only the version; then the same number as a list of 2^31 doubles.
         assert_eq!(check(&[0x15, 2, 0]), Ok(()));
         let huge = [0x19, 0xf7, 0xff, 0xff, 0xff, 0xff, 0x07, 0];
-        assert_eq!(check(&huge), Err(Fault::Invalid("a field of another type")));
+        assert_eq!(check(&huge), Err(ThriftFault::Invalid("a field of another type")));
         // Field 15 is unknown: its list is walked, and exceeds the footer.
-        assert_eq!(check(&[&[0xf9], &huge[1..]].concat()), Err(Fault::Ends));
+        assert_eq!(check(&[&[0xf9], &huge[1..]].concat()), Err(ThriftFault::Ends));
     }
 }

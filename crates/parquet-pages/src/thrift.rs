@@ -27,7 +27,7 @@ pub(crate) enum Wire {
 const DEEPEST: u8 = 32;
 
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub(crate) enum Fault {
+pub(crate) enum ThriftFault {
     /// The bytes end before the structure does.
     #[error("one that goes on beyond its end")]
     Ends,
@@ -57,7 +57,7 @@ impl<'a> Compact<'a> {
     }
 
     /// The next field of a structure after the one with the id `last`; `None` at the structure's end.
-    pub(crate) fn field(&mut self, last: i16) -> Result<Option<Field>, Fault> {
+    pub(crate) fn field(&mut self, last: i16) -> Result<Option<Field>, ThriftFault> {
         let byte = self.byte()?;
         if byte == 0 {
             return Ok(None);
@@ -67,17 +67,17 @@ impl<'a> Compact<'a> {
             0 => i16::try_from(self.zigzag()?).ok(),
             delta => last.checked_add(delta),
         };
-        Ok(Some(Field { id: id.ok_or(Fault::Invalid("a field number out of range"))?, wire }))
+        Ok(Some(Field { id: id.ok_or(ThriftFault::Invalid("a field number out of range"))?, wire }))
     }
 
-    pub(crate) fn int(&mut self, field: Field) -> Result<i32, Fault> {
+    pub(crate) fn int(&mut self, field: Field) -> Result<i32, ThriftFault> {
         if field.wire != Wire::I32 {
-            return Err(Fault::Invalid("a field of another type"));
+            return Err(ThriftFault::Invalid("a field of another type"));
         }
-        i32::try_from(self.zigzag()?).map_err(|_| Fault::Invalid("a number out of range"))
+        i32::try_from(self.zigzag()?).map_err(|_| ThriftFault::Invalid("a number out of range"))
     }
 
-    pub(crate) fn list(&mut self) -> Result<(Wire, usize), Fault> {
+    pub(crate) fn list(&mut self) -> Result<(Wire, usize), ThriftFault> {
         let byte = self.byte()?;
         let count = match byte >> 4 {
             15 => self.varint()?,
@@ -90,13 +90,13 @@ impl<'a> Compact<'a> {
         Ok((element(byte & 0xf)?, self.within(count)?))
     }
 
-    pub(crate) fn skip(&mut self, wire: Wire) -> Result<(), Fault> {
+    pub(crate) fn skip(&mut self, wire: Wire) -> Result<(), ThriftFault> {
         self.skip_at(wire, 0)
     }
 
-    fn skip_at(&mut self, wire: Wire, depth: u8) -> Result<(), Fault> {
+    fn skip_at(&mut self, wire: Wire, depth: u8) -> Result<(), ThriftFault> {
         if depth > DEEPEST {
-            return Err(Fault::Invalid("structures within structures without end"));
+            return Err(ThriftFault::Invalid("structures within structures without end"));
         }
         match wire {
             Wire::True | Wire::False => Ok(()),
@@ -122,7 +122,7 @@ impl<'a> Compact<'a> {
         }
     }
 
-    fn skip_map(&mut self, depth: u8) -> Result<(), Fault> {
+    fn skip_map(&mut self, depth: u8) -> Result<(), ThriftFault> {
         let count = self.varint()?;
         if count == 0 {
             return Ok(());
@@ -136,22 +136,22 @@ impl<'a> Compact<'a> {
         Ok(())
     }
 
-    fn byte(&mut self) -> Result<u8, Fault> {
-        let byte = *self.data.get(self.at).ok_or(Fault::Ends)?;
+    fn byte(&mut self) -> Result<u8, ThriftFault> {
+        let byte = *self.data.get(self.at).ok_or(ThriftFault::Ends)?;
         self.at += 1;
         Ok(byte)
     }
 
-    fn bytes(&mut self, count: u64) -> Result<(), Fault> {
+    fn bytes(&mut self, count: u64) -> Result<(), ThriftFault> {
         self.at += self.within(count)?;
         Ok(())
     }
 
-    fn within(&self, count: u64) -> Result<usize, Fault> {
-        usize::try_from(count).ok().filter(|count| *count <= self.data.len() - self.at).ok_or(Fault::Ends)
+    fn within(&self, count: u64) -> Result<usize, ThriftFault> {
+        usize::try_from(count).ok().filter(|count| *count <= self.data.len() - self.at).ok_or(ThriftFault::Ends)
     }
 
-    fn varint(&mut self) -> Result<u64, Fault> {
+    fn varint(&mut self) -> Result<u64, ThriftFault> {
         let mut value = 0;
         for shift in (0..64).step_by(7) {
             let byte = self.byte()?;
@@ -160,27 +160,27 @@ impl<'a> Compact<'a> {
                 return Ok(value);
             }
         }
-        Err(Fault::Invalid("a number of too many bytes"))
+        Err(ThriftFault::Invalid("a number of too many bytes"))
     }
 
-    fn zigzag(&mut self) -> Result<i64, Fault> {
+    fn zigzag(&mut self) -> Result<i64, ThriftFault> {
         let value = self.varint()?;
         Ok((value >> 1).cast_signed() ^ -(value & 1).cast_signed())
     }
 }
 
-fn wire(code: u8) -> Result<Wire, Fault> {
+fn wire(code: u8) -> Result<Wire, ThriftFault> {
     use Wire::{Binary, Double, False, I8, I16, I32, I64, List, Map, Set, Struct, True, Uuid};
     const BY_CODE: [Wire; 13] = [True, False, I8, I16, I32, I64, Double, Binary, List, Set, Map, Struct, Uuid];
     let wire = usize::from(code).checked_sub(1).and_then(|at| BY_CODE.get(at));
-    wire.copied().ok_or(Fault::Invalid("a value of an unknown type"))
+    wire.copied().ok_or(ThriftFault::Invalid("a value of an unknown type"))
 }
 
 /// The encoding of the elements of a collection. Truth values take a byte each there, which the Parquet library does
 /// not skip. The Parquet structures read here have none.
-fn element(code: u8) -> Result<Wire, Fault> {
+fn element(code: u8) -> Result<Wire, ThriftFault> {
     match wire(code)? {
-        Wire::True | Wire::False => Err(Fault::Invalid("a collection of truth values")),
+        Wire::True | Wire::False => Err(ThriftFault::Invalid("a collection of truth values")),
         wire => Ok(wire),
     }
 }
@@ -190,7 +190,7 @@ mod tests {
     use proptest::collection::vec;
     use proptest::prelude::*;
 
-    use super::{Compact, Fault, Field, Wire};
+    use super::{Compact, Field, ThriftFault, Wire};
 
     #[test]
     fn the_fields_of_a_structure_are_read_or_skipped() {
@@ -211,13 +211,13 @@ mod tests {
         let huge = [0xff, 0xff, 0xff, 0xff, 0x07];
         let list = |element: u8| [&[0xf0 | element], &huge[..], &[0; 20]].concat();
         for element in [3, 5, 7, 8, 9, 12, 13] {
-            assert_eq!(Compact::new(&list(element)).skip(Wire::List), Err(Fault::Ends), "{element}");
+            assert_eq!(Compact::new(&list(element)).skip(Wire::List), Err(ThriftFault::Ends), "{element}");
         }
         let truths = Compact::new(&list(1)).skip(Wire::List);
-        assert_eq!(truths, Err(Fault::Invalid("a collection of truth values")));
+        assert_eq!(truths, Err(ThriftFault::Invalid("a collection of truth values")));
         let map = [&huge[..], &[0x77], &[0; 20]].concat();
-        assert_eq!(Compact::new(&map).skip(Wire::Map), Err(Fault::Ends));
-        assert_eq!(Compact::new(&huge).skip(Wire::Binary), Err(Fault::Ends));
+        assert_eq!(Compact::new(&map).skip(Wire::Map), Err(ThriftFault::Ends));
+        assert_eq!(Compact::new(&huge).skip(Wire::Binary), Err(ThriftFault::Ends));
         let deep = vec![0x19; 100_000];
         assert!(Compact::new(&deep).skip(Wire::List).is_err());
     }

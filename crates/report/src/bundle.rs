@@ -66,7 +66,7 @@ pub struct Manifest {
     #[serde(rename = "where")]
     pub filter: Option<String>,
     /// The inputs, ordered by path, then hash.
-    pub inputs: Vec<Input>,
+    pub inputs: Vec<InputFile>,
     /// What was written beside this manifest, ordered by path. Absent in reports of earlier versions, and in the copy
     /// inside `report.html`, whose own hash would have to be in it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -86,7 +86,8 @@ pub struct StyleOrigin {
 
 /// One file that was read.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
-pub struct Input {
+#[schemars(rename = "Input")]
+pub struct InputFile {
     /// The path as given if that is relative, else the file's name alone.
     pub path: String,
     /// SHA-256 of its content.
@@ -113,7 +114,7 @@ pub enum BundleError {
     #[error("cannot write the report: `{}` is not a path of its own inside the folder", path.display())]
     BadPath { path: PathBuf },
     #[error("cannot write the report: {0}, or the report another --out")]
-    Input(#[from] TargetIsInput),
+    InputFile(#[from] TargetIsInput),
     #[error(transparent)]
     Folder(#[from] FolderHoldsInput),
     #[error("cannot write the report to {}; is the folder writable?", path.display())]
@@ -122,7 +123,13 @@ pub enum BundleError {
 
 impl Manifest {
     /// The manifest of a report made by this version.
-    pub fn new(cells: &Cells, style: &Style, schema_version: u32, filter: Option<String>, inputs: Vec<Input>) -> Self {
+    pub fn new(
+        cells: &Cells,
+        style: &Style,
+        schema_version: u32,
+        filter: Option<String>,
+        inputs: Vec<InputFile>,
+    ) -> Self {
         let mut inputs = inputs;
         inputs.sort();
         Self {
@@ -150,7 +157,7 @@ impl Manifest {
     }
 }
 
-impl Input {
+impl InputFile {
     /// An input in the form allowed in a manifest: no absolute path, no `..`, `/` between folders.
     pub fn new(path: &Path, sha256: String, bytes: u64) -> Self {
         let is_plain = |part: &Component| matches!(part, Component::Normal(_) | Component::CurDir);
@@ -165,7 +172,7 @@ impl Input {
 impl Output {
     fn new(file: &OutputFile) -> Self {
         Self {
-            path: Input::new(&file.path, String::new(), 0).path,
+            path: InputFile::new(&file.path, String::new(), 0).path,
             sha256: hash::of_bytes(&file.bytes),
             bytes: file.bytes.len() as u64,
         }

@@ -20,7 +20,8 @@ use exact::number::Decimal;
 
 /// The result of a comparison.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
-pub struct Comparison {
+#[schemars(rename = "Comparison")]
+pub struct PublishedComparison {
     /// The table of ours.
     pub table: String,
     /// The number of cells of the published table.
@@ -104,11 +105,11 @@ fn described(table: &MetricTable) -> String {
     format!("`{}` ({})", table.name, metrics.join(", "))
 }
 
-pub fn compare(table: &MetricTable, published: &Published, errata: &Errata) -> Comparison {
+pub fn compare(table: &MetricTable, published: &Published, errata: &Errata) -> PublishedComparison {
     let ours = our_cells(table);
     let about_table: Vec<&Erratum> = errata.erratum.iter().filter(|erratum| erratum.table == table.name).collect();
     let mut used = vec![false; about_table.len()];
-    let mut comparison = Comparison {
+    let mut comparison = PublishedComparison {
         table: table.name.clone(),
         cells: published.cells.len(),
         same: 0,
@@ -214,7 +215,7 @@ fn excuses(erratum: &Erratum, difference: &Difference) -> bool {
         && is_stated(&erratum.computed, &difference.computed)
 }
 
-impl Comparison {
+impl PublishedComparison {
     pub fn holds(&self) -> bool {
         self.differing == 0
     }

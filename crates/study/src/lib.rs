@@ -46,7 +46,7 @@ use std::path::{Path, PathBuf};
 use ::report::bundle::BundleError;
 use ::report::cells::Cells;
 use ::report::cells::group::group;
-use ::report::comparison::{Comparison, choose, compare};
+use ::report::comparison::{PublishedComparison, choose, compare};
 use ::report::errata::Errata;
 use ::report::figures::{Figure, FigureName};
 pub use ::report::layout;
@@ -346,7 +346,7 @@ impl Study {
         style: impl AsRef<Path>,
         table: Option<&str>,
         errata: &Errata,
-    ) -> Result<Comparison, StudyError> {
+    ) -> Result<PublishedComparison, StudyError> {
         // Small files first: a mistake in them should not cost a scan of the traces.
         let published = published::read(published)?;
         let style = Style::load(style)?;

@@ -156,7 +156,7 @@ pub fn info(set: &TraceSet, listing: Listing, threads: NonZeroUsize) -> Result<I
     let most = most_listed(bytes);
     // The names of models are compared, counted and printed in full.
     let names = Limit::in_proportion("bytes of models in experiments in files of their size", 24 << 20, 8, bytes);
-    let mut tally = Tally { files: vec![0; set.files().len()], ..Tally::default() };
+    let mut tally = EpisodeTally { files: vec![0; set.files().len()], ..EpisodeTally::default() };
     let statuses: Vec<String> = set.declares(REPLY_STATUS).then(|| REPLY_STATUS.to_owned()).into_iter().collect();
     let mut replies = (!statuses.is_empty()).then(ReplyCounts::default);
     let summary = set.scan(
@@ -292,7 +292,7 @@ fn list(set: &TraceSet, batch: &EpisodeBatch) -> Vec<EpisodeInfo> {
 }
 
 #[derive(Default)]
-struct Tally {
+struct EpisodeTally {
     files: Vec<u64>,
     /// The bytes of models and experiments, names included.
     bytes: u64,
@@ -309,7 +309,7 @@ struct Grid {
     pairs: Vec<SeedRun>,
 }
 
-impl Tally {
+impl EpisodeTally {
     fn add(&mut self, Keys { file, cells, episodes }: Keys) {
         self.files[file] += episodes.len() as u64;
         let places: Vec<usize> = cells.into_iter().map(|cell| self.place(cell)).collect();

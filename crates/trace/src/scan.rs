@@ -17,7 +17,7 @@ use super::diagnostic::Finding;
 use super::error::TraceError;
 use super::read::budget::most_episodes;
 use super::read::open::{TraceFile, TraceSet};
-use super::read::parallel_scan::{Episodes, Event, pass};
+use super::read::parallel_scan::{Episodes, ScanEvent, pass};
 use super::read::projection::Layout;
 use super::schema::DeclaredColumn;
 use super::validate::color_set::{Spellings, other_names};
@@ -64,7 +64,7 @@ pub struct EpisodeBatch {
     pub texts: Vec<Texts>,
     /// One row per episode: [`EPISODE_COLUMNS`], then the columns of [`Projection::constants`], those of labels last.
     pub episodes: RecordBatch,
-    pub origin: Origin,
+    pub origin: RowOrigin,
 }
 
 /// A column of steps with few distinct texts, one byte per row.
@@ -87,7 +87,7 @@ impl Texts {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Origin {
+pub struct RowOrigin {
     /// The file's position in [`TraceSet::files`].
     pub file: usize,
     pub row_group: usize,
@@ -150,8 +150,8 @@ impl TraceSet {
         };
         let passed = pass(self.files(), &layout, threads, &checked, |_, event| {
             let checked = match event {
-                Event::Whole(checked) => checked,
-                Event::Fault(finding) => return Err(TraceError::from(finding).into()),
+                ScanEvent::Whole(checked) => checked,
+                ScanEvent::Fault(finding) => return Err(TraceError::from(finding).into()),
             };
             prints.add(&checked.ids);
             spellings.add(checked.colors);
@@ -190,7 +190,7 @@ pub struct EpisodePlace {
 pub fn episode_places(traces: &TraceSet, threads: NonZeroUsize) -> Result<HashMap<String, EpisodePlace>, TraceError> {
     let mut places = HashMap::new();
     let work = |batch: EpisodeBatch| -> Result<Vec<(String, EpisodePlace)>, TraceError> {
-        let Origin { file, row_group, row } = batch.origin;
+        let RowOrigin { file, row_group, row } = batch.origin;
         let before: usize = (0..row_group).map(|group| traces.files()[file].row_group_rows(group)).sum();
         let start = before + row;
         let ids = batch.episodes.column_by_name("episode_id").expect("every batch names its episodes");
@@ -238,7 +238,7 @@ impl Shape<'_> {
         let steps = self.part(&others, rows, |place| episodes.columns[place].flat())?;
         let constants = self.part(&self.episodes, episodes.len(), |place| episodes.columns[place].at(firsts))?;
         let first = episodes.pieces[0];
-        let origin = Origin { file: episodes.file, row_group: first.row_group, row: first.row };
+        let origin = RowOrigin { file: episodes.file, row_group: first.row_group, row: first.row };
         Ok(EpisodeBatch { offsets: episodes.offsets, steps, texts, episodes: constants, origin })
     }
 

@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use trace::episode::Episode;
 use trace::inputs::Input;
 use trace::log::LogError;
-use trace::log::frames::{self, LogIndex, Moment, Shape};
+use trace::log::frames::{self, LogIndex, Moment, SceneShape};
 use trace::merge::OwnColumn;
 
 /// The number of log indices in memory.
@@ -70,7 +70,7 @@ impl Logs {
     }
 
     /// Passes the shapes of each step with its t; no calls without a log. Only one log at a time is read for shapes.
-    pub fn each_shapes(&self, opened: &Opened, give: &mut dyn FnMut(usize, Vec<Shape>)) -> Result<(), LogError> {
+    pub fn each_shapes(&self, opened: &Opened, give: &mut dyn FnMut(usize, Vec<SceneShape>)) -> Result<(), LogError> {
         let _one = self.reading.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(log) = &opened.running {
             let times = opened.times();

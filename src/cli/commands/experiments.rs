@@ -17,12 +17,12 @@ use world::experiment::{Experiment, Spec, UnknownExperiment, built_in, built_in_
 #[derive(Clone, Debug, clap::Args)]
 pub struct ExperimentsArgs {
     #[command(subcommand)]
-    pub action: Action,
+    pub action: ExperimentsAction,
 }
 
 /// The action on experiments.
 #[derive(Clone, Debug, clap::Subcommand)]
-pub enum Action {
+pub enum ExperimentsAction {
     /// Show every fault of a file of experiments, underlined, with a suggestion
     Check {
         /// A TOML file
@@ -59,9 +59,9 @@ pub struct ExperimentsAnswer {
 impl ExperimentsArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
         match self.action {
-            Action::Check { file, json } => check(&file, json),
-            Action::Explain { experiment, json } => explain(&experiment, json),
-            Action::Show { name } => show(name.as_deref()),
+            ExperimentsAction::Check { file, json } => check(&file, json),
+            ExperimentsAction::Explain { experiment, json } => explain(&experiment, json),
+            ExperimentsAction::Show { name } => show(name.as_deref()),
         }
     }
 }

@@ -15,12 +15,12 @@ use study::StudyError;
 #[derive(Clone, Debug, clap::Args)]
 pub struct StyleArgs {
     #[command(subcommand)]
-    action: Action,
+    action: StyleAction,
 }
 
 /// The action on styles.
 #[derive(Clone, Debug, clap::Subcommand)]
-enum Action {
+enum StyleAction {
     /// Print a built-in style, to start your own from
     Show {
         /// `default` or `paper`
@@ -41,8 +41,8 @@ enum Action {
 impl StyleArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
         match self.action {
-            Action::Show { name } => show(&name),
-            Action::Check { file, definitions } => check(&file, &definitions),
+            StyleAction::Show { name } => show(&name),
+            StyleAction::Check { file, definitions } => check(&file, &definitions),
         }
     }
 }

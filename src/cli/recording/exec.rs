@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use crate::cli::Failure;
-use world::agent::exec::{Exec, Images, Settings};
+use world::agent::exec::{Exec, ExecSettings, Images};
 use world::record::lock::parts_of;
 
 /// The folder inside a recording's folder for the standard error of programs.
@@ -41,7 +41,7 @@ impl ExecArgs {
             ExecImages::Path => Images::Path,
             ExecImages::Base64 => Images::Base64,
         };
-        Exec::new(Settings {
+        Exec::new(ExecSettings {
             model: model.unwrap_or("exec").to_owned(),
             command: command.to_owned(),
             images,

@@ -12,7 +12,7 @@ use web::{self, Guard};
 use world::agent::human::Human;
 use world::agent::human::design::{Design, Order, Schedule};
 use world::agent::human::hub::{Eraser, Hub};
-use world::agent::human::journal::Journal;
+use world::agent::human::journal::ParticipantJournal;
 use world::agent::human::seat::Terms;
 use world::agent::human::server::{self, Server};
 use world::record::participants::remove_episodes;
@@ -77,7 +77,8 @@ impl HumanArgs {
             prefills: self.prefill_identification,
         };
         let unwritable = |error| Failure::input(format!("the journal in {} cannot be opened: {error}", out.display()));
-        let journal = if plays { Journal::open(out).map_err(unwritable)? } else { Journal::none() };
+        let journal =
+            if plays { ParticipantJournal::open(out).map_err(unwritable)? } else { ParticipantJournal::none() };
         let mut people = Vec::new();
         for (code, place) in self.participants.iter().zip(1..) {
             self.check_place(&journal, code, place)?;
@@ -116,7 +117,7 @@ impl HumanArgs {
         })
     }
 
-    fn check_place(&self, journal: &Journal, code: &str, place: usize) -> Result<(), Failure> {
+    fn check_place(&self, journal: &ParticipantJournal, code: &str, place: usize) -> Result<(), Failure> {
         match journal.enrolled(code) {
             Some((before, _)) if before != place && self.design != Design::Split => Err(Failure::input(format!(
                 "--participants: `{code}` has place {place}, and had place {before} when this recording began\n  help: keep \
@@ -144,7 +145,7 @@ impl HumanArgs {
 }
 
 /// The token of a participant's link: that of the previous start, or a new one.
-fn enrol(journal: &Journal, code: &str, place: usize) -> io::Result<String> {
+fn enrol(journal: &ParticipantJournal, code: &str, place: usize) -> io::Result<String> {
     if let Some((_, token)) = journal.enrolled(code) {
         return Ok(token.to_owned());
     }

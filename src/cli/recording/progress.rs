@@ -196,7 +196,7 @@ mod tests {
 
     #[test]
     fn a_log_names_programs_but_not_scripted_agents() {
-        let settings = exec::Settings {
+        let settings = exec::ExecSettings {
             model: "own".to_owned(),
             command: "true".to_owned(),
             images: exec::Images::Path,

@@ -4,11 +4,11 @@ use std::num::NonZeroUsize;
 use std::path::Path;
 use std::sync::LazyLock;
 
-use report::bundle::{Input, Manifest};
+use report::bundle::{InputFile, Manifest};
 use report::cells::Cells;
 use report::cells::group::group;
 use report::figures::{self, FigureName};
-use report::html::{self, Figure, HtmlError, Page, Recordings};
+use report::html::{self, EmbeddedFigure, HtmlError, Page, Recordings};
 use report::layout;
 use report::layout::MetricTable;
 use report::statistics::{Options, Statistics};
@@ -49,7 +49,7 @@ impl Report {
         let cells = group(&episodes, &by).unwrap();
         let style = Style::load(style).unwrap();
         let tables = layout::tables(&cells, &style).unwrap();
-        let input = |name: &str| Input::new(Path::new(name), "0".repeat(64), 1234);
+        let input = |name: &str| InputFile::new(Path::new(name), "0".repeat(64), 1234);
         let inputs = vec![input("traces/a.parquet"), input("traces/b.parquet")];
         let manifest = Manifest::new(&cells, &style, 1, None, inputs);
         let paths = manifest.inputs.iter().map(|input| input.path.clone()).collect();
@@ -79,7 +79,7 @@ impl Report {
     }
 
     pub fn render(&self) -> Result<String, HtmlError> {
-        let figures: Vec<Figure<'_>> = self.figures.iter().map(figure).collect();
+        let figures: Vec<EmbeddedFigure<'_>> = self.figures.iter().map(figure).collect();
         html::render(&Page {
             tables: &self.tables,
             cells: &self.cells,
@@ -93,6 +93,6 @@ impl Report {
     }
 }
 
-fn figure((name, caption, svg): &(FigureName, String, String)) -> Figure<'_> {
-    Figure { name: name.name(), title: name.title(), caption, svg }
+fn figure((name, caption, svg): &(FigureName, String, String)) -> EmbeddedFigure<'_> {
+    EmbeddedFigure { name: name.name(), title: name.title(), caption, svg }
 }

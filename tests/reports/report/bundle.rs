@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use report::bundle::{Bundle, BundleError, Input, Manifest, OutputFile, cells_csv, write};
+use report::bundle::{Bundle, BundleError, InputFile, Manifest, OutputFile, cells_csv, write};
 use report::cells::Cells;
 use report::layout::MetricTable;
 use report::style::Style;
@@ -22,7 +22,7 @@ const INPUTS: [&str; 4] = ["b.parquet", "/data/of/someone/a.parquet", "../up/c.p
 
 fn report() -> Report {
     let cells = published::cells();
-    let inputs = INPUTS.map(|path| Input::new(Path::new(path), "0".repeat(64), 5)).to_vec();
+    let inputs = INPUTS.map(|path| InputFile::new(Path::new(path), "0".repeat(64), 5)).to_vec();
     let filter = Some("seed = 1".to_owned());
     let manifest = Manifest::new(&cells, &Style::load("paper").unwrap(), 1, filter, inputs);
     Report { cells, tables: published::tables("paper"), manifest }

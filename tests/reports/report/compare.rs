@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use report::comparison::{Comparison, choose, compare};
+use report::comparison::{PublishedComparison, choose, compare};
 use report::errata::Errata;
 use report::published::{Published, read};
 use report::style::Style;
@@ -21,14 +21,14 @@ fn paper(table: &str) -> Published {
     read(Path::new(&published::path(table, "csv"))).unwrap()
 }
 
-fn against(published: &Published, errata: &Errata) -> Comparison {
+fn against(published: &Published, errata: &Errata) -> PublishedComparison {
     let style = Style::load("paper").unwrap();
     let tables = published::tables("paper");
     compare(choose(&tables, published, None, &style).unwrap(), published, errata)
 }
 
 /// The published main table after `change`, compared under the paper's errata.
-fn changed(change: impl Fn(&str) -> String) -> Comparison {
+fn changed(change: impl Fn(&str) -> String) -> PublishedComparison {
     let text = fs::read_to_string(published::path("main", "csv")).unwrap();
     against(&read(file(&change(&text)).path()).unwrap(), &Errata::of_paper())
 }

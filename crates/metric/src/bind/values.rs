@@ -14,7 +14,7 @@ use exact::suggest::nearest;
 use toml_spec::Fault;
 
 #[derive(Debug, Default)]
-struct Possible {
+struct PossibleValues {
     columns: Vec<String>,
     texts: Vec<String>,
 }
@@ -42,8 +42,8 @@ impl Binder<'_> {
     }
 
     /// The possible values of a node except null; `None` if any text is possible.
-    fn possible(&self, node: NodeId) -> Option<Possible> {
-        let mut possible = Possible::default();
+    fn possible(&self, node: NodeId) -> Option<PossibleValues> {
+        let mut possible = PossibleValues::default();
         let (mut seen, mut todo) = (HashSet::new(), vec![node]);
         while let Some(node) = todo.pop() {
             if !seen.insert(node) {
@@ -69,7 +69,7 @@ impl Binder<'_> {
     }
 }
 
-impl Possible {
+impl PossibleValues {
     fn never(&self, text: &str) -> String {
         let columns: Vec<String> = self.columns.iter().map(|name| format!("`{name}`")).collect();
         match columns.as_slice() {

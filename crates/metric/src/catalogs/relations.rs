@@ -20,7 +20,7 @@ pub struct Relations {
 
 impl Relations {
     pub fn of(catalog: &Catalog) -> Self {
-        let reader = Reader { catalog };
+        let reader = RelationReader { catalog };
         let moments: Vec<Completed> =
             catalog.metric.iter().filter_map(|(name, one)| reader.completed(name, one)).collect();
         let mut found = Self::default();
@@ -65,11 +65,11 @@ enum Without {
     Open,
 }
 
-struct Reader<'c> {
+struct RelationReader<'c> {
     catalog: &'c Catalog,
 }
 
-impl Reader<'_> {
+impl RelationReader<'_> {
     fn completed(&self, name: &str, metric: &Metric) -> Option<Completed> {
         let ExprKind::Name(whole) = parse(&metric.value).ok()?.kind else { return None };
         let (of_whole, when) = (self.catalog.metric.get(&whole)?, parse(metric.when.as_ref()?).ok()?);

@@ -40,16 +40,16 @@ pub struct Restricted {
 /// The known facts about each metric of a plan, in episodes of 1 to `steps` steps. `has_value` returns true if a column
 /// has a value in every row of every trace.
 pub fn implied(plan: &Plan, steps: u32, has_value: fn(&str) -> bool) -> IndexMap<String, Implied> {
-    let reader = Reader { plan, traces: Traces { plan, steps, has_value } };
+    let reader = OutputReader { plan, traces: Traces { plan, steps, has_value } };
     plan.outputs.iter().map(|output| (output.name.clone(), reader.read(output))).collect()
 }
 
-struct Reader<'p> {
+struct OutputReader<'p> {
     plan: &'p Plan,
     traces: Traces<'p>,
 }
 
-impl Reader<'_> {
+impl OutputReader<'_> {
     fn read(&self, output: &Output) -> Implied {
         let range = self.possible(output.node).range();
         let always = if self.possible(output.node).may_be_null { Defined::Sometimes } else { Defined::Always };

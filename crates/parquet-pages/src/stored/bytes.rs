@@ -34,34 +34,34 @@ const LARGEST: u64 = 8 << 20;
 
 /// A file, or a part of one in memory, addressed by file offsets.
 pub struct Store {
-    held: Held,
+    held: Backing,
     pub(crate) expansion: Arc<Expansion>,
 }
 
-enum Held {
+enum Backing {
     File(File),
     Memory { start: u64, bytes: Bytes },
 }
 
 impl Store {
     pub fn new(file: File, expansion: Arc<Expansion>) -> Self {
-        Self { held: Held::File(file), expansion }
+        Self { held: Backing::File(file), expansion }
     }
 
     /// Bytes from `start` of a file that has not been expanded yet.
     pub fn of_memory(start: u64, bytes: Bytes) -> Self {
         let expansion = Arc::new(Expansion::new(bytes.len() as u64));
-        Self { held: Held::Memory { start, bytes }, expansion }
+        Self { held: Backing::Memory { start, bytes }, expansion }
     }
 
-    fn of(&self, held: Held) -> Self {
+    fn of(&self, held: Backing) -> Self {
         Self { held, expansion: Arc::clone(&self.expansion) }
     }
 
     pub(crate) fn again(&self) -> io::Result<Self> {
         Ok(self.of(match &self.held {
-            Held::File(file) => Held::File(file.try_clone()?),
-            Held::Memory { start, bytes } => Held::Memory { start: *start, bytes: bytes.clone() },
+            Backing::File(file) => Backing::File(file.try_clone()?),
+            Backing::Memory { start, bytes } => Backing::Memory { start: *start, bytes: bytes.clone() },
         }))
     }
 
@@ -70,16 +70,16 @@ impl Store {
             return self.again();
         }
         let most = usize::try_from(length).unwrap_or(usize::MAX);
-        Ok(self.of(Held::Memory { start, bytes: self.read(start, most)? }))
+        Ok(self.of(Backing::Memory { start, bytes: self.read(start, most)? }))
     }
 
     /// The CRC-32 of `length` bytes from `start` on, or fewer at the end.
     pub(crate) fn sum(&self, start: u64, length: u64) -> io::Result<u32> {
         match &self.held {
-            Held::File(file) => {
+            Backing::File(file) => {
                 checksums::sum(file, start, length).map_err(|fault| io::Error::other(fault.to_string()))
             }
-            Held::Memory { .. } => {
+            Backing::Memory { .. } => {
                 self.read(start, usize::try_from(length).unwrap_or(usize::MAX)).map(|bytes| crc32fast::hash(&bytes))
             }
         }
@@ -87,7 +87,7 @@ impl Store {
 
     pub(crate) fn read(&self, start: u64, length: usize) -> io::Result<Bytes> {
         match &self.held {
-            Held::File(file) => {
+            Backing::File(file) => {
                 let mut file = file;
                 // All in one call; if a footer claims more than this, the buffer grows while reading.
                 let most = usize::try_from(LARGEST).unwrap_or(usize::MAX);
@@ -96,7 +96,7 @@ impl Store {
                 file.take(length as u64).read_to_end(&mut bytes)?;
                 Ok(bytes.into())
             }
-            Held::Memory { start: first, bytes } => {
+            Backing::Memory { start: first, bytes } => {
                 let from = start.checked_sub(*first).and_then(|from| usize::try_from(from).ok());
                 let from = from.map_or(bytes.len(), |from| from.min(bytes.len()));
                 Ok(bytes.slice(from..from.saturating_add(length).min(bytes.len())))

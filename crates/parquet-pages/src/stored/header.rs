@@ -5,7 +5,7 @@
 
 use parquet::basic::{Compression, Type as Physical};
 
-use crate::thrift::{Compact, Fault, Field, Wire};
+use crate::thrift::{Compact, Field, ThriftFault, Wire};
 
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Header {
@@ -45,7 +45,7 @@ pub(crate) struct About {
 }
 
 impl Header {
-    pub(crate) fn parse(data: &[u8]) -> Result<Self, Fault> {
+    pub(crate) fn parse(data: &[u8]) -> Result<Self, ThriftFault> {
         let mut compact = Compact::new(data);
         let (mut header, mut code, mut seen, mut last) = (Self::default(), 0, 0_u16, 0);
         while let Some(field) = compact.field(last)? {
@@ -56,7 +56,7 @@ impl Header {
                 3 => header.stored = size(compact.int(field)?)?,
                 4 => header.checksum = Some(compact.int(field)?.cast_unsigned()),
                 5 | 7 | 8 if field.wire == Wire::Struct => header.fields(&mut compact, field.id)?,
-                5..=8 if field.wire != Wire::Struct => return Err(Fault::Invalid("a field of another type")),
+                5..=8 if field.wire != Wire::Struct => return Err(ThriftFault::Invalid("a field of another type")),
                 _ => compact.skip(field.wire)?,
             }
             last = field.id;
@@ -66,16 +66,16 @@ impl Header {
             1 => (Kind::Index, 6),
             2 => (Kind::Dictionary, 7),
             3 => (Kind::DataV2, 8),
-            _ => return Err(Fault::Invalid("a page of an unknown kind")),
+            _ => return Err(ThriftFault::Invalid("a page of an unknown kind")),
         };
         // Type, both sizes, and only the header of this kind.
         if seen & 0b1110 != 0b1110 || seen & 0b1_1110_0000 != 1 << own {
-            return Err(Fault::Invalid("fields that are missing, or of another kind of page"));
+            return Err(ThriftFault::Invalid("fields that are missing, or of another kind of page"));
         }
         Ok(Self { kind, length: compact.position(), ..header })
     }
 
-    fn fields(&mut self, compact: &mut Compact<'_>, kind: i16) -> Result<(), Fault> {
+    fn fields(&mut self, compact: &mut Compact<'_>, kind: i16) -> Result<(), ThriftFault> {
         let (mut seen, mut last) = (0, 0);
         while let Some(field) = compact.field(last)? {
             once(&mut seen, field)?;
@@ -87,7 +87,7 @@ impl Header {
                 (8, 7) if matches!(field.wire, Wire::True | Wire::False) => {
                     self.is_plain = field.wire == Wire::False;
                 }
-                (8, 7) => return Err(Fault::Invalid("a field of another type")),
+                (8, 7) => return Err(ThriftFault::Invalid("a field of another type")),
                 (5, 2..=4) | (7, 2) | (8, 4) => drop(compact.int(field)?),
                 _ => compact.skip(field.wire)?,
             }
@@ -98,7 +98,7 @@ impl Header {
             7 => 0b110,
             _ => 0b111_1110,
         };
-        if seen & required == required { Ok(()) } else { Err(Fault::Invalid("fields that are missing")) }
+        if seen & required == required { Ok(()) } else { Err(ThriftFault::Invalid("fields that are missing")) }
     }
 
     pub(crate) fn fault(&self, about: &About, read: usize) -> Option<(String, String)> {
@@ -171,15 +171,15 @@ fn most(codec: Compression, stored: usize) -> usize {
     stored.saturating_mul(ratio).saturating_add(free)
 }
 
-fn once(seen: &mut u16, field: Field) -> Result<(), Fault> {
+fn once(seen: &mut u16, field: Field) -> Result<(), ThriftFault> {
     let bit = u32::try_from(field.id).ok().and_then(|id| 1_u16.checked_shl(id)).unwrap_or(0);
     if *seen & bit != 0 {
-        return Err(Fault::Invalid("a field that is there twice"));
+        return Err(ThriftFault::Invalid("a field that is there twice"));
     }
     *seen |= bit;
     Ok(())
 }
 
-fn size(number: i32) -> Result<usize, Fault> {
-    usize::try_from(number).map_err(|_| Fault::Invalid("a number below zero"))
+fn size(number: i32) -> Result<usize, ThriftFault> {
+    usize::try_from(number).map_err(|_| ThriftFault::Invalid("a number below zero"))
 }

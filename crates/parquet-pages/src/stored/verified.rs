@@ -158,7 +158,7 @@ impl Verified {
             let bytes = self.store.read(offset, most.min(left)).map_err(|error| self.fault(offset, "a page", error))?;
             match Header::parse(&bytes) {
                 Ok(header) => return Ok((bytes, header)),
-                Err(thrift::Fault::Ends) if bytes.len() == most && most < LONGEST_HEADER => most *= 8,
+                Err(thrift::ThriftFault::Ends) if bytes.len() == most && most < LONGEST_HEADER => most *= 8,
                 Err(fault) => return Err(self.fault(offset, "a page header", fault)),
             }
         }

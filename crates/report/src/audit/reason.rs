@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::row::{Definitions, LARGEST_VALUE, Question, Refused, Row, World};
+use super::row::{Definitions, LARGEST_VALUE, Refused, Row, RowQuestion, World};
 use crate::errata::Field;
 use exact::moments::Moments;
 use exact::number::Decimal;
@@ -26,7 +26,7 @@ impl Reason {
 
 pub(super) fn reason(row: &Row, refused: &Refused, definitions: Definitions<'_>, search: &mut Search) -> Reason {
     let cells = [refused.cell];
-    let question = Question { row_n: row.n, metric: &refused.metric, cells: &cells, definitions };
+    let question = RowQuestion { row_n: row.n, metric: &refused.metric, cells: &cells, definitions };
     let ns: BTreeSet<u64> = refused.worlds.iter().flat_map(|world| question.defined_in(world)).collect();
     let because = condition(row, &refused.metric, definitions);
     let Some(print) = refused.cell.numbers() else {
@@ -39,18 +39,18 @@ pub(super) fn reason(row: &Row, refused: &Refused, definitions: Definitions<'_>,
         return Reason::of_mean(format!("undefined: there is no episode{because}"));
     }
     let kind = definitions.catalog.metric[&refused.metric].kind;
-    let cell = Cell { print, samples, kind, among: format!("{}{because}", episodes(&ns)) };
+    let cell = CheckedCell { print, samples, kind, among: format!("{}{because}", episodes(&ns)) };
     cell.no_mean().or_else(|| cell.no_spread(search)).unwrap_or_else(|| conflict(row, refused, &question, &ns))
 }
 
-struct Cell {
+struct CheckedCell {
     print: Print,
     samples: Vec<Sample>,
     kind: Kind,
     among: String,
 }
 
-impl Cell {
+impl CheckedCell {
     fn no_mean(&self) -> Option<Reason> {
         let has_sum = |sample: &Sample| {
             let (low, high) = sample.sums(&[self.print]);
@@ -124,7 +124,7 @@ fn listed(nearest: &[String]) -> String {
 }
 
 /// The reason for a cell that is feasible alone, but not beside the cells accepted before it.
-fn conflict(row: &Row, refused: &Refused, question: &Question<'_>, ns: &BTreeSet<u64>) -> Reason {
+fn conflict(row: &Row, refused: &Refused, question: &RowQuestion<'_>, ns: &BTreeSet<u64>) -> Reason {
     if let Some(earlier) = refused.accepted.first() {
         let other = shown(earlier.cell.mean, earlier.cell.se);
         return Reason::of_mean(format!(

@@ -74,7 +74,7 @@ impl Refused {
         search: &mut Search,
     ) -> bool {
         let cells: Vec<RowCell> = self.accepted.iter().copied().chain([RowCell { rounding, ..self.cell }]).collect();
-        let question = Question { row_n: row.n, metric: &self.metric, cells: &cells, definitions };
+        let question = RowQuestion { row_n: row.n, metric: &self.metric, cells: &cells, definitions };
         !question.counts_in(&self.worlds, false, search).is_empty()
     }
 }
@@ -105,7 +105,7 @@ impl Row {
         let mut counted: Vec<(usize, Count)> = Vec::new();
         for cell in &self.metrics[metric] {
             let cells: Vec<RowCell> = accepted.iter().chain([cell]).copied().collect();
-            let question = Question { row_n: self.n, metric, cells: &cells, definitions };
+            let question = RowQuestion { row_n: self.n, metric, cells: &cells, definitions };
             let found = question.counts_in(&worlds, is_needed, search);
             if found.is_empty() {
                 let (metric, worlds) = (metric.to_owned(), worlds.clone());
@@ -137,14 +137,14 @@ impl Row {
 }
 
 #[derive(Clone, Copy)]
-pub(super) struct Question<'q> {
+pub(super) struct RowQuestion<'q> {
     pub(super) row_n: u64,
     pub(super) metric: &'q str,
     pub(super) cells: &'q [RowCell],
     pub(super) definitions: Definitions<'q>,
 }
 
-impl Question<'_> {
+impl RowQuestion<'_> {
     /// The counts that print these cells, each with its world; one count per world unless `all` is true.
     fn counts_in(&self, worlds: &[World], all: bool, search: &mut Search) -> Vec<(usize, Count)> {
         let needs = self.definitions.needs(self.metric);

@@ -86,7 +86,7 @@ struct Membership {
 
 impl Membership {
     fn of(table: &EpisodeTable, by: &[String]) -> Result<Self, GroupError> {
-        let columns: Vec<Ranks> = columns(table, by)?.iter().map(|column| column.ranks(table)).collect();
+        let columns: Vec<KeyRanks> = columns(table, by)?.iter().map(|column| column.ranks(table)).collect();
         let ranks = |row: usize| columns.iter().map(move |column| column.of_row[row]);
         let mut seen: BTreeMap<Vec<usize>, usize> = BTreeMap::new();
         let mut of_row: Vec<usize> = Vec::with_capacity(table.len());
@@ -113,12 +113,12 @@ impl Membership {
     }
 }
 
-struct Ranks {
+struct KeyRanks {
     values: Vec<KeyValue>,
     of_row: Vec<usize>,
 }
 
-impl Ranks {
+impl KeyRanks {
     /// A column of `rows` values with many duplicates: each row has a code, and each code a value.
     fn of(rows: usize, code: impl Fn(usize) -> usize, value: impl Fn(usize) -> KeyValue) -> Self {
         let mut of_row: Vec<usize> = (0..rows).map(code).collect();
@@ -153,13 +153,13 @@ enum KeyColumn<'a> {
 }
 
 impl KeyColumn<'_> {
-    fn ranks(&self, table: &EpisodeTable) -> Ranks {
+    fn ranks(&self, table: &EpisodeTable) -> KeyRanks {
         let of_text = |column: &TextColumn| {
             // Null has its own code.
-            Ranks::of(table.len(), |row| column.code(row).map_or(0, |code| code + 1), |row| self.value(table, row))
+            KeyRanks::of(table.len(), |row| column.code(row).map_or(0, |code| code + 1), |row| self.value(table, row))
         };
         match self {
-            Self::Int(of) => Ranks::of_ints(table.keys.iter().map(of)),
+            Self::Int(of) => KeyRanks::of_ints(table.keys.iter().map(of)),
             Self::Text(column) => of_text(column),
             Self::Label { column, .. } => of_text(&column.values),
         }

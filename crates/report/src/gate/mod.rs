@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 pub use sides::{FlippedPair, Played};
 pub use text::GateFormat;
 
-use self::sides::{Fill, Sides, joined};
+use self::sides::{GateSides, LossFill, joined};
 use crate::comparable::Varied;
 use crate::statistics::Replies;
 use crate::statistics::comparisons::compare::{Compared, Comparison};
@@ -137,9 +137,9 @@ struct Tried {
 impl Gate {
     /// The verdict on every cell of either side.
     pub fn of([base, new]: [&EpisodeTable; 2], design: Design, options: &GateOptions) -> Result<Self, MomentOverflow> {
-        let sides = Sides::of(base, new);
+        let sides = GateSides::of(base, new);
         let barrier = sides.barrier().filter(|_| !options.pool);
-        let counted = joined(&sides, options, Fill::Out);
+        let counted = joined(&sides, options, LossFill::Out);
         let study = Study::of(&counted, design, None)?;
         let mut cells = judged(&study, options, barrier.as_deref());
         let lost = sides.lost();
@@ -148,7 +148,7 @@ impl Gate {
             [cell.base.lost, cell.new.lost] = lost.get(&cell.key()).copied().unwrap_or_default();
         }
         if cells.iter().any(|cell| cell.base.lost + cell.new.lost > 0) {
-            for fill in [Fill::Against, Fill::For] {
+            for fill in [LossFill::Against, LossFill::For] {
                 let filled = joined(&sides, options, fill);
                 let bound = judged(&Study::of(&filled, design, None)?, options, barrier.as_deref());
                 let verdicts: BTreeMap<_, _> = bound.iter().map(|cell| (cell.key(), cell.verdict)).collect();
@@ -331,13 +331,13 @@ impl GateCell {
         (&self.experiment, &self.model, self.condition.as_deref().unwrap_or(sides::DEFAULT))
     }
 
-    fn bounded_by(&mut self, bound: Option<GateVerdict>, fill: Fill) {
+    fn bounded_by(&mut self, bound: Option<GateVerdict>, fill: LossFill) {
         let has_verdict = !matches!(self.verdict, GateVerdict::CannotSay | GateVerdict::NotComparable);
         let lost = self.base.lost + self.new.lost;
         if !has_verdict || lost == 0 || bound == Some(self.verdict) {
             return;
         }
-        let (verdict, side) = (text::name(self.verdict), if fill == Fill::Against { "against" } else { "for" });
+        let (verdict, side) = (text::name(self.verdict), if fill == LossFill::Against { "against" } else { "for" });
         let other = bound.map_or("nothing", text::name);
         self.why = format!("{verdict} without the {lost} lost episodes, {other} if they count {side} NEW");
         self.verdict = GateVerdict::CannotSay;

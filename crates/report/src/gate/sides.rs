@@ -23,7 +23,7 @@ pub(super) const DEFAULT: &str = "default";
 
 /// The assumed result of lost episodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Fill {
+pub(super) enum LossFill {
     /// Not counted.
     Out,
     /// Failures on the later side, successes on the earlier one.
@@ -32,12 +32,12 @@ pub(super) enum Fill {
     For,
 }
 
-pub(super) struct Sides<'a> {
+pub(super) struct GateSides<'a> {
     tables: [&'a EpisodeTable; 2],
     renamed: Option<[&'a str; 2]>,
 }
 
-impl<'a> Sides<'a> {
+impl<'a> GateSides<'a> {
     pub fn of(base: &'a EpisodeTable, new: &'a EpisodeTable) -> Self {
         let only = |table: &'a EpisodeTable| {
             let mut models = table.keys.models().iter().flatten();
@@ -94,7 +94,7 @@ fn is_lost(table: &EpisodeTable, row: usize) -> bool {
     table.label(LOST).is_some_and(|label| label.get(row) == Some("true"))
 }
 
-pub(super) fn joined(sides: &Sides, options: &GateOptions, fill: Fill) -> EpisodeTable {
+pub(super) fn joined(sides: &GateSides, options: &GateOptions, fill: LossFill) -> EpisodeTable {
     let [base, new] = sides.tables;
     let names = new.metrics.iter().map(|column| column.name.clone());
     let metrics: Vec<String> = names.filter(|name| base.metric(name).is_some()).collect();
@@ -104,13 +104,13 @@ pub(super) fn joined(sides: &Sides, options: &GateOptions, fill: Fill) -> Episod
     let mut builder = TableBuilder::new(Header { catalog, labels, metrics: metrics.clone() });
     let is_lower = new.catalog.metric.get(&options.metric).is_some_and(|metric| metric.better == Better::Lower);
     for (side, table) in sides.tables.into_iter().enumerate() {
-        let is_good = (side == 1) == (fill == Fill::For);
+        let is_good = (side == 1) == (fill == LossFill::For);
         let lost = i64::from(is_good != is_lower);
         let value = |name: &String, own: Option<i64>, is_lost: bool| {
             if is_lost && *name == options.metric { Some(lost) } else { own }
         };
         let mark = |text: &str| format!("{}{text}", MARKS[side]);
-        for row in (0..table.len()).filter(|row| fill != Fill::Out || !is_lost(table, *row)) {
+        for row in (0..table.len()).filter(|row| fill != LossFill::Out || !is_lost(table, *row)) {
             let key = table.keys.get(row);
             let text = |name: &str| table.label(name).and_then(|label| label.get(row)).map(str::to_owned);
             let label = |name: &&str| match *name {
@@ -124,7 +124,7 @@ pub(super) fn joined(sides: &Sides, options: &GateOptions, fill: Fill) -> Episod
             let key = KeyRef { model: sides.model(side, key.model), episode_id: &id, ..key };
             builder.push(key, labels.iter().map(Option::as_deref), values);
         }
-        for lost in table.declared.unrecorded.iter().filter(|_| fill != Fill::Out) {
+        for lost in table.declared.unrecorded.iter().filter(|_| fill != LossFill::Out) {
             let id = mark(&lost.episode_id);
             let condition = mark(lost.condition.as_deref().unwrap_or(DEFAULT));
             let key = KeyRef {

@@ -23,13 +23,13 @@ struct Embedded<'a> {
     undefined: &'a str,
     metrics: BTreeMap<&'a str, &'a Json>,
     groups: Vec<String>,
-    episodes: Episodes,
+    episodes: EmbeddedEpisodes,
     commands: Json,
     pairs: Json,
 }
 
 #[derive(Debug, Serialize)]
-struct Episodes {
+struct EmbeddedEpisodes {
     id: Vec<String>,
     word: BTreeMap<usize, String>,
     seed: Vec<i32>,
@@ -60,7 +60,7 @@ pub(super) fn json(page: &Page<'_>, metrics: &[Json], undefined: &str) -> Result
         undefined: &undefined,
         metrics: metrics.iter().filter_map(|metric| Some((metric["name"].as_str()?, metric))).collect(),
         groups: cells.groups.iter().map(|group| label(&group.key)).collect(),
-        episodes: Episodes {
+        episodes: EmbeddedEpisodes {
             id: episodes.keys.iter().map(|key| visible(key.episode_id)).collect(),
             word: (episodes.keys.iter().enumerate())
                 .filter_map(|(at, key)| Some((at, quoted(key.episode_id)?)))

@@ -33,7 +33,7 @@ pub struct Page<'a> {
     pub episodes: &'a EpisodeTable,
     pub manifest: &'a Manifest,
     /// The figures, in order; an empty slice omits the section.
-    pub figures: &'a [Figure<'a>],
+    pub figures: &'a [EmbeddedFigure<'a>],
     /// The statistics; `None` omits the section.
     pub statistics: Option<&'a Statistics>,
     pub lists: &'a [ListTable],
@@ -42,7 +42,7 @@ pub struct Page<'a> {
 }
 
 #[derive(Clone, Copy, Debug)]
-pub struct Figure<'a> {
+pub struct EmbeddedFigure<'a> {
     pub name: &'a str,
     pub title: &'a str,
     pub caption: &'a str,

@@ -8,7 +8,7 @@ use serde_json::{Value as Json, json};
 
 use super::filter::{Filters, shown};
 use super::template::markup;
-use super::{Figure, HtmlError, Page, definitions, embedded, pair};
+use super::{EmbeddedFigure, HtmlError, Page, definitions, embedded, pair};
 use crate::bundle::Manifest;
 use crate::cells::group::group;
 use crate::cells::{Cell, Cells};
@@ -157,7 +157,7 @@ fn strip(metric: &Metric, moments: &Moments, interval: Option<Interval>) -> Opti
     Some(json!({ "low": place(low)?, "width": place(high - low)?, "mean": place(moments.mean()?)? }))
 }
 
-fn figure(figure: &Figure<'_>) -> Value {
+fn figure(figure: &EmbeddedFigure<'_>) -> Value {
     let [name, title, caption] = [figure.name, figure.title, figure.caption].map(visible);
     context! { name, title, caption, svg => markup(figure.svg) }
 }

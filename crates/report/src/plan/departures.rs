@@ -115,18 +115,18 @@ fn short(hash: &str) -> &str {
 }
 
 #[derive(Default)]
-struct Block {
+struct PlannedBlock {
     seeds: BTreeSet<i32>,
     scenes: BTreeSet<usize>,
     episodes: usize,
 }
 
-struct Blocks<'a>(BTreeMap<(&'a str, &'a str), Block>);
+struct Blocks<'a>(BTreeMap<(&'a str, &'a str), PlannedBlock>);
 
 impl<'a> Blocks<'a> {
     fn of(table: &'a EpisodeTable) -> Self {
         let scenes = table.label("scene");
-        let mut blocks: BTreeMap<(&str, &str), Block> = BTreeMap::new();
+        let mut blocks: BTreeMap<(&str, &str), PlannedBlock> = BTreeMap::new();
         for (row, key) in table.keys.iter().enumerate() {
             let block = blocks.entry((key.experiment, key.model)).or_default();
             block.seeds.insert(key.seed);
@@ -136,7 +136,7 @@ impl<'a> Blocks<'a> {
         Self(blocks)
     }
 
-    fn each(&self, count: impl Fn(&Block) -> usize) -> String {
+    fn each(&self, count: impl Fn(&PlannedBlock) -> usize) -> String {
         range(self.0.values().map(&count))
     }
 

@@ -28,7 +28,7 @@ pub struct Style {
     pub name: String,
     /// SHA-256 of the file, 64 hexadecimal digits.
     pub hash: String,
-    pub sheet: Sheet,
+    pub sheet: StyleSheet,
     named: Vec<(String, Place)>,
     is_built_in: bool,
 }
@@ -37,7 +37,7 @@ pub struct Style {
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 #[schemars(rename = "StyleFile")]
-pub struct Sheet {
+pub struct StyleSheet {
     /// Styles that come first, by name or by path relative to this file; what this file says replaces what they say.
     pub include: Vec<String>,
     /// The models in the order of their rows; others come after them, by name.
@@ -74,7 +74,7 @@ pub struct TableSheet {
     pub undefined_as_zero: Vec<String>,
 }
 
-impl Default for Sheet {
+impl Default for StyleSheet {
     fn default() -> Self {
         Self {
             include: Vec::new(),
@@ -234,7 +234,7 @@ impl Style {
     }
 }
 
-impl Sheet {
+impl StyleSheet {
     pub fn print_of(&self, table: &TableSheet) -> Print {
         let (own, all) = (&table.print, &self.print);
         Print {

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use toml::Value;
 
-use super::{MAIN_TABLE, OTHER_TABLE, Sheet, StyleError};
+use super::{MAIN_TABLE, OTHER_TABLE, StyleError, StyleSheet};
 use crate::figures::shown::FIGURES;
 use crate::figures::{FigureError, FigureName};
 use exact::budget::Limit;
@@ -27,7 +27,7 @@ pub(super) const KIND: FileKind = FileKind {
 };
 
 pub(super) struct Read {
-    pub sheet: Sheet,
+    pub sheet: StyleSheet,
     /// Metrics named by the user's files, with locations.
     pub named: Vec<(String, Place)>,
     /// The SHA-256 of the text; with includes, of the hashes of all texts, one per line, in reading order.
@@ -44,7 +44,7 @@ pub(super) fn read(path: &Path) -> Result<Read, StyleError> {
     })?;
     let figures: Value = toml::from_str(FIGURES).expect("the file comes with the program");
     let mut merged = Value::Table([("figure".to_owned(), figures)].into_iter().collect());
-    let (shape, mut named) = (Shape::of::<Sheet>(), Vec::new());
+    let (shape, mut named) = (Shape::of::<StyleSheet>(), Vec::new());
     let mut sheet = None;
     let texts = KIND.read(file, |at, part, faults| {
         if let Some(own) = shape.value(at, "a style", faults) {
@@ -56,7 +56,7 @@ pub(super) fn read(path: &Path) -> Result<Read, StyleError> {
             named.extend(metrics(at));
         }
         if part.is_outermost && faults.is_empty() {
-            let whole: Sheet = merged.clone().try_into().expect("values of the shape, over others of it");
+            let whole: StyleSheet = merged.clone().try_into().expect("values of the shape, over others of it");
             check_tables(&whole, at, faults);
             sheet = Some(whole);
         }
@@ -113,7 +113,7 @@ fn check(at: &At<'_>, faults: &mut Vec<Fault>) {
     }
 }
 
-fn check_tables(sheet: &Sheet, at: &At<'_>, faults: &mut Vec<Fault>) {
+fn check_tables(sheet: &StyleSheet, at: &At<'_>, faults: &mut Vec<Fault>) {
     if !sheet.table.contains_key(MAIN_TABLE) {
         let message = format!("there is no table `{MAIN_TABLE}`: every report needs one");
         faults.push(at.fault(message).help(format!("add `[table.{MAIN_TABLE}]`, or `include = [\"default\"]`")));

@@ -26,7 +26,7 @@ pub struct Units {
 
 /// Gains, losses and the number of pairs; partial verdicts count as fractions.
 #[derive(Clone, Copy)]
-struct Pairs {
+struct PairCounts {
     gains: f64,
     losses: f64,
     n: f64,
@@ -34,22 +34,22 @@ struct Pairs {
 
 /// Successes and the number of units of two sides.
 #[derive(Clone, Copy)]
-struct Sides {
+struct SideCounts {
     successes: [f64; 2],
     n: [f64; 2],
 }
 
 impl Units {
-    fn pairs(&self) -> Option<Pairs> {
+    fn pairs(&self) -> Option<PairCounts> {
         let differences = || self.shared.iter().map(|(a, b)| a - b);
         let gains = differences().map(|difference| difference.max(0.0)).sum();
         let losses = differences().map(|difference| (-difference).max(0.0)).sum();
-        (!self.shared.is_empty()).then_some(Pairs { gains, losses, n: self.shared.len() as f64 })
+        (!self.shared.is_empty()).then_some(PairCounts { gains, losses, n: self.shared.len() as f64 })
     }
 
-    fn sides(&self) -> Option<Sides> {
+    fn sides(&self) -> Option<SideCounts> {
         let (first, second) = (&self.first, &self.second);
-        (!first.is_empty() && !second.is_empty()).then(|| Sides {
+        (!first.is_empty() && !second.is_empty()).then(|| SideCounts {
             successes: [first.iter().sum(), second.iter().sum()],
             n: [first.len() as f64, second.len() as f64],
         })
@@ -87,11 +87,11 @@ impl Units {
     /// The spread of the difference, after adding half a success and half a failure.
     pub fn spread(&self) -> Option<Spread> {
         let share = |successes: f64, n: f64| (successes + 0.5) / (n + 1.0);
-        let pairs = self.pairs().map(|Pairs { gains, losses, n }| {
+        let pairs = self.pairs().map(|PairCounts { gains, losses, n }| {
             let (gained, lost) = (share(gains, n), share(losses, n));
             ((gains - losses) / n, gained + lost - (gained - lost).powi(2), n)
         });
-        let sides = self.sides().map(|Sides { successes: [a, b], n: [m, n] }| {
+        let sides = self.sides().map(|SideCounts { successes: [a, b], n: [m, n] }| {
             let (p, q) = (share(a, m), share(b, n));
             (a / m - b / n, p * (1.0 - p) + q * (1.0 - q), m.min(n))
         });
@@ -136,7 +136,7 @@ impl Spread {
     }
 }
 
-impl Pairs {
+impl PairCounts {
     /// The score statistic of Tango (1998) for a difference of at most `-margin`.
     fn score(self, margin: f64) -> f64 {
         let Self { gains, losses, n } = self;
@@ -171,7 +171,7 @@ impl Pairs {
     }
 }
 
-impl Sides {
+impl SideCounts {
     /// The score statistic of Farrington and Manning (1990) for a difference of at most `-margin`.
     fn score(self, margin: f64) -> f64 {
         let Self { successes: [a, b], n: [m, n] } = self;

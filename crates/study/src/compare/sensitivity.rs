@@ -86,7 +86,7 @@ impl Study {
         let found = Sensitivity::of(&levels, &trial.reference, &trial.moved, &trial.unmoved, &style);
         let labels: Vec<Stage<'_>> =
             stages.iter().map(|stage| Stage { px: stage.level.px, cells: &stage.drawn }).collect();
-        let drawn = drawing::Input {
+        let drawn = drawing::SensitivityInput {
             stages: &labels,
             metrics: &trial.moved,
             order: &style.sheet.row_order,
@@ -105,7 +105,7 @@ impl Study {
         Ok(tables)
     }
 
-    fn stages(&self, trial: &Trial, mut tables: Vec<EpisodeTable>) -> Result<Vec<Scored>, StudyError> {
+    fn stages(&self, trial: &Trial, mut tables: Vec<EpisodeTable>) -> Result<Vec<ScoredLevel>, StudyError> {
         let mut others = tables.split_off(trial.definitions.len()).into_iter();
         let pixels = others.next();
         let lost = others.next().map(|table| ids(&table));
@@ -127,7 +127,7 @@ impl Study {
         Ok(self.counted(results))
     }
 
-    fn stage(&self, px: Option<u32>, counted: &Counted) -> Result<Scored, StudyError> {
+    fn stage(&self, px: Option<u32>, counted: &Counted) -> Result<ScoredLevel, StudyError> {
         let cells = self.cells_of(&counted.results.episodes)?;
         // Conclusions need no intervals of cells; their bootstraps would take most of the time.
         let none = |group: &Group| Group { moments: Vec::new(), ..group.clone() };
@@ -135,11 +135,11 @@ impl Study {
         let statistics = self.statistics_of(counted, &bare, &Options::default())?;
         let shown = counted.results.with_conditions_as_models();
         let drawn = group(&shown.episodes, &DEFAULT_BY.map(str::to_owned))?;
-        Ok(Scored { level: Level { px, cells, statistics }, drawn, lost: counted.lost.total() })
+        Ok(ScoredLevel { level: Level { px, cells, statistics }, drawn, lost: counted.lost.total() })
     }
 }
 
-struct Scored {
+struct ScoredLevel {
     level: Level,
     drawn: Cells,
     lost: u64,

@@ -115,8 +115,8 @@ impl Drawings {
         self.drawn.iter().map(|(_, figure)| figure.inline_svg()).collect()
     }
 
-    pub(crate) fn on_page<'a>(&'a self, svgs: &'a [String]) -> Vec<html::Figure<'a>> {
-        let figure = |((name, drawn), svg): (&'a (FigureName, Figure), &'a String)| html::Figure {
+    pub(crate) fn on_page<'a>(&'a self, svgs: &'a [String]) -> Vec<html::EmbeddedFigure<'a>> {
+        let figure = |((name, drawn), svg): (&'a (FigureName, Figure), &'a String)| html::EmbeddedFigure {
             name: name.name(),
             title: name.title(),
             caption: drawn.caption(),

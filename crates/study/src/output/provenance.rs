@@ -108,7 +108,7 @@ pub fn traces(manifest: &Manifest, places: &[PathBuf]) -> Result<Vec<Input>, Pro
     if faults.is_empty() { Ok(found) } else { Err(ProvenanceError::Traces { all, faults }) }
 }
 
-fn find(wanted: &bundle::Input, places: &[PathBuf]) -> Result<PathBuf, TraceFault> {
+fn find(wanted: &bundle::InputFile, places: &[PathBuf]) -> Result<PathBuf, TraceFault> {
     let mut other = None;
     for path in places.iter().flat_map(|place| candidates(wanted, place)) {
         match input::open(&path).and_then(hash::of_reader) {
@@ -120,7 +120,7 @@ fn find(wanted: &bundle::Input, places: &[PathBuf]) -> Result<PathBuf, TraceFaul
     Err(TraceFault { path: wanted.path.clone(), expected: wanted.sha256.clone(), found: other })
 }
 
-fn candidates(wanted: &bundle::Input, place: &Path) -> Vec<PathBuf> {
+fn candidates(wanted: &bundle::InputFile, place: &Path) -> Vec<PathBuf> {
     let path = Path::new(&wanted.path);
     if place.is_file() {
         let names = [place, path].map(|path| path.file_name().map(OsStr::to_string_lossy));
@@ -183,7 +183,7 @@ mod tests {
     fn a_trace_may_lie_under_its_path_or_its_name() {
         let folder = tempfile::tempdir().unwrap();
         std::fs::create_dir(folder.path().join("runs")).unwrap();
-        let wanted = bundle::Input { path: "runs/a.parquet".into(), sha256: String::new(), bytes: 0 };
+        let wanted = bundle::InputFile { path: "runs/a.parquet".into(), sha256: String::new(), bytes: 0 };
         let [deep, bare] = ["runs/a.parquet", "a.parquet"].map(|name| folder.path().join(name));
         std::fs::write(&bare, "").unwrap();
         assert_eq!(candidates(&wanted, folder.path()), std::slice::from_ref(&bare));

@@ -134,7 +134,7 @@ impl Study {
     fn recordings(&self, manifest: &Manifest) -> Option<Recordings> {
         let Source::Traces(_) = &self.source else { return None };
         // As in manifests: without absolute paths.
-        let named = |path: &PathBuf| bundle::Input::new(path, String::new(), 0).path;
+        let named = |path: &PathBuf| bundle::InputFile::new(path, String::new(), 0).path;
         Some(Recordings {
             paths: manifest.inputs.iter().map(|input| input.path.clone()).collect(),
             definitions: self.question.definitions.as_ref().map(named).filter(|name| name != DEFAULT_DEFINITIONS),

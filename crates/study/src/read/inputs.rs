@@ -140,16 +140,16 @@ fn state_of(path: &std::path::Path) -> io::Result<FileState> {
     std::fs::metadata(path).map(|metadata| FileState::of(&metadata))
 }
 
-pub(crate) fn hashes(inputs: &[Input]) -> Result<Vec<bundle::Input>, StudyError> {
+pub(crate) fn hashes(inputs: &[Input]) -> Result<Vec<bundle::InputFile>, StudyError> {
     inputs.iter().map(hash_of).collect()
 }
 
-fn hash_of(input: &Input) -> Result<bundle::Input, StudyError> {
+fn hash_of(input: &Input) -> Result<bundle::InputFile, StudyError> {
     let read = || {
         let file = exact::input::open(&input.path)?;
         let bytes = file.metadata()?.len();
         Ok::<_, io::Error>((hash::of_reader(file)?, bytes))
     };
     let (sha256, bytes) = read().map_err(|error| StudyError::file(&input.name, error))?;
-    Ok(bundle::Input::new(input.name.as_ref(), sha256, bytes))
+    Ok(bundle::InputFile::new(input.name.as_ref(), sha256, bytes))
 }

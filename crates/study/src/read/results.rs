@@ -58,7 +58,7 @@ pub struct Results {
     /// The reply quality by cell, lost episodes included. `None` if not requested, and for scores.
     pub quality: Option<QualityByCell>,
     /// The inputs with their hashes; empty if not requested.
-    pub inputs: Vec<bundle::Input>,
+    pub inputs: Vec<bundle::InputFile>,
 }
 
 impl Results {

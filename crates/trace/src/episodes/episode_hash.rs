@@ -23,7 +23,7 @@ pub(crate) const IDENTIFICATION: &str = "identification";
 
 /// The hash of an episode, 64 hexadecimal digits; ignores the field for the hash.
 pub fn of(episode: &Episode) -> String {
-    let mut form = Form::new();
+    let mut form = CanonicalForm::new();
     for column in columns().filter_map(schema::column) {
         let derived = |at: usize| column.name == SELF_COLOR && episode.steps[at].extra.identification.is_some();
         let values = column.of_steps(episode).enumerate();
@@ -44,12 +44,12 @@ pub(crate) fn columns() -> impl Iterator<Item = &'static str> {
     names.into_iter()
 }
 
-pub(crate) struct Form {
+pub(crate) struct CanonicalForm {
     hasher: Sha256,
     lines: Vec<u8>,
 }
 
-impl Form {
+impl CanonicalForm {
     pub(crate) fn new() -> Self {
         Self { hasher: Sha256::new_with_prefix("mirrorstats.episode 1\n"), lines: Vec::new() }
     }

@@ -33,14 +33,14 @@ pub struct DeclaredExperiment {
 const HELP: &str = "write it as a definition file has it under `[experiment.NAME]`, or remove the key from the footer";
 
 /// An invalid declaration: its place in the recording, the expected value, and the value found.
-struct Fault {
+struct DeclarationFault {
     key: String,
     expected: &'static str,
     found: String,
 }
 
 pub(crate) fn of_recording(file: &str, recording: &Value) -> Result<Vec<DeclaredExperiment>, Box<Finding>> {
-    read(recording).map_err(|Fault { key, expected, found }| {
+    read(recording).map_err(|DeclarationFault { key, expected, found }| {
         let expected = format!("`{RECORDING_KEY}.{key}` to be {expected}");
         Box::new(Finding::new(Code::InvalidMetadata, file, expected, found).with_help(HELP))
     })
@@ -53,7 +53,7 @@ pub(crate) fn absent(file: &str, recording: &Value) -> Vec<&'static str> {
     of_some_tasks().filter(|name| !declared.is_empty() && say_so(name)).collect()
 }
 
-fn read(recording: &Value) -> Result<Vec<DeclaredExperiment>, Fault> {
+fn read(recording: &Value) -> Result<Vec<DeclaredExperiment>, DeclarationFault> {
     let several = match &recording["experiments"] {
         Value::Null => &[],
         Value::Array(several) => several.as_slice(),
@@ -74,7 +74,7 @@ fn read(recording: &Value) -> Result<Vec<DeclaredExperiment>, Fault> {
 }
 
 impl DeclaredExperiment {
-    fn read(key: &str, value: &Value) -> Result<Self, Fault> {
+    fn read(key: &str, value: &Value) -> Result<Self, DeclarationFault> {
         let members = value.as_object().ok_or_else(|| fault(key, "an object", value))?;
         let member = |name: &str| members.get(name).filter(|value| !value.is_null());
         let text = |name: &str, expected| match member(name) {
@@ -103,8 +103,8 @@ impl DeclaredExperiment {
 fn levels<T>(
     key: &str,
     value: Option<&Value>,
-    read: impl Fn(&str, &Value) -> Result<T, Fault>,
-) -> Result<IndexMap<String, T>, Fault> {
+    read: impl Fn(&str, &Value) -> Result<T, DeclarationFault>,
+) -> Result<IndexMap<String, T>, DeclarationFault> {
     let members = match value {
         None => return Ok(IndexMap::new()),
         Some(Value::Object(members)) => members,
@@ -114,7 +114,7 @@ fn levels<T>(
     members.iter().map(one).collect()
 }
 
-fn columns(key: &str, value: Option<&Value>) -> Result<Vec<&'static str>, Fault> {
+fn columns(key: &str, value: Option<&Value>) -> Result<Vec<&'static str>, DeclarationFault> {
     let known = |name: &Value| of_some_tasks().find(|known| *name == **known);
     let Some(value) = value else { return Ok(Vec::new()) };
     let named: Option<Vec<_>> = value.as_array().and_then(|names| names.iter().map(known).collect());
@@ -122,14 +122,14 @@ fn columns(key: &str, value: Option<&Value>) -> Result<Vec<&'static str>, Fault>
     Ok(of_some_tasks().filter(|known| named.contains(known)).collect())
 }
 
-fn chance(key: &str, value: &Value) -> Result<Option<Ratio>, Fault> {
+fn chance(key: &str, value: &Value) -> Result<Option<Ratio>, DeclarationFault> {
     if value == "none" {
         return Ok(None);
     }
     ratio(value).map(Some).ok_or_else(|| fault(key, "a fraction such as `1/3`, or `none`", value))
 }
 
-fn reference(key: &str, value: &Value) -> Result<Vec<Ratio>, Fault> {
+fn reference(key: &str, value: &Value) -> Result<Vec<Ratio>, DeclarationFault> {
     let levels = value.as_array().map(|levels| levels.iter().map(ratio).collect::<Option<Vec<_>>>());
     levels.flatten().ok_or_else(|| fault(key, "a list of fractions such as `1/10`", value))
 }
@@ -142,13 +142,13 @@ fn ratio(value: &Value) -> Option<Ratio> {
     }
 }
 
-fn fault(key: impl Into<String>, expected: &'static str, found: &Value) -> Fault {
+fn fault(key: impl Into<String>, expected: &'static str, found: &Value) -> DeclarationFault {
     const SHOWN: usize = 80;
     let text = found.to_string();
     let shown: String = text.chars().take(SHOWN).collect();
     let rest = if shown.len() < text.len() { ".." } else { "" };
     let found = if found.is_null() { "none".to_owned() } else { format!("`{shown}{rest}`") };
-    Fault { key: key.into(), expected, found }
+    DeclarationFault { key: key.into(), expected, found }
 }
 
 #[cfg(test)]

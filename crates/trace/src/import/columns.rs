@@ -7,7 +7,7 @@ use indexmap::IndexMap;
 
 use super::Limits;
 use super::error::{Fault, Place};
-use super::line::{Members, Value};
+use super::line::{LineValue, Members};
 use crate::schema::rules::{Known, Requirement, Rule, rules_of};
 use crate::schema::{COLUMNS, Column, Kind, Stored};
 use exact::suggest::nearest;
@@ -81,7 +81,7 @@ impl Columns {
         self.own.iter().map(|(name, inferred)| Own { name: name.clone(), kind: inferred.kind }).collect()
     }
 
-    fn check_own(&mut self, key: &str, value: &Value, place: &Place) -> Option<Fault> {
+    fn check_own(&mut self, key: &str, value: &LineValue, place: &Place) -> Option<Fault> {
         if key.is_empty() {
             return Some(Fault::new("a key with a name", "an empty one", "give the key a name, or leave it out"));
         }
@@ -100,9 +100,9 @@ impl Columns {
 
 impl Inferred {
     /// Adds a value; returns a fault if its type does not fit those before it.
-    fn take(&mut self, kind: Option<Kind>, value: &Value, place: &Place) -> Option<Fault> {
+    fn take(&mut self, kind: Option<Kind>, value: &LineValue, place: &Place) -> Option<Fault> {
         let now = kind?;
-        if let Value::Int(value) = value
+        if let LineValue::Int(value) = value
             && value.unsigned_abs() > EXACT
             && self.wide.is_none()
         {
@@ -134,41 +134,45 @@ fn named(kind: Kind) -> &'static str {
     }
 }
 
-fn kind_of(value: &Value) -> Result<Option<Kind>, Box<Fault>> {
+fn kind_of(value: &LineValue) -> Result<Option<Kind>, Box<Fault>> {
     match value {
-        Value::Null => Ok(None),
-        Value::Bool(_) => Ok(Some(Kind::Bool)),
-        Value::Int(_) => Ok(Some(Kind::Int)),
-        Value::Float(_) => Ok(Some(Kind::Float)),
-        Value::Text(_) => Ok(Some(Kind::String)),
-        Value::LargeInt(_) => {
+        LineValue::Null => Ok(None),
+        LineValue::Bool(_) => Ok(Some(Kind::Bool)),
+        LineValue::Int(_) => Ok(Some(Kind::Int)),
+        LineValue::Float(_) => Ok(Some(Kind::Float)),
+        LineValue::Text(_) => Ok(Some(Kind::String)),
+        LineValue::LargeInt(_) => {
             let expected = format!("an integer of at most {}", i64::MAX);
             Err(Box::new(Fault::new(expected, value.shown(), "write it as text in every line")))
         }
-        Value::List | Value::Object(_) => {
+        LineValue::List | LineValue::Object(_) => {
             let help = "give its parts keys of their own, write it as text, or leave it out";
             Err(Box::new(Fault::new("null, true or false, a number or a text", value.shown(), help)))
         }
     }
 }
 
-fn misfit(column: &Column, value: &Value, limits: Limits<'_>) -> Option<Fault> {
+fn misfit(column: &Column, value: &LineValue, limits: Limits<'_>) -> Option<Fault> {
     let refused = |help: &str| Some(Fault::new(expected(column), value.shown(), help));
     match (column.stored.kind(), value) {
-        (_, Value::Null) if column.nullable => None,
-        (_, Value::Null) => refused("give the step its value; nothing is filled in"),
-        (Kind::Bool, Value::Bool(_)) => None,
-        (Kind::Int, Value::Int(value)) if *value < lowest(column) => {
+        (_, LineValue::Null) if column.nullable => None,
+        (_, LineValue::Null) => refused("give the step its value; nothing is filled in"),
+        (Kind::Bool, LineValue::Bool(_)) => None,
+        (Kind::Int, LineValue::Int(value)) if *value < lowest(column) => {
             refused(if column.name == "t" { "number the steps from 1" } else { "correct the number" })
         }
-        (Kind::Int, Value::Int(value)) if column.stored.range().is_none_or(|(_, highest)| *value <= highest) => None,
-        (Kind::Int, Value::Float(value)) if value.fract() != 0.0 => refused("write a whole number"),
-        (Kind::Int, Value::Int(_) | Value::LargeInt(_) | Value::Float(_)) => {
+        (Kind::Int, LineValue::Int(value)) if column.stored.range().is_none_or(|(_, highest)| *value <= highest) => {
+            None
+        }
+        (Kind::Int, LineValue::Float(value)) if value.fract() != 0.0 => refused("write a whole number"),
+        (Kind::Int, LineValue::Int(_) | LineValue::LargeInt(_) | LineValue::Float(_)) => {
             refused("correct the number, or use smaller ones")
         }
         (Kind::Float, _) if is_held(column, value) => None,
-        (Kind::Float, Value::Int(_) | Value::LargeInt(_) | Value::Float(_)) => refused("correct the number"),
-        (Kind::String, Value::Text(text)) => {
+        (Kind::Float, LineValue::Int(_) | LineValue::LargeInt(_) | LineValue::Float(_)) => {
+            refused("correct the number")
+        }
+        (Kind::String, LineValue::Text(text)) => {
             let Limits { expected, palette, .. } = limits;
             let rules = rules_of(column, Known { palette, experiments: expected.experiments });
             rules.iter().find(|rule| !rule.allows(text)).map(|rule| odd_text(column, rule, text, value.shown()))
@@ -177,22 +181,22 @@ fn misfit(column: &Column, value: &Value, limits: Limits<'_>) -> Option<Fault> {
     }
 }
 
-fn misdeclared(key: &str, value: &Value, limits: Limits<'_>) -> Option<Fault> {
+fn misdeclared(key: &str, value: &LineValue, limits: Limits<'_>) -> Option<Fault> {
     let declared = limits.expected.declared.iter().find(|declared| declared.name == key)?;
     let is_of_kind = matches!(
         (declared.kind, value),
-        (_, Value::Null)
-            | (Kind::Bool, Value::Bool(_))
-            | (Kind::Int, Value::Int(_))
-            | (Kind::Float, Value::Int(_) | Value::Float(_))
-            | (Kind::String, Value::Text(_))
+        (_, LineValue::Null)
+            | (Kind::Bool, LineValue::Bool(_))
+            | (Kind::Int, LineValue::Int(_))
+            | (Kind::Float, LineValue::Int(_) | LineValue::Float(_))
+            | (Kind::String, LineValue::Text(_))
     );
     let help = "correct the value, or declare the column as the lines have it, under `[column.NAME]`";
     if !is_of_kind {
         let expected = format!("{}, as the definitions declare it", named(declared.kind));
         return Some(Fault::new(expected, value.shown(), help));
     }
-    let Value::Text(text) = value else { return None };
+    let LineValue::Text(text) = value else { return None };
     let is_known = declared.values.is_empty() || declared.values.contains(text);
     let near =
         || nearest(text, declared.values.iter().map(String::as_str)).map(|like| format!("did you mean `{like}`?"));
@@ -211,11 +215,11 @@ pub(super) fn lowest(column: &Column) -> i64 {
 
 #[expect(clippy::cast_precision_loss, reason = "a column of floating-point numbers rounds")]
 #[expect(clippy::cast_possible_truncation, reason = "that is the question")]
-fn is_held(column: &Column, value: &Value) -> bool {
+fn is_held(column: &Column, value: &LineValue) -> bool {
     let number = match value {
-        Value::Int(value) => *value as f64,
-        Value::LargeInt(value) => *value as f64,
-        Value::Float(value) => *value,
+        LineValue::Int(value) => *value as f64,
+        LineValue::LargeInt(value) => *value as f64,
+        LineValue::Float(value) => *value,
         _ => return false,
     };
     let fits = column.stored != Stored::Float32 || (number as f32).is_finite();

@@ -3,13 +3,13 @@
 use std::collections::HashMap;
 
 use super::error::{Fault, Place};
-use super::line::{Members, Value};
+use super::line::{LineValue, Members};
 use super::text::{Line, Text};
 use crate::schema::{COLUMNS, Column};
 use exact::escape::visible;
 
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Step {
+pub(super) struct IndexedStep {
     pub(super) episode: usize,
     t: i64,
     pub(super) text: usize,
@@ -22,30 +22,32 @@ pub(super) struct Step {
 struct Head {
     id: String,
     place: Place,
-    constants: Vec<Value>,
+    constants: Vec<LineValue>,
 }
 
 #[derive(Debug, Default)]
 pub(super) struct Index {
     heads: Vec<Head>,
     by_id: HashMap<String, usize>,
-    steps: Vec<Step>,
+    steps: Vec<IndexedStep>,
 }
 
 fn constants() -> impl Iterator<Item = &'static Column> {
     COLUMNS.iter().filter(|column| column.constant && column.name != "episode_id")
 }
 
-fn value<'a>(members: &'a Members, name: &str) -> &'a Value {
-    members.iter().find(|(key, _)| key == name).map_or(&Value::Null, |(_, value)| value)
+fn value<'a>(members: &'a Members, name: &str) -> &'a LineValue {
+    members.iter().find(|(key, _)| key == name).map_or(&LineValue::Null, |(_, value)| value)
 }
 
 impl Index {
     pub(super) fn add(&mut self, text: usize, line: &Line, members: &Members) -> Option<Fault> {
-        let (Value::Text(id), Value::Int(t)) = (value(members, "episode_id"), value(members, "t")) else { return None };
+        let (LineValue::Text(id), LineValue::Int(t)) = (value(members, "episode_id"), value(members, "t")) else {
+            return None;
+        };
         let known = self.by_id.get(id).copied();
         let episode = known.unwrap_or_else(|| self.begin(id, line, members));
-        self.steps.push(Step { episode, t: *t, text, offset: line.offset, line: line.place.line });
+        self.steps.push(IndexedStep { episode, t: *t, text, offset: line.offset, line: line.place.line });
         let head = &self.heads[episode];
         let mut pairs = constants().zip(&head.constants);
         pairs.find_map(|(column, first)| {
@@ -67,7 +69,7 @@ impl Index {
     }
 
     /// The steps of each episode in turn, ordered by t; adds a fault for each incomplete episode.
-    pub(super) fn into_steps(self, texts: &[Text], faults: &mut super::error::Faults) -> Vec<Step> {
+    pub(super) fn into_steps(self, texts: &[Text], faults: &mut super::error::Faults) -> Vec<IndexedStep> {
         let Self { heads, mut steps, .. } = self;
         steps.sort_by_key(|step| (step.episode, step.t));
         for episode in steps.chunk_by(|a, b| a.episode == b.episode) {
@@ -78,10 +80,10 @@ impl Index {
     }
 }
 
-fn sequence_fault(id: &str, episode: &[Step], texts: &[Text]) -> Option<Fault> {
-    let place = |step: &Step| texts[step.text].place(step.line);
+fn sequence_fault(id: &str, episode: &[IndexedStep], texts: &[Text]) -> Option<Fault> {
+    let place = |step: &IndexedStep| texts[step.text].place(step.line);
     let of = format!("of episode `{}`", visible(id));
-    let mut before: Option<&Step> = None;
+    let mut before: Option<&IndexedStep> = None;
     for step in episode {
         let wanted = before.map_or(1, |before| before.t.saturating_add(1));
         let is_again = before.is_some_and(|before| before.t == step.t);

@@ -15,7 +15,7 @@ use exact::escape::{exact, visible};
 pub(super) const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
 
 #[derive(Clone, Debug, PartialEq)]
-pub enum Value {
+pub enum LineValue {
     Null,
     Bool(bool),
     Int(i64),
@@ -28,9 +28,9 @@ pub enum Value {
 }
 
 /// Keys and values in the order of the line; those of a nested object are dropped.
-pub(super) type Members = Vec<(String, Value)>;
+pub(super) type Members = Vec<(String, LineValue)>;
 
-impl Value {
+impl LineValue {
     pub(super) fn shown(&self) -> String {
         const LONGEST: usize = 60;
         match self {
@@ -56,7 +56,7 @@ pub(super) fn members(bytes: &[u8], ended: bool) -> Result<Members, Box<Fault>> 
         Box::new(Fault::new("text in UTF-8", found, "write the file as UTF-8"))
     })?;
     match serde_json::from_str(text.trim_end()) {
-        Ok(Value::Object(members)) => Ok(with_integers(unique(members)?)),
+        Ok(LineValue::Object(members)) => Ok(with_integers(unique(members)?)),
         Ok(other) => Err(Box::new(Fault::new("a JSON object, one step", other.shown(), "write one object a line"))),
         Err(error) => Err(Box::new(no_json(text.trim_end(), ended, &error))),
     }
@@ -72,8 +72,8 @@ pub(super) fn whole(number: f64) -> Option<i64> {
 fn with_integers(mut members: Members) -> Members {
     let is_integer = |key: &str| schema::column(key).is_some_and(|column| column.stored.kind() == Kind::Int);
     for (_, value) in members.iter_mut().filter(|(key, _)| is_integer(key)) {
-        if let Value::Float(number) = *value {
-            *value = whole(number).map_or(Value::Float(number), Value::Int);
+        if let LineValue::Float(number) = *value {
+            *value = whole(number).map_or(LineValue::Float(number), LineValue::Int);
         }
     }
     members
@@ -114,7 +114,7 @@ fn character(text: &str, byte: usize) -> usize {
     text.get(..text.floor_char_boundary(byte)).map_or(byte, |before| before.chars().count())
 }
 
-impl<'de> Deserialize<'de> for Value {
+impl<'de> Deserialize<'de> for LineValue {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         Plain { is_line: true }.deserialize(deserializer)
     }
@@ -126,50 +126,50 @@ struct Plain {
 }
 
 impl<'de> DeserializeSeed<'de> for Plain {
-    type Value = Value;
+    type Value = LineValue;
 
-    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Value, D::Error> {
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<LineValue, D::Error> {
         deserializer.deserialize_any(self)
     }
 }
 
 impl<'de> Visitor<'de> for Plain {
-    type Value = Value;
+    type Value = LineValue;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("a JSON value")
     }
 
-    fn visit_unit<E>(self) -> Result<Value, E> {
-        Ok(Value::Null)
+    fn visit_unit<E>(self) -> Result<LineValue, E> {
+        Ok(LineValue::Null)
     }
 
-    fn visit_bool<E>(self, value: bool) -> Result<Value, E> {
-        Ok(Value::Bool(value))
+    fn visit_bool<E>(self, value: bool) -> Result<LineValue, E> {
+        Ok(LineValue::Bool(value))
     }
 
-    fn visit_i64<E>(self, value: i64) -> Result<Value, E> {
-        Ok(Value::Int(value))
+    fn visit_i64<E>(self, value: i64) -> Result<LineValue, E> {
+        Ok(LineValue::Int(value))
     }
 
-    fn visit_u64<E>(self, value: u64) -> Result<Value, E> {
-        Ok(i64::try_from(value).map_or(Value::LargeInt(value), Value::Int))
+    fn visit_u64<E>(self, value: u64) -> Result<LineValue, E> {
+        Ok(i64::try_from(value).map_or(LineValue::LargeInt(value), LineValue::Int))
     }
 
-    fn visit_f64<E>(self, value: f64) -> Result<Value, E> {
-        Ok(Value::Float(value))
+    fn visit_f64<E>(self, value: f64) -> Result<LineValue, E> {
+        Ok(LineValue::Float(value))
     }
 
-    fn visit_str<E>(self, text: &str) -> Result<Value, E> {
-        Ok(Value::Text(text.to_owned()))
+    fn visit_str<E>(self, text: &str) -> Result<LineValue, E> {
+        Ok(LineValue::Text(text.to_owned()))
     }
 
-    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Value, A::Error> {
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<LineValue, A::Error> {
         while list.next_element::<IgnoredAny>()?.is_some() {}
-        Ok(Value::List)
+        Ok(LineValue::List)
     }
 
-    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Value, A::Error> {
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<LineValue, A::Error> {
         let mut members = Members::new();
         while let Some(key) = map.next_key()? {
             if self.is_line {
@@ -178,20 +178,21 @@ impl<'de> Visitor<'de> for Plain {
                 map.next_value::<IgnoredAny>()?;
             }
         }
-        Ok(Value::Object(members))
+        Ok(LineValue::Object(members))
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{Value, members};
+    use super::{LineValue, members};
 
     #[test]
     fn numbers_keep_their_spelling() {
         let line = r#"{"a":1,"b":1.0,"c":-9223372036854775808,"d":18446744073709551615,"e":1e3,"f":null}"#;
         let values: Vec<_> = members(line.as_bytes(), true).unwrap().into_iter().map(|(_, value)| value).collect();
-        let (int, float) = (Value::Int, Value::Float);
-        let expected = [int(1), float(1.0), int(i64::MIN), Value::LargeInt(u64::MAX), float(1000.0), Value::Null];
+        let (int, float) = (LineValue::Int, LineValue::Float);
+        let expected =
+            [int(1), float(1.0), int(i64::MIN), LineValue::LargeInt(u64::MAX), float(1000.0), LineValue::Null];
         assert_eq!(values, expected);
     }
 

@@ -155,7 +155,7 @@ fn survey(
 fn write(
     texts: &mut [Text],
     columns: &Columns,
-    steps: &[index::Step],
+    steps: &[index::IndexedStep],
     out: &Path,
     limits: Limits<'_>,
 ) -> Result<NewFile, ImportError> {
@@ -192,15 +192,15 @@ fn add(rows: &mut Gathered, members: &Members) -> Result<(), ()> {
 }
 
 #[expect(clippy::cast_precision_loss, reason = "the first pass refused what would lose anything in an own column")]
-fn plain<'a>(value: Option<&'a line::Value>, stored: &DataType) -> Result<Option<Value<'a>>, ()> {
+fn plain<'a>(value: Option<&'a line::LineValue>, stored: &DataType) -> Result<Option<Value<'a>>, ()> {
     Ok(Some(match value {
-        None | Some(line::Value::Null) => return Ok(None),
-        Some(line::Value::Bool(value)) => Value::Bool(*value),
-        Some(line::Value::Int(value)) if stored.is_floating() => Value::Float(*value as f64),
-        Some(line::Value::Int(value)) => Value::Int(*value),
-        Some(line::Value::LargeInt(value)) if stored.is_floating() => Value::Float(*value as f64),
-        Some(line::Value::Float(value)) => Value::Float(*value),
-        Some(line::Value::Text(text)) => Value::Text(text),
+        None | Some(line::LineValue::Null) => return Ok(None),
+        Some(line::LineValue::Bool(value)) => Value::Bool(*value),
+        Some(line::LineValue::Int(value)) if stored.is_floating() => Value::Float(*value as f64),
+        Some(line::LineValue::Int(value)) => Value::Int(*value),
+        Some(line::LineValue::LargeInt(value)) if stored.is_floating() => Value::Float(*value as f64),
+        Some(line::LineValue::Float(value)) => Value::Float(*value),
+        Some(line::LineValue::Text(text)) => Value::Text(text),
         Some(_) => return Err(()),
     }))
 }

@@ -12,7 +12,7 @@ use serde_json::Value;
 
 use super::error::{ImportError, Place};
 use super::format::lerobot::data_set;
-use super::format::{Format, Rows};
+use super::format::{Format, RowSink};
 use super::line::BYTE_ORDER_MARK;
 use super::mapping::Mapping;
 use crate::inputs::Input;
@@ -75,7 +75,7 @@ impl Text {
         }
         let (name, format) = (Input::new(folder).name, Format::LeRobot);
         let source = Source { sha256: data_set::hash_of(folder)?, format, mapping: mapping.declared() };
-        let mut rows = Rows::new(&name, &source.sha256, mapping)?;
+        let mut rows = RowSink::new(&name, &source.sha256, mapping)?;
         data_set::read_folder(folder, &mut rows)?;
         let lines = Self::of_file(&name, rows.finish()?);
         Ok(Some(Self { noun: format.noun(), source: Some(source), ..lines }))
@@ -96,7 +96,7 @@ impl Text {
             return Ok(self);
         }
         let source = Source { sha256: self.hash()?, format, mapping: mapping.declared() };
-        let mut rows = Rows::new(&self.name, &source.sha256, mapping)?;
+        let mut rows = RowSink::new(&self.name, &source.sha256, mapping)?;
         match format {
             Format::JsonLines => while rows.add_line(&self.read_line()?)? {},
             _ => format.read(self.reader.into_inner(), &mut rows)?,

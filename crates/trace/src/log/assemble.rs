@@ -52,14 +52,14 @@ pub fn assemble(
     scratch: &Path,
 ) -> Result<(), LogError> {
     let file = NewFile::create_in(scratch, out).map_err(LogError::io("write", out))?;
-    let before = before.map(Source::open).transpose()?;
+    let before = before.map(LogPart::open).transpose()?;
     replaced(file, out, recording, |log| copy_all(log, before, out, parts))
 }
 
 /// Rewrites the log at `path` without the episodes of these ids.
 #[cfg(feature = "view")]
 pub fn without(path: &Path, ids: &BTreeSet<String>, recording: &Value) -> Result<(), LogError> {
-    let mut source = Source::open(path)?;
+    let mut source = LogPart::open(path)?;
     let file = NewFile::create(path).map_err(LogError::io("write", path))?;
     replaced(file, path, recording, |log| {
         while let Some((head, _)) = &source.begin {
@@ -94,14 +94,14 @@ fn replaced(
 
 fn copy_all<W: Write + Seek>(
     log: &mut Writer<W>,
-    mut before: Option<Source>,
+    mut before: Option<LogPart>,
     out: &Path,
     parts: &[(Place, PathBuf)],
 ) -> Result<(), LogError> {
     let mut parts = parts.to_vec();
     parts.sort();
     for (place, part) in &parts {
-        while let Some(earlier) = before.as_ref().and_then(Source::place).filter(|earlier| earlier <= place) {
+        while let Some(earlier) = before.as_ref().and_then(LogPart::place).filter(|earlier| earlier <= place) {
             if let Some(source) = &mut before {
                 source.copy_episode(log, out)?;
             }
@@ -111,7 +111,7 @@ fn copy_all<W: Write + Seek>(
         }
         let is_written = before.as_ref().is_some_and(|source| source.last == Some(*place));
         if !is_written {
-            Source::open(part)?.copy_episode(log, out)?;
+            LogPart::open(part)?.copy_episode(log, out)?;
         }
     }
     while let Some(source) = before.as_mut().filter(|source| source.place().is_some()) {
@@ -120,14 +120,14 @@ fn copy_all<W: Write + Seek>(
     Ok(())
 }
 
-struct Source {
+struct LogPart {
     path: PathBuf,
     messages: Messages,
     begin: Option<(Episode, Message<'static>)>,
     last: Option<Place>,
 }
 
-impl Source {
+impl LogPart {
     fn open(path: &Path) -> Result<Self, LogError> {
         let messages = Messages::open(path)?;
         let mut source = Self { path: path.to_owned(), messages, begin: None, last: None };

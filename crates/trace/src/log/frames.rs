@@ -15,7 +15,7 @@ use super::chunk::{Budgets, inside};
 use super::error::LogError;
 use super::message::EpisodeMessage;
 use super::read::{Event, event, png};
-use super::records::{Piece, Records};
+use super::records::{RecordPiece, Records};
 use super::topic;
 use crate::episode::{Episode, Step};
 
@@ -23,12 +23,12 @@ use crate::episode::{Episode, Step};
 pub struct LogIndex {
     path: PathBuf,
     topics: BTreeMap<u16, String>,
-    chunks: Vec<Chunk>,
+    chunks: Vec<ChunkTimes>,
 }
 
 /// The start of a chunk, and the times of its first and its last message, ns.
 #[derive(Clone, Copy, Debug)]
-struct Chunk {
+struct ChunkTimes {
     at: u64,
     first: u64,
     last: u64,
@@ -38,12 +38,12 @@ struct Chunk {
 pub struct Moment {
     /// The frame, PNG; `None` if none was drawn.
     pub frame: Option<Vec<u8>>,
-    pub shapes: Vec<Shape>,
+    pub shapes: Vec<SceneShape>,
 }
 
 /// A shape seen from above.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Shape {
+pub struct SceneShape {
     /// Its name, such as `pane0`, `cube0` or `agent0_head`.
     pub name: String,
     /// Its outline on the floor: the corners in order, m.
@@ -72,7 +72,7 @@ impl LogIndex {
                 Record::Channel(channel) => {
                     topics.insert(channel.id, channel.topic);
                 }
-                Record::ChunkIndex(index) => chunks.push(Chunk {
+                Record::ChunkIndex(index) => chunks.push(ChunkTimes {
                     at: index.chunk_start_offset,
                     first: index.message_start_time,
                     last: index.message_end_time,
@@ -101,7 +101,7 @@ impl LogIndex {
         &self,
         episode_id: &str,
         times: &BTreeSet<u64>,
-        give: &mut dyn FnMut(u64, Vec<Shape>),
+        give: &mut dyn FnMut(u64, Vec<SceneShape>),
     ) -> Result<(), LogError> {
         let (Some(first), Some(last)) = (times.first(), times.last()) else { return Ok(()) };
         let mut records = Records::open(&self.path)?;
@@ -139,7 +139,7 @@ impl LogIndex {
     fn moments(
         &self,
         records: &mut Records<BufReader<File>>,
-        chunk: &Chunk,
+        chunk: &ChunkTimes,
         episode_id: &str,
         is_wanted: impl Fn(&MessageHeader) -> bool,
     ) -> Result<BTreeMap<u64, Moment>, LogError> {
@@ -159,7 +159,7 @@ impl LogIndex {
     fn messages(
         &self,
         records: &mut Records<BufReader<File>>,
-        chunk: &Chunk,
+        chunk: &ChunkTimes,
         episode_id: &str,
         is_wanted: impl Fn(&MessageHeader) -> bool,
     ) -> Result<Vec<Record<'static>>, LogError> {
@@ -221,7 +221,7 @@ pub fn unfinished_step(path: &Path, time: u64) -> Result<Option<Moment>, LogErro
 }
 
 /// Passes on the shapes of the steps of a log that is still being written, by time, ns.
-pub fn each_unfinished_shapes(path: &Path, give: &mut dyn FnMut(u64, Vec<Shape>)) -> Result<(), LogError> {
+pub fn each_unfinished_shapes(path: &Path, give: &mut dyn FnMut(u64, Vec<SceneShape>)) -> Result<(), LogError> {
     each_message(path, |topic, at, data| {
         if topic == topic::SCENE {
             give(at, shapes(data));
@@ -238,9 +238,9 @@ fn each_message(path: &Path, mut give: impl FnMut(&str, u64, &[u8])) -> Result<(
     let mut topics = BTreeMap::new();
     while let Some(piece) = records.next().map_err(LogError::io("read", path))? {
         let messages = match piece {
-            Piece::Chunk(_, bytes) => inside(&bytes, &records.budgets).unwrap_or_default(),
-            Piece::Cut(..) => break,
-            Piece::Record(_) | Piece::Damage(_) => continue,
+            RecordPiece::Chunk(_, bytes) => inside(&bytes, &records.budgets).unwrap_or_default(),
+            RecordPiece::Cut(..) => break,
+            RecordPiece::Record(_) | RecordPiece::Damage(_) => continue,
         };
         for record in messages {
             match record {
@@ -279,15 +279,15 @@ struct Entity {
     #[prost(string, tag = "3")]
     id: String,
     #[prost(message, repeated, tag = "8")]
-    cubes: Vec<Solid>,
+    cubes: Vec<SolidMessage>,
     #[prost(message, repeated, tag = "9")]
-    spheres: Vec<Solid>,
+    spheres: Vec<SolidMessage>,
     #[prost(message, repeated, tag = "10")]
     cylinders: Vec<Cylinder>,
 }
 
 #[derive(Clone, PartialEq, prost::Message)]
-struct Solid {
+struct SolidMessage {
     #[prost(message, optional, tag = "1")]
     pose: Option<Pose>,
     #[prost(message, optional, tag = "2")]
@@ -327,14 +327,14 @@ struct Numbers {
     w: f64,
 }
 
-fn shapes(data: &[u8]) -> Vec<Shape> {
+fn shapes(data: &[u8]) -> Vec<SceneShape> {
     let Ok(update) = <SceneUpdate as prost::Message>::decode(data) else { return Vec::new() };
-    let mut shapes: Vec<Shape> = update.entities.iter().flat_map(of_entity).collect();
+    let mut shapes: Vec<SceneShape> = update.entities.iter().flat_map(of_entity).collect();
     shapes.sort_by(|a, b| a.height.total_cmp(&b.height));
     shapes
 }
 
-fn of_entity(entity: &Entity) -> Vec<Shape> {
+fn of_entity(entity: &Entity) -> Vec<SceneShape> {
     let name = &entity.id;
     let cubes = entity.cubes.iter().filter_map(|cube| boxed(name, cube.pose.as_ref()?, cube.size?, cube.color?));
     let spheres = entity.spheres.iter().filter_map(|ball| round(name, ball.pose.as_ref()?, ball.size?, ball.color?));
@@ -342,7 +342,7 @@ fn of_entity(entity: &Entity) -> Vec<Shape> {
     cubes.chain(spheres).chain(posts).collect()
 }
 
-fn boxed(name: &str, pose: &Pose, size: Numbers, color: Numbers) -> Option<Shape> {
+fn boxed(name: &str, pose: &Pose, size: Numbers, color: Numbers) -> Option<SceneShape> {
     let (at, turn) = (pose.position?, pose.orientation?);
     let corner = |x: f64, y: f64, z: f64| {
         let [dx, dy, _] = turned(turn, [x * size.x / 2.0, y * size.y / 2.0, z * size.z / 2.0]);
@@ -350,13 +350,13 @@ fn boxed(name: &str, pose: &Pose, size: Numbers, color: Numbers) -> Option<Shape
     };
     let sign = |corner: u8, axis: u8| if corner >> axis & 1 == 0 { -1.0 } else { 1.0 };
     let outline = hull((0..8).map(|of| corner(sign(of, 0), sign(of, 1), sign(of, 2))).collect());
-    Some(Shape { name: name.to_owned(), outline, radius: None, rgba: rgba(color), height: at.z })
+    Some(SceneShape { name: name.to_owned(), outline, radius: None, rgba: rgba(color), height: at.z })
 }
 
-fn round(name: &str, pose: &Pose, size: Numbers, color: Numbers) -> Option<Shape> {
+fn round(name: &str, pose: &Pose, size: Numbers, color: Numbers) -> Option<SceneShape> {
     let at = pose.position?;
     let radius = Some(size.x / 2.0);
-    Some(Shape { name: name.to_owned(), outline: vec![[at.x, at.y]], radius, rgba: rgba(color), height: at.z })
+    Some(SceneShape { name: name.to_owned(), outline: vec![[at.x, at.y]], radius, rgba: rgba(color), height: at.z })
 }
 
 fn rgba(color: Numbers) -> [f64; 4] {

@@ -16,7 +16,7 @@ use serde_json::Value;
 use super::chunk::{Unpacked, inside};
 use super::error::LogError;
 use super::message::{Decision, EpisodeMessage};
-use super::records::{Piece, Records};
+use super::records::{RecordPiece, Records};
 use super::topic;
 
 #[derive(Clone, Debug, PartialEq)]
@@ -131,22 +131,22 @@ impl Messages {
                 return Ok(Some(record));
             }
             let fault = match self.records.next().map_err(LogError::io("read", &self.path))? {
-                Some(Piece::Record(Record::DataEnd(end))) => {
+                Some(RecordPiece::Record(Record::DataEnd(end))) => {
                     let (written, found) = (end.data_section_crc, self.records.checksum);
                     if written == 0 || written == found {
                         return Ok(None);
                     }
                     format!("the checksum of the data: expected {written:08x}, found {found:08x}")
                 }
-                Some(Piece::Record(record)) => return Ok(Some(record)),
-                Some(Piece::Chunk(at, bytes)) => match inside(&bytes, &self.records.budgets) {
+                Some(RecordPiece::Record(record)) => return Ok(Some(record)),
+                Some(RecordPiece::Chunk(at, bytes)) => match inside(&bytes, &self.records.budgets) {
                     Ok(records) => {
                         (self.chunk, self.at) = (records, at);
                         continue;
                     }
                     Err(fault) => format!("the chunk at byte {at}: {fault}"),
                 },
-                Some(Piece::Damage(fault) | Piece::Cut(fault, _)) => fault,
+                Some(RecordPiece::Damage(fault) | RecordPiece::Cut(fault, _)) => fault,
                 None => "it ends before its end record".to_owned(),
             };
             return Err(LogError::Damaged { file: self.path.display().to_string(), fault });

@@ -18,7 +18,7 @@ use exact::input;
 const CHUNK_HEADER: usize = 8 + 8 + 8 + 4 + 4 + 8;
 
 #[derive(Debug)]
-pub(super) enum Piece {
+pub(super) enum RecordPiece {
     Record(Record<'static>),
     /// A chunk: its position, and its opcode, length and bytes.
     Chunk(u64, Vec<u8>),
@@ -42,12 +42,12 @@ pub(super) struct Records<R> {
 
 /// An opcode, and the length of the contents.
 #[derive(Clone, Copy)]
-struct Frame {
+struct RecordHead {
     opcode: u8,
     length: u64,
 }
 
-impl Frame {
+impl RecordHead {
     fn of(bytes: [u8; FRAME]) -> Self {
         let [opcode, length @ ..] = bytes;
         Self { opcode, length: u64::from_le_bytes(length) }
@@ -94,9 +94,9 @@ impl<R: Read + Seek> Records<R> {
         Ok((begin == MAGIC).then_some(records))
     }
 
-    pub(super) fn next(&mut self) -> io::Result<Option<Piece>> {
+    pub(super) fn next(&mut self) -> io::Result<Option<RecordPiece>> {
         if let Some(damage) = self.damage.take() {
-            return Ok(Some(Piece::Damage(damage)));
+            return Ok(Some(RecordPiece::Damage(damage)));
         }
         if self.at >= self.end {
             return Ok(None);
@@ -119,7 +119,7 @@ impl<R: Read + Seek> Records<R> {
             }
             Err(fault) if is_followed => {
                 self.at = behind;
-                Ok(Some(Piece::Damage(format!("the record at byte {from} cannot be read: {fault}"))))
+                Ok(Some(RecordPiece::Damage(format!("the record at byte {from} cannot be read: {fault}"))))
             }
             Err(fault) => self.past_damage(&fault).map(Some),
         }
@@ -135,14 +135,16 @@ impl<R: Read + Seek> Records<R> {
         let last = self.end.saturating_sub((FOOTER + MAGIC.len()) as u64);
         let footer = self.read(last, FOOTER)?;
         let start = match footer.first().map(|opcode| decode(last, *opcode, &footer)) {
-            Some(Ok(Piece::Record(Record::Footer(footer)))) if footer.summary_start < last => footer.summary_start,
+            Some(Ok(RecordPiece::Record(Record::Footer(footer)))) if footer.summary_start < last => {
+                footer.summary_start
+            }
             _ => return Ok(Vec::new()),
         };
         let mut found = Vec::new();
         let mut at = start;
         while let Some(frame) = self.frame(at)?.filter(|_| at < last) {
             let whole = self.whole(at, frame)?;
-            if let Ok(Piece::Record(record)) = decode(at, frame.opcode, &whole) {
+            if let Ok(RecordPiece::Record(record)) = decode(at, frame.opcode, &whole) {
                 found.push(record);
             }
             at += whole.len() as u64;
@@ -180,27 +182,27 @@ impl<R: Read + Seek> Records<R> {
         Ok(bytes)
     }
 
-    fn frame(&mut self, at: u64) -> io::Result<Option<Frame>> {
+    fn frame(&mut self, at: u64) -> io::Result<Option<RecordHead>> {
         let bytes = self.read(at, FRAME)?;
         let behind = self.end.saturating_sub(at + FRAME as u64);
-        let frame = <[u8; FRAME]>::try_from(bytes).ok().map(Frame::of);
+        let frame = <[u8; FRAME]>::try_from(bytes).ok().map(RecordHead::of);
         Ok(frame.filter(|frame| frame.is_plausible(behind)))
     }
 
-    fn whole(&mut self, at: u64, frame: Frame) -> io::Result<Vec<u8>> {
+    fn whole(&mut self, at: u64, frame: RecordHead) -> io::Result<Vec<u8>> {
         self.read(at, FRAME + usize::try_from(frame.length).unwrap_or(LONGEST))
     }
 
-    fn past_damage(&mut self, fault: &str) -> io::Result<Piece> {
+    fn past_damage(&mut self, fault: &str) -> io::Result<RecordPiece> {
         let from = self.at;
         Ok(if let Some(next) = self.landmark(from + 1)? {
             self.at = next;
-            Piece::Damage(format!("bytes {from} to {next} cannot be read: {fault}"))
+            RecordPiece::Damage(format!("bytes {from} to {next} cannot be read: {fault}"))
         } else {
             self.at = self.end;
             let tail = self.read(from, LONGEST)?;
             let tail = if tail.first() == Some(&op::CHUNK) { tail } else { Vec::new() };
-            Piece::Cut(format!("the log ends before its end record: after byte {from} nothing can be read"), tail)
+            RecordPiece::Cut(format!("the log ends before its end record: after byte {from} nothing can be read"), tail)
         })
     }
 
@@ -210,7 +212,7 @@ impl<R: Read + Seek> Records<R> {
         loop {
             let window = self.read(start, WINDOW)?;
             for (at, bytes) in (start..).zip(window.windows(FRAME)) {
-                let frame = <[u8; FRAME]>::try_from(bytes).map(Frame::of);
+                let frame = <[u8; FRAME]>::try_from(bytes).map(RecordHead::of);
                 if let Ok(frame) = frame
                     && self.is_landmark(at, frame)?
                 {
@@ -224,7 +226,7 @@ impl<R: Read + Seek> Records<R> {
         }
     }
 
-    fn is_landmark(&mut self, at: u64, frame: Frame) -> io::Result<bool> {
+    fn is_landmark(&mut self, at: u64, frame: RecordHead) -> io::Result<bool> {
         let behind = self.end.saturating_sub(at + FRAME as u64);
         if !frame.is_plausible(behind) {
             return Ok(false);
@@ -244,14 +246,14 @@ impl<R: Read + Seek> Records<R> {
     }
 }
 
-fn decode(at: u64, opcode: u8, whole: &[u8]) -> Result<Piece, String> {
+fn decode(at: u64, opcode: u8, whole: &[u8]) -> Result<RecordPiece, String> {
     let body = whole.get(FRAME..).unwrap_or_default();
     match opcode {
         op::CHUNK => match parsed(op::CHUNK, body) {
             Ok(Record::Chunk { header, data })
                 if CHUNK_HEADER + header.compression.len() + data.len() == body.len() && !data.is_empty() =>
             {
-                Ok(Piece::Chunk(at, whole.to_vec()))
+                Ok(RecordPiece::Chunk(at, whole.to_vec()))
             }
             Ok(_) => Err("a chunk of another length than it says".to_owned()),
             Err(fault) => Err(fault),
@@ -259,7 +261,7 @@ fn decode(at: u64, opcode: u8, whole: &[u8]) -> Result<Piece, String> {
         // An end record counts only with its exact length, since no episodes are read after it.
         op::DATA_END if body.len() != 4 => Err("an end record of another length".to_owned()),
         // Our logs have no attachments, and the library expects valid ones.
-        op::ATTACHMENT => Ok(Piece::Record(Record::Unknown { opcode, data: Vec::new().into() })),
-        _ => Ok(Piece::Record(parsed(opcode, body)?.into_owned())),
+        op::ATTACHMENT => Ok(RecordPiece::Record(Record::Unknown { opcode, data: Vec::new().into() })),
+        _ => Ok(RecordPiece::Record(parsed(opcode, body)?.into_owned())),
     }
 }

@@ -17,7 +17,7 @@ use super::chunk::{Budgets, glimpse, inside};
 use super::error::LogError;
 use super::message::EpisodeMessage;
 use super::read::{Event, event};
-use super::records::{Piece, Records};
+use super::records::{RecordPiece, Records};
 use super::{METADATA, METADATA_KEY, topic};
 use crate::episode::{Episode, Step};
 use crate::episode_hash;
@@ -37,7 +37,7 @@ pub struct Recovered {
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Losses {
     /// Episodes that were begun and are not whole.
-    pub episodes: Vec<LostEpisode>,
+    pub episodes: Vec<PartialEpisode>,
     /// Rows that belong to no episode whose begin is there.
     pub stray_rows: usize,
     /// Chunks that cannot be read.
@@ -52,7 +52,8 @@ pub struct Losses {
 
 /// An episode that is not whole.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
-pub struct LostEpisode {
+#[schemars(rename = "LostEpisode")]
+pub struct PartialEpisode {
     /// Its id.
     pub episode_id: String,
     /// The rows that are there.
@@ -111,16 +112,16 @@ impl Salvage {
         let mut is_open = true;
         while let Some(piece) = records.next()? {
             match piece {
-                Piece::Record(Record::DataEnd(end)) => {
+                RecordPiece::Record(Record::DataEnd(end)) => {
                     is_open = false;
                     salvage.compare("the data", end.data_section_crc, records.checksum);
                     salvage.index(records)?;
                     break;
                 }
-                Piece::Record(record) => salvage.record(record),
-                Piece::Chunk(at, chunk) => salvage.chunk(at, &chunk, &records.budgets),
-                Piece::Damage(fault) => salvage.result.losses.damage.push(fault),
-                Piece::Cut(fault, tail) => {
+                RecordPiece::Record(record) => salvage.record(record),
+                RecordPiece::Chunk(at, chunk) => salvage.chunk(at, &chunk, &records.budgets),
+                RecordPiece::Damage(fault) => salvage.result.losses.damage.push(fault),
+                RecordPiece::Cut(fault, tail) => {
                     salvage.close("the log ends before the episode does");
                     salvage.lose_all(&tail, &records.budgets, "the log ends before the episode does");
                     salvage.result.losses.cut = Some(fault);
@@ -136,16 +137,16 @@ impl Salvage {
     fn index(&mut self, records: &mut Records<impl Read + Seek>) -> io::Result<()> {
         while let Some(piece) = records.next()? {
             match piece {
-                Piece::Record(Record::Footer(footer)) => {
+                RecordPiece::Record(Record::Footer(footer)) => {
                     self.compare("the index", footer.summary_crc, records.checksum);
                     if !records.is_closed()? {
                         self.result.losses.damage.push("the log does not end as an MCAP file does".to_owned());
                     }
                     return Ok(());
                 }
-                Piece::Record(_) | Piece::Chunk(..) => {}
-                Piece::Damage(fault) => self.result.losses.damage.push(fault),
-                Piece::Cut(..) => break,
+                RecordPiece::Record(_) | RecordPiece::Chunk(..) => {}
+                RecordPiece::Damage(fault) => self.result.losses.damage.push(fault),
+                RecordPiece::Cut(..) => break,
             }
         }
         self.result.losses.cut = Some("the log ends within its index, behind all that was recorded".to_owned());
@@ -278,7 +279,7 @@ impl Salvage {
     }
 
     fn lose(&mut self, episode_id: String, rows: usize, reason: String) {
-        self.result.losses.episodes.push(LostEpisode { episode_id, rows, reason });
+        self.result.losses.episodes.push(PartialEpisode { episode_id, rows, reason });
     }
 }
 

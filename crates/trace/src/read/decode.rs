@@ -69,7 +69,7 @@ pub(crate) struct RowGroup<'a> {
     readable: Arc<Readable>,
     index: usize,
     ids: Option<Ids>,
-    sources: Vec<Source>,
+    sources: Vec<ColumnSource>,
     first: usize,
     at_a_time: usize,
     over: bool,
@@ -77,7 +77,7 @@ pub(crate) struct RowGroup<'a> {
     seen: Vec<Option<Seen>>,
 }
 
-enum Source {
+enum ColumnSource {
     Absent,
     /// The ids of the episodes, which are decoded already.
     Ahead,
@@ -140,10 +140,10 @@ impl<'a> RowGroup<'a> {
         rows.seen = (0..layout.columns.len()).map(|at| rows.described(at).map(|_| Seen::default())).collect();
         for at in 0..layout.columns.len() {
             let source = match root(file, layout, at) {
-                None => Source::Absent,
-                Some(_) if at == EPISODE_ID && rows.ids.is_some() => Source::Ahead,
+                None => ColumnSource::Absent,
+                Some(_) if at == EPISODE_ID && rows.ids.is_some() => ColumnSource::Ahead,
                 Some(root) => match contained(|| cursor(&rows.readable, &store, root, row_group, form(layout, at))) {
-                    Ok(Ok(cursor)) => Source::Pages { root, cursor: Box::new(cursor) },
+                    Ok(Ok(cursor)) => ColumnSource::Pages { root, cursor: Box::new(cursor) },
                     Ok(Err(Unsupported)) | Err(_) => rows.library(at, root)?,
                 },
             };
@@ -152,11 +152,11 @@ impl<'a> RowGroup<'a> {
         Ok(rows)
     }
 
-    fn library(&self, at: usize, root: usize) -> Result<Source, Box<Finding>> {
+    fn library(&self, at: usize, root: usize) -> Result<ColumnSource, Box<Finding>> {
         let (store, slot) = (self.file.store()?, FaultSlot::default());
         let made = contained(|| self.reader(store, root, self.first, &slot));
         match made.and_then(|reader| reader.map_err(|error| plain(&error))) {
-            Ok(reader) => Ok(Source::Library(Box::new(Library { reader, held: Vec::new(), slot }))),
+            Ok(reader) => Ok(ColumnSource::Library(Box::new(Library { reader, held: Vec::new(), slot }))),
             Err(error) => Err(self.damaged(at, &slot, &error)),
         }
     }
@@ -225,17 +225,17 @@ impl<'a> RowGroup<'a> {
     /// The next `count` rows of a column. At the end `count` is 0 and no rows may remain.
     fn column(&mut self, at: usize, count: usize) -> Result<Column, Box<Finding>> {
         let kind = self.layout.columns[at].kind;
-        if let Source::Pages { root, cursor } = &mut self.sources[at] {
+        if let ColumnSource::Pages { root, cursor } = &mut self.sources[at] {
             if let Ok(Ok(column)) = contained(|| cursor.read(count)) {
                 return Ok(column);
             }
             let root = *root;
             self.sources[at] = self.library(at, root)?;
         }
-        if let (Source::Ahead, Some(ids)) = (&self.sources[at], &self.ids) {
+        if let (ColumnSource::Ahead, Some(ids)) = (&self.sources[at], &self.ids) {
             return Ok(Column::Runs(ids.runs.slice(self.first, count)));
         }
-        let Source::Library(library) = &mut self.sources[at] else {
+        let ColumnSource::Library(library) = &mut self.sources[at] else {
             return Ok(Column::Flat(new_null_array(&held_as(kind), count)));
         };
         loop {

@@ -64,14 +64,14 @@ impl Episodes {
     }
 }
 
-pub(crate) enum Event<T> {
+pub(crate) enum ScanEvent<T> {
     Whole(T),
     /// The file cannot be decoded further; this is its last event.
     Fault(Box<Finding>),
 }
 
 /// The parts of a row group, in this order: at most one head, wholes, a tail or a fault.
-enum Part<T> {
+enum ScanPart<T> {
     /// The first episode's rows, which may continue the row group before.
     Head(Vec<Rows>),
     Whole(T),
@@ -80,7 +80,7 @@ enum Part<T> {
     Fault(Box<Finding>),
 }
 
-type Order<T> = (Job, SyncSender<Part<T>>);
+type Order<T> = (Job, SyncSender<ScanPart<T>>);
 
 #[derive(Clone, Copy)]
 struct Job {
@@ -97,7 +97,7 @@ pub(crate) fn pass<T: Send, E: From<TraceError>>(
     layout: &Layout,
     threads: NonZeroUsize,
     work: &(impl Fn(Episodes) -> T + Sync),
-    receive: impl FnMut(usize, Event<T>) -> Result<(), E>,
+    receive: impl FnMut(usize, ScanEvent<T>) -> Result<(), E>,
 ) -> Result<(), E> {
     let jobs = files.iter().enumerate().flat_map(|(file, trace)| {
         (0..trace.row_groups())
@@ -159,7 +159,7 @@ struct Splitter<'a, T, W> {
     layout: &'a Layout,
     job: Job,
     work: &'a W,
-    parts: &'a SyncSender<Part<T>>,
+    parts: &'a SyncSender<ScanPart<T>>,
     open: Vec<Rows>,
     headed: bool,
 }
@@ -170,7 +170,7 @@ impl<T, W: Fn(Episodes) -> T> Splitter<'_, T, W> {
     fn run(mut self, ids: Option<Ids>) {
         let result = match RowGroup::open(self.file, self.layout, self.job.row_group, ids) {
             Ok(rows) => self.split(rows),
-            Err(finding) => self.send(Part::Fault(finding)),
+            Err(finding) => self.send(ScanPart::Fault(finding)),
         };
         // The receiver has gone, so the result is not needed.
         drop(result);
@@ -182,10 +182,10 @@ impl<T, W: Fn(Episodes) -> T> Splitter<'_, T, W> {
                 Ok(rows) => {
                     self.add(&rows)?;
                     if let Some(finding) = too_long(self.file, &self.open) {
-                        return self.send(Part::Fault(finding));
+                        return self.send(ScanPart::Fault(finding));
                     }
                 }
-                Err(finding) => return self.send(Part::Fault(finding)),
+                Err(finding) => return self.send(ScanPart::Fault(finding)),
             }
         }
         if self.job.row_group + 1 == self.file.row_groups() {
@@ -193,8 +193,8 @@ impl<T, W: Fn(Episodes) -> T> Splitter<'_, T, W> {
         }
         match std::mem::take(&mut self.open) {
             open if open.is_empty() => Ok(()),
-            open if self.headed => self.send(Part::Tail(open)),
-            open => self.send(Part::Head(open)),
+            open if self.headed => self.send(ScanPart::Tail(open)),
+            open => self.send(ScanPart::Head(open)),
         }
     }
 
@@ -239,29 +239,29 @@ impl<T, W: Fn(Episodes) -> T> Splitter<'_, T, W> {
             return Ok(());
         }
         if !std::mem::replace(&mut self.headed, true) {
-            return self.send(Part::Head(open));
+            return self.send(ScanPart::Head(open));
         }
         match join(self.job.file, &open) {
             Ok(episode) => self.send_whole(episode),
-            Err(why) => self.send(Part::Fault(unjoined(self.file, &open, why))),
+            Err(why) => self.send(ScanPart::Fault(unjoined(self.file, &open, why))),
         }
     }
 
     fn send_whole(&self, episodes: Episodes) -> Result<(), Abandoned> {
         if let Some(finding) = too_many(self.file, &episodes) {
-            return self.send(Part::Fault(finding));
+            return self.send(ScanPart::Fault(finding));
         }
-        self.send(Part::Whole((self.work)(episodes)))
+        self.send(ScanPart::Whole((self.work)(episodes)))
     }
 
-    fn send(&self, part: Part<T>) -> Result<(), Abandoned> {
+    fn send(&self, part: ScanPart<T>) -> Result<(), Abandoned> {
         self.parts.send(part).map_err(|_| Abandoned)
     }
 }
 
 struct Started<T> {
     job: Job,
-    parts: Receiver<Part<T>>,
+    parts: Receiver<ScanPart<T>>,
     /// Held so that a file's footer is read once for all its row groups.
     _footer: Option<Arc<Readable>>,
 }
@@ -277,7 +277,7 @@ struct Joiner<'a, W, R> {
     failed: bool,
 }
 
-impl<T, E: From<TraceError>, W: Fn(Episodes) -> T, R: FnMut(usize, Event<T>) -> Result<(), E>> Joiner<'_, W, R> {
+impl<T, E: From<TraceError>, W: Fn(Episodes) -> T, R: FnMut(usize, ScanEvent<T>) -> Result<(), E>> Joiner<'_, W, R> {
     fn run(mut self, give: &Sender<Order<T>>, mut jobs: VecDeque<Job>, under_way: usize) -> Result<(), E> {
         let mut started: VecDeque<Started<T>> = VecDeque::new();
         loop {
@@ -304,9 +304,9 @@ impl<T, E: From<TraceError>, W: Fn(Episodes) -> T, R: FnMut(usize, Event<T>) -> 
         self.close()
     }
 
-    fn take(&mut self, part: Part<T>) -> Result<(), E> {
+    fn take(&mut self, part: ScanPart<T>) -> Result<(), E> {
         match part {
-            Part::Head(rows) => {
+            ScanPart::Head(rows) => {
                 let goes_on = self.open.first().zip(rows.first()).is_some_and(|(a, b)| a.episode(0) == b.episode(0));
                 if !goes_on {
                     self.close()?;
@@ -314,23 +314,23 @@ impl<T, E: From<TraceError>, W: Fn(Episodes) -> T, R: FnMut(usize, Event<T>) -> 
                 self.open.extend(rows);
                 too_long(&self.files[self.file], &self.open).map_or(Ok(()), |finding| self.fail(finding))
             }
-            Part::Whole(result) => {
+            ScanPart::Whole(result) => {
                 self.close()?;
-                (self.receive)(self.file, Event::Whole(result))
+                (self.receive)(self.file, ScanEvent::Whole(result))
             }
-            Part::Tail(rows) => {
+            ScanPart::Tail(rows) => {
                 self.close()?;
                 self.open = rows;
                 Ok(())
             }
-            Part::Fault(finding) => self.fail(finding),
+            ScanPart::Fault(finding) => self.fail(finding),
         }
     }
 
     fn fail(&mut self, finding: Box<Finding>) -> Result<(), E> {
         self.failed = true;
         self.open.clear();
-        (self.receive)(self.file, Event::Fault(finding))
+        (self.receive)(self.file, ScanEvent::Fault(finding))
     }
 
     fn close(&mut self) -> Result<(), E> {
@@ -339,7 +339,7 @@ impl<T, E: From<TraceError>, W: Fn(Episodes) -> T, R: FnMut(usize, Event<T>) -> 
             return Ok(());
         }
         match join(self.file, &open) {
-            Ok(episode) => (self.receive)(self.file, Event::Whole((self.work)(episode))),
+            Ok(episode) => (self.receive)(self.file, ScanEvent::Whole((self.work)(episode))),
             Err(why) => self.fail(unjoined(&self.files[self.file], &open, why)),
         }
     }

@@ -39,7 +39,7 @@ const AHEAD: usize = 4;
 ///
 /// An error ends the iteration. One thread per row group decodes ahead.
 pub struct Steps {
-    shape: Shape,
+    shape: StepSelection,
     parts: vec::IntoIter<Part>,
     /// Row groups that are being decoded: the name of the file, and the rows.
     ahead: VecDeque<(String, Receiver<Rows>)>,
@@ -47,7 +47,7 @@ pub struct Steps {
 }
 
 #[derive(Clone)]
-struct Shape {
+struct StepSelection {
     schema: SchemaRef,
     episodes: Option<Arc<BTreeSet<String>>>,
 }
@@ -85,7 +85,7 @@ impl Steps {
         let files = set.files().iter().map(|file| Part::of_file(file).map_err(TraceError::from));
         let parts: Vec<Vec<Part>> = files.collect::<Result<_, _>>()?;
         let parts = parts.into_iter().flatten().collect::<Vec<_>>().into_iter();
-        let shape = Shape { schema, episodes: episodes.map(Arc::new) };
+        let shape = StepSelection { schema, episodes: episodes.map(Arc::new) };
         Ok(Self { shape, parts, ahead: VecDeque::new(), threads })
     }
 
@@ -116,7 +116,7 @@ impl Steps {
     }
 }
 
-impl Shape {
+impl StepSelection {
     fn complete(&self, rows: &RecordBatch) -> Result<RecordBatch, TraceError> {
         let column = |field: &Arc<Field>| -> Result<ArrayRef, arrow::error::ArrowError> {
             let options = CastOptions { safe: false, ..CastOptions::default() };
@@ -183,7 +183,7 @@ impl Part {
         Ok((0..readable.footer.metadata().num_row_groups()).map(part).collect())
     }
 
-    fn ahead(self, shape: Shape) -> (String, Receiver<Rows>) {
+    fn ahead(self, shape: StepSelection) -> (String, Receiver<Rows>) {
         let (sender, rows) = sync_channel(AHEAD);
         let name = self.name.clone();
         thread::spawn(move || {
@@ -194,7 +194,7 @@ impl Part {
         (name, rows)
     }
 
-    fn send(self, shape: &Shape, sender: &SyncSender<Rows>) -> Result<(), TraceError> {
+    fn send(self, shape: &StepSelection, sender: &SyncSender<Rows>) -> Result<(), TraceError> {
         let name = self.name.clone();
         let (mut reader, slot) = self.reader(&shape.schema)?;
         loop {

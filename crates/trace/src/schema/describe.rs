@@ -12,11 +12,11 @@ pub struct SchemaDocument {
     pub version: u32,
     pub columns: &'static [Column],
     pub metadata: &'static [MetadataKey],
-    pub rules: Vec<Rule>,
+    pub rules: Vec<RuleDescription>,
 }
 
 #[derive(Clone, Copy, Debug, Serialize)]
-pub struct Rule {
+pub struct RuleDescription {
     pub code: Code,
     /// True if breaking it makes a trace unusable.
     pub severity: Severity,
@@ -26,7 +26,8 @@ pub struct Rule {
 
 impl SchemaDocument {
     pub fn current() -> Self {
-        let rule = |code: Code| Rule { code, severity: code.severity(), rule: code.explain(), help: code.help() };
+        let rule =
+            |code: Code| RuleDescription { code, severity: code.severity(), rule: code.explain(), help: code.help() };
         Self {
             title: "mirrorstats trace",
             description: "A Parquet file of whole episodes: the rows of an episode are together, and t runs 1..T. \

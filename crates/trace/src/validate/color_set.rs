@@ -13,7 +13,7 @@ use crate::diagnostic::{Code, Finding};
 use crate::error::TraceError;
 use crate::palette::Color;
 use crate::read::open::TraceFile;
-use crate::read::parallel_scan::{Episodes, Event, pass};
+use crate::read::parallel_scan::{Episodes, ScanEvent, pass};
 use crate::read::projection::{Layout, T};
 use crate::schema::colors::palette::Palette;
 use crate::schema::colors::spelling::{WORDS, did_you_mean, meant_by, most_like, spelling_key};
@@ -222,8 +222,8 @@ impl Spellings {
         let work = |episodes: Episodes| sightings(&files[episodes.file], layout, &episodes);
         pass(files, layout, threads, &work, |file, event| {
             match event {
-                Event::Whole(found) => tally.add(files, file, found),
-                Event::Fault(finding) => return Err(TraceError::from(finding)),
+                ScanEvent::Whole(found) => tally.add(files, file, found),
+                ScanEvent::Fault(finding) => return Err(TraceError::from(finding)),
             }
             Ok(())
         })?;

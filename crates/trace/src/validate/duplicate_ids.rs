@@ -11,7 +11,7 @@ use super::rules::Located;
 use crate::diagnostic::{Code, Finding};
 use crate::error::TraceError;
 use crate::read::open::TraceFile;
-use crate::read::parallel_scan::{Episodes, Event, pass};
+use crate::read::parallel_scan::{Episodes, ScanEvent, pass};
 use crate::read::projection::Layout;
 
 /// The id hashes of the episodes that begin at a row up to `last`, except episodes without an id.
@@ -87,12 +87,12 @@ fn first_equal(
     alike: &HashSet<u64>,
     count: usize,
 ) -> Result<Option<Box<Finding>>, TraceError> {
-    let (mut ids, mut left) = (Ids::default(), count);
+    let (mut ids, mut left) = (SeenIds::default(), count);
     let name = |file: usize| files[file].name().to_owned();
     let search = pass(files, layout, NonZeroUsize::MIN, &|episodes| starts(&episodes), |file, event| {
         let starts = match event {
-            Event::Whole(starts) => starts,
-            Event::Fault(finding) => return Err(TraceError::from(finding).into()),
+            ScanEvent::Whole(starts) => starts,
+            ScanEvent::Fault(finding) => return Err(TraceError::from(finding).into()),
         };
         for start in starts {
             if left == 0 {
@@ -127,7 +127,7 @@ fn repeated(file: &str, id: &str, other: Option<&str>, groups: (usize, usize)) -
 
 /// The ids so far, in file order: finds every repetition, but takes more memory.
 #[derive(Default)]
-pub(crate) struct Ids {
+pub(crate) struct SeenIds {
     seen: HashMap<String, (usize, usize)>,
 }
 
@@ -137,7 +137,7 @@ pub(crate) struct Start {
     pub(crate) row_group: usize,
 }
 
-impl Ids {
+impl SeenIds {
     /// Adds an episode; returns a finding if its id is known. `name` gives the names of files.
     pub(crate) fn admit(&mut self, start: Start, file: usize, name: impl Fn(usize) -> String) -> Option<Located> {
         let Start { id, row, row_group } = start;
@@ -196,7 +196,7 @@ mod tests {
             NonZeroUsize::MIN,
             &|episodes| hashes(&episodes, usize::MAX),
             |_, event| {
-                let Event::Whole(hashes) = event else { panic!("a fault in a fixture") };
+                let ScanEvent::Whole(hashes) = event else { panic!("a fault in a fixture") };
                 all.extend(hashes);
                 Ok(())
             },

@@ -3,7 +3,7 @@ use arrow::array::{Array as _, ArrayRef};
 use super::rules::Located;
 use crate::answers;
 use crate::diagnostic::{Code, Finding};
-use crate::episode_hash::{EPISODE_HASH, Form, IDENTIFICATION, SELF_COLOR, columns};
+use crate::episode_hash::{CanonicalForm, EPISODE_HASH, IDENTIFICATION, SELF_COLOR, columns};
 use crate::read::open::TraceFile;
 use crate::read::parallel_scan::Episodes;
 use crate::read::projection::Layout;
@@ -54,7 +54,7 @@ pub(crate) fn check(file: &TraceFile, layout: &Layout, episodes: &Episodes) -> V
 
 fn hash(held: &[(&str, ArrayRef)], rows: std::ops::Range<usize>) -> String {
     let identification = held.iter().find(|(name, _)| *name == IDENTIFICATION).map(|(_, values)| values);
-    let mut form = Form::new();
+    let mut form = CanonicalForm::new();
     for (name, values) in held {
         let derived = |row: usize| *name == SELF_COLOR && identification.is_some_and(|texts| texts.is_valid(row));
         form.add(name, rows.clone().map(|row| value_at(values, row).filter(|_| !derived(row))));

@@ -22,13 +22,13 @@ use super::diagnostic::{Code, Finding, Severity};
 use super::error::TraceError;
 use super::inputs::Input;
 use super::read::open::{TraceFile, TraceSet};
-use super::read::parallel_scan::{Episodes, Event, pass};
+use super::read::parallel_scan::{Episodes, ScanEvent, pass};
 use super::read::projection::Layout;
 use super::read::verify::verify_columns;
 use super::replies::{REPLY_STATUS, ReplyCounts, statuses};
 use super::schema::{self, COLUMNS, DeclaredColumn, Domain, Kind};
 use color_set::{Tally, sightings};
-use duplicate_ids::{Ids, Start, starts};
+use duplicate_ids::{SeenIds, Start, starts};
 use parquet_pages::checksums::Checksums;
 use rules::{Located, Rules};
 
@@ -140,11 +140,11 @@ pub fn validate_as(inputs: &[Input], expected: Expected<'_>, threads: NonZeroUsi
     check_rows(&set, Expected { experiments: known.as_deref(), ..expected }, threads, |file, checked| {
         let place = places[file];
         match checked {
-            Event::Fault(finding) => {
+            ScanEvent::Fault(finding) => {
                 report.files[place].complete = false;
                 found[place].push(*finding);
             }
-            Event::Whole(checked) => {
+            ScanEvent::Whole(checked) => {
                 report.files[place].episodes += checked.episodes;
                 report.files[place].steps += checked.steps;
                 found[place].extend(checked.findings);
@@ -203,7 +203,7 @@ fn unreadable(file: &str, replies: &ReplyCounts) -> Option<Finding> {
     (bad > 0).then(finding)
 }
 
-struct Checked {
+struct ValidatedFile {
     findings: Vec<Finding>,
     episodes: u64,
     steps: u64,
@@ -214,7 +214,7 @@ fn check_rows(
     set: &TraceSet,
     expected: Expected<'_>,
     threads: NonZeroUsize,
-    mut receive: impl FnMut(usize, Event<Checked>),
+    mut receive: impl FnMut(usize, ScanEvent<ValidatedFile>),
 ) -> Result<(), TraceError> {
     let known = COLUMNS.iter().filter(|column| set.domain().has(column)).map(|column| column.name);
     let declared = expected.declared.iter().filter(|_| set.domain() == Domain::Own).map(|own| own.name.as_str());
@@ -247,7 +247,7 @@ fn check_rows(
         let mut found = rules.check(&set.files()[episodes.file], &episodes);
         found.extend(split(&name(episodes.file), &episodes));
         found.extend(episode_hashes::check(&set.files()[episodes.file], &layout, &episodes));
-        let checked = Checked {
+        let checked = ValidatedFile {
             findings: Vec::new(),
             episodes: episodes.len() as u64,
             steps: episodes.columns[0].len() as u64,
@@ -256,25 +256,28 @@ fn check_rows(
         let colors = sightings(&set.files()[episodes.file], &layout, &episodes);
         (found, colors, starts(&episodes), alike(&episodes), checked)
     };
-    let (mut ids, mut tally) = (Ids::default(), Tally::new(set.files()));
+    let (mut ids, mut tally) = (SeenIds::default(), Tally::new(set.files()));
     let mut alike = HashMap::new();
     pass(set.files(), &layout, threads, &work, |file, event| {
         let event = match event {
-            Event::Fault(finding) => Event::Fault(finding),
-            Event::Whole((found, colors, starts, keys, checked)) => {
+            ScanEvent::Fault(finding) => ScanEvent::Fault(finding),
+            ScanEvent::Whole((found, colors, starts, keys, checked)) => {
                 tally.add(set.files(), file, colors);
                 for (key, id) in keys.into_iter().filter(|_| !expected.errors_alone) {
                     alike.entry(key).or_insert_with(Vec::new).push((id, file));
                 }
-                Event::Whole(Checked { findings: with_repeated(found, starts, &mut ids, file, name), ..checked })
+                ScanEvent::Whole(ValidatedFile {
+                    findings: with_repeated(found, starts, &mut ids, file, name),
+                    ..checked
+                })
             }
         };
         receive(file, event);
         Ok::<_, TraceError>(())
     })?;
     for (file, finding) in tally.findings(set.files()).into_iter().chain(copied(set, alike, threads)) {
-        let checked = Checked { findings: vec![finding], episodes: 0, steps: 0, replies: ReplyCounts::default() };
-        receive(file, Event::Whole(checked));
+        let checked = ValidatedFile { findings: vec![finding], episodes: 0, steps: 0, replies: ReplyCounts::default() };
+        receive(file, ScanEvent::Whole(checked));
     }
     Ok(())
 }
@@ -308,7 +311,7 @@ fn copied(set: &TraceSet, alike: HashMap<u64, Vec<(String, usize)>>, threads: No
 fn with_repeated(
     mut found: Vec<Located>,
     starts: Vec<Start>,
-    ids: &mut Ids,
+    ids: &mut SeenIds,
     file: usize,
     name: impl Fn(usize) -> String,
 ) -> Vec<Finding> {

@@ -22,7 +22,7 @@ use super::answers::{self, Answered, is_answer};
 use super::episode::Episode;
 use super::episode_hash::{self, EPISODE_HASH};
 use super::error::TraceError;
-use super::schema::colors::palette::{Declared, Palette};
+use super::schema::colors::palette::{DeclaredPalette, Palette};
 use super::schema::rules::{Known, Requirement, Rule, rules_of};
 use super::schema::{COLUMNS, Column, Value, of_some_tasks};
 use exact::escape::visible;
@@ -137,7 +137,7 @@ impl<W: Write + Send> TraceEncoder<W> {
 
     fn with(out: W, metadata: &TraceMetadata, has_checksums: bool) -> Result<Self, TraceError> {
         let recording = metadata.recording.as_ref().unwrap_or(&serde_json::Value::Null);
-        let palette = Declared::of("stream", recording).map_err(|finding| *finding)?.palette;
+        let palette = DeclaredPalette::of("stream", recording).map_err(|finding| *finding)?.palette;
         let (columns, undeclared) = metadata.columns.split();
         let gathered = Gathered::of_columns(columns.iter().copied());
         let recording = metadata.recording.as_ref();

@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use crate::filter::{Query, required};
 use crate::{Snapshot, ViewError};
 use exact::escape::visible;
-use trace::log::frames::{Shape, hull};
+use trace::log::frames::{SceneShape, hull};
 
 /// The maximum number of distinct shapes in an answer, about 600 kB.
 const MOST: usize = 12_000;
@@ -45,7 +45,7 @@ impl Default for Map {
 }
 
 impl Map {
-    pub fn add(&mut self, t: usize, shapes: &[Shape]) {
+    pub fn add(&mut self, t: usize, shapes: &[SceneShape]) {
         if !(t - 1).is_multiple_of(self.every) || shapes.len() > MOST {
             return;
         }
@@ -57,7 +57,7 @@ impl Map {
         }
     }
 
-    fn id(&mut self, shape: &Shape) -> usize {
+    fn id(&mut self, shape: &SceneShape) -> usize {
         let name = place(&mut self.names, visible(&shape.name));
         let [r, g, b, a] = shape.rgba;
         let paint = place(&mut self.paints, [whole(r * 255.0), whole(g * 255.0), whole(b * 255.0), whole(a * 100.0)]);
@@ -94,8 +94,8 @@ impl Map {
 }
 
 /// The shapes with each body reduced to its outline and head: its fifty parts are a few pixels in size.
-fn from_above(shapes: &[Shape]) -> Vec<Shape> {
-    let mut parts: BTreeMap<&str, Vec<&Shape>> = BTreeMap::new();
+fn from_above(shapes: &[SceneShape]) -> Vec<SceneShape> {
+    let mut parts: BTreeMap<&str, Vec<&SceneShape>> = BTreeMap::new();
     let mut all = Vec::new();
     for shape in shapes {
         match shape.name.split_once('_') {
@@ -109,20 +109,20 @@ fn from_above(shapes: &[Shape]) -> Vec<Shape> {
         let largest = parts.iter().max_by(|a, b| spread(a).total_cmp(&spread(b)))?;
         let outline = hull(parts.iter().flat_map(|part| corners(part)).collect());
         let height = parts.iter().map(|part| part.height).sum::<f64>() / f64::from(u32::try_from(parts.len()).ok()?);
-        Some(Shape { name: body.to_owned(), outline, radius: None, rgba: largest.rgba, height })
+        Some(SceneShape { name: body.to_owned(), outline, radius: None, rgba: largest.rgba, height })
     }));
     all
 }
 
 /// The largest distance from a part's centre to its outline.
-fn spread(part: &Shape) -> f64 {
+fn spread(part: &SceneShape) -> f64 {
     let [first, ..] = part.outline[..] else { return 0.0 };
     let far = |at: &[f64; 2]| (at[0] - first[0]).hypot(at[1] - first[1]);
     part.radius.unwrap_or_default().max(part.outline.iter().map(far).fold(0.0, f64::max) / 2.0)
 }
 
 /// The corners of a part; a round part gets eight.
-fn corners(part: &Shape) -> Vec<[f64; 2]> {
+fn corners(part: &SceneShape) -> Vec<[f64; 2]> {
     let Some(radius) = part.radius else { return part.outline.clone() };
     let around = |at: &[f64; 2]| {
         let [x, y] = *at;
@@ -155,10 +155,16 @@ fn whole(value: f64) -> i64 {
 #[cfg(test)]
 mod tests {
     use super::{MOST, Map};
-    use trace::log::frames::Shape;
+    use trace::log::frames::SceneShape;
 
-    fn shape(name: &str, x: f64) -> Shape {
-        Shape { name: name.into(), outline: vec![[x, 0.0]], radius: Some(0.1), rgba: [1.0, 0.0, 0.0, 1.0], height: 0.5 }
+    fn shape(name: &str, x: f64) -> SceneShape {
+        SceneShape {
+            name: name.into(),
+            outline: vec![[x, 0.0]],
+            radius: Some(0.1),
+            rgba: [1.0, 0.0, 0.0, 1.0],
+            height: 0.5,
+        }
     }
 
     #[test]

@@ -2,8 +2,8 @@ use std::fmt::Write as _;
 
 use super::Experiment;
 use super::spec::{
-    Answer, Behavior, Body, BodyShown, Camera, Colors, Cubes, Hand, Look, Mark, MarkColor, Occluders, Others, Paint,
-    Pane, PaneKind, Picture, Start, Stated, Wall, Wearer,
+    Answer, Behavior, Body, BodyShown, CameraKind, Colors, Cubes, Hand, Look, Mark, MarkColor, Occluders, Others,
+    Paint, Pane, PaneKind, Picture, Start, Stated, Wall, Wearer,
 };
 use exact::escape::visible;
 
@@ -63,7 +63,7 @@ pub fn explained(experiment: &Experiment) -> String {
     if let Some(hand) = experiment.hand {
         line("hand", self::hand(hand));
     }
-    if experiment.camera == Camera::Behind {
+    if experiment.camera == CameraKind::Behind {
         line("camera", "behind the body and above it, which looks over its head".to_owned());
     }
     if let Some(Picture { width, height, fovy }) = experiment.view {

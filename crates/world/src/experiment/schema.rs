@@ -7,10 +7,10 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::spec::{
-    AbsentColumn, Actions, Answer, Body, BodyShown, Camera, Colors, Cubes, Decision, Look, MOST_MARKS, MOST_PANES,
+    AbsentColumn, Actions, Answer, Body, BodyShown, CameraKind, Colors, Cubes, Decision, Look, MOST_MARKS, MOST_PANES,
     Mark, Others, Paint, PaneKind, Picture, ReplyKey, Start, Stated, Truth, Wall,
 };
-use metric::shape::{Fraction, Level};
+use metric::shape::{ChanceLevel, Fraction};
 use trace::answers::MOST_ANSWERS;
 use trace::palette::Color;
 
@@ -37,7 +37,7 @@ pub struct ExperimentTable {
     pub order: Option<i64>,
     /// Chance levels by metric: a fraction such as `1/3`, a number, or `none`.
     #[serde(default)]
-    pub chance: IndexMap<String, Level>,
+    pub chance: IndexMap<String, ChanceLevel>,
     /// The rates of blind strategies, by metric, where no chance level applies.
     #[serde(default)]
     pub reference: IndexMap<String, Vec<Fraction>>,
@@ -85,7 +85,7 @@ pub struct ExperimentTable {
     /// The agent's actions; `hand` if absent and it has one, else `walk`.
     pub actions: Option<Actions>,
     /// The agent's camera; `eye` if absent.
-    pub camera: Option<Camera>,
+    pub camera: Option<CameraKind>,
     /// Steps after which an episode ends automatically; the world's if absent.
     #[schemars(range(min = 1, max = 100_000))]
     pub steps: Option<u32>,

@@ -68,7 +68,7 @@ pub struct Spec {
     /// The agent's actions.
     pub actions: Actions,
     /// The agent's camera.
-    pub camera: Camera,
+    pub camera: CameraKind,
     /// Steps after which an episode ends automatically; the world's if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub steps: Option<u32>,
@@ -278,7 +278,8 @@ pub enum Actions {
 /// The agent's camera.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Camera {
+#[schemars(rename = "Camera")]
+pub enum CameraKind {
     /// Its own eye, before its face.
     #[default]
     Eye,

@@ -19,11 +19,11 @@ use crate::sim::Experiment;
 #[derive(Debug)]
 pub(crate) struct Queue<'a> {
     store: &'a Store,
-    waiting: Mutex<Waiting>,
+    waiting: Mutex<WaitingKeys>,
 }
 
 #[derive(Debug)]
-struct Waiting {
+struct WaitingKeys {
     keys: VecDeque<Key>,
     /// Episodes that other processes have recorded since.
     elsewhere: Vec<Key>,
@@ -40,7 +40,7 @@ pub struct Outcomes {
     pub lost: Vec<(Key, LostEpisode)>,
 }
 
-impl Waiting {
+impl WaitingKeys {
     fn end(&mut self, key: &Key, lost: Option<LostEpisode>) {
         let outcomes = self.experiments.entry(key.experiment.clone()).or_default();
         match lost {
@@ -87,7 +87,7 @@ impl<'a> Queue<'a> {
         }
         let (elsewhere, complete) = (Vec::new(), Vec::new());
         let keys = keys.iter().cloned().collect();
-        let waiting = Waiting { keys, elsewhere, left_out: 0, experiments, complete };
+        let waiting = WaitingKeys { keys, elsewhere, left_out: 0, experiments, complete };
         Self { store, waiting: Mutex::new(waiting) }
     }
 

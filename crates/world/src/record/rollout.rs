@@ -39,7 +39,7 @@ pub struct Nobody;
 
 impl Observer for Nobody {}
 
-pub struct Stage<'a> {
+pub struct EpisodeStage<'a> {
     pub config: &'a WorldConfig,
     /// The thread's camera; `None` if no pictures are needed.
     pub eye: Option<&'a RefCell<Camera>>,
@@ -49,7 +49,7 @@ pub struct Stage<'a> {
     pub shares: &'a Shares,
 }
 
-impl Stage<'_> {
+impl EpisodeStage<'_> {
     /// The renderer of the frames that the agent sees; `None` if it sees none.
     pub fn renderer(&self) -> Option<Renderer> {
         self.eye.filter(|_| self.looks).map(|eye| eye.borrow().drawn_by().clone())
@@ -99,7 +99,7 @@ pub struct Played {
 
 /// Plays an episode to its end: `done`, a reached mark, or the last step of the budget.
 pub async fn play(
-    stage: &Stage<'_>,
+    stage: &EpisodeStage<'_>,
     world: &mut World,
     agent: &mut dyn Agent,
     key: &Key,
@@ -167,7 +167,7 @@ pub async fn play(
     Ok(Played { episode, model, other_model, is_reached: world.is_reached() })
 }
 
-fn look(stage: &Stage<'_>, world: &World) -> Result<Option<Arc<Frame>>, RecordError> {
+fn look(stage: &EpisodeStage<'_>, world: &World) -> Result<Option<Arc<Frame>>, RecordError> {
     let Some(eye) = stage.eye else { return Ok(None) };
     let start = Instant::now();
     let frame = eye.borrow_mut().frame(world).map_err(RecordError::fatal)?;

@@ -19,7 +19,7 @@ use super::lock::EpisodeLock;
 use super::plan::{Key, Subject};
 use super::queue::{Held, Next, Outcomes, Queue};
 use super::replies::{GivenUp, Unusable};
-use super::rollout::{self, Nobody, Observer, Played, Stage};
+use super::rollout::{self, EpisodeStage, Nobody, Observer, Played};
 use super::shares::Shares;
 use super::store::Store;
 use crate::agent::{Agent, Ended, Lost, LostKind, Player};
@@ -243,7 +243,7 @@ impl Recording<'_> {
         let mut agent = agent.map_err(|lost| RecordError::Lost { step: None, lost })?;
         episode.participant = agent.participant().map(str::to_owned);
         let stage =
-            Stage { config: self.config, eye, looks: self.player.looks(), stop: self.stop, shares: self.shares };
+            EpisodeStage { config: self.config, eye, looks: self.player.looks(), stop: self.stop, shares: self.shares };
         if agent.wants_practice() {
             self.practise(&stage, agent.as_mut(), key).await?;
         }
@@ -264,7 +264,7 @@ impl Recording<'_> {
         committed.and(played).map(|played| played.episode.steps.len())
     }
 
-    async fn practise(&self, stage: &Stage<'_>, agent: &mut dyn Agent, key: &Key) -> Result<(), RecordError> {
+    async fn practise(&self, stage: &EpisodeStage<'_>, agent: &mut dyn Agent, key: &Key) -> Result<(), RecordError> {
         let key = &Key::first(key.experiment.clone(), PRACTICE_SEED, 1);
         let scene = Scene::draw(self.config, key.experiment.clone(), key.seed, key.run).map_err(RecordError::fatal)?;
         let head = rollout::head(self.config, &scene, key, self.subject);
@@ -275,7 +275,13 @@ impl Recording<'_> {
         Ok(())
     }
 
-    fn commit(&self, stage: &Stage<'_>, key: &Key, played: &Played, log: Option<Log>) -> Result<(), RecordError> {
+    fn commit(
+        &self,
+        stage: &EpisodeStage<'_>,
+        key: &Key,
+        played: &Played,
+        log: Option<Log>,
+    ) -> Result<(), RecordError> {
         let start = Instant::now();
         let fingerprint = self.store.fingerprint(key, played.model.as_deref(), stage.renderer().as_ref());
         let episode = Episode { fingerprint: Some(fingerprint.id.clone()), ..played.episode.clone() };

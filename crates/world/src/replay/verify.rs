@@ -24,7 +24,7 @@ use trace::merge::{self, EpisodeRows};
 use trace::open::TraceSet;
 use trace::renderer::{self, Renderer};
 
-pub struct Recorded {
+pub struct RecordedTrace {
     pub path: PathBuf,
     pub rows: Vec<EpisodeRows>,
     recording: Value,
@@ -84,7 +84,7 @@ pub struct FramesAnswer {
     pub not_compared: Option<String>,
 }
 
-impl Recorded {
+impl RecordedTrace {
     pub fn open(files: &[Input], episode: Option<&str>) -> Result<Vec<Self>, ReplayError> {
         let set = TraceSet::open(files).map_err(ReplayError::other)?;
         let mut traces = Vec::new();
@@ -112,7 +112,7 @@ impl Recorded {
         let eye = outputs.recount.as_ref().map_or_else(|| self.recipe.eye.clone(), |recount| recount.eye(&self.recipe));
         let camera = self.camera(outputs, answer)?;
         let parts = TemporaryFolder::private("replay").map_err(ReplayError::other)?;
-        let mut player = Player { trace: self, outputs, eye: &eye, camera };
+        let mut player = TracePlayer { trace: self, outputs, eye: &eye, camera };
         let (mut logs, mut rewritten) = (Vec::new(), Vec::new());
         for rows in &self.rows {
             let episode = rows.episode().map_err(ReplayError::other)?;
@@ -201,25 +201,25 @@ impl Recount {
     }
 }
 
-struct Player<'a> {
-    trace: &'a Recorded,
+struct TracePlayer<'a> {
+    trace: &'a RecordedTrace,
     outputs: &'a Outputs,
     eye: &'a WorldConfig,
     camera: Option<Camera>,
 }
 
-impl Player<'_> {
+impl TracePlayer<'_> {
     fn episode<E: From<ReplayError>>(
         &mut self,
         episode: &Episode,
         part: &Path,
         mut frames: Option<&mut FramesAnswer>,
         save: &mut impl FnMut(&Path, &[u8]) -> Result<(), E>,
-    ) -> Result<(Option<Divergence>, Counts), E> {
+    ) -> Result<(Option<Divergence>, RecordedCounts), E> {
         let unwritten = |fault: super::log::LogFault| ReplayError::other(fault.to_string());
         let log = self.outputs.log.as_ref().map(|_| Log::begin(part, episode).map(Log::in_large_chunks));
         let mut log = log.transpose().map_err(unwritten)?;
-        let (mut counts, mut other_frame) = (Counts::default(), None);
+        let (mut counts, mut other_frame) = (RecordedCounts::default(), None);
         let divergence = again(&self.trace.recipe, self.eye, episode, |t, world, visibility, step| {
             counts.add(by_column(world, visibility), world.is_mirror_visible(visibility));
             let frame = self.camera.as_mut().map(|camera| camera.frame(world)).transpose();
@@ -248,12 +248,12 @@ impl Player<'_> {
 }
 
 #[derive(Default)]
-struct Counts {
+struct RecordedCounts {
     px: Vec<(&'static str, Vec<i32>)>,
     visible: Vec<bool>,
 }
 
-impl Counts {
+impl RecordedCounts {
     fn add(&mut self, counts: Vec<(&'static str, i32)>, visible: bool) {
         // A scene has the same columns at every step.
         self.px.resize_with(counts.len(), Default::default);

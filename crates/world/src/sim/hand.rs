@@ -14,7 +14,7 @@ const BODY: [f64; 3] = [0.12, 0.3, 1.62];
 
 /// The units and limits of a hand's steps.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Place<'a> {
+pub(super) struct HandRules<'a> {
     pub task: Hand,
     pub patch: Patch,
     pub hand: HandStart,
@@ -22,7 +22,7 @@ pub(super) struct Place<'a> {
     pub body: Pose,
 }
 
-impl<'a> Place<'a> {
+impl<'a> HandRules<'a> {
     /// The units and limits in a scene; `None` without a hand.
     pub fn of(scene: &Scene, config: &'a WorldConfig) -> Option<Self> {
         let patch = scene.marks.iter().find(|mark| mark.part == Part::Front)?.patch?;

@@ -68,7 +68,7 @@ const PANELS: &str = r#"<texture name="panels" type="2d" builtin="flat" mark="ed
 pub(super) const BARS: usize = 4;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Paint {
+pub enum PaintMode {
     /// Lit, as the agent sees it.
     Lit,
     /// Every pixel has exactly the colour of its thing: no light, no shade, no smoothing.
@@ -91,7 +91,7 @@ pub enum Item {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Look {
+pub enum Sight {
     /// Directly by the eye: panes are blank.
     Direct,
     /// Through the pane of this number.
@@ -100,7 +100,7 @@ pub enum Look {
 
 /// The moving things at one moment.
 #[derive(Clone, Copy, Debug)]
-pub struct Moment {
+pub struct SceneMoment {
     /// The next step, from 1, which determines the visible marks.
     pub t: u32,
     /// The humanoids by number; `None` for absent ones.
@@ -120,7 +120,7 @@ pub struct Stage {
     model: Arc<MjModel>,
     items: Vec<Item>,
     pieces: Vec<(usize, [f64; 3])>,
-    look: Look,
+    look: Sight,
     beyond: usize,
     hand: usize,
     marks_at: u32,
@@ -129,17 +129,17 @@ pub struct Stage {
 impl Stage {
     /// The stages of a scene, for pictures of the configured size: the eye's direct view, then the view through each
     /// pane.
-    pub fn all(config: &WorldConfig, paint: Paint, scene: &Scene) -> Result<(Self, Vec<Self>), ModelError> {
+    pub fn all(config: &WorldConfig, paint: PaintMode, scene: &Scene) -> Result<(Self, Vec<Self>), ModelError> {
         let model = compile(config, paint, [config.eye.width as usize, config.eye.height_px as usize])?;
         let stage = |look| Self::of(model.clone(), config, paint, scene, look);
-        Ok((stage(Look::Direct), (0..scene.panes.len()).map(|pane| stage(Look::Through(pane))).collect()))
+        Ok((stage(Sight::Direct), (0..scene.panes.len()).map(|pane| stage(Sight::Through(pane))).collect()))
     }
 
-    fn of(mut model: MjModel, config: &WorldConfig, paint: Paint, scene: &Scene, look: Look) -> Self {
+    fn of(mut model: MjModel, config: &WorldConfig, paint: PaintMode, scene: &Scene, look: Sight) -> Self {
         let items: Vec<Item> = (0..model.geom_group().len()).map(|geom| item(&model, geom, scene)).collect();
         dress::dress(&mut model, &items, config, scene, look);
         dress::show_marks(&mut model, &items, scene, 1, look);
-        if paint == Paint::Labels {
+        if paint == PaintMode::Labels {
             dress::label(&mut model, &items);
         }
         let moved = |name: &str| {
@@ -166,7 +166,7 @@ impl Stage {
         self.marks_at = t;
     }
 
-    pub const fn look(&self) -> Look {
+    pub const fn look(&self) -> Sight {
         self.look
     }
 
@@ -186,12 +186,12 @@ impl Stage {
         self.data.model().geom_group()[geom] != group::HIDDEN
     }
 
-    pub fn show(&mut self, config: &WorldConfig, scene: &Scene, moment: &Moment) {
+    pub fn show(&mut self, config: &WorldConfig, scene: &Scene, moment: &SceneMoment) {
         self.show_marks(scene, moment.t);
         self.pose(config, moment);
     }
 
-    fn pose(&mut self, config: &WorldConfig, moment: &Moment) {
+    fn pose(&mut self, config: &WorldConfig, moment: &SceneMoment) {
         const FAR_BELOW: f64 = -100.0;
         for (body, figure) in moment.bodies.iter().enumerate() {
             for (at, piece) in Piece::ALL.into_iter().enumerate() {
@@ -258,8 +258,8 @@ fn item(model: &MjModel, geom: usize, scene: &Scene) -> Item {
     }
 }
 
-pub(super) fn compile(config: &WorldConfig, paint: Paint, size: [usize; 2]) -> Result<MjModel, ModelError> {
-    let is_textured = config.look == crate::experiment::spec::Look::Textured && paint == Paint::Lit;
+pub(super) fn compile(config: &WorldConfig, paint: PaintMode, size: [usize; 2]) -> Result<MjModel, ModelError> {
+    let is_textured = config.look == crate::experiment::spec::Look::Textured && paint == PaintMode::Lit;
     let mut spec =
         MjSpec::from_xml_string(&if is_textured { ROOM.replace("</asset>", PANELS) } else { ROOM.to_owned() })?;
     build_room(&mut spec, config, paint);
@@ -283,8 +283,8 @@ pub(super) fn compile(config: &WorldConfig, paint: Paint, size: [usize; 2]) -> R
     add_eyes(&mut spec, config);
     set_picture(&mut spec, config, paint, size);
     match paint {
-        Paint::Lit => light(&mut spec, &config.lights),
-        Paint::Labels => {
+        PaintMode::Lit => light(&mut spec, &config.lights),
+        PaintMode::Labels => {
             let head = &mut spec.visual_mut().headlight;
             (head.ambient, head.diffuse, head.specular) = ([1.0; 3], [0.0; 3], [0.0; 3]);
         }
@@ -292,7 +292,7 @@ pub(super) fn compile(config: &WorldConfig, paint: Paint, size: [usize; 2]) -> R
     Ok(spec.compile()?)
 }
 
-fn build_room(spec: &mut MjSpec, config: &WorldConfig, paint: Paint) {
+fn build_room(spec: &mut MjSpec, config: &WorldConfig, paint: PaintMode) {
     let room = &config.room;
     let [half, middle] = [room.size / 2.0, room.height / 2.0];
     let floor = [half, half, 1.0];
@@ -322,7 +322,7 @@ fn build_room(spec: &mut MjSpec, config: &WorldConfig, paint: Paint) {
     #[expect(clippy::cast_possible_truncation, reason = "a size of the room")]
     let repeats = (1.0 / room.tile_size) as f32;
     *material.texrepeat_mut() = [repeats, repeats];
-    if paint == Paint::Labels {
+    if paint == PaintMode::Labels {
         spec.geom_mut("floor").expect("the room has this plane").set_material("");
     }
 }
@@ -333,7 +333,7 @@ fn rgba(color: [f64; 3]) -> [f32; 4] {
     [red, green, blue, 1.0]
 }
 
-fn build_boxes(spec: &mut MjSpec, name: &str, count: usize, largest: f64, paint: Paint) {
+fn build_boxes(spec: &mut MjSpec, name: &str, count: usize, largest: f64, paint: PaintMode) {
     for at in 0..count {
         let geom = spec.world_body_mut().add_geom();
         geom.set_name(&format!("{name}{at}")).expect("names of boxes differ");
@@ -345,7 +345,7 @@ fn build_boxes(spec: &mut MjSpec, name: &str, count: usize, largest: f64, paint:
         *geom.quat_mut() = [quarter, 0.0, -quarter, 0.0];
         geom.set_contype(1);
         geom.set_conaffinity(0);
-        if paint == Paint::Lit {
+        if paint == PaintMode::Lit {
             geom.set_material("matte");
         }
     }
@@ -370,17 +370,17 @@ fn add_eyes(spec: &mut MjSpec, config: &WorldConfig) {
     top.set_fovy(45.0);
 }
 
-fn set_picture(spec: &mut MjSpec, config: &WorldConfig, paint: Paint, size: [usize; 2]) {
+fn set_picture(spec: &mut MjSpec, config: &WorldConfig, paint: PaintMode, size: [usize; 2]) {
     let visual = spec.visual_mut();
     let [width, height] = size.map(|pixels| i32::try_from(pixels).unwrap_or(i32::MAX));
     (visual.global.offwidth, visual.global.offheight) = (width, height);
-    let samples = if paint == Paint::Lit { config.eye.samples } else { 0 };
+    let samples = if paint == PaintMode::Lit { config.eye.samples } else { 0 };
     visual.quality.offsamples = i32::try_from(samples).unwrap_or(0);
     // Drawing time depends on the triangles of round parts, and a body is a few hundred pixels high at most. Labels are
     // compared with rays, and are as round as possible.
     let parts = match paint {
-        Paint::Lit => [config.eye.slices, config.eye.stacks, config.eye.quads],
-        Paint::Labels => LABELLED_PARTS,
+        PaintMode::Lit => [config.eye.slices, config.eye.stacks, config.eye.quads],
+        PaintMode::Labels => LABELLED_PARTS,
     };
     [visual.quality.numslices, visual.quality.numstacks, visual.quality.numquads] =
         parts.map(|count| i32::try_from(count).unwrap_or(i32::MAX));

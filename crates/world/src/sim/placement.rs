@@ -48,7 +48,7 @@ impl Scene {
         let mut chance = Rng::of(purpose, seed, run);
         let drawn = (0..DRAWINGS).find_map(|_| Drawing { config, chance: &mut chance }.scene(&experiment, body_color));
         let Some(scene) = drawn else { return Err(Crowded { experiment, seed, run }) };
-        let layout = panes::Layout { config, scene: &scene };
+        let layout = panes::PaneLayout { config, scene: &scene };
         let panes::Extras { stated_color, panes, marks, hand } = layout.extras(purpose, seed, run);
         if experiment.hand.is_some() && hand.is_none() {
             return Err(Crowded { experiment, seed, run });

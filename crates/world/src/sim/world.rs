@@ -9,9 +9,9 @@ use super::body::{Figure, Pose};
 use super::config::WorldConfig;
 use super::distractor::Distractor;
 use super::floor::FloorPlan;
-use super::hand::{self, Place};
+use super::hand::{self, HandRules};
 use super::label_image::LabelImage;
-use super::model::{AGENTS, BODIES, Look, ModelError, Moment, Paint, Stage};
+use super::model::{AGENTS, BODIES, ModelError, PaintMode, SceneMoment, Sight, Stage};
 use super::passage;
 use super::scene::Scene;
 use crate::experiment::spec::{Behavior, PaneKind};
@@ -46,7 +46,7 @@ impl World {
     /// The world of a scene at its start. The experiment's lengths and counts override the configuration.
     pub fn new(config: &WorldConfig, scene: Scene) -> Result<Self, ModelError> {
         let config = config.of(&scene.experiment);
-        let (stage, beyond) = Stage::all(&config, Paint::Lit, &scene)?;
+        let (stage, beyond) = Stage::all(&config, PaintMode::Lit, &scene)?;
         let mut world = Self {
             plan: scene.floor_plan(&config),
             ego: Figure::standing(scene.start),
@@ -121,12 +121,12 @@ impl World {
 
     /// The Manhattan distance from the hand to the mark, mm; `None` without a hand.
     pub fn target_distance(&self) -> Option<i32> {
-        let place = Place::of(&self.scene, &self.config)?;
+        let place = HandRules::of(&self.scene, &self.config)?;
         i32::try_from(place.distance_mm(*self.hand.back()?)).ok()
     }
 
     pub fn is_reached(&self) -> bool {
-        Place::of(&self.scene, &self.config)
+        HandRules::of(&self.scene, &self.config)
             .zip(self.hand.back())
             .is_some_and(|(place, from_mark)| place.is_reached(*from_mark))
     }
@@ -138,13 +138,13 @@ impl World {
 
     fn hand_back(&self, steps: u32) -> Option<[f64; 3]> {
         let at = self.hand.len().saturating_sub(1 + steps as usize);
-        Some(Place::of(&self.scene, &self.config)?.center(*self.hand.get(at)?))
+        Some(HandRules::of(&self.scene, &self.config)?.center(*self.hand.get(at)?))
     }
 
     fn reach(&mut self, step: [i32; 3]) -> Moved {
         let Some(from) = self.hand.back().copied() else { return Moved::default() };
         let to = [0, 1, 2].map(|axis| from[axis].saturating_add(step[axis]));
-        let is_free = Place::of(&self.scene, &self.config).is_some_and(|place| place.is_free(to));
+        let is_free = HandRules::of(&self.scene, &self.config).is_some_and(|place| place.is_free(to));
         self.hand.push_back(if is_free { to } else { from });
         Moved { bumped: !is_free }
     }
@@ -236,16 +236,16 @@ impl World {
         while self.hand.len() > latest + 1 {
             self.hand.pop_front();
         }
-        let direct = self.moment(Look::Direct);
+        let direct = self.moment(Sight::Direct);
         self.stage.show(&self.config, &self.scene, &direct);
         for pane in 0..self.beyond.len() {
-            let moment = self.moment(Look::Through(pane));
+            let moment = self.moment(Sight::Through(pane));
             self.beyond[pane].show(&self.config, &self.scene, &moment);
         }
     }
 
     /// Further stages of the same scene in its current state: with other paint, or for other rays.
-    pub fn stages(&self, paint: Paint) -> Result<(Stage, Vec<Stage>), ModelError> {
+    pub fn stages(&self, paint: PaintMode) -> Result<(Stage, Vec<Stage>), ModelError> {
         let mut stages = Stage::all(&self.config, paint, &self.scene)?;
         self.show_on(&mut stages);
         Ok(stages)
@@ -259,20 +259,20 @@ impl World {
         }
     }
 
-    fn moment(&self, look: Look) -> Moment {
+    fn moment(&self, look: Sight) -> SceneMoment {
         let (figures, t, beyond, late) = match look {
-            Look::Direct => (self.figures(), self.t, None, 0),
-            Look::Through(pane) => {
+            Sight::Direct => (self.figures(), self.t, None, 0),
+            Sight::Through(pane) => {
                 let late = self.scene.panes[pane].delay;
                 (self.figures_in(pane), self.t.saturating_sub(late).max(1), Some(self.eye_beyond(pane)), late)
             }
         };
         let mut bodies = [None; BODIES];
         bodies.iter_mut().zip(figures).for_each(|(place, figure)| *place = Some(figure));
-        if let Look::Through(pane) = look {
+        if let Sight::Through(pane) = look {
             bodies[AGENTS + pane] = self.double(pane);
         }
-        Moment { t, bodies, beyond, hand: self.hand_back(late) }
+        SceneMoment { t, bodies, beyond, hand: self.hand_back(late) }
     }
 
     /// The distance that the agent's body could still walk before it touches the candidate of a colour, m; `None` if

@@ -13,7 +13,7 @@ use trace::log::read::{episode_hashes, other_episode};
 use trace::renderer::Renderer;
 use world::replay::again::MOST_RAYS;
 use world::replay::error::{Divergence, ReplayError};
-use world::replay::verify::{FramesAnswer, Outputs, Recorded, Recount, ReplayAnswer, frame_path};
+use world::replay::verify::{FramesAnswer, Outputs, RecordedTrace, Recount, ReplayAnswer, frame_path};
 
 /// Replay a trace's episodes in their recorded worlds, and compare every step with the recording
 ///
@@ -67,7 +67,7 @@ impl ReplayArgs {
     pub fn run(&self) -> Result<Outcome, Failure> {
         let files = inputs::resolve(&self.traces, io::stdin()).map_err(Failure::input)?;
         output::note_stale_checksums(&files);
-        let traces = Recorded::open(&files, self.episode.as_deref())?;
+        let traces = RecordedTrace::open(&files, self.episode.as_deref())?;
         if traces.len() > 1 && (self.mcap.is_some() || self.recompute_visibility) {
             return Err(Failure::input("--mcap and --recompute-visibility take a single trace"));
         }
@@ -87,7 +87,7 @@ impl ReplayArgs {
         Outputs { frames: self.frames.clone(), log: self.mcap.clone(), recount, skip_frames }
     }
 
-    fn check_targets(&self, traces: &[Recorded]) -> Result<(), Failure> {
+    fn check_targets(&self, traces: &[RecordedTrace]) -> Result<(), Failure> {
         for (option, target) in [("--mcap", &self.mcap), ("--out", &self.out)] {
             let is_trace = |target: &PathBuf| traces.iter().any(|trace| is_same_file(target, &trace.path));
             if target.as_ref().is_some_and(is_trace) {
@@ -106,7 +106,7 @@ impl ReplayArgs {
         self.check_hashes(traces)
     }
 
-    fn check_hashes(&self, traces: &[Recorded]) -> Result<(), Failure> {
+    fn check_hashes(&self, traces: &[RecordedTrace]) -> Result<(), Failure> {
         // A file that is not a readable log may be replaced.
         let Some((log, logged)) = self.mcap.as_ref().and_then(|log| Some((log, episode_hashes(log).ok()?))) else {
             return Ok(());

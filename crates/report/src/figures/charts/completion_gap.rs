@@ -1,7 +1,7 @@
 //! `completion-gap`: a rate among finished episodes minus the rate among all, models by experiments.
 
 use crate::figures::kit::{
-    Align, Frame, MARGIN, Mark, PALETTE, Rgb, Sheet, label, leading, legend, lettering, many, tiles,
+    Frame, MARGIN, Mark, PALETTE, Rgb, Sheet, TextAnchor, label, leading, legend, lettering, many, tiles,
 };
 use crate::figures::matrix::{MetricId, Reading};
 use crate::figures::{Drawn, Scene, missing};
@@ -25,7 +25,7 @@ pub fn draw(scene: Scene<'_>) -> Drawn {
     let cell = (width - MARGIN - left) / columns;
     let mut sheet = Sheet::new(width);
     let rows = MARGIN + leading(lettering::heading()) + 4.0;
-    let heading = lettering::heading().aligned(Align::Middle);
+    let heading = lettering::heading().aligned(TextAnchor::Middle);
     for (column, name) in label::fitted(&matrix.experiments, cell - 2.0, heading).iter().enumerate() {
         let at = (left + cell * (many(column) + 0.5), MARGIN + leading(heading) / 2.0);
         sheet.text(at, name, heading);

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use crate::figures::kit::{
-    Align, Fill, Frame, Lettering, MARGIN, Mark, PALETTE, Plot, Sheet, Swatch, Tick, label, legend, lettering, many,
-    text_on, tiles,
+    Fill, Frame, Lettering, MARGIN, Mark, PALETTE, Plot, Sheet, Swatch, TextAnchor, Tick, label, legend, lettering,
+    many, text_on, tiles,
 };
 use crate::figures::{Drawn, Scene};
 use score::table::{EpisodeTable, MetricColumn};
@@ -127,14 +127,14 @@ fn bar(sheet: &mut Sheet, plot: &Plot, experiment: &str, row: &OutcomeRow, middl
             }
             sheet.rectangle(Frame::new(from, middle - BAR / 2.0, to - from, BAR), fill);
             let text = count.to_string();
-            let lettering = Lettering { color: text_on(fill.color), ..lettering::value().aligned(Align::Middle) };
+            let lettering = Lettering { color: text_on(fill.color), ..lettering::value().aligned(TextAnchor::Middle) };
             if lettering.width(&text) + 3.0 <= to - from {
                 sheet.text((f64::midpoint(from, to), middle), &text, lettering);
             }
         });
     }
     let right = sheet.width() - MARGIN;
-    sheet.text((right, middle), &format!("n = {episodes}"), lettering::tick().aligned(Align::End));
+    sheet.text((right, middle), &format!("n = {episodes}"), lettering::tick().aligned(TextAnchor::End));
 }
 
 fn empty_bar(sheet: &mut Sheet, plot: &Plot, experiment: &str, model: &str, middle: f64) {

@@ -1,7 +1,7 @@
 //! `heatmap`: models by experiments and metrics; the colour shows how good the mean is, the number is the mean.
 
 use crate::figures::kit::{
-    Align, Arrangement, Frame, Lettering, MARGIN, PALETTE, Panels, Sheet, label, leading, legend, lettering, many,
+    Arrangement, Frame, Lettering, MARGIN, PALETTE, Panels, Sheet, TextAnchor, label, leading, legend, lettering, many,
     panels, tiles,
 };
 use crate::figures::matrix::{MetricId, Reading};
@@ -62,12 +62,12 @@ struct Head<'a> {
 impl<'a> Head<'a> {
     fn new(metrics: &'a [MetricId<'a>], cell: f64) -> Self {
         const TALLEST: f64 = 60.0;
-        let level = lettering::tick().aligned(Align::Middle);
+        let level = lettering::tick().aligned(TextAnchor::Middle);
         let widest = metrics.iter().map(|metric| level.width(metric.name)).fold(0.0, f64::max);
         if widest <= cell {
             return Self { metrics, lettering: level, height: leading(level) + 2.0 };
         }
-        Self { metrics, lettering: level.aligned(Align::Start).upwards(), height: widest.min(TALLEST) + 5.0 }
+        Self { metrics, lettering: level.aligned(TextAnchor::Start).upwards(), height: widest.min(TALLEST) + 5.0 }
     }
 
     fn draw(&self, sheet: &mut Sheet, body: Frame) {

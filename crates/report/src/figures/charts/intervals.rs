@@ -1,8 +1,8 @@
 //! `intervals`: a rate of each model with its 95 % interval, counts and the level of chance, per experiment.
 
 use crate::figures::kit::{
-    Align, Arrangement, Frame, MARGIN, Mark, Member, PALETTE, Panels, Plot, Sheet, Stroke, Swatch, legend, lettering,
-    many, marker, panels, rate_ticks, tiles,
+    Arrangement, Frame, MARGIN, Mark, Member, PALETTE, Panels, Plot, Sheet, Stroke, Swatch, TextAnchor, legend,
+    lettering, many, marker, panels, rate_ticks, tiles,
 };
 use crate::figures::matrix::{MetricId, Reading};
 use crate::figures::{Drawn, Scene};
@@ -137,7 +137,7 @@ impl Panel<'_> {
             if let Some(mean) = reading.mean() {
                 marker::draw(sheet, (self.plot.at(mean, 0.0).0, middle), 3.2, member.style);
             }
-            sheet.text((self.right, middle), &counts(reading), lettering::tick().aligned(Align::End));
+            sheet.text((self.right, middle), &counts(reading), lettering::tick().aligned(TextAnchor::End));
         });
     }
 }

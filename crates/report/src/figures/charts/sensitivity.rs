@@ -40,7 +40,7 @@ pub struct Stage<'a> {
 }
 
 #[derive(Clone, Copy, Debug)]
-pub struct Input<'a> {
+pub struct SensitivityInput<'a> {
     /// The unchanged definitions, then the thresholds, ascending.
     pub stages: &'a [Stage<'a>],
     pub metrics: &'a [String],
@@ -50,21 +50,21 @@ pub struct Input<'a> {
     pub reference: &'a str,
 }
 
-pub fn draw(input: &Input<'_>) -> Result<Figure, FigureError> {
-    let (sheet, height) = Field::of(input)?.draw();
+pub fn draw(input: &SensitivityInput<'_>) -> Result<Figure, FigureError> {
+    let (sheet, height) = SensitivityChart::of(input)?.draw();
     Ok(Figure::new(sheet, height, TITLE, CAPTION))
 }
 
-struct Field<'a> {
-    input: &'a Input<'a>,
+struct SensitivityChart<'a> {
+    input: &'a SensitivityInput<'a>,
     matrices: Vec<Option<Matrix<'a>>>,
     experiments: Vec<&'a str>,
     roster: Roster<'a>,
     columns: usize,
 }
 
-impl<'a> Field<'a> {
-    fn of(input: &'a Input<'a>) -> Result<Self, FigureError> {
+impl<'a> SensitivityChart<'a> {
+    fn of(input: &'a SensitivityInput<'a>) -> Result<Self, FigureError> {
         let matrix = |stage: &Stage<'a>| match Matrix::new(stage.cells) {
             Ok(matrix) => Ok(Some(matrix)),
             Err(FigureError::NoEpisodes) => Ok(None),
@@ -85,7 +85,8 @@ impl<'a> Field<'a> {
     }
 
     fn draw(&self) -> Drawn {
-        let panels: Vec<Panel<'_, 'a>> = self.input.metrics.iter().flat_map(|metric| self.row(metric)).collect();
+        let panels: Vec<SensitivityPanel<'_, 'a>> =
+            self.input.metrics.iter().flat_map(|metric| self.row(metric)).collect();
         let names = panels.iter().map(|panel| format!("{} · {}", panel.experiment, panel.metric));
         let names: Vec<String> = names.collect();
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
@@ -106,9 +107,9 @@ impl<'a> Field<'a> {
         self.columns == self.experiments.len()
     }
 
-    fn row<'f>(&'f self, metric: &'f str) -> Vec<Panel<'f, 'a>> {
+    fn row<'f>(&'f self, metric: &'f str) -> Vec<SensitivityPanel<'f, 'a>> {
         let top = self.top(metric);
-        self.experiments.iter().map(|experiment| Panel { field: self, experiment, metric, top }).collect()
+        self.experiments.iter().map(|experiment| SensitivityPanel { field: self, experiment, metric, top }).collect()
     }
 
     /// The largest mean of a quantity in any panel; `None` for a rate.
@@ -159,14 +160,14 @@ fn id<'m>(matrix: &Matrix<'m>, name: &str) -> Option<MetricId<'m>> {
     matrix.metrics().into_iter().find(|metric| metric.name == name)
 }
 
-struct Panel<'f, 'a> {
-    field: &'f Field<'a>,
+struct SensitivityPanel<'f, 'a> {
+    field: &'f SensitivityChart<'a>,
     experiment: &'a str,
     metric: &'f str,
     top: Option<f64>,
 }
 
-impl Panel<'_, '_> {
+impl SensitivityPanel<'_, '_> {
     fn draw(&self, sheet: &mut Sheet, frame: Frame, has_numbers: bool) {
         let y = self.top.map_or(-0.05..1.05, |top| -0.05 * top..1.05 * top);
         let column = self.field.column(frame.width);

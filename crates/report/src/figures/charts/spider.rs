@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 
 use crate::figures::kit::{
-    Align, Arrangement, MARGIN, Mark, Member, PALETTE, Panels, Point, Sheet, Stroke, Swatch, legend, lettering, many,
-    marker, panels, polar,
+    Arrangement, MARGIN, Mark, Member, PALETTE, Panels, Point, Sheet, Stroke, Swatch, TextAnchor, legend, lettering,
+    many, marker, panels, polar,
 };
 use crate::figures::matrix::MetricId;
 use crate::figures::missing::{self, Strip};
@@ -98,9 +98,9 @@ impl Radar<'_> {
         for (axis, metric) in self.scene.metrics.iter().enumerate() {
             let (x, y) = polar(RADIUS + 9.0, self.angle(axis));
             let align = match x {
-                x if x < -1.0 => Align::End,
-                x if x > 1.0 => Align::Start,
-                _ => Align::Middle,
+                x if x < -1.0 => TextAnchor::End,
+                x if x > 1.0 => TextAnchor::Start,
+                _ => TextAnchor::Middle,
             };
             let at = (self.center.0 + x, self.center.1 + y);
             sheet.text(at, &axis_label(*metric), lettering::value().aligned(align));

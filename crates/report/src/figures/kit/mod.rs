@@ -19,7 +19,7 @@ use drawing::{ink, look, mark};
 
 pub(super) use frame::{Frame, Point, many};
 pub(super) use legend::{Legend, Swatch};
-pub(super) use lettering::{Align, FULL_WIDTH, Lettering, MARGIN, NAME_ROOM, leading};
+pub(super) use lettering::{FULL_WIDTH, Lettering, MARGIN, NAME_ROOM, TextAnchor, leading};
 pub(super) use look::{Fill, Rgb, Stroke};
 pub(super) use mark::Mark;
 pub(super) use marker::polar;

@@ -9,7 +9,7 @@ use plotters::coord::types::RangedCoordf64;
 
 use super::frame::{Frame, Point};
 use super::ink::UNITS_PER_PX;
-use super::lettering::{self, Align};
+use super::lettering::{self, TextAnchor};
 use super::look::Stroke;
 use super::palette::PALETTE;
 use super::sheet::{Sheet, lattice};
@@ -41,7 +41,7 @@ impl Plot {
     }
 
     pub(crate) fn x_axis(&self, sheet: &mut Sheet, ticks: &[Tick]) {
-        let lettering = lettering::tick().aligned(Align::Middle);
+        let lettering = lettering::tick().aligned(TextAnchor::Middle);
         for tick in ticks {
             let x = self.at(tick.at, 0.0).0;
             sheet.line(&[(x, self.frame.top), (x, self.frame.bottom())], grid());
@@ -52,7 +52,7 @@ impl Plot {
     }
 
     pub(crate) fn y_axis(&self, sheet: &mut Sheet, ticks: &[Tick]) {
-        let lettering = lettering::tick().aligned(Align::End);
+        let lettering = lettering::tick().aligned(TextAnchor::End);
         for tick in ticks {
             let y = self.at(0.0, tick.at).1;
             sheet.line(&[(self.frame.left, y), (self.frame.right(), y)], grid());
@@ -64,13 +64,13 @@ impl Plot {
 
     pub(crate) fn x_title(&self, sheet: &mut Sheet, text: &str) {
         let at = (self.frame.center().0, self.frame.bottom() + 20.0);
-        sheet.text(at, text, lettering::label().aligned(Align::Middle));
+        sheet.text(at, text, lettering::label().aligned(TextAnchor::Middle));
     }
 
     /// Draws the title of the y axis, `away` px from the plot.
     pub(crate) fn y_title(&self, sheet: &mut Sheet, text: &str, away: f64) {
         let at = (self.frame.left - away, self.frame.center().1);
-        sheet.text(at, text, lettering::label().aligned(Align::Middle).upwards());
+        sheet.text(at, text, lettering::label().aligned(TextAnchor::Middle).upwards());
     }
 }
 

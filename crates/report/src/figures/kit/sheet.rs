@@ -17,7 +17,7 @@ use super::font::{self, Weight};
 use super::frame::{Frame, Point};
 use super::ink::{Ink, UNITS_PER_PX};
 use super::label;
-use super::lettering::{self, Align, Lettering, MARGIN};
+use super::lettering::{self, Lettering, MARGIN, TextAnchor};
 use super::look::{Fill, Rgb, Stroke};
 use super::mark::Mark;
 use exact::format::fixed;
@@ -146,9 +146,9 @@ fn text_style(lettering: Lettering) -> TextStyle<'static> {
     let turn = if lettering.upwards { FontTransform::Rotate270 } else { FontTransform::None };
     let font = FontDesc::new(FontFamily::Name(font::FAMILY), lettering.size * UNITS_PER_PX, style).transform(turn);
     let h_pos = match lettering.align {
-        Align::Start => HPos::Left,
-        Align::Middle => HPos::Center,
-        Align::End => HPos::Right,
+        TextAnchor::Start => HPos::Left,
+        TextAnchor::Middle => HPos::Center,
+        TextAnchor::End => HPos::Right,
     };
     let color = RGBColor::from(lettering.color).to_backend_color();
     TextStyle { font, color, pos: Pos::new(h_pos, VPos::Center) }
@@ -167,7 +167,7 @@ fn outline_attributes(fill: Fill) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{Align, Fill, Frame, Lettering, Rgb, Sheet, Stroke};
+    use super::{Fill, Frame, Lettering, Rgb, Sheet, Stroke, TextAnchor};
     use crate::figures::kit::mark::Mark;
     use crate::figures::kit::picture::Figure;
 
@@ -185,7 +185,7 @@ mod tests {
             );
             sheet.rectangle(Frame::new(0.0, 0.0, 4.0, 3.0), Fill::plain(red));
         });
-        sheet.text((20.0, 10.0), "T & A", Lettering::new(10.0, black).semibold().aligned(Align::Middle));
+        sheet.text((20.0, 10.0), "T & A", Lettering::new(10.0, black).semibold().aligned(TextAnchor::Middle));
         insta::assert_snapshot!(Figure::new(sheet, 20.0, "Title", "What it is.").inline_svg());
     }
 }

@@ -2,14 +2,14 @@
 
 use super::frame::{Frame, Point, many};
 use super::label;
-use super::lettering::{self, Align, Lettering};
+use super::lettering::{self, Lettering, TextAnchor};
 use super::look::{Fill, Rgb, Stroke};
 use super::palette::{PALETTE, text_on};
 use super::sheet::Sheet;
 
 /// A value: its colour, and the first of `texts` that fits into the cell.
 pub(crate) fn known(sheet: &mut Sheet, frame: Frame, color: Rgb, texts: &[String]) {
-    let lettering = lettering::value().aligned(Align::Middle);
+    let lettering = lettering::value().aligned(TextAnchor::Middle);
     sheet.rectangle(frame, Fill::plain(color));
     if let Some(text) = texts.iter().find(|text| lettering.width(text) <= frame.width - 2.0) {
         sheet.text(frame.center(), text, Lettering { color: text_on(color), ..lettering });
@@ -27,7 +27,7 @@ pub(crate) fn undefined(sheet: &mut Sheet, frame: Frame) {
         let to = (c.min(frame.width), (c - frame.width).max(0.0));
         sheet.line(&[within(frame, from), within(frame, to)], stroke);
     }
-    let text = lettering::value().aligned(Align::Middle);
+    let text = lettering::value().aligned(TextAnchor::Middle);
     let (x, y) = frame.center();
     let half = text.width("--") / 2.0 + 1.5;
     sheet.rectangle(Frame::new(x - half, y - 3.5, 2.0 * half, 7.0), Fill::plain(surface.paper));

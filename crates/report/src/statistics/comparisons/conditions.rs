@@ -31,14 +31,14 @@ pub struct Contrast {
     pub comparison: Comparison,
 }
 
-pub(crate) struct Pair<'s, 'a> {
+pub(crate) struct ConditionPair<'s, 'a> {
     baseline: &'s Experiment<'a>,
     against: &'s Experiment<'a>,
     /// The declared metrics; all if empty.
     on: &'a [String],
 }
 
-impl<'s, 'a> Pair<'s, 'a> {
+impl<'s, 'a> ConditionPair<'s, 'a> {
     fn all(study: &'s Study<'a>) -> Vec<Self> {
         let known = &study.table.catalog.experiment;
         if known.values().any(|experiment| experiment.control.is_some()) {
@@ -102,18 +102,18 @@ impl Contrast {
     }
 
     /// The pairs of experiments with similar tasks.
-    pub(crate) fn pairs<'s, 'a>(study: &'s Study<'a>) -> Vec<Pair<'s, 'a>> {
+    pub(crate) fn pairs<'s, 'a>(study: &'s Study<'a>) -> Vec<ConditionPair<'s, 'a>> {
         let catalog = &study.table.catalog;
-        let is_like = |pair: &Pair| tasks_differ(catalog, pair.baseline.name, pair.against.name).is_none();
-        Pair::all(study).into_iter().filter(is_like).collect()
+        let is_like = |pair: &ConditionPair| tasks_differ(catalog, pair.baseline.name, pair.against.name).is_none();
+        ConditionPair::all(study).into_iter().filter(is_like).collect()
     }
 
     pub(crate) fn left_out(study: &Study) -> Vec<String> {
-        let sentence = |pair: Pair| {
+        let sentence = |pair: ConditionPair| {
             let (baseline, against) = (pair.baseline.name, pair.against.name);
             let why = tasks_differ(&study.table.catalog, baseline, against)?;
             Some(format!("{against} is not contrasted with {baseline}: {why}."))
         };
-        Pair::all(study).into_iter().filter_map(sentence).collect()
+        ConditionPair::all(study).into_iter().filter_map(sentence).collect()
     }
 }

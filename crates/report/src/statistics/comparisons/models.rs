@@ -75,14 +75,14 @@ pub struct Gap {
 }
 
 /// All blocks of an experiment, each matched with each once for all metrics.
-struct Field<'s, 'a> {
+struct MatchedBlocks<'s, 'a> {
     study: &'s Study<'a>,
     blocks: &'s [Block<'a>],
     scenes: Vec<Scenes>,
     matched: Vec<Vec<Matched>>,
 }
 
-impl<'s, 'a> Field<'s, 'a> {
+impl<'s, 'a> MatchedBlocks<'s, 'a> {
     fn of(study: &'s Study<'a>, experiment: &'s Experiment<'a>) -> Self {
         let scenes: Vec<Scenes> = experiment.blocks.iter().map(|block| Scenes::of(study, block)).collect();
         let of_first = |first| scenes.iter().map(|second| Matched::of(first, second)).collect();
@@ -137,7 +137,7 @@ fn triangle(count: usize, a: usize, b: usize) -> usize {
 pub(crate) fn compared(study: &Study, horizon: Option<i64>, confidence: f64) -> (Vec<Family>, Vec<Gap>) {
     let (mut families, mut gaps) = (Vec::new(), Vec::new());
     for experiment in study.experiments.iter().filter(|experiment| experiment.blocks.len() > 1) {
-        let field = Field::of(study, experiment);
+        let field = MatchedBlocks::of(study, experiment);
         for column in &study.table.metrics {
             if is_duration(study, &column.name) {
                 // Models are ordered and compared up to one horizon, the one in the table of durations.
@@ -157,7 +157,7 @@ impl Family {
         self.tests.iter().map(|test| &test.comparison)
     }
 
-    fn of(experiment: &str, column: &MetricColumn, field: &Field, asked: (Option<i64>, f64)) -> Self {
+    fn of(experiment: &str, column: &MetricColumn, field: &MatchedBlocks, asked: (Option<i64>, f64)) -> Self {
         let order = best_first(field, column, asked.0);
         let mut tests = Vec::new();
         for (at, &first) in order.iter().enumerate() {
@@ -192,7 +192,7 @@ impl Reach {
     }
 }
 
-fn best_first(field: &Field, column: &MetricColumn, horizon: Option<i64>) -> Vec<usize> {
+fn best_first(field: &MatchedBlocks, column: &MetricColumn, horizon: Option<i64>) -> Vec<usize> {
     let mean = |block: &Block| match horizon {
         Some(horizon) => durations::restricted(field.study, block, column, horizon),
         None => block.moments(column).mean(),

@@ -41,7 +41,7 @@ pub fn render(table: &Table, terminal: Terminal) -> String {
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Shape {
+enum RowShape {
     OneLine,
     TwoLines,
 }
@@ -89,9 +89,9 @@ struct Grid {
 
 impl Grid {
     fn within(table: &Table, terminal: Terminal) -> Vec<Self> {
-        let one_line = Self::new(table, terminal.emphasis, Shape::OneLine);
+        let one_line = Self::new(table, terminal.emphasis, RowShape::OneLine);
         let Some(width) = terminal.width.filter(|width| one_line.width() > *width) else { return vec![one_line] };
-        let two_lines = Self::new(table, terminal.emphasis, Shape::TwoLines);
+        let two_lines = Self::new(table, terminal.emphasis, RowShape::TwoLines);
         if two_lines.width() <= width { vec![two_lines] } else { two_lines.split(width) }
     }
 
@@ -132,7 +132,7 @@ impl Grid {
         }
     }
 
-    fn new(table: &Table, marks: Marks, shape: Shape) -> Self {
+    fn new(table: &Table, marks: Marks, shape: RowShape) -> Self {
         let header: Vec<Piece> = table.columns.iter().map(|column| Piece::new(column.spelled(visible))).collect();
         let pieces = |row: &Vec<TableCell>| row.iter().map(|cell| spell(cell, marks, shape)).collect();
         let groups: Vec<Vec<Vec<Vec<Piece>>>> =
@@ -186,15 +186,15 @@ impl Grid {
     }
 }
 
-fn spell(cell: &TableCell, marks: Marks, shape: Shape) -> Vec<Piece> {
+fn spell(cell: &TableCell, marks: Marks, shape: RowShape) -> Vec<Piece> {
     let (text, mark) = (visible(&cell.text), cell.mark());
     let emphasised = |text: &str| Piece::emphasised(text, cell.emphasis, marks);
     match (&cell.detail, shape) {
-        (Some(detail), Shape::OneLine) if cell.is_whole => {
+        (Some(detail), RowShape::OneLine) if cell.is_whole => {
             vec![emphasised(&format!("{text} {detail}")).followed_by(mark)]
         }
-        (Some(detail), Shape::OneLine) => vec![emphasised(&text).followed_by(&format!("{mark} {detail}"))],
-        (Some(detail), Shape::TwoLines) => vec![emphasised(&text).followed_by(mark), Piece::new(detail.clone())],
+        (Some(detail), RowShape::OneLine) => vec![emphasised(&text).followed_by(&format!("{mark} {detail}"))],
+        (Some(detail), RowShape::TwoLines) => vec![emphasised(&text).followed_by(mark), Piece::new(detail.clone())],
         (None, _) => vec![emphasised(&text).followed_by(mark)],
     }
 }

@@ -6,12 +6,12 @@ use std::io::{BufReader, Seek as _};
 use ::csv::{Reader, StringRecord};
 use serde_json::Value;
 
-use super::Rows;
+use super::RowSink;
 use crate::import::error::ImportError;
 use crate::import::mapping::is_general_text;
 use crate::schema::Kind;
 
-pub(super) fn read(mut file: &File, rows: &mut Rows<'_>) -> Result<(), ImportError> {
+pub(super) fn read(mut file: &File, rows: &mut RowSink<'_>) -> Result<(), ImportError> {
     let mut reader = Reader::from_reader(BufReader::new(file));
     let names = reader.headers().map_err(|error| unreadable(rows, &error))?.clone();
     if let Some(twice) = names.iter().enumerate().find(|(at, name)| names.iter().take(*at).any(|other| other == *name))
@@ -71,7 +71,7 @@ fn value(cell: &str, kind: Option<Kind>) -> Value {
     }
 }
 
-fn unreadable(rows: &Rows<'_>, error: &::csv::Error) -> ImportError {
+fn unreadable(rows: &RowSink<'_>, error: &::csv::Error) -> ImportError {
     let line = error.position().map(|at| format!("line {}", at.line())).unwrap_or_default();
     let help = "write it with commas, quotes around cells with commas, and a header";
     rows.fault(&line, "a record with the cells of the header, in UTF-8", error.to_string(), help)

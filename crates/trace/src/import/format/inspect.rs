@@ -11,7 +11,7 @@ use serde::de::DeserializeOwned;
 use serde_json::{Map, Value, json};
 use zip::{CompressionMethod, ZipArchive};
 
-use super::Rows;
+use super::RowSink;
 use super::json::from_slice;
 use crate::import::error::ImportError;
 use exact::budget::Limit;
@@ -28,13 +28,13 @@ pub(super) fn is_archive(file: &mut File) -> io::Result<bool> {
     file.rewind().map(|()| is_archive)
 }
 
-pub(super) fn read_archive(file: File, rows: &mut Rows<'_>) -> Result<(), ImportError> {
+pub(super) fn read_archive(file: File, rows: &mut RowSink<'_>) -> Result<(), ImportError> {
     let help = "copy the log again; `inspect log recover` mends one whose writer was ended";
     let expected = "a log of Inspect, an archive with a directory at its end";
     let mut archive = EvalArchive::open(file).map_err(|found| rows.fault("", expected, found, help))?;
     let header = ["header.json", "_journal/start.json"].into_iter().find(|name| archive.names.contains(*name));
     let header = header.ok_or_else(|| rows.fault("", expected, "neither `header.json` nor a journal", help))?;
-    let damaged = |rows: &Rows<'_>, name: &str, found| rows.fault(name, "JSON of Inspect", found, help);
+    let damaged = |rows: &RowSink<'_>, name: &str, found| rows.fault(name, "JSON of Inspect", found, help);
     let head: Value = archive.json(header).map_err(|found| damaged(rows, header, found))?;
     let mut log = Log::new(head["eval"].clone());
     for name in archive.names.clone() {
@@ -122,7 +122,7 @@ pub(super) enum SampleFault {
 }
 
 impl SampleFault {
-    pub(super) fn into_error(self, rows: &Rows<'_>, part: &str) -> ImportError {
+    pub(super) fn into_error(self, rows: &RowSink<'_>, part: &str) -> ImportError {
         match self {
             Self::Import(error) => error,
             Self::Shape(what) => rows.fault(part, what, "none", "check that it is a sample of Inspect, version 2"),
@@ -137,7 +137,7 @@ impl Log {
         Self { eval, numbers: ids.collect() }
     }
 
-    pub(super) fn add(&mut self, mut sample: Map<String, Value>, rows: &mut Rows<'_>) -> Result<(), SampleFault> {
+    pub(super) fn add(&mut self, mut sample: Map<String, Value>, rows: &mut RowSink<'_>) -> Result<(), SampleFault> {
         let mut take = |key: &str| sample.remove(key).unwrap_or_default();
         let (attachments, pools, events) = (take("attachments"), take("events_data"), take("events"));
         let mut sample = Value::Object(sample);
@@ -183,7 +183,7 @@ impl Log {
 }
 
 /// The events that are steps, in order; those inside a tool's event follow it.
-fn flatten(events: Value, rows: &mut Rows<'_>, steps: &mut Vec<Value>) {
+fn flatten(events: Value, rows: &mut RowSink<'_>, steps: &mut Vec<Value>) {
     let Value::Array(events) = events else { return };
     for mut event in events {
         let kind = event["event"].as_str().unwrap_or_default().to_owned();
@@ -229,7 +229,7 @@ fn integer(value: Option<f64>, factor: f64) -> Option<i64> {
 }
 
 /// `score` of the first scorer, and a column for each.
-fn scores(scores: &Value, rows: &mut Rows<'_>) -> Vec<(String, Value)> {
+fn scores(scores: &Value, rows: &mut RowSink<'_>) -> Vec<(String, Value)> {
     let mut columns = vec![("score".to_owned(), Value::Null)];
     for (name, score) in scores.as_object().into_iter().flatten() {
         let parts: Vec<_> = match &score["value"] {
@@ -282,7 +282,7 @@ fn resolve(value: &mut Value, attachments: &Value) {
 }
 
 /// Replaces references to the message pools in an event whose messages are mapped.
-fn expand(event: &mut Value, pools: &Value, rows: &Rows<'_>) {
+fn expand(event: &mut Value, pools: &Value, rows: &RowSink<'_>) {
     let of = |refs: &Value, pool: &Value| -> Option<Value> {
         let range =
             |pair: &Value| Some(usize::try_from(pair[0].as_u64()?).ok()?..usize::try_from(pair[1].as_u64()?).ok()?);

@@ -4,7 +4,7 @@ use std::fs::File;
 
 use serde_json::{Value, json};
 
-use super::Rows;
+use super::RowSink;
 use super::json::WithoutNan;
 use crate::import::error::ImportError;
 
@@ -17,7 +17,7 @@ const PER_TRIAL: [(&str, &str); 5] = [
     ("trial_metadata", "trial"),
 ];
 
-pub(super) fn read(file: File, rows: &mut Rows<'_>) -> Result<(), ImportError> {
+pub(super) fn read(file: File, rows: &mut RowSink<'_>) -> Result<(), ImportError> {
     let help = "name a log of `inspect-robots`; another JSON file has another --from";
     let expected = "an EvalLog of inspect-robots, version 1";
     let log: Value = serde_json::from_reader(WithoutNan::new(file))
@@ -43,7 +43,7 @@ fn add_trial(
     scene: &Value,
     (number, at): (u64, usize),
     scores: &Value,
-    rows: &mut Rows<'_>,
+    rows: &mut RowSink<'_>,
 ) -> Result<(), ImportError> {
     let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
     let id = [&eval["policy"], &eval["task"], &eval["created"], &scene["scene_id"]].map(text).join("/");

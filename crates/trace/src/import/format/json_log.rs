@@ -6,11 +6,11 @@ use std::io::Read;
 use serde::de::{DeserializeSeed, Deserializer, Error as _, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use serde_json::{Map, Value};
 
-use super::Rows;
+use super::RowSink;
 use super::inspect::Log;
 use crate::import::error::ImportError;
 
-pub(super) fn read(json: impl Read, rows: &mut Rows<'_>) -> Result<(), ImportError> {
+pub(super) fn read(json: impl Read, rows: &mut RowSink<'_>) -> Result<(), ImportError> {
     let mut log = JsonLog { log: None, rows, failed: None };
     let mut json = serde_json::Deserializer::from_reader(json);
     let read = (&mut log).deserialize(&mut json).and_then(|()| json.end());
@@ -29,7 +29,7 @@ pub(super) fn read(json: impl Read, rows: &mut Rows<'_>) -> Result<(), ImportErr
 /// Visits the object of the log, or the list of its samples once `eval` was read.
 struct JsonLog<'r, 'm> {
     log: Option<Log>,
-    rows: &'r mut Rows<'m>,
+    rows: &'r mut RowSink<'m>,
     failed: Option<ImportError>,
 }
 

@@ -75,7 +75,7 @@ impl Format {
         if matches!(self, Self::JsonLines) { "line" } else { "row" }
     }
 
-    pub(super) fn read(self, mut file: File, rows: &mut Rows<'_>) -> Result<(), ImportError> {
+    pub(super) fn read(self, mut file: File, rows: &mut RowSink<'_>) -> Result<(), ImportError> {
         file.rewind().map_err(ImportError::read(&rows.file))?;
         match self {
             Self::JsonLines => Ok(()),
@@ -92,7 +92,7 @@ impl Format {
 }
 
 /// The destination of rows: a mapping, then a temporary file of lines.
-pub(super) struct Rows<'m> {
+pub(super) struct RowSink<'m> {
     pub(super) file: String,
     /// The first digits of its hash, which keep ids distinct between files that number their episodes from 0.
     pub(super) digits: String,
@@ -100,7 +100,7 @@ pub(super) struct Rows<'m> {
     out: BufWriter<File>,
 }
 
-impl<'m> Rows<'m> {
+impl<'m> RowSink<'m> {
     pub(super) fn new(file: &str, sha256: &str, mapping: &'m mut Mapping) -> Result<Self, ImportError> {
         let out = tempfile::tempfile().map_err(ImportError::read(file))?;
         let digits = sha256.chars().take(8).collect();

@@ -9,20 +9,20 @@ use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use serde_json::{Map, Value};
 
-use super::Rows;
+use super::RowSink;
 use crate::catch_panic::contained;
 use crate::import::error::ImportError;
 
 const BATCH: usize = 1024;
 
-pub(super) fn read(file: File, rows: &mut Rows<'_>) -> Result<(), ImportError> {
+pub(super) fn read(file: File, rows: &mut RowSink<'_>) -> Result<(), ImportError> {
     each_row(file, rows, |row, rows| rows.add_object(&row))
 }
 
 pub(super) fn each_row(
     file: File,
-    rows: &mut Rows<'_>,
-    add: impl FnMut(Map<String, Value>, &mut Rows<'_>) -> Result<(), ImportError>,
+    rows: &mut RowSink<'_>,
+    add: impl FnMut(Map<String, Value>, &mut RowSink<'_>) -> Result<(), ImportError>,
 ) -> Result<(), ImportError> {
     each_row_of(file, rows, &[], add)
 }
@@ -30,11 +30,11 @@ pub(super) fn each_row(
 /// The same for these columns only; all columns if the list is empty.
 pub(super) fn each_row_of(
     file: File,
-    rows: &mut Rows<'_>,
+    rows: &mut RowSink<'_>,
     columns: &[&str],
-    mut add: impl FnMut(Map<String, Value>, &mut Rows<'_>) -> Result<(), ImportError>,
+    mut add: impl FnMut(Map<String, Value>, &mut RowSink<'_>) -> Result<(), ImportError>,
 ) -> Result<(), ImportError> {
-    let damaged = |rows: &Rows<'_>, found: String| {
+    let damaged = |rows: &RowSink<'_>, found: String| {
         rows.fault("", "a Parquet file whose values JSON can hold", found, "write the file anew, or as JSON Lines")
     };
     let opened = contained(|| {

@@ -19,7 +19,7 @@ use parquet_pages::{Column, Runs};
 const CUT: usize = 60;
 
 #[derive(Debug, Default)]
-pub(crate) struct Declared(Vec<Vec<Option<Chunk>>>);
+pub(crate) struct DeclaredStatistics(Vec<Vec<Option<Chunk>>>);
 
 /// A footer's statistics of the values of a chunk.
 #[derive(Clone, Debug, Default)]
@@ -27,19 +27,19 @@ pub(crate) struct Chunk {
     nulls: Option<u64>,
     /// The total bytes of the texts of all rows.
     bytes: Option<u64>,
-    least: Option<Value>,
-    greatest: Option<Value>,
+    least: Option<Bound>,
+    greatest: Option<Bound>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
-enum Value {
+enum Bound {
     Bool(bool),
     Int(i64),
     Float(f64),
     Text(Vec<u8>),
 }
 
-impl Declared {
+impl DeclaredStatistics {
     pub(crate) fn of(metadata: &ParquetMetaData) -> Self {
         let groups = metadata.row_groups().iter();
         Self(groups.map(|group| group.columns().iter().map(Chunk::of).collect()).collect())
@@ -70,14 +70,14 @@ impl Chunk {
             );
         let [least, greatest] = match statistics {
             _ if is_unsigned => [None, None],
-            Statistics::Boolean(of) => ends([of.min_opt(), of.max_opt()], |value| Value::Bool(*value)),
-            Statistics::Int32(of) => ends([of.min_opt(), of.max_opt()], |value| Value::Int((*value).into())),
-            Statistics::Int64(of) => ends([of.min_opt(), of.max_opt()], |value| Value::Int(*value)),
-            Statistics::Float(of) => ends([of.min_opt(), of.max_opt()], |value| Value::Float((*value).into())),
-            Statistics::Double(of) => ends([of.min_opt(), of.max_opt()], |value| Value::Float(*value)),
+            Statistics::Boolean(of) => ends([of.min_opt(), of.max_opt()], |value| Bound::Bool(*value)),
+            Statistics::Int32(of) => ends([of.min_opt(), of.max_opt()], |value| Bound::Int((*value).into())),
+            Statistics::Int64(of) => ends([of.min_opt(), of.max_opt()], |value| Bound::Int(*value)),
+            Statistics::Float(of) => ends([of.min_opt(), of.max_opt()], |value| Bound::Float((*value).into())),
+            Statistics::Double(of) => ends([of.min_opt(), of.max_opt()], |value| Bound::Float(*value)),
             // The older fields are ordered as signed bytes.
             Statistics::ByteArray(of) if !statistics.is_min_max_deprecated() => {
-                ends([of.min_opt(), of.max_opt()], |value| Value::Text(value.data().to_vec()))
+                ends([of.min_opt(), of.max_opt()], |value| Bound::Text(value.data().to_vec()))
             }
             _ => [None, None],
         };
@@ -85,7 +85,7 @@ impl Chunk {
     }
 }
 
-fn ends<T>(ends: [Option<&T>; 2], value: impl Fn(&T) -> Value) -> [Option<Value>; 2] {
+fn ends<T>(ends: [Option<&T>; 2], value: impl Fn(&T) -> Bound) -> [Option<Bound>; 2] {
     ends.map(|end| end.map(&value))
 }
 
@@ -94,8 +94,8 @@ fn ends<T>(ends: [Option<&T>; 2], value: impl Fn(&T) -> Value) -> [Option<Value>
 pub(crate) struct Seen {
     nulls: u64,
     bytes: u64,
-    least: Option<Value>,
-    greatest: Option<Value>,
+    least: Option<Bound>,
+    greatest: Option<Bound>,
     /// The bounds of dictionary texts. Some writers use these for statistics, even if no row has them.
     entries: Option<[Vec<u8>; 2]>,
 }
@@ -126,7 +126,7 @@ impl Seen {
             let (declared, found) = (declared.as_ref()?, found.as_ref()?);
             let order = found.order(declared)?;
             // Some row must have a bound that is not cut, unless it is that of a dictionary.
-            let may_be_absent = matches!(declared, Value::Text(text)
+            let may_be_absent = matches!(declared, Bound::Text(text)
                 if text.len() >= CUT || self.entries.as_ref().is_some_and(|ends| ends.contains(text)));
             let expected = || format!("{} as the {word} value, as in the footer's statistics", declared.words());
             let is_wrong = order == beyond || order != Ordering::Equal && !may_be_absent;
@@ -134,9 +134,9 @@ impl Seen {
         })
     }
 
-    fn value(&mut self, value: &Value) {
+    fn value(&mut self, value: &Bound) {
         let is_beyond =
-            |bound: &Option<Value>, beyond| bound.as_ref().is_none_or(|bound| value.order(bound) == Some(beyond));
+            |bound: &Option<Bound>, beyond| bound.as_ref().is_none_or(|bound| value.order(bound) == Some(beyond));
         if is_beyond(&self.least, Ordering::Less) {
             self.least = Some(value.clone());
         }
@@ -207,20 +207,20 @@ impl Seen {
         match values.data_type() {
             DataType::Boolean => {
                 let values = values.as_boolean();
-                self.both(rows.map(|row| values.value(row)), Ord::cmp, Value::Bool);
+                self.both(rows.map(|row| values.value(row)), Ord::cmp, Bound::Bool);
             }
             DataType::Int64 => {
                 let values = values.as_primitive::<Int64Type>();
-                self.both(rows.map(|row| values.value(row)), Ord::cmp, Value::Int);
+                self.both(rows.map(|row| values.value(row)), Ord::cmp, Bound::Int);
             }
             DataType::Float64 => {
                 let values = values.as_primitive::<Float64Type>();
                 let numbers = rows.map(|row| values.value(row)).filter(|value| !value.is_nan());
-                self.both(numbers, f64::total_cmp, Value::Float);
+                self.both(numbers, f64::total_cmp, Bound::Float);
             }
             DataType::Utf8 => {
                 let values = values.as_string::<i32>();
-                self.both(rows.map(|row| values.value(row)), Ord::cmp, |text| Value::Text(text.as_bytes().to_vec()));
+                self.both(rows.map(|row| values.value(row)), Ord::cmp, |text| Bound::Text(text.as_bytes().to_vec()));
             }
             _ => {}
         }
@@ -230,7 +230,7 @@ impl Seen {
         &mut self,
         mut values: impl Iterator<Item = T>,
         order: impl Fn(&T, &T) -> Ordering,
-        value: impl Fn(T) -> Value,
+        value: impl Fn(T) -> Bound,
     ) {
         let Some(first) = values.next() else { return };
         let (least, greatest) = values.fold((first, first), |(least, greatest), next| {
@@ -244,7 +244,7 @@ impl Seen {
     }
 }
 
-impl Value {
+impl Bound {
     /// `None` for values of two types: the column is wider than its statistics.
     fn order(&self, other: &Self) -> Option<Ordering> {
         match (self, other) {

@@ -24,8 +24,8 @@ use crate::diagnostic::{Code, Finding};
 use crate::footers;
 use crate::inputs::Input;
 use crate::read::budget::{EpisodeBudget, MOST_COLUMNS};
-use crate::read::statistics::Declared as Statistics;
-use crate::schema::colors::palette::{Declared, Palette};
+use crate::read::statistics::DeclaredStatistics as Statistics;
+use crate::schema::colors::palette::{DeclaredPalette, Palette};
 use crate::schema::{self, COLUMNS, Column, DeclaredColumn, Domain, Kind};
 use exact::escape::visible;
 use exact::input;
@@ -42,7 +42,7 @@ pub struct TraceFile {
     columns: Vec<FileColumn>,
     rows: Vec<usize>,
     pub(crate) pairs: Vec<KeyValue>,
-    pub(crate) colors: Declared,
+    pub(crate) colors: DeclaredPalette,
     experiments: Vec<DeclaredExperiment>,
     checksums: Checksums,
     /// The footer's statistics, in a file without checksums.
@@ -83,7 +83,7 @@ impl TraceFile {
         let rows = metadata.row_groups().iter().map(rows_of).collect();
         // They are verified, long, and apply only to this file.
         pairs.retain(|pair| pair.key != schema::CHECKSUMS_KEY);
-        let colors = Declared::of(&input.name, &recording).map_err(|f| vec![*f])?;
+        let colors = DeclaredPalette::of(&input.name, &recording).map_err(|f| vec![*f])?;
         let experiments = declared_experiment::of_recording(&input.name, &recording).map_err(|f| vec![*f])?;
         readable(metadata, &columns)
             .map_err(|error| vec![Finding::new(Code::CorruptFooter, &input.name, "a readable schema", error)])?;

@@ -28,12 +28,12 @@ fn hint(meant: Option<&str>) -> String {
 }
 
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Declared {
+pub(crate) struct DeclaredPalette {
     pub(crate) palette: Option<Palette>,
     is_of_world: bool,
 }
 
-impl Declared {
+impl DeclaredPalette {
     pub(crate) fn of(file: &str, recording: &Value) -> Result<Self, Box<Finding>> {
         let said = |key: &str| recording.get(key).filter(|value| !value.is_null());
         let palette = said("palette").map(|palette| Palette::read(file, palette)).transpose()?;
@@ -121,13 +121,14 @@ fn invalid(file: &str, palette: &Value) -> Finding {
 
 #[cfg(test)]
 mod tests {
-    use super::{Declared, Palette};
+    use super::{DeclaredPalette, Palette};
     use crate::footers::recording;
     use crate::palette::Color;
 
     #[test]
     fn a_declared_palette_is_read() {
-        let names = |text| Declared::of("a.parquet", &recording(Some(text))).unwrap().palette.map(|palette| palette.0);
+        let names =
+            |text| DeclaredPalette::of("a.parquet", &recording(Some(text))).unwrap().palette.map(|palette| palette.0);
         assert_eq!(
             names(r#"{"world":{},"palette":["teal","dark red"]}"#),
             Some(vec!["teal".into(), "dark red".into()])
@@ -135,12 +136,12 @@ mod tests {
         for text in ["{}", r#"{"palette":null}"#, "no JSON", "7"] {
             assert_eq!(names(text), None, "{text}");
         }
-        assert_eq!(Declared::of("a.parquet", &recording(None)).unwrap(), Declared::default());
+        assert_eq!(DeclaredPalette::of("a.parquet", &recording(None)).unwrap(), DeclaredPalette::default());
     }
 
     #[test]
     fn a_recording_of_this_world_has_the_colors_of_the_study() {
-        let has = |text, name| Declared::of("a.parquet", &recording(Some(text))).unwrap().has(name);
+        let has = |text, name| DeclaredPalette::of("a.parquet", &recording(Some(text))).unwrap().has(name);
         assert!(has(r#"{"scene_version":1}"#, "pink") && !has(r#"{"scene_version":1}"#, "teal"));
         assert!(!has(r#"{"kind":"import"}"#, "pink"));
         assert!(has(r#"{"scene_version":1,"palette":["teal"]}"#, "teal"));
@@ -168,7 +169,7 @@ mod tests {
     fn an_invalid_palette_is_refused() {
         for palette in ["[]", "7", "\"red\"", "[1]", "[\"Red\"]", "[\"none\"]", "[\"red \"]", "[\"\"]", "{\"red\":1}"] {
             let text = format!("{{\"palette\":{palette}}}");
-            let finding = Declared::of("a.parquet", &recording(Some(&text))).unwrap_err();
+            let finding = DeclaredPalette::of("a.parquet", &recording(Some(&text))).unwrap_err();
             assert_eq!(finding.code.name(), "invalid-metadata", "{palette}");
             assert!(finding.expected.contains("a list of lower-case names"), "{finding}");
         }

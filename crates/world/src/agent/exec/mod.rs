@@ -30,7 +30,7 @@ use self::conversation::Conversation;
 use self::files::Unreadable;
 use self::group::Groups;
 use self::message::{EndMessage, Message, PROTOCOL};
-use self::program::{Failure, Program};
+use self::program::{Program, ProgramFailure};
 use self::said::Kept;
 use super::vlm::secrets::{Secret, from_every_key_variable};
 use super::{Agent, Decision, Ended, Farewell, Lost, Observation, Player, Reply, Status, Task, Usage};
@@ -50,7 +50,7 @@ pub enum Images {
 names!(Images { Path: "path", Base64: "base64" });
 
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Settings {
+pub struct ExecSettings {
     pub model: String,
     /// The command, in shell syntax.
     pub command: String,
@@ -70,7 +70,7 @@ pub struct Exec {
 
 #[derive(Debug)]
 struct Shared {
-    settings: Settings,
+    settings: ExecSettings,
     files: Option<String>,
     groups: Arc<Groups>,
     secrets: Arc<[Secret]>,
@@ -78,7 +78,7 @@ struct Shared {
 }
 
 impl Exec {
-    pub fn new(settings: Settings) -> Result<Self, Unreadable> {
+    pub fn new(settings: ExecSettings) -> Result<Self, Unreadable> {
         let files = files::fingerprint(&settings.command)?;
         let (groups, secrets, stop) = (Arc::default(), from_every_key_variable().into(), OnceLock::new());
         Ok(Self { shared: Arc::new(Shared { settings, files, groups, secrets, stop }) })
@@ -93,7 +93,7 @@ impl Player for Exec {
     /// The command by its hash, since its text may hold local paths or keys; the files that it names by theirs, null if
     /// it names none.
     fn description(&self) -> serde_json::Value {
-        let Settings { model, command, images, .. } = &self.shared.settings;
+        let ExecSettings { model, command, images, .. } = &self.shared.settings;
         serde_json::json!({
             "exec": model,
             "command": hash::of_bytes(command.as_bytes()),
@@ -106,7 +106,7 @@ impl Player for Exec {
 
     fn agent(&self, task: Task, episode_id: &str) -> Result<Box<dyn Agent>, Lost> {
         let shared = Arc::clone(&self.shared);
-        let Settings { images, scratch, .. } = &shared.settings;
+        let ExecSettings { images, scratch, .. } = &shared.settings;
         let conversation = Conversation::new(task, episode_id, *images, scratch)?;
         let kept = Kept::new(&shared.settings.standard_error, episode_id, Arc::clone(&shared.secrets));
         let program = Program::start(&shared.settings.command, &shared.groups, &kept.said);
@@ -185,17 +185,17 @@ impl ExecAgent {
     }
 
     /// The program is unusable from now on; if the command cannot be run at all, so are all others.
-    async fn give_up(&mut self, failure: &Failure) -> Lost {
+    async fn give_up(&mut self, failure: &ProgramFailure) -> Lost {
         let Some(program) = self.program.take() else { return lost(failure) };
         let lost = lost(failure);
         program.end(None).await;
         let words = self.kept.said.last_words(&self.shared.secrets);
         let words = words.map_or_else(String::new, |words| format!("; its last words:\n{words}"));
         // Output before the reply belongs to the previous step, though it is noticed now.
-        let earlier = matches!(failure, Failure::Chatter { .. }).then(|| self.steps - 1);
+        let earlier = matches!(failure, ProgramFailure::Chatter { .. }).then(|| self.steps - 1);
         let step = earlier.unwrap_or(self.steps);
         let cause = self.shared.without_secrets(&format!("step {step}: {}{words}", lost.cause));
-        if let Failure::Ended(status) = failure
+        if let ProgramFailure::Ended(status) = failure
             && self.steps == 1
             && status.code().is_some_and(|code| NO_COMMAND.contains(&code))
         {
@@ -211,9 +211,9 @@ impl Shared {
     }
 }
 
-fn lost(failure: &Failure) -> Lost {
+fn lost(failure: &ProgramFailure) -> Lost {
     let status = match failure {
-        Failure::Slow(_) => Status::Timeout,
+        ProgramFailure::Slow(_) => Status::Timeout,
         _ => Status::ServerError,
     };
     Lost::counted_as(status, failure.to_string())

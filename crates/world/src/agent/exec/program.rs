@@ -30,7 +30,7 @@ const GLANCE: Duration = Duration::from_millis(2);
 const SHOWN: usize = 100;
 
 #[derive(Debug, thiserror::Error)]
-pub enum Failure {
+pub enum ProgramFailure {
     #[error("the program cannot be started: {0}")]
     Start(io::Error),
     #[error(
@@ -72,11 +72,11 @@ pub(crate) struct Program {
 
 impl Program {
     /// Starts a command of the shell; what it says on standard error is added to `said`.
-    pub fn start(command: &str, groups: &Arc<Groups>, said: &Arc<Said>) -> Result<Self, Failure> {
+    pub fn start(command: &str, groups: &Arc<Groups>, said: &Arc<Said>) -> Result<Self, ProgramFailure> {
         let mut shell = shell(command);
         shell.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).kill_on_drop(true);
-        let (mut child, group) = Group::start(&mut shell, groups).map_err(Failure::Start)?;
-        let gone = || Failure::Start(io::Error::other("it has no standard streams"));
+        let (mut child, group) = Group::start(&mut shell, groups).map_err(ProgramFailure::Start)?;
+        let gone = || ProgramFailure::Start(io::Error::other("it has no standard streams"));
         let (input, output) = (child.stdin.take().ok_or_else(gone)?, child.stdout.take().ok_or_else(gone)?);
         let listener = tokio::spawn(listen(child.stderr.take().ok_or_else(gone)?, Arc::clone(said)));
         Ok(Self { child, group, input, output: BufReader::new(output), listener, last: String::new() })
@@ -84,7 +84,12 @@ impl Program {
 
     /// Sends a question and waits for a line, returned without its end. The first question follows the task, which
     /// requires no line.
-    pub async fn ask(&mut self, task: Option<&[u8]>, question: &[u8], patience: Duration) -> Result<Vec<u8>, Failure> {
+    pub async fn ask(
+        &mut self,
+        task: Option<&[u8]>,
+        question: &[u8],
+        patience: Duration,
+    ) -> Result<Vec<u8>, ProgramFailure> {
         let asked = async {
             match task {
                 Some(task) => self.tell(task).await?,
@@ -93,25 +98,25 @@ impl Program {
             let line = self.exchange(question).await?;
             if self.unread() >= question.len() as u64 {
                 return Err(match task {
-                    Some(_) => Failure::Early(beginning(&line)),
+                    Some(_) => ProgramFailure::Early(beginning(&line)),
                     None => self.out_of_turn(&line),
                 });
             }
             self.last = beginning(&line);
             Ok(line)
         };
-        timeout(patience, asked).await.unwrap_or(Err(Failure::Slow(patience)))
+        timeout(patience, asked).await.unwrap_or(Err(ProgramFailure::Slow(patience)))
     }
 
     /// Sends the task and waits until the program has read it; earlier output is not a reply.
-    async fn tell(&mut self, task: &[u8]) -> Result<(), Failure> {
+    async fn tell(&mut self, task: &[u8]) -> Result<(), ProgramFailure> {
         // A program that no longer reads has ended or is about to; reading detects this.
         let _ = self.input.write_all(task).await;
         loop {
             // The order matters: output from before the task was read is visible afterwards.
             let is_read = self.unread() == 0;
             match timeout(GLANCE, self.output.fill_buf()).await {
-                Ok(Ok(early)) if !early.is_empty() => return Err(Failure::Early(beginning(early))),
+                Ok(Ok(early)) if !early.is_empty() => return Err(ProgramFailure::Early(beginning(early))),
                 // Its output has ended; the next read detects this.
                 Ok(_) => return Ok(()),
                 Err(_) if is_read => return Ok(()),
@@ -120,26 +125,26 @@ impl Program {
         }
     }
 
-    async fn exchange(&mut self, question: &[u8]) -> Result<Vec<u8>, Failure> {
+    async fn exchange(&mut self, question: &[u8]) -> Result<Vec<u8>, ProgramFailure> {
         let _ = self.input.write_all(question).await;
         let mut line = Vec::new();
         let read = (&mut self.output).take(LONGEST_REPLY + 1).read_until(b'\n', &mut line).await;
-        read.map_err(Failure::Unreadable)?;
+        read.map_err(ProgramFailure::Unreadable)?;
         if line.pop_if(|last| *last == b'\n').is_some() {
             line.pop_if(|last| *last == b'\r');
             return Ok(line);
         }
         if line.len() as u64 > LONGEST_REPLY {
-            return Err(Failure::TooLong);
+            return Err(ProgramFailure::TooLong);
         }
         match timeout(CLOSING, self.child.wait()).await {
-            Ok(Ok(status)) => Err(Failure::Ended(status)),
-            Ok(Err(_)) | Err(_) => Err(Failure::Closed),
+            Ok(Ok(status)) => Err(ProgramFailure::Ended(status)),
+            Ok(Err(_)) | Err(_) => Err(ProgramFailure::Closed),
         }
     }
 
     /// Checks that no output is waiting: a line from before the question would be taken for the answer.
-    async fn is_silent(&mut self) -> Result<(), Failure> {
+    async fn is_silent(&mut self) -> Result<(), ProgramFailure> {
         // Lets the runtime notice output that has arrived.
         tokio::task::yield_now().await;
         let early = match self.output.fill_buf().now_or_never() {
@@ -149,13 +154,13 @@ impl Program {
         Err(self.out_of_turn(early.as_bytes()))
     }
 
-    fn out_of_turn(&self, line: &[u8]) -> Failure {
+    fn out_of_turn(&self, line: &[u8]) -> ProgramFailure {
         let (line, before) = (beginning(line), self.last.clone());
         // Of two lines for one question, the one that is not an object was not meant as the reply.
         if before.trim_start().starts_with('{') {
-            Failure::OutOfTurn { line, before }
+            ProgramFailure::OutOfTurn { line, before }
         } else {
-            Failure::Chatter { chatter: before, line }
+            ProgramFailure::Chatter { chatter: before, line }
         }
     }
 

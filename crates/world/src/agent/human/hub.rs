@@ -14,8 +14,8 @@ use serde_json::Value;
 use tokio::sync::oneshot;
 
 use super::design::{Design, Schedule};
-use super::journal::{Entry, Journal, Leaving};
-use super::seat::{Asked, End, Given, LISTENING, Question, Seat, Terms};
+use super::journal::{Leaving, ParticipantJournal, PlayedStep};
+use super::seat::{End, Given, LISTENING, OpenQuestion, PlayerQuestion, Seat, Terms};
 use crate::agent::{Planned, Turn, locked};
 
 /// Removes the episodes of a code from a folder; returns their ids.
@@ -30,8 +30,8 @@ pub struct Hub {
     pub(super) schedule: Schedule,
     seats: Vec<Mutex<Seat>>,
     tokens: Vec<String>,
-    answers: BTreeMap<(String, String, i32), Entry>,
-    journal: Mutex<Journal>,
+    answers: BTreeMap<(String, String, i32), PlayedStep>,
+    journal: Mutex<ParticipantJournal>,
     eraser: Eraser,
     /// The participant of each episode that is still to be played.
     owners: Mutex<BTreeMap<String, usize>>,
@@ -44,10 +44,10 @@ impl Hub {
         people: Vec<(String, String)>,
         terms: Terms,
         schedule: Schedule,
-        journal: Journal,
+        journal: ParticipantJournal,
         eraser: Eraser,
     ) -> Self {
-        let key = |entry: &Entry| (entry.episode_id.clone(), entry.participant.clone(), entry.t);
+        let key = |entry: &PlayedStep| (entry.episode_id.clone(), entry.participant.clone(), entry.t);
         let answers = journal.entries().into_iter().map(|entry| (key(&entry), entry)).collect();
         let (codes, tokens): (Vec<String>, Vec<String>) = people.into_iter().unzip();
         let seat = |code: String| Seat {
@@ -140,11 +140,11 @@ impl Hub {
         Some(seat)
     }
 
-    pub(super) fn answered(&self, seat: usize, episode_id: &str, t: i32) -> Option<Entry> {
+    pub(super) fn answered(&self, seat: usize, episode_id: &str, t: i32) -> Option<PlayedStep> {
         self.answers.get(&(episode_id.to_owned(), self.code(seat), t)).cloned()
     }
 
-    pub(super) fn keep(&self, entry: Entry) -> io::Result<()> {
+    pub(super) fn keep(&self, entry: PlayedStep) -> io::Result<()> {
         locked(&self.journal).keep(entry)
     }
 
@@ -165,7 +165,7 @@ impl Hub {
     }
 
     /// Asks a person and waits for the answer without a time limit; `None` if the person leaves or the recording stops.
-    pub(super) async fn ask(&self, seat: usize, question: Question) -> Option<Given> {
+    pub(super) async fn ask(&self, seat: usize, question: PlayerQuestion) -> Option<Given> {
         let (sender, answer) = oneshot::channel();
         {
             let mut seat = self.seat(seat);
@@ -174,7 +174,7 @@ impl Hub {
             }
             seat.number += 1;
             seat.is_ready &= !question.is_practice;
-            seat.asked = Some(Asked::new(question, sender));
+            seat.asked = Some(OpenQuestion::new(question, sender));
         }
         answer.await.ok()
     }

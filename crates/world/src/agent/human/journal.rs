@@ -19,7 +19,7 @@ const NAME: &str = "participants.jsonl";
 const LONGEST_LINE: Limit = Limit::new("bytes in a line of the journal of participants", 4 << 20);
 
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Entry {
+pub struct PlayedStep {
     pub participant: String,
     pub episode_id: String,
     /// The step, from 1.
@@ -33,7 +33,7 @@ pub struct Entry {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(untagged)]
 enum Line {
-    Answer(Entry),
+    Answer(PlayedStep),
     /// Somebody agreed to the consent text with this hash.
     Agreed {
         participant: String,
@@ -68,7 +68,7 @@ pub(crate) enum Leaving {
 impl Line {
     fn participant(&self) -> &str {
         match self {
-            Self::Answer(Entry { participant, .. })
+            Self::Answer(PlayedStep { participant, .. })
             | Self::Agreed { participant, .. }
             | Self::Practised { participant, .. }
             | Self::Left { participant, .. }
@@ -78,13 +78,13 @@ impl Line {
 }
 
 #[derive(Debug)]
-pub struct Journal {
+pub struct ParticipantJournal {
     /// The folder; `None` without a recording. The file is opened per line, since `participants remove` replaces it.
     folder: Option<PathBuf>,
     lines: Vec<Line>,
 }
 
-impl Journal {
+impl ParticipantJournal {
     pub fn open(folder: &Path) -> io::Result<Self> {
         replace::make_folder(folder)?;
         let path = path(folder);
@@ -102,7 +102,7 @@ impl Journal {
     }
 
     /// The answers that existed when it was opened.
-    pub fn entries(&self) -> Vec<Entry> {
+    pub fn entries(&self) -> Vec<PlayedStep> {
         let answer = |line: &Line| if let Line::Answer(entry) = line { Some(entry.clone()) } else { None };
         self.lines.iter().filter_map(answer).collect()
     }
@@ -118,7 +118,7 @@ impl Journal {
         self.lines.iter().any(|line| matches!(line, Line::Practised { participant, .. } if participant == code))
     }
 
-    pub(super) fn keep(&self, entry: Entry) -> io::Result<()> {
+    pub(super) fn keep(&self, entry: PlayedStep) -> io::Result<()> {
         self.write(&Line::Answer(entry))
     }
 
@@ -197,44 +197,44 @@ fn path(folder: &Path) -> PathBuf {
 
 #[cfg(test)]
 mod tests {
-    use super::{Entry, Journal, Leaving, remove};
+    use super::{Leaving, ParticipantJournal, PlayedStep, remove};
 
     #[test]
     fn answers_come_back_and_a_person_can_be_removed() {
         let folder = tempfile::tempdir().unwrap();
-        let entry = |participant: &str, t| Entry {
+        let entry = |participant: &str, t| PlayedStep {
             participant: participant.to_owned(),
             episode_id: "E1/human/s1/r1".to_owned(),
             t,
             latency_ms: 5,
             reply: "{}".to_owned(),
         };
-        let journal = Journal::open(folder.path()).unwrap();
+        let journal = ParticipantJournal::open(folder.path()).unwrap();
         journal.agreed("P1", "words").unwrap();
         journal.keep(entry("P1", 1)).unwrap();
         journal.practised("P2").unwrap();
         journal.keep(entry("P2", 2)).unwrap();
         drop(journal);
-        let journal = Journal::open(folder.path()).unwrap();
+        let journal = ParticipantJournal::open(folder.path()).unwrap();
         assert_eq!(journal.entries(), [entry("P1", 1), entry("P2", 2)]);
         assert!(journal.has_agreed("P1", Some("words")) && !journal.has_agreed("P1", Some("other words")));
         assert!(journal.has_practised("P2") && !journal.has_practised("P1"));
         assert_eq!(remove(folder.path(), "P1").unwrap(), 2);
         assert!(!std::fs::read_to_string(folder.path().join("participants.jsonl")).unwrap().contains("P1"));
-        assert_eq!(Journal::open(folder.path()).unwrap().entries(), [entry("P2", 2)]);
+        assert_eq!(ParticipantJournal::open(folder.path()).unwrap().entries(), [entry("P2", 2)]);
     }
 
     #[test]
     fn forgetting_a_person_keeps_that_they_left() {
         let folder = tempfile::tempdir().unwrap();
-        let journal = Journal::open(folder.path()).unwrap();
+        let journal = ParticipantJournal::open(folder.path()).unwrap();
         journal.enrol("P1", 1, "abc").unwrap();
         journal.agreed("P1", "words").unwrap();
         journal.leave("P1", Leaving::Deleted).unwrap();
         journal.forget("P1").unwrap();
         journal.practised("P2").unwrap();
         drop(journal);
-        let journal = Journal::open(folder.path()).unwrap();
+        let journal = ParticipantJournal::open(folder.path()).unwrap();
         assert_eq!((journal.enrolled("P1"), journal.left("P1")), (Some((1, "abc")), Some(Leaving::Deleted)));
         assert!(
             !journal.has_agreed("P1", Some("words")) && journal.has_practised("P2") && journal.left("P2").is_none()

@@ -23,8 +23,8 @@ use std::sync::{Arc, Mutex};
 use serde_json::{Value, json};
 
 use self::hub::Hub;
-use self::journal::Entry;
-use self::seat::{Given, Question};
+use self::journal::PlayedStep;
+use self::seat::{Given, PlayerQuestion};
 use self::server::Server;
 use super::prompt::{self, Prompt, Rendered};
 use super::reply::{self, Ending};
@@ -179,7 +179,7 @@ impl HumanAgent {
             return Ok(read(&entry.reply, task, entry.latency_ms));
         }
         let Rendered { system, user } = self.prompt.render(task, observation).map_err(Lost::unobservable)?;
-        let question = Question {
+        let question = PlayerQuestion {
             frame: Arc::clone(&observation.frame),
             system,
             user,
@@ -193,7 +193,7 @@ impl HumanAgent {
         let Given { reply, latency_ms } = given.ok_or_else(gone)?;
         if !is_practice {
             let (participant, episode_id) = (self.code.clone(), self.episode_id.clone());
-            let entry = Entry { participant, episode_id, t: observation.t, latency_ms, reply: reply.clone() };
+            let entry = PlayedStep { participant, episode_id, t: observation.t, latency_ms, reply: reply.clone() };
             self.hub.keep(entry).map_err(|error| Lost::because(format!("the journal cannot be written: {error}")))?;
         }
         Ok(read(&reply, task, latency_ms))

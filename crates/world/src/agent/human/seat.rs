@@ -20,7 +20,7 @@ pub(super) const LISTENING: Duration = Duration::from_secs(3);
 const AWAY: Duration = Duration::from_secs(10);
 
 #[derive(Clone, Debug)]
-pub struct Question {
+pub struct PlayerQuestion {
     pub frame: Arc<Frame>,
     pub system: String,
     pub user: String,
@@ -56,16 +56,16 @@ pub(super) struct End {
 }
 
 #[derive(Debug)]
-pub(super) struct Asked {
-    pub question: Question,
+pub(super) struct OpenQuestion {
+    pub question: PlayerQuestion,
     pub answer: Option<oneshot::Sender<Given>>,
     shown: Option<Instant>,
     breaks: Duration,
     pause: Option<Instant>,
 }
 
-impl Asked {
-    pub fn new(question: Question, answer: oneshot::Sender<Given>) -> Self {
+impl OpenQuestion {
+    pub fn new(question: PlayerQuestion, answer: oneshot::Sender<Given>) -> Self {
         Self { question, answer: Some(answer), shown: None, breaks: Duration::ZERO, pause: None }
     }
 }
@@ -86,7 +86,7 @@ pub(super) struct Seat {
     pub(crate) is_ready: bool,
     pub left: Option<Leaving>,
     pub is_deleted: bool,
-    pub asked: Option<Asked>,
+    pub asked: Option<OpenQuestion>,
     pub number: u64,
     pub seen: Option<Instant>,
     pub end: Option<End>,
@@ -148,7 +148,7 @@ impl Seat {
             return json!({"phase": "break"});
         }
         asked.shown.get_or_insert_with(Instant::now);
-        let Question { system, user, t, is_practice, experiment, actions, .. } = &asked.question;
+        let PlayerQuestion { system, user, t, is_practice, experiment, actions, .. } = &asked.question;
         json!({
             "phase": if *is_practice { "practice" } else { "play" },
             "episode": episode,

@@ -34,12 +34,12 @@ impl Place {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pose {
+pub struct Viewpoint {
     pub place: Place,
     pub heading: Heading,
 }
 
-impl Pose {
+impl Viewpoint {
     pub fn of(observation: &Observation) -> Self {
         let place = Place { x: f64::from(observation.x), y: f64::from(observation.y) };
         Self { place, heading: Heading::nearest(f64::from(observation.yaw)) }
@@ -55,7 +55,7 @@ pub struct Bearing {
 }
 
 #[derive(Clone, Copy, Debug)]
-pub struct Camera {
+pub struct ViewCamera {
     pub eye: Place,
     heading: Heading,
     half_width: f64,
@@ -63,10 +63,10 @@ pub struct Camera {
     focal: f64,
 }
 
-impl Camera {
+impl ViewCamera {
     /// The camera of a body at `pose` whose pictures have `width` x `height` pixels and a vertical field of view of `fov_y`
     /// degrees, less than 180.
-    pub fn new(pose: Pose, width: usize, height: usize, fov_y: f64) -> Self {
+    pub fn new(pose: Viewpoint, width: usize, height: usize, fov_y: f64) -> Self {
         let (half_width, half_height) = (real(width) / 2.0, real(height) / 2.0);
         let eye = pose.place.ahead(pose.heading, EYE_AHEAD);
         let (sine, cosine) = sine_cosine(fov_y / 2.0);
@@ -126,12 +126,17 @@ impl Camera {
 mod tests {
     use super::*;
 
-    fn camera(thirties: u8) -> Camera {
+    fn camera(thirties: u8) -> ViewCamera {
         camera_of(thirties, 110.0)
     }
 
-    fn camera_of(thirties: u8, fov_y: f64) -> Camera {
-        Camera::new(Pose { place: Place { x: 1.0, y: -2.0 }, heading: Heading::new(thirties) }, 640, 480, fov_y)
+    fn camera_of(thirties: u8, fov_y: f64) -> ViewCamera {
+        ViewCamera::new(
+            Viewpoint { place: Place { x: 1.0, y: -2.0 }, heading: Heading::new(thirties) },
+            640,
+            480,
+            fov_y,
+        )
     }
 
     #[test]

@@ -9,7 +9,7 @@
 
 use trace::frame::Frame;
 
-use super::camera::{Camera, Place};
+use super::camera::{Place, ViewCamera};
 use super::{paint, real};
 
 /// The tolerance of a channel within one shade. The light is even, and a floor may be nearly as grey as a wall.
@@ -26,11 +26,11 @@ pub struct Foot {
 }
 
 /// The feet of the walls in a picture, from left to right.
-pub fn feet(frame: &Frame, camera: &Camera) -> Vec<Foot> {
+pub fn feet(frame: &Frame, camera: &ViewCamera) -> Vec<Foot> {
     (STRIDE / 2..frame.width).step_by(STRIDE).filter_map(|column| foot(frame, camera, column)).collect()
 }
 
-fn foot(frame: &Frame, camera: &Camera, column: usize) -> Option<Foot> {
+fn foot(frame: &Frame, camera: &ViewCamera, column: usize) -> Option<Foot> {
     let horizon = frame.height / 2;
     let shade = pixel(frame, column, horizon);
     let is_wall = |row: &usize| same_shade(pixel(frame, column, *row), shade);

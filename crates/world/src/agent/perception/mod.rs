@@ -19,7 +19,7 @@ use std::sync::Arc;
 use crate::agent::Observation;
 use trace::frame::Frame;
 
-use camera::{Camera, Pose};
+use camera::{ViewCamera, Viewpoint};
 use ground::Foot;
 use things::Thing;
 
@@ -28,8 +28,8 @@ const LEAST_OF_PATCH: usize = 6;
 
 #[derive(Clone, Debug)]
 pub struct View {
-    pub pose: Pose,
-    pub camera: Camera,
+    pub pose: Viewpoint,
+    pub camera: ViewCamera,
     pub frame: Arc<Frame>,
     /// Cubes that are completely in view.
     pub cubes: Vec<Thing>,
@@ -40,8 +40,8 @@ pub struct View {
 impl View {
     pub fn of(observation: &Observation) -> Self {
         let frame = Arc::clone(&observation.frame);
-        let pose = Pose::of(observation);
-        let camera = Camera::new(pose, frame.width, frame.height, observation.fov_y);
+        let pose = Viewpoint::of(observation);
+        let camera = ViewCamera::new(pose, frame.width, frame.height, observation.fov_y);
         let patches = patches::patches(&frame, LEAST_OF_PATCH);
         Self {
             pose,

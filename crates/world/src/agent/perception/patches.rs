@@ -8,7 +8,7 @@ use trace::palette::Color;
 use super::{paint, real};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Patch {
+pub struct ColorPatch {
     pub color: Color,
     pub pixels: usize,
     pub left: usize,
@@ -17,7 +17,7 @@ pub struct Patch {
     pub bottom: usize,
 }
 
-impl Patch {
+impl ColorPatch {
     pub const fn width(&self) -> usize {
         self.right - self.left + 1
     }
@@ -45,10 +45,10 @@ impl Patch {
     }
 }
 
-pub(crate) fn patches(frame: &Frame, least: usize) -> Vec<Patch> {
+pub(crate) fn patches(frame: &Frame, least: usize) -> Vec<ColorPatch> {
     let runs = runs(frame);
     let roots = connect(&runs);
-    let mut found: Vec<Option<Patch>> = vec![None; runs.len()];
+    let mut found: Vec<Option<ColorPatch>> = vec![None; runs.len()];
     for (run, &root) in runs.iter().zip(&roots) {
         found[root] = Some(found[root].map_or(*run, |patch| patch.joined(run)));
     }
@@ -56,10 +56,10 @@ pub(crate) fn patches(frame: &Frame, least: usize) -> Vec<Patch> {
 }
 
 /// The patches within each row: pixels of one colour side by side.
-fn runs(frame: &Frame) -> Vec<Patch> {
-    let mut runs: Vec<Patch> = Vec::new();
+fn runs(frame: &Frame) -> Vec<ColorPatch> {
+    let mut runs: Vec<ColorPatch> = Vec::new();
     for (row, line) in frame.rgb.chunks_exact(3 * frame.width.max(1)).enumerate() {
-        let mut open: Option<Patch> = None;
+        let mut open: Option<ColorPatch> = None;
         for (column, pixel) in line.chunks_exact(3).enumerate() {
             let color = paint::color(pixel);
             if let Some(run) = open.as_mut().filter(|run| Some(run.color) == color) {
@@ -67,7 +67,7 @@ fn runs(frame: &Frame) -> Vec<Patch> {
             } else {
                 runs.extend(open.take());
                 let (pixels, left, right, top, bottom) = (1, column, column, row, row);
-                open = color.map(|color| Patch { color, pixels, left, right, top, bottom });
+                open = color.map(|color| ColorPatch { color, pixels, left, right, top, bottom });
             }
         }
         runs.extend(open);
@@ -75,7 +75,7 @@ fn runs(frame: &Frame) -> Vec<Patch> {
     runs
 }
 
-fn connect(runs: &[Patch]) -> Vec<usize> {
+fn connect(runs: &[ColorPatch]) -> Vec<usize> {
     let mut parent: Vec<usize> = (0..runs.len()).collect();
     let mut above = 0;
     for (at, run) in runs.iter().enumerate() {

@@ -8,8 +8,8 @@
 
 use trace::palette::Color;
 
-use super::camera::{Camera, EYE_HEIGHT, Place};
-use super::patches::Patch;
+use super::camera::{EYE_HEIGHT, Place, ViewCamera};
+use super::patches::ColorPatch;
 use super::real;
 
 /// A thing of one colour that stands on the floor.
@@ -36,15 +36,15 @@ const HIGH: f64 = 0.33;
 /// Half of the depth of a body, m.
 const HALF_BODY: f64 = 0.12;
 
-pub fn cubes(patches: &[Patch], camera: &Camera, width: usize, height: usize) -> Vec<Thing> {
+pub fn cubes(patches: &[ColorPatch], camera: &ViewCamera, width: usize, height: usize) -> Vec<Thing> {
     patches.iter().filter(|patch| is_whole(patch, width, height)).filter_map(|patch| cube(patch, camera)).collect()
 }
 
-const fn is_whole(patch: &Patch, width: usize, height: usize) -> bool {
+const fn is_whole(patch: &ColorPatch, width: usize, height: usize) -> bool {
     patch.left > 0 && patch.right + 1 < width && patch.bottom + 1 < height
 }
 
-fn cube(patch: &Patch, camera: &Camera) -> Option<Thing> {
+fn cube(patch: &ColorPatch, camera: &ViewCamera) -> Option<Thing> {
     let ahead = camera.floor_ahead(real(patch.bottom) + 1.0)?;
     // The highest row shows the rear edge of the top: `edge` above the floor, and `edge` farther away than the front.
     let fall = (EYE_HEIGHT - camera.height(ahead, real(patch.top))) / ahead;
@@ -62,8 +62,8 @@ fn cube(patch: &Patch, camera: &Camera) -> Option<Thing> {
 }
 
 /// The bodies of a picture of `width` x `height` pixels: no cubes, with limbs and trunk joined if their columns touch.
-pub fn bodies(patches: &[Patch], camera: &Camera, width: usize, height: usize) -> Vec<Thing> {
-    let mut wholes: Vec<Patch> = Vec::new();
+pub fn bodies(patches: &[ColorPatch], camera: &ViewCamera, width: usize, height: usize) -> Vec<Thing> {
+    let mut wholes: Vec<ColorPatch> = Vec::new();
     for patch in patches.iter().filter(|patch| !is_whole(patch, width, height) || cube(patch, camera).is_none()) {
         let mut whole = *patch;
         // Joining widens a body, so that it may touch others.
@@ -75,12 +75,12 @@ pub fn bodies(patches: &[Patch], camera: &Camera, width: usize, height: usize) -
     wholes.iter().filter_map(|patch| body(patch, camera, height)).collect()
 }
 
-fn of_one_body(one: &Patch, other: &Patch) -> bool {
+fn of_one_body(one: &ColorPatch, other: &ColorPatch) -> bool {
     let slack = 2 + one.width().min(other.width()) / 2;
     one.color == other.color && one.left <= other.right + slack && other.left <= one.right + slack
 }
 
-fn body(patch: &Patch, camera: &Camera, height: usize) -> Option<Thing> {
+fn body(patch: &ColorPatch, camera: &ViewCamera, height: usize) -> Option<Thing> {
     let horizon = real(height) / 2.0;
     let (top, bottom) = (real(patch.top) - horizon, real(patch.bottom) + 1.0 - horizon);
     let is_body =

@@ -111,8 +111,8 @@ pub(super) fn object(raw: &str) -> Result<(Object, Vec<Repair>), NoObject> {
 /// The arguments of a function call, parsed again so that no repeated key is lost; any other object unchanged.
 fn without_call(object: Object, text: &str, mut repairs: Vec<Repair>) -> (Object, Vec<Repair>) {
     let arguments = || {
-        let opening = |piece| matches!(piece, Piece::Mark(_, '{')).then_some(piece);
-        let Piece::Mark(at, _) = Pieces::of(text).filter_map(opening).nth(1)? else { return None };
+        let opening = |piece| matches!(piece, JsonPiece::Mark(_, '{')).then_some(piece);
+        let JsonPiece::Mark(at, _) = Pieces::of(text).filter_map(opening).nth(1)? else { return None };
         let length = end_of_object(&text[at..])?;
         Object::parse(&text[at..at + length]).ok()
     };
@@ -167,8 +167,8 @@ fn end_of_object(text: &str) -> Option<usize> {
     let mut pieces = Pieces::of(text);
     while let Some(piece) = pieces.next_outside_comments() {
         match piece {
-            Piece::Mark(_, '{') => depth += 1,
-            Piece::Mark(at, '}') => {
+            JsonPiece::Mark(_, '{') => depth += 1,
+            JsonPiece::Mark(at, '}') => {
                 depth = depth.checked_sub(1)?;
                 if depth == 0 {
                     return Some(at + 1);
@@ -185,9 +185,9 @@ fn without_trailing_commas(text: &str) -> Option<String> {
     let mut comma = None;
     for piece in Pieces::of(text) {
         match piece {
-            Piece::Mark(at, ',') => comma = Some(at),
-            Piece::Mark(_, '}' | ']') => dropped.extend(comma.take()),
-            Piece::Mark(_, c) if c.is_whitespace() => {}
+            JsonPiece::Mark(at, ',') => comma = Some(at),
+            JsonPiece::Mark(_, '}' | ']') => dropped.extend(comma.take()),
+            JsonPiece::Mark(_, c) if c.is_whitespace() => {}
             _ => comma = None,
         }
     }
@@ -202,8 +202,8 @@ fn with_double_quotes(text: &str) -> Option<String> {
     let mut is_changed = false;
     for piece in Pieces::of(text) {
         match piece {
-            Piece::Mark(_, c) => changed.push(c),
-            Piece::Quoted(string) => match string.strip_prefix('\'').and_then(|rest| rest.strip_suffix('\'')) {
+            JsonPiece::Mark(_, c) => changed.push(c),
+            JsonPiece::Quoted(string) => match string.strip_prefix('\'').and_then(|rest| rest.strip_suffix('\'')) {
                 Some(inside) => {
                     is_changed = true;
                     changed.push('"');
@@ -235,8 +235,8 @@ fn without_comments(text: &str) -> Option<String> {
     let (mut kept, mut pieces) = (String::with_capacity(text.len()), Pieces::of(text));
     while let Some(piece) = pieces.next_outside_comments() {
         match piece {
-            Piece::Mark(_, c) => kept.push(c),
-            Piece::Quoted(string) => kept.push_str(string),
+            JsonPiece::Mark(_, c) => kept.push(c),
+            JsonPiece::Quoted(string) => kept.push_str(string),
         }
     }
     (kept.len() < text.len()).then_some(kept)
@@ -254,8 +254,8 @@ fn with_escaped_controls(text: &str) -> Option<String> {
     let (mut changed, mut is_changed) = (String::with_capacity(text.len()), false);
     for piece in Pieces::of(text) {
         match piece {
-            Piece::Mark(_, c) => changed.push(c),
-            Piece::Quoted(string) => is_changed |= push_escaped(&mut changed, string),
+            JsonPiece::Mark(_, c) => changed.push(c),
+            JsonPiece::Quoted(string) => is_changed |= push_escaped(&mut changed, string),
         }
     }
     is_changed.then_some(changed)
@@ -276,7 +276,7 @@ fn push_escaped(text: &mut String, string: &str) -> bool {
 }
 
 /// A piece of almost-JSON: a string with its quotes, or one character outside of strings and its position.
-enum Piece<'a> {
+enum JsonPiece<'a> {
     Quoted(&'a str),
     Mark(usize, char),
 }
@@ -292,7 +292,7 @@ impl<'a> Pieces<'a> {
         Self { text, at: 0, before: ':' }
     }
 
-    fn next_outside_comments(&mut self) -> Option<Piece<'a>> {
+    fn next_outside_comments(&mut self) -> Option<JsonPiece<'a>> {
         while let Some(length) = length_of_comment(&self.text[self.at..]) {
             self.at += length;
         }
@@ -320,9 +320,9 @@ fn ends_a_string(rest: &str) -> bool {
 }
 
 impl<'a> Iterator for Pieces<'a> {
-    type Item = Piece<'a>;
+    type Item = JsonPiece<'a>;
 
-    fn next(&mut self) -> Option<Piece<'a>> {
+    fn next(&mut self) -> Option<JsonPiece<'a>> {
         let rest = &self.text[self.at..];
         let c = rest.chars().next()?;
         let at = self.at;
@@ -331,12 +331,12 @@ impl<'a> Iterator for Pieces<'a> {
             let length = Self::length_of_string(rest, c);
             self.at += length;
             self.before = c;
-            return Some(Piece::Quoted(&rest[..length]));
+            return Some(JsonPiece::Quoted(&rest[..length]));
         }
         self.at += c.len_utf8();
         if !c.is_whitespace() {
             self.before = c;
         }
-        Some(Piece::Mark(at, c))
+        Some(JsonPiece::Mark(at, c))
     }
 }

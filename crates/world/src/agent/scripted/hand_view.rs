@@ -5,7 +5,7 @@
 //! reflection is as far behind the mirror as its original is before it.
 
 use crate::agent::Observation;
-use crate::agent::perception::patches::{Patch, patches};
+use crate::agent::perception::patches::{ColorPatch, patches};
 use crate::agent::perception::real;
 use trace::palette::Color;
 
@@ -33,8 +33,8 @@ pub(super) type Place = [f64; 2];
 
 #[derive(Clone, Debug, Default)]
 pub(super) struct HandView {
-    pub mark: Option<Patch>,
-    pub hand: Option<Patch>,
+    pub mark: Option<ColorPatch>,
+    pub hand: Option<ColorPatch>,
 }
 
 impl HandView {
@@ -44,9 +44,10 @@ impl HandView {
         let eye = Eye::of(observation);
         let all = patches(&observation.frame, LEAST);
         let small: Vec<Color> = Color::ALL.into_iter().filter(|color| is_small(&all, *color)).collect();
-        let mut seen: Vec<(Patch, bool)> = small.into_iter().filter_map(|color| eye.reflected(&all, color)).collect();
+        let mut seen: Vec<(ColorPatch, bool)> =
+            small.into_iter().filter_map(|color| eye.reflected(&all, color)).collect();
         seen.sort_by_key(|(patch, _)| std::cmp::Reverse(patch.pixels));
-        let fits = |patch: &Patch| eye.is_on_front(patch);
+        let fits = |patch: &ColorPatch| eye.is_on_front(patch);
         let mark = seen.iter().position(|(patch, is_direct)| !is_direct && fits(patch));
         let mark = mark.map(|at| seen.remove(at).0);
         let hand = seen.iter().find(|(_, is_direct)| *is_direct).or_else(|| seen.first());
@@ -54,7 +55,7 @@ impl HandView {
     }
 }
 
-fn is_small(all: &[Patch], color: Color) -> bool {
+fn is_small(all: &[ColorPatch], color: Color) -> bool {
     let pixels: usize = all.iter().filter(|patch| patch.color == color).map(|patch| patch.pixels).sum();
     (1..=MOST).contains(&pixels)
 }
@@ -78,7 +79,7 @@ impl Eye {
     }
 
     /// The position of a thing `ahead` of the body whose reflection is in the middle of a patch.
-    pub fn place(&self, patch: &Patch, ahead: f64) -> Place {
+    pub fn place(&self, patch: &ColorPatch, ahead: f64) -> Place {
         let row = real(patch.top + patch.bottom + 1) / 2.0;
         let aside = (2.0 * patch.middle() / self.size[0] - 1.0) * self.tangent * self.size[0] / self.size[1];
         let above = (1.0 - 2.0 * row / self.size[1]) * self.tangent;
@@ -87,15 +88,15 @@ impl Eye {
         [-aside * length, HEIGHT + (above * cosine - sine) * length]
     }
 
-    fn is_on_front(&self, patch: &Patch) -> bool {
+    fn is_on_front(&self, patch: &ColorPatch) -> bool {
         let [left, up] = self.place(patch, FRONT);
         let widest = self.length(patch.width().max(patch.height()));
         left.abs() <= ASIDE && (HEIGHTS[0]..=HEIGHTS[1]).contains(&up) && widest <= WIDEST
     }
 
-    fn reflected(&self, all: &[Patch], color: Color) -> Option<(Patch, bool)> {
+    fn reflected(&self, all: &[ColorPatch], color: Color) -> Option<(ColorPatch, bool)> {
         let of_color = || all.iter().filter(|patch| patch.color == color);
-        let may_be = |patch: &&Patch| {
+        let may_be = |patch: &&ColorPatch| {
             let [left, up] = self.place(patch, 0.4);
             left.abs() <= 1.0 && (LOWEST..=HEIGHT).contains(&up) && patch.width() <= 40
         };

@@ -7,13 +7,13 @@
 
 use crate::agent::Observation;
 use crate::agent::perception::View;
-use crate::agent::perception::camera::{Place, Pose};
+use crate::agent::perception::camera::{Place, Viewpoint};
 use crate::agent::perception::things::Thing;
 use trace::episode::Action;
 use trace::palette::Color;
 
 use super::reflection::{self, Reflection};
-use super::room::{Room, Side};
+use super::room::{Room, WallSide};
 use super::route::Obstacle;
 
 /// The assumed length of a step before the first one, m.
@@ -51,7 +51,7 @@ pub struct Landmark {
 
 #[derive(Clone, Debug)]
 pub struct Knowledge {
-    pub pose: Pose,
+    pub pose: Viewpoint,
     pub room: Room,
     pub reflection: Reflection,
     /// The bodies in view, including reflections.
@@ -72,7 +72,7 @@ pub struct Knowledge {
 impl Knowledge {
     pub fn new(observation: &Observation) -> Self {
         Self {
-            pose: Pose::of(observation),
+            pose: Viewpoint::of(observation),
             room: Room::default(),
             reflection: Reflection::default(),
             bodies: Vec::new(),
@@ -99,7 +99,7 @@ impl Knowledge {
         self.cubes_in_view = view.cubes;
     }
 
-    fn feel(&mut self, observation: &Observation, pose: Pose) {
+    fn feel(&mut self, observation: &Observation, pose: Viewpoint) {
         let moved = pose.place.distance(self.pose.place);
         let last = observation.history.as_ref().and_then(|(action, _)| *action);
         if moved > 0.05 && last == Some(Action::MoveForward) {
@@ -189,8 +189,8 @@ impl Knowledge {
     }
 
     /// The sides whose wall is a mirror right across from a place.
-    pub(crate) fn mirrors_across(&self, place: Place) -> impl Iterator<Item = Side> + '_ {
-        let is_mirror = move |side: &Side| self.room.is_mirror(*side, side.along(place));
-        Side::ALL.into_iter().filter(is_mirror)
+    pub(crate) fn mirrors_across(&self, place: Place) -> impl Iterator<Item = WallSide> + '_ {
+        let is_mirror = move |side: &WallSide| self.room.is_mirror(*side, side.along(place));
+        WallSide::ALL.into_iter().filter(is_mirror)
     }
 }

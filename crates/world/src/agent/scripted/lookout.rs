@@ -5,12 +5,12 @@
 //!
 //! Rule: the first lookout is the starting place; the others are spread over the known part of the room.
 
-use crate::agent::perception::camera::{Heading, Place, Pose};
+use crate::agent::perception::camera::{Heading, Place, Viewpoint};
 use crate::sim::angle::HEADINGS;
 use trace::episode::Action;
 
 use super::knowledge::Knowledge;
-use super::room::Side;
+use super::room::WallSide;
 use super::route::{self, Ground};
 
 const LOOKOUTS: usize = 3;
@@ -58,7 +58,7 @@ impl Lookouts {
         }
         let is_open = |place| known.is_open(place);
         let ground = Ground { is_open: &is_open, obstacles: &known.obstacles(), step: known.step };
-        let arrived = |pose: Pose| pose.place.distance(goal) < ARRIVED;
+        let arrived = |pose: Viewpoint| pose.place.distance(goal) < ARRIVED;
         route::first_action(known.pose, &ground, &arrived, &|place| place.distance(goal) - ARRIVED)
     }
 
@@ -89,8 +89,9 @@ impl Lookouts {
 }
 
 fn candidates(known: &Knowledge) -> Vec<Place> {
-    let edge = |side: Side| known.room.wall(side).unwrap_or_else(|| side.out(known.pose.place) + 2.0);
-    let (east, north, west, south) = (edge(Side::East), edge(Side::North), -edge(Side::West), -edge(Side::South));
+    let edge = |side: WallSide| known.room.wall(side).unwrap_or_else(|| side.out(known.pose.place) + 2.0);
+    let (east, north, west, south) =
+        (edge(WallSide::East), edge(WallSide::North), -edge(WallSide::West), -edge(WallSide::South));
     let at = |part_x: f64, part_y: f64| Place { x: west + part_x * (east - west), y: south + part_y * (north - south) };
     let places = [at(0.25, 0.25), at(0.75, 0.25), at(0.25, 0.75), at(0.75, 0.75), at(0.5, 0.5)];
     let obstacles = known.obstacles();

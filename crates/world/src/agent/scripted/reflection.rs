@@ -12,16 +12,16 @@
 //! things in view. Only walls known to be mirrors count.
 
 use crate::agent::perception::View;
-use crate::agent::perception::camera::{Bearing, Camera, Place};
+use crate::agent::perception::camera::{Bearing, Place, ViewCamera};
 use crate::agent::perception::{paint, real};
 use trace::palette::Color;
 
-use super::room::{Room, Side};
+use super::room::{Room, WallSide};
 
 /// A test that found a body in the place of the own reflection.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Match {
-    pub side: Side,
+    pub side: WallSide,
     pub color: Color,
     pub place: Place,
     /// The delay of the body, in steps.
@@ -92,7 +92,7 @@ impl Reflection {
     pub fn see(&mut self, view: &View, room: &Room) {
         let here = view.pose.place;
         self.trail.push(here);
-        for side in Side::ALL {
+        for side in WallSide::ALL {
             if room.is_mirror(side, side.along(here)) {
                 self.see_now(view, room, side);
             }
@@ -100,7 +100,7 @@ impl Reflection {
         }
     }
 
-    fn see_now(&mut self, view: &View, room: &Room, side: Side) {
+    fn see_now(&mut self, view: &View, room: &Room, side: WallSide) {
         let Some(double) = room.mirrored(side, view.pose.place) else { return };
         match body_at(view, double) {
             Test::Unclear => {}
@@ -113,7 +113,7 @@ impl Reflection {
     }
 
     /// The same test for late reflections. A place where the agent still stands gives no evidence.
-    fn see_late(&mut self, view: &View, room: &Room, side: Side) {
+    fn see_late(&mut self, view: &View, room: &Room, side: WallSide) {
         let here = view.pose.place;
         for lag in 1..=LATEST.min(self.trail.len() - 1) {
             let place = self.trail[self.trail.len() - 1 - lag];
@@ -189,7 +189,7 @@ impl Reflection {
 
 impl Window {
     /// The part between two edges aside of the middle of a thing and two heights above the floor, m.
-    fn at(camera: &Camera, bearing: Bearing, (left, right): (f64, f64), (low, high): (f64, f64)) -> Self {
+    fn at(camera: &ViewCamera, bearing: Bearing, (left, right): (f64, f64), (low, high): (f64, f64)) -> Self {
         let (middle, scale) = (camera.column(bearing), camera.scale(bearing.ahead));
         let row = |height| camera.row(bearing.ahead, height);
         Self { left: middle + left * scale, right: middle + right * scale, top: row(high), bottom: row(low) }

@@ -10,14 +10,14 @@ use crate::agent::perception::camera::{Heading, Place};
 use crate::agent::perception::ground::Foot;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Side {
+pub enum WallSide {
     East,
     North,
     West,
     South,
 }
 
-impl Side {
+impl WallSide {
     pub const ALL: [Self; 4] = [Self::East, Self::North, Self::West, Self::South];
 
     /// The distance of a place in this direction, m.
@@ -54,10 +54,10 @@ impl Side {
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Look {
+struct Glance {
     from: Place,
     foot: Foot,
-    side: Option<Side>,
+    side: Option<WallSide>,
 }
 
 /// The width of the pieces of wall on which looks vote, m.
@@ -75,7 +75,7 @@ const BEYOND: f64 = 0.5;
 
 #[derive(Clone, Debug, Default)]
 pub struct Room {
-    looks: Vec<Look>,
+    looks: Vec<Glance>,
     walls: [Option<f64>; 4],
     votes: [Vec<i32>; 4],
 }
@@ -86,24 +86,24 @@ impl Room {
         let side = |at: usize| {
             side_of(view.pose.place, view.feet.get(at.wrapping_sub(1)), &view.feet[at], view.feet.get(at + 1))
         };
-        self.looks.extend((0..view.feet.len()).map(|at| Look { from, foot: view.feet[at], side: side(at) }));
-        self.walls = Side::ALL.map(|side| self.fixed(side, view.pose.place));
-        self.votes = Side::ALL.map(|side| self.vote(side));
+        self.looks.extend((0..view.feet.len()).map(|at| Glance { from, foot: view.feet[at], side: side(at) }));
+        self.walls = WallSide::ALL.map(|side| self.fixed(side, view.pose.place));
+        self.votes = WallSide::ALL.map(|side| self.vote(side));
     }
 
     /// The distance of a wall, m; `None` if not seen yet.
-    pub const fn wall(&self, side: Side) -> Option<f64> {
+    pub const fn wall(&self, side: WallSide) -> Option<f64> {
         self.walls[side as usize]
     }
 
     /// Returns true if a place is in the room, at least `margin` metres from the known walls.
     pub fn holds(&self, place: Place, margin: f64) -> bool {
-        Side::ALL.into_iter().all(|side| self.wall(side).is_none_or(|wall| side.out(place) <= wall - margin))
+        WallSide::ALL.into_iter().all(|side| self.wall(side).is_none_or(|wall| side.out(place) <= wall - margin))
     }
 
     /// Returns true if a wall is a mirror at a place along it. Right across, one's own head hides what is beyond, so
     /// the neighbouring pieces vote too.
-    pub fn is_mirror(&self, side: Side, along: f64) -> bool {
+    pub fn is_mirror(&self, side: WallSide, along: f64) -> bool {
         let votes = &self.votes[side as usize];
         let at = piece(along);
         let around = at.checked_sub(1).and_then(|first| votes.get(first..)?.get(..3));
@@ -111,10 +111,10 @@ impl Room {
     }
 
     /// The sides with at least half a metre of known mirror.
-    pub fn mirrors(&self) -> impl Iterator<Item = Side> + '_ {
+    pub fn mirrors(&self) -> impl Iterator<Item = WallSide> + '_ {
         let is_mirror =
-            |side: &Side| self.votes[*side as usize].windows(2).any(|pair| pair.iter().all(|&votes| votes > 1));
-        Side::ALL.into_iter().filter(is_mirror)
+            |side: &WallSide| self.votes[*side as usize].windows(2).any(|pair| pair.iter().all(|&votes| votes > 1));
+        WallSide::ALL.into_iter().filter(is_mirror)
     }
 
     pub fn has_mirror(&self) -> bool {
@@ -122,24 +122,24 @@ impl Room {
     }
 
     /// The apparent place of a body at `place` in a mirror on `side`.
-    pub fn mirrored(&self, side: Side, place: Place) -> Option<Place> {
+    pub fn mirrored(&self, side: WallSide, place: Place) -> Option<Place> {
         Some(side.place(2.0 * self.wall(side)? - side.out(place), side.along(place)))
     }
 
     /// The first crossing of a wall between `from` and `to`.
-    pub(crate) fn crossing(&self, from: Place, to: Place) -> Option<(Side, f64)> {
-        let crossed = |side: Side| {
+    pub(crate) fn crossing(&self, from: Place, to: Place) -> Option<(WallSide, f64)> {
+        let crossed = |side: WallSide| {
             let (start, end) = (side.out(from), side.out(to));
             let wall = self.wall(side).filter(|&wall| end > wall && end > start)?;
             let part = (wall - start) / (end - start);
             Some((part, side, side.along(from) + part * (side.along(to) - side.along(from))))
         };
-        let nearest = Side::ALL.into_iter().filter_map(crossed).min_by(|one, other| one.0.total_cmp(&other.0))?;
+        let nearest = WallSide::ALL.into_iter().filter_map(crossed).min_by(|one, other| one.0.total_cmp(&other.0))?;
         Some((nearest.1, nearest.2))
     }
 
-    fn fixed(&self, side: Side, inside: Place) -> Option<f64> {
-        let on_side = |look: &&Look| look.side == Some(side) && look.foot.error < SHARP;
+    fn fixed(&self, side: WallSide, inside: Place) -> Option<f64> {
+        let on_side = |look: &&Glance| look.side == Some(side) && look.foot.error < SHARP;
         let mut out: Vec<f64> = self.looks.iter().filter(on_side).map(|look| side.out(look.foot.place)).collect();
         out.retain(|&out| out > side.out(inside));
         out.sort_by(f64::total_cmp);
@@ -149,7 +149,7 @@ impl Room {
         Some(line[end / 2])
     }
 
-    fn vote(&self, side: Side) -> Vec<i32> {
+    fn vote(&self, side: WallSide) -> Vec<i32> {
         let mut votes = vec![0; 2 * usize::try_from(PIECES).unwrap_or_default()];
         let Some(wall) = self.wall(side) else { return votes };
         for look in &self.looks {
@@ -173,14 +173,14 @@ fn piece(along: f64) -> usize {
     usize::try_from((along / PIECE).floor() as i32 + PIECES).unwrap_or(usize::MAX)
 }
 
-fn side_of(from: Place, before: Option<&Foot>, foot: &Foot, after: Option<&Foot>) -> Option<Side> {
+fn side_of(from: Place, before: Option<&Foot>, foot: &Foot, after: Option<&Foot>) -> Option<WallSide> {
     let (before, after) = (before?.place, after?.place);
     let (dx, dy) = ((after.x - before.x).abs(), (after.y - before.y).abs());
     let near = before.distance(after) < 1.5;
     let wall = if near && dx < 0.25 * dy {
-        if foot.place.x > from.x { Side::East } else { Side::West }
+        if foot.place.x > from.x { WallSide::East } else { WallSide::West }
     } else if near && dy < 0.25 * dx {
-        if foot.place.y > from.y { Side::North } else { Side::South }
+        if foot.place.y > from.y { WallSide::North } else { WallSide::South }
     } else {
         return None;
     };

@@ -8,7 +8,7 @@
 use std::cmp::Reverse;
 use std::collections::{BTreeSet, BinaryHeap};
 
-use crate::agent::perception::camera::{Heading, Place, Pose};
+use crate::agent::perception::camera::{Heading, Place, Viewpoint};
 use trace::episode::Action;
 
 /// An obstacle: a circle that the body's axis avoids.
@@ -40,9 +40,9 @@ const PATIENCE: usize = 6_000;
 ///
 /// `far` is a lower bound of the metres from a place to the goal; zero is always valid, but slow.
 pub(crate) fn first_action(
-    start: Pose,
+    start: Viewpoint,
     ground: &Ground<'_>,
-    is_goal: &dyn Fn(Pose) -> bool,
+    is_goal: &dyn Fn(Viewpoint) -> bool,
     far: &dyn Fn(Place) -> f64,
 ) -> Option<Action> {
     let mut search = Search { open: BinaryHeap::new(), nodes: Vec::new(), closed: BTreeSet::new() };
@@ -73,7 +73,7 @@ pub(crate) fn first_action(
 
 #[derive(Clone, Copy)]
 struct Node {
-    pose: Pose,
+    pose: Viewpoint,
     cost: u32,
     first: Option<Action>,
 }
@@ -95,12 +95,12 @@ impl Search {
 }
 
 /// The pose after an unblocked action.
-pub fn after(pose: Pose, action: Action, step: f64) -> Pose {
+pub fn after(pose: Viewpoint, action: Action, step: f64) -> Viewpoint {
     match action {
-        Action::MoveForward => Pose { place: pose.place.ahead(pose.heading, step), ..pose },
-        Action::MoveBackward => Pose { place: pose.place.ahead(pose.heading, -step), ..pose },
-        Action::TurnLeft => Pose { heading: pose.heading.turned(1), ..pose },
-        Action::TurnRight => Pose { heading: pose.heading.turned(-1), ..pose },
+        Action::MoveForward => Viewpoint { place: pose.place.ahead(pose.heading, step), ..pose },
+        Action::MoveBackward => Viewpoint { place: pose.place.ahead(pose.heading, -step), ..pose },
+        Action::TurnLeft => Viewpoint { heading: pose.heading.turned(1), ..pose },
+        Action::TurnRight => Viewpoint { heading: pose.heading.turned(-1), ..pose },
         // A hand moves no body.
         _ => pose,
     }
@@ -121,7 +121,7 @@ fn bound(metres: f64, step: f64) -> u32 {
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "rooms are small")]
-fn key(pose: Pose) -> (i32, i32, Heading) {
+fn key(pose: Viewpoint) -> (i32, i32, Heading) {
     let cell = |metres: f64| (metres / CELL).round() as i32;
     (cell(pose.place.x), cell(pose.place.y), pose.heading)
 }
@@ -136,7 +136,7 @@ mod tests {
     fn walk(goal: Place, obstacles: &[Obstacle]) -> Vec<Place> {
         let is_open = |place: Place| place.x.abs() < 4.0 && place.y.abs() < 4.0;
         let ground = Ground { is_open: &is_open, obstacles, step: STEP };
-        let mut pose = Pose { place: Place { x: 0.0, y: 0.0 }, heading: Heading::nearest(0.0) };
+        let mut pose = Viewpoint { place: Place { x: 0.0, y: 0.0 }, heading: Heading::nearest(0.0) };
         let mut places = vec![pose.place];
         let far = |place: Place| place.distance(goal) - 0.5;
         while let Some(action) = first_action(pose, &ground, &|pose| pose.place.distance(goal) < 0.5, &far) {

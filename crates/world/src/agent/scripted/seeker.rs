@@ -11,7 +11,7 @@
 //!
 //! Rule: it selects a cube only from at most one step away, except on the last step, where waiting gains nothing.
 
-use crate::agent::perception::camera::{Place, Pose};
+use crate::agent::perception::camera::{Place, Viewpoint};
 use crate::agent::{Observation, Task};
 use trace::episode::Action;
 use trace::palette::Color;
@@ -20,7 +20,7 @@ use super::chance::Chance;
 use super::knowledge::{Knowledge, Landmark};
 use super::lookout::Lookouts;
 use super::policy::{Belief, Policy};
-use super::room::Side;
+use super::room::WallSide;
 use super::route::{self, Ground, Obstacle};
 use super::words;
 use super::{Move, Script, answering};
@@ -120,7 +120,7 @@ impl<C: Policy> Seeker<C> {
             self.looked_from.push(known.pose.place);
         }
         let is_new = |place: Place| self.looked_from.iter().all(|from| from.distance(place) > APART);
-        let is_goal = |pose: Pose| is_new(pose.place) && is_before_mirror(known, pose);
+        let is_goal = |pose: Viewpoint| is_new(pose.place) && is_before_mirror(known, pose);
         way_to_mirror(known, &is_goal).unwrap_or_else(|| self.look_around(known))
     }
 
@@ -140,7 +140,7 @@ impl<C: Policy> Seeker<C> {
     }
 
     fn approach(&self, known: &Knowledge, cube: Landmark) -> Action {
-        let is_goal = |pose: Pose| pose.place.distance(cube.place) <= NEAR;
+        let is_goal = |pose: Viewpoint| pose.place.distance(cube.place) <= NEAR;
         let far = |place: Place| place.distance(cube.place) - NEAR;
         let careful = if self.turns > PATIENCE { None } else { go(known, &known.obstacles(), &is_goal, &far) };
         careful.or_else(|| go(known, &known.standing(), &is_goal, &far)).unwrap_or(Action::TurnLeft)
@@ -171,13 +171,13 @@ impl<C: Policy> Script for Seeker<C> {
     }
 }
 
-fn is_before_mirror(known: &Knowledge, pose: Pose) -> bool {
+fn is_before_mirror(known: &Knowledge, pose: Viewpoint) -> bool {
     turns_to_mirror(known, pose).is_some()
 }
 
 /// Turns to the left, -1 to 1, that make a pose at a good distance look straight into a mirror; `None` if it looks into
 /// none.
-fn turns_to_mirror(known: &Knowledge, pose: Pose) -> Option<i32> {
+fn turns_to_mirror(known: &Knowledge, pose: Viewpoint) -> Option<i32> {
     known.mirrors_across(pose.place).find_map(|side| {
         let away = known.room.wall(side).map_or(f64::INFINITY, |wall| wall - side.out(pose.place));
         let turns = pose.heading.turns_to(side.heading());
@@ -187,11 +187,11 @@ fn turns_to_mirror(known: &Knowledge, pose: Pose) -> Option<i32> {
 
 /// A lower bound of the metres from a place to the nearest wall that is a mirror.
 fn metres_to_mirror(known: &Knowledge, place: Place) -> f64 {
-    let away = |side: Side| known.room.wall(side).map(|wall| wall - side.out(place));
+    let away = |side: WallSide| known.room.wall(side).map(|wall| wall - side.out(place));
     known.room.mirrors().filter_map(away).fold(f64::INFINITY, f64::min).min(1e3)
 }
 
-fn way_to_mirror(known: &Knowledge, is_goal: &dyn Fn(Pose) -> bool) -> Option<Action> {
+fn way_to_mirror(known: &Knowledge, is_goal: &dyn Fn(Viewpoint) -> bool) -> Option<Action> {
     let far = |place: Place| metres_to_mirror(known, place) - BEFORE_MIRROR.1;
     go(known, &known.obstacles(), is_goal, &far)
 }
@@ -199,7 +199,7 @@ fn way_to_mirror(known: &Knowledge, is_goal: &dyn Fn(Pose) -> bool) -> Option<Ac
 fn go(
     known: &Knowledge,
     obstacles: &[Obstacle],
-    is_goal: &dyn Fn(Pose) -> bool,
+    is_goal: &dyn Fn(Viewpoint) -> bool,
     far: &dyn Fn(Place) -> f64,
 ) -> Option<Action> {
     let is_open = |place| known.is_open(place);

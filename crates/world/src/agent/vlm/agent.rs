@@ -9,7 +9,7 @@ use super::journal::{Journal, JournalError, Recorded};
 use super::limits::Begun;
 use super::model::{Memory, Vlm};
 use super::step::{Asked, Step};
-use super::wire_format::Answer;
+use super::wire_format::ModelAnswer;
 use crate::agent::prompt::Prompt;
 use crate::agent::reply;
 use crate::agent::{Agent, Decision, Lost, Observation, Reply, Task, Usage, locked};
@@ -122,7 +122,7 @@ impl VlmAgent {
         }
     }
 
-    fn reply_of(&self, answer: Answer, latency_ms: i32) -> Reply {
+    fn reply_of(&self, answer: ModelAnswer, latency_ms: i32) -> Reply {
         let count = |tokens: Option<u32>| tokens.and_then(|tokens| i32::try_from(tokens).ok());
         let usage = Usage {
             latency_ms: Some(latency_ms),

@@ -13,7 +13,7 @@ use super::limits::{Account, Spend};
 use super::models::Choice;
 use super::provider::{Provider, Unreachable};
 use super::spending::estimate;
-use super::wire_format::Answer;
+use super::wire_format::ModelAnswer;
 use crate::agent::reply::Ending;
 use crate::agent::{Lost, locked};
 
@@ -52,7 +52,7 @@ struct Learned {
 }
 
 impl Learned {
-    fn add(&mut self, answer: &Answer) {
+    fn add(&mut self, answer: &ModelAnswer) {
         let counted = [answer.prompt_tokens, answer.completion_tokens];
         let (Some(usd), [Some(prompt), Some(completion)]) = (answer.cost_usd, counted) else { return };
         self.usd += usd;
@@ -160,7 +160,7 @@ impl Vlm {
     }
 
     /// Ends a recording that has a cost limit if neither prices nor answers state the cost.
-    pub(super) fn check_cost(&self, answer: &Answer) -> Result<(), Lost> {
+    pub(super) fn check_cost(&self, answer: &ModelAnswer) -> Result<(), Lost> {
         let is_unknown = answer.ending != Ending::Refused && self.cost_of([1, 1]).is_none();
         match self.choice.check_prices() {
             Err(error) if is_unknown && self.account.limits_cost() => Err(self.halt(Lost::because(error.to_string()))),
@@ -207,7 +207,7 @@ impl Vlm {
         description
     }
 
-    pub(super) fn read(&self, body: &str) -> Option<Answer> {
+    pub(super) fn read(&self, body: &str) -> Option<ModelAnswer> {
         self.choice.backend.dialect.read(body).ok()?
     }
 
@@ -223,7 +223,7 @@ impl Vlm {
         by_price.or_else(|| locked(&self.learned).cost_at_most([prompt, completion]))
     }
 
-    pub(super) fn learn_from(&self, answer: &Answer) {
+    pub(super) fn learn_from(&self, answer: &ModelAnswer) {
         locked(&self.learned).add(answer);
     }
 
@@ -247,6 +247,6 @@ impl Vlm {
     }
 }
 
-pub(super) fn tokens(answer: &Answer) -> u64 {
+pub(super) fn tokens(answer: &ModelAnswer) -> u64 {
     u64::from(answer.prompt_tokens.unwrap_or(0)) + u64::from(answer.completion_tokens.unwrap_or(0))
 }

@@ -12,7 +12,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer};
 use serde_json::{Map, Value};
 
-use super::wire_format::{Answer, Dialect, Effort};
+use super::wire_format::{Dialect, Effort, ModelAnswer};
 use exact::budget::Limit;
 use exact::input;
 use exact::names;
@@ -165,7 +165,7 @@ pub struct Prices {
 
 impl Prices {
     /// The cost of an answer, US dollars; `None` unless its tokens and both prices are known.
-    pub fn cost_usd(self, answer: &Answer) -> Option<f64> {
+    pub fn cost_usd(self, answer: &ModelAnswer) -> Option<f64> {
         let (prompt, completion) = (answer.prompt_tokens?, answer.completion_tokens?);
         let cached = answer.cached_tokens.unwrap_or(0).min(prompt);
         let of_cached = Self { input: self.cached_input.or(self.input), ..self }.cost_of_requests(cached.into())?;

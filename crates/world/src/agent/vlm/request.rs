@@ -1,7 +1,7 @@
 use serde_json::Value;
 
 use super::models::{Choice, Contract, Prices, merge};
-use super::wire_format::{Answer, Dialect, Question};
+use super::wire_format::{Dialect, ModelAnswer, Question};
 use crate::agent::prompt;
 
 /// A service tier at half the price.
@@ -51,7 +51,7 @@ impl Choice {
         body
     }
 
-    pub(super) fn cost_usd(&self, answer: &Answer) -> Option<f64> {
+    pub(super) fn cost_usd(&self, answer: &ModelAnswer) -> Option<f64> {
         answer.cost_usd.or_else(|| self.model.prices.cost_usd(answer))
     }
 }

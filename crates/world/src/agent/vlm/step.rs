@@ -10,7 +10,7 @@ use super::limits::Reached;
 use super::model::{OnOutage, Vlm, tokens};
 use super::provider::failure::{Failure, FailureKind};
 use super::provider::{Provider, Received, Waiting};
-use super::wire_format::Answer;
+use super::wire_format::ModelAnswer;
 use crate::agent::{Lost, Status, locked, milliseconds};
 
 pub(super) struct Step {
@@ -26,7 +26,7 @@ pub(super) struct Step {
 }
 
 pub(super) enum Asked {
-    Answer { answer: Answer, latency_ms: i32 },
+    Answer { answer: ModelAnswer, latency_ms: i32 },
     GivenUp(Status),
 }
 

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use toml::Value;
 
 use crate::experiment::Spec;
-use crate::experiment::spec::{Body, Camera, Cubes, Look, Occluders, Others, is_default};
+use crate::experiment::spec::{Body, CameraKind, Cubes, Look, Occluders, Others, is_default};
 use exact::budget::Limit;
 use exact::hash;
 use exact::input;
@@ -367,7 +367,7 @@ impl WorldConfig {
         }
         world.look = experiment.look;
         world.body.shape = experiment.body.unwrap_or(world.body.shape);
-        if experiment.camera == Camera::Behind {
+        if experiment.camera == CameraKind::Behind {
             (world.eye.forward, world.eye.height, world.eye.pitch) = BEHIND;
         }
         let Others { least, most, twin_percent, .. } = experiment.layout.others;

@@ -5,7 +5,7 @@ use mujoco_rs::prelude::{MjModel, MjtObjBase};
 use super::super::angle::{Heading, Quaternion};
 use super::super::config::WorldConfig;
 use super::super::scene::{Cube, HandShape, HandStart, HungPane, Scene, WornMark};
-use super::{AGENTS, BARS, Item, Look, group, numbered, shadow};
+use super::{AGENTS, BARS, Item, Sight, group, numbered, shadow};
 use crate::experiment::spec::{MOST_MARKS, PaneKind};
 use crate::sim::scene::MOST_CUBES;
 use trace::palette::Color;
@@ -19,10 +19,10 @@ const BLANK: [u8; 3] = [128, 132, 138];
 /// Walls by their quarter turns from +x.
 const WALLS: [&str; 4] = ["wall_east", "wall_north", "wall_west", "wall_south"];
 
-pub(super) fn dress(model: &mut MjModel, items: &[Item], config: &WorldConfig, scene: &Scene, look: Look) {
+pub(super) fn dress(model: &mut MjModel, items: &[Item], config: &WorldConfig, scene: &Scene, look: Sight) {
     let pane = match look {
-        Look::Direct => None,
-        Look::Through(at) => Some((at, &scene.panes[at])),
+        Sight::Direct => None,
+        Sight::Through(at) => Some((at, &scene.panes[at])),
     };
     let is_window = pane.is_some_and(|(_, pane)| pane.kind == PaneKind::Window);
     let neutral = config.body.shape.neutral_parts();
@@ -57,10 +57,10 @@ pub(super) fn dress(model: &mut MjModel, items: &[Item], config: &WorldConfig, s
     }
 }
 
-pub(super) fn show_marks(model: &mut MjModel, items: &[Item], scene: &Scene, t: u32, look: Look) {
+pub(super) fn show_marks(model: &mut MjModel, items: &[Item], scene: &Scene, t: u32, look: Sight) {
     let pane = match look {
-        Look::Direct => None,
-        Look::Through(at) => Some(&scene.panes[at]),
+        Sight::Direct => None,
+        Sight::Through(at) => Some(&scene.panes[at]),
     };
     for (geom, item) in items.iter().enumerate() {
         let Item::Mark(at) = *item else { continue };
@@ -169,10 +169,10 @@ fn hang(model: &mut MjModel, geom: usize, pane: Option<&HungPane>, config: &Worl
 const HALF_BAR: f64 = 0.03;
 
 /// Puts a frame's bar beside its pane, flush with it, so that it hides nothing; only direct views show frames.
-fn frame(model: &mut MjModel, geom: usize, scene: &Scene, look: Look, config: &WorldConfig) {
+fn frame(model: &mut MjModel, geom: usize, scene: &Scene, look: Sight, config: &WorldConfig) {
     let name = model.id_to_name(MjtObjBase::mjOBJ_GEOM, geom).unwrap_or_default();
     let Some(number) = numbered(name, "frame") else { return };
-    let pane = scene.panes.get(number / BARS).filter(|_| look == Look::Direct);
+    let pane = scene.panes.get(number / BARS).filter(|_| look == Sight::Direct);
     let Some(pane) = pane else { return hide(model, geom) };
     let [x, y] = pane.place.center(config);
     let [out_x, out_y] = pane.place.heading().direction();

@@ -14,7 +14,7 @@ use mujoco_rs::renderer::MjRenderer;
 use super::super::config::WorldConfig;
 use super::super::label_image::{LabelImage, Rectangle};
 use super::super::model::{
-    BEYOND_CAMERA, EYE_CAMERA, Item, ModelError, Paint, Stage, TOP_CAMERA, compile, group, labelled,
+    BEYOND_CAMERA, EYE_CAMERA, Item, ModelError, PaintMode, Stage, TOP_CAMERA, compile, group, labelled,
 };
 use super::super::scene::{HungPane, Scene};
 use super::super::visibility::{self, Shown};
@@ -54,10 +54,10 @@ impl Camera {
     }
 
     pub fn sized(config: &WorldConfig, width: usize, height: usize) -> Result<Self, CameraError> {
-        Self::painted(config, Paint::Lit, width, height)
+        Self::painted(config, PaintMode::Lit, width, height)
     }
 
-    fn painted(config: &WorldConfig, paint: Paint, width: usize, height: usize) -> Result<Self, CameraError> {
+    fn painted(config: &WorldConfig, paint: PaintMode, width: usize, height: usize) -> Result<Self, CameraError> {
         let model = Arc::new(compile(config, paint, [width, height])?);
         let renderer = MjRenderer::new(&model, width, height, 0)
             .map_err(|error| CameraError::NoDisplay { reason: reason(&error) })?;
@@ -174,14 +174,14 @@ pub struct LabelCamera {
 
 impl LabelCamera {
     pub fn new(config: &WorldConfig, width: usize, height: usize) -> Result<Self, CameraError> {
-        Ok(Self { eye: Camera::painted(config, Paint::Labels, width, height)?, painted: None })
+        Ok(Self { eye: Camera::painted(config, PaintMode::Labels, width, height)?, painted: None })
     }
 
     /// The label of every pixel, as drawn; a colour without a label counts as the room.
     pub fn labels(&mut self, world: &World) -> Result<LabelImage, CameraError> {
         let mut stages = match self.painted.take() {
             Some((scene, stages)) if scene == *world.scene() => stages,
-            _ => Stage::all(world.config(), Paint::Labels, world.scene())?,
+            _ => Stage::all(world.config(), PaintMode::Labels, world.scene())?,
         };
         world.show_on(&mut stages);
         let (stage, beyond) = &stages;

@@ -40,7 +40,7 @@ pub enum ContactSheetError {
     Png(String),
 }
 
-struct Picture {
+struct SheetPicture {
     frame: Frame,
     caption: String,
 }
@@ -53,14 +53,14 @@ pub fn png(config: &WorldConfig, experiments: &[Experiment], seed: i32) -> Resul
 
 /// From above; at the start; before the mirror, nearby and from the side, with every mark. The pictures use the
 /// experiment's settings.
-fn row(config: &WorldConfig, experiment: &Experiment, seed: i32) -> Result<Vec<Picture>, ContactSheetError> {
+fn row(config: &WorldConfig, experiment: &Experiment, seed: i32) -> Result<Vec<SheetPicture>, ContactSheetError> {
     let eye = &mut Camera::new(&config.of(experiment))?;
     let scene = Scene::draw(config, experiment.clone(), seed, 1)?;
     let mut world = World::new(config, scene)?;
     let name = experiment.name();
     let color = world.scene().body_color.name();
     let above =
-        Picture { frame: eye.top_view(&world)?, caption: format!("{name} from above; the own body is {color}") };
+        SheetPicture { frame: eye.top_view(&world)?, caption: format!("{name} from above; the own body is {color}") };
     let start = picture(eye, &world, "at the start")?;
     let [near, aside] = [(1.6, 0.0), (2.6, 0.9)].map(|(away, aside)| before_mirror(&world, away, aside));
     let marked = world.scene().marks.iter().map(|mark| mark.from_t).max().unwrap_or(1);
@@ -71,7 +71,7 @@ fn row(config: &WorldConfig, experiment: &Experiment, seed: i32) -> Result<Vec<P
     Ok(vec![above, start, near, aside])
 }
 
-fn picture(eye: &mut Camera, world: &World, place: &str) -> Result<Picture, ContactSheetError> {
+fn picture(eye: &mut Camera, world: &World, place: &str) -> Result<SheetPicture, ContactSheetError> {
     let visibility = world.visibility();
     let mut caption = format!("{place}: own body {} px", visibility.self_px);
     if !visibility.marks.is_empty() {
@@ -80,7 +80,7 @@ fn picture(eye: &mut Camera, world: &World, place: &str) -> Result<Picture, Cont
     if !visibility.others.is_empty() {
         let _ = write!(caption, ", others {}", visibility.other_px);
     }
-    Ok(Picture { frame: eye.frame(world)?, caption })
+    Ok(SheetPicture { frame: eye.frame(world)?, caption })
 }
 
 fn before_mirror(world: &World, away: f64, aside: f64) -> Pose {
@@ -97,7 +97,7 @@ fn before_mirror(world: &World, away: f64, aside: f64) -> Pose {
     places.into_iter().find(is_free).unwrap_or(wanted)
 }
 
-fn compose(rows: &[Vec<Picture>]) -> Result<Vec<u8>, ContactSheetError> {
+fn compose(rows: &[Vec<SheetPicture>]) -> Result<Vec<u8>, ContactSheetError> {
     let frames = || rows.iter().flatten().map(|picture| &picture.frame);
     let widest = frames().map(|frame| frame.width).max().unwrap_or_default();
     let highest = frames().map(|frame| frame.height).max().unwrap_or_default();

@@ -6,7 +6,7 @@
 use super::super::angle::{HEADINGS, Heading};
 use super::super::body::Pose;
 use super::super::config::{WorldConfig, metres};
-use super::super::hand::Place;
+use super::super::hand::HandRules;
 use super::super::rng::Rng;
 use super::super::scene::{HandShape, HandStart, HungPane, MirrorPlace, Other, Patch, Scene, WornMark, floor_plan};
 use super::{Drawing, is_in_view};
@@ -23,7 +23,7 @@ const STARTS: u32 = 2000;
 const PURPOSE: u64 = 0x7061_6e65_7300;
 
 /// A scene without panes and marks, to which they are added.
-pub(super) struct Layout<'a> {
+pub(super) struct PaneLayout<'a> {
     pub config: &'a WorldConfig,
     pub scene: &'a Scene,
 }
@@ -37,7 +37,7 @@ pub(super) struct Extras {
     pub hand: Option<HandStart>,
 }
 
-impl Layout<'_> {
+impl PaneLayout<'_> {
     pub(super) fn extras(&self, purpose: u64, seed: i32, run: i32) -> Extras {
         let stream = |at: u64| Rng::of(purpose ^ (PURPOSE + at), seed, run);
         // Separate streams, so that an unused one does not affect the others.
@@ -83,7 +83,7 @@ impl Layout<'_> {
         };
         let fits = |hand: &HandStart| {
             let steps: u32 = hand.from_mark.iter().map(|steps| steps.unsigned_abs()).sum();
-            let is_there = Place { task, patch, hand: *hand, config: self.config, body: self.scene.start };
+            let is_there = HandRules { task, patch, hand: *hand, config: self.config, body: self.scene.start };
             (task.least..=task.most).contains(&steps) && is_there.is_free(hand.from_mark)
         };
         (0..STARTS).map(|_| draw(chance)).find(fits)

@@ -1,25 +1,25 @@
 //! Views over the pixels, direct and through each pane, row by row, each part within its bounding rectangle.
 
 use super::super::label_image::Rectangle;
-use super::super::model::{Item, Look, Stage};
+use super::super::model::{Item, Sight, Stage};
 use super::super::world::World;
-use super::shape::{Part, solid};
-use super::view::{Shown, View};
+use super::shape::{SolidPart, solid};
+use super::view::{RayView, Shown};
 
 struct Candidate {
-    part: Part,
+    part: SolidPart,
     rectangle: Rectangle,
 }
 
 struct Pass {
-    view: View,
+    view: RayView,
     candidates: Vec<Candidate>,
     depths: Vec<f64>,
 }
 
 /// Calls `each` with the codes of every row, from the top.
 pub(super) fn rows(world: &World, width: usize, height: usize, mut each: impl FnMut(&[u8])) {
-    let view = View::of_eye(world, width, height);
+    let view = RayView::of_eye(world, width, height);
     let mut direct = Pass::new(view, world.stage());
     let mut beyond: Vec<(usize, Pass)> = world
         .beyond()
@@ -46,14 +46,14 @@ fn pane_code(pane: usize) -> u8 {
 }
 
 impl Pass {
-    fn new(view: View, stage: &Stage) -> Self {
+    fn new(view: RayView, stage: &Stage) -> Self {
         let code = |item: Item| match stage.look() {
-            Look::Direct => Shown::Direct(item).code(),
-            Look::Through(pane) => Shown::Through(pane, item).code(),
+            Sight::Direct => Shown::Direct(item).code(),
+            Sight::Through(pane) => Shown::Through(pane, item).code(),
         };
         let shown =
             stage.items().iter().enumerate().filter(|(geom, item)| **item != Item::Room && stage.is_shown(*geom));
-        let parts = shown.map(|(geom, item)| Part { code: code(*item), solid: solid(stage, geom) });
+        let parts = shown.map(|(geom, item)| SolidPart { code: code(*item), solid: solid(stage, geom) });
         let candidates = parts.filter_map(|part| Some(Candidate { part, rectangle: part.solid.rectangle(&view)? }));
         Self { view, candidates: candidates.collect(), depths: vec![f64::INFINITY; view.width] }
     }

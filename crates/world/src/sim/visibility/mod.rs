@@ -18,10 +18,10 @@ pub(crate) use count::by_column;
 pub use count::{PaneSighting, Sighting, Visibility};
 pub use view::Shown;
 
-use view::View;
+use view::RayView;
 
 use super::label_image::{LabelImage, Rectangle};
-use super::model::{Item, Look, ModelError, Paint, Stage};
+use super::model::{Item, ModelError, PaintMode, Sight, Stage};
 use super::world::World;
 
 impl World {
@@ -47,10 +47,10 @@ impl World {
 /// Returns, per geom, true if it may appear within these pixels of a view of this size; others do not change the
 /// picture. The room always may.
 pub(in crate::sim) fn in_view(world: &World, stage: &Stage, size: [usize; 2], within: Rectangle) -> Vec<bool> {
-    let view = View::of_eye(world, size[0], size[1]);
+    let view = RayView::of_eye(world, size[0], size[1]);
     let view = match stage.look() {
-        Look::Direct => view,
-        Look::Through(pane) => view.through(world, &world.scene().panes[pane]),
+        Sight::Direct => view,
+        Sight::Through(pane) => view.through(world, &world.scene().panes[pane]),
     };
     let is_in_view = |(geom, item): (usize, &Item)| {
         *item == Item::Room
@@ -68,6 +68,6 @@ pub fn labels(world: &World, width: usize, height: usize) -> LabelImage {
 
 /// The same by MuJoCo's own rays in a loop, fifty times slower: tests compare the counts with it.
 pub fn labels_by_mujoco(world: &World, width: usize, height: usize) -> Result<LabelImage, ModelError> {
-    let mut stages = world.stages(Paint::Lit)?;
+    let mut stages = world.stages(PaintMode::Lit)?;
     Ok(view::by_mujoco(world, &mut stages, width, height))
 }

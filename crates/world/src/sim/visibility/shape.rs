@@ -5,37 +5,37 @@
 
 use super::super::label_image::Rectangle;
 use super::super::model::Stage;
-use super::view::{Vector, View, dot, minus, plus};
+use super::view::{RayView, Vector, dot, minus, plus};
 
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Part {
+pub(super) struct SolidPart {
     /// The label code of its thing in this view.
     pub code: u8,
-    pub solid: Solid,
+    pub solid: RaySolid,
 }
 
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Solid {
+pub(super) enum RaySolid {
     /// A sphere if `half` is 0.
     Capsule { center: Vector, axis: Vector, half: f64, radius: f64 },
     /// Also a pane, whose face alone can be hit.
     Box { center: Vector, axes: [Vector; 3], halves: Vector },
 }
 
-pub(super) fn solid(stage: &Stage, geom: usize) -> Solid {
+pub(super) fn solid(stage: &Stage, geom: usize) -> RaySolid {
     use mujoco_rs::prelude::MjtGeomBase as Kind;
     let center = stage.data.geom_xpos()[geom];
     let rotation = stage.data.geom_xmat()[geom];
     let axes = [0, 1, 2].map(|column| [rotation[column], rotation[3 + column], rotation[6 + column]]);
     let size = stage.model().geom_size()[geom];
     match stage.model().geom_type()[geom] {
-        Kind::mjGEOM_SPHERE => Solid::Capsule { center, axis: axes[2], half: 0.0, radius: size[0] },
-        Kind::mjGEOM_CAPSULE => Solid::Capsule { center, axis: axes[2], half: size[1], radius: size[0] },
-        _ => Solid::Box { center, axes, halves: size },
+        Kind::mjGEOM_SPHERE => RaySolid::Capsule { center, axis: axes[2], half: 0.0, radius: size[0] },
+        Kind::mjGEOM_CAPSULE => RaySolid::Capsule { center, axis: axes[2], half: size[1], radius: size[0] },
+        _ => RaySolid::Box { center, axes, halves: size },
     }
 }
 
-impl Solid {
+impl RaySolid {
     /// The first intersection with a ray, in lengths of `ray` from `origin`.
     pub fn meets(&self, origin: Vector, ray: Vector) -> Option<f64> {
         match *self {
@@ -45,7 +45,7 @@ impl Solid {
     }
 
     /// Its bounding rectangle of pixels; `None` if it is out of view.
-    pub fn rectangle(&self, view: &View) -> Option<Rectangle> {
+    pub fn rectangle(&self, view: &RayView) -> Option<Rectangle> {
         match *self {
             Self::Capsule { center, axis, half, radius } => {
                 let ends = [half, -half].map(|along| (view.local(plus(center, along, axis)), radius));
@@ -67,7 +67,7 @@ impl Solid {
 /// A point of the view: to the right and up, both in halves of the view at one metre, and ahead.
 type Local = [f64; 3];
 
-impl View {
+impl RayView {
     fn local(&self, point: Vector) -> Local {
         let offset = minus(point, self.origin);
         [
@@ -79,7 +79,7 @@ impl View {
 }
 
 /// The smallest rectangle of pixels that surely contains the hull of some spheres.
-fn bounds(view: &View, spheres: &[(Local, f64)]) -> Option<Rectangle> {
+fn bounds(view: &RayView, spheres: &[(Local, f64)]) -> Option<Rectangle> {
     let halves = [dot(view.right, view.right), dot(view.up, view.up)].map(f64::sqrt);
     let [left, right] = span(spheres, 0, halves[0])?;
     let [bottom, top] = span(spheres, 1, halves[1])?;

@@ -57,7 +57,7 @@ pub(super) fn plus(a: Vector, times: f64, b: Vector) -> Vector {
 
 /// A pinhole camera: the ray of a pixel is `forward + u right + v up`, with u and v from -1 to 1.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct View {
+pub(super) struct RayView {
     pub origin: Vector,
     pub forward: Vector,
     /// Half of the view's width at one metre.
@@ -75,7 +75,7 @@ pub(super) fn middle(at: usize, count: usize) -> f64 {
     2.0 * (at + 0.5) / count - 1.0
 }
 
-impl View {
+impl RayView {
     pub(crate) fn of_eye(world: &World, width: usize, height: usize) -> Self {
         let eye = &world.config().eye;
         let pose = world.pose();
@@ -135,7 +135,7 @@ fn shown_groups() -> [u8; 6] {
 }
 
 pub(super) fn by_mujoco(world: &World, stages: &mut (Stage, Vec<Stage>), width: usize, height: usize) -> LabelImage {
-    let view = View::of_eye(world, width, height);
+    let view = RayView::of_eye(world, width, height);
     let (stage, beyond) = stages;
     let mut codes = Vec::with_capacity(width * height);
     let groups = shown_groups();

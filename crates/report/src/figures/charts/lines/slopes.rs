@@ -1,8 +1,8 @@
 //! `slopes`: a rate of each model from the first experiment to every other.
 
 use crate::figures::kit::{
-    Align, Arrangement, Frame, Legend, MARGIN, Mark, Member, Panels, Plot, Point, Sheet, Swatch, dodge, label, leading,
-    lettering, many, marker, panels, rate_ticks,
+    Arrangement, Frame, Legend, MARGIN, Mark, Member, Panels, Plot, Point, Sheet, Swatch, TextAnchor, dodge, label,
+    leading, lettering, many, marker, panels, rate_ticks,
 };
 use crate::figures::matrix::MetricId;
 use crate::figures::missing::Strip;
@@ -35,7 +35,7 @@ pub fn draw(scene: Scene<'_>) -> Result<Drawn, FigureError> {
     for (at, ((other, body), strips)) in others.iter().zip(&panels.bodies).zip(&strips).enumerate() {
         let plot = Plot::new(Frame { height: PLOT_HEIGHT, ..*body }, 0.0..1.0, -0.03..1.03);
         axis(&mut sheet, &plot, at % columns, metric.name);
-        Pair { scene, metric, plot, experiments: [first, other] }.draw(&mut sheet);
+        SlopePlot { scene, metric, plot, experiments: [first, other] }.draw(&mut sheet);
         let top = body.top + PLOT_HEIGHT + label_room();
         strips[0].draw(&mut sheet, (body.left, top));
         strips[1].draw(&mut sheet, (body.center().0 + 4.0, top));
@@ -61,17 +61,17 @@ fn axis(sheet: &mut Sheet, plot: &Plot, column: usize, title: &str) {
     plot.y_axis(sheet, &ticks);
 }
 
-struct Pair<'a> {
+struct SlopePlot<'a> {
     scene: Scene<'a>,
     metric: MetricId<'a>,
     plot: Plot,
     experiments: [&'a str; 2],
 }
 
-impl Pair<'_> {
+impl SlopePlot<'_> {
     fn draw(&self, sheet: &mut Sheet) {
         let frame = self.plot.frame;
-        let lettering = lettering::label().aligned(Align::Middle);
+        let lettering = lettering::label().aligned(TextAnchor::Middle);
         let names = label::fitted(&self.experiments, frame.width / 2.0 - 4.0, lettering);
         for (name, x) in names.iter().zip(self.columns()) {
             sheet.text((x, frame.bottom() + 8.0 + leading(lettering) / 2.0 - 2.0), name, lettering);

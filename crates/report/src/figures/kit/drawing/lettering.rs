@@ -12,7 +12,7 @@ pub(crate) const FULL_WIDTH: f64 = 640.0;
 pub(crate) const NAME_ROOM: f64 = 210.0;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Align {
+pub enum TextAnchor {
     Start,
     Middle,
     End,
@@ -23,20 +23,20 @@ pub struct Lettering {
     pub size: f64,
     pub weight: Weight,
     pub color: Rgb,
-    pub align: Align,
+    pub align: TextAnchor,
     pub upwards: bool,
 }
 
 impl Lettering {
     pub const fn new(size: f64, color: Rgb) -> Self {
-        Self { size, weight: Weight::Regular, color, align: Align::Start, upwards: false }
+        Self { size, weight: Weight::Regular, color, align: TextAnchor::Start, upwards: false }
     }
 
     pub(crate) const fn semibold(self) -> Self {
         Self { weight: Weight::Semibold, ..self }
     }
 
-    pub(crate) const fn aligned(self, align: Align) -> Self {
+    pub(crate) const fn aligned(self, align: TextAnchor) -> Self {
         Self { align, ..self }
     }
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Map, Value, json};
 
-use super::super::{Rows, parquet};
+use super::super::{RowSink, parquet};
 use super::read_frames;
 use crate::import::error::ImportError;
 use crate::inputs::{Input, traces_at};
@@ -34,7 +34,7 @@ pub(in crate::import) fn hash_of(folder: &Path) -> Result<String, ImportError> {
 }
 
 /// Adds the frames of all episodes with their tasks, and checks that none is missing.
-pub(in crate::import) fn read_folder(folder: &Path, rows: &mut Rows<'_>) -> Result<(), ImportError> {
+pub(in crate::import) fn read_folder(folder: &Path, rows: &mut RowSink<'_>) -> Result<(), ImportError> {
     let constants = constants(folder, rows)?;
     let tasks = tasks(folder, rows)?;
     let mut left = frames_of_episodes(folder, rows)?;
@@ -60,7 +60,7 @@ pub(in crate::import) fn read_folder(folder: &Path, rows: &mut Rows<'_>) -> Resu
 }
 
 /// The values in `meta/info.json` that apply to all frames.
-fn constants(folder: &Path, rows: &Rows<'_>) -> Result<Map<String, Value>, ImportError> {
+fn constants(folder: &Path, rows: &RowSink<'_>) -> Result<Map<String, Value>, ImportError> {
     let path = folder.join(INFO);
     let text = input::text(&path, LARGEST_INFO).map_err(ImportError::read(&Input::new(&path).name))?;
     let expected = "a data set of LeRobot, version 3, with `codebase_version`";
@@ -77,7 +77,7 @@ fn constants(folder: &Path, rows: &Rows<'_>) -> Result<Map<String, Value>, Impor
 }
 
 /// Tasks by number. Pandas names the column of texts `__index_level_0__` if it has no name.
-fn tasks(folder: &Path, rows: &mut Rows<'_>) -> Result<BTreeMap<i64, String>, ImportError> {
+fn tasks(folder: &Path, rows: &mut RowSink<'_>) -> Result<BTreeMap<i64, String>, ImportError> {
     let mut tasks = BTreeMap::new();
     let path = folder.join("meta/tasks.parquet");
     if path.is_file() {
@@ -93,7 +93,7 @@ fn tasks(folder: &Path, rows: &mut Rows<'_>) -> Result<BTreeMap<i64, String>, Im
 }
 
 /// The number of frames of each episode. The files also hold statistics of each feature.
-fn frames_of_episodes(folder: &Path, rows: &mut Rows<'_>) -> Result<BTreeMap<i64, i64>, ImportError> {
+fn frames_of_episodes(folder: &Path, rows: &mut RowSink<'_>) -> Result<BTreeMap<i64, i64>, ImportError> {
     let mut lengths = BTreeMap::new();
     for path in below(folder, "meta/episodes")? {
         each_file(&path, rows, |file, rows| {
@@ -117,8 +117,8 @@ fn below(folder: &Path, name: &str) -> Result<Vec<PathBuf>, ImportError> {
 /// Reads each file; faults name the file.
 fn each_file(
     path: &Path,
-    rows: &mut Rows<'_>,
-    read: impl FnOnce(std::fs::File, &mut Rows<'_>) -> Result<(), ImportError>,
+    rows: &mut RowSink<'_>,
+    read: impl FnOnce(std::fs::File, &mut RowSink<'_>) -> Result<(), ImportError>,
 ) -> Result<(), ImportError> {
     let name = Input::new(path).name;
     let file = input::open(path).map_err(ImportError::read(&name))?;

@@ -8,21 +8,21 @@ use std::io::{Read as _, Seek as _};
 use serde_json::{Map, Value, json};
 
 use super::json::WithoutNan;
-use super::{Rows, parquet};
+use super::{RowSink, parquet};
 use crate::import::error::ImportError;
 
 /// Frame columns with dots in their names, and their names here.
 const FRAME: [(&str, &str); 4] =
     [("next.reward", "reward"), ("next.success", "success"), ("next.done", "done"), ("next.truncated", "truncated")];
 
-pub(super) fn read(mut file: File, rows: &mut Rows<'_>) -> Result<(), ImportError> {
+pub(super) fn read(mut file: File, rows: &mut RowSink<'_>) -> Result<(), ImportError> {
     let mut start = [0; 4];
     let is_parquet = file.read_exact(&mut start).is_ok() && start == *b"PAR1";
     file.rewind().map_err(ImportError::read(&rows.file))?;
     if is_parquet { read_frames(file, rows, |_| ()) } else { read_evaluation(file, rows) }
 }
 
-fn read_evaluation(file: File, rows: &mut Rows<'_>) -> Result<(), ImportError> {
+fn read_evaluation(file: File, rows: &mut RowSink<'_>) -> Result<(), ImportError> {
     let help = "name the `eval_info.json` that `lerobot-eval` writes";
     let expected = "an evaluation of LeRobot, with `per_episode` or `per_task`";
     let info: Value = serde_json::from_reader(WithoutNan::new(file))
@@ -47,7 +47,7 @@ fn read_evaluation(file: File, rows: &mut Rows<'_>) -> Result<(), ImportError> {
     Ok(())
 }
 
-fn add_episode(index: &Value, prefix: &str, episode: &Value, rows: &mut Rows<'_>) -> Result<(), ImportError> {
+fn add_episode(index: &Value, prefix: &str, episode: &Value, rows: &mut RowSink<'_>) -> Result<(), ImportError> {
     let mut row = identity(index, &format!("{}/{prefix}", rows.digits), 1);
     row.extend(episode.as_object().cloned().unwrap_or_default());
     rows.add_object(&row)
@@ -55,7 +55,7 @@ fn add_episode(index: &Value, prefix: &str, episode: &Value, rows: &mut Rows<'_>
 
 fn read_frames(
     file: File,
-    rows: &mut Rows<'_>,
+    rows: &mut RowSink<'_>,
     mut complete: impl FnMut(&mut Map<String, Value>),
 ) -> Result<(), ImportError> {
     let mut before = (Value::Null, 0, Value::Null);

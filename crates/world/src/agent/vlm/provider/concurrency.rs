@@ -43,7 +43,7 @@ struct Gate {
 
 /// Permission for one request, which counts as in flight until this is dropped.
 #[derive(Debug)]
-pub struct Turn<'a> {
+pub struct Permit<'a> {
     pace: &'a Pace,
 }
 
@@ -62,12 +62,12 @@ impl Pace {
         Ok(())
     }
 
-    pub async fn turn(&self) -> Turn<'_> {
+    pub async fn turn(&self) -> Permit<'_> {
         // The semaphore is never closed, so this always yields a permit.
         if let Ok(permit) = self.permits.acquire().await {
             permit.forget();
         }
-        let turn = Turn { pace: self };
+        let turn = Permit { pace: self };
         let mut at = Duration::ZERO;
         if !self.interval.is_zero() {
             at = self.gate(|gate| {
@@ -132,7 +132,7 @@ impl Pace {
     }
 }
 
-impl Drop for Turn<'_> {
+impl Drop for Permit<'_> {
     fn drop(&mut self) {
         let mut state = locked(&self.pace.state);
         self.pace.give_back(&mut state);

@@ -26,11 +26,11 @@ pub(super) use waiting::Waiting;
 
 use super::models::Backend;
 use super::secrets::Secret;
-use super::wire_format::{Answer, Dialect};
+use super::wire_format::{Dialect, ModelAnswer};
 use crate::agent::reply::Ending;
 use crate::record::plan::slug;
 use batch::Batches;
-use concurrency::{Pace, Turn};
+use concurrency::{Pace, Permit};
 use failure::{Failure, broken, failed, no_answer, server};
 pub use preflight::Unreachable;
 use preflight::connect;
@@ -74,7 +74,7 @@ impl Default for Patience {
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct Received {
-    pub answer: Answer,
+    pub answer: ModelAnswer,
     /// The body without keys.
     pub body: String,
     /// From sending the request to the end of the answer.
@@ -187,12 +187,12 @@ impl Provider {
         self.secret.as_ref().map_or_else(|| text.to_owned(), |secret| secret.without(text))
     }
 
-    pub async fn turn(&self) -> Turn<'_> {
+    pub async fn turn(&self) -> Permit<'_> {
         self.pace.turn().await
     }
 
     /// Sends a request once, in its turn. `id` is unique within a recording.
-    pub async fn ask(&self, turn: Turn<'_>, id: &str, body: &Value) -> Result<Received, Failure> {
+    pub async fn ask(&self, turn: Permit<'_>, id: &str, body: &Value) -> Result<Received, Failure> {
         let result = match &self.batches {
             Some(batches) => batches.ask(id, body).await,
             None => self.exchange(body).await,
@@ -249,7 +249,7 @@ impl Provider {
 
     /// The refusal in an error about the request's content. Providers send it as a bad request, routers also as a
     /// forbidden one.
-    fn declined(&self, status: StatusCode, said: &str) -> Option<Answer> {
+    fn declined(&self, status: StatusCode, said: &str) -> Option<ModelAnswer> {
         const ABOUT_CONTENT: [StatusCode; 3] =
             [StatusCode::BAD_REQUEST, StatusCode::FORBIDDEN, StatusCode::UNPROCESSABLE_ENTITY];
         if !ABOUT_CONTENT.contains(&status) {
@@ -260,12 +260,12 @@ impl Provider {
     }
 }
 
-fn received(secret: Option<&Secret>, answer: Answer, body: String, latency: Duration) -> Received {
+fn received(secret: Option<&Secret>, answer: ModelAnswer, body: String, latency: Duration) -> Received {
     let kept = |text: String| match secret {
         Some(secret) => secret.without_in_answer(&text),
         None => text,
     };
-    let answer = Answer { text: kept(answer.text), model: answer.model.map(kept), ..answer };
+    let answer = ModelAnswer { text: kept(answer.text), model: answer.model.map(kept), ..answer };
     Received { answer, body: kept(body), latency, rate_limits: Vec::new() }
 }
 

@@ -64,7 +64,7 @@ impl Spend {
 
 /// The spending of one process, and its requests in flight.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(super) struct Entry {
+pub(super) struct LedgerEntry {
     pub(super) spend: Spend,
     pub(super) in_flight: u64,
     pub(super) reserved_usd: f64,
@@ -73,7 +73,7 @@ pub(super) struct Entry {
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Others {
+pub(super) struct OtherProcesses {
     pub(super) spend: Spend,
     pub(super) reserved_usd: f64,
     pub(super) is_waiting: bool,
@@ -82,7 +82,7 @@ pub(super) struct Others {
 #[derive(Debug, Default, Serialize, Deserialize)]
 struct Page {
     before: Spend,
-    processes: BTreeMap<String, Entry>,
+    processes: BTreeMap<String, LedgerEntry>,
 }
 
 #[derive(Debug)]
@@ -121,7 +121,7 @@ impl Ledger {
 
     /// Decides with the others' spending, then stores this process's spending and reservations. An unreadable ledger
     /// reports no others, and is left unchanged.
-    pub(super) fn exchange<T>(&self, decide: impl FnOnce(Option<Others>) -> (T, Entry)) -> T {
+    pub(super) fn exchange<T>(&self, decide: impl FnOnce(Option<OtherProcesses>) -> (T, LedgerEntry)) -> T {
         self.file.locked(|| {
             let mut page = self.file.read::<Page>().ok();
             let (outcome, mut entry) = decide(page.as_ref().map(|page| self.others(page)));
@@ -134,8 +134,8 @@ impl Ledger {
         })
     }
 
-    fn others(&self, page: &Page) -> Others {
-        let mut others = Others { spend: page.before, ..Others::default() };
+    fn others(&self, page: &Page) -> OtherProcesses {
+        let mut others = OtherProcesses { spend: page.before, ..OtherProcesses::default() };
         for (_, entry) in page.processes.iter().filter(|(process, _)| **process != self.process) {
             others.spend.add(&entry.spend);
             others.reserved_usd += entry.reserved_usd;

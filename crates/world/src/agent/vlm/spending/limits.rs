@@ -12,7 +12,7 @@ use std::time::Duration;
 use tokio::sync::Notify;
 
 pub use super::ledger::Spend;
-use super::ledger::{Entry, Ledger, Others};
+use super::ledger::{Ledger, LedgerEntry, OtherProcesses};
 use crate::agent::locked;
 
 /// The limits of a run; `None` for no limit.
@@ -41,14 +41,14 @@ pub struct Reached {
 pub struct Account {
     limits: Limits,
     ledger: OnceLock<Ledger>,
-    state: Mutex<State>,
+    state: Mutex<SpendState>,
     changed: Notify,
 }
 
 #[derive(Debug, Default)]
-struct State {
-    own: Entry,
-    others: Others,
+struct SpendState {
+    own: LedgerEntry,
+    others: OtherProcesses,
     /// Replies of known cost, their total cost, and the highest cost of one.
     costed: u64,
     costed_usd: f64,
@@ -77,8 +77,8 @@ const AGAIN: Duration = Duration::from_millis(200);
 
 impl Account {
     pub fn new(limits: Limits, spent: Spend) -> Self {
-        let others = Others { spend: spent, ..Others::default() };
-        Self { limits, state: Mutex::new(State { others, ..State::default() }), ..Self::default() }
+        let others = OtherProcesses { spend: spent, ..OtherProcesses::default() };
+        Self { limits, state: Mutex::new(SpendState { others, ..SpendState::default() }), ..Self::default() }
     }
 
     pub(crate) fn limits_cost(&self) -> bool {
@@ -140,7 +140,7 @@ impl Account {
         Begun { account: Arc::clone(self), left: steps }
     }
 
-    fn reserve_now(&self, state: &mut State, at_most_usd: Option<f64>) -> Result<Option<f64>, Reached> {
+    fn reserve_now(&self, state: &mut SpendState, at_most_usd: Option<f64>) -> Result<Option<f64>, Reached> {
         let spend = state.spend();
         if let Some(limit) = self.limits.requests.filter(|limit| spend.requests >= *limit) {
             return Err(reached("requests", spend.requests.to_string(), limit.to_string()));
@@ -165,7 +165,7 @@ impl Account {
     }
 
     #[expect(clippy::cast_precision_loss, reason = "nobody counts 2^53 steps")]
-    fn begin_now(&self, state: &mut State, steps: u64, at_most_usd: Option<f64>) -> bool {
+    fn begin_now(&self, state: &mut SpendState, steps: u64, at_most_usd: Option<f64>) -> bool {
         let a_step = if state.costed == 0 { at_most_usd } else { Some(state.costed_usd / state.costed as f64) };
         let (spend, steps_of_all) = (state.spend(), state.steps_left + steps);
         let cost = a_step.map(|a_step| spend.cost_at_most() + a_step * steps_of_all as f64);
@@ -179,7 +179,7 @@ impl Account {
         false
     }
 
-    fn post<T>(&self, change: impl FnOnce(&mut State) -> T) -> T {
+    fn post<T>(&self, change: impl FnOnce(&mut SpendState) -> T) -> T {
         let mut state = locked(&self.state);
         let Some(ledger) = self.ledger.get() else { return change(&mut state) };
         ledger.exchange(|others| {
@@ -189,7 +189,7 @@ impl Account {
     }
 }
 
-impl State {
+impl SpendState {
     fn spend(&self) -> Spend {
         let mut spend = self.others.spend;
         spend.add(&self.own.spend);
@@ -222,7 +222,7 @@ impl Reserved {
         self.close(|_| ());
     }
 
-    fn close(&mut self, outcome: impl FnOnce(&mut State)) {
+    fn close(&mut self, outcome: impl FnOnce(&mut SpendState)) {
         self.is_open = false;
         let reserved = self.at_most_usd;
         self.account.post(|state| {

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::{Answer, Question, text, text_or_call, tokens};
+use super::{ModelAnswer, Question, text, text_or_call, tokens};
 use crate::agent::reply::Ending;
 
 pub(super) fn body(question: &Question<'_>) -> Value {
@@ -28,7 +28,7 @@ pub(super) fn body(question: &Question<'_>) -> Value {
     body
 }
 
-pub(super) fn answer(body: &Value) -> Option<Answer> {
+pub(super) fn answer(body: &Value) -> Option<ModelAnswer> {
     let is_refused = body["stop_reason"] == "refusal";
     let blocks = match body.get("content").filter(|content| !content.is_null()) {
         Some(content) => content.as_array()?.as_slice(),
@@ -45,7 +45,7 @@ pub(super) fn answer(body: &Value) -> Option<Answer> {
     let calls: Vec<_> =
         blocks.iter().filter(|block| block["type"] == "tool_use").map(|block| block["input"].to_string()).collect();
     let (text_of_reply, repairs) = text_or_call(words.collect(), &calls);
-    Some(Answer {
+    Some(ModelAnswer {
         text: text_of_reply,
         repairs,
         ending,

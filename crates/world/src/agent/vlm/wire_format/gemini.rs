@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::{Answer, Effort, Question, text, text_or_call, tokens};
+use super::{Effort, ModelAnswer, Question, text, text_or_call, tokens};
 use crate::agent::reply::{Ending, Repair};
 
 pub(super) fn body(question: &Question<'_>) -> Value {
@@ -55,7 +55,7 @@ const REFUSALS: [&str; 9] = [
     "MODEL_ARMOR",
 ];
 
-pub(super) fn answer(body: &Value) -> Option<Answer> {
+pub(super) fn answer(body: &Value) -> Option<ModelAnswer> {
     let blocked = body["promptFeedback"]["blockReason"].as_str();
     let candidates = body.get("candidates").map(|candidates| candidates.as_array());
     let first = match (candidates, blocked) {
@@ -73,7 +73,7 @@ pub(super) fn answer(body: &Value) -> Option<Answer> {
     let usage = &body["usageMetadata"];
     let completion = [&usage["candidatesTokenCount"], &usage["thoughtsTokenCount"]].map(tokens);
     let (text_of_reply, repairs) = first.map(words).unwrap_or_default();
-    Some(Answer {
+    Some(ModelAnswer {
         text: text_of_reply,
         repairs,
         ending,

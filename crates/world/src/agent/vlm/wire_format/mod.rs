@@ -79,7 +79,7 @@ names!(Effort {
 });
 
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Answer {
+pub struct ModelAnswer {
     /// The text of the reply; empty if there is none.
     pub text: String,
     /// Repairs of the text's container: a lone surrogate in the body, for which the text has U+FFFD; a function call,
@@ -144,7 +144,7 @@ impl Dialect {
 
     /// The content of a body's text; lone surrogates are replaced, since strict JSON rejects them. `None` if it has
     /// another format.
-    pub fn read(self, body: &str) -> serde_json::Result<Option<Answer>> {
+    pub fn read(self, body: &str) -> serde_json::Result<Option<ModelAnswer>> {
         let fault = match serde_json::from_str(body) {
             Ok(value) => return Ok(self.answer(&value)),
             Err(fault) => fault,
@@ -160,7 +160,7 @@ impl Dialect {
 
     /// The content of an answer's body; `None` if it has another format. An error that refuses the request's content is
     /// an answer, too.
-    pub fn answer(self, body: &Value) -> Option<Answer> {
+    pub fn answer(self, body: &Value) -> Option<ModelAnswer> {
         let answer = match self {
             Self::OpenaiChat | Self::OpenaiCompatible => openai::answer(body),
             Self::Gemini => gemini::answer(body),

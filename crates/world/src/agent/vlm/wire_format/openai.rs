@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::{Answer, Question, text, text_or_call, tokens};
+use super::{ModelAnswer, Question, text, text_or_call, tokens};
 use crate::agent::reply::Ending;
 
 pub(super) fn body(question: &Question<'_>, limit: &str) -> Value {
@@ -33,7 +33,7 @@ pub(super) fn body(question: &Question<'_>, limit: &str) -> Value {
     body
 }
 
-pub(super) fn answer(body: &Value) -> Option<Answer> {
+pub(super) fn answer(body: &Value) -> Option<ModelAnswer> {
     let choices = body.get("choices")?.as_array()?;
     // A router that lost its provider in the middle of an answer reports it in the choice, beside a partial text.
     if choices.first().is_some_and(|choice| choice["finish_reason"] == "error" || choice["error"].is_object()) {
@@ -45,7 +45,7 @@ pub(super) fn answer(body: &Value) -> Option<Answer> {
     let arguments = |call: &Value| call["function"]["arguments"].as_str().map(str::to_owned);
     let calls: Vec<_> = calls.into_iter().flatten().filter_map(arguments).collect();
     let (reply, repairs) = text_or_call(reply, &calls);
-    Some(Answer {
+    Some(ModelAnswer {
         text: reply,
         repairs,
         ending,

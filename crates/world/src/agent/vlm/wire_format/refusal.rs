@@ -5,7 +5,7 @@
 
 use serde_json::Value;
 
-use super::{Answer, text};
+use super::{ModelAnswer, text};
 use crate::agent::reply::Ending;
 
 /// The names of such errors, lower case.
@@ -49,13 +49,13 @@ const WORDS: [&str; 6] = [
 ];
 
 /// The refusal in an error's body; `None` for any other body.
-pub(super) fn answer(body: &Value) -> Option<Answer> {
+pub(super) fn answer(body: &Value) -> Option<ModelAnswer> {
     let error = [&body["error"], &body["choices"][0]["error"]].into_iter().find(|error| is_refusal(error))?;
-    Some(Answer {
+    Some(ModelAnswer {
         text: error["message"].as_str().map_or_else(|| error.to_string(), str::to_owned),
         ending: Ending::Refused,
         model: text(&body["model"]),
-        ..Answer::default()
+        ..ModelAnswer::default()
     })
 }
 

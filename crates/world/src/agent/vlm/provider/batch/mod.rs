@@ -48,11 +48,11 @@ pub(super) struct Batches {
     secret: Option<Secret>,
     patience: Patience,
     notes: OnceLock<PathBuf>,
-    state: Mutex<State>,
+    state: Mutex<BatchState>,
 }
 
 #[derive(Debug, Default)]
-struct State {
+struct BatchState {
     queue: Vec<(String, Value)>,
     is_gathering: bool,
     waiting: HashMap<String, oneshot::Sender<Outcome>>,

@@ -121,9 +121,9 @@ fn sql_type(ty: &DataType) -> &'static str {
 }
 
 /// The value of a subquery: the value of its only row, or null without a row. `EXISTS` gives true if there is a row.
-fn scalar(context: &mut SQLContext, query: &Query, asked: rewrite::Sought) -> Result<Value, PolarsError> {
+fn scalar(context: &mut SQLContext, query: &Query, asked: rewrite::SubqueryResult) -> Result<Value, PolarsError> {
     let found = run::collect(run::plan(context, &query.to_string())?)?;
-    if asked == rewrite::Sought::Exists {
+    if asked == rewrite::SubqueryResult::Exists {
         return Ok(Value::Boolean(found.height() > 0));
     }
     let (rows, columns) = found.shape();

@@ -277,7 +277,7 @@ fn null_like(key: &Expr) -> Expr {
 
 pub(super) fn substitute<E>(
     statement: &mut Statement,
-    value: impl FnMut(&Query, Sought) -> Result<Value, E>,
+    value: impl FnMut(&Query, SubqueryResult) -> Result<Value, E>,
 ) -> Result<(), E> {
     let with = if let Statement::Query(query) = statement { query.with.clone() } else { None };
     match statement.visit(&mut Substitute { with, value }) {
@@ -287,7 +287,7 @@ pub(super) fn substitute<E>(
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Sought {
+pub(super) enum SubqueryResult {
     /// The value of its only row.
     Value,
     /// True if the subquery has a row.
@@ -299,20 +299,20 @@ struct Substitute<F> {
     value: F,
 }
 
-impl<E, F: FnMut(&Query, Sought) -> Result<Value, E>> VisitorMut for Substitute<F> {
+impl<E, F: FnMut(&Query, SubqueryResult) -> Result<Value, E>> VisitorMut for Substitute<F> {
     type Break = E;
 
     fn post_visit_expr(&mut self, expr: &mut Expr) -> ControlFlow<E> {
         let (query, asked, negated) = match expr {
-            Expr::Subquery(query) => (query, Sought::Value, false),
-            Expr::Exists { subquery, negated } => (subquery, Sought::Exists, *negated),
+            Expr::Subquery(query) => (query, SubqueryResult::Value, false),
+            Expr::Exists { subquery, negated } => (subquery, SubqueryResult::Exists, *negated),
             _ => return ControlFlow::Continue(()),
         };
         if query.with.is_none() {
             query.with.clone_from(&self.with);
         }
         match (self.value)(query, asked) {
-            Ok(Value::Boolean(found)) if asked == Sought::Exists => {
+            Ok(Value::Boolean(found)) if asked == SubqueryResult::Exists => {
                 *expr = Expr::value(Value::Boolean(found != negated));
             }
             Ok(value) => *expr = Expr::value(value),

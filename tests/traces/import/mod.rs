@@ -3,6 +3,8 @@
 mod formats;
 #[cfg(feature = "polars")]
 mod inspect;
+#[cfg(feature = "polars")]
+mod inspect_samples;
 mod palette;
 mod refusals;
 mod round_trip;

@@ -48,7 +48,7 @@ pub(super) struct Line {
 }
 
 /// A step with its whole reply; the longest reply of a model has some hundred thousand bytes.
-const LONGEST_LINE: Limit = Limit::new("bytes in a line of steps", 16 << 20);
+pub(super) const LONGEST_LINE: Limit = Limit::new("bytes in a line of steps", 16 << 20);
 
 /// The limit for piped input, which is stored on disk meanwhile.
 const LARGEST_STREAM: Limit = Limit::new("bytes of steps that are piped in", 64 << 30);

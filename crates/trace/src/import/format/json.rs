@@ -1,4 +1,5 @@
-//! JSON as Python writes it: `NaN` and infinities become null.
+//! JSON as Python writes it: `NaN` becomes null, its word for a missing number, and infinities become texts, which no
+//! column of numbers takes.
 
 use std::io::{self, BufReader, Read};
 
@@ -14,7 +15,7 @@ pub(super) fn from_slice<T: DeserializeOwned>(bytes: &[u8]) -> serde_json::Resul
     }
 }
 
-/// Replaces `NaN`, `Infinity` and `-Infinity` outside of texts by `null`.
+/// Replaces `NaN` outside of texts by `null`, and puts `Infinity` and `-Infinity` in quotes.
 pub(super) struct WithoutNan<R> {
     bytes: io::Bytes<BufReader<R>>,
     pending: Vec<u8>,
@@ -44,12 +45,12 @@ impl<R: Read> WithoutNan<R> {
         self.word(byte)
     }
 
-    /// The first byte of `null`, or of the text if it is not one of the words.
+    /// The first byte of what replaces the word, or of the text if it is not one of the words.
     fn word(&mut self, first: u8) -> io::Result<Option<u8>> {
         let mut word = vec![first];
         while ["NaN", "Infinity", "-Infinity"].iter().any(|whole| whole.as_bytes().starts_with(&word)) {
             if ["NaN", "Infinity", "-Infinity"].iter().any(|whole| whole.as_bytes() == word) {
-                word = b"null".to_vec();
+                word = if word == b"NaN" { b"null".to_vec() } else { [b"\"", &word[..], b"\""].concat() };
                 break;
             }
             match self.bytes.next().transpose()? {
@@ -57,7 +58,7 @@ impl<R: Read> WithoutNan<R> {
                 None => break,
             }
         }
-        self.in_text = word.last() == Some(&b'"');
+        self.in_text = word.last() == Some(&b'"') && !word.starts_with(b"\"");
         self.pending = word.into_iter().rev().collect();
         Ok(self.pending.pop())
     }
@@ -82,9 +83,10 @@ mod tests {
     use super::from_slice;
 
     #[test]
-    fn only_nan_becomes_null() {
+    fn nan_becomes_null_and_infinities_become_texts() {
         let text = r#"{"a":NaN,"b":[-Infinity,Infinity,-1.5],"c":"NaN \" Infinity \\","d":"-","e":NaN}"#;
-        let expected = json!({"a": null, "b": [null, null, -1.5], "c": "NaN \" Infinity \\", "d": "-", "e": null});
+        let expected =
+            json!({"a": null, "b": ["-Infinity", "Infinity", -1.5], "c": "NaN \" Infinity \\", "d": "-", "e": null});
         assert_eq!(from_slice::<Value>(text.as_bytes()).unwrap(), expected);
         for wrong in ["{\"a\":Nan,\"b\":NaN}", "{\"a\":-\"x\",\"b\":NaN}", "{\"a\":NaN", "-Inf"] {
             from_slice::<Value>(wrong.as_bytes()).unwrap_err();

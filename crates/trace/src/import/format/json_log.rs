@@ -69,8 +69,8 @@ impl<'de> Visitor<'de> for &mut JsonLog<'_, '_> {
         let mut number = 0_u64;
         while let Some(sample) = list.next_element::<Map<String, Value>>()? {
             number += 1;
-            if let Err(fault) = log.add(sample, self.rows) {
-                self.failed = Some(fault.into_error(self.rows, &format!("sample {number}")));
+            if let Err(error) = log.add(sample, &format!("sample {number}"), self.rows) {
+                self.failed = Some(error);
                 return Err(A::Error::custom("a sample failed"));
             }
         }

@@ -19,6 +19,7 @@ use serde_json::{Map, Value};
 use super::error::{Fault, ImportError};
 use super::line::{self, BYTE_ORDER_MARK};
 use super::mapping::{Mapping, Row};
+use exact::budget::{Budget, Exceeded, Limit};
 use exact::input;
 use json::WithoutNan;
 
@@ -42,6 +43,12 @@ exact::names!(Format {
     InspectRobots: "inspect-robots",
     LeRobot: "lerobot",
 });
+
+const UNLIMITED: Limit = Limit::new("bytes of rows", u64::MAX);
+
+const fn most_rows(bytes: u64) -> Limit {
+    Limit::new("bytes of rows of a log of its size", 128 << 20).and_beyond(1 << 20, 1024, bytes)
+}
 
 /// The number of bytes that identify the kind of a JSON file.
 const HEAD: u64 = 64 << 10;
@@ -77,6 +84,9 @@ impl Format {
 
     pub(super) fn read(self, mut file: File, rows: &mut RowSink<'_>) -> Result<(), ImportError> {
         file.rewind().map_err(ImportError::read(&rows.file))?;
+        if matches!(self, Self::Inspect | Self::InspectRobots) {
+            rows.budget = Budget::new(most_rows(file.metadata().map_err(ImportError::read(&rows.file))?.len()));
+        }
         match self {
             Self::JsonLines => Ok(()),
             Self::Csv => csv::read(&file, rows),
@@ -97,6 +107,8 @@ pub(super) struct RowSink<'m> {
     /// The first digits of its hash, which keep ids distinct between files that number their episodes from 0.
     pub(super) digits: String,
     pub(super) mapping: &'m mut Mapping,
+    /// Values of a sample or of the whole log are repeated in every row.
+    pub(super) budget: Budget,
     out: BufWriter<File>,
 }
 
@@ -104,12 +116,13 @@ impl<'m> RowSink<'m> {
     pub(super) fn new(file: &str, sha256: &str, mapping: &'m mut Mapping) -> Result<Self, ImportError> {
         let out = tempfile::tempfile().map_err(ImportError::read(file))?;
         let digits = sha256.chars().take(8).collect();
-        Ok(Self { file: file.to_owned(), digits, mapping, out: BufWriter::new(out) })
+        Ok(Self { file: file.to_owned(), digits, mapping, budget: Budget::new(UNLIMITED), out: BufWriter::new(out) })
     }
 
     pub(super) fn add(&mut self, row: &Row<'_>) -> Result<(), ImportError> {
         let mut line = serde_json::to_vec(&self.mapping.flat(row)).unwrap_or_default();
         line.push(b'\n');
+        self.budget.spend(line.len() as u64).map_err(|exceeded| self.over("", &exceeded))?;
         self.write(&line)
     }
 
@@ -131,6 +144,10 @@ impl<'m> RowSink<'m> {
     pub(super) fn fault(&self, part: &str, expected: &str, found: impl Into<String>, help: &str) -> ImportError {
         let file = if part.is_empty() { self.file.clone() } else { format!("{}, {part}", self.file) };
         Fault { file, ..Fault::new(expected, found, help) }.into()
+    }
+
+    pub(super) fn over(&self, part: &str, exceeded: &Exceeded) -> ImportError {
+        self.fault(part, &exceeded.expected(), "more", &Exceeded::help())
     }
 
     pub(super) fn finish(self) -> Result<File, ImportError> {

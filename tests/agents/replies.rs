@@ -286,8 +286,69 @@ fn an_invalid_reply_is_no_decision() {
 }
 
 #[test]
+fn a_whole_object_before_white_space_is_taken_although_the_limit_was_reached() {
+    for (text, repairs) in [
+        (GOOD.to_owned(), vec![]),
+        (format!("{GOOD}{}", "\n\t ".repeat(500)), vec![]),
+        (format!("<think>hm</think>{GOOD}\n\n"), vec![Repair::Thoughts]),
+        (format!("```json\n{GOOD}\n```\n\n"), vec![Repair::CodeFence]),
+    ] {
+        let reading = reply::read(&text, &Experiment::E1, Ending::Truncated);
+        assert_eq!((reading.action, reading.repairs), (Some(Action::TurnLeft), repairs), "{text}");
+    }
+}
+
+/// The marks around thoughts, as servers leave them in a reply: before the thoughts, after them, and after the answer.
+const MARKS: [[&str; 3]; 22] = [
+    ["<think>", "</think>", ""],
+    ["<THINK>", "</THINK>", ""],
+    ["<think effort=\"high\">", "</think >", ""],
+    ["<thinking>", "</thinking>", ""],
+    ["<thought>", "</thought>", ""],
+    ["<reasoning>", "</reasoning>", ""],
+    ["<seed:think>", "</seed:think>", ""],
+    ["[THINK]", "[/THINK]", ""],
+    ["\u{25c1}think\u{25b7}", "\u{25c1}/think\u{25b7}", ""],
+    ["<|begin_of_thought|>", "<|end_of_thought|>\n<|begin_of_solution|>", "<|end_of_solution|>"],
+    ["<|START_THINKING|>", "<|END_THINKING|><|START_RESPONSE|>", "<|END_RESPONSE|>"],
+    ["<|inner_prefix|>", "<|inner_suffix|>", ""],
+    ["<|channel>thought\n", "<channel|>", ""],
+    ["<|channel>thought\n", "<channel|>", "<turn|>"],
+    ["<|channel|>analysis<|message|>", "<|end|>", ""],
+    ["<|channel|>analysis<|message|>", "<|end|>", "<|end|>"],
+    ["<|channel|>analysis<|message|>", "<|end|><|start|>assistant<|channel|>final<|message|>", "<|return|>"],
+    ["<|channel|>analysis<|message|>", "<|start|>assistant<|channel|>final <|constrain|>json<|message|>", "<|end|>"],
+    ["<|start|>assistant<|channel|>analysis<|message|>", "<|end|><|start|>assistant<|channel|>final<|message|>", ""],
+    ["<|channel|>commentary<|message|>", "<|end|><|start|>assistant<|channel|>final<|message|>", ""],
+    ["analysisWe think. ", "assistantfinal", ""],
+    ["<unused94>thought\n", "<unused95>", ""],
+];
+
+#[test]
+fn thoughts_in_any_marks_are_no_answer_and_the_answer_behind_them_is_taken() {
+    let draft = draft();
+    for [opening, closing, end] in MARKS {
+        let thoughts = format!("{opening}A draft: {draft} but I should look first.");
+        for none in
+            [thoughts.clone(), format!("{thoughts}{closing}"), format!("{opening}{draft}"), format!("\n{thoughts}")]
+        {
+            let reading = read(&none);
+            assert_eq!(reading.action, None, "{none}");
+            assert!([Status::Empty, Status::Truncated].contains(&reading.status), "{none}: {:?}", reading.status);
+        }
+        for answered in [format!("{thoughts}{closing}{GOOD}{end}"), format!("{opening}{closing}\n{GOOD}{end}\n")] {
+            let reading = read(&answered);
+            assert_eq!(reading.action, Some(Action::TurnLeft), "{answered}: {:?}", reading.fault);
+            assert_eq!(reading.repairs, [Repair::Thoughts], "{answered}");
+        }
+    }
+}
+
+#[test]
 fn an_ending_counts_before_the_text() {
-    assert_eq!(reply::read(GOOD, &Experiment::E1, Ending::Truncated).status, Status::Truncated);
+    for cut in [&GOOD[..GOOD.len() - 1], &format!("{GOOD} and"), &format!("{GOOD}{GOOD}"), &format!("<think>{GOOD}")] {
+        assert_eq!(reply::read(cut, &Experiment::E1, Ending::Truncated).status, Status::Truncated, "{cut}");
+    }
     assert_eq!(reply::read(GOOD, &Experiment::E1, Ending::Refused).status, Status::Refusal);
     assert_eq!(reply::read("", &Experiment::E1, Ending::Truncated).status, Status::Truncated);
 }

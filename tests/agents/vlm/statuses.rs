@@ -61,7 +61,11 @@ fn replies_end_in_their_status_with_every_provider() {
                 ("a key twice", text(&twice), Status::SchemaInvalid),
                 ("another action", text(&decision("jump")), Status::SchemaInvalid),
                 ("cut off", ok(&spoken(dialect, &decision("w")[..20], length)), Status::Truncated),
-                ("cut off when whole", ok(&spoken(dialect, &decision("w"), length)), Status::Truncated),
+                (
+                    "white space up to the limit",
+                    ok(&spoken(dialect, &format!("{}\n\n\n", decision("w")), length)),
+                    Status::Ok,
+                ),
                 ("no text", text(""), Status::Empty),
                 ("blanks", text(" \n\t"), Status::Empty),
             ],
@@ -111,6 +115,14 @@ fn failures_of_the_server_end_in_their_status_with_every_provider() {
                 ("429 with seconds", too_many("retry-after: 0\r\n"), Status::RateLimited),
                 ("429 with a date", too_many("retry-after: Sun, 06 Nov 1994 08:49:37 GMT\r\n"), Status::RateLimited),
                 ("429 with nonsense", too_many("retry-after: -1 soon\r\n"), Status::RateLimited),
+                (
+                    "429 with a list",
+                    http("429 Too Many Requests", JSON, br#"[{"error": {"code": 429}}]"#),
+                    Status::RateLimited,
+                ),
+                ("429 with a text", http("429 Too Many Requests", JSON, br#""slow down""#), Status::RateLimited),
+                ("429 with a number", http("429 Too Many Requests", JSON, b"429"), Status::RateLimited),
+                ("429 with an exponent", too_many("retry-after: 1e3\r\n"), Status::RateLimited),
                 ("429 cut", cut("429 Too Many Requests"), Status::RateLimited),
                 ("429 and huge", http("429 Too Many Requests", "", &huge), Status::RateLimited),
                 ("408", http("408 Request Timeout", "", b""), Status::Timeout),
@@ -180,6 +192,42 @@ fn refusals_and_empty_answers_have_each_providers_own_form() {
             ("a window too small", anthropic(json!([]), "model_context_window_exceeded"), Status::Truncated),
         ],
     );
+}
+
+#[test]
+fn reasons_of_other_providers_are_understood_in_every_wire_format() {
+    for dialect in PROVIDERS {
+        let cut = &decision("w")[..20];
+        let ended = |reason: &str| ok(&spoken(dialect, cut, reason));
+        let cases = [
+            ("length", Status::Truncated),
+            ("MAX_TOKENS", Status::Truncated),
+            ("max_tokens", Status::Truncated),
+            ("content_filter", Status::Refusal),
+            ("SAFETY", Status::Refusal),
+            ("RECITATION", Status::Refusal),
+            ("refusal", Status::Refusal),
+            ("end_turn", Status::ParseFailed),
+            ("STOP", Status::ParseFailed),
+        ];
+        check(dialect, cases.into_iter().map(|(reason, status)| (reason, ended(reason), status)).collect());
+    }
+}
+
+#[test]
+fn a_text_that_the_provider_could_not_validate_is_a_step_without_a_decision() {
+    let rejected = |code: &str, text: &str| {
+        let error =
+            json!({ "error": { "message": "Failed to generate JSON.", "code": code, "failed_generation": text } });
+        http("400 Bad Request", JSON, error.to_string().as_bytes())
+    };
+    for dialect in PROVIDERS {
+        let cases = vec![
+            ("invalid JSON", rejected("json_validate_failed", "{\"action\": "), Status::ParseFailed),
+            ("a failed call", rejected("tool_use_failed", "<function=reply>"), Status::ParseFailed),
+        ];
+        check(dialect, cases);
+    }
 }
 
 #[test]

@@ -38,7 +38,7 @@ use trace::palette::Color;
 pub enum Ending {
     #[default]
     Whole,
-    /// Cut off by the token limit.
+    /// Cut off by the token limit: no decision, unless only white space follows a whole object.
     Truncated,
     /// Declined by the model or a filter around it.
     Refused,
@@ -97,14 +97,18 @@ impl Reply {
 
 /// Parses a reply's text by the keys and actions of an experiment. Its text and its cost are left out.
 pub fn read(raw: &str, experiment: &Spec, ending: Ending) -> Reply {
+    let is_truncated = ending == Ending::Truncated;
+    // Some models fill the rest of their limit with white space: then the object is whole.
+    let has_cut_words = !raw.trim_end_matches(|c: char| c.is_whitespace() || c == '`').ends_with('}');
     match ending {
         Ending::Refused => return Reply::without_decision(Status::Refusal, None),
-        Ending::Truncated => return Reply::without_decision(Status::Truncated, None),
-        Ending::Whole if raw.trim().is_empty() => return Reply::without_decision(Status::Empty, None),
-        Ending::Whole => {}
+        Ending::Truncated if has_cut_words => return Reply::without_decision(Status::Truncated, None),
+        _ if raw.trim().is_empty() => return Reply::without_decision(Status::Empty, None),
+        _ => {}
     }
     let (object, mut repairs) = match repair::object(raw) {
         Ok(found) => found,
+        Err(_) if is_truncated => return Reply::without_decision(Status::Truncated, None),
         Err(fault) => return without_object(fault),
     };
     match decision(&object, experiment) {
@@ -120,7 +124,7 @@ pub fn read(raw: &str, experiment: &Spec, ending: Ending) -> Reply {
 fn without_object(fault: NoObject) -> Reply {
     let (status, fault) = match fault {
         NoObject::Unreadable(fault) => (Status::ParseFailed, Some(fault)),
-        NoObject::OpenThoughts => (Status::Truncated, Some("the reply ends within <think>".to_owned())),
+        NoObject::OpenThoughts => (Status::Truncated, Some("the reply ends within its thoughts".to_owned())),
         NoObject::ThoughtsAlone => (Status::Empty, None),
     };
     Reply::without_decision(status, fault)

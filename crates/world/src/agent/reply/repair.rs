@@ -17,7 +17,7 @@ use exact::names;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Repair {
     CodeFence,
-    /// Thoughts, which end with `</think>`, preceded the object.
+    /// Thoughts, such as `<think>...</think>`, preceded the object.
     Thoughts,
     /// There was text before or after the object.
     SurroundingText,

@@ -1,12 +1,69 @@
-//! A reasoning model's thoughts before its answer, `<think>...</think>`.
+//! A reasoning model's thoughts before its answer, such as `<think>...</think>`.
 //!
-//! Servers that separate them send none. Others send them in the text, some without the opening tag, since it is the
+//! Servers that separate them send none. Others send them in the text, some without the opening mark, since it is the
 //! end of their prompt.
 //!
 //! Rule: the content of thoughts is no answer, not even a whole object.
 
-const OPENING: &str = "<think>";
-const CLOSING: &str = "</think>";
+use std::sync::LazyLock;
+
+use regex::Regex;
+
+/// A mark that no text has.
+const NEVER: &str = r"[^\s\S]";
+
+/// Each kind of thoughts: the opening mark; the closing mark, which counts without an opening one too; the mark that
+/// closes opened thoughts if there is no other. Closing marks include the header of the answer.
+const MARKS: [[&str; 3]; 7] = [
+    // Qwen, DeepSeek, EXAONE, Seed and others; tags may have a prefix (`seed:think`) and attributes.
+    [
+        r"<(?:[\w-]+:)?(?:think|thinking|thoughts?|reasoning|reflection|scratchpad)(?:\s[^<>]*)?>",
+        r"</(?:[\w-]+:)?(?:think|thinking|thoughts?|reasoning|reflection|scratchpad)\s*>",
+        NEVER,
+    ],
+    // Mistral.
+    [r"\[think(?:ing)?\]", r"\[/think(?:ing)?\]", NEVER],
+    // Kimi.
+    [r"\x{25c1}think(?:ing)?\x{25b7}", r"\x{25c1}/think(?:ing)?\x{25b7}", NEVER],
+    // Harmony (gpt-oss), with every channel but the final one; Gemma 4, `<|channel>thought` to `<channel|>`.
+    [
+        r"<\|?channel\|?>\s*(?:analysis|commentary|thoughts?|think|thinking|reasoning)\b",
+        r"<\|channel\|?>\s*final\b[^<{]*(?:<\|constrain\|>[^<{]*)?(?:<\|message\|>)?",
+        r"<\|end\|>|<channel\|>",
+    ],
+    // Harmony without its special tokens: `analysisWe need ...assistantfinal{...}`.
+    [r"^(?:assistant)?(?:analysis|commentary)(?-i:[A-Z{])", NEVER, r"assistant\s*final"],
+    // OpenThinker, Command A, Apertus, Solar.
+    [
+        r"<\|(?:begin_of_thought|start_thinking|inner_prefix|think(?:ing)?)\|>",
+        r"<\|(?:end_of_thought|end_thinking|inner_suffix|/think(?:ing)?)\|>\s*(?:<\|(?:begin_of_solution|start_response|start_text)\|>)?",
+        r"<\|end\|>",
+    ],
+    // MedGemma.
+    ["<unused94>", "<unused95>", NEVER],
+];
+
+/// The mark of the answer's end in the formats that mark its beginning.
+const END: &str = r"(?:<\|(?:return|end|end_of_solution|end_response|end_text)\|>|<turn\|>)$";
+
+struct Kind {
+    opening: Regex,
+    closing: Regex,
+    weak: Regex,
+}
+
+static KINDS: LazyLock<Vec<Kind>> = LazyLock::new(|| {
+    let kind = |[opening, closing, weak]: [&str; 3]| {
+        Some(Kind { opening: compiled(opening)?, closing: compiled(closing)?, weak: compiled(weak)? })
+    };
+    MARKS.into_iter().filter_map(kind).collect()
+});
+
+static ENDS: LazyLock<Option<Regex>> = LazyLock::new(|| compiled(END));
+
+fn compiled(mark: &str) -> Option<Regex> {
+    Regex::new(&format!("(?i){mark}")).ok()
+}
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Thoughts<'a> {
@@ -19,17 +76,51 @@ pub(super) enum Thoughts<'a> {
 
 /// Removes the thoughts from a text.
 ///
-/// They end with the last closing tag, so thoughts may mention the tag. An opening tag counts only before the first
-/// brace: later ones may be in the answer's strings.
+/// They end with the last closing mark of their kind, so thoughts may mention the mark. An opening mark counts only
+/// before the first brace: later ones may be in the answer's strings.
 pub(super) fn of(text: &str) -> Thoughts<'_> {
-    let after = text.rfind(CLOSING).map(|at| text[at + CLOSING.len()..].trim());
-    let rest = after.unwrap_or(text);
-    let before_brace = rest.split('{').next().unwrap_or_default();
-    match after {
-        _ if before_brace.contains(OPENING) => Thoughts::Open,
-        Some(answer) => Thoughts::Before(answer),
-        None => Thoughts::None,
+    let (mut rest, mut found) = (text, Thoughts::None);
+    loop {
+        let end = match opened(rest) {
+            Some((kind, after)) => match kind.end(&rest[after..]) {
+                Some(end) => after + end,
+                None => return Thoughts::Open,
+            },
+            None => match KINDS.iter().filter_map(|kind| last(&kind.closing, rest)).max() {
+                Some(end) => end,
+                None => return found,
+            },
+        };
+        rest = without_end(&rest[end..]);
+        found = Thoughts::Before(rest);
     }
+}
+
+/// The kind of the first opening mark before the first brace, and the mark's end.
+fn opened(text: &str) -> Option<(&'static Kind, usize)> {
+    let brace = text.find('{').unwrap_or(text.len());
+    let marks = KINDS.iter().filter_map(|kind| Some((kind.opening.find(text)?, kind)));
+    let first = marks.filter(|(mark, _)| mark.start() < brace).min_by_key(|(mark, _)| mark.start());
+    first.map(|(mark, kind)| (kind, mark.end()))
+}
+
+impl Kind {
+    /// The end of opened thoughts.
+    fn end(&self, text: &str) -> Option<usize> {
+        let has_more = |end: &usize| !without_end(&text[*end..]).is_empty();
+        let weak = || self.weak.find_iter(text).map(|mark| mark.end()).filter(has_more).last();
+        last(&self.closing, text).or_else(weak).or_else(|| last(&self.weak, text))
+    }
+}
+
+fn last(mark: &Regex, text: &str) -> Option<usize> {
+    mark.find_iter(text).last().map(|mark| mark.end())
+}
+
+fn without_end(text: &str) -> &str {
+    let text = text.trim();
+    let end = ENDS.as_ref().and_then(|ends| ends.find(text));
+    end.map_or(text, |end| text[..end.start()].trim())
 }
 
 #[cfg(test)]
@@ -52,6 +143,18 @@ mod tests {
             ("<think>a</think><think>b {}", Thoughts::Open),
             ("{\"a\": \"<think>\"}", Thoughts::None),
             ("<think>hm</think>{\"a\": \"<think>\"}", Thoughts::Before("{\"a\": \"<think>\"}")),
+            ("{} <|end|>", Thoughts::None),
+            ("<think>a [THINK] {1}</think>{}", Thoughts::Before("{}")),
+            ("<think>a</think>[THINK]{1}[/THINK]{}", Thoughts::Before("{}")),
+            ("<|channel|>analysis<|message|>{1}<|end|>{}<|end|>", Thoughts::Before("{}")),
+            (
+                "<|channel|>analysis<|message|>{1}<|end|><|start|>assistant<|channel|>commentary<|message|>{2}",
+                Thoughts::Open,
+            ),
+            (
+                "{1}<|end|><|start|>assistant<|channel|>final <|constrain|>json<|message|>{}<|return|>",
+                Thoughts::Before("{}"),
+            ),
         ] {
             assert_eq!(of(text), expected, "{text}");
         }

@@ -7,6 +7,7 @@ use serde_json::Value;
 
 use super::parameter;
 use crate::agent::Status;
+use crate::agent::vlm::wire_format::error_of;
 
 const SEES: &str = "\n  help: choose a model that sees; a server of one's own may have to be started with the model's part \
                     for images (llama.cpp: --mmproj FILE)";
@@ -131,7 +132,7 @@ pub(crate) fn no_answer(body: &str) -> Failure {
     let kind = if takes_no_images(body) { FailureKind::NoImages } else { FailureKind::Server };
     let detail = format!("the answer is not of the provider's language: {}", shortened(body));
     // Routers report with status 200 that no model answered.
-    let is_error = serde_json::from_str::<Value>(body).is_ok_and(|body| body.get("error").is_some());
+    let is_error = serde_json::from_str::<Value>(body).is_ok_and(|body| error_of(&body).is_some());
     Failure { kind, detail, after: None, may_be_paid: !is_error }
 }
 
@@ -171,8 +172,8 @@ fn takes_no_images(body: &str) -> bool {
 /// Returns true if too many requests means that the account has no credit left; waiting does not help.
 fn is_out_of_credit(body: &str) -> bool {
     const CODE: &str = "insufficient_quota";
-    let error = serde_json::from_str::<Value>(body).map(|mut body| body["error"].take()).unwrap_or_default();
-    error["code"] == CODE || error["type"] == CODE
+    let body = serde_json::from_str::<Value>(body).unwrap_or_default();
+    error_of(&body).is_some_and(|error| error["code"] == CODE || error["type"] == CODE)
 }
 
 /// Returns true if the server is up but overloaded. Anthropic uses status 529; Gemini says it with 503 ("The model is
@@ -199,7 +200,11 @@ mod tests {
         let kind = |body| failed(StatusCode::TOO_MANY_REQUESTS, None, body).kind;
         assert_eq!(kind(r#"{"error": {"code": "insufficient_quota"}}"#), FailureKind::Denied);
         assert_eq!(kind(r#"{"error": {"code": "rate_limit_exceeded"}}"#), FailureKind::RateLimited);
-        assert_eq!(kind("slow down"), FailureKind::RateLimited);
+        assert_eq!(kind(r#"[{"error": {"code": "insufficient_quota"}}]"#), FailureKind::Denied);
+        for other in ["slow down", "\"slow down\"", "429", "null", "true", "[]", "{}", r#"[{"error": {"code": 429}}]"#]
+        {
+            assert_eq!(kind(other), FailureKind::RateLimited, "{other}");
+        }
     }
 
     #[test]

@@ -27,7 +27,6 @@ pub(super) use waiting::Waiting;
 use super::models::Backend;
 use super::secrets::Secret;
 use super::wire_format::{Dialect, ModelAnswer};
-use crate::agent::reply::Ending;
 use crate::record::plan::slug;
 use batch::Batches;
 use concurrency::{Pace, Permit};
@@ -247,7 +246,7 @@ impl Provider {
         Ok(Received { rate_limits, ..received(self.secret.as_ref(), answer, text, latency) })
     }
 
-    /// The refusal in an error about the request's content. Providers send it as a bad request, routers also as a
+    /// The answer in an error about the content. Providers send it as a bad request, routers also as a
     /// forbidden one.
     fn declined(&self, status: StatusCode, said: &str) -> Option<ModelAnswer> {
         const ABOUT_CONTENT: [StatusCode; 3] =
@@ -255,8 +254,7 @@ impl Provider {
         if !ABOUT_CONTENT.contains(&status) {
             return None;
         }
-        let answer = self.dialect.read(said).ok()??;
-        (answer.ending == Ending::Refused).then_some(answer)
+        self.dialect.declined(said)
     }
 }
 

@@ -8,6 +8,8 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
 
+use crate::agent::vlm::wire_format::error_of;
+
 /// The name of a limit's header, by the unit that it counts: `OpenAI` and compatible servers, then Anthropic.
 const HEADERS: [fn(&str, &str) -> String; 2] = [
     |counts, what| format!("x-ratelimit-{what}-{counts}"),
@@ -30,7 +32,7 @@ pub struct RateLimit {
 pub(super) fn stated(headers: &HeaderMap) -> Vec<RateLimit> {
     let limit = |header: fn(&str, &str) -> String, counts: &str| {
         let text = |what: &str| headers.get(header(counts, what))?.to_str().ok().map(str::trim);
-        let number = |what: &str| text(what)?.parse().ok().filter(|number: &f64| number.is_finite());
+        let number = |what: &str| text(what).and_then(decimal);
         let (remaining, renewed) = (number("remaining")?, text("reset").map(str::to_owned));
         Some(RateLimit { counts: counts.to_owned(), remaining, limit: number("limit"), renewed })
     };
@@ -73,30 +75,34 @@ fn until(reset: &str) -> Option<Duration> {
     Duration::try_from_secs_f64(all).ok().filter(|_| !reset.is_empty())
 }
 
+/// A number of digits, with a point or without. Rust's parser also takes `1e3` and `inf`, which no header means.
+fn decimal(text: &str) -> Option<f64> {
+    let is_decimal = text.bytes().all(|byte| byte.is_ascii_digit() || byte == b'.');
+    text.parse().ok().filter(|_| is_decimal)
+}
+
 /// The wait requested in an error's body: Gemini sends `google.rpc.RetryInfo`, in seconds with an `s`. Source:
 /// <https://github.com/googleapis/googleapis/blob/master/google/rpc/error_details.proto>, duration in JSON.
 pub(super) fn retry_info(body: &str) -> Option<Duration> {
     let body: Value = serde_json::from_str(body).ok()?;
-    let error = body.get("error").or_else(|| body.get(0)?.get("error"))?;
-    let info = error["details"]
+    let info = error_of(&body)?["details"]
         .as_array()?
         .iter()
         .find(|detail| detail["@type"].as_str().is_some_and(|name| name.ends_with("google.rpc.RetryInfo")))?;
-    let seconds = info["retryDelay"].as_str()?.strip_suffix('s')?.parse().ok()?;
+    let seconds = info["retryDelay"].as_str()?.strip_suffix('s').and_then(decimal)?;
     Duration::try_from_secs_f64(seconds).ok()
 }
 
 /// The wait in headers: milliseconds, as `OpenAI`'s own client reads them; seconds, whole or not; or a date. A past
 /// date means no wait, other text is ignored, and a number too large for a duration means the longest.
 pub(super) fn retry_after(headers: &HeaderMap) -> Option<Duration> {
-    let milliseconds = headers.get("retry-after-ms").and_then(|value| value.to_str().ok()?.trim().parse::<f64>().ok());
+    let milliseconds = headers.get("retry-after-ms").and_then(|value| decimal(value.to_str().ok()?.trim()));
     if let Some(wait) = milliseconds.and_then(|wait| Duration::try_from_secs_f64(wait / 1e3).ok()) {
         return Some(wait);
     }
     let value = headers.get(RETRY_AFTER)?.to_str().ok()?.trim();
-    if let Ok(seconds) = value.parse::<f64>() {
-        let is_wait = seconds >= 0.0;
-        return is_wait.then(|| Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX));
+    if let Some(seconds) = decimal(value) {
+        return Some(Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX));
     }
     let date = httpdate::parse_http_date(value).ok()?;
     Some(date.duration_since(SystemTime::now()).unwrap_or_default())
@@ -122,7 +128,7 @@ mod tests {
         assert_eq!(asked("Sun, 06 Nov 1994 08:49:37 GMT"), Some(Duration::ZERO));
         assert!(asked("Fri, 31 Dec 9999 23:59:59 GMT").is_some_and(|wait| wait > Duration::from_hours(24)));
         assert_eq!(asked("99999999999999999999999999"), Some(Duration::MAX));
-        for nothing in ["-1", "NaN", "soon", ""] {
+        for nothing in ["-1", "NaN", "inf", "infinity", "1e3", "1E3", "0x10", "+5", "1_000", "2s", ".", "soon", ""] {
             assert_eq!(asked(nothing), None, "{nothing:?}");
         }
         assert_eq!(retry_after(&HeaderMap::new()), None);

@@ -2,6 +2,7 @@
 
 use serde_json::{Value, json};
 
+use super::refusal::ending;
 use super::{ModelAnswer, Question, text, text_or_call, tokens};
 use crate::agent::reply::Ending;
 
@@ -29,22 +30,16 @@ pub(super) fn body(question: &Question<'_>) -> Value {
 }
 
 pub(super) fn answer(body: &Value) -> Option<ModelAnswer> {
-    let is_refused = body["stop_reason"] == "refusal";
+    let ending = ending(&body["stop_reason"]);
     let blocks = match body.get("content").filter(|content| !content.is_null()) {
         Some(content) => content.as_array()?.as_slice(),
-        None if is_refused => &[],
+        None if ending == Ending::Refused => &[],
         None => return None,
     };
     let words = blocks.iter().filter(|block| block["type"] == "text").filter_map(|block| block["text"].as_str());
-    let ending = match body["stop_reason"].as_str() {
-        Some("max_tokens" | "model_context_window_exceeded") => Ending::Truncated,
-        _ if is_refused => Ending::Refused,
-        _ => Ending::Whole,
-    };
     let usage = &body["usage"];
-    let calls: Vec<_> =
-        blocks.iter().filter(|block| block["type"] == "tool_use").map(|block| block["input"].to_string()).collect();
-    let (text_of_reply, repairs) = text_or_call(words.collect(), &calls);
+    let calls = blocks.iter().filter(|block| block["type"] == "tool_use").map(|block| &block["input"]);
+    let (text_of_reply, repairs) = text_or_call(words.collect(), calls);
     Some(ModelAnswer {
         text: text_of_reply,
         repairs,

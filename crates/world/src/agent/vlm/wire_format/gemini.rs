@@ -2,6 +2,7 @@
 
 use serde_json::{Value, json};
 
+use super::refusal::ending;
 use super::{Effort, ModelAnswer, Question, text, text_or_call, tokens};
 use crate::agent::reply::{Ending, Repair};
 
@@ -42,19 +43,6 @@ fn thinking(model: &str, effort: Effort) -> Value {
     json!({ "thinkingBudget": budget })
 }
 
-/// The finish reasons of a candidate that mean a refusal.
-const REFUSALS: [&str; 9] = [
-    "SAFETY",
-    "RECITATION",
-    "BLOCKLIST",
-    "PROHIBITED_CONTENT",
-    "SPII",
-    "IMAGE_SAFETY",
-    "IMAGE_PROHIBITED_CONTENT",
-    "IMAGE_RECITATION",
-    "MODEL_ARMOR",
-];
-
 pub(super) fn answer(body: &Value) -> Option<ModelAnswer> {
     let blocked = body["promptFeedback"]["blockReason"].as_str();
     let candidates = body.get("candidates").map(|candidates| candidates.as_array());
@@ -64,11 +52,9 @@ pub(super) fn answer(body: &Value) -> Option<ModelAnswer> {
         // A complete answer without candidates has at least its usage.
         (None, None) => body.get("usageMetadata").map(|_| None)?,
     };
-    let ending = match (blocked, first.and_then(|candidate| candidate["finishReason"].as_str())) {
-        (Some(_), _) => Ending::Refused,
-        (None, Some("MAX_TOKENS")) => Ending::Truncated,
-        (None, Some(reason)) if REFUSALS.contains(&reason) => Ending::Refused,
-        (None, _) => Ending::Whole,
+    let ending = match blocked {
+        Some(_) => Ending::Refused,
+        None => first.map_or(Ending::Whole, |candidate| ending(&candidate["finishReason"])),
     };
     let usage = &body["usageMetadata"];
     let completion = [&usage["candidatesTokenCount"], &usage["thoughtsTokenCount"]].map(tokens);
@@ -92,7 +78,5 @@ pub(super) fn answer(body: &Value) -> Option<ModelAnswer> {
 fn words(candidate: &Value) -> (String, Vec<Repair>) {
     let parts = candidate["content"]["parts"].as_array().map(Vec::as_slice).unwrap_or_default();
     let words = parts.iter().filter(|part| part["thought"] != true).filter_map(|part| part["text"].as_str()).collect();
-    let calls = parts.iter().filter_map(|part| part.get("functionCall"));
-    let calls: Vec<_> = calls.map(|call| call["args"].to_string()).collect();
-    text_or_call(words, &calls)
+    text_or_call(words, parts.iter().map(|part| &part["functionCall"]["args"]))
 }

@@ -158,8 +158,15 @@ impl Dialect {
         }))
     }
 
+    /// The answer in an error's body: a refusal, or a reply that the provider could not validate.
+    pub(crate) fn declined(self, body: &str) -> Option<ModelAnswer> {
+        let answer = self.read(body).ok()??;
+        let is_reply = || serde_json::from_str(body).is_ok_and(|body| refusal::answer(&body).is_some());
+        (answer.ending == Ending::Refused || is_reply()).then_some(answer)
+    }
+
     /// The content of an answer's body; `None` if it has another format. An error that refuses the request's content is
-    /// an answer, too.
+    /// an answer, too, and so is one with the model's text.
     pub fn answer(self, body: &Value) -> Option<ModelAnswer> {
         let answer = match self {
             Self::OpenaiChat | Self::OpenaiCompatible => openai::answer(body),
@@ -170,15 +177,26 @@ impl Dialect {
     }
 }
 
-fn text_or_call(text: String, calls: &[String]) -> (String, Vec<Repair>) {
-    match calls {
-        [arguments] if text.trim().is_empty() => (arguments.clone(), vec![Repair::ToolCall]),
+/// The error in a body; some providers put it into a list.
+pub(crate) fn error_of(body: &Value) -> Option<&Value> {
+    body.get("error").or_else(|| body.get(0)?.get("error"))
+}
+
+/// A text, or the arguments of the only call of a function: an object, or its JSON as a string.
+fn text_or_call<'a>(text: String, arguments: impl Iterator<Item = &'a Value>) -> (String, Vec<Repair>) {
+    let calls: Vec<_> = arguments.filter(|arguments| !arguments.is_null()).collect();
+    match calls[..] {
+        [Value::String(arguments)] if text.trim().is_empty() => (arguments.clone(), vec![Repair::ToolCall]),
+        [arguments] if text.trim().is_empty() => (arguments.to_string(), vec![Repair::ToolCall]),
         _ => (text, Vec::new()),
     }
 }
 
+/// A count, which some servers write as `100.0`.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a whole number below 2^32")]
 fn tokens(value: &Value) -> Option<u32> {
-    value.as_u64().and_then(|count| u32::try_from(count).ok())
+    let count = value.as_f64().filter(|count| count.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(count));
+    count.map(|count| count as u32)
 }
 
 fn text(value: &Value) -> Option<String> {

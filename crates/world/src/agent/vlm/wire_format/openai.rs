@@ -2,6 +2,7 @@
 
 use serde_json::{Value, json};
 
+use super::refusal::ending;
 use super::{ModelAnswer, Question, text, text_or_call, tokens};
 use crate::agent::reply::Ending;
 
@@ -36,15 +37,13 @@ pub(super) fn body(question: &Question<'_>, limit: &str) -> Value {
 pub(super) fn answer(body: &Value) -> Option<ModelAnswer> {
     let choices = body.get("choices")?.as_array()?;
     // A router that lost its provider in the middle of an answer reports it in the choice, beside a partial text.
-    if choices.first().is_some_and(|choice| choice["finish_reason"] == "error" || choice["error"].is_object()) {
+    let is_error = |reason: &Value| reason.as_str().is_some_and(|reason| reason.eq_ignore_ascii_case("error"));
+    if choices.first().is_some_and(|choice| is_error(&choice["finish_reason"]) || choice["error"].is_object()) {
         return None;
     }
     let usage = &body["usage"];
     let (reply, ending) = choices.first().map_or((String::new(), Ending::Whole), reply);
-    let calls = choices.first().and_then(|choice| choice["message"]["tool_calls"].as_array());
-    let arguments = |call: &Value| call["function"]["arguments"].as_str().map(str::to_owned);
-    let calls: Vec<_> = calls.into_iter().flatten().filter_map(arguments).collect();
-    let (reply, repairs) = text_or_call(reply, &calls);
+    let (reply, repairs) = text_or_call(reply, choices.first().into_iter().flat_map(arguments));
     Some(ModelAnswer {
         text: reply,
         repairs,
@@ -60,18 +59,27 @@ pub(super) fn answer(body: &Value) -> Option<ModelAnswer> {
 fn reply(choice: &Value) -> (String, Ending) {
     let message = &choice["message"];
     let refusal = message["refusal"].as_str().filter(|words| !words.is_empty());
-    let ending = match (refusal, choice["finish_reason"].as_str()) {
-        (Some(_), _) | (None, Some("content_filter" | "refusal")) => Ending::Refused,
-        (None, Some("length")) => Ending::Truncated,
-        _ => Ending::Whole,
-    };
+    let ending = if refusal.is_some() { Ending::Refused } else { ending(&choice["finish_reason"]) };
     (content(&message["content"]).or_else(|| refusal.map(str::to_owned)).unwrap_or_default(), ending)
 }
 
+/// The arguments of calls of functions; `function_call` is the older form of a single one.
+fn arguments(choice: &Value) -> Vec<&Value> {
+    let message = &choice["message"];
+    match message["tool_calls"].as_array().map(Vec::as_slice) {
+        None | Some([]) => vec![&message["function_call"]["arguments"]],
+        Some(calls) => calls.iter().map(|call| &call["function"]["arguments"]).collect(),
+    }
+}
+
+/// The text of a message, without parts that hold its reasoning.
 fn content(content: &Value) -> Option<String> {
     match content {
         Value::String(text) => Some(text.clone()),
-        Value::Array(parts) => Some(parts.iter().filter_map(|part| part["text"].as_str()).collect()),
+        Value::Array(parts) => {
+            let is_text = |part: &&Value| part["type"].as_str().is_none_or(|kind| kind.ends_with("text"));
+            Some(parts.iter().filter(is_text).filter_map(|part| part["text"].as_str()).collect())
+        }
         _ => None,
     }
 }

@@ -4,6 +4,8 @@ use std::fs;
 use std::path::Path;
 use std::process::Output;
 
+use base64::Engine as _;
+use base64::engine::general_purpose::{STANDARD, URL_SAFE_NO_PAD};
 use world::agent::vlm::OnOutage;
 use world::agent::vlm::limits::Limits;
 use world::agent::vlm::wire_format::Dialect;
@@ -87,6 +89,28 @@ fn a_key_echoed_by_the_server_is_not_printed_or_stored() {
     });
     check(&server, KEY, "");
     assert_eq!(server.count(), 1);
+}
+
+#[test]
+fn a_key_in_another_form_is_not_printed_or_stored() {
+    let hex: String = KEY.bytes().map(|byte| format!("{byte:02X}")).collect();
+    let percent: String = KEY.bytes().map(|byte| format!("%{byte:02x}")).collect();
+    let reversed: String = KEY.chars().rev().collect();
+    let forms = [hex.to_lowercase(), hex, percent, reversed, STANDARD.encode(KEY), URL_SAFE_NO_PAD.encode(KEY)];
+    for form in &forms {
+        let echo = serde_json::json!({ "error": format!("your key {form} is wrong") }).to_string();
+        let words = decision("done").replace("a wall", form);
+        let server = Server::start(move |at, _| match at {
+            0 => http("500 Internal Server Error", JSON, echo.as_bytes()),
+            1 => whole(Dialect::OpenaiChat, &words),
+            _ => http("401 Unauthorized", JSON, echo.as_bytes()),
+        });
+        let bench = Bench::new(Limits::default());
+        let vlm = bench.vlm(&server, Dialect::OpenaiChat, OnOutage::Lose);
+        let replies = Bench::play(&vlm, "episode", 2);
+        let told = format!("{replies:?}{}", bench.written());
+        assert!(!told.contains(form) && told.contains("[key]"), "{form}: {told}");
+    }
 }
 
 #[test]

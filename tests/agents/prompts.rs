@@ -1,5 +1,6 @@
 //! The prompts match the paper word for word; `tests/agents/prompts` holds its verbatim blocks.
 
+use std::fs;
 use std::sync::Arc;
 
 use trace::episode::Action;
@@ -7,6 +8,7 @@ use trace::frame::Frame;
 use world::agent::prompt::{self, Prompt};
 use world::agent::{Observation, Past, Task};
 use world::experiment::Experiment;
+use world::experiment::file;
 use world::record::plan::Key;
 use world::record::rollout;
 use world::sim::config::WorldConfig;
@@ -156,4 +158,33 @@ fn reaching_prompts_list_all_steps_and_paper_prompts_the_last() {
     }
     let user = Prompt::of(&Experiment::E1).unwrap().render(&task(Experiment::E1, None), &later).unwrap().user;
     assert!(user.contains("the previous action was 6;") && !user.contains("went up"), "{user}");
+}
+
+#[test]
+fn a_template_has_a_limit_of_work_and_length() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path().join("asked");
+    fs::create_dir(&at).unwrap();
+    let table = "[experiment.Z]\ntitle = \"z\"\norder = 20\nprompt = \"asked\"\ndecision = \"selected_cube\"\n";
+    fs::write(folder.path().join("z.toml"), table).unwrap();
+    fs::write(at.join("system.txt"), "s").unwrap();
+    fs::write(at.join("user.txt"), "{{ history_text }}").unwrap();
+    let nested = |depth: usize, inside: &str| {
+        let open: String = (0..depth).map(|at| format!("{{% for a{at} in steps %}}")).collect();
+        format!("{open}{inside}{}", "{% endfor %}".repeat(depth))
+    };
+    let rendered = |history: String, thought: &str| {
+        fs::write(at.join("history.txt"), history).unwrap();
+        let loaded = file::load(&folder.path().join("z.toml")).unwrap().remove(0);
+        let past = Past { action: Some(Action::MoveForward), bumped: false, thought: Some(thought.to_owned()) };
+        let observation = Observation { t: 40, past: Arc::new(vec![past; 39]), ..first_step() };
+        let task = task(loaded.experiment.clone(), None);
+        Prompt::of(&loaded.experiment).unwrap().render(&task, &observation).map_err(|error| error.to_string())
+    };
+    assert!(rendered(nested(2, "{{ a0.thought }}"), "I turn.").is_ok());
+    let told = rendered(nested(4, "{{ a0.thought }}"), "").unwrap_err();
+    assert!(told.contains("step 40: the template history.txt: expected at most 500000 instructions"), "{told}");
+    let told = rendered(nested(2, "{{ a0.thought }}"), &"long ".repeat(1000)).unwrap_err();
+    assert!(told.contains("step 40: the template history.txt: expected at most 4194304 bytes"), "{told}");
+    assert!(told.contains("MIRRORSTATS_BUDGET"), "{told}");
 }

@@ -2,13 +2,21 @@
 //!
 //! Rule: equal tasks and observations give equal words, and [`Prompt::hash`] changes with every edit of the templates.
 
-use minijinja::{Environment, Error, UndefinedBehavior, Value, context};
+use std::io;
+
+use minijinja::{Environment, Error, ErrorKind, UndefinedBehavior, Value, context};
 
 use super::{Observation, Past, Task};
 use crate::experiment::Experiment;
 use crate::experiment::spec::{Actions, Answer};
+use exact::budget::Limit;
 use exact::number::Decimal;
 use trace::episode::Action;
+
+/// Loops over steps within loops grow faster than an episode.
+const INSTRUCTIONS: Limit = Limit::new("instructions of a prompt's template", 500_000);
+/// About a million tokens: more than models take.
+const LONGEST: Limit = Limit::new("bytes of a prompt's text", 4 << 20);
 
 #[derive(Debug)]
 pub struct Prompt {
@@ -35,6 +43,7 @@ impl Prompt {
     fn environment(&self) -> Result<Environment<'_>, Error> {
         let mut environment = Environment::new();
         environment.set_undefined_behavior(UndefinedBehavior::Strict);
+        environment.set_fuel(Some(INSTRUCTIONS.most()));
         for (name, source) in &self.experiment.templates().all {
             environment.add_template(name, source)?;
         }
@@ -49,7 +58,11 @@ impl Prompt {
     pub fn render(&self, task: &Task, observation: &Observation) -> Result<Rendered, Error> {
         let environment = self.environment()?;
         let fill = |name: &str, values: Value| -> Result<String, Error> {
-            environment.get_template(name)?.render(values).map(|text| text.trim_end().to_owned())
+            let template = environment.get_template(name)?;
+            let mut text = Bounded::default();
+            let rendered = template.render_captured_to(values, &mut text);
+            rendered.map_err(|error| at_limit(error, name, observation.t))?;
+            Ok(String::from_utf8_lossy(&text.0).trim_end().to_owned())
         };
         let values = context! {
             stated_color => task.stated_color.as_deref(),
@@ -85,6 +98,32 @@ impl Prompt {
         let user = fill("user", values)?;
         Ok(Rendered { system, user })
     }
+}
+
+/// A text up to the limit of its length.
+#[derive(Default)]
+struct Bounded(Vec<u8>);
+
+impl io::Write for Bounded {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        LONGEST.check((self.0.len() + bytes.len()) as u64)?;
+        self.0.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// The error of a template, with the step and the limit if it exceeds one.
+fn at_limit(error: Error, template: &str, t: i32) -> Error {
+    let limit = match error.kind() {
+        ErrorKind::OutOfFuel => INSTRUCTIONS,
+        ErrorKind::WriteFailure => LONGEST,
+        _ => return error,
+    };
+    let exceeded = limit.check(u64::MAX).map_or_else(|exceeded| exceeded.to_string(), |()| String::new());
+    Error::new(ErrorKind::InvalidOperation, format!("step {t}: the template {template}.txt: {exceeded}"))
 }
 
 /// The hashes of the paper's two prompts, for registered plans.

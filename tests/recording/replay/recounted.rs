@@ -45,6 +45,18 @@ fn another_threshold_agrees_with_the_recorded_counts() {
 }
 
 #[test]
+fn a_replay_has_a_limit_of_rays() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut command = program(folder.path());
+    command.args(["replay", "--recompute-visibility", "--grid", "4000x4000", "--out", "anew.parquet"]);
+    let output = command.arg(WITH_SIGHT.as_path()).output().unwrap();
+    let told = stderr(&output);
+    assert_eq!(output.status.code(), Some(2), "{told}");
+    assert!(told.contains("at most 3500000000 rays in a replay") && told.contains("MIRRORSTATS_BUDGET"), "{told}");
+    assert!(!folder.path().join("anew.parquet").exists());
+}
+
+#[test]
 fn changed_steps_are_counted() {
     let (folder, out) = recounted(&["--threshold", "100000"]);
     let was_visible = episodes(&WITH_SIGHT).iter().flat_map(|e| &e.steps).filter(|s| s.mirror_visible).count();

@@ -5,6 +5,7 @@ use serde_json::Value;
 
 use super::again::{Recipe, again};
 use super::error::ReplayError;
+use super::verify::{check_rays, rays};
 use crate::sim::camera::Camera;
 use crate::sim::config::WorldConfig;
 use trace::episode::Episode;
@@ -45,6 +46,7 @@ pub(super) fn rendered(
     last: i32,
     is_wanted: impl Fn(i32) -> bool,
 ) -> Result<BTreeMap<i32, Vec<u8>>, ReplayError> {
+    check_rays(rays(episode.steps.len(), eye), 0)?;
     let mut camera = Camera::new(&recipe.config).map_err(ReplayError::other)?;
     let mut frames = BTreeMap::new();
     let ended = again(recipe, eye, episode, |t, world, _, _| {

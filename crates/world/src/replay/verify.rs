@@ -15,6 +15,7 @@ use super::log::{Log, Seen};
 use crate::sim::camera::Camera;
 use crate::sim::config::WorldConfig;
 use crate::sim::visibility::by_column;
+use exact::budget::Limit;
 use exact::replace::TemporaryFolder;
 use trace::episode::Episode;
 use trace::frame::{Frame, Likeness, TOLERANCE, likeness};
@@ -23,6 +24,17 @@ use trace::log::assemble;
 use trace::merge::{self, EpisodeRows};
 use trace::open::TraceSet;
 use trace::renderer::{self, Renderer};
+
+/// The limit of a replay's work: 11,000 steps with the usual grid, which take eight seconds; more for larger traces.
+pub(super) fn check_rays(rays: u64, bytes: u64) -> Result<(), ReplayError> {
+    let limit = Limit::new("rays in a replay (steps times the grid of visibility)", 3_500_000_000);
+    limit.and_beyond(1 << 20, 12_288, bytes).check(rays).map_err(ReplayError::other)
+}
+
+/// The rays of a replay of this many steps.
+pub(super) fn rays(steps: usize, eye: &WorldConfig) -> u64 {
+    (u64::from(eye.eye.width) * u64::from(eye.eye.height_px)).saturating_mul(steps as u64)
+}
 
 pub struct RecordedTrace {
     pub path: PathBuf,
@@ -102,6 +114,19 @@ impl RecordedTrace {
         Ok(traces)
     }
 
+    /// Rejects traces that would take too long to replay.
+    pub fn check_work(traces: &[Self], outputs: &Outputs) -> Result<(), ReplayError> {
+        let bytes =
+            traces.iter().map(|trace| std::fs::metadata(&trace.path).map_or(0, |metadata| metadata.len())).sum();
+        let steps = |trace: &Self| trace.rows.iter().map(EpisodeRows::len).sum();
+        let all = traces.iter().map(|trace| rays(steps(trace), &trace.eye(outputs)));
+        check_rays(all.fold(0, u64::saturating_add), bytes)
+    }
+
+    fn eye(&self, outputs: &Outputs) -> WorldConfig {
+        outputs.recount.as_ref().map_or_else(|| self.recipe.eye.clone(), |recount| recount.eye(&self.recipe))
+    }
+
     /// Replays the episodes and adds to `answer`; `save` writes a frame as PNG.
     pub fn replay<E: From<ReplayError>>(
         &self,
@@ -109,7 +134,7 @@ impl RecordedTrace {
         answer: &mut ReplayAnswer,
         mut save: impl FnMut(&Path, &[u8]) -> Result<(), E>,
     ) -> Result<(), E> {
-        let eye = outputs.recount.as_ref().map_or_else(|| self.recipe.eye.clone(), |recount| recount.eye(&self.recipe));
+        let eye = self.eye(outputs);
         let camera = self.camera(outputs, answer)?;
         let parts = TemporaryFolder::private("replay").map_err(ReplayError::other)?;
         let mut player = TracePlayer { trace: self, outputs, eye: &eye, camera };

@@ -71,6 +71,7 @@ impl ReplayArgs {
         if traces.len() > 1 && (self.mcap.is_some() || self.recompute_visibility) {
             return Err(Failure::input("--mcap and --recompute-visibility take a single trace"));
         }
+        RecordedTrace::check_work(&traces, &self.outputs())?;
         self.check_targets(&traces)?;
         let mut answer = ReplayAnswer::default();
         for trace in &traces {

@@ -1,5 +1,6 @@
 //! `rescore --reparse`: the current parser reads recorded replies again.
 
+use std::fs;
 use std::path::Path;
 
 use serde_json::{Value, json};
@@ -44,8 +45,8 @@ fn recorded(folder: &Path) {
         // The recorded colour differs from the text.
         step(Some(said("a", "none", "I am red")), "ok", left, Some("blue")),
         step(None, "timeout", None, None),
-        // The provider cut this reply off, whatever its text looks like.
-        step(Some(said("w", "none", "I am red")), "truncated", None, None),
+        // The provider cut this reply off.
+        step(Some(said("w", "none", "I am red").replace('}', "")), "truncated", None, None),
         step(Some(said("done", "red", "I am red")), "ok", Some(Action::Done), Some("red")),
     ];
     let commented = said("w", "none", "I am red").replace("\"action\"", "// on\n\"action\"");
@@ -122,6 +123,35 @@ fn changes_by_another_parser_are_listed_and_recorded_actions_stay() {
     run(at, &["report", "new-traces/own.parquet", "--no-figures", "--out", "read"]).ends(0);
     let answer = run(at, &["table", "rescore", "read", "--reparse", "--out", "twice", "--json"]).json();
     assert_eq!(answer["reparsed"]["changes"], json!([]));
+}
+
+#[test]
+fn traces_without_their_report_are_made_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    recorded(at);
+    run(at, &["report", "own.parquet", "--no-figures", "--out", "old"]).ends(0);
+    let words = ["table", "rescore", "old", "--reparse", "--out", "new"];
+    let first = run(at, &words);
+    assert!(!first.stderr.contains("interrupted"), "{}", first.stderr);
+    let whole = fs::read(at.join("new-traces/own.parquet")).unwrap();
+    for (lost, kept) in [("new", "new-traces"), ("new-traces", "new")] {
+        fs::remove_dir_all(at.join(lost)).unwrap();
+        let again = run(at, &words);
+        assert!(again.stderr.contains(&format!("{kept} is there without {lost}")), "{}", again.stderr);
+        assert_eq!(fs::read(at.join("new-traces/own.parquet")).unwrap(), whole);
+        assert!(at.join("new/manifest.json").is_file());
+    }
+}
+
+#[test]
+fn a_report_that_cannot_be_made_again_leaves_no_traces() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    recorded(at);
+    run(at, &["report", "own.parquet", "--no-figures", "--out", "old"]).ends(0);
+    run(at, &["table", "rescore", "old", "--reparse", "--out", "new", "--definitions", "missing.toml"]).refused();
+    assert!(!at.join("new-traces").exists() && !at.join("new").exists());
 }
 
 #[test]

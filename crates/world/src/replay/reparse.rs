@@ -1,7 +1,8 @@
 //! Recorded replies parsed again by this program.
 //!
 //! Rule: recorded actions stay, since the world has reacted to them. An episode with a changed action diverges from the
-//! first such step on, and is listed. Replies that the provider refused or truncated stay unchanged.
+//! first such step on, and is listed. Replies that the provider refused stay unchanged, and so do truncated ones
+//! unless a whole object is in them.
 
 use std::path::Path;
 
@@ -76,14 +77,16 @@ pub enum ReparseError {
 }
 
 impl ReparseAnswer {
-    /// Reparses the replies of traces, and writes new traces into an existing folder; their names must differ.
-    pub fn of(inputs: &[Input], folder: &Path) -> Result<(Self, Vec<Input>), ReparseError> {
+    /// Reparses the replies of traces, and writes new traces into the folder `stage`; their names must differ. They
+    /// are named as in `folder`, where the caller puts them.
+    pub fn of(inputs: &[Input], stage: &Path, folder: &Path) -> Result<(Self, Vec<Input>), ReparseError> {
         let mut answer = Self::default();
         let mut written = Vec::new();
         for input in inputs {
-            let target = folder.join(input.path.file_name().unwrap_or_default());
-            answer.add_trace(input, &target)?;
-            written.push(Input::new(&target));
+            let name = input.path.file_name().unwrap_or_default();
+            let path = stage.join(name);
+            answer.add_trace(input, &path)?;
+            written.push(Input { path, ..Input::new(folder.join(name)) });
         }
         answer.traces = written.iter().map(|input| input.name.clone()).collect();
         Ok((answer, written))
@@ -145,11 +148,13 @@ fn recipe(input: &Input) -> Result<(Value, Experiment), ReparseError> {
 
 fn read_again(step: &Step, experiment: &Spec) -> Option<Reply> {
     let status = step.extra.reply_status.as_deref().and_then(Status::named)?;
-    // Their text does not show how the provider ended them.
-    if matches!(status, Status::Refusal | Status::Truncated) {
-        return None;
-    }
-    let reading = reply::read(step.extra.reply.as_deref()?, experiment, Ending::Whole);
+    // The text does not show how the provider ended it.
+    let ending = match status {
+        Status::Refusal => return None,
+        Status::Truncated => Ending::Truncated,
+        _ => Ending::Whole,
+    };
+    let reading = reply::read(step.extra.reply.as_deref()?, experiment, ending);
     let repairs = step.extra.reply_repair.as_deref().unwrap_or_default();
     let carried = [Repair::Surrogate, Repair::ToolCall]
         .into_iter()

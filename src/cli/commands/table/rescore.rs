@@ -10,6 +10,7 @@ use crate::cli::args::ThreadArgs;
 use crate::cli::{Failure, Outcome, output, terminal};
 use exact::escape::visible;
 use exact::format::counted;
+use exact::replace::{Content, TemporaryFolder, folder_of};
 use report::bundle::Manifest;
 use report::cells::diff::Changes;
 use report::changes::Limit;
@@ -78,14 +79,15 @@ impl RescoreArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
         let out = folder_of_rescored(&self.report, self.out.as_deref())?;
         let mut traces = traces_of(&self.report, &self.traces)?;
-        let mut reparsed = None;
-        if self.reparse {
-            let (answer, new) = reparse(&traces, &out)?;
-            (reparsed, traces) = (Some(answer), new);
+        let reread = self.reparse.then(|| reparse(&traces, &out)).transpose()?;
+        if let Some(reread) = &reread {
+            traces.clone_from(&reread.traces);
         }
         let rescored = self.request(&out, traces).run()?;
         output::notes(&rescored.report.notes);
         let written = rescored.report.write(&out)?;
+        // A kill between the two leaves a report without its traces, which the same command makes again.
+        let reparsed = reread.map(|reread| reread.put().map(|()| reread.answer)).transpose()?;
         match &rescored.changes {
             Ok(diff) => output::notes(&diff.notes),
             Err(reason) => output::note(&format!("no comparison with the old report: {reason}")),
@@ -130,11 +132,28 @@ impl RescoreArgs {
     }
 }
 
-/// Reads the replies of traces again; writes the new traces to a folder beside `out`.
-fn reparse(traces: &[Input], out: &Path) -> Result<(ReparseAnswer, Vec<Input>), Failure> {
+/// Traces with replies read again, beside the folder that they get.
+struct Reread {
+    _stage: TemporaryFolder,
+    folder: PathBuf,
+    answer: ReparseAnswer,
+    traces: Vec<Input>,
+}
+
+impl Reread {
+    /// Puts all traces into their folder together.
+    fn put(&self) -> Result<(), Failure> {
+        let names = self.traces.iter().filter_map(|trace| Some((Path::new(trace.path.file_name()?), &trace.path)));
+        let new: Vec<_> = names.map(|(name, path)| (name, Content::File(path))).collect();
+        output::write_folder(&self.folder, &new)
+    }
+}
+
+/// Reads the replies of traces again, for a folder beside `out`.
+fn reparse(traces: &[Input], out: &Path) -> Result<Reread, Failure> {
     let mut folder = out.as_os_str().to_owned();
     folder.push("-traces");
-    let folder = Path::new(&folder);
+    let folder = PathBuf::from(folder);
     for (at, trace) in traces.iter().enumerate() {
         let target = folder.join(trace.path.file_name().unwrap_or_default());
         output::check_target(&target, [&trace.path])?;
@@ -146,8 +165,16 @@ fn reparse(traces: &[Input], out: &Path) -> Result<(ReparseAnswer, Vec<Input>), 
             )));
         }
     }
-    output::make_folder(folder)?;
-    ReparseAnswer::of(traces, folder).map_err(Failure::input)
+    if out.exists() != folder.exists() {
+        let (there, missing) = if out.exists() { (out, &*folder) } else { (&*folder, out) };
+        let [there, missing] = [there, missing].map(|path| visible(&path.display().to_string()));
+        output::note(&format!("{there} is there without {missing}, as after an interrupted run; both are made again"));
+    }
+    output::make_folder(folder_of(&folder))?;
+    let stage = TemporaryFolder::create(folder_of(&folder), "traces")
+        .map_err(|error| output::unwritable(folder_of(&folder), error))?;
+    let (answer, traces) = ReparseAnswer::of(traces, stage.path(), &folder).map_err(Failure::input)?;
+    Ok(Reread { _stage: stage, folder, answer, traces })
 }
 
 fn tell_reparsed(out: &mut impl io::Write, answer: &ReparseAnswer, most: usize) -> io::Result<()> {

@@ -78,6 +78,8 @@ pub struct Recorded {
     pub(crate) lost_list: PathBuf,
     pub(crate) elapsed: Duration,
     pub(crate) times: Spent,
+    /// The steps of unfinished episodes that the next start plays again, since the agent keeps no journal.
+    pub(crate) forgotten: u64,
 }
 
 fn unreadable(counts: &ReplyCounts) -> Option<String> {
@@ -165,6 +167,10 @@ pub(crate) fn say(recorded: &Recorded, folder: &Path, files: &[&Path]) -> io::Re
         )?;
     }
     match stopped(answer) {
+        Some(words) if recorded.forgotten > 0 => {
+            let steps = counted(recorded.forgotten, "step");
+            writeln!(out, "{words}, and plays {steps} of unfinished episodes again: this agent keeps no journal")?;
+        }
         Some(words) => writeln!(out, "{words}")?,
         None if answer.recorded + answer.found + answer.elsewhere == 0 => {}
         None => writeln!(out, "next: {}", next(folder, files).join("\n      "))?,

@@ -1,12 +1,13 @@
 //! The progress of a recording on standard error.
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::io::{self, IsTerminal as _, Write as _};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
 use super::{spent, unreadable};
 use exact::escape::{visible, visible_lines};
@@ -22,6 +23,33 @@ use world::sim::config::WorldConfig;
 
 const BETWEEN_LINES: Duration = Duration::from_secs(10);
 
+/// The steps of ended episodes, and the most that they could have had.
+#[derive(Debug, Default)]
+struct Used {
+    steps: u64,
+    budget: u64,
+}
+
+impl Used {
+    /// The expected steps of a budget, if all episodes end as early as those that have ended.
+    fn expected(&self, planned: u64) -> u64 {
+        let expected = u128::from(planned) * u128::from(self.steps) / u128::from(self.budget.max(1));
+        u64::try_from(expected).unwrap_or(u64::MAX)
+    }
+}
+
+fn rate(per_second: f64) -> String {
+    let is_known = per_second.is_finite() && per_second > 0.0;
+    if is_known { format!(", {} a second", fixed(Some(per_second), 1)) } else { String::new() }
+}
+
+fn time_left(left: Duration) -> String {
+    match left.as_secs() {
+        seconds @ 0..60 => format!(", about {seconds} s left"),
+        seconds => format!(", about {} min left", seconds.div_ceil(60)),
+    }
+}
+
 /// The progress: a bar on a terminal. Otherwise occasional lines, for agents that wait for a provider or a program, or
 /// whose replies are unreadable.
 pub(crate) struct Bar<'a> {
@@ -29,9 +57,14 @@ pub(crate) struct Bar<'a> {
     player: &'a dyn Player,
     subject: &'a Subject,
     episodes: usize,
+    /// The steps of all episodes at most.
+    planned: u64,
     ended: AtomicUsize,
     replies: Replies,
     budget: BTreeMap<Experiment, u64>,
+    used: Mutex<Used>,
+    /// True once an episode has ended: before, nobody knows how long one takes.
+    known: Arc<AtomicBool>,
     is_shown: bool,
     told: Mutex<Instant>,
     is_waiting: AtomicBool,
@@ -42,22 +75,50 @@ impl<'a> Bar<'a> {
         let steps_of = |key: &Key| u64::from(world.of(&key.experiment).episode.steps);
         let budget: BTreeMap<Experiment, u64> =
             todo.iter().map(|key| (key.experiment.clone(), steps_of(key))).collect();
-        let steps = todo.iter().filter_map(|key| budget.get(&key.experiment)).sum();
+        let planned = todo.iter().filter_map(|key| budget.get(&key.experiment)).sum();
         let episodes = todo.len();
         let is_shown = io::stderr().is_terminal();
         let target = if is_shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
-        let line = ProgressBar::with_draw_target(Some(steps), target);
-        let style = ProgressStyle::with_template("{msg} {wide_bar} {pos} steps, {per_sec}, {eta} left");
-        line.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        let line = ProgressBar::with_draw_target(Some(planned), target);
+        let style = ProgressStyle::with_template("{msg} {wide_bar} {pos} steps{rate}{left}");
+        let (ended, known) = (AtomicUsize::new(0), Arc::new(AtomicBool::new(false)));
+        let is_known = Arc::clone(&known);
+        let style = style.unwrap_or_else(|_| ProgressStyle::default_bar());
+        let style = style.with_key("rate", |state: &ProgressState, out: &mut dyn fmt::Write| {
+            let _ = out.write_str(&rate(state.per_sec()));
+        });
+        line.set_style(style.with_key("left", move |state: &ProgressState, out: &mut dyn fmt::Write| {
+            let left = is_known.load(Ordering::Relaxed).then(|| state.eta());
+            let _ = out.write_str(&left.map_or_else(String::new, time_left));
+        }));
         let told = Mutex::new(Instant::now());
-        let (ended, is_waiting, replies) = (AtomicUsize::new(0), AtomicBool::new(false), Replies::default());
-        let bar = Self { line, player, subject, episodes, ended, replies, budget, is_shown, told, is_waiting };
+        let (is_waiting, replies, used) = (AtomicBool::new(false), Replies::default(), Mutex::default());
+        let bar = Self {
+            line,
+            player,
+            subject,
+            episodes,
+            planned,
+            ended,
+            replies,
+            budget,
+            used,
+            known,
+            is_shown,
+            told,
+            is_waiting,
+        };
         bar.line.set_message(bar.message());
         bar
     }
 
     pub(crate) fn clear(&self) {
         self.line.finish_and_clear();
+    }
+
+    /// The steps played by this start, those of unfinished episodes too.
+    pub(crate) fn steps(&self) -> u64 {
+        self.line.position()
     }
 
     pub(crate) fn replies(&self) -> RepliesAnswer {
@@ -87,10 +148,10 @@ impl<'a> Bar<'a> {
             return;
         }
         *told = Instant::now();
-        let (steps, rate, left) = (self.line.position(), self.line.per_sec(), self.line.eta().as_secs().div_ceil(60));
+        let (message, steps, rate) = (self.message(), self.line.position(), rate(self.line.per_sec()));
+        let left = self.known.load(Ordering::Relaxed).then(|| time_left(self.line.eta())).unwrap_or_default();
         // If standard error is closed, the message cannot be shown.
-        let (message, rate) = (self.message(), fixed(Some(rate), 1));
-        let _ = writeln!(io::stderr(), "{message}, {steps} steps, {rate} a second, about {left} min left");
+        let _ = writeln!(io::stderr(), "{message}, {steps} steps{rate}{left}");
     }
 }
 
@@ -109,10 +170,12 @@ impl Progress for Bar<'_> {
 
     fn episode(&self, key: &Key, _: &str, steps: usize) {
         self.ended.fetch_add(1, Ordering::Relaxed);
-        // Steps left unused by an early decision are not remaining work.
         let budget = self.budget.get(&key.experiment).copied().unwrap_or_default();
-        let unused = budget.saturating_sub(steps as u64);
-        self.line.set_length(self.line.length().unwrap_or_default().saturating_sub(unused));
+        let mut used = self.used.lock().unwrap_or_else(PoisonError::into_inner);
+        used.steps += steps as u64;
+        used.budget += budget;
+        self.line.set_length(used.expected(self.planned).max(self.line.position()));
+        self.known.store(true, Ordering::Relaxed);
         self.line.set_message(self.message());
     }
 
@@ -153,7 +216,7 @@ fn waiting(id: &str, held: &Held) -> String {
 mod tests {
     use std::time::Duration;
 
-    use super::{Bar, waiting};
+    use super::{Bar, rate, time_left, waiting};
     use trace::episode::{Extra, Step};
     use world::agent::scripted::Scripted;
     use world::agent::{Player, exec};
@@ -192,6 +255,21 @@ mod tests {
         }
         let expected = "0 of 2 episodes, 3 of 4 replies could not be read: parse_failed 1, refusal 2";
         assert_eq!((bar.message().as_str(), bar.has_news()), (expected, true));
+    }
+
+    #[test]
+    fn the_time_left_follows_the_episodes_that_ended() {
+        let player = Scripted::named("frozen").unwrap();
+        let subject = Subject::of("frozen");
+        let todo = [1, 2, 3, 4].map(|run| Key::first(Experiment::E1, 1, run));
+        let bar = Bar::new(&player, &subject, &todo, &WorldConfig::default());
+        let all = bar.line.length().unwrap();
+        bar.line.inc(all / 20);
+        bar.episode(&todo[0], "", usize::try_from(all / 20).unwrap());
+        assert_eq!(bar.line.length(), Some(all / 5));
+        assert_eq!([rate(2.7208), rate(0.0), rate(f64::NAN)], [", 2.7 a second", "", ""]);
+        assert_eq!(time_left(Duration::from_secs(59)), ", about 59 s left");
+        assert_eq!(time_left(Duration::from_secs(61)), ", about 2 min left");
     }
 
     #[test]

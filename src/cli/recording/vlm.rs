@@ -279,6 +279,10 @@ impl Player for VlmPlayer {
         self.vlm.note_answered();
     }
 
+    fn keeps_steps(&self) -> bool {
+        true
+    }
+
     fn spend(&self) -> Option<Spend> {
         self.network.as_ref()?;
         if self.has_counted.set(()).is_ok() {

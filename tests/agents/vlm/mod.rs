@@ -3,6 +3,8 @@
 mod bench;
 mod bodies;
 mod fingerprints;
+#[cfg(unix)]
+mod interrupted;
 mod keys;
 mod killed;
 mod languages;

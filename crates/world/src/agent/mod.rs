@@ -334,6 +334,11 @@ pub trait Player: Send + Sync {
 
     fn resumes(&self) {}
 
+    /// Returns true if the steps of an unfinished episode stay in a journal, from which the next start continues.
+    fn keeps_steps(&self) -> bool {
+        false
+    }
+
     #[cfg(feature = "sim")]
     fn spend(&self) -> Option<vlm::limits::Spend> {
         None

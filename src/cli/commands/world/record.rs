@@ -348,7 +348,9 @@ impl RecordArgs {
             logs: files(plan, |experiment| store.log(experiment)),
         };
         let gave_up = player.stopped().or_else(|| given_up.map(|given_up| given_up.to_string()));
-        Ok(Recorded { answer, gave_up, lost_list: store.lost_list(), elapsed: start.elapsed(), times: shares.spent() })
+        let forgotten = if stopped && !player.keeps_steps() { bar.steps().saturating_sub(steps) } else { 0 };
+        let (lost_list, elapsed, times) = (store.lost_list(), start.elapsed(), shares.spent());
+        Ok(Recorded { answer, gave_up, lost_list, elapsed, times, forgotten })
     }
 
     fn recordings(&self, config: &WorldConfig, plan: &Plan, player: &dyn Player) -> Result<Recordings, Failure> {

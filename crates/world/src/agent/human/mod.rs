@@ -110,6 +110,10 @@ impl Player for Human {
         self.hub.turn(episode_id)
     }
 
+    fn keeps_steps(&self) -> bool {
+        true
+    }
+
     fn interrupt(&self) {
         self.hub.interrupt();
     }

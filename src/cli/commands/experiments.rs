@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::cli::{Failure, Outcome, experiments, output};
-use exact::escape::visible;
+use exact::escape::{visible, visible_lines};
 use exact::suggest::hint;
 use world::experiment::explain::explained;
 use world::experiment::file::Loaded;
@@ -37,6 +37,9 @@ pub enum ExperimentsAction {
         /// A built-in experiment, or a TOML file
         #[arg(value_name = "NAME|FILE")]
         experiment: PathBuf,
+        /// Print the templates of its prompt, each under the name of its file, to start your own from
+        #[arg(long, conflicts_with = "json")]
+        prompt: bool,
         /// Print the experiment as traces carry it, as JSON
         #[arg(long)]
         json: bool,
@@ -60,7 +63,7 @@ impl ExperimentsArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
         match self.action {
             ExperimentsAction::Check { file, json } => check(&file, json),
-            ExperimentsAction::Explain { experiment, json } => explain(&experiment, json),
+            ExperimentsAction::Explain { experiment, prompt, json } => explain(&experiment, prompt, json),
             ExperimentsAction::Show { name } => show(name.as_deref()),
         }
     }
@@ -95,7 +98,7 @@ fn answer<'a>(experiments: impl Iterator<Item = &'a Experiment>) -> Result<Outco
     output::print_json(&ExperimentsAnswer { experiments: experiments.map(|one| (**one).clone()).collect() })
 }
 
-fn explain(path: &Path, json: bool) -> Result<Outcome, Failure> {
+fn explain(path: &Path, prompt: bool, json: bool) -> Result<Outcome, Failure> {
     let experiments = match Experiment::parse(&path.to_string_lossy()) {
         Ok(experiment) => vec![experiment],
         Err(_) if path.extension().is_some_and(|ending| ending == "toml") => {
@@ -106,8 +109,17 @@ fn explain(path: &Path, json: bool) -> Result<Outcome, Failure> {
     if json {
         return answer(experiments.iter());
     }
-    let texts: Vec<String> = experiments.iter().map(explained).collect();
+    let words = if prompt { prompt_of } else { explained };
+    let texts: Vec<String> = experiments.iter().map(words).collect();
     output::plain(texts.join("\n") + "\n")
+}
+
+fn prompt_of(experiment: &Experiment) -> String {
+    let file = |(name, text): &(String, String)| {
+        let folder = visible(&experiment.prompt);
+        format!("# {folder}/{name}.txt\n{}\n", visible_lines(text.trim_end()))
+    };
+    experiment.templates().all.iter().map(file).collect::<Vec<_>>().join("\n")
 }
 
 fn show(name: Option<&str>) -> Result<Outcome, Failure> {

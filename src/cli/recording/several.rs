@@ -202,5 +202,8 @@ mod tests {
         ] {
             assert!(told.contains(words), "{words}: {told}");
         }
+        std::fs::write(&path, "[model.a]\n[condition.short]\nprompt = \"short\"\n").unwrap();
+        let told = recordings(&path).unwrap_err().to_string();
+        assert!(told.contains("`scenes = \"E1\"`") && !told.contains("prompt-only"), "{told}");
     }
 }

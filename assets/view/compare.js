@@ -13,9 +13,9 @@ function side(episode, letter, lead) {
 }
 
 async function shown(own) {
-  const { elements, ready, show } = sight(own.episode);
+  const { element, ready, show } = sight(own.episode);
   await ready;
-  own.element.append(make("div", { class: "sights" }, elements), own.panel);
+  own.element.append(element, own.panel);
   own.show = (place, columns) => {
     const t = place - own.lead;
     const at = Math.max(1, Math.min(t, own.episode.length));
@@ -75,13 +75,13 @@ export async function scenePage(content) {
     const t = { start: 1, end: episode.length }[at] ?? episode.marks.find(({ title }) => title === at)?.t ?? null;
     const shown = t ?? episode.length;
     const next = link(new URLSearchParams({ view: "episode", id: episode.id, t: shown }));
-    const frame = episode.frames ? make("img", { class: "frame", loading: "lazy", width: 640, height: 480, alt: `What ${episode.model} saw at t = ${shown}`, src: await frameAddress(episode.id, shown) }) : make("p", { class: "quiet missing" }, "No frames.");
+    const frame = episode.frames ? make("img", { class: "frame", loading: "lazy", width: 640, height: 480, alt: `What ${episode.model} saw at t = ${shown}`, src: await frameAddress(episode.id, shown) }) : null;
     const verdict = episode.verdict ? make("p", { class: "verdict", "data-outcome": episode.verdict.outcome }, episode.verdict.words) : null;
     const title = episode.condition === null || episode.condition === "default" ? episode.model : `${episode.model}, ${episode.condition}`;
     return make("li", {}, make("h2", {}, make("a", { href: next }, title)), frame, make("p", { class: "quiet" }, t === null ? `no ${at}; the end, t = ${shown}` : `t = ${shown} of ${episode.length}`), verdict);
   }));
-  const rest = told.others > 0 ? make("p", { class: "quiet" }, `${counted(told.others, "more episode")} of this scene are in the list.`) : null;
-  content.replaceChildren(make("h1", {}, "One scene"), make("p", { class: "quiet" }, counted(told.episodes.length, "episode")),
+  const rest = told.others > 0 ? make("p", { class: "quiet" }, `${counted(told.others, "more episode")} ${told.has_scene ? "of this scene" : "of this seed and run"} are in the list.`) : null;
+  content.replaceChildren(make("h1", {}, told.has_scene ? "One scene" : "One seed and run"), make("p", { class: "quiet" }, counted(told.episodes.length, "episode")),
     make("div", { class: "controls" }, make("label", { class: "align" }, "At ", select)), make("ul", { class: "scene" }, cards), rest ?? "");
   return {};
 }

@@ -1,5 +1,5 @@
 // Data sources: a server, or files beside the page that load on demand.
-import { whereOf } from "./where.js";
+import { compareNumbers, whereOf } from "./where.js";
 
 /** True if the page is a copy without a server. */
 export const isCopy = document.documentElement.dataset.copy !== undefined || document.querySelector("script[data-copy]") !== null;
@@ -114,7 +114,7 @@ function byColumn(metric, name, sign) {
   return (a, b) => {
     const [left, right] = [key(a), key(b)];
     if (left === null || right === null) return (left === null) - (right === null);
-    if (metric >= 0) return sign * (Number(left) - Number(right));
+    if (metric >= 0) return sign * compareNumbers(left, right);
     return sign * (left < right ? -1 : Number(left > right));
   };
 }
@@ -201,7 +201,7 @@ async function sceneOf(query) {
   const episodes = await Promise.all(ids.map(async (id) => part(`episode-${await numberOf(id)}`)));
   const constant = (episode, name) => episode.constants.find((column) => column.name === name)?.value ?? null;
   const told = episodes.map((episode) => ({ ...episode, model: constant(episode, "model"), condition: constant(episode, "condition") }));
-  return { episodes: told.sort((a, b) => (a.name < b.name ? -1 : 1)), others: Math.max(0, own.siblings.length + 1 - 60) };
+  return { has_scene: constant(own, "scene") !== null, episodes: told.sort((a, b) => (a.name < b.name ? -1 : 1)), others: Math.max(0, own.siblings.length + 1 - 60) };
 }
 
 /** The address of a step's frame. */

@@ -18,23 +18,27 @@ const TRUTH = ["mirror_visible", "mirror_self_px", "mirror_other_px", "mirror_px
 /** The log's map of the room; empty if there is none. */
 export const askMap = (id) => ask("map", new URLSearchParams({ id })).catch(() => EMPTY);
 
-/** The frame and the map of a step; `show(t)` draws it, `ready` waits briefly for the map. */
+/** The frame and the map of a step, as far as they exist; `show(t)` draws it, `ready` waits briefly for the map. */
 export function sight(episode, asked = episode.log ? askMap(episode.id) : Promise.resolve(EMPTY)) {
   const image = make("img", { class: "frame", alt: "", width: 640, height: 480 });
-  const shown = make("figure", { class: "sight" }, image);
+  const shown = make("figure", { class: "sight", hidden: !episode.frames }, image);
   const map = make("figure", { class: "above" });
+  const note = make("p", { class: "quiet missing" });
   const legend = make("ul", { class: "legend", "aria-label": "Colours of the map" });
   const places = { show: () => {} };
   let at = 1;
-  const missing = episode.log_fault ? `No frames: ${episode.log_fault}` : "No frames: they are in no log among the files that were opened.";
-  if (!episode.frames) shown.replaceChildren(make("p", { class: "quiet missing" }, missing));
+  const noFrames = episode.log_fault ? `No frames: ${episode.log_fault}` : "No frames: they are in no log among the files that were opened.";
   place(EMPTY);
   const told = asked.then((found) => found.shapes.length > 0 && place(found));
   const ready = Promise.race([told, new Promise((done) => setTimeout(done, MAP_WAIT))]);
   function place(found) {
     const { picture, show, legend: keys } = mapOf(episode, found);
-    if (picture === null) map.replaceChildren(make("p", { class: "quiet missing" }, "The trace has no positions."));
-    else map.replaceChildren(picture);
+    map.hidden = picture === null;
+    map.replaceChildren(picture ?? "");
+    // Only the mirror's traces are expected to have them.
+    const missing = episode.own ? [] : [episode.frames ? null : noFrames, picture === null ? "The trace has no positions." : null];
+    note.textContent = missing.filter((words) => words !== null).join(" ");
+    note.hidden = note.textContent === "";
     legend.replaceChildren(...keys);
     places.show = show;
     show(at);
@@ -64,7 +68,7 @@ export function sight(episode, asked = episode.log ? askMap(episode.id) : Promis
     image.src = source;
     fetchAhead(t + 1);
   }
-  return { elements: [shown, map], legend, ready, show };
+  return { element: make("div", { class: "sights" }, shown, map, note), legend, ready, show };
 }
 
 function factList(episode, names, t) {
@@ -73,7 +77,7 @@ function factList(episode, names, t) {
     const column = episode.steps[name];
     if (column === undefined) continue;
     const value = column.values[t - 1] ?? null;
-    list.append(make("dt", { title: column.doc }, name.replaceAll("_", " ")), make("dd", { "data-column": name }, typeof value === "string" ? colored(value) : spelled(value, column.unit)));
+    list.append(make("dt", { title: column.doc }, name.replaceAll("_", " ")), make("dd", { "data-column": name }, typeof value === "string" && !column.is_number ? colored(value) : spelled(value, column.unit)));
   }
   return list;
 }
@@ -158,7 +162,7 @@ function headline(episode) {
     else if (select.value !== "") go(new URLSearchParams({ view: "compare", a: episode.id, b: select.value }));
   });
   return make("div", { class: "headline" },
-    make("div", { class: "title" }, make("h1", {}, episode.name), make("p", { class: "turn" }, other(previous, "previous", "prev"), place ? make("a", { href: link(listQuery()), class: "place" }, `${place} of ${total}`) : null, other(next, "next", "next"), select, (episode.siblings ?? []).length > 0 ? make("a", { href: link(new URLSearchParams({ view: "scene", id: episode.id })) }, `All ${episode.siblings.length + 1} on this scene`) : null, isCopy ? null : copyButton("Copy link", () => location.href), isCopy || episode.running ? null : make("a", { href: `api/file?${new URLSearchParams({ id: episode.id })}`, download: `${episode.name.replaceAll("/", "-")}.html` }, "Save as a file"), isCopy || !episode.frames || episode.running ? null : make("a", { href: `api/film?${new URLSearchParams({ id: episode.id })}`, download: `${episode.name.replaceAll("/", "-")}.png` }, "Film"))),
+    make("div", { class: "title" }, make("h1", {}, episode.name), make("p", { class: "turn" }, other(previous, "previous", "prev"), place ? make("a", { href: link(listQuery()), class: "place" }, `${place} of ${total}`) : null, other(next, "next", "next"), select, (episode.siblings ?? []).length > 0 ? make("a", { href: link(new URLSearchParams({ view: "scene", id: episode.id })) }, `All ${episode.siblings.length + 1} ${constant(episode, "scene") === null ? `of seed ${constant(episode, "seed")}, run ${constant(episode, "run")}` : "on this scene"}`) : null, isCopy ? null : copyButton("Copy link", () => location.href), isCopy || episode.running ? null : make("a", { href: `api/file?${new URLSearchParams({ id: episode.id })}`, download: `${episode.name.replaceAll("/", "-")}.html` }, "Save as a file"), isCopy || !episode.frames || episode.running ? null : make("a", { href: `api/film?${new URLSearchParams({ id: episode.id })}`, download: `${episode.name.replaceAll("/", "-")}.png` }, "Film"))),
     episode.verdict ? make("p", { class: "verdict", "data-outcome": episode.verdict.outcome }, episode.verdict.words) : null,
     make("dl", { class: "facts" }, list, make("div", {}, make("dt", {}, "steps"), make("dd", { id: "length" }, episode.length))), state);
 }
@@ -177,7 +181,7 @@ export async function episodePage(content, study) {
   }
   const limit = (t) => Math.min(episode.length, Math.max(1, Math.round(t) || 1));
   let t = limit(query().has("t") ? Number(query().get("t")) : episode.running ? episode.length : (episode.verdict?.t ?? decidedAt(episode) ?? 1));
-  const { elements, legend, ready, show } = sight(episode, episode.log ? asked : Promise.resolve(EMPTY));
+  const { element, legend, ready, show } = sight(episode, episode.log ? asked : Promise.resolve(EMPTY));
   show(t);
   const panel = make("section", { class: "panel", tabindex: 0, "aria-label": "Reply and truth of the step" });
   const clock = make("output", { class: "clock" });
@@ -220,7 +224,7 @@ export async function episodePage(content, study) {
   await ready;
   content.replaceChildren(headline(episode), labels.element,
     make("div", { class: "at-once" },
-      make("div", { class: "over-time" }, make("div", { class: "sights" }, elements), legend, make("div", { class: "controls" }, play, clock), line.element),
+      make("div", { class: "over-time" }, element, legend, make("div", { class: "controls" }, play, clock), line.element),
       panel,
       make("section", { class: "scores", tabindex: 0, "aria-label": "Metrics" }, make("h2", {}, "Metrics"), metrics.length > 0 ? metrics : make("p", { class: "quiet" }, none))));
   draw();

@@ -94,6 +94,9 @@ export function nothingFound() {
   return make("div", { class: "nothing" }, make("p", {}, "No episode is like that. Go on with"), make("ul", {}, ways.length > 1 ? ways : [], rest));
 }
 
+/** The note of a recording without a finished episode. */
+export const nothingYet = () => make("p", { class: "quiet", id: "nothing-yet" }, "No episode is finished yet. Results appear with the first one.");
+
 /** The filters of a page; `study` has the choices, `fault` the error in the condition. */
 export function filterLine(study) {
   const now = query();

@@ -2,14 +2,14 @@
 import { counted, make, notice, one } from "./dom.js";
 import { ask } from "./data.js";
 import { changed, filtered, go, link, query } from "./state.js";
-import { filterLine, nothingFound, tellFault } from "./filters.js";
+import { filterLine, nothingFound, nothingYet, tellFault } from "./filters.js";
 
 const ROW = 30;
 const PAGE = 100;
 
 class Rows {
   constructor(frame, body, columns) {
-    Object.assign(this, { frame, body, columns, pages: new Map(), total: 0, stop: 0 });
+    Object.assign(this, { frame, body, columns, passes: [], pages: new Map(), total: 0, stop: 0 });
     frame.addEventListener("scroll", () => this.show(), { passive: true });
     body.addEventListener("focusin", ({ target }) => (this.stop = Number(target.closest("a").dataset.at)));
     body.addEventListener("keydown", (event) => {
@@ -70,6 +70,8 @@ class Rows {
       if (kind === "words") return make("span", { class: kind, role: "cell", title: row.said?.excerpt }, row.said === undefined ? "" : `t = ${row.said.t}, ${row.said.column.replaceAll("_", " ")}: ${row.said.excerpt}`);
       const value = kind === "put" ? row.put.join(", ") : metric === undefined ? row[key] : row.values[metric];
       const text = value === null ? "--" : String(value);
+      const pass = value === null ? null : (this.passes[metric] ?? null);
+      if (pass !== null) return verdictCell(text, value === pass);
       const long = { id: true, name: true, put: true }[kind] ? text : null;
       return make("span", { class: kind, role: "cell", title: long }, kind === "id" ? parted(text) : text);
     });
@@ -77,6 +79,12 @@ class Rows {
     element.style.top = `${at * ROW}px`;
     return element;
   }
+}
+
+/** The value of a rate that has a better direction: a sign, its words and a colour tell which it is. */
+function verdictCell(text, isPass) {
+  const sign = make("span", { role: "img", "aria-label": isPass ? "pass" : "fail" }, isPass ? "✓" : "✗");
+  return make("span", { class: `number ${isPass ? "pass" : "fail"}`, role: "cell" }, sign, ` ${text}`);
 }
 
 /** An id whose end stays visible when space is short: seed and run distinguish it from its neighbours. */
@@ -130,7 +138,9 @@ export async function list(content, study) {
     tellFault(filters, error.message);
     return;
   }
+  if (told.all === 0) return content.append(nothingYet());
   rows.columns = columnsOf(told);
+  rows.passes = told.passes;
   const widths = { id: "minmax(13rem, 2.2fr)", short: "6.5rem", name: "minmax(9rem, 1.4fr)", number: "minmax(3.4rem, .5fr)", words: "minmax(16rem, 4fr)", put: "minmax(7rem, 1fr)" };
   frame.style.setProperty("--columns", rows.columns.map(({ kind }) => widths[kind]).join(" "));
   frame.setAttribute("aria-rowcount", told.total + 1);

@@ -1,5 +1,6 @@
 // The room from above: the program's shapes from the log, the path so far, and the heading.
 import { draw, make } from "./dom.js";
+import { numbersOf } from "./values.js";
 
 const REACH = 1.2;
 const KINDS = [["self", "itself"], ["other", "another body"], ["mirror", "mirror"], ["cube", "cube"]];
@@ -54,7 +55,7 @@ function legendOf({ all, every }) {
 /** A map of an episode; `show(t)` draws a step. */
 export function mapOf(episode, map) {
   const room = unpacked(map);
-  const column = (name) => episode.steps[name]?.values ?? [];
+  const column = (name) => numbersOf(episode.steps[name]);
   const [xs, ys, yaws] = [column("pose_x"), column("pose_y"), column("pose_yaw")];
   const path = xs.map((x, at) => [x, ys[at]]).filter(([x, y]) => x !== null && y !== null && y !== undefined);
   const picture = draw("svg", { class: "map", role: "img", "aria-label": "The room from above" });

@@ -2,7 +2,7 @@
 import { all, counted, make, notice, one, parsed } from "./dom.js";
 import { ask, isCopy } from "./data.js";
 import { FILTERS, changed, filtered, go, link, query } from "./state.js";
-import { filterLine, groupQuery, nothingFound, roving, tellFault } from "./filters.js";
+import { filterLine, groupQuery, nothingFound, nothingYet, roving, tellFault } from "./filters.js";
 
 /** The query for the server: only the filters. */
 function wanted() {
@@ -163,6 +163,10 @@ export async function overview(content, study) {
   const sections = make("div", { id: "sections" });
   const filters = filterLine(study);
   content.replaceChildren(head, filters, sections);
+  if (study.episodes === 0) {
+    sections.append(nothingYet());
+    return;
+  }
   let told;
   try {
     told = await ask("overview", wanted());

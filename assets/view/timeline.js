@@ -1,6 +1,6 @@
 // The steps of an episode over time: a strip per column, a legend of its colours, and the key moments.
 import { counted, make, one } from "./dom.js";
-import { paintOf } from "./values.js";
+import { numbersOf, paintOf } from "./values.js";
 
 const ACTIONS = {
   move_forward: "--accent", move_backward: "--strip", turn_left: "--firm", turn_right: "--quiet", done: "--ink",
@@ -16,31 +16,32 @@ function stripsOf(episode) {
   const rows = [];
   const add = (title, list, color, height = () => 1) => list !== null && rows.push({ title, list, color, height });
   if (episode.own) {
-    for (const [name, { values: list }] of Object.entries(episode.steps)) addOwn(add, name, list);
+    for (const [name, column] of Object.entries(episode.steps)) addOwn(add, name, column);
     return rows;
   }
   const values = (name) => episode.steps[name]?.values ?? null;
-  const self = values("mirror_self_px");
+  const numbers = (name) => (episode.steps[name] === undefined ? null : numbersOf(episode.steps[name]));
+  const self = numbers("mirror_self_px");
   const most = self === null ? 1 : largest(self);
   add("Mirror evidence", values("mirror_visible"), (seen) => (seen ? "--accent" : null), (_, at) => (self === null ? 1 : 0.35 + (0.65 * (self[at] ?? 0)) / most));
   add("Claim", values("self_color"), (claim) => (claim === null ? null : claim === "unknown" ? "--firm" : claim));
   add("Cube", values("selected_cube"), (cube) => (cube === null ? null : cube === "none" ? "--rule" : cube));
   add("Action", values("action"), (action) => ACTIONS[action] ?? null, (action) => (action?.startsWith("turn") ? 0.5 : 1));
-  const distance = values("target_distance");
+  const distance = numbers("target_distance");
   if (distance !== null) add("Distance", distance, (mm) => (mm === null ? null : "--firm"), (mm) => (mm ?? 0) / largest(distance));
   add("Bumped", values("bumped"), (bumped) => (bumped ? "--warn" : null));
   add("Reply", values("reply_status"), (status) => (status === null ? null : status === "ok" ? "--strip" : status === "repaired" ? "--firm" : "--warn"));
-  const latency = values("latency_ms");
+  const latency = numbers("latency_ms");
   if (latency !== null && largest(latency) > 1) add("Time taken", latency, (ms) => (ms === null ? null : "--firm"), (ms) => (ms ?? 0) / largest(latency));
   return rows;
 }
 
 /** Adds a column of any type: a number's height, true or false, or a tone per text. */
-function addOwn(add, name, list) {
-  const numbers = list.filter((value) => typeof value === "number");
-  if (numbers.length > 0) {
-    const [least, most] = numbers.reduce(([low, high], value) => [Math.min(low, value), Math.max(high, value)], [0, 0]);
-    add(name, list, (value) => (value === null ? null : "--firm"), (value) => (value - least) / (most - least || 1));
+function addOwn(add, name, { values: list, is_number: isNumber }) {
+  if (isNumber) {
+    const numbers = numbersOf({ values: list });
+    const [least, most] = numbers.reduce(([low, high], value) => [Math.min(low, value ?? 0), Math.max(high, value ?? 0)], [0, 0]);
+    add(name, numbers, (value) => (value === null ? null : "--firm"), (value) => (value - least) / (most - least || 1));
     return;
   }
   const texts = [...new Set(list.filter((value) => !isNothing(value)))];

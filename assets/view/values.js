@@ -2,6 +2,8 @@
 import { make } from "./dom.js";
 
 export const valueAt = (episode, name, t) => episode.steps[name]?.values[t - 1] ?? null;
+/** The numbers of a column, to draw; null if not finite. The page shows the program's text, since a number may have been rounded. */
+export const numbersOf = (column) => (column?.values ?? []).map((text) => (text === null || !Number.isFinite(Number(text)) ? null : Number(text)));
 export const constant = (episode, name) => episode.constants.find((column) => column.name === name)?.value ?? null;
 
 /** The words of a value. */

@@ -2,7 +2,15 @@
 // Without `not`, undefined and false are equivalent: the episode is left out.
 
 const TOKEN = /\s*(?:([A-Za-z_]\w*)|"((?:[^"]|"")+)"|'((?:[^']|'')*)'|(-?\d+(?:\.\d+)?)(?![\w.])|(<>|!=|<=|>=|[=<>(),]))/y;
-const COMPARE = { "=": (a, b) => a === b, "<>": (a, b) => a !== b, "!=": (a, b) => a !== b, "<": (a, b) => a < b, "<=": (a, b) => a <= b, ">": (a, b) => a > b, ">=": (a, b) => a >= b };
+const HOLDS = { "=": (order) => order === 0, "<>": (order) => order !== 0, "!=": (order) => order !== 0, "<": (order) => order < 0, "<=": (order) => order <= 0, ">": (order) => order > 0, ">=": (order) => order >= 0 };
+
+/** Compares two decimals exactly: negative, 0 or positive. Numbers of JavaScript would round large ones. */
+export function compareNumbers(a, b) {
+  const parts = [a, b].map((text) => String(text).split("."));
+  const places = Math.max(...parts.map(([, part = ""]) => part.length));
+  const [left, right] = parts.map(([whole, part = ""]) => BigInt(whole + part.padEnd(places, "0")));
+  return left === right ? 0 : left < right ? -1 : 1;
+}
 
 function tokens(text) {
   const found = [];
@@ -14,7 +22,7 @@ function tokens(text) {
     if (word !== undefined) found.push({ word: word.toLowerCase(), name: word });
     else if (name !== undefined) found.push({ name: name.replaceAll('""', '"') });
     else if (string !== undefined) found.push({ value: string.replaceAll("''", "'") });
-    else if (number !== undefined) found.push({ value: Number(number) });
+    else if (number !== undefined) found.push({ number });
     else found.push({ word: sign });
   }
   return found;
@@ -46,12 +54,13 @@ function condition(text, columns) {
     const { kind, of } = columns.get(left.shift()?.name) ?? {};
     need(of !== undefined);
     const literal = () => {
-      const { value, word } = left.shift() ?? {};
-      // Other columns are text in the list and are converted back to numbers; a coder's label is true or false.
-      const own = kind === "coded" ? ["true", "false"].find((truth) => truth === word) : kind === "label" && value !== undefined ? String(value) : value;
-      need(typeof own === (kind === "number" ? "number" : "string"));
+      const { value, number, word } = left.shift() ?? {};
+      // Labels are text in the list, numbers too; a coder's label is true or false.
+      const own = kind === "coded" ? ["true", "false"].find((truth) => truth === word) : kind === "number" ? number : kind === "label" ? (value ?? number) : value;
+      need(own !== undefined);
       return own;
     };
+    const orderOf = kind === "number" ? compareNumbers : (a, b) => (a === b ? 0 : 1);
     if (kind === "coded" && !["is", "in", "=", "<>", "!="].includes(left[0]?.word)) return (row) => of(row) === "true";
     if (take("is")) {
       const isNull = !take("not");
@@ -63,13 +72,13 @@ function condition(text, columns) {
       const wanted = [literal()];
       while (take(",")) wanted.push(literal());
       need(take(")"));
-      return (row) => wanted.includes(of(row));
+      return (row) => of(row) !== null && wanted.some((value) => orderOf(of(row), value) === 0);
     }
     const sign = left.shift()?.word;
     // Only the program knows the order of texts.
-    need(Object.hasOwn(COMPARE, sign ?? "") && (kind === "number" || !/^[<>]=?$/.test(sign)));
+    need(Object.hasOwn(HOLDS, sign ?? "") && (kind === "number" || !/^[<>]=?$/.test(sign)));
     const value = literal();
-    return (row) => of(row) !== null && COMPARE[sign](of(row), value);
+    return (row) => of(row) !== null && HOLDS[sign](orderOf(of(row), value));
   };
   const whole = either();
   need(left.length === 0);
@@ -81,7 +90,7 @@ function columnsOfList(list) {
   for (const name of ["experiment", "model", "condition"]) columns.set(name, { kind: "text", of: (row) => (row.keys ?? row)[name] });
   for (const name of ["seed", "run"]) columns.set(name, { kind: "number", of: (row) => row[name] });
   for (const name of list.labels ?? []) if (!columns.has(name)) columns.set(name, { kind: name.startsWith("label_") ? "coded" : "label", of: (row) => row.labels[name] ?? null });
-  list.metrics.forEach((name, at) => columns.set(name, { kind: "number", of: (row) => (row.values[at] === null ? null : Number(row.values[at])) }));
+  list.metrics.forEach((name, at) => columns.set(name, { kind: "number", of: (row) => row.values[at] }));
   return columns;
 }
 

@@ -241,6 +241,7 @@ fn said(told: &Value) -> Value {
     let steps = told["steps"].as_object().into_iter().flatten();
     let is_mirror = told["own"] == false;
     let texts = steps.filter(|(name, _)| !is_mirror || trace::search::SAID.contains(&name.as_str()));
+    let texts = texts.filter(|(_, column)| column["is_number"] == false);
     let texts = texts.filter(|(_, column)| column["values"].as_array().into_iter().flatten().any(Value::is_string));
     texts.map(|(name, column)| (name.clone(), column["values"].clone())).collect::<serde_json::Map<_, _>>().into()
 }

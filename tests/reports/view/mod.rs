@@ -13,6 +13,7 @@ mod pages;
 #[cfg(feature = "sim")]
 mod people;
 mod server;
+mod values;
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::TcpStream;

@@ -2,9 +2,10 @@
 //!
 //! Columns of the schema that the file does not have are absent; columns outside the schema are not read.
 
-use arrow::array::{Array as _, ArrayRef, RecordBatch};
+use arrow::array::{Array as _, ArrayRef, AsArray as _, RecordBatch};
 use arrow::compute::cast;
 use arrow::datatypes::DataType;
+use arrow::util::display::{ArrayFormatter, FormatOptions};
 
 use crate::answers::{self, Answered};
 use crate::episode::{Episode, Step};
@@ -54,18 +55,45 @@ fn held(values: &ArrayRef) -> Option<ArrayRef> {
     cast(values, &held).ok()
 }
 
-/// A column of an episode as one of four types, whatever the file stores.
+/// A column of an episode as the file stores it.
 #[derive(Clone, Debug)]
 pub struct OwnColumn {
     pub name: String,
     values: ArrayRef,
 }
 
+/// A truth value, or any other value as text without loss.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Displayed {
+    Bool(bool),
+    Text(String),
+}
+
 impl OwnColumn {
-    pub fn values(&self) -> impl Iterator<Item = Option<Value<'_>>> {
-        (0..self.values.len()).map(|row| value_at(&self.values, row))
+    /// Returns true if the column has integers, floats or decimals.
+    pub fn is_numeric(&self) -> bool {
+        self.values.data_type().is_numeric()
+    }
+
+    pub fn values(&self) -> impl Iterator<Item = Option<Displayed>> {
+        let formatter = ArrayFormatter::try_new(&self.values, &OPTIONS).map_err(|error| error.to_string());
+        let nulls = self.values.logical_nulls();
+        let is_float = self.values.data_type().is_floating();
+        let shown = move |row| match (self.values.as_boolean_opt(), &formatter) {
+            (Some(truths), _) => Displayed::Bool(truths.value(row)),
+            (None, Ok(formatter)) => {
+                let text = formatter.value(row).to_string();
+                let whole = if is_float { text.strip_suffix(".0") } else { None };
+                Displayed::Text(whole.map_or_else(|| text.clone(), str::to_owned))
+            }
+            (None, Err(error)) => Displayed::Text(error.clone()),
+        };
+        (0..self.values.len())
+            .map(move |row| nulls.as_ref().is_none_or(|nulls| nulls.is_valid(row)).then(|| shown(row)))
     }
 }
+
+const OPTIONS: FormatOptions<'static> = FormatOptions::new();
 
 pub(crate) fn identity(rows: &RecordBatch) -> Result<Episode, NotAnEpisode> {
     let mut episode = Episode { steps: vec![Step::default(); rows.num_rows()], ..Episode::default() };
@@ -76,11 +104,11 @@ pub(crate) fn identity(rows: &RecordBatch) -> Result<Episode, NotAnEpisode> {
     Ok(episode)
 }
 
-/// The columns besides identity and time, in file order, except those that cannot be displayed.
+/// The columns besides identity and time, in file order.
 pub(crate) fn own_columns(rows: &RecordBatch) -> Vec<OwnColumn> {
     let schema = rows.schema();
     let named = schema.fields().iter().zip(rows.columns()).filter(|(field, _)| !is_identity(field.name()));
-    named.filter_map(|(field, values)| Some(OwnColumn { name: field.name().clone(), values: held(values)? })).collect()
+    named.map(|(field, values)| OwnColumn { name: field.name().clone(), values: values.clone() }).collect()
 }
 
 fn fill(episode: &mut Episode, column: &Column, values: &ArrayRef) -> Result<(), NotAnEpisode> {

@@ -15,7 +15,7 @@ use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{RowSelection, RowSelector};
 
 use super::decode_episode;
-pub use super::decode_episode::{NotAnEpisode, OwnColumn};
+pub use super::decode_episode::{Displayed, NotAnEpisode, OwnColumn};
 use crate::catch_panic::contained;
 use crate::diagnostic::{Code, Finding};
 use crate::episode::Episode;

@@ -40,6 +40,11 @@ pub(crate) fn answer(snapshot: &Snapshot) -> Result<Value, ViewError> {
 
 fn told(flip: &Flip) -> Value {
     let mut told = json!(flip);
+    // A browser would round large numbers.
+    told["value"] = json!({
+        "before": flip.value.before.map(|value| value.to_string()),
+        "after": flip.value.after.map(|value| value.to_string()),
+    });
     told["id"] = json!(flip.episode.episode_id);
     told["name"] = json!(visible(&flip.episode.episode_id));
     told

@@ -57,8 +57,10 @@ pub(crate) fn answer(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewEr
     let is_known = |column: &Column| a.own.is_none() && b.own.is_none() || is_identity(column.name);
     let parted = |is_wanted: fn(&Column) -> bool, of_a: usize, of_b: usize| -> Vec<(&str, Vec<usize>)> {
         let columns = COLUMNS.iter().filter(|column| is_wanted(column) && is_known(column));
-        let of_both =
-            |column: &Column| differing(column.of_steps(&a.episode).skip(of_a), column.of_steps(&b.episode).skip(of_b));
+        let of_both = |column: &Column| {
+            let (a, b) = (column.of_steps(&a.episode).skip(of_a), column.of_steps(&b.episode).skip(of_b));
+            differing(a.map(comparable), b.map(comparable))
+        };
         columns.map(|column| (column.name, of_both(column))).collect()
     };
     let constants = parted(|column| column.constant && column.name != "episode_hash", 0, 0);
@@ -123,7 +125,8 @@ pub(crate) fn scene(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewErr
         }));
     }
     told.sort_by_key(|episode| episode["name"].to_string());
-    Ok(json!({"episodes": told, "others": (others.len() + 1).saturating_sub(MOST_OF_A_SCENE)}))
+    let has_scene = snapshot.episode(id)?.episode.scene.is_some();
+    Ok(json!({"episodes": told, "has_scene": has_scene, "others": (others.len() + 1).saturating_sub(MOST_OF_A_SCENE)}))
 }
 
 /// Returns true if both have the same frame at a step; null if either has no frame.
@@ -135,7 +138,15 @@ pub(crate) fn same_frame(snapshot: &Snapshot, query: &Query) -> Result<Value, Vi
     Ok(json!({"is_same": a.zip(b).map(|(a, b)| a == b)}))
 }
 
-fn differing<'e>(a: impl Iterator<Item = Option<Cell<'e>>>, b: impl Iterator<Item = Option<Cell<'e>>>) -> Vec<usize> {
+/// A value that equals itself: floats by their bits, as NaN differs from NaN.
+fn comparable(value: Option<Cell<'_>>) -> Option<Result<u64, Cell<'_>>> {
+    Some(match value? {
+        Cell::Float(float) => Ok(float.to_bits()),
+        other => Err(other),
+    })
+}
+
+fn differing<T: PartialEq>(a: impl Iterator<Item = T>, b: impl Iterator<Item = T>) -> Vec<usize> {
     let pairs = a.zip(b).enumerate();
     pairs.filter(|(_, (a, b))| a != b).map(|(at, _)| at + 1).collect()
 }

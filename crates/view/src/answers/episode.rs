@@ -15,8 +15,9 @@ use study::{Question, Study};
 use trace::episode::Episode;
 use trace::inputs::Input;
 use trace::log::frames::Moment;
+use trace::merge::Displayed;
 use trace::schema::domain::is_identity;
-use trace::schema::{COLUMNS, Column, Value as Cell};
+use trace::schema::{COLUMNS, Column, Kind, Stored, Value as Cell};
 use world::replay::moments::moments;
 
 /// The maximum number of characters of a text in an answer; the page requests the whole text separately.
@@ -83,7 +84,7 @@ pub(crate) fn text(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewErro
     let (name, t) = (required(query, "column")?, number(query, "t")?.unwrap_or_default());
     if let Some(own) = opened.own.iter().flatten().find(|own| own.name == name) {
         let value = t.checked_sub(1).and_then(|at| own.values().nth(at)).flatten();
-        return Ok(json!({"text": if let Some(Cell::Text(text)) = value { Some(lines(text)) } else { None }}));
+        return Ok(json!({"text": if let Some(Displayed::Text(text)) = value { Some(lines(&text)) } else { None }}));
     }
     let column = COLUMNS.iter().find(|column| column.name == name && !column.constant);
     let at = t.checked_sub(1).filter(|at| *at < opened.episode.steps.len());
@@ -112,7 +113,7 @@ fn constants(opened: &Opened, longest: usize) -> Vec<Value> {
     columns
         .filter_map(|column| {
             let value = column.of_steps(episode).next().flatten().or_else(|| head(episode, column))?;
-            Some(json!({"name": column.name, "doc": column.doc, "value": shown(value, longest)}))
+            Some(json!({"name": column.name, "doc": column.doc, "value": shown(value, column.stored, longest)}))
         })
         .collect()
 }
@@ -130,8 +131,9 @@ fn steps(opened: &Opened, longest: usize) -> Value {
     let (episode, mut all) = (&opened.episode, Map::new());
     if let Some(own) = &opened.own {
         for column in own {
-            let values: Vec<Option<Value>> = column.values().map(|value| Some(shown(value?, longest))).collect();
-            all.insert(column.name.clone(), json!({"doc": "", "unit": null, "values": values}));
+            let values: Vec<Option<Value>> = column.values().map(|value| Some(displayed(value?, longest))).collect();
+            let told = json!({"doc": "", "unit": null, "is_number": column.is_numeric(), "values": values});
+            all.insert(column.name.clone(), told);
         }
         return Value::Object(all);
     }
@@ -140,22 +142,43 @@ fn steps(opened: &Opened, longest: usize) -> Value {
         if values.iter().all(Option::is_none) {
             continue;
         }
-        let values: Vec<Value> =
-            values.into_iter().map(|value| value.map_or(Value::Null, |value| shown(value, longest))).collect();
-        all.insert(column.name.to_owned(), json!({"doc": column.doc, "unit": column.unit, "values": values}));
+        let is_number = matches!(column.stored.kind(), Kind::Int | Kind::Float);
+        let values: Vec<Option<Value>> =
+            values.into_iter().map(|value| Some(shown(value?, column.stored, longest))).collect();
+        let told = json!({"doc": column.doc, "unit": column.unit, "is_number": is_number, "values": values});
+        all.insert(column.name.to_owned(), told);
     }
     Value::Object(all)
 }
 
-fn shown(value: Cell<'_>, longest: usize) -> Value {
+/// A value for the page: numbers are text, since a browser would round them.
+fn shown(value: Cell<'_>, stored: Stored, longest: usize) -> Value {
     match value {
         Cell::Bool(value) => json!(value),
-        Cell::Int(value) => json!(value),
-        Cell::Float(value) => json!((value * 1e6).round() / 1e6),
-        Cell::Text(text) => match text.char_indices().nth(longest) {
-            None => json!(lines(text)),
-            Some((end, _)) => json!({"text": lines(&text[..end]), "characters": text.chars().count()}),
-        },
+        Cell::Int(value) => json!(value.to_string()),
+        Cell::Float(value) => json!(shortest(value, stored)),
+        Cell::Text(text) => cut(text, longest),
+    }
+}
+
+fn displayed(value: Displayed, longest: usize) -> Value {
+    match value {
+        Displayed::Bool(value) => json!(value),
+        Displayed::Text(text) => cut(&text, longest),
+    }
+}
+
+/// The fewest digits that distinguish a float from its neighbours of the same width.
+#[expect(clippy::cast_possible_truncation, reason = "the value was stored as a float of 32 bits")]
+fn shortest(value: f64, stored: Stored) -> String {
+    let text = if stored == Stored::Float32 { format!("{:?}", value as f32) } else { format!("{value:?}") };
+    text.strip_suffix(".0").map(str::to_owned).unwrap_or(text)
+}
+
+fn cut(text: &str, longest: usize) -> Value {
+    match text.char_indices().nth(longest) {
+        None => json!(lines(text)),
+        Some((end, _)) => json!({"text": lines(&text[..end]), "characters": text.chars().count()}),
     }
 }
 

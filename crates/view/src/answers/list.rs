@@ -8,6 +8,7 @@ use super::labels;
 use crate::filter::{COLUMNS, Filter, Query, condition_of, number, value};
 use crate::{Snapshot, ViewError};
 use exact::escape::visible;
+use metric::catalog::{Better, Kind};
 use score::select::is_of_coders;
 use score::table::{EpisodeTable, MetricColumn};
 
@@ -16,7 +17,8 @@ const MOST: usize = 500;
 
 /// Some episodes of the list, by `offset`, `limit`, `sort` and `order`.
 pub(crate) fn answer(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewError> {
-    let table = &snapshot.table()?.results.episodes;
+    let Some(scored) = &snapshot.scored else { return Ok(none(snapshot)) };
+    let table = &scored.results.episodes;
     let rows = sorted(snapshot, query)?;
     let offset = number(query, "offset")?.unwrap_or_default().min(rows.len());
     let limit = number(query, "limit")?.unwrap_or(100).min(MOST);
@@ -36,10 +38,29 @@ pub(crate) fn answer(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewEr
         "offset": offset,
         "generation": snapshot.generation,
         "metrics": table.metrics.iter().map(|metric| visible(&metric.name)).collect::<Vec<_>>(),
+        "passes": passes(table),
         "has_conditions": table.has_conditions(),
         "has_labels": table.labels.iter().any(is_of_coders),
         "rows": page.iter().map(|row| with_words(table, *row)).collect::<Vec<_>>(),
     }))
+}
+
+/// The list until an episode is finished.
+fn none(snapshot: &Snapshot) -> Value {
+    json!({"total": 0, "all": 0, "offset": 0, "generation": snapshot.generation, "metrics": [], "passes": [], "rows": []})
+}
+
+/// The value of each rate that its definition calls better; null for quantities and for rates without a direction.
+fn passes(table: &EpisodeTable) -> Vec<Option<&'static str>> {
+    let pass = |metric: &MetricColumn| {
+        let defined = table.catalog.metric.get(&metric.name).filter(|metric| metric.kind == Kind::Rate)?;
+        match defined.better {
+            Better::Higher => Some("1"),
+            Better::Lower => Some("0"),
+            Better::Neither => None,
+        }
+    };
+    table.metrics.iter().map(pass).collect()
 }
 
 /// The whole list, for a copy. Rows whose names are shown escaped also have `keys`, the raw values for filters.
@@ -47,6 +68,7 @@ pub(crate) fn everything(snapshot: &Snapshot) -> Result<Value, ViewError> {
     let table = &snapshot.table()?.results.episodes;
     Ok(json!({
         "metrics": table.metrics.iter().map(|metric| visible(&metric.name)).collect::<Vec<_>>(),
+        "passes": passes(table),
         "labels": table.labels.iter().map(|label| &label.name).collect::<Vec<_>>(),
         "has_conditions": table.has_conditions(),
         "has_labels": table.labels.iter().any(is_of_coders),
@@ -80,19 +102,26 @@ pub(crate) fn neighbours(snapshot: &Snapshot, query: &Query, id: &str) -> Result
     }))
 }
 
+/// The other episodes of an episode's scene. Without declared scenes, those of its experiment, seed and run.
 pub(crate) fn siblings(snapshot: &Snapshot, id: &str) -> Vec<Value> {
     let Some(scored) = &snapshot.scored else { return Vec::new() };
     let table = &scored.results.episodes;
-    let Some(own) = scored.rows.get(id).map(|row| table.keys.get(*row)) else { return Vec::new() };
+    let Some(at) = scored.rows.get(id).copied() else { return Vec::new() };
+    let (own, scene) = (table.keys.get(at), scene_of(table, at));
     let is_sibling = |row: &usize| {
         let key = table.keys.get(*row);
-        (key.experiment, key.seed, key.run) == (own.experiment, own.seed, own.run) && key.episode_id != id
+        let is_beside = scene.map_or((key.seed, key.run) == (own.seed, own.run), |_| scene_of(table, *row) == scene);
+        is_beside && key.experiment == own.experiment && key.episode_id != id
     };
     let named = |row: usize| {
         let key = table.keys.get(row);
         json!({"id": key.episode_id, "name": visible(key.episode_id), "model": visible(key.model), "condition": visible(condition_of(table, row))})
     };
     (0..table.len()).filter(is_sibling).take(MOST).map(named).collect()
+}
+
+fn scene_of(table: &EpisodeTable, row: usize) -> Option<&str> {
+    table.label("scene").and_then(|label| label.get(row))
 }
 
 /// The filtered rows in the requested order; undefined values come last in both directions.

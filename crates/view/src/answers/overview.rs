@@ -106,7 +106,7 @@ fn ranking(episodes: &EpisodeTable) -> Value {
 }
 
 pub(crate) fn sections(snapshot: &Snapshot, query: &Query, part: Part) -> Result<Value, ViewError> {
-    let scored = snapshot.table()?;
+    let Some(scored) = &snapshot.scored else { return Ok(empty(snapshot)) };
     let filter = Filter::of(query);
     let mut order = Value::Null;
     let made = match part {

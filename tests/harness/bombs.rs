@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 use std::fs::{self, File};
+use std::io::Write as _;
 use std::ops::Range;
 use std::path::Path;
 use std::process::{Child, Stdio};
@@ -14,6 +15,8 @@ use arrow::datatypes::Int32Type;
 use parquet::arrow::ArrowWriter;
 use parquet::basic::{Compression, Encoding, ZstdLevel};
 use parquet::file::properties::WriterProperties;
+
+use serde_json::json;
 
 use super::program::{Answer, limited, stderr, stdout};
 
@@ -97,6 +100,20 @@ pub fn many_episodes(path: &Path, numbers: Range<usize>) {
 /// Episodes of one step each, every one of a different model.
 pub fn many_models(path: &Path, count: usize) {
     write(path, count, vec![("episode_id", numbered(0..count)), ("model", numbered(0..count))]);
+}
+
+/// Writes a deflated log of Inspect, of less than 1 MiB, whose only sample has this JSON; `note` is in its header.
+pub fn inspect_log(path: &Path, note: &str, sample: &str) {
+    let eval = json!({ "eval_id": "e", "task": "t", "model": "m", "note": note });
+    let header = json!({ "version": 2, "status": "success", "eval": eval }).to_string();
+    let mut zip = zip::ZipWriter::new(File::create(path).unwrap());
+    for (name, text) in [("header.json", header.as_str()), ("samples/1_epoch_1.json", sample)] {
+        zip.start_file(name, zip::write::SimpleFileOptions::default()).unwrap();
+        zip.write_all(text.as_bytes()).unwrap();
+    }
+    zip.finish().unwrap();
+    let bytes = fs::metadata(path).unwrap().len();
+    assert!(bytes < 1 << 20, "{}: {bytes} bytes", path.display());
 }
 
 /// Definitions with `count` metrics.

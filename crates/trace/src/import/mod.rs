@@ -20,6 +20,7 @@ mod mapping;
 pub mod schema;
 mod text;
 
+use std::collections::HashMap;
 use std::num::NonZeroUsize;
 use std::path::Path;
 
@@ -183,8 +184,10 @@ fn write(
 }
 
 fn add(rows: &mut Gathered, members: &Members) -> Result<(), ()> {
+    // A row may have a thousand columns.
+    let members: HashMap<&str, &line::LineValue> = members.iter().map(|(key, value)| (key.as_str(), value)).collect();
     for (field, values) in rows.layout.fields().iter().zip(&mut rows.columns) {
-        let value = members.iter().find(|(key, _)| key == field.name()).map(|(_, value)| value);
+        let value = members.get(field.name().as_str()).copied();
         values.push(plain(value, field.data_type())?)?;
     }
     rows.rows += 1;

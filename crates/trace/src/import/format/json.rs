@@ -6,12 +6,15 @@ use std::io::{self, BufReader, Read};
 use memchr::memmem;
 use serde::de::DeserializeOwned;
 
-pub(super) fn from_slice<T: DeserializeOwned>(bytes: &[u8]) -> serde_json::Result<T> {
-    match serde_json::from_slice(bytes) {
-        Err(_) if [&b"NaN"[..], b"Infinity"].iter().any(|word| memmem::find(bytes, word).is_some()) => {
-            serde_json::from_reader(WithoutNan::new(bytes))
+pub(super) fn from_bytes<T: DeserializeOwned>(bytes: Vec<u8>) -> io::Result<T> {
+    match serde_json::from_slice(&bytes) {
+        Err(_) if [&b"NaN"[..], b"Infinity"].iter().any(|word| memmem::find(&bytes, word).is_some()) => {
+            let mut strict = Vec::with_capacity(bytes.len());
+            WithoutNan::new(&bytes[..]).read_to_end(&mut strict)?;
+            drop(bytes);
+            Ok(serde_json::from_slice(&strict)?)
         }
-        read => read,
+        read => Ok(read?),
     }
 }
 
@@ -80,16 +83,16 @@ impl<R: Read> Read for WithoutNan<R> {
 mod tests {
     use serde_json::{Value, json};
 
-    use super::from_slice;
+    use super::from_bytes;
 
     #[test]
     fn nan_becomes_null_and_infinities_become_texts() {
         let text = r#"{"a":NaN,"b":[-Infinity,Infinity,-1.5],"c":"NaN \" Infinity \\","d":"-","e":NaN}"#;
         let expected =
             json!({"a": null, "b": ["-Infinity", "Infinity", -1.5], "c": "NaN \" Infinity \\", "d": "-", "e": null});
-        assert_eq!(from_slice::<Value>(text.as_bytes()).unwrap(), expected);
+        assert_eq!(from_bytes::<Value>(text.into()).unwrap(), expected);
         for wrong in ["{\"a\":Nan,\"b\":NaN}", "{\"a\":-\"x\",\"b\":NaN}", "{\"a\":NaN", "-Inf"] {
-            from_slice::<Value>(wrong.as_bytes()).unwrap_err();
+            from_bytes::<Value>(wrong.into()).unwrap_err();
         }
     }
 }

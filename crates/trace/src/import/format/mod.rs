@@ -46,8 +46,11 @@ exact::names!(Format {
 
 const UNLIMITED: Limit = Limit::new("bytes of rows", u64::MAX);
 
+/// The bytes of text whose reading and writing costs as much as a value itself.
+const VALUE: u64 = 64;
+
 const fn most_rows(bytes: u64) -> Limit {
-    Limit::new("bytes of rows of a log of its size", 128 << 20).and_beyond(1 << 20, 1024, bytes)
+    Limit::new("bytes of rows of a log of its size, 64 more for each value", 128 << 20).and_beyond(1 << 20, 1024, bytes)
 }
 
 /// The number of bytes that identify the kind of a JSON file.
@@ -120,9 +123,12 @@ impl<'m> RowSink<'m> {
     }
 
     pub(super) fn add(&mut self, row: &Row<'_>) -> Result<(), ImportError> {
-        let mut line = serde_json::to_vec(&self.mapping.flat(row)).unwrap_or_default();
+        let flat = self.mapping.flat(row);
+        let mut line = serde_json::to_vec(&flat).unwrap_or_default();
         line.push(b'\n');
-        self.budget.spend(line.len() as u64).map_err(|exceeded| self.over("", &exceeded))?;
+        self.budget
+            .spend(line.len() as u64 + VALUE * flat.len() as u64)
+            .map_err(|exceeded| self.over("", &exceeded))?;
         self.write(&line)
     }
 

@@ -12,7 +12,7 @@ use serde_json::{Map, Value, json};
 use zip::{CompressionMethod, ZipArchive};
 
 use super::super::RowSink;
-use super::super::json::from_slice;
+use super::super::json::from_bytes;
 use super::Log;
 use crate::import::error::ImportError;
 use exact::budget::{Budget, Exceeded, Limit};
@@ -25,12 +25,12 @@ const SEQUENCES: [&str; 4] = ["messages", "calls", "events", "attachments"];
 const HELP: &str = "copy the log again; `inspect log recover` mends one whose writer was ended";
 
 const fn most_inflated(bytes: u64) -> Limit {
-    Limit::new("bytes inflated from a log of its size", 128 << 20).and_beyond(1 << 20, 1024, bytes)
+    Limit::new("bytes inflated from a log of its size", 96 << 20).and_beyond(1 << 20, 1024, bytes)
 }
 
 /// A value takes 72 bytes of memory, however short its text in the log is.
 const fn most_values(bytes: u64) -> Limit {
-    Limit::new("values of a sample of a log of its size", 2_500_000).and_beyond(1 << 20, 64, bytes)
+    Limit::new("values of a sample of a log of its size", 2_000_000).and_beyond(1 << 20, 64, bytes)
 }
 
 pub(in super::super) fn is_archive(file: &mut File) -> io::Result<bool> {
@@ -113,7 +113,7 @@ impl EvalArchive {
     fn json<T: DeserializeOwned>(&mut self, name: &str) -> io::Result<T> {
         let bytes = self.bytes(name)?;
         self.values.spend(values(&bytes))?;
-        Ok(from_slice(&bytes)?)
+        from_bytes(bytes)
     }
 
     fn bytes(&mut self, name: &str) -> io::Result<Vec<u8>> {
@@ -137,7 +137,7 @@ impl EvalArchive {
     }
 }
 
-/// The number of commas, and six for each list and object: their items take more memory than they need.
+/// The number of commas, and eight for each list and object: even small ones reserve memory for several items.
 fn values(json: &[u8]) -> u64 {
     let (mut values, mut rest) = (1, json);
     while let Some((byte, after)) = rest.split_first() {
@@ -145,7 +145,7 @@ fn values(json: &[u8]) -> u64 {
         match byte {
             b'"' => rest = after_text(rest),
             b',' => values += 1,
-            b'[' | b'{' => values += 6,
+            b'[' | b'{' => values += 8,
             _ => {}
         }
     }

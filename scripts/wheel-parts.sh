@@ -13,7 +13,7 @@ cp LICENSE LICENSE-APACHE LICENSE-MIT python/
 mkdir "$package/runs"
 cp fixtures/paper/*.parquet fixtures/paper/README.md "$package/runs/"
 mkdir -p "$data/mirrorstats"
-scripts/supply-chain.py sbom "$data/mirrorstats/sbom.cdx.json"
+scripts/sbom.py "$data/mirrorstats/sbom.cdx.json"
 mkdir -p "$data/man/man1" "$data/bash-completion/completions" "$data/zsh/site-functions" "$data/fish/vendor_completions.d"
 [ $# -gt 0 ] || exit 0
 "$@" man "$data/man/man1" 2>/dev/null

@@ -1,8 +1,10 @@
 //! `query` and `--engine polars` at the process boundary.
 
 use std::path::Path;
+use std::process::Command;
 
 use crate::harness::files::repository;
+use crate::harness::need;
 use crate::harness::program::{self, Answer};
 
 const FIXTURE: &str = "fixtures/paper";
@@ -103,6 +105,55 @@ fn a_bad_query_is_refused_with_its_location_and_the_nearest_name() {
     assert!(refusal("SELECT model FROM step").contains("did you mean `steps`?"));
     assert!(refusal("SELECT model FROM").contains("not a query"));
     assert!(refusal("SELECT nosuch(model) FROM steps").contains("nosuch"));
+}
+
+/// A program `duckdb` and this program on PATH, in a folder with one trace whose path needs quotes.
+fn beside_duckdb() -> (tempfile::TempDir, String) {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let script = format!(
+        "#!/bin/sh\nPYTHONPATH='{}' exec python3 -c '\nimport duckdb, sys\nfor row in duckdb.sql(sys.argv[2]).fetchall(): print(*row, sep=\",\")\n' \"$@\"\n",
+        need::duckdb().display()
+    );
+    std::fs::write(at.join("duckdb"), script).unwrap();
+    let made = Command::new("chmod").arg("+x").arg(at.join("duckdb")).status().unwrap();
+    assert!(made.success());
+    std::fs::create_dir(at.join("it's $HOME")).unwrap();
+    let first = ["E1", "E2"].map(|name| format!("SELECT * FROM steps WHERE experiment = '{name}'"));
+    for (query, name) in first.iter().zip(["a", "b"]) {
+        let path = at.join(format!("it's $HOME/{name}.parquet"));
+        assert_eq!(run(&["query", query, FIXTURE, "-o", path.to_str().unwrap()]).0, 0);
+    }
+    let program = Path::new(env!("CARGO_BIN_EXE_mirrorstats")).parent().unwrap();
+    let path = format!("{}:{}:{}", at.display(), program.display(), std::env::var("PATH").unwrap());
+    (folder, path)
+}
+
+#[test]
+fn a_refused_query_comes_with_a_command_line_for_duckdb() {
+    let (folder, path) = beside_duckdb();
+    for (query, expected) in [
+        ("SELECT string_agg(DISTINCT experiment, ' ' ORDER BY experiment) AS e FROM steps", "E1 E2\n"),
+        (
+            "SELECT count(*) FILTER (WHERE x.t <> 'a''b') FROM (SELECT action AS t FROM steps\n-- all\nQUALIFY true) x WHERE 1 = 2",
+            "0\n",
+        ),
+        ("SELECT list(DISTINCT e.seed)[1] > 0 FROM episodes e JOIN steps s USING (episode_id)", "True\n"),
+        ("SELECT any_value(metric) FROM cells WHERE metric = 'TSA'", "TSA\n"),
+    ] {
+        let asked = ["query", query, "it's $HOME", "--where", "seed = seed and model <> 'x'"];
+        let Answer { code, stdout, stderr } = program::run(folder.path(), &asked);
+        assert_eq!((code, stdout.as_str()), (2, ""), "{query}");
+        let line = stderr.split_once("run it in DuckDB: ").unwrap_or_else(|| panic!("{query}: {stderr}")).1;
+        let answer = Command::new("sh")
+            .args(["-c", line.lines().next().unwrap()])
+            .env("PATH", &path)
+            .current_dir(folder.path())
+            .output()
+            .unwrap();
+        assert!(answer.status.success(), "{line}: {}", String::from_utf8_lossy(&answer.stderr));
+        assert_eq!(String::from_utf8_lossy(&answer.stdout), expected, "{query}");
+    }
 }
 
 #[test]

@@ -1,25 +1,18 @@
 //! A SELECT over the steps, episodes and cells of a study.
 
-use engines::polars::answer::{Format, QueryError, plan};
+use engines::polars::answer::{Format, plan};
+use engines::polars::refused::QueryError;
 use engines::polars::shared_file::in_memory;
 use engines::polars::statement::{self, Checked, Table};
 use engines::polars::tables;
 use polars::prelude::LazyFrame;
+use toml_spec::Faults;
 
 use super::{Study, StudyError};
 
-impl From<QueryError> for StudyError {
-    fn from(error: QueryError) -> Self {
-        match error {
-            QueryError::Faults(faults) => Self::Filter(faults),
-            QueryError::Polars(error) => Self::Polars(error),
-        }
-    }
-}
-
 impl Study {
     /// The lazy answer to a checked query, and a note if the filter keeps nothing. Computes only the tables that it
-    /// names.
+    /// names. Errors: a query that DuckDB would answer differently, with the same query for DuckDB.
     pub fn query(&self, query: &Checked) -> Result<(LazyFrame, Option<String>), StudyError> {
         let (mut loaded, mut note) = (Vec::new(), None);
         if query.tables.contains(&Table::Steps) {
@@ -33,7 +26,55 @@ impl Study {
                 loaded.push((Table::Cells, tables::cells(&self.cells_of(&scores)?)?));
             }
         }
-        Ok((plan(query, loaded)?, note))
+        let frame = plan(query, loaded).map_err(|error| match error {
+            QueryError::Faults(faults) => StudyError::Filter(faults),
+            QueryError::Polars(error) => StudyError::Polars(error),
+            QueryError::Unsupported(mut fault) => {
+                let other = fault.help.take().map(|help| format!("{help}; or ")).unwrap_or_default();
+                let help = format!("{other}{}", self.in_duckdb(query));
+                StudyError::Filter(Faults(vec![fault.help(help)]))
+            }
+        })?;
+        Ok((frame, note))
+    }
+
+    /// A command line with which DuckDB answers the same query.
+    pub fn in_duckdb(&self, query: &Checked) -> String {
+        let is_in_files = |table| {
+            let has_labels =
+                |traces: &trace::open::TraceSet| traces.column_names().iter().any(|name| traces.is_label_column(name));
+            table == Table::Steps && self.traces().is_ok_and(|traces| !has_labels(traces))
+        };
+        let (mut exports, mut views) = (String::new(), String::new());
+        for table in query.tables.iter().copied() {
+            let name = table.name();
+            let from = if is_in_files(table) {
+                let files = self.inputs.iter().map(|input| sql_text(&input.path.to_string_lossy())).collect::<Vec<_>>();
+                format!("read_parquet([{}], union_by_name = true, hive_partitioning = false)", files.join(", "))
+            } else {
+                exports.push_str(&self.export(name));
+                sql_text(&format!("{name}.parquet"))
+            };
+            views.push_str(&format!("CREATE VIEW {name} AS SELECT * FROM {from}; "));
+        }
+        format!("run it in DuckDB: {exports}duckdb -c {}", shell_text(&format!("{views}{}", query.on_one_line())))
+    }
+
+    fn export(&self, table: &str) -> String {
+        let question = &self.question;
+        let option = |name: &str, value: Option<String>| {
+            value.map(|value| format!(" {name} {}", shell_text(&value))).unwrap_or_default()
+        };
+        let files: String =
+            self.inputs.iter().map(|input| format!(" {}", shell_text(&input.path.to_string_lossy()))).collect();
+        let definitions = question.definitions.as_ref().map(|name| name.to_string_lossy().into_owned());
+        format!(
+            "mirrorstats query {}{files}{}{}{} -o {table}.parquet && ",
+            shell_text(&format!("SELECT * FROM {table}")),
+            option("--definitions", definitions),
+            option("--metrics", question.metrics.as_ref().map(|names| names.join(","))),
+            option("--where", question.filter.clone()),
+        )
     }
 
     /// The rows of a query as a Parquet file in memory. Errors: a query that cannot be run; faults of the inputs.
@@ -41,4 +82,12 @@ impl Study {
         let (frame, _) = self.query(&statement::check(sql)?)?;
         Ok(in_memory(frame, Format::Parquet)?)
     }
+}
+
+fn sql_text(text: &str) -> String {
+    format!("'{}'", text.replace('\'', "''"))
+}
+
+fn shell_text(text: &str) -> String {
+    format!("'{}'", text.replace('\'', r"'\''"))
 }

@@ -2,34 +2,26 @@
 //!
 //! Rule: rows come in the order of the query; null and empty stay distinct.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, HashSet, VecDeque};
 use std::io::Write;
 use std::num::NonZeroUsize;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use polars::prelude::{
-    AnyValue, Column, CsvWriter, DataFrame, DataType, Engine, IntoLazy as _, JsonFormat, JsonWriter, LazyFrame,
-    ParquetWriter, PlanCallback, PolarsError as Inner, PolarsResult, SerWriter as _,
+    AnyValue, Column, CsvWriter, DataFrame, Engine, IntoLazy as _, JsonFormat, JsonWriter, LazyFrame, ParquetWriter,
+    PlanCallback, PolarsError as Inner, PolarsResult, SerWriter as _, col,
 };
-use polars::sql::SQLContext;
 
-use sqlparser::ast::{Query, Value};
-
-use super::rewrite::{self, substitute};
-use super::run::{self, PolarsError};
+use super::accepted::Kind;
+use super::plan::Planner;
+use super::refused::QueryError;
+use super::relation::{self, Relation};
+use super::run::PolarsError;
 use super::statement::{Asked, Checked, Table};
-use toml_spec::Faults;
+use metric::syntax::grammar::with_stack;
 use trace::catch_panic::contained_on_all_threads;
 
 const BATCH: NonZeroUsize = NonZeroUsize::new(1 << 17).expect("not zero");
-
-#[derive(Debug, thiserror::Error)]
-pub enum QueryError {
-    #[error(transparent)]
-    Faults(#[from] Faults),
-    #[error(transparent)]
-    Polars(#[from] PolarsError),
-}
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
@@ -48,50 +40,51 @@ pub struct Excerpt {
     pub rows: usize,
 }
 
+/// The lazy answer to a query over its tables.
 pub fn plan(query: &Checked, tables: Vec<(Table, LazyFrame)>) -> Result<LazyFrame, QueryError> {
-    let mut context = SQLContext::new();
-    let (mut columns, mut schemas) = (Vec::new(), Vec::new());
+    let mut relations = BTreeMap::new();
     for (table, mut frame) in tables {
         let schema = frame.collect_schema().map_err(PolarsError::from)?;
-        columns.extend(schema.iter_names().map(polars::prelude::PlSmallStr::to_string));
-        schemas.push((table, schema));
-        context.register(table.name(), frame);
+        let columns = schema.iter().filter_map(|(name, ty)| {
+            let (kind, bits) = Kind::of(ty)?;
+            let (name, inner) = (name.to_string(), name.to_string());
+            Some(relation::Column { table: table.name().to_owned(), name, inner, kind, bits, hidden: false })
+        });
+        let columns = columns.collect();
+        relations.insert(table, Relation { frame, columns });
     }
-    let statement = match &query.asked {
-        Asked::Tables => return Ok(listed("name", Table::ALL.map(Table::name), None)?),
+    match &query.asked {
+        Asked::Tables => Ok(listed("name", Table::ALL.map(Table::name), None)?),
         Asked::Columns(table) => {
-            let found = schemas.iter().find(|(other, _)| other == table).map(|(_, schema)| schema);
-            let columns: Vec<(String, &str)> = found
-                .into_iter()
-                .flat_map(|schema| schema.iter())
-                .map(|(name, ty)| (name.to_string(), sql_type(ty)))
-                .collect();
-            let (names, types): (Vec<_>, Vec<_>) = columns.into_iter().unzip();
-            return Ok(listed("column_name", names, Some(types))?);
+            let columns = relations.get(table).into_iter().flat_map(|relation| &relation.columns);
+            let (names, types): (Vec<_>, Vec<_>) =
+                columns.map(|column| (column.name.as_str(), sql_type(column.kind, column.bits))).unzip();
+            Ok(listed("column_name", names, Some(types))?)
         }
-        Asked::Rows(statement) => {
-            let mut statement = statement.as_ref().clone();
-            let value = |inner: &Query, asked| {
-                scalar(&mut context, inner, asked).map_err(|error| match error {
-                    PolarsError::Failed(words) => {
-                        query.whole(format!("a subquery runs by itself first: {words}")).into()
-                    }
-                    other => QueryError::Polars(other),
-                })
-            };
-            substitute(&mut statement, value)?;
-            statement
+        Asked::Rows(rows) => {
+            let planned = with_stack(&query.source.text, || {
+                contained_on_all_threads(|| named(Planner::new(&query.source, &relations).query(rows)?))
+            });
+            planned.map_err(PolarsError::panicked)?
         }
-    };
-    let planned = run::plan(&mut context, &statement.to_string()).and_then(|mut frame| {
-        // Names and types are resolved here, before a row is read.
-        contained_on_all_threads(|| frame.collect_schema()).map_err(PolarsError::panicked)??;
-        Ok(frame)
-    });
-    planned.map_err(|error| match error {
-        PolarsError::Failed(words) => QueryError::Faults(query.fault(&words, &columns)),
-        other => QueryError::Polars(other),
-    })
+    }
+}
+
+/// Gives the columns their names. Of two with one name, the second gets a number, as in DuckDB's files.
+fn named(relation: Relation) -> Result<LazyFrame, QueryError> {
+    let mut taken = HashSet::new();
+    let mut chosen = Vec::new();
+    for column in &relation.columns {
+        let numbered = (1..).map(|number| format!("{}_{number}", column.name));
+        let name = std::iter::once(column.name.clone()).chain(numbered).find(|name| !taken.contains(name));
+        let name = name.unwrap_or_default();
+        chosen.push(col(column.inner.as_str()).alias(name.as_str()));
+        taken.insert(name);
+    }
+    let mut frame = relation.frame.select(chosen);
+    // Types are resolved here, before a row is read.
+    frame.collect_schema().map_err(PolarsError::from)?;
+    Ok(frame)
 }
 
 fn listed<T: AsRef<str>>(
@@ -105,46 +98,11 @@ fn listed<T: AsRef<str>>(
     Ok(DataFrame::new(texts.len(), columns)?.lazy())
 }
 
-fn sql_type(ty: &DataType) -> &'static str {
-    match ty {
-        DataType::Boolean => "BOOLEAN",
-        DataType::Int8 => "TINYINT",
-        DataType::Int16 => "SMALLINT",
-        DataType::Int32 => "INTEGER",
-        DataType::Int64 => "BIGINT",
-        DataType::UInt32 => "UINTEGER",
-        DataType::UInt64 => "UBIGINT",
-        DataType::Float32 => "FLOAT",
-        DataType::Float64 => "DOUBLE",
-        _ => "VARCHAR",
-    }
-}
-
-/// The value of a subquery: the value of its only row, or null without a row. `EXISTS` gives true if there is a row.
-fn scalar(context: &mut SQLContext, query: &Query, asked: rewrite::SubqueryResult) -> Result<Value, PolarsError> {
-    let found = run::collect(run::plan(context, &query.to_string())?)?;
-    if asked == rewrite::SubqueryResult::Exists {
-        return Ok(Value::Boolean(found.height() > 0));
-    }
-    let (rows, columns) = found.shape();
-    if columns != 1 || rows > 1 {
-        let words =
-            format!("a subquery in the place of a value has {rows} rows of {columns} columns: expected one value");
-        return Err(PolarsError::Failed(words));
-    }
-    if rows == 0 {
-        return Ok(Value::Null);
-    }
-    match found.columns()[0].get(0)? {
-        AnyValue::Null => Ok(Value::Null),
-        AnyValue::Boolean(value) => Ok(Value::Boolean(value)),
-        AnyValue::String(text) => Ok(Value::SingleQuotedString(text.to_owned())),
-        AnyValue::StringOwned(text) => Ok(Value::SingleQuotedString(text.to_string())),
-        // All digits.
-        AnyValue::Float64(value) => Ok(Value::Number(format!("{value:?}"), false)),
-        AnyValue::Float32(value) => Ok(Value::Number(format!("{value:?}"), false)),
-        value if value.is_integer() => Ok(Value::Number(value.to_string(), false)),
-        value => Err(PolarsError::Failed(format!("a subquery has a value that no statement can hold: {value}"))),
+fn sql_type(kind: Kind, bits: u32) -> &'static str {
+    match (kind, bits) {
+        (Kind::Int, 7) => "TINYINT",
+        (Kind::Int, 31) => "INTEGER",
+        _ => kind.sql(),
     }
 }
 

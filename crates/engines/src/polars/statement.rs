@@ -1,10 +1,10 @@
 //! A query as typed: one SELECT over the known tables, which reads nothing else.
 //!
-//! Polars SQL has functions that read files (`read_parquet('...')`) and statements that change tables. So a query is
-//! parsed and checked here first; Polars gets the checked statement, printed again.
+//! Parses the text and finds its tables before a trace is read. Statements that change something and functions that
+//! read files (`read_parquet('...')`) are refused here.
 
 use std::collections::BTreeSet;
-use std::ops::{ControlFlow, Range};
+use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use sqlparser::ast::{
@@ -12,7 +12,6 @@ use sqlparser::ast::{
 };
 use sqlparser::tokenizer::Span;
 
-use super::rewrite::{bare_column, rewrite};
 use exact::suggest::nearest;
 pub use metric::syntax::grammar::{Grammar, SyntaxFault, bytes_of, shortened, with_stack};
 use toml_spec::{Fault, Faults, Place, Source};
@@ -31,14 +30,25 @@ exact::names!(Table { Steps: "steps", Episodes: "episodes", Cells: "cells" });
 pub struct Checked {
     pub(super) asked: Asked,
     pub tables: BTreeSet<Table>,
-    source: Arc<Source>,
+    pub(super) source: Arc<Source>,
 }
 
 #[derive(Clone, Debug)]
 pub(super) enum Asked {
-    Rows(Box<Statement>),
+    Rows(Box<Query>),
     Tables,
     Columns(Table),
+}
+
+impl Checked {
+    /// The query as typed if it has one line; else as parsed, without comments.
+    pub fn on_one_line(&self) -> String {
+        let typed = self.source.text.trim().trim_end_matches([';', ' ']);
+        match &self.asked {
+            Asked::Rows(query) if typed.contains(['\n', '\r']) => query.to_string(),
+            _ => typed.to_owned(),
+        }
+    }
 }
 
 const QUERY: Grammar = Grammar { noun: "query", one: "a query", longest: 64 * 1024, most_tokens: 8000, help: None };
@@ -51,7 +61,7 @@ fn checked(text: &str) -> Result<Checked, Faults> {
     let source = Arc::new(Source { name: "query".to_owned(), text: text.to_owned() });
     let at = |span, message: String| Fault::new(Place { source: Arc::clone(&source), span }, message);
     let parsed = parse(text);
-    let mut statement = parsed.map_err(|fault| Faults(vec![at(fault.span, fault.message).help_if(fault.help)]))?;
+    let statement = parsed.map_err(|fault| Faults(vec![at(fault.span, fault.message).help_if(fault.help)]))?;
     let mut reader = Reader { source: &source, ctes: BTreeSet::new(), tables: BTreeSet::new(), faults: Vec::new() };
     let _ = statement.visit(&mut Names(&mut reader.ctes));
     let _ = statement.visit(&mut reader);
@@ -60,70 +70,11 @@ fn checked(text: &str) -> Result<Checked, Faults> {
         return Err(Faults(faults));
     }
     let asked = match statement {
-        Statement::ShowTables { .. } => Asked::Tables,
+        Statement::Query(query) => Asked::Rows(query),
         Statement::ExplainTable { .. } => tables.first().map_or(Asked::Tables, |table| Asked::Columns(*table)),
-        _ => {
-            rewrite(&mut statement).map_err(|words| Faults(vec![at(0..text.len(), words)]))?;
-            Asked::Rows(Box::new(statement))
-        }
+        _ => Asked::Tables,
     };
     Ok(Checked { asked, tables, source })
-}
-
-impl Checked {
-    pub(super) fn whole(&self, message: String) -> Faults {
-        let place = Place { source: Arc::clone(&self.source), span: 0..self.source.text.len() };
-        Faults(vec![Fault::new(place, message).help(OTHERWISE)])
-    }
-
-    /// The column whose name contains an unknown name, because it is not quoted.
-    fn unquoted<'c>(&self, start: usize, columns: &'c [String]) -> Option<(Range<usize>, &'c String)> {
-        let text = &self.source.text;
-        let is_word = |name: &str| name.chars().all(|c| c.is_alphanumeric() || c == '_');
-        columns.iter().filter(|column| !is_word(column)).find_map(|column| {
-            let spans = text.match_indices(column.as_str()).map(|(at, _)| at..at + column.len());
-            let span = spans.into_iter().find(|span| span.contains(&start) && !text[..span.start].ends_with('"'))?;
-            Some((span, column))
-        })
-    }
-
-    /// Polars' message, located at the unknown name in the query. `columns` are those of the tables.
-    pub fn fault(&self, words: &str, columns: &[String]) -> Faults {
-        let unknown =
-            ["column '", "column \"", "column named '", "column: ", "Column '"].into_iter().find_map(|before| {
-                let rest = words.split_once(before)?.1;
-                let name: String = rest.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
-                (!name.is_empty() && !columns.contains(&name)).then_some(name)
-            });
-        let Some(name) = unknown else {
-            return self.whole(format!("Polars cannot do this: {}", plain(words)));
-        };
-        let start = word_at(&self.source.text, &name);
-        if let Some((span, quoted)) = self.unquoted(start, columns) {
-            let place = Place { source: Arc::clone(&self.source), span };
-            let help = format!("write \"{quoted}\" in double quotes: its name is more than letters, digits and `_`");
-            return Faults(vec![Fault::new(place, format!("unknown column `{name}`")).help(help)]);
-        }
-        let place = Place { source: Arc::clone(&self.source), span: start..start + name.len() };
-        let near = nearest(&name, columns.iter().map(String::as_str)).map(|near| format!("did you mean `{near}`?"));
-        let known = || format!("columns are {}", columns.join(", "));
-        Faults(vec![Fault::new(place, format!("unknown column `{name}`")).help(near.unwrap_or_else(known))])
-    }
-}
-
-const OTHERWISE: &str = "ask with a JOIN or a table of WITH; or ask DuckDB, of the file that `mirrorstats score TRACES -o \
-                         scores.parquet` writes, or in Python of `study.episodes`";
-
-fn plain(words: &str) -> &str {
-    let end = words.find(['{', '[']).filter(|_| words.contains("Ident {") || words.contains("Query {"));
-    words[..end.unwrap_or(words.len())].trim_end()
-}
-
-/// The position of a whole word in a text; the start of the text if it is absent.
-fn word_at(text: &str, word: &str) -> usize {
-    let part = |c: char| c.is_alphanumeric() || c == '_';
-    let alone = |at: &usize| !text[..*at].ends_with(part) && !text[at + word.len()..].starts_with(part);
-    text.match_indices(word).map(|(at, _)| at).find(alone).unwrap_or(0)
 }
 
 fn parse(text: &str) -> Result<Statement, SyntaxFault> {
@@ -211,14 +162,6 @@ impl Visitor for Reader<'_> {
         for cte in query.with.iter().flat_map(|with| &with.cte_tables) {
             self.check_name(&cte.alias.name);
         }
-        let plain = query.locks.is_empty()
-            && query.for_clause.is_none()
-            && query.settings.is_none()
-            && query.format_clause.is_none()
-            && query.pipe_operators.is_empty();
-        if !plain {
-            self.refuse(query.span(), "a query ends with ORDER BY and LIMIT: no FOR, SETTINGS, FORMAT or |>", None);
-        }
         if let SetExpr::Table(_) = query.body.as_ref() {
             self.refuse(query.span(), "`TABLE name` is not supported", Some("write SELECT * FROM name".to_owned()));
         }
@@ -228,14 +171,6 @@ impl Visitor for Reader<'_> {
     fn pre_visit_select(&mut self, select: &Select) -> ControlFlow<()> {
         if select.into.is_some() {
             self.refuse(select.span(), "SELECT INTO makes a table; a query reads alone", None);
-        }
-        if let Some(column) = bare_column(select) {
-            let help = match column.value.as_str() {
-                "*" => "name the columns in its place, here and in a GROUP BY".to_owned(),
-                _ => format!("add GROUP BY {column}, or write max({column})"),
-            };
-            let message = format!("the column `{}` is used beside an aggregate without GROUP BY", column.value);
-            self.refuse(column.span, message, Some(help));
         }
         ControlFlow::Continue(())
     }
@@ -324,8 +259,5 @@ mod tests {
         assert!(told.contains("unknown table `stepps`") && told.contains("did you mean `steps`?"), "{told}");
         let told = check("select a, from steps where").unwrap_err().to_string();
         assert!(told.contains("not a query"), "{told}");
-        let query = check("select tt, t from steps").unwrap();
-        let told = query.fault("unable to find column \"tt\"; valid columns: [\"t\"]", &["t".to_owned()]).to_string();
-        assert!(told.contains("unknown column `tt`") && told.contains("query:1:8"), "{told}");
     }
 }

@@ -85,23 +85,25 @@ mod rows {
         if let Some(path) = &args.output {
             output::check_target(path, study.files_read(None))?;
         }
-        let (frame, note) = study.query(&query)?;
+        let failed = |error: StudyError| failed(error, || study.in_duckdb(&query));
+        let (frame, note) = study.query(&query).map_err(failed)?;
         output::notes(note.as_slice());
         match (format, &args.output) {
             (None, path) => {
-                let excerpt = excerpt(frame, (args.rows > 0).then_some(args.rows)).map_err(failed)?;
+                let excerpt =
+                    excerpt(frame, (args.rows > 0).then_some(args.rows)).map_err(|error| failed(error.into()))?;
                 match path {
                     Some(path) => output::write_file(path, render(&excerpt, None).as_bytes())?,
                     None => io::stdout().lock().write_all(render(&excerpt, terminal::width()).as_bytes())?,
                 }
             }
-            (Some(format), None) => write(frame, format, io::stdout()).map_err(failed)?,
+            (Some(format), None) => write(frame, format, io::stdout()).map_err(|error| failed(error.into()))?,
             (Some(format), Some(path)) => {
                 let file = output::create(path)?;
                 let out = file.as_file().try_clone().map_err(|error| output::unwritable(path, error))?;
                 write_file(frame, format, out).map_err(|error| match error {
                     WriteError::Output(error) => output::unwritable(path, error),
-                    WriteError::Polars(error) => failed(error),
+                    WriteError::Polars(error) => failed(error.into()),
                 })?;
                 output::commit(file, path)?;
             }
@@ -109,8 +111,14 @@ mod rows {
         Ok(Outcome::Done)
     }
 
-    fn failed(error: PolarsError) -> Failure {
-        StudyError::from(error).into()
+    /// The failure of an engine, with another one that may do better.
+    fn failed(error: StudyError, elsewhere: impl FnOnce() -> String) -> Failure {
+        match error {
+            StudyError::Polars(error @ PolarsError::Failed(_)) => {
+                Failure::Rendered(format!("error: {error}\n  help: {}", elsewhere()))
+            }
+            other => other.into(),
+        }
     }
 
     /// The requested format; `None` for a table.

@@ -29,6 +29,7 @@ needed:
 	scripts/get-harnesses.sh
 	scripts/get-mujoco.sh
 	scripts/get-spark.sh
+	scripts/get-tex.sh
 	scripts/get-writers.sh
 
 # The member `fuzz` replays its corpora; chosen together, both use one build of the program. Many tests wait for other

@@ -20,6 +20,7 @@ mod generation;
 #[path = "../harness/mod.rs"]
 mod harness;
 mod hostile;
+mod latex;
 mod new_names;
 mod options;
 #[cfg(target_os = "linux")]

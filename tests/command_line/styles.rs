@@ -67,6 +67,20 @@ fn faults_of_styles_are_underlined() {
 }
 
 #[test]
+fn a_style_without_include_keeps_the_meaning_of_the_default_style() {
+    let folder = two_files();
+    let at = folder.path();
+    fs::write(at.join("mine.toml"), "[table.main]\ncolumns = ['TSA', 'TTD']\n").unwrap();
+    fs::write(at.join("means.toml"), "[print]\ncell = 'mean_se'\nemphasis = 'exact_mean'\n").unwrap();
+    let report = |style: &str| run(at, &["report", "a.parquet", "--style", style, "--no-figures", "--out", "r"]).done();
+    let mine = report("mine.toml");
+    assert!(mine.contains("with Wilson 95 % intervals") && mine.contains("† defined in fewer than 5"), "{mine}");
+    let means = report("means.toml");
+    assert!(means.contains("Values are mean ± standard error.") && !means.contains("Wilson"), "{means}");
+    assert!(!means.contains("no test shows"), "{means}");
+}
+
+#[test]
 fn a_table_in_latex_names_the_packages_that_it_needs() {
     let folder = two_files();
     run(folder.path(), &["report", "a.parquet", "--out", "r"]).done();

@@ -57,6 +57,13 @@ pub fn harnesses() -> PathBuf {
     packages
 }
 
+/// The program that compiles LaTeX to PDF.
+pub fn pdftex() -> &'static str {
+    let found = Command::new("pdflatex").arg("--version").stdout(Stdio::null()).status();
+    assert!(found.is_ok_and(|status| status.success()), "no pdflatex on PATH: scripts/get-tex.sh installs it");
+    "pdflatex"
+}
+
 /// An interpreter of Python.
 pub fn python() -> &'static str {
     let found = Command::new("python3").arg("--version").stdout(Stdio::null()).status();

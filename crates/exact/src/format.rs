@@ -2,11 +2,14 @@
 //!
 //! These numbers are floats from the start; `number` formats exact fractions.
 
-/// `1 file`, `2 files`.
+/// `1 file`, `2 files`, `2 replies`.
 pub fn counted(count: impl Into<u64>, noun: &str) -> String {
     match count.into() {
         1 => format!("1 {noun}"),
-        count => format!("{count} {noun}s"),
+        count => match noun.strip_suffix("ply") {
+            Some(stem) => format!("{count} {stem}plies"),
+            None => format!("{count} {noun}s"),
+        },
     }
 }
 

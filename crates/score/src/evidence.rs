@@ -31,6 +31,7 @@ use super::score_traces::{check_work, failed, projection};
 use super::segments::{Segments, truths};
 use super::vectors::Vector;
 use exact::escape::visible;
+use exact::format::counted;
 use exact::suggest::nearest;
 use metric::columns::{Level, Type};
 use metric::definitions::Definitions;
@@ -334,7 +335,7 @@ fn decided(timesteps: &[i64]) -> String {
 
 impl fmt::Display for Evidence {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {} steps", visible(&self.episode_id), self.length)?;
+        write!(f, "{}: {}", visible(&self.episode_id), counted(self.length as u64, "step"))?;
         for metric in &self.metrics {
             let value = metric.value.map_or_else(|| "undefined".to_owned(), |value| value.to_string());
             write!(f, "\n\n{} = {value}   decided at {}", metric.metric, decided(&metric.timesteps))?;

@@ -55,7 +55,7 @@ use ::report::plan::departures::{Looks, departures};
 use ::report::plan::register::RegisteredPlan;
 use ::report::published;
 use ::report::statistics::{Options, Ranks, Replies};
-use ::report::style::Style;
+use ::report::style::{EmphasisRule, Style};
 use ::report::tables::ListTable;
 use exact::replace;
 use metric::definitions::Definitions;
@@ -259,7 +259,7 @@ impl Study {
             let design = design_of(&episodes.declared);
             let found = Ranks::of_table(episodes, &self.undecided(lost), design, self.question.pool)?;
             for table in &mut tables {
-                table.mark_ties(&found, &style.sheet.emphasis_note);
+                table.mark_ties(&found, style.sheet.emphasis_note(EmphasisRule::Tied));
             }
             ranks = found.list();
         }

@@ -90,7 +90,10 @@ fn expand(argument: &OsStr) -> Result<Vec<PathBuf>, TraceError> {
     }
     // A pattern is text; other bytes can only be a name.
     let Some(pattern) = argument.to_str().filter(|text| is_glob(text)) else {
-        return Err(no_input("no such file or folder", "check the spelling and the current folder"));
+        return Err(no_input(
+            "no such file or folder",
+            "a path is relative to the current folder; a file may be elsewhere, or not recorded yet",
+        ));
     };
     let matches = matches(pattern).map_err(|error| match error {
         GlobError::Pattern(error) => no_input(error.msg, "correct the glob, or name the files"),

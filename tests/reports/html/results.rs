@@ -251,7 +251,7 @@ fn everything_is_within_ten_tabs() {
         tabs(&mut browser, 0, &format!("document.activeElement.matches('{goal}')"));
     }
     browser.close();
-    let links = "[...document.querySelectorAll('.top nav a')].map((a) => a.hash)";
+    let links = "[...document.querySelectorAll('nav.sections a')].map((a) => a.hash)";
     let mut browser = Browser::open(&PAPER_PAGE);
     let sections = browser.texts(links);
     assert_eq!(sections.len(), 6);
@@ -263,7 +263,7 @@ fn everything_is_within_ten_tabs() {
         (5, "#provenance summary"),
     ] {
         let mut browser = Browser::open(&PAPER_PAGE);
-        let mut pressed = tabs(&mut browser, 0, "document.activeElement.matches('.top nav a')");
+        let mut pressed = tabs(&mut browser, 0, "document.activeElement.matches('nav.sections a')");
         for _ in 0..at {
             browser.press("ArrowRight");
         }

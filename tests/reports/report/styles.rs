@@ -23,8 +23,8 @@ fn message(text: &str) -> String {
 fn each_fault_of_a_style_file_is_named() {
     let faults = [
         MAIN.to_owned(),
-        String::new(),
-        "[table.appendix]\ntitle = 'T'\ncolumns = ['TSA']\n".to_owned(),
+        "include = []\n".to_owned(),
+        "include = []\n[table.appendix]\ntitle = 'T'\ncolumns = ['TSA']\n".to_owned(),
         format!("colour = 'red'\n{MAIN}"),
         MAIN.replace("'TSA'", "'TSA', 'MTAOT'"),
         MAIN.replace("'TSA'", "'TSA', 'TSA'"),
@@ -84,6 +84,28 @@ fn an_include_comes_first_and_the_file_overrides_it() {
     // Changing an included file changes the style's hash.
     let (_other, changed) = files(&[("mine.toml", mine), ("more/base.toml", &base.replace("Extra", "Other"))]);
     assert_ne!(Style::load(&changed).unwrap().hash, style.hash);
+}
+
+#[test]
+fn a_style_starts_from_the_default_style_unless_it_lists_its_includes() {
+    let sheet = |list: &[(&str, &str)]| {
+        let (_folder, path) = files(list);
+        Style::load(path).unwrap()
+    };
+    let (default, paper) = (Style::load("default").unwrap().sheet, Style::load("paper").unwrap().sheet);
+    let implied = sheet(&[("mine.toml", "[table.main]\ncolumns = ['CR']\n")]);
+    let stated = sheet(&[("mine.toml", "include = ['default']\n[table.main]\ncolumns = ['CR']\n")]);
+    assert_eq!((&implied.sheet.print, &implied.sheet.table), (&default.print, &stated.sheet.table));
+    assert_eq!(sheet(&[("empty.toml", "")]).sheet, default);
+    // From nothing: no daggers, and the program's own defaults.
+    let alone = sheet(&[("mine.toml", &format!("include = []\n{MAIN}"))]).sheet;
+    assert_eq!((alone.print.mark_n_below, alone.table.len()), (None, 1));
+    // A file means the same alone and included; behind another style it only adds to that one.
+    let part = "[table.extra]\ntitle = 'Extra'\ncolumns = ['CR']\n";
+    let around = sheet(&[("mine.toml", "include = ['part.toml']\n"), ("part.toml", part)]).sheet;
+    assert_eq!((&around.print, around.table.len()), (&default.print, default.table.len() + 1));
+    let behind = sheet(&[("mine.toml", "include = ['paper', 'part.toml']\n"), ("part.toml", part)]).sheet;
+    assert_eq!((&behind.print, behind.emphasis_note.as_deref()), (&paper.print, Some("")));
 }
 
 #[test]

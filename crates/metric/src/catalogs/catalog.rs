@@ -38,6 +38,13 @@ pub struct Catalog {
     pub factor: IndexMap<String, Factor>,
 }
 
+impl Catalog {
+    /// The title of a report on these episodes.
+    pub fn subject(&self) -> String {
+        self.domain.as_ref().map_or_else(|| "Mirror self-recognition".to_owned(), |domain| format!("Results: {domain}"))
+    }
+}
+
 /// One metric, as defined.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Metric {

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use super::row::{Definitions, LARGEST_VALUE, Refused, Row, RowQuestion, World};
 use crate::errata::Field;
+use exact::format::counted;
 use exact::moments::Moments;
 use exact::number::Decimal;
 use metric::catalog::Kind;
@@ -177,8 +178,7 @@ pub(super) fn shown(mean: Option<Decimal>, se: Option<Decimal>) -> String {
 /// `21 episodes`, `0 to 21 episodes`.
 fn episodes(ns: &BTreeSet<u64>) -> String {
     match (ns.first(), ns.last()) {
-        (Some(1), Some(1)) => "1 episode".to_owned(),
-        (Some(low), Some(high)) if low == high => format!("{low} episodes"),
+        (Some(low), Some(high)) if low == high => counted(*low, "episode"),
         (Some(low), Some(high)) => format!("{low} to {high} episodes"),
         _ => "no episode".to_owned(),
     }

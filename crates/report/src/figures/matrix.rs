@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::cells::{Cells, Group, KeyValue};
 use crate::figures::kit::Mark;
 use crate::figures::{FigureError, FigureName};
+use exact::format::counted;
 use exact::moments::Moments;
 use exact::number::Decimal;
 use metric::catalog::{Better, Catalog, Kind, Metric};
@@ -53,7 +54,7 @@ impl Reading {
     pub fn words(self) -> String {
         match self {
             Self::Empty => "no episodes".to_owned(),
-            Self::Undefined(episodes) => format!("undefined (0 of {episodes} episodes)"),
+            Self::Undefined(episodes) => format!("undefined (0 of {})", counted(episodes, "episode")),
             Self::Known(moments) => {
                 let mean = self.decimal(4).map(|mean| mean.to_string()).unwrap_or_default();
                 format!("{mean} ({}/{n}, n = {n})", moments.sum, n = moments.n)

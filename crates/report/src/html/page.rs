@@ -37,6 +37,7 @@ pub(super) fn content(page: &Page<'_>) -> Result<Value, HtmlError> {
     let tables = page.tables.iter().map(|of| table(of, page.cells, &filters)).collect::<Result<Vec<_>, _>>()?;
     Ok(context! {
         font => markup(&figures::font_style_sheet()),
+        subject => visible(&catalog.subject()),
         counts => Serde(counts(page.episodes)),
         filters => Serde(filters.filters),
         tables => Serde(tables),

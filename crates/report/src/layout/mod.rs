@@ -85,7 +85,7 @@ impl<'a> Layout<'a> {
         MetricTable {
             name: name.to_owned(),
             title: sheet.title.clone(),
-            note: sheet.note.clone(),
+            note: sheet.note(name, self.print.cell).to_owned(),
             footnotes: self.footnotes(&groups),
             label: sheet.label.clone(),
             undefined: self.style.sheet.undefined.clone(),
@@ -102,7 +102,7 @@ impl<'a> Layout<'a> {
         let cells = || groups.iter().flat_map(|group| &group.rows).flat_map(|row| &row.cells);
         let mut notes = Vec::new();
         if cells().any(|cell| cell.emphasis != Emphasis::Plain) {
-            notes.push(self.style.sheet.emphasis_note.clone());
+            notes.push(self.style.sheet.emphasis_note(self.print.emphasis).to_owned());
         }
         if cells().any(|cell| cell.is_marked) {
             notes.push(format!("{DAGGER} defined in fewer than {} episodes.", self.print.mark_n_below));

@@ -89,7 +89,8 @@ fn caveats(statistics: &Statistics, options: &Options) -> Vec<String> {
     let lost = Some(super::warnings::lost(statistics)).filter(|lost| *lost > 0);
     let lost = lost.map(|lost| format!("{} lost", format::counted(lost, "episode")));
     let replies = statistics.replies.as_ref().filter(|replies| replies.unusable > 0);
-    let replies = replies.map(|it| format!("{} of {} replies gave no decision", it.unusable, it.replies));
+    let replies =
+        replies.map(|it| format!("{} of {} gave no decision", it.unusable, format::counted(it.replies, "reply")));
     let pooled = (!statistics.pooled.is_empty()).then(|| "recordings that differ are pooled".to_owned());
     let given = options.caveats.iter().cloned();
     selection.into_iter().chain(pooled).chain(given).chain(lost).chain(replies).collect()
@@ -122,9 +123,11 @@ fn unranked(statistics: &Statistics) -> Vec<Answer> {
         let parts: Vec<String> = families.map(|family| differing_in(family, confidence)).chain(overall).collect();
         answers.extend(Answer::new("Who differs from whom?", metric, &parts));
     }
+    let question =
+        if statistics.is_mirror { "What does the mirror change?" } else { "What does the experiment change?" };
     for metric in &statistics.headline {
         let parts = changes(&statistics.conditions, metric, confidence);
-        answers.extend(Answer::new("What does the mirror change?", metric, &parts));
+        answers.extend(Answer::new(question, metric, &parts));
     }
     answers
 }
@@ -165,10 +168,10 @@ fn above_in(experiment: &str, rows: &[&ChanceRow], confidence: f64) -> String {
     }
     let family: Vec<&ChanceRow> = rows.iter().map(|row| **row).collect();
     if let Some(units) = ChanceRow::hopeless(&family, confidence) {
-        return format!("{about} {} for {} models", cannot_say(&units), rows.len());
+        return format!("{about} {} for {}", cannot_say(&units), format::counted(rows.len() as u64, "model"));
     }
     let below = if below.is_empty() { String::new() } else { format!(" (below: {})", names(&below, rows.len())) };
-    let unsaid = unsaid.iter().map(|(model, units)| format!("cannot say for {model}: {}", counted(units)));
+    let unsaid = unsaid.iter().map(|(model, units)| format!("cannot say for {model}: {}", units.counted()));
     let told = format!("{about} {}{below}", names(&above, rows.len()));
     [told].into_iter().chain(unsaid).collect::<Vec<_>>().join(", ")
 }
@@ -183,12 +186,7 @@ fn names(models: &[String], all: usize) -> String {
 
 /// The answer if no outcome of these units could be significant.
 fn cannot_say(units: &Units) -> String {
-    format!("cannot say: {}", counted(units))
-}
-
-fn counted(Units { n, name, .. }: &Units) -> String {
-    let name = if *n == 1 { name.trim_end_matches('s') } else { name };
-    format!("{n} {name}")
+    format!("cannot say: {}", units.counted())
 }
 
 /// The reason why these comparisons cannot show a difference; `None` if any can.
@@ -218,8 +216,12 @@ fn unsayable(family: &Family, confidence: f64) -> Option<String> {
     let comparisons: Vec<&Comparison> = family.comparisons().collect();
     untested(&comparisons, confidence).or_else(|| match family.detectable {
         Some(Reach { method, n, tests, family: None, .. }) => {
-            let name = if method == Method::Mcnemar { "pairs" } else { "episodes" };
-            Some(format!("cannot say: {n} {name} for {tests} comparisons"))
+            let name = if method == Method::Mcnemar { "pair" } else { "episode" };
+            Some(format!(
+                "cannot say: {} for {}",
+                format::counted(n, name),
+                format::counted(tests as u64, "comparison")
+            ))
         }
         _ => None,
     })
@@ -234,7 +236,7 @@ fn differing_in(family: &Family, confidence: f64) -> String {
     let is_silent = |it: &&Comparison| !it.separated && it.incomparable.is_none();
     let reason = |it: &Comparison| match it.unsaid(confidence) {
         Some(units) if units.name == LOST => Some(units.name),
-        Some(units) => Some(counted(&units)),
+        Some(units) => Some(units.counted()),
         None => it.p.is_none().then(|| "not tested".to_owned()),
     };
     let unsaid: Vec<String> = comparisons.iter().copied().filter(is_silent).filter_map(reason).collect();
@@ -247,7 +249,7 @@ fn differing_in(family: &Family, confidence: f64) -> String {
 fn differing<'n>(about: &str, all: usize, separated: impl Iterator<Item = (&'n str, &'n str)>) -> String {
     let separated: Vec<_> = separated.collect();
     if separated.len() > MOST_NAMED {
-        return format!("{about} {} of {all} pairs", separated.len());
+        return format!("{about} {} of {}", separated.len(), format::counted(all as u64, "pair"));
     }
     let mut better: IndexMap<&str, Vec<&str>> = IndexMap::new();
     for (first, second) in separated {
@@ -291,7 +293,7 @@ fn changed(baseline: &str, against: &str, group: &[&Contrast], confidence: f64) 
     };
     let unsaid = unsaid.into_iter().map(|contrast| {
         let model = contrast.name();
-        let why = contrast.comparison.unsaid(confidence).map_or_else(|| "not tested".to_owned(), |it| counted(&it));
+        let why = contrast.comparison.unsaid(confidence).map_or_else(|| "not tested".to_owned(), |it| it.counted());
         format!("cannot say for {model}: {why}")
     });
     let shown = [phrase("higher for", Sign::Higher), phrase("lower for", Sign::Lower), unshown].into_iter().flatten();

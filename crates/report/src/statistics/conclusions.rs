@@ -5,7 +5,7 @@ use indexmap::IndexMap;
 use super::chance::own_levels;
 use super::{ChanceRow, DurationRow, Family, Method, Reach, Role, Selection, Statistics, Verdict};
 use crate::study::Study;
-use exact::format::fixed;
+use exact::format::{counted, fixed};
 use statistics::power::Detectable;
 
 /// The metrics of conclusions: rates with a level, and durations. The first metric if there are neither.
@@ -48,12 +48,7 @@ fn reaches(families: &[&Family]) -> Vec<String> {
 fn reach_sentence(reach: Reach, names: &[String]) -> String {
     let is_paired = reach.method == Method::Mcnemar;
     let (about, n) = (names.join(", "), reach.n);
-    let with = match (is_paired, n) {
-        (true, 1) => "1 pair".to_owned(),
-        (true, _) => format!("{n} pairs"),
-        (false, 1) => "1 episode per model".to_owned(),
-        (false, _) => format!("{n} episodes per model"),
-    };
+    let with = if is_paired { counted(n, "pair") } else { counted(n, "episode") + " per model" };
     let when = if is_paired { "if every disagreement points the same way" } else { "against a model without success" };
     let least = |found: Detectable| format!("{}/{} ({})", found.pairs, found.n, fixed(Some(found.smallest), 2));
     let Some(single) = reach.single.map(least) else {
@@ -117,8 +112,9 @@ fn unfinished(rows: &[DurationRow]) -> Vec<String> {
     }
     let sentence = |(metric, (unfinished, all)): (&str, (u64, u64))| {
         format!(
-            "{metric}: {unfinished} of {all} episodes never finished and are censored; every comparison is of restricted means, \
-             since the plain mean takes them as finished."
+            "{metric}: {unfinished} of {} never finished and are censored; every comparison is of restricted means, \
+             since the plain mean takes them as finished.",
+            counted(all, "episode")
         )
     };
     totals.into_iter().filter(|(_, (unfinished, _))| *unfinished > 0).map(sentence).collect()

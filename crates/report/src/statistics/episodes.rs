@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::study::RowKey;
 use exact::escape::visible;
+use exact::format::counted;
 use score::table::{CONDITION, EpisodeTable, UNUSABLE_REPLIES};
 
 /// The most cells that a sentence names; others are counted.
@@ -78,8 +79,9 @@ impl Replies {
         (self.unusable > 0).then(|| {
             let (unusable, replies) = (self.unusable, self.replies);
             format!(
-                "{unusable} of {replies} replies gave no decision ({named}): a model that cannot be read is not told \
-                 from one that fails."
+                "{unusable} of {} gave no decision ({named}): a model that cannot be read is not told \
+                 from one that fails.",
+                counted(replies, "reply")
             )
         })
     }

@@ -140,6 +140,9 @@ pub struct Statistics {
     /// Relations between metrics, for the text.
     #[serde(skip)]
     relations: Relations,
+    /// True for the domain of the mirror, for the text.
+    #[serde(skip)]
+    is_mirror: bool,
 }
 
 impl Statistics {
@@ -178,6 +181,7 @@ impl Statistics {
             replies: options.replies.clone(),
             headline,
             relations: study.relations.clone(),
+            is_mirror: table.catalog.domain.is_none(),
             ..Self::default()
         };
         for cell in &mut statistics.cells {

@@ -38,7 +38,8 @@ pub(super) fn design_note(statistics: &Statistics) -> String {
     let pairs = match (has_scenes, paired) {
         _ if all == 0 => "there is nothing to compare".to_owned(),
         (false, _) => "no scenes are declared, so nothing is paired".to_owned(),
-        (true, 0) => format!("none of {all} comparisons has pairs of equal scenes"),
+        (true, 0) => format!("none of {} has pairs of equal scenes", counted(all as u64, "comparison")),
+        (true, 1) => format!("1 of {} is by pairs of equal scenes", counted(all as u64, "comparison")),
         (true, _) => format!("{paired} of {all} comparisons are by pairs of equal scenes"),
     };
     let clusters = match statistics.design.clusters() {
@@ -124,7 +125,7 @@ fn gaps(statistics: &Statistics) -> Option<String> {
         count => format!("{count} scenes of models are"),
     };
     let gap = |gap: &Gap| {
-        let found = if gap.episodes == 0 { "missing".to_owned() } else { format!("{} episodes", gap.episodes) };
+        let found = if gap.episodes == 0 { "missing".to_owned() } else { counted(gap.episodes as u64, "episode") };
         let scene: String = gap.scene.chars().take(SCENE_SHOWN).collect();
         format!("{} {} scene {scene} ({found})", gap.key.experiment, gap.key.name())
     };
@@ -139,10 +140,12 @@ fn losses(statistics: &Statistics) -> Option<String> {
         return Some(words.to_owned());
     }
     let total = lost(statistics);
+    let (lost, they) = if total == 1 { ("was", "it is") } else { ("were", "they are") };
     (total > 0).then(|| {
         format!(
-            "{total} episodes were lost without an answer (a crash, a rate limit, a server error, a timeout): they are \
-             in no denominator; the bounds under losses say what they could have changed."
+            "{} {lost} lost without an answer (a crash, a rate limit, a server error, a timeout): {they} \
+             in no denominator; the bounds under losses say what they could have changed.",
+            counted(total, "episode")
         )
     })
 }

@@ -33,19 +33,21 @@ pub struct Style {
     is_built_in: bool,
 }
 
-/// A style file. With an include only what differs has to be said.
+/// A style file. It starts from `include`, or from the style `default`, and states only what differs.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 #[schemars(rename = "StyleFile")]
 pub struct StyleSheet {
     /// Styles that come first, by name or by path relative to this file; what this file says replaces what they say.
+    /// `default` if absent, unless the including file lists styles before this one; an empty list starts from nothing.
     pub include: Vec<String>,
     /// The models in the order of their rows; others come after them, by name.
     pub row_order: Vec<String>,
     /// The text for an undefined value.
     pub undefined: String,
-    /// The sentence that explains emphasis, under tables where something is emphasised.
-    pub emphasis_note: String,
+    /// The sentence that explains emphasis, under tables where something is emphasised; follows from the rule of emphasis
+    /// if absent, none if empty.
+    pub emphasis_note: Option<String>,
     /// The defaults for cells of every table.
     pub print: PrintSheet,
     /// Headers and arrows, by metric.
@@ -62,8 +64,8 @@ pub struct StyleSheet {
 pub struct TableSheet {
     /// The first words of the caption, without a full stop.
     pub title: String,
-    /// The sentences after them.
-    pub note: String,
+    /// The sentences after them; in `main`, a sentence about the form of the cells if absent.
+    pub note: Option<String>,
     /// The LaTeX label; none if absent.
     pub label: Option<String>,
     /// The metrics, in the order of the columns. Those that the scores have not are left out.
@@ -80,7 +82,7 @@ impl Default for StyleSheet {
             include: Vec::new(),
             row_order: Vec::new(),
             undefined: "--".to_owned(),
-            emphasis_note: String::new(),
+            emphasis_note: None,
             print: PrintSheet::default(),
             column: IndexMap::new(),
             table: IndexMap::new(),
@@ -93,7 +95,7 @@ impl Default for StyleSheet {
 #[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ColumnSheet {
-    /// The header as LaTeX; the escaped name if absent.
+    /// The header as LaTeX source, written unchanged; the escaped name if absent.
     pub latex: Option<String>,
     /// The direction to print and emphasise by; the definition's own if absent.
     pub better: Option<Better>,
@@ -247,9 +249,48 @@ impl StyleSheet {
         }
     }
 
+    /// The sentence that explains emphasis by this rule.
+    pub fn emphasis_note(&self, rule: EmphasisRule) -> &str {
+        self.emphasis_note.as_deref().unwrap_or_else(|| rule.note())
+    }
+
     pub fn better(&self, metric: &str, catalog: &Catalog) -> Better {
         let own = self.column.get(metric).and_then(|column| column.better);
         own.or_else(|| catalog.metric.get(metric).map(|m| m.better)).unwrap_or(Better::Neither)
+    }
+}
+
+impl TableSheet {
+    /// The sentences after the title of the table `name` with cells of this form.
+    pub(crate) fn note(&self, name: &str, form: CellForm) -> &str {
+        let own = if name == MAIN_TABLE { form.note() } else { "" };
+        self.note.as_deref().unwrap_or(own)
+    }
+}
+
+impl CellForm {
+    fn note(self) -> &'static str {
+        match self {
+            Self::MeanSe => "Values are mean ± standard error.",
+            Self::CountInterval => {
+                "Rates are counts of the episodes where the metric is defined, with Wilson 95 % intervals; other values \
+                 are means with Student's 95 % intervals, n given where it is not all episodes, or where the interval is \
+                 withheld."
+            }
+        }
+    }
+}
+
+impl EmphasisRule {
+    fn note(self) -> &'static str {
+        match self {
+            Self::None => "",
+            Self::ExactMean | Self::PrintedMean => "The best means are in bold, the second-best are underlined.",
+            Self::Tied => {
+                "In bold: models that no test shows to be worse than another in the experiment, after Holm's adjustment; \
+                 nothing where that is so of all."
+            }
+        }
     }
 }
 

@@ -1,4 +1,7 @@
 //! Style files: a file overrides its includes, key by key in tables, and replaces whole lists.
+//!
+//! Rule: a file that says nothing about a setting never changes its meaning. So a style starts from `default`, unless
+//! it lists its includes.
 
 use std::io;
 use std::path::Path;
@@ -13,12 +16,15 @@ use exact::hash;
 use exact::suggest::hint;
 use toml_spec::{At, Fault, FileKind, Place, Shape, lay};
 
+/// The style that others start from.
+const DEFAULT: &str = "default";
+
 pub(super) const KIND: FileKind = FileKind {
     name: "style",
     names: "styles",
     check: "mirrorstats style check FILE",
     built_in: &[
-        ("default", include_str!("../../../../assets/styles/default.toml")),
+        (DEFAULT, include_str!("../../../../assets/styles/default.toml")),
         ("paper", include_str!("../../../../assets/styles/paper.toml")),
     ],
     largest: Limit::new("bytes of a style", 1 << 20),
@@ -45,8 +51,13 @@ pub(super) fn read(path: &Path) -> Result<Read, StyleError> {
     let figures: Value = toml::from_str(FIGURES).expect("the file comes with the program");
     let mut merged = Value::Table([("figure".to_owned(), figures)].into_iter().collect());
     let (shape, mut named) = (Shape::of::<StyleSheet>(), Vec::new());
-    let mut sheet = None;
+    let (mut sheet, mut base, mut is_first) = (None, None, true);
     let texts = KIND.read(file, |at, part, faults| {
+        if is_first && part.built_in.is_none() && at.get("include").is_none() {
+            base = KIND.built_in_text(DEFAULT);
+            lay(&mut merged, toml::from_str(base.expect("a built-in style")).expect("the file comes with the program"));
+        }
+        is_first = false;
         if let Some(own) = shape.value(at, "a style", faults) {
             lay(&mut merged, own);
         }
@@ -61,7 +72,8 @@ pub(super) fn read(path: &Path) -> Result<Read, StyleError> {
             sheet = Some(whole);
         }
     })?;
-    let hashes: Vec<String> = texts.iter().map(|source| hash::of_bytes(source.text.as_bytes())).collect();
+    let texts = texts.iter().map(|source| source.text.as_str()).chain(base);
+    let hashes: Vec<String> = texts.map(|text| hash::of_bytes(text.as_bytes())).collect();
     let hash = match hashes.as_slice() {
         [one] => one.clone(),
         several => hash::of_bytes(several.join("\n").as_bytes()),
@@ -116,7 +128,7 @@ fn check(at: &At<'_>, faults: &mut Vec<Fault>) {
 fn check_tables(sheet: &StyleSheet, at: &At<'_>, faults: &mut Vec<Fault>) {
     if !sheet.table.contains_key(MAIN_TABLE) {
         let message = format!("there is no table `{MAIN_TABLE}`: every report needs one");
-        faults.push(at.fault(message).help(format!("add `[table.{MAIN_TABLE}]`, or `include = [\"default\"]`")));
+        faults.push(at.fault(message).help(format!("add `[table.{MAIN_TABLE}]`, or leave `include` out")));
     }
     for (name, table) in &sheet.table {
         let missing = [("title", table.title.is_empty()), ("columns", table.columns.is_empty())];

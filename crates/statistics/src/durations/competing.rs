@@ -33,11 +33,14 @@ impl Incidence {
 
     /// Each step, and the shares decided correctly and wrongly by its end.
     fn curve(&self) -> impl Iterator<Item = (i64, [f64; 2])> {
-        self.points.iter().scan([0.0; 2], |shares, point| {
+        self.points.iter().scan([0.0; 2], |sums, point| {
             let [correct, wrong, _] = point.counts();
             let more = [correct, wrong].map(|ended| point.before * ended / point.at_risk as f64);
-            *shares = [shares[0] + more[0], shares[1] + more[1]];
-            Some((point.steps, *shares))
+            *sums = [sums[0] + more[0], sums[1] + more[1]];
+            // The sums carry the rounding of every step, and may exceed 1; the decided share is exact at 0 and 1.
+            let (decided, sum) = (1.0 - point.undecided, sums[0] + sums[1]);
+            let correct = if sum > 0.0 { decided * (sums[0] / sum) } else { 0.0 };
+            Some((point.steps, [correct, decided - correct]))
         })
     }
 

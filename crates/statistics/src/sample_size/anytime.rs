@@ -103,7 +103,7 @@ impl Power for Anytime {
     fn power(&mut self, n: u64) -> f64 {
         self.run(n);
         let looks = usize::try_from(n / self.every).unwrap_or(usize::MAX);
-        self.stopped.iter().take(looks).sum()
+        self.stopped.iter().take(looks).sum::<f64>().min(1.0)
     }
 
     fn most(&self) -> u64 {

@@ -43,7 +43,7 @@ impl Power for McNemar {
         for discordant in self.rejects.len() as u64..=n {
             self.rejects.push(self.rejects(discordant));
         }
-        probabilities(n, self.discordance).iter().zip(&self.rejects).map(|(a, b)| a * b).sum()
+        probabilities(n, self.discordance).iter().zip(&self.rejects).map(|(a, b)| a * b).sum::<f64>().min(1.0)
     }
 }
 
@@ -67,7 +67,8 @@ impl Power for Fisher {
             let counts = (from..=to).filter(|successes| rejects[size(successes - fewest)]);
             counts.map(|successes| first[size(successes)] * second[size(total - successes)]).sum()
         };
-        (of_first.start() + of_second.start()..=of_first.end() + of_second.end()).map(rejected).sum()
+        let totals = of_first.start() + of_second.start()..=of_first.end() + of_second.end();
+        totals.map(rejected).sum::<f64>().min(1.0)
     }
 }
 
@@ -112,7 +113,7 @@ impl Power for OneRate {
         let probabilities = probabilities(n, self.rate);
         let rejects = |successes: &u64| chance::two_sided(*successes, n, self.chance).is_some_and(|p| p <= self.level);
         let counts = likely(&probabilities).filter(rejects);
-        counts.map(|successes| probabilities[size(successes)]).sum()
+        counts.map(|successes| probabilities[size(successes)]).sum::<f64>().min(1.0)
     }
 }
 

@@ -65,7 +65,8 @@ impl Seeds {
         let all = (0..self.seeds).fold(vec![1.0], |all, _| convolved(&all, successes));
         let rejects =
             |sum: i128| rate_test_of_sum(sum, runs.into(), self.seeds, chance).is_some_and(|test| test.p <= self.level);
-        (0..).zip(all).filter(|(sum, _)| rejects(*sum)).map(|(_, probability)| probability).sum()
+        let rejected = (0..).zip(all).filter(|(sum, _)| rejects(*sum));
+        rejected.map(|(_, probability)| probability).sum::<f64>().min(1.0)
     }
 
     fn of_pairs(&self, sums: &[f64], runs: u64) -> f64 {

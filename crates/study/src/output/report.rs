@@ -185,7 +185,7 @@ fn undeclared(episodes: &EpisodeTable) -> Option<String> {
         (false, true) => "which episodes share a scene",
         (false, false) => return None,
     };
-    Some(format!("the traces do not declare {what} (schema version 1): pooled and unpaired as they are"))
+    Some(format!("the traces do not declare {what}: pooled and unpaired as they are"))
 }
 
 impl Report {

@@ -12,6 +12,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use exact::escape::visible;
+use exact::format::counted;
 use exact::{hash, input};
 use report::bundle::{MANIFEST, Output};
 
@@ -204,10 +205,15 @@ impl fmt::Display for Verification {
         }
         let files = self.files;
         if self.holds() {
-            return write!(f, "{files} files are as the manifest says");
+            let verb = if files == 1 { "is" } else { "are" };
+            return write!(f, "{} {verb} as the manifest says", counted(files as u64, "file"));
         }
         let [changed, missing, unexpected] =
             [Kind::Changed, Kind::Missing, Kind::Unexpected].map(|kind| self.count(kind));
-        write!(f, "{files} files in the manifest: {changed} changed, {missing} missing, {unexpected} unexpected")
+        write!(
+            f,
+            "{} in the manifest: {changed} changed, {missing} missing, {unexpected} unexpected",
+            counted(files as u64, "file")
+        )
     }
 }

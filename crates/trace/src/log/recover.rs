@@ -22,6 +22,7 @@ use super::{METADATA, METADATA_KEY, topic};
 use crate::episode::{Episode, Step};
 use crate::episode_hash;
 use exact::budget::{Budget, Limit, SETTING};
+use exact::format::counted;
 use exact::input;
 
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -70,8 +71,11 @@ impl Losses {
     pub fn first(&self) -> Option<String> {
         let episode = self.episodes.first().map(|lost| format!("the episode `{}`: {}", lost.episode_id, lost.reason));
         let told = self.damage.first().or(self.cut.as_ref()).or(self.recording.as_ref()).cloned();
-        let counted = || format!("{} damaged chunks, {} rows of no episode", self.damaged_chunks, self.stray_rows);
-        episode.or(told).or_else(|| self.is_any().then(counted))
+        let counts = || {
+            let [chunks, rows] = [(self.damaged_chunks, "damaged chunk"), (self.stray_rows, "row")];
+            format!("{}, {} of no episode", counted(chunks.0 as u64, chunks.1), counted(rows.0 as u64, rows.1))
+        };
+        episode.or(told).or_else(|| self.is_any().then(counts))
     }
 }
 

@@ -5,6 +5,7 @@ use crate::figures::kit::{
     many, panels, tiles, whole_ticks,
 };
 use crate::figures::{Drawn, Scene};
+use exact::format::counted;
 use score::timeline::Timeline;
 
 /// The most episodes of the raster: with more, rows become too thin to read.
@@ -148,7 +149,7 @@ fn mark(timeline: &Timeline) -> Mark {
     let [sight_words, claim_words, decision_words] = [first_sight, claim, decision].map(words);
     let words = format!("first sight {sight_words}, claim {claim_words}, decision {decision_words}");
     let in_view: usize = timeline.visible.iter().map(|run| run.clone().count()).sum();
-    Mark::new(format!("{}: {length} steps; {words}", key.episode_id))
+    Mark::new(format!("{}: {}; {words}", key.episode_id, counted(*length as u64, "step")))
         .with("experiment", &key.experiment)
         .with("model", &key.model)
         .with("episode", &key.episode_id)

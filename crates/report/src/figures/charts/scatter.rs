@@ -10,7 +10,7 @@ use crate::figures::{Drawn, Scene};
 
 const MOST_COLUMNS: usize = 3;
 const LEAST_PANEL: f64 = 120.0;
-/// The radius of the slowest model's marker, px; the area is proportional to relative duration.
+/// The radius of the marker with the greatest duration, px; the area is proportional to relative duration.
 const LARGEST: f64 = 5.6;
 /// The smallest radius of a visible shape, px.
 const SMALLEST: f64 = 2.0;
@@ -52,10 +52,10 @@ fn diagonal() -> Stroke {
 }
 
 fn points(sheet: &mut Sheet, scene: Scene<'_>, experiment: &str, ids: [MetricId<'_>; 3], plot: &Plot) {
-    let slowest = scene.matrix.span(experiment, ids[2]).map(|(_, slowest)| slowest);
+    let greatest = scene.matrix.span(experiment, ids[2]).map(|(_, greatest)| greatest);
     let seen = scene.roster.0.iter().filter_map(|member| {
         let readings @ [x, y, duration] = ids.map(|id| scene.matrix.reading(experiment, member.model, id));
-        Some((*member, readings, (x.mean()?, y.mean()?), radius(duration.mean(), slowest)))
+        Some((*member, readings, (x.mean()?, y.mean()?), radius(duration.mean(), greatest)))
     });
     let mut seen: Vec<_> = seen.collect();
     // The large first, so that they do not hide the small.
@@ -73,11 +73,11 @@ fn points(sheet: &mut Sheet, scene: Scene<'_>, experiment: &str, ids: [MetricId<
     }
 }
 
-/// The radius for an area proportional to the duration relative to the slowest; the smallest size without a duration.
-fn radius(duration: Option<f64>, slowest: Option<f64>) -> f64 {
-    match (duration, slowest) {
-        (Some(duration), Some(slowest)) if slowest > 0.0 => {
-            SMALLEST.max(LARGEST * (duration / slowest).max(0.0).sqrt())
+/// The radius for an area proportional to the duration relative to the greatest; the smallest size without a duration.
+fn radius(duration: Option<f64>, greatest: Option<f64>) -> f64 {
+    match (duration, greatest) {
+        (Some(duration), Some(greatest)) if greatest > 0.0 => {
+            SMALLEST.max(LARGEST * (duration / greatest).max(0.0).sqrt())
         }
         _ => SMALLEST,
     }
@@ -86,7 +86,7 @@ fn radius(duration: Option<f64>, slowest: Option<f64>) -> f64 {
 fn signs([x, y, duration]: [MetricId<'_>; 3]) -> Vec<(Swatch, String)> {
     let ring = |share: f64| Swatch::Ring(radius(Some(share), Some(1.0)));
     vec![
-        (ring(1.0), format!("{} of the slowest model", duration.name)),
+        (ring(1.0), format!("the greatest {}", duration.name)),
         (ring(0.5), "half of it".to_owned()),
         (ring(0.2), "a fifth of it".to_owned()),
         (Swatch::Rule(diagonal()), format!("{} = {}", y.name, x.name)),

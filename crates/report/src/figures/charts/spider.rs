@@ -44,7 +44,7 @@ fn signs(scene: Scene<'_>) -> Vec<(Swatch, String)> {
     let reversed: Vec<&str> = scene.metrics.iter().filter(is_reversed).map(|id| id.name).collect();
     let reversed = match reversed.as_slice() {
         [] => String::new(),
-        names => format!("; {} reversed, from the slowest (0) to the fastest model (1)", names.join(", ")),
+        names => format!("; {} reversed, from the greatest mean (0) to the least (1)", names.join(", ")),
     };
     chance.into_iter().chain([(Swatch::None, format!("centre 0, outer ring 1{reversed}"))]).collect()
 }

@@ -11,6 +11,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::study::{Block, Study, Unit};
+use exact::format::counted;
 use exact::moments::Moments;
 use score::table::MetricColumn;
 use statistics::clustered::fewest_clusters;
@@ -110,8 +111,20 @@ impl Units {
         if names[0] == names[1] {
             return Self::new(study, blocks[0], first.min(second), least, confidence);
         }
-        Self { n: first as u64, name: format!("{} against {second} {}", names[0], names[1]), too_few: true }
+        let second = counted(second as u64, singular(names[1]));
+        Self { n: first as u64, name: format!("{} against {second}", names[0]), too_few: true }
     }
+
+    /// `1 scene`, `2 scenes`, `1 participant against 2 scenes`.
+    pub(crate) fn counted(&self) -> String {
+        let (noun, second) = self.name.split_at(self.name.find(" against ").unwrap_or(self.name.len()));
+        counted(self.n, singular(noun)) + second
+    }
+}
+
+/// The name of one of them.
+pub(crate) fn singular(plural: &str) -> &str {
+    plural.strip_suffix('s').unwrap_or(plural)
 }
 
 /// True if no symmetric test with this number of units or episodes, or with this least p value, can reach the level.

@@ -10,7 +10,7 @@ mod text_table;
 use super::{Answer, FEW, Selection, Statistics};
 use crate::tables::{Table, push_wrapped};
 use exact::escape::visible;
-use exact::format::fixed;
+use exact::format::{counted, fixed};
 
 /// The amount of printed detail.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,8 +29,8 @@ impl Statistics {
         let shown = |metric: &str| metrics.iter().any(|name| name == metric);
         let percent = percent(statistics.confidence);
         let mut text = format!(
-            "{} episodes, definitions {}, {percent} confidence\n",
-            statistics.episodes,
+            "{}, definitions {}, {percent} confidence\n",
+            counted(statistics.episodes as u64, "episode"),
             visible(&statistics.definitions)
         );
         episodes(&mut text, statistics.selection.as_ref(), &statistics.pooled, width);

@@ -6,7 +6,7 @@ use super::{departures, episodes, list, percent, section};
 use crate::statistics::{Sequential, SequentialPair, Verdict};
 use crate::tables::{Table, push_wrapped};
 use exact::escape::visible;
-use exact::format::{e_value, fixed};
+use exact::format::{counted, e_value, fixed};
 
 /// The methods, with line breaks for a wide terminal.
 const METHODS: [&str; 5] = [
@@ -26,8 +26,8 @@ impl Sequential {
         let percent = percent(sequential.confidence);
         let definitions = visible(&sequential.definitions);
         let opening = format!(
-            "{} episodes so far, definitions {definitions}, {percent} confidence at every look",
-            sequential.episodes
+            "{} so far, definitions {definitions}, {percent} confidence at every look",
+            counted(sequential.episodes as u64, "episode")
         );
         let mut text = String::new();
         push_wrapped(&mut text, &opening, width, 0);
@@ -48,6 +48,7 @@ impl Sequential {
         let told_apart = pairs.iter().filter(|pair| pair.verdict != Verdict::NotSeparated).count();
         let outcome = match pairs.len() {
             0 => "No two models have episodes of one experiment: they are not compared.".to_owned(),
+            1 => format!("{told_apart} of 1 pair of models is told apart so far."),
             all => format!("{told_apart} of {all} pairs of models are told apart so far."),
         };
         text.push('\n');

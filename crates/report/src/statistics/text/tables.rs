@@ -1,13 +1,14 @@
 //! The tables of `stats`, one function each: one line per row of the statistics whose metric is shown.
 
 use super::text_table::TextTable;
+use crate::statistics::matching::singular;
 use crate::statistics::ranks::ALL;
 use crate::statistics::{
     CellRow, Comparison, Intervals, LossCases, Method, OverallMethod, Sign, Statistics, Units, Verdict,
 };
 use crate::study::named;
 use crate::tables::Table;
-use exact::format::{UNDEFINED, bounds, fixed, p_value};
+use exact::format::{UNDEFINED, bounds, counted, fixed, p_value};
 use metric::catalog::Kind;
 use statistics::coverage::Withheld;
 use statistics::interval::Interval;
@@ -94,7 +95,7 @@ pub(super) fn chance(statistics: &Statistics, shown: Shown, is_full: bool) -> Ta
 
 /// The number of units beside the episodes.
 fn of_units(units: Option<&Units>) -> String {
-    units.map_or_else(String::new, |units| format!(" in {} {}", units.n, units.name))
+    units.map_or_else(String::new, |units| format!(" in {}", units.counted()))
 }
 
 impl<R> TextTable<R> {
@@ -163,13 +164,13 @@ pub(super) fn trends(statistics: &Statistics, shown: Shown) -> Table {
             rates.collect::<Vec<_>>().join(", ")
         })
         .number("compared within", |row| {
-            row.trend.map_or_else(|| UNDEFINED.to_owned(), |trend| format!("{} {}", trend.strata, row.units))
+            row.trend.map_or_else(|| UNDEFINED.to_owned(), |trend| counted(trend.strata, singular(&row.units)))
         })
         .number("z", |row| fixed(row.trend.map(|trend| trend.z), 2))
         .number("p adjusted", |row| p_value(row.p_adjusted))
         .number("verdict", |row| match (row.trend, row.too_few(), row.verdict) {
             (None, ..) => "not tested".to_owned(),
-            (_, Some(units), _) => format!("cannot say: {units} {}", row.units),
+            (_, Some(units), _) => format!("cannot say: {}", counted(units, singular(&row.units))),
             (.., Verdict::Above) => "rises".to_owned(),
             (.., Verdict::Below) => "falls".to_owned(),
             (.., Verdict::NotSeparated) => "no trend shown".to_owned(),
@@ -180,9 +181,9 @@ pub(super) fn trends(statistics: &Statistics, shown: Shown) -> Table {
 fn counts(found: &Comparison) -> String {
     let [m, n] = found.n;
     let counts = match (found.pairs, found.successes) {
-        (Some(pairs), _) => format!("{}:{} of {m} pairs", pairs.first_only, pairs.second_only),
+        (Some(pairs), _) => format!("{}:{} of {}", pairs.first_only, pairs.second_only, counted(m, "pair")),
         (None, Some([k, l])) => format!("{k}/{m}, {l}/{n}"),
-        _ if matches!(found.method, Method::RestrictedMeanPaired | Method::StudentPaired) => format!("{m} pairs"),
+        _ if matches!(found.method, Method::RestrictedMeanPaired | Method::StudentPaired) => counted(m, "pair"),
         _ => format!("{m}, {n}"),
     };
     counts + &of_units(found.units.as_ref())

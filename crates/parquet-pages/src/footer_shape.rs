@@ -92,8 +92,10 @@ const STATISTICS: Shape = &[TEXT, TEXT, LONG, LONG, TEXT, TEXT, Truth, Truth];
 const BOX: Shape = &[DOUBLE, DOUBLE, DOUBLE, DOUBLE, DOUBLE, DOUBLE, DOUBLE, DOUBLE];
 const KEY_VALUE: Shape = &[TEXT, TEXT];
 
-/// Checks that a footer keeps within its bytes, before the Parquet library follows it. Passes without a footer, which
-/// the library reports better.
+const GOES_ON: &str = "one that ends before its stated length";
+
+/// Checks that a footer has exactly the length that the file states, before the Parquet library follows it. Passes
+/// without a footer, which the library reports better.
 pub fn check_footer(file: &impl ChunkReader) -> Result<(), String> {
     footer_bytes(file).map_or(Ok(()), |(_, footer)| check(&footer).map_err(|fault| fault.to_string()))
 }
@@ -107,7 +109,10 @@ pub fn footer_bytes(file: &impl ChunkReader) -> Option<(u64, Bytes)> {
 }
 
 fn check(footer: &[u8]) -> Result<(), ThriftFault> {
-    walk(&mut Compact::new(footer), FILE)
+    let mut compact = Compact::new(footer);
+    walk(&mut compact, FILE)?;
+    // A zero in place of a field ends the structure: every later key vanishes, and the file looks like one without it.
+    if compact.position() == footer.len() { Ok(()) } else { Err(ThriftFault::Invalid(GOES_ON)) }
 }
 
 fn walk(compact: &mut Compact<'_>, shape: Shape) -> Result<(), ThriftFault> {
@@ -142,13 +147,14 @@ fn elements<'a>(
 
 #[cfg(test)]
 mod tests {
-    use super::check;
+    use super::{GOES_ON, check};
     use crate::thrift::ThriftFault;
 
     #[test]
     fn a_field_of_another_type_than_its_number_is_refused() {
         // Only the version; then the same number as a list of 2^31 doubles.
         assert_eq!(check(&[0x15, 2, 0]), Ok(()));
+        assert_eq!(check(&[0x15, 2, 0, 0]), Err(ThriftFault::Invalid(GOES_ON)));
         let huge = [0x19, 0xf7, 0xff, 0xff, 0xff, 0xff, 0x07, 0];
         assert_eq!(check(&huge), Err(ThriftFault::Invalid("a field of another type")));
         // Field 15 is unknown: its list is walked, and exceeds the footer.

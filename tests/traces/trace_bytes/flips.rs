@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::num::NonZeroUsize;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use trace::diagnostic::Severity;
@@ -63,17 +64,40 @@ impl Victim {
         }
         for bit in bits {
             bytes[bit / 8] ^= 1 << (bit % 8);
-            fs::write(&self.path, &bytes).unwrap();
-            counts.flips += 1;
-            match scores(&self.path) {
-                Err(_) => counts.refused += 1,
-                Ok(scores) => counts.scores_changed += usize::from(scores != self.scores),
-            }
-            let has_changed = || values(&self.path).is_none_or(|values| values != self.values);
-            counts.values_changed += usize::from(is_valid(&self.path) && has_changed());
+            self.read(&bytes, &mut counts);
             bytes[bit / 8] ^= 1 << (bit % 8);
         }
         counts
+    }
+
+    /// Zeros ranges of bytes, one at a time.
+    fn zero(&self, ranges: impl IntoIterator<Item = Range<usize>>) -> Counts {
+        let mut counts = Counts::default();
+        for range in ranges {
+            let mut bytes = self.whole.clone();
+            bytes[range].fill(0);
+            if bytes != self.whole {
+                self.read(&bytes, &mut counts);
+            }
+        }
+        counts
+    }
+
+    fn read(&self, bytes: &[u8], counts: &mut Counts) {
+        fs::write(&self.path, bytes).unwrap();
+        counts.flips += 1;
+        match scores(&self.path) {
+            Err(_) => counts.refused += 1,
+            Ok(scores) => counts.scores_changed += usize::from(scores != self.scores),
+        }
+        let has_changed = || values(&self.path).is_none_or(|values| values != self.values);
+        counts.values_changed += usize::from(is_valid(&self.path) && has_changed());
+    }
+
+    /// The footer's range, without its length.
+    fn footer(&self) -> Range<usize> {
+        let end = self.whole.len() - 8;
+        end - u32::from_le_bytes(*self.whole[end..].first_chunk().unwrap()) as usize..end
     }
 }
 
@@ -117,11 +141,35 @@ fn place(whole: &[u8], bytes: &[u8]) -> usize {
 #[test]
 fn a_flipped_bit_of_each_byte_of_the_footer_is_refused_or_changes_nothing() {
     let victim = Victim::new(trace());
-    let footer = u32::from_le_bytes(*victim.whole[victim.whole.len() - 8..].first_chunk().unwrap()) as usize;
-    let first = victim.whole.len() - 8 - footer;
+    let first = victim.footer().start;
     let counts = victim.flip((first..victim.whole.len()).map(|byte| byte * 8 + byte % 8));
     assert_eq!((counts.scores_changed, counts.values_changed), (0, 0), "{counts:?}");
     assert_eq!(counts.refused, counts.flips, "{counts:?}");
+}
+
+/// Zeros end the footer where a field begins, and would hide all later keys: checksums, design, palette, origin.
+#[test]
+fn a_footer_with_zeros_up_to_its_end_is_refused() {
+    for whole in [trace(), recorded()] {
+        let victim = Victim::new(whole);
+        let Range { start, end } = victim.footer();
+        // Every place behind the row groups; before it, some.
+        let keys = place(&victim.whole, b"mirrorstats.schema_version") - 8;
+        let counts = victim.zero((start..keys).step_by(29).chain(keys..end - 1).map(|from| from..end));
+        assert_eq!((counts.refused, counts.scores_changed), (counts.flips, 0), "{counts:?}");
+        let places: Vec<usize> = draws(400, end - start).map(|place| start + place).collect();
+        let counts = victim.zero(places.chunks(2).map(|pair| pair[0].min(pair[1])..pair[0].max(pair[1])));
+        assert_eq!((counts.refused, counts.scores_changed), (counts.flips, 0), "{counts:?}");
+    }
+}
+
+/// A file without checksums is refused too if its footer ends early: a design must not vanish from it.
+#[test]
+fn an_unsealed_footer_ends_at_its_stated_length() {
+    let victim = Victim::new(unchecked());
+    let Range { start, end } = victim.footer();
+    let counts = victim.zero((start..end - 1).map(|from| from..end));
+    assert_eq!((counts.refused, counts.scores_changed), (counts.flips, 0), "{counts:?}");
 }
 
 /// The program's name alone decides nothing: if it is damaged, the file is refused, whatever else is damaged.

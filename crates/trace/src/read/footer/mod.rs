@@ -8,7 +8,7 @@ use std::io::{self, Read as _, Seek as _, SeekFrom};
 
 use parquet::errors::ParquetError;
 use parquet::file::metadata::{
-    ParquetMetaData, ParquetMetaDataOptions, ParquetMetaDataReader, ParquetStatisticsPolicy,
+    ParquetMetaData, ParquetMetaDataOptions, ParquetMetaDataReader, ParquetStatisticsPolicy, RowGroupMetaData,
 };
 
 use crate::catch_panic::contained;
@@ -91,6 +91,11 @@ fn verified(
     metadata: &ParquetMetaData,
 ) -> Result<(Checksums, ChunkChecksums), Box<Finding>> {
     let Some((start, footer)) = footer_bytes(file) else { return Ok(<_>::default()) };
+    let mut chunks = metadata.row_groups().iter().flat_map(RowGroupMetaData::columns);
+    if chunks.any(|chunk| checksums::range(chunk).is_none_or(|(_, end)| end > start)) {
+        let (expected, found) = ("columns that lie before the footer", "one that lies behind its start");
+        return Err(Box::new(Finding::new(Code::CorruptFooter, &input.name, expected, found)));
+    }
     checksums::of_file(file, (start, &footer), metadata).map_err(|fault| {
         let finding = |code, expected: String, found| Box::new(Finding::new(code, &input.name, expected, found));
         match fault {

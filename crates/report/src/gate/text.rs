@@ -96,11 +96,12 @@ impl Gate {
 
     fn workflow_command(&self, cell: &GateCell) -> String {
         let [name, command, _] = spelled(cell.verdict);
-        let data = |text: &str| text.replace('%', "%25").replace('\r', "%0D").replace('\n', "%0A");
-        let property = |text: &str| data(text).replace(':', "%3A").replace(',', "%2C");
+        let data = |text: &str| visible(text).replace('%', "%25");
         let title = format!("{} {} {}: {name}", cell.experiment, cell.name(), self.metric);
-        let message: Vec<String> = std::iter::once(self.sentence(cell)).chain(cell.flips.iter().map(words)).collect();
-        format!("::{command} title={}::{}\n", property(&visible(&title)), data(&message.join("\n")))
+        let title = data(&title).replace(':', "%3A").replace(',', "%2C");
+        let lines = std::iter::once(self.sentence(cell)).chain(cell.flips.iter().map(words));
+        let message = lines.map(|line| data(&line)).collect::<Vec<_>>().join("%0A");
+        format!("::{command} title={title}::{message}\n")
     }
 
     fn junit(&self) -> String {

@@ -67,7 +67,7 @@ impl LogIndex {
     pub fn open(path: &Path) -> Result<Option<Self>, LogError> {
         let mut records = Records::open(path)?;
         let (mut topics, mut chunks) = (BTreeMap::new(), Vec::new());
-        for record in records.summary().map_err(LogError::io("read", path))? {
+        for record in records.verified_summary().map_err(LogError::io("read", path))? {
             match record {
                 Record::Channel(channel) => {
                     topics.insert(channel.id, channel.topic);
@@ -441,6 +441,23 @@ mod tests {
         }
         std::fs::write(&cut, &log[..4]).unwrap();
         assert!(unfinished(&cut).is_err());
+    }
+
+    #[test]
+    fn a_damaged_index_is_not_used() {
+        let mut log =
+            std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/recorded/E1-guesser.mcap")).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("damaged.mcap");
+        // The last bytes are the footer, 20 bytes, and the magic number, 8 bytes.
+        let start = log.len() - 8 - 20;
+        let index = usize::try_from(u64::from_le_bytes(*log[start..].first_chunk().unwrap())).unwrap();
+        for at in (index..start + 16).step_by(97) {
+            log[at] ^= 1;
+            std::fs::write(&path, &log).unwrap();
+            assert!(LogIndex::open(&path).unwrap().is_none(), "{at}");
+            log[at] ^= 1;
+        }
     }
 
     #[test]

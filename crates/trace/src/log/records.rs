@@ -8,7 +8,7 @@ use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
 use mcap::MAGIC;
-use mcap::records::{Record, op};
+use mcap::records::{Footer, Record, op};
 
 use super::chunk::{Budgets, FRAME, LONGEST, inside, parsed};
 use super::error::LogError;
@@ -16,6 +16,9 @@ use exact::input;
 
 /// The header of a chunk without the name of its compression.
 const CHUNK_HEADER: usize = 8 + 8 + 8 + 4 + 4 + 8;
+
+/// The footer: two positions and a checksum.
+const FOOTER: usize = FRAME + 20;
 
 #[derive(Debug)]
 pub(super) enum RecordPiece {
@@ -129,19 +132,30 @@ impl<R: Read + Seek> Records<R> {
         Ok(self.read(self.at, MAGIC.len() + 1)? == MAGIC)
     }
 
-    pub(super) fn summary(&mut self) -> io::Result<Vec<Record<'static>>> {
-        /// Two positions and a checksum.
-        const FOOTER: usize = FRAME + 20;
+    /// The records of the index; none if its checksum differs, since a reader trusts its positions.
+    pub(super) fn verified_summary(&mut self) -> io::Result<Vec<Record<'static>>> {
+        let Some((last, footer)) = self.footer()? else { return Ok(Vec::new()) };
+        let counted = usize::try_from(last - footer.summary_start).unwrap_or(LONGEST) + FOOTER - 4;
+        let is_sound = |bytes: &[u8]| footer.summary_crc == 0 || crc32fast::hash(bytes) == footer.summary_crc;
+        if is_sound(&self.read(footer.summary_start, counted)?) { self.summary() } else { Ok(Vec::new()) }
+    }
+
+    /// The position of the footer, and the footer.
+    fn footer(&mut self) -> io::Result<Option<(u64, Footer)>> {
         let last = self.end.saturating_sub((FOOTER + MAGIC.len()) as u64);
         let footer = self.read(last, FOOTER)?;
-        let start = match footer.first().map(|opcode| decode(last, *opcode, &footer)) {
+        Ok(match footer.first().map(|opcode| decode(last, *opcode, &footer)) {
             Some(Ok(RecordPiece::Record(Record::Footer(footer)))) if footer.summary_start < last => {
-                footer.summary_start
+                Some((last, footer))
             }
-            _ => return Ok(Vec::new()),
-        };
+            _ => None,
+        })
+    }
+
+    pub(super) fn summary(&mut self) -> io::Result<Vec<Record<'static>>> {
+        let Some((last, footer)) = self.footer()? else { return Ok(Vec::new()) };
         let mut found = Vec::new();
-        let mut at = start;
+        let mut at = footer.summary_start;
         while let Some(frame) = self.frame(at)?.filter(|_| at < last) {
             let whole = self.whole(at, frame)?;
             if let Ok(RecordPiece::Record(record)) = decode(at, frame.opcode, &whole) {

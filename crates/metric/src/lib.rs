@@ -32,7 +32,6 @@ pub mod columns;
 pub mod definitions;
 pub mod file;
 mod functions;
-pub mod implied;
 mod logical_plan;
 pub mod names;
 pub mod shape;

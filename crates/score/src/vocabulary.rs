@@ -42,11 +42,6 @@ fn set_fallbacks(columns: &mut Columns, is_read: impl Fn(&str) -> bool) {
     }
 }
 
-/// Returns true if a column of this name has a value in each row of each trace.
-pub fn has_value(name: &str) -> bool {
-    COLUMNS.iter().any(|column| column.name == name && column.required && !column.nullable)
-}
-
 /// The columns that definitions may name over these traces: the schema's and the traces' own.
 pub fn trace_columns(traces: &TraceSet) -> Columns {
     let mut columns =

@@ -70,7 +70,7 @@ use trace::open::TraceSet;
 use trace::steps::Steps;
 
 pub use agreement::{CoderCount, LabelAgreement, LabelCount, PairAgreement};
-pub use audit::{AuditRequest, audit_tables};
+pub use audit::audit_tables;
 pub use backend::{Backend, SparkJob, are_uris};
 pub use diff::{Diff, DiffRequest, Side, diff};
 pub use error::StudyError;

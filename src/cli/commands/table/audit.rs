@@ -6,30 +6,24 @@ use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 
 use crate::cli::{Failure, Outcome, output, terminal};
 use exact::rounding::Rounding;
-use report::audit::episodes::Episodes;
-use study::{AuditRequest, audit_tables};
+use report::audit::MOST_EPISODES;
+use study::audit_tables;
 
-/// Name the cells of published tables that no data can give, and say why
+/// Name the cells of published tables whose mean and standard error no data can give
 #[derive(Clone, Debug, clap::Args)]
 pub struct AuditArgs {
-    /// Published tables of one study: CSV files with the columns experiment,model,metric,mean,se,emphasis
+    /// Published tables: CSV files with the columns experiment,model,metric,mean,se,emphasis
     #[arg(required = true, value_name = "TABLE")]
     pub tables: Vec<PathBuf>,
-    /// Episodes per row: `21`, `E1=21,E2=20`, `21,E3/GPT 5.1=19`
-    #[arg(long = "n", value_name = "EPISODES")]
-    pub episodes: Episodes,
+    /// Episodes per cell; of a metric with `when`, at most
+    #[arg(long = "n", value_name = "EPISODES", value_parser = clap::value_parser!(u64).range(1..=MOST_EPISODES))]
+    pub n: u64,
     /// Definitions: `paper`, `extended`, or a TOML file
     #[arg(long, value_name = "NAME|FILE", default_value = "paper")]
     pub definitions: PathBuf,
-    /// The most steps of an episode
-    #[arg(long, value_name = "STEPS", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
-    pub steps: u32,
     /// Roundings to consider, separated by commas: half-even, half-up, binary, twice, truncate [default: all]
     #[arg(long, value_name = "RULES", value_delimiter = ',', value_parser = rounding_parser(), hide_possible_values = true)]
     pub rounding: Vec<Rounding>,
-    /// The style whose tables say what emphasis means, and where undefined prints as zero: `paper`, `default`, or a file
-    #[arg(long, value_name = "STYLE", default_value = "paper")]
-    pub style: PathBuf,
     /// Print the answer as JSON
     #[arg(long)]
     pub json: bool,
@@ -38,8 +32,8 @@ pub struct AuditArgs {
 impl AuditArgs {
     /// Audits; the check passes if every cell is possible.
     pub fn run(self) -> Result<Outcome, Failure> {
-        let Self { episodes, definitions, steps, rounding: roundings, style, .. } = self;
-        let found = audit_tables(&self.tables, &AuditRequest { episodes, definitions, steps, roundings, style })?;
+        let roundings = if self.rounding.is_empty() { &Rounding::ALL[..] } else { &self.rounding };
+        let found = audit_tables(&self.tables, self.n, &self.definitions, roundings)?;
         output::print_rendered(&found, self.json, |found| found.render(terminal::width()))?;
         Ok(if found.holds() { Outcome::Done } else { Outcome::CheckFailed })
     }

@@ -3,14 +3,13 @@
 
 use std::fmt::Write as _;
 use std::fs;
-use std::io::Cursor;
 use std::path::Path;
 use std::process::Command;
 
-use mcap::{Compression, WriteOptions};
 use trace::episode::{Extra, Step};
 use trace::write::write_episodes;
 
+use crate::harness::bombs::log;
 use crate::harness::program::{answer, limited, run_with_input, succeeds};
 use crate::{Answer, episode, program, run, two_files};
 
@@ -138,22 +137,6 @@ fn numbers_of_errors_and_keys_are_limited() {
     assert!(check(faults).refused().contains("100 faults or more"));
     let keys = (0..60_000).fold("[let]\n".to_owned(), |text, at| text + &format!("a{at} = \"t\"\n"));
     over_budget(check(keys), "at most 10000 keys");
-}
-
-/// A log with chunks that each unpack to this many bytes.
-fn log(chunks: usize, bytes: usize) -> Vec<u8> {
-    let options = WriteOptions::new().compression(Some(Compression::Zstd)).compression_threads(0).chunk_size(None);
-    let mut out = options.create(Cursor::new(Vec::new())).unwrap();
-    let channel = out.add_channel(0, "/episode", "json", &std::collections::BTreeMap::new()).unwrap();
-    let header = mcap::records::MessageHeader { channel_id: channel, sequence: 0, log_time: 0, publish_time: 0 };
-    for _ in 0..chunks {
-        for _ in 0..bytes >> 20 {
-            out.write_to_known_channel(&header, &vec![b' '; 1 << 20]).unwrap();
-        }
-        out.flush().unwrap();
-    }
-    out.finish().unwrap();
-    out.into_inner().into_inner()
 }
 
 #[test]

@@ -4,6 +4,7 @@ use std::fs;
 
 use trace::write::write_episodes;
 
+use crate::pairs::missing;
 use crate::{Answer, contents, episode, run};
 
 const NAMES: [&str; 8] = [
@@ -101,6 +102,84 @@ fn names_of_models_and_episodes_cannot_reach_the_terminal_raw() {
     let scores = fs::read_to_string(at.join("s.csv")).unwrap();
     assert_eq!(run(at, &["score", "s.csv"]).done(), scores);
     assert_eq!(run(at, &["score", "s.jsonl"]).done(), scores);
+}
+
+/// Every verb that shows names of a trace, in every format for people.
+const SHOWN: [&str; 28] = [
+    "report a.parquet b.parquet",
+    "stats a.parquet --metric all",
+    "figure intervals a.parquet -o figure.svg",
+    "diff paper extended a.parquet",
+    "gate a.parquet b.parquet",
+    "gate a.parquet b.parquet --format md",
+    "gate a.parquet b.parquet --format github",
+    "gate a.parquet b.parquet --format junit",
+    "import a.parquet -o c.parquet",
+    "score a.parquet",
+    "query SELECT+model+FROM+episodes a.parquet --format table",
+    "trace info a.parquet",
+    "trace info a.parquet --episodes",
+    "trace labels a.parquet",
+    "trace validate a.parquet",
+    "trace check a.parquet --max-unreadable 0.05",
+    "trace renormalize a.parquet --dry-run",
+    "trace seal a.parquet sealed.parquet",
+    "trace recover a.parquet -o x.parquet",
+    "table compare a.parquet --published table.csv",
+    "table audit table.csv --n 21",
+    "table verify reports/latest",
+    "table rescore reports/latest --definitions extended --out again",
+    "definitions sensitivity a.parquet",
+    "world replay a.parquet --skip-frames",
+    "world filmstrip x a.parquet -o strip.png",
+    "view a.parquet --export page",
+    "participants remove x .",
+];
+
+/// Verbs whose output has no name of a trace.
+const NOT_SHOWN: [&str; 18] = [
+    "plan",
+    "record",
+    "trace schema",
+    "definitions check",
+    "definitions explain",
+    "definitions show",
+    "definitions sql",
+    "experiments check",
+    "experiments explain",
+    "experiments show",
+    "style show",
+    "style check",
+    "world config",
+    "world scene",
+    "world sheet",
+    "setup config",
+    "setup completions",
+    "setup man",
+];
+
+#[test]
+fn no_verb_and_no_format_for_people_prints_a_name_raw() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for (file, choices) in [("a.parquet", ["red", "blue"]), ("b.parquet", ["blue", "red"])] {
+        let episodes: Vec<_> = NAMES
+            .iter()
+            .flat_map(|name| (0..).zip(choices).map(move |(run, choice)| episode(name, "E1", run, choice)))
+            .collect();
+        write_episodes(&at.join(file), None, &episodes).unwrap();
+    }
+    let rows = NAMES.map(|name| format!("E1,\"{}\",TSA,0.57,0.15,\n", name.replace('"', "\"\"")));
+    fs::write(at.join("table.csv"), format!("experiment,model,metric,mean,se,emphasis\n{}", rows.concat())).unwrap();
+    for words in SHOWN {
+        let arguments: Vec<String> = words.split_whitespace().map(|word| word.replace('+', " ")).collect();
+        let answer = run(at, &arguments.iter().map(String::as_str).collect::<Vec<_>>());
+        check(&answer);
+        let is_cut = words.contains("github") && !answer.stdout.contains("\\u{1b}");
+        assert!(!is_cut, "the flipped episodes are named: {}", answer.stdout);
+    }
+    let missing = missing(SHOWN.into_iter().chain(NOT_SHOWN));
+    assert!(missing.is_empty(), "no trace with hostile names: {missing:?}");
 }
 
 #[test]

@@ -19,7 +19,10 @@ mod generated;
 mod generation;
 #[path = "../harness/mod.rs"]
 mod harness;
+#[cfg(target_os = "linux")]
 mod hostile;
+#[cfg(target_os = "linux")]
+mod inspect_logs;
 mod latex;
 mod new_names;
 mod options;

@@ -1,200 +1,355 @@
-//! Every verb on small files that ask for much work: its peak memory, or a refusal that names the limit.
+//! Every verb on small files that ask for much work, of every kind that it reads: its peak memory, or a refusal that
+//! names the limit. A verb without a case fails the test by its name.
 
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+use std::fs;
 use std::path::Path;
 
 use crate::harness::bombs::{
-    MEMORY, definitions, inspect_log, long_episode, long_texts, many_episodes, many_models, measured,
+    MEMORY, definitions, large_log, long_episode, long_texts, many_colors, many_episodes, many_models, measured,
 };
+use crate::harness::files::{fixture, repository};
 
 /// The option that raises every limit.
 const SETTING: &str = "MIRRORSTATS_BUDGET";
 
-/// Succeeds, or is a failed check, within the memory limit.
-#[track_caller]
-fn within(at: &Path, words: &str) {
-    let arguments: Vec<&str> = words.split_whitespace().collect();
-    let (answer, most) = measured(at, &arguments);
-    assert!(most < MEMORY, "{words}: {} MB", most >> 10);
-    assert!([0, 1].contains(&answer.code), "{words}: {}", answer.stderr);
+/// The end of a command within the limits of memory and time.
+#[derive(Clone, Copy)]
+enum End {
+    /// It succeeds, or a check fails.
+    Answer,
+    /// Its input is invalid, whatever its size.
+    Invalid,
+    /// It is refused by this limit.
+    Limit(&'static str),
+}
+use End::{Answer, Invalid, Limit};
+
+/// Inputs of one kind, and the commands that read them.
+struct Walk {
+    inputs: fn(&Path),
+    cases: &'static [(&'static str, End)],
 }
 
-/// Is refused within the memory limit; the message names the exceeded limit and how to raise it.
-#[track_caller]
-fn refused(at: &Path, words: &str, limit: &str) {
-    let arguments: Vec<&str> = words.split_whitespace().collect();
-    let (answer, most) = measured(at, &arguments);
-    assert!(most < MEMORY, "{words}: {} MB", most >> 10);
-    let told = answer.refused();
-    assert!(told.contains(limit) && told.contains(SETTING), "{words}: {told}");
-}
+/// Verbs that read no file of others.
+const WITHOUT_INPUT: [(&str, &str); 7] = [
+    ("plan", "numbers of its command line"),
+    ("setup completions", "prints what is built in"),
+    ("setup config", "the configuration of its own folder, at most 1 MiB"),
+    ("setup man", "writes what is built in"),
+    ("style show", "prints what is built in"),
+    ("trace schema", "prints what is built in"),
+    ("world config", "prints what is built in"),
+];
 
-#[test]
-fn an_episode_of_millions_of_steps_stays_within_the_limits() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
-    long_episode(&at.join("a.parquet"), 4_000_000);
-    within(at, "info a.parquet");
-    within(at, "score a.parquet -o scores.csv");
-    within(at, "validate a.parquet");
-    #[cfg(feature = "view")]
-    refused(at, "view a.parquet --export page", "steps times columns of an episode");
-    assert!(!at.join("page").exists());
-    definitions(&at.join("d.toml"), 20, |at| format!("sum(t * {})", at + 2));
-    refused(at, "score a.parquet --definitions d.toml -o scores.csv", "bytes of values of the definitions");
-    definitions(&at.join("d.toml"), 500, |at| format!("sum(t * {})", at + 2));
-    refused(at, "score a.parquet --definitions d.toml -o scores.csv", "rows times values of the definitions");
-}
+const EPISODE: Walk = Walk {
+    inputs: |at| {
+        long_episode(&at.join("a.parquet"), 4_000_000);
+        definitions(&at.join("some.toml"), 20, |at| format!("sum(t * {})", at + 2));
+        definitions(&at.join("many.toml"), 500, |at| format!("sum(t * {})", at + 2));
+    },
+    cases: &[
+        ("trace info a.parquet", Answer),
+        ("trace validate a.parquet", Answer),
+        ("trace check a.parquet --max-unreadable 0.05", Answer),
+        ("trace seal a.parquet sealed.parquet", Answer),
+        ("score a.parquet -o scores.csv", Answer),
+        ("definitions sensitivity a.parquet", Answer),
+        ("view a.parquet --export page", Limit("steps times columns of an episode")),
+        ("score a.parquet --definitions some.toml -o s.csv", Limit("bytes of values of the definitions")),
+        ("score a.parquet --definitions many.toml -o s.csv", Limit("rows times values of the definitions")),
+        ("world filmstrip e a.parquet -o strip.png", Invalid),
+        ("world replay a.parquet --skip-frames", Invalid),
+    ],
+};
 
-#[test]
-fn texts_of_a_million_steps_stay_within_the_limits_or_are_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
-    long_texts(&at.join("a.parquet"), 1_000_000);
-    within(at, "info a.parquet");
-    within(at, "validate a.parquet");
-    within(at, "score a.parquet -o scores.csv");
-    refused(at, "renormalize a.parquet -o new", "bytes of changed attributions");
-    refused(at, "renormalize a.parquet --dry-run --json", "bytes of changed attributions");
-    assert!(!at.join("new").exists());
-    #[cfg(feature = "view")]
-    refused(at, "view a.parquet --export page", "steps times columns of an episode");
-}
+const TEXTS: Walk = Walk {
+    inputs: |at| {
+        long_texts(&at.join("a.parquet"), 1_000_000);
+        definitions(&at.join("few.toml"), 5, |at| format!("sum(t * {})", at + 2));
+    },
+    cases: &[
+        ("trace info a.parquet", Answer),
+        ("trace validate a.parquet", Answer),
+        ("score a.parquet -o scores.csv", Answer),
+        ("score a.parquet --definitions few.toml -o few.csv", Answer),
+        ("trace renormalize a.parquet -o new", Limit("bytes of changed attributions")),
+        ("trace renormalize a.parquet --dry-run --json", Limit("bytes of changed attributions")),
+        ("view a.parquet --export page", Limit("steps times columns of an episode")),
+    ],
+};
 
-#[test]
-fn hundreds_of_thousands_of_episodes_stay_within_the_limits_or_are_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
-    many_episodes(&at.join("all.parquet"), 0..900_000);
-    for verb in ["info", "info --episodes", "validate", "score -o s.csv", "report --by episode_id"] {
-        let (verb, rest) = verb.split_once(' ').unwrap_or((verb, ""));
-        if verb == "validate" {
-            within(at, "validate all.parquet");
-        } else {
-            refused(at, &format!("{verb} all.parquet {rest}"), "episodes in");
+const TOO_MANY_EPISODES: Walk = Walk {
+    inputs: |at| {
+        many_episodes(&at.join("a.parquet"), 0..900_000);
+        for number in 0..4 {
+            many_episodes(&at.join(format!("{number}.parquet")), number * 290_000..(number + 1) * 290_000);
         }
+    },
+    cases: &[
+        ("trace validate a.parquet", Answer),
+        ("trace info a.parquet", Limit("episodes in")),
+        ("trace info a.parquet --episodes", Limit("episodes in")),
+        ("score a.parquet -o s.csv", Limit("episodes in")),
+        ("report a.parquet --by episode_id", Limit("episodes in")),
+        ("score 0.parquet 1.parquet 2.parquet 3.parquet -o s.csv", Limit("episodes in files of their size")),
+    ],
+};
+
+const EPISODES: Walk = Walk {
+    inputs: |at| {
+        many_episodes(&at.join("a.parquet"), 0..290_000);
+        many_episodes(&at.join("few.parquet"), 0..100_000);
+        definitions(&at.join("sums.toml"), 500, |at| format!("sum(t * {} + length() % {})", at + 2, at + 3));
+    },
+    cases: &[
+        ("trace info a.parquet", Answer),
+        ("trace info few.parquet --episodes", Answer),
+        ("trace info few.parquet --episodes --json", Answer),
+        ("trace info a.parquet --episodes", Limit("episodes in a list")),
+        ("trace info a.parquet --episodes --json", Limit("episodes in a list")),
+        ("trace validate a.parquet --json", Answer),
+        ("score a.parquet -o scores.csv", Answer),
+        ("score a.parquet --definitions sums.toml -o s.csv", Limit("values of the definitions")),
+        ("report a.parquet -o report", Answer),
+        ("table verify report", Answer),
+        ("table rescore report --definitions extended --out again", Answer),
+        ("report a.parquet --by episode_id -o other", Limit("cells, groups times metrics")),
+        ("figure intervals a.parquet -o figure.svg", Answer),
+        ("diff paper extended a.parquet", Answer),
+        ("view a.parquet --export page", Limit("episodes of a page as files")),
+    ],
+};
+
+const MODELS: Walk = Walk {
+    inputs: |at| {
+        many_models(&at.join("a.parquet"), 290_000);
+        many_models(&at.join("b.parquet"), 90_000);
+    },
+    cases: &[
+        ("trace info a.parquet", Limit("bytes of models in experiments")),
+        ("trace info a.parquet --json", Limit("bytes of models in experiments")),
+        ("trace validate a.parquet", Answer),
+        ("score a.parquet -o scores.csv", Answer),
+        ("report a.parquet -o report", Limit("whose replies are counted")),
+        ("stats a.parquet", Limit("comparisons of two models")),
+        ("gate a.parquet a.parquet", Limit("cells of a gate")),
+        ("trace info b.parquet", Answer),
+        ("report b.parquet -o report", Limit("comparisons of two models")),
+        ("table compare b.parquet --published table.csv", Invalid),
+    ],
+};
+
+const COLORS: Walk = Walk {
+    inputs: |at| {
+        many_colors(&at.join("a.parquet"), 40_000);
+        let names = |count: usize| (0..count).map(|at| format!("colour {at}\n")).collect::<String>();
+        fs::write(at.join("many.txt"), names(60_000)).unwrap();
+        fs::write(at.join("steps.jsonl"), "{}\n").unwrap();
+    },
+    cases: &[
+        ("trace validate a.parquet", Answer),
+        ("import steps.jsonl --palette many.txt -o x.parquet", Limit("colours of a palette")),
+    ],
+};
+
+/// Lists of labels: pairs of coders times labels, and lines of one coder.
+const LABELS: Walk = Walk {
+    inputs: |at| {
+        for (name, coders, labels, episodes) in
+            [("coders", 1000, 9, 1), ("labels", 40, 200, 1), ("episodes", 2, 10, 450), ("pairs", 90, 5, 20)]
+        {
+            fs::create_dir(at.join(name)).unwrap();
+            many_episodes(&at.join(name).join("a.parquet"), 0..episodes);
+            let mut lines = String::new();
+            for number in 0..coders * labels * episodes {
+                let (coder, label) = (number % coders, number / coders % labels);
+                let episode = number / coders / labels;
+                let line = format!("{{\"coder\":\"c{coder}\",\"episode_id\":\"{episode:07}\",\"label\":\"l{label}\"}}");
+                writeln!(lines, "{line}").unwrap();
+            }
+            fs::write(at.join(name).join("labels.jsonl"), lines).unwrap();
+        }
+    },
+    cases: &[
+        ("trace labels coders", Limit("pairs of coders times labels")),
+        ("trace labels labels", Limit("pairs of coders times labels")),
+        ("trace labels pairs", Limit("pairs of coders times labels")),
+        ("trace labels episodes", Answer),
+    ],
+};
+
+/// Conditions times models of a study, and its options in each of them.
+const STUDIES: Walk = Walk {
+    inputs: |at| {
+        let study = |name: &str, options: &str, conditions: usize, models: usize| {
+            let of =
+                |kind: &str, count: usize| (0..count).map(|at| format!("[{kind}.{kind}{at}]\n")).collect::<String>();
+            let text = format!("{options}\n{}{}", of("condition", conditions), of("model", models));
+            fs::write(at.join(name), text).unwrap();
+        };
+        study("square.toml", "", 1000, 1000);
+        study("long.toml", &format!("api-url = \"http://127.0.0.1/{}\"", "x".repeat(500_000)), 40, 40);
+        study("episodes.toml", "seeds = 4000\nruns = 9\nagent = \"oracle\"", 1, 2);
+        study("seeds.toml", "seeds = 4000\nruns = 999\nrepeats = 99\nagent = \"oracle\"", 1, 1);
+    },
+    cases: &[
+        ("record square.toml --dry-run", Limit("recordings of a study, conditions times models")),
+        ("record long.toml --dry-run", Limit("bytes of options of a study")),
+        ("record episodes.toml --dry-run", Limit("episodes to record")),
+        ("record seeds.toml --dry-run", Limit("episodes to record")),
+    ],
+};
+
+/// Texts that are read whole: tables, definitions, styles, experiments; a log; a folder of a recording.
+const FILES: Walk = Walk {
+    inputs: |at| {
+        let mut table = "experiment,model,metric,mean,se,emphasis\n".to_owned();
+        for row in 0..30_000 {
+            let metric = ["TSA-C,0.505", "TTD,5000000", "TSA,0.57,0.15"][row % 3];
+            writeln!(table, "E1,m{row},{metric}{}", ",".repeat(5 - 2 - metric.matches(',').count())).unwrap();
+        }
+        fs::write(at.join("table.csv"), table).unwrap();
+        fs::copy(fixture("recorded/E1-oracle.parquet"), at.join("a.parquet")).unwrap();
+        let mut nested = "[let]\nx0 = \"t < coalesce(first(action = 'done'), 9)\"\n".to_owned();
+        for at in 0..40 {
+            writeln!(nested, "x{} = \"x{at} and x{at}\"", at + 1).unwrap();
+        }
+        fs::write(at.join("nested.toml"), nested + "[metric.M]\nvalue = \"any(x40)\"\n").unwrap();
+        let keys = |start: &str| (0..60_000).fold(start.to_owned(), |text, at| text + &format!("a{at} = \"t\"\n"));
+        fs::write(at.join("keys.toml"), keys("[let]\n")).unwrap();
+        fs::write(at.join("style.toml"), keys("")).unwrap();
+        fs::write(at.join("long.toml"), keys("") + &"#".repeat(1 << 20)).unwrap();
+        let long = "x".repeat(400_000);
+        fs::write(at.join("names.toml"), format!("[let]\n{long}a = \"{long}b\"\n[metric.M]\nvalue = \"{long}c\"\n"))
+            .unwrap();
+        large_log(&at.join("bomb.mcap"));
+    },
+    cases: &[
+        ("table audit table.csv --n 2000", Limit("sums that the cells of published tables are tried with")),
+        ("table compare a.parquet --published table.csv", Invalid),
+        ("definitions check nested.toml", Answer),
+        ("definitions check keys.toml", Limit("keys in a definition file")),
+        ("definitions check names.toml", Invalid),
+        ("definitions explain M --definitions nested.toml", Answer),
+        ("definitions show nested.toml", Answer),
+        ("definitions sql --definitions nested.toml", Limit("bytes of a statement")),
+        ("query SELECT(1) a.parquet --definitions keys.toml", Limit("keys in a definition file")),
+        ("style check style.toml", Limit("keys in a style")),
+        ("experiments check long.toml", Limit("bytes of an experiment file")),
+        ("experiments explain long.toml", Limit("bytes of an experiment file")),
+        ("experiments show long.toml", Limit("bytes of an experiment file")),
+        ("world scene --experiment long.toml", Limit("bytes of an experiment file")),
+        ("world sheet --experiment long.toml", Limit("bytes of an experiment file")),
+        ("trace recover bomb.mcap -o x.parquet", Answer),
+        ("participants remove P01 .", Invalid),
+    ],
+};
+
+const WALKS: [&Walk; 9] =
+    [&EPISODE, &TEXTS, &TOO_MANY_EPISODES, &EPISODES, &MODELS, &COLORS, &LABELS, &STUDIES, &FILES];
+
+fn is_there(words: &str) -> bool {
+    match words.split_whitespace().next() {
+        Some("view") => cfg!(feature = "view"),
+        Some("record" | "world") => cfg!(feature = "sim"),
+        Some("participants") => cfg!(all(feature = "sim", feature = "view")),
+        Some("query") => cfg!(feature = "polars"),
+        _ => true,
     }
-    many_episodes(&at.join("some.parquet"), 0..290_000);
-    within(at, "info some.parquet");
-    refused(at, "info some.parquet --episodes", "episodes in a list");
-    refused(at, "info some.parquet --episodes --json", "episodes in a list");
-    within(at, "score some.parquet -o scores.csv");
-    within(at, "report some.parquet -o report");
-    refused(at, "report some.parquet --by episode_id -o other", "cells, groups times metrics");
-    #[cfg(feature = "view")]
-    refused(at, "view some.parquet --export page", "episodes of a page as files");
-    many_episodes(&at.join("few.parquet"), 0..100_000);
-    within(at, "info few.parquet --episodes");
-    within(at, "info few.parquet --episodes --json");
-    within(at, "validate some.parquet --json");
 }
 
-#[test]
-fn many_small_files_have_one_budget() {
+fn walk(walk: &Walk) {
     let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
-    let all: Vec<String> = (0..4).map(|at| format!("{at}.parquet")).collect();
-    for (number, name) in all.iter().enumerate() {
-        many_episodes(&at.join(name), number * 290_000..(number + 1) * 290_000);
+    (walk.inputs)(folder.path());
+    let faults: Vec<String> = walk
+        .cases
+        .iter()
+        .filter(|(words, _)| is_there(words))
+        .filter_map(|(words, end)| fault(folder.path(), words, *end))
+        .collect();
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+}
+
+fn fault(at: &Path, words: &str, end: End) -> Option<String> {
+    let arguments: Vec<&str> = words.split_whitespace().collect();
+    let (answer, most) = measured(at, &arguments);
+    if most >= MEMORY {
+        return Some(format!("{words}: {} MB", most >> 10));
     }
-    refused(at, &format!("score {} -o scores.csv", all.join(" ")), "episodes in files of their size");
-}
-
-#[test]
-fn hundreds_of_thousands_of_models_are_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
-    many_models(&at.join("a.parquet"), 290_000);
-    for verb in ["info", "info --json"] {
-        refused(at, &format!("{verb} a.parquet"), "bytes of models in experiments");
-    }
-    within(at, "validate a.parquet");
-    within(at, "score a.parquet -o scores.csv");
-    refused(at, "report a.parquet -o report", "whose replies are counted");
-    refused(at, "stats a.parquet", "comparisons of two models");
-    refused(at, "gate a.parquet a.parquet", "cells of a gate");
-    many_models(&at.join("c.parquet"), 20_000);
-    within(at, "score c.parquet -o c.csv");
-    let gate = measured(at, &["gate", "c.csv", "c.parquet"]);
-    assert!(gate.1 < MEMORY && gate.0.code == 4, "{} MB, {}", gate.1 >> 10, gate.0.stderr);
-    many_models(&at.join("b.parquet"), 90_000);
-    within(at, "info b.parquet");
-    within(at, "info b.parquet --json");
-    refused(at, "report b.parquet -o report", "comparisons of two models");
-}
-
-/// A sample with this many tool events, all with these arguments, and more keys.
-fn sample(events: usize, arguments: &str, more: &str) -> String {
-    let event = format!("{{\"event\":\"tool\",\"function\":\"f\",\"arguments\":{arguments}}}");
-    let events = vec![event; events].join(",");
-    format!("{{\"id\":1,\"epoch\":1,\"scores\":{{\"s\":{{\"value\":\"C\"}}}},\"events\":[{events}]{more}}}")
-}
-
-#[test]
-fn samples_of_inspect_are_limited_with_what_their_events_share() {
-    const ROWS: &str = "bytes of rows of a log of its size";
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
-    std::fs::write(at.join("d.toml"), "domain = \"tools\"\n[metric.M]\nvalue = \"length()\"\n").unwrap();
-    let import = "import a.eval --definitions d.toml -o x.parquet";
-    let log = |note: &str, sample: &str| inspect_log(&at.join("a.eval"), note, sample);
-    let text = "A".repeat(900_000);
-    let attached = format!(",\"attachments\":{{\"k\":\"{text}\"}}");
-    log("", &sample(20_000, "[\"attachment://k\"]", &attached));
-    refused(at, import, ROWS);
-    log("", &sample(1, &format!("[{}0]", "\"attachment://k\",".repeat(20_000)), &attached));
-    refused(at, import, "bytes in a line of steps");
-    // What no column reads is not copied.
-    let unread = format!("{attached},\"metadata\":[{}0]", "\"attachment://k\",".repeat(20_000));
-    log("", &sample(10, "null", &unread));
-    within(at, import);
-    log(&text, &sample(10_000, "1", &format!(",\"metadata\":{{\"b\":\"{text}\"}}")));
-    for path in ["sample.metadata.b", "eval.note"] {
-        refused(at, &format!("{import} --map big={path}"), ROWS);
-    }
-    let scores: Vec<String> = (0..9000).map(|at| format!("\"s{at}\":{{\"value\":1}}")).collect();
-    log("", &sample(2000, "1", "").replace("\"s\":{\"value\":\"C\"}", &scores.join(",")));
-    refused(at, import, ROWS);
-    let refs = "{\"event\":\"model\",\"input_refs\":[[0,20000]]}";
-    let pool = format!(",\"events_data\":{{\"messages\":[{}1]}}", "{\"content\":\"x\"},".repeat(19_999));
-    let pooled = format!("{{\"id\":1,\"epoch\":1,\"events\":[{}]{pool}}}", vec![refs; 20_000].join(","));
-    log("", &pooled);
-    refused(at, &format!("{import} --map last=event.input.2.content"), ROWS);
-}
-
-#[test]
-fn samples_of_inspect_are_limited_when_they_are_inflated() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
-    let log = |sample: &str| inspect_log(&at.join("a.eval"), "", sample);
-    log(&format!("{{\"events\":[{}1]}}", "1,".repeat(20 << 20)));
-    refused(at, "import a.eval -o x.parquet", "values of a sample of a log of its size");
-    log(&format!("{{\"id\":\"{}\"}}", "A".repeat(100 << 20)));
-    refused(at, "import a.eval -o x.parquet", "bytes inflated from a log of its size");
-    // The largest that is read, with its text beside its objects.
-    let objects = "{\"a\":1},".repeat(200_000);
-    log(&format!("{{\"id\":1,\"z\":NaN,\"l\":[{objects}1],\"t\":\"{}\"}}", "A".repeat(90 << 20)));
-    let (answer, most) = measured(at, &["import", "a.eval", "-o", "x.parquet"]);
-    assert!(most < MEMORY && answer.refused().contains("expected an `epoch`"), "{} MB", most >> 10);
-}
-
-#[test]
-fn definitions_and_rows_are_limited_together() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
-    many_episodes(&at.join("episodes.parquet"), 0..290_000);
-    long_texts(&at.join("steps.parquet"), 1_000_000);
-    definitions(&at.join("sums.toml"), 500, |at| format!("sum(t * {} + length() % {})", at + 2, at + 3));
-    let branches = |at: usize| {
-        let one = |branch: usize| format!("when t = {} then {branch}", at * 7 + branch);
-        format!("sum(case {} else t end)", (0..60).map(one).collect::<Vec<_>>().join(" "))
+    let is_refused = answer.code == 2 && answer.stdout.is_empty() && !answer.stderr.contains("panicked");
+    let is_expected = match end {
+        Answer => [0, 1, 3, 4].contains(&answer.code),
+        Invalid => is_refused && !answer.stderr.contains(SETTING),
+        Limit(limit) => is_refused && answer.stderr.contains(limit) && answer.stderr.contains(SETTING),
     };
-    definitions(&at.join("branches.toml"), 100, branches);
-    for name in ["sums", "branches"] {
-        for trace in ["episodes", "steps"] {
-            let words = format!("score {trace}.parquet --definitions {name}.toml -o scores.csv");
-            refused(at, &words, "values of the definitions");
-        }
-    }
-    definitions(&at.join("few.toml"), 5, |at| format!("sum(t * {})", at + 2));
-    within(at, "score steps.parquet --definitions few.toml -o scores.csv");
+    let told: String = answer.stderr.chars().take(600).collect();
+    (!is_expected).then(|| format!("{words}: exit {}, {told}", answer.code))
+}
+
+#[test]
+fn an_episode_of_millions_of_steps() {
+    walk(&EPISODE);
+}
+
+#[test]
+fn texts_of_a_million_steps() {
+    walk(&TEXTS);
+}
+
+#[test]
+fn too_many_episodes_in_one_file_or_in_several() {
+    walk(&TOO_MANY_EPISODES);
+}
+
+#[test]
+fn hundreds_of_thousands_of_episodes() {
+    walk(&EPISODES);
+}
+
+#[test]
+fn hundreds_of_thousands_of_models() {
+    walk(&MODELS);
+}
+
+#[test]
+fn tens_of_thousands_of_colors() {
+    walk(&COLORS);
+}
+
+#[test]
+fn coders_times_labels() {
+    walk(&LABELS);
+}
+
+#[test]
+fn conditions_times_models() {
+    walk(&STUDIES);
+}
+
+#[test]
+fn files_that_are_read_whole() {
+    walk(&FILES);
+}
+
+/// The commands without subcommands, from the reference page; another test compares that page with the program.
+pub fn verbs() -> BTreeSet<String> {
+    let page = fs::read_to_string(repository().join("docs/reference/commands.md")).unwrap();
+    let all: BTreeSet<&str> = page.lines().filter_map(|line| line.strip_prefix("## mirrorstats ")).collect();
+    let is_noun = |verb: &str| all.iter().any(|other| other.starts_with(&format!("{verb} ")));
+    all.iter().filter(|verb| !is_noun(verb)).map(|verb| (*verb).to_owned()).collect()
+}
+
+/// The verbs that no command line begins with.
+pub fn missing<'c>(commands: impl Iterator<Item = &'c str> + Clone) -> Vec<String> {
+    let is_there = |verb: &str| commands.clone().any(|words| format!("{words} ").starts_with(&format!("{verb} ")));
+    verbs().into_iter().filter(|verb| !is_there(verb)).collect()
+}
+
+#[test]
+fn every_verb_is_walked() {
+    let cases = WALKS.iter().flat_map(|walk| walk.cases.iter().map(|(words, _)| *words));
+    let missing = missing(cases.chain(WITHOUT_INPUT.iter().map(|(verb, _)| *verb)));
+    assert!(verbs().len() > 35 && missing.is_empty(), "no input that asks for much work: {missing:?}");
 }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 use std::fs::{self, File};
-use std::io::Write as _;
+use std::io::{Cursor, Write as _};
 use std::ops::Range;
 use std::path::Path;
 use std::process::{Child, Stdio};
@@ -12,6 +12,7 @@ use std::time::{Duration, Instant};
 
 use arrow::array::{ArrayRef, BooleanArray, DictionaryArray, Int32Array, RecordBatch, StringArray};
 use arrow::datatypes::Int32Type;
+use mcap::WriteOptions;
 use parquet::arrow::ArrowWriter;
 use parquet::basic::{Compression, Encoding, ZstdLevel};
 use parquet::file::properties::WriterProperties;
@@ -114,6 +115,38 @@ pub fn inspect_log(path: &Path, note: &str, sample: &str) {
     zip.finish().unwrap();
     let bytes = fs::metadata(path).unwrap().len();
     assert!(bytes < 1 << 20, "{}: {bytes} bytes", path.display());
+}
+
+/// Episodes of one step each, with as many bodies and claims of different colours.
+pub fn many_colors(path: &Path, count: usize) {
+    let named = |suffix: &str| -> ArrayRef {
+        let letter = |at: usize| char::from(b'a' + u8::try_from(at % 26).unwrap());
+        let name = |at: usize| [at / 17_576, at / 676, at / 26, at].map(letter).iter().collect::<String>() + suffix;
+        Arc::new(StringArray::from_iter_values((0..count).map(name)))
+    };
+    let columns = vec![("episode_id", numbered(0..count)), ("body_color", named("x")), ("self_color", named("y"))];
+    write(path, count, columns);
+}
+
+/// A log whose only chunk unpacks to 200 MiB.
+pub fn large_log(path: &Path) {
+    fs::write(path, log(1, 200 << 20)).unwrap();
+}
+
+/// A log with chunks that each unpack to this many bytes.
+pub fn log(chunks: usize, bytes: usize) -> Vec<u8> {
+    let options = WriteOptions::new().compression(Some(mcap::Compression::Zstd));
+    let mut out = options.compression_threads(0).chunk_size(None).create(Cursor::new(Vec::new())).unwrap();
+    let channel = out.add_channel(0, "/episode", "json", &std::collections::BTreeMap::new()).unwrap();
+    let header = mcap::records::MessageHeader { channel_id: channel, sequence: 0, log_time: 0, publish_time: 0 };
+    for _ in 0..chunks {
+        for _ in 0..bytes >> 20 {
+            out.write_to_known_channel(&header, &vec![b' '; 1 << 20]).unwrap();
+        }
+        out.flush().unwrap();
+    }
+    out.finish().unwrap();
+    out.into_inner().into_inner()
 }
 
 /// Definitions with `count` metrics.

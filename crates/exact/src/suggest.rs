@@ -2,13 +2,18 @@
 
 /// The candidate most similar to `name`, if any is similar. Similarity is Jaro-Winkler, ignoring ASCII case, or one
 /// typing error (a letter added, missing or replaced, or two exchanged). The first of equal candidates wins, so the
-/// answer depends only on the given order.
+/// answer depends only on the given order. Long names are not compared, since that takes the product of their lengths.
 pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     const LIKE_ENOUGH: f64 = 0.75;
     const ONE_SLIP: f64 = 0.85;
+    const LONGEST: usize = 100;
+    const MOST: usize = 10_000;
+    if name.len() > LONGEST {
+        return None;
+    }
     let name = name.to_ascii_lowercase();
     let mut best: Option<(&str, f64)> = None;
-    for candidate in candidates {
+    for candidate in candidates.into_iter().filter(|candidate| candidate.len() <= LONGEST).take(MOST) {
         let known = candidate.to_ascii_lowercase();
         let slip = name.chars().count() > 1 && strsim::osa_distance(&name, &known) == 1;
         let likeness = strsim::jaro_winkler(&name, &known).max(if slip { ONE_SLIP } else { 0.0 });
@@ -35,5 +40,7 @@ mod tests {
         assert_eq!(nearest("SELF_COLOR", names), Some("self_color"));
         assert_eq!(nearest("zzz", names), None);
         assert_eq!(nearest("MRC", ["TSA", "MCR", "CR"]), Some("MCR"));
+        let long = "x".repeat(1 << 20);
+        assert_eq!((nearest(&long, ["x"]), nearest("self_colour", [&long, "self_color"])), (None, Some("self_color")));
     }
 }

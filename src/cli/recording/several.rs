@@ -13,11 +13,14 @@ use toml::de::{DeString, DeTable, DeValue};
 use crate::cli::config::{self, OptionFile};
 use crate::cli::recording::{RecordAnswer, Recorded};
 use crate::cli::{Failure, NAME, Options, Outcome};
-use exact::budget::Limit;
+use exact::budget::{Budget, Limit};
 use exact::{input, suggest};
 use toml_spec::{Source, parse_toml};
 
 const LARGEST: Limit = Limit::new("bytes of a study file", 1 << 20);
+const MOST_RECORDINGS: Limit = Limit::new("recordings of a study, conditions times models", 2000);
+/// Each recording has a copy of the options for all.
+const MOST_COPIED: Limit = Limit::new("bytes of options of a study, those of all its recordings together", 16 << 20);
 const DEFAULT: &str = "default";
 
 const RECORD: &str = "record";
@@ -53,6 +56,14 @@ pub fn recordings<A: clap::Args>(path: &Path) -> Result<Vec<Options>, Failure> {
     if conditions.is_empty() {
         conditions.insert(DEFAULT.to_owned(), Options::new());
     }
+    let count = (conditions.len() as u64).saturating_mul(models.len() as u64);
+    MOST_RECORDINGS.check(count).map_err(|exceeded| fault(&exceeded))?;
+    let copied = Budget::new(MOST_COPIED);
+    for (of, times) in [(&conditions, models.len()), (&models, conditions.len())] {
+        let bytes: u64 = of.iter().map(|(name, of)| name.len() as u64 + bytes_of(of)).sum();
+        copied.spend(bytes.saturating_mul(times as u64)).map_err(|exceeded| fault(&exceeded))?;
+    }
+    copied.spend(bytes_of(&options).saturating_mul(count)).map_err(|exceeded| fault(&exceeded))?;
     let each = conditions.iter().flat_map(|condition| models.iter().map(move |model| (condition, model)));
     Ok(each
         .map(|((condition, of_condition), (model, of_model))| {
@@ -67,6 +78,10 @@ pub fn recordings<A: clap::Args>(path: &Path) -> Result<Vec<Options>, Failure> {
             all
         })
         .collect())
+}
+
+fn bytes_of(options: &Options) -> u64 {
+    options.iter().map(|(key, value)| (key.len() + value.to_string().len()) as u64).sum()
 }
 
 fn sections(reader: &mut OptionFile<'_>, table: &DeTable<'_>) -> BTreeMap<String, Options> {

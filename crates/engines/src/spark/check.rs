@@ -171,7 +171,7 @@ mod tests {
     /// Polars replaces Spark here: it has the same functions, and its patterns mean the same in this case.
     #[test]
     fn the_sql_condition_agrees_with_the_color_rule() {
-        let palette = Palette::of_all([Some(&Palette::new(vec!["teal".into(), "grün".into()]))].into_iter());
+        let palette = Palette::of_all([Some(&Palette::new(["teal".into(), "grün".into()]))].into_iter());
         for palette in [None, palette.as_ref()] {
             for column in columns() {
                 let mut context = SQLContext::new();

@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::{Study, StudyError};
+use exact::budget::Limit;
 use statistics::agreement::{FEWEST, Kappa};
 use statistics::interval::Interval;
 use statistics::paired::Pairs;
@@ -62,6 +63,10 @@ pub struct PairAgreement {
     pub cannot_say: Option<String>,
 }
 
+type Coded<'l> = BTreeMap<&'l str, BTreeSet<&'l str>>;
+
+const MOST_COMPARISONS: Limit = Limit::new("pairs of coders times labels; leave episodes out with --where", 20_000);
+
 impl PairAgreement {
     #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
     fn new(label: &str, coders: [&str; 2], counts: Pairs, confidence: f64) -> Self {
@@ -102,25 +107,24 @@ impl Study {
         coders.retain(|_, episodes| !episodes.is_empty());
         let words: BTreeSet<&str> = coders.values().flat_map(BTreeMap::values).flatten().copied().collect();
         let names: Vec<&str> = coders.keys().copied().collect();
-        let pairs =
-            names.iter().enumerate().flat_map(|(at, first)| names[at + 1..].iter().map(move |other| [*first, *other]));
-        let pairs: Vec<[&str; 2]> = pairs.collect();
+        let pairs = names.len() as u64 * (names.len() as u64).saturating_sub(1) / 2;
+        MOST_COMPARISONS.check(pairs.saturating_mul(words.len() as u64))?;
         let mut agreement = Vec::new();
-        for label in &words {
-            for pair in &pairs {
-                let [first, second] = pair.map(|name| &coders[name]);
-                let both = first.iter().filter_map(|(id, own)| Some((own, second.get(id)?)));
-                let counts =
-                    Pairs::of(both.map(|(own, other)| (own.contains(label).into(), other.contains(label).into())));
-                agreement.push(PairAgreement::new(label, *pair, counts, confidence));
+        for (at, first) in names.iter().enumerate() {
+            for second in &names[at + 1..] {
+                let counts = compared(&coders[first], &coders[second], &words);
+                let of =
+                    |(label, counts): (&&str, Pairs)| PairAgreement::new(label, [*first, *second], counts, confidence);
+                agreement.extend(words.iter().zip(counts).map(of));
             }
         }
-        let with = |label: &str| {
-            let of = |episodes: &BTreeMap<&str, BTreeSet<&str>>, id: &str| {
-                episodes.get(id).is_some_and(|own| own.contains(label))
-            };
-            ids.iter().filter(|id| coders.values().any(|episodes| of(episodes, id))).count() as u64
-        };
+        agreement.sort_by(|one, other| one.label.cmp(&other.label));
+        let mut with: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
+        for (id, labels) in coders.values().flatten() {
+            for label in labels {
+                with.entry(label).or_default().insert(id);
+            }
+        }
         Ok(LabelAgreement {
             episodes: ids.len() as u64,
             coded,
@@ -129,11 +133,32 @@ impl Study {
                 .iter()
                 .map(|(coder, episodes)| CoderCount { coder: (*coder).to_owned(), episodes: episodes.len() as u64 })
                 .collect(),
-            labels: words
-                .iter()
-                .map(|label| LabelCount { label: (*label).to_owned(), episodes: with(label) })
+            labels: with
+                .into_iter()
+                .map(|(label, ids)| LabelCount { label: label.to_owned(), episodes: ids.len() as u64 })
                 .collect(),
             agreement,
         })
     }
+}
+
+/// The counts of two coders for each label, in one pass over the episodes that both coded.
+fn compared(first: &Coded<'_>, second: &Coded<'_>, words: &BTreeSet<&str>) -> Vec<Pairs> {
+    let (mut n, mut given) = (0, BTreeMap::<&str, Pairs>::new());
+    for (own, other) in first.iter().filter_map(|(id, own)| Some((own, second.get(id)?))) {
+        n += 1;
+        for label in own.union(other) {
+            let counts = given.entry(label).or_default();
+            match (own.contains(label), other.contains(label)) {
+                (true, true) => counts.both += 1,
+                (true, false) => counts.first_only += 1,
+                (false, _) => counts.second_only += 1,
+            }
+        }
+    }
+    let whole = |label: &&str| {
+        let counts = given.get(label).copied().unwrap_or_default();
+        Pairs { neither: n - counts.n(), ..counts }
+    };
+    words.iter().map(whole).collect()
 }

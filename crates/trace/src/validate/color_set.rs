@@ -20,6 +20,9 @@ use crate::schema::colors::spelling::{WORDS, did_you_mean, meant_by, most_like, 
 use crate::schema::colors::{ColorColumn, column};
 use parquet_pages::Column;
 
+/// Beyond this number of claims times colours, findings suggest no colour.
+const MOST_COMPARED: usize = 1_000_000;
+
 pub(crate) struct Sighting {
     column: ColorColumn,
     name: String,
@@ -160,7 +163,9 @@ impl Tally {
         let found = format!("`{}` in {rows}, first in this one", sighting.name.escape_debug());
         let expected = "the colour of a body or of a selected cube in these inputs";
         let finding = sighting.place(Finding::new(Code::UnseenColor, file.name(), expected, found));
-        let like = most_like(&sighting.name, self.seen.iter().map(String::as_str));
+        // Each claim is compared with each colour that was seen.
+        let is_few = self.met.len().saturating_mul(self.seen.len()) <= MOST_COMPARED;
+        let like = is_few.then(|| most_like(&sighting.name, self.seen.iter().map(String::as_str))).flatten();
         Some(match like {
             Some(like) => finding.with_help(format!("{} Otherwise {}", did_you_mean(like), Code::UnseenColor.help())),
             None => finding,

@@ -94,6 +94,12 @@ pub fn slug(model: &str) -> String {
 }
 
 impl Plan {
+    /// The number of its episodes, those of other shards included.
+    pub fn size(&self) -> u64 {
+        let counts = [self.seeds, self.runs, self.repeats].map(|count| u64::from(count.unsigned_abs()));
+        counts.into_iter().fold(self.experiments.len() as u64, u64::saturating_mul)
+    }
+
     /// The episodes of this shard, by experiment, seed, run and repetition.
     pub fn keys(&self) -> Vec<Key> {
         let (seeds, runs, repeats) = (self.seeds, self.runs, self.repeats);

@@ -23,6 +23,7 @@ use crate::cli::recording::{self, RecordAnswer, probe, several};
 use crate::cli::registration::registration;
 use crate::cli::vlm::VlmArgs;
 use crate::cli::{Failure, Outcome, experiments, options_of, output};
+use exact::budget::{Budget, Limit};
 use exact::escape::visible;
 use exact::suggest::hint;
 use world::agent::Player;
@@ -38,6 +39,10 @@ use world::sim::Experiment;
 use world::sim::config::WorldConfig;
 
 const HUMAN: &str = "human";
+
+/// A plan lists each of its episodes.
+const MOST_EPISODES: Limit =
+    Limit::new("episodes to record, experiments times seeds times runs times repeats", 100_000);
 
 /// Record episodes of an agent in the mirror world: step traces for `report`, logs with the frames
 ///
@@ -123,7 +128,8 @@ pub struct RecordArgs {
 impl RecordArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
         let each = self.each()?;
-        let forecasts = || each.iter().map(Self::forecast).collect::<Result<Vec<_>, _>>();
+        let planned = Budget::new(MOST_EPISODES);
+        let forecasts = || each.iter().map(|args| args.forecast(&planned)).collect::<Result<Vec<_>, _>>();
         if self.dry_run {
             return self.print_forecasts(&forecasts()?);
         }
@@ -266,6 +272,7 @@ impl RecordArgs {
             )));
         }
         let plan = Plan { experiments, seeds: self.seeds, runs: self.runs, repeats: self.repeats, shard: self.shard };
+        MOST_EPISODES.check(plan.size()).map_err(Failure::input)?;
         #[cfg(feature = "view")]
         if self.agent == HUMAN {
             return self.human.spread(plan);
@@ -273,9 +280,11 @@ impl RecordArgs {
         Ok(plan)
     }
 
-    fn forecast(&self) -> Result<ForecastAnswer, Failure> {
+    /// The episodes are counted together with those of other recordings.
+    fn forecast(&self, all: &Budget) -> Result<ForecastAnswer, Failure> {
         let config = &configured(self.config.as_ref())?;
         let plan = &self.planned(config)?;
+        all.spend(plan.size()).map_err(Failure::input)?;
         let vlm = (self.agent == "vlm").then(|| self.vlm.forecaster(&self.out)).transpose()?.map(Arc::new);
         let player = match &vlm {
             Some(vlm) => Arc::clone(vlm) as Arc<dyn Player>,

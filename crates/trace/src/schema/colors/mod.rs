@@ -35,7 +35,7 @@ impl ColorColumn {
 
     pub(crate) fn expected(self, palette: Option<&Palette>) -> String {
         let colors = match palette {
-            Some(palette) => format!("a colour of the palette ({})", palette.names().join(", ")),
+            Some(palette) => format!("a colour of the palette ({})", listed(palette)),
             None => "the lower-case name of a colour".to_owned(),
         };
         let word = self.word.map(|word| format!(", `{word}`")).unwrap_or_default();
@@ -59,6 +59,15 @@ impl ColorColumn {
             None => "use a name of the palette, or add the colour to the palette".to_owned(),
         }
     }
+}
+
+/// The first names of a palette: each finding repeats them.
+fn listed(palette: &Palette) -> String {
+    const MOST: usize = 20;
+    let names = palette.names();
+    let shown: Vec<&str> = names.iter().take(MOST).map(String::as_str).collect();
+    let more = if names.len() > MOST { format!(", and {} more", names.len() - MOST) } else { String::new() };
+    shown.join(", ") + &more
 }
 
 #[cfg(test)]
@@ -125,7 +134,7 @@ mod tests {
 
     #[test]
     fn only_colors_of_the_palette_are_valid() {
-        let palette = Palette::new(["teal", "magenta"].map(str::to_owned).to_vec());
+        let palette = Palette::new(["teal", "magenta"].map(str::to_owned));
         let [body, claim] = [column("body_color").unwrap(), column("self_color").unwrap()];
         assert!(claim.may_hold("teal", Some(&palette)) && claim.may_hold("unknown", Some(&palette)));
         for (text, help) in [

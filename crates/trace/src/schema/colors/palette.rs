@@ -1,17 +1,22 @@
 //! The colours in the footer's `mirrorstats.recording`: `palette`, a list of names, or the statement that the world is
 //! this program's, with the colours of the study.
 
+use indexmap::IndexSet;
 use serde_json::Value;
 
 use super::spelling::{WORDS, did_you_mean, is_well_spelled, most_like, normal, study_color};
 use crate::diagnostic::{Code, Finding};
 use crate::palette::Color;
 use crate::schema::RECORDING_KEY;
+use exact::budget::{Exceeded, Limit};
 use exact::escape::visible;
+
+/// Each value that is not in a palette is compared with all of it. The names of the xkcd colour survey are 954.
+const MOST_COLORS: Limit = Limit::new("colours of a palette", 1000);
 
 /// The colours of a recording; never empty.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Palette(Vec<String>);
+pub struct Palette(IndexSet<String>);
 
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NoPalette {
@@ -21,6 +26,8 @@ pub enum NoPalette {
     NoColor { found: String, meant: Option<String> },
     #[error("expected each colour once, found `{0}` twice")]
     Twice(String),
+    #[error(transparent)]
+    TooMany(#[from] Exceeded),
 }
 
 fn hint(meant: Option<&str>) -> String {
@@ -49,16 +56,16 @@ impl DeclaredPalette {
 }
 
 impl Palette {
-    pub fn new(names: Vec<String>) -> Self {
-        Self(names)
+    pub fn new(names: impl IntoIterator<Item = String>) -> Self {
+        Self(names.into_iter().collect())
     }
 
     pub fn of_study() -> Self {
-        Self(Color::ALL.map(|color| color.name().to_owned()).to_vec())
+        Self::new(Color::ALL.map(|color| color.name().to_owned()))
     }
 
     pub fn of_names<'a>(names: impl IntoIterator<Item = &'a str>) -> Result<Self, NoPalette> {
-        let mut palette: Vec<String> = Vec::new();
+        let mut palette: IndexSet<String> = IndexSet::new();
         for name in names {
             if !is_color(name) {
                 let meant = Some(study_color(name).map_or_else(|| normal(name), str::to_owned));
@@ -67,16 +74,18 @@ impl Palette {
                     meant: meant.filter(|meant| is_color(meant)),
                 });
             }
-            if palette.iter().any(|before| before == name) {
+            if !palette.insert(name.to_owned()) {
                 return Err(NoPalette::Twice(name.to_owned()));
             }
-            palette.push(name.to_owned());
         }
+        MOST_COLORS.check(palette.len() as u64)?;
         if palette.is_empty() { Err(NoPalette::Empty) } else { Ok(Self(palette)) }
     }
 
     fn read(file: &str, palette: &Value) -> Result<Self, Box<Finding>> {
-        let names: Option<Vec<String>> = serde_json::from_value(palette.clone()).ok();
+        let listed = palette.as_array().map_or(0, Vec::len);
+        MOST_COLORS.check(listed as u64).map_err(|exceeded| Finding::over_budget(file, &exceeded))?;
+        let names: Option<IndexSet<String>> = serde_json::from_value(palette.clone()).ok();
         match names.filter(|names| !names.is_empty() && names.iter().all(|name| is_color(name))) {
             Some(names) => Ok(Self(names)),
             None => Err(Box::new(invalid(file, palette))),
@@ -85,21 +94,20 @@ impl Palette {
 
     /// The names of all these palettes, in order; `None` if a palette is missing, or there are none.
     pub fn of_all<'a>(palettes: impl Iterator<Item = Option<&'a Self>>) -> Option<Self> {
-        let mut names: Vec<String> = Vec::new();
+        let mut names: IndexSet<String> = IndexSet::new();
         for palette in palettes {
-            let new = palette?.0.iter().filter(|name| !names.contains(name)).cloned().collect::<Vec<_>>();
-            names.extend(new);
+            names.extend(palette?.0.iter().cloned());
         }
         (!names.is_empty()).then_some(Self(names))
     }
 
     /// The names, in footer order.
-    pub fn names(&self) -> &[String] {
+    pub const fn names(&self) -> &IndexSet<String> {
         &self.0
     }
 
     pub(crate) fn has(&self, text: &str) -> bool {
-        self.0.iter().any(|name| name == text)
+        self.0.contains(text)
     }
 
     pub(super) fn nearest(&self, text: &str) -> Option<&str> {
@@ -127,11 +135,10 @@ mod tests {
 
     #[test]
     fn a_declared_palette_is_read() {
-        let names =
-            |text| DeclaredPalette::of("a.parquet", &recording(Some(text))).unwrap().palette.map(|palette| palette.0);
+        let names = |text| DeclaredPalette::of("a.parquet", &recording(Some(text))).unwrap().palette;
         assert_eq!(
             names(r#"{"world":{},"palette":["teal","dark red"]}"#),
-            Some(vec!["teal".into(), "dark red".into()])
+            Some(Palette::new(["teal".into(), "dark red".into()]))
         );
         for text in ["{}", r#"{"palette":null}"#, "no JSON", "7"] {
             assert_eq!(names(text), None, "{text}");
@@ -151,7 +158,11 @@ mod tests {
     #[test]
     fn invalid_palettes_have_a_reason() {
         let palette = |names: &[&'static str]| Palette::of_names(names.iter().copied());
-        assert_eq!(palette(&["teal", "dark red"]).unwrap().names(), ["teal", "dark red"]);
+        assert!(palette(&["teal", "dark red"]).unwrap().names().iter().eq(["teal", "dark red"]));
+        let many: Vec<String> = (0..1001).map(|at| format!("c{at}")).collect();
+        assert!(Palette::of_names(many[1..].iter().map(String::as_str)).is_ok());
+        let told = Palette::of_names(many.iter().map(String::as_str)).unwrap_err().to_string();
+        assert!(told.contains("at most 1000 colours of a palette"), "{told}");
         assert_eq!(Palette::of_study(), palette(&Color::ALL.map(Color::name)).unwrap());
         for (names, words) in [
             (&[][..], "expected at least one colour, found none"),

@@ -190,7 +190,7 @@ const STUDIES: Walk = Walk {
             fs::write(at.join(name), text).unwrap();
         };
         study("square.toml", "", 1000, 1000);
-        study("long.toml", &format!("api-url = \"http://127.0.0.1/{}\"", "x".repeat(500_000)), 40, 40);
+        study("long.toml", &format!("base-url = \"http://127.0.0.1/{}\"", "x".repeat(500_000)), 40, 40);
         study("episodes.toml", "seeds = 4000\nruns = 9\nagent = \"oracle\"", 1, 2);
         study("seeds.toml", "seeds = 4000\nruns = 999\nrepeats = 99\nagent = \"oracle\"", 1, 1);
     },

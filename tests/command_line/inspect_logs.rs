@@ -74,14 +74,3 @@ fn samples_of_inspect_are_limited_when_they_are_inflated() {
     let (answer, most) = measured(at, &["import", "a.eval", "-o", "x.parquet"]);
     assert!(most < MEMORY && answer.refused().contains("expected an `epoch`"), "{} MB", most >> 10);
 }
-
-#[test]
-fn definitions_and_rows_are_limited_together() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
-    many_episodes(&at.join("episodes.parquet"), 0..290_000);
-    long_texts(&at.join("steps.parquet"), 1_000_000);
-    definitions(&at.join("sums.toml"), 500, |at| format!("sum(t * {} + length() % {})", at + 2, at + 3));
-    let branches = |at: usize| {
-        let one = |branch: usize| format!("when t = {} then {branch}", at * 7 + branch);
-        format!("sum(case {} else t end)", (0..60).map(one).collect::<Vec<_>>().join(" "))

@@ -72,7 +72,10 @@ fn a_style_without_include_keeps_the_meaning_of_the_default_style() {
     let at = folder.path();
     fs::write(at.join("mine.toml"), "[table.main]\ncolumns = ['TSA', 'TTD']\n").unwrap();
     fs::write(at.join("means.toml"), "[print]\ncell = 'mean_se'\nemphasis = 'exact_mean'\n").unwrap();
-    let report = |style: &str| run(at, &["report", "a.parquet", "--style", style, "--no-figures", "--out", "r"]).done();
+    let report = |style: &str| {
+        let shown = run(at, &["report", "a.parquet", "--style", style, "--no-figures", "--out", "r"]).done();
+        shown.split_whitespace().collect::<Vec<_>>().join(" ")
+    };
     let mine = report("mine.toml");
     assert!(mine.contains("with Wilson 95 % intervals") && mine.contains("† defined in fewer than 5"), "{mine}");
     let means = report("means.toml");

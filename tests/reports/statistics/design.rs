@@ -37,7 +37,7 @@ fn different_scenes_with_equal_seed_and_run_are_not_paired() {
     assert_eq!((test.comparison.method, test.comparison.pairs, test.matching.alone), (Method::Fisher, None, 42));
     // scipy 1.17.1: fisher_exact([[21, 0], [7, 14]]).pvalue
     assert!((test.comparison.p.unwrap() / 4.399_526_904_206_901_5e-6 - 1.0).abs() < 1e-9, "{test:?}");
-    assert!(found.design_note.contains("none of 1 comparisons has pairs"), "{}", found.design_note);
+    assert!(found.design_note.contains("none of 1 comparison has pairs"), "{}", found.design_note);
 }
 
 /// Episodes with the same scene are a pair, whatever their seeds and runs.

@@ -37,7 +37,7 @@ pub enum ExperimentsAction {
         /// A built-in experiment, or a TOML file
         #[arg(value_name = "NAME|FILE")]
         experiment: PathBuf,
-        /// Print the templates of its prompt, each under the name of its file, to start your own from
+        /// Print the templates of its prompt, each under its file's name
         #[arg(long, conflicts_with = "json")]
         prompt: bool,
         /// Print the experiment as traces carry it, as JSON

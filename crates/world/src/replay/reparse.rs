@@ -155,6 +155,9 @@ fn read_again(step: &Step, experiment: &Spec) -> Option<Reply> {
         _ => Ending::Whole,
     };
     let reading = reply::read(step.extra.reply.as_deref()?, experiment, ending);
+    if status == Status::Truncated && reading.status == status {
+        return None;
+    }
     let repairs = step.extra.reply_repair.as_deref().unwrap_or_default();
     let carried = [Repair::Surrogate, Repair::ToolCall]
         .into_iter()

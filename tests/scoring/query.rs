@@ -135,7 +135,7 @@ fn a_refused_query_comes_with_a_command_line_for_duckdb() {
     for (query, expected) in [
         ("SELECT string_agg(DISTINCT experiment, ' ' ORDER BY experiment) AS e FROM steps", "E1 E2\n"),
         (
-            "SELECT count(*) FILTER (WHERE x.t <> 'a''b') FROM (SELECT action AS t FROM steps\n-- all\nQUALIFY true) x WHERE 1 = 2",
+            "SELECT count(*) FILTER (WHERE x.t <> 'a''b') FROM (SELECT action AS t FROM steps\n-- all\nEXCEPT SELECT 'a''b') x WHERE 1 = 2",
             "0\n",
         ),
         ("SELECT list(DISTINCT e.seed)[1] > 0 FROM episodes e JOIN steps s USING (episode_id)", "True\n"),

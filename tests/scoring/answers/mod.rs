@@ -5,12 +5,13 @@ mod generate;
 
 use std::collections::BTreeMap;
 
+use engines::polars::shared_file::in_memory;
 use engines::polars::statement::{Table, check};
-use polars::prelude::{Engine, IntoLazy as _, df};
+use polars::prelude::{IntoLazy as _, df};
 
 use engine::{Duckdb, Rows, Tables, sorted};
 use engines::polars::accepted::FUNCTIONS;
-use engines::polars::answer::plan;
+use engines::polars::answer::{Format, plan};
 use engines::polars::refused::QueryError;
 use generate::{Generator, Statement};
 
@@ -132,14 +133,10 @@ fn asked(sql: &str) -> String {
         Err(QueryError::Unsupported(fault)) => return fault.message,
         Err(error) => return error.to_string(),
     };
-    let rows = match frame.collect_with_engine(Engine::Streaming) {
-        Ok(rows) => rows.unwrap_single(),
-        Err(error) => return error.to_string(),
-    };
-    let cell = |value: polars::prelude::AnyValue| value.to_string();
-    let row = |at| rows.columns().iter().map(|column| cell(column.get(at).unwrap())).collect::<Vec<_>>().join(",");
-    let names = rows.get_column_names().iter().map(ToString::to_string).collect::<Vec<_>>().join(",");
-    [names].into_iter().chain((0..rows.height()).map(row)).collect::<Vec<_>>().join(" ")
+    match in_memory(frame, Format::Csv) {
+        Ok(rows) => String::from_utf8(rows).unwrap().trim_end().replace('\n', " "),
+        Err(error) => error.to_string(),
+    }
 }
 
 #[test]
@@ -154,11 +151,11 @@ fn shapes_that_polars_answers_differently_have_the_answer_of_duckdb() {
         ("SELECT count(*) AS n FROM steps WHERE b IS UNKNOWN", "n 1"),
         ("SELECT 1 AS c WHERE 1 = 2", "c"),
         ("SELECT x, * EXCLUDE (x, run, n) FROM steps WHERE t = 1", "x,t,b 10.0,1,true"),
-        ("SELECT * EXCLUDE (x, run, n, b), upper('a') AS x FROM steps WHERE t = 1", "t,x 1,\"A\""),
+        ("SELECT * EXCLUDE (x, run, n, b), upper('a') AS x FROM steps WHERE t = 1", "t,x 1,A"),
         ("SELECT -t AS t FROM steps ORDER BY steps.t LIMIT 2", "t -1 -2"),
         ("SELECT -t AS t FROM steps ORDER BY t LIMIT 2", "t -4 -3"),
         ("SELECT n % 4 AS r FROM steps WHERE t < 3 ORDER BY t", "r -3 3"),
-        ("SELECT sum(1) AS s, 'a' AS a FROM steps", "s,a 4,\"a\""),
+        ("SELECT sum(1) AS s, 'a' AS a FROM steps", "s,a 4,a"),
         ("SELECT 1 AS one FROM steps", "one 1 1 1 1"),
         ("SELECT count(*) AS n FROM steps a JOIN steps b ON a.t = b.t AND a.run < b.t", "n 3"),
     ] {
@@ -168,9 +165,9 @@ fn shapes_that_polars_answers_differently_have_the_answer_of_duckdb() {
 
 #[test]
 fn shapes_without_an_equal_answer_are_refused_by_name() {
+    let mut wrong = Vec::new();
     for (sql, words) in [
         ("SELECT CAST(2.5 AS INTEGER) AS c", "`CAST(2.5 AS INTEGER)` of DECIMAL"),
-        ("SELECT t DIV 2 FROM steps", "`t DIV 2` of BIGINT, BIGINT"),
         ("SELECT 7 % n FROM steps", "`7 % n` of BIGINT, BIGINT"),
         ("SELECT a.t FROM steps a JOIN steps b ON a.t < b.t", "`ON a.t < b.t`"),
         ("SELECT a.t FROM steps a NATURAL JOIN steps b", "NATURAL JOIN"),
@@ -187,8 +184,11 @@ fn shapes_without_an_equal_answer_are_refused_by_name() {
         ("SELECT 0.1 + 0.2 = 0.3", "of DECIMAL, DECIMAL"),
     ] {
         let refusal = asked(sql);
-        assert!(refusal.contains("`query` does not support") && refusal.contains(words), "{sql}: {refusal}");
+        if !(refusal.contains("`query` does not support") && refusal.contains(words)) {
+            wrong.push(format!("{sql}: {refusal}"));
+        }
     }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
 #[test]
@@ -199,6 +199,7 @@ fn numbers_that_leave_64_bits_are_never_wrapped() {
         "SELECT sum(n) * 2 FROM steps",
         "SELECT sum(n) OVER (ORDER BY t DESC) + sum(n) OVER () FROM steps",
     ] {
-        assert!(asked(sql).contains("conversion from"), "{sql}: {}", asked(sql));
+        let answer = asked(sql);
+        assert!(answer.contains("overflow") || answer.contains("conversion from"), "{sql}: {answer}");
     }
 }

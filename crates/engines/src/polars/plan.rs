@@ -212,19 +212,14 @@ impl<'s> Planner<'s> {
     }
 
     pub(super) fn from(&mut self, tables: &[TableWithJoins]) -> Answer {
-        let [table] = tables else {
-            return match tables {
-                // One row without a column.
-                [] => {
-                    let frame = df!("" => [0_i64]).map_err(PolarsError::from)?.lazy();
-                    Ok(Relation { frame, columns: Vec::new() })
-                }
-                [_, second, ..] => {
-                    self.wrong(second.span(), "several tables without JOIN", "write JOIN ... ON a.x = b.y")
-                }
-                [_] => unreachable!("matched above"),
-            };
+        let Some((table, others)) = tables.split_first() else {
+            // One row without a column.
+            let frame = df!("" => [0_i64]).map_err(PolarsError::from)?.lazy();
+            return Ok(Relation { frame, columns: Vec::new() });
         };
+        if let Some(second) = others.first() {
+            return self.wrong(second.span(), "several tables without JOIN", "write JOIN ... ON a.x = b.y");
+        }
         let first = self.factor(&table.relation)?;
         table.joins.iter().try_fold(first, |left, join| self.join(left, join))
     }

@@ -133,9 +133,6 @@
 
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
-#[global_allocator]
-static ALLOCATOR: memory::Allocator = memory::Allocator;
-
 pub mod cli;
 
 pub use exact::moments::Moments;

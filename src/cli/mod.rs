@@ -81,19 +81,10 @@ fn told_of_large_files() -> io::Result<()> {
     Ok(())
 }
 
-/// Ends the process with a message and its own exit code if memory is refused, and leaves no temporary files.
-fn end_without_memory(bytes: usize) {
-    outcome::say_no_memory(bytes);
-    exact::replace::remove_temporary();
-    signal_hook::low_level::exit(outcome::NO_MEMORY.into());
-}
-
 /// Like [`run`], but returns the code as a number, for a process that belongs to a caller.
 pub fn run_to_code(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let arguments = names::current(arguments.into_iter().collect());
     let format = ErrorFormat::asked_for(&arguments);
-    outcome::set_format(format);
-    memory::on_refusal(end_without_memory);
     let answer = caught(|| execute(arguments.clone())).unwrap_or_else(|fault| Err(Failure::Panic(fault)));
     let answer = answer.map_err(|failure| scoring::with_commands(failure, &arguments));
     let code = outcome::exit_code(answer.and_then(flushed), format);

@@ -8,7 +8,6 @@
 //! | 3 | part of the input is lost (`recover`); the rest was saved |
 //! | 4 | `gate`: no regression, but some cells allow no verdict |
 //! | 5 | `gate`: no regression, but some cells are not comparable |
-//! | 6 | the system refused memory |
 //! | 101 | an internal error |
 //! | 130 | interrupted (`record`); finished work stays |
 
@@ -16,7 +15,6 @@ use std::error::Error;
 use std::ffi::OsString;
 use std::fmt::Write as _;
 use std::io::{self, Write as _};
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -28,7 +26,6 @@ use trace::diagnostic::{MORE_FILES, is_short_of_files};
 /// The form of errors if no option sets it; read before anything is parsed.
 pub const ERRORS_VARIABLE: &str = "MIRRORSTATS_ERRORS";
 const BAD_INPUT: u8 = 2;
-pub const NO_MEMORY: u8 = 6;
 /// As Rust's own after a panic.
 const PANIC: u8 = 101;
 
@@ -134,24 +131,6 @@ pub fn exit_code(result: Result<Outcome, Failure>, format: ErrorFormat) -> u8 {
             failure_code(&failure)
         }
     }
-}
-
-/// Whether errors are printed as JSON. A refused allocation is reported from wherever it happens.
-static IS_JSON: AtomicBool = AtomicBool::new(false);
-
-pub fn set_format(format: ErrorFormat) {
-    IS_JSON.store(format == ErrorFormat::Json, Ordering::Relaxed);
-}
-
-/// Reports a refused allocation. Allocates nothing.
-pub fn say_no_memory(bytes: usize) {
-    let help = "use fewer --threads, or raise the memory limit (ulimit -v, a container's limit)";
-    let _ = if IS_JSON.load(Ordering::Relaxed) {
-        let error = format_args!("out of memory: the system refused {bytes} bytes\\n  help: {help}");
-        writeln!(io::stderr(), r#"{{"error":"{error}","code":{NO_MEMORY}}}"#)
-    } else {
-        writeln!(io::stderr(), "error: out of memory: the system refused {bytes} bytes\n  help: {help}")
-    };
 }
 
 fn say(failure: &Failure, format: ErrorFormat) {

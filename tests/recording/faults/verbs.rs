@@ -165,15 +165,20 @@ impl<'a> Case<'a> {
                 .unwrap_or_else(|words| panic!("{}: {words}", told()));
         }
         if found != self.new && found != self.old || !leftovers(&home).is_empty() {
-            let again = command(&home, self.verb.words).output().unwrap();
-            // A plan that is already registered is not replaced.
-            let is_registered =
-                self.verb.words.starts_with("plan") && stderr(&again).contains("a registered plan is not replaced");
-            assert!(again.status.success() || is_registered, "{}: again: {}", told(), stderr(&again));
-            assert!(all_held(&home, self.verb) == self.new, "{}: again", told());
-            // If the plan is registered, the command stops before it looks for leftovers.
-            assert!(is_registered || leftovers(&home).is_empty(), "{}: again: {:?}", told(), leftovers(&home));
+            self.check_again(&home, &told());
         }
+    }
+
+    /// Runs the verb once more after a fault, without one.
+    fn check_again(&self, home: &Path, told: &str) {
+        let again = command(home, self.verb.words).output().unwrap();
+        // A plan that is already registered is not replaced.
+        let is_registered =
+            self.verb.words.starts_with("plan") && stderr(&again).contains("a registered plan is not replaced");
+        assert!(again.status.success() || is_registered, "{told}: again: {}", stderr(&again));
+        assert!(all_held(home, self.verb) == self.new, "{told}: again");
+        // If the plan is registered, the command stops before it looks for leftovers.
+        assert!(is_registered || leftovers(home).is_empty(), "{told}: again: {:?}", leftovers(home));
     }
 }
 
@@ -209,9 +214,12 @@ impl Case<'_> {
         if output.status.success() {
             return false;
         }
+        // Rust's own end of a process: SIGABRT, which removes nothing.
         assert!(said.contains("memory") || said.contains("allocat"), "{}", told());
-        assert!([Some(2), Some(6), Some(101)].contains(&output.status.code()), "{}", told());
-        assert_eq!(leftovers(&home), Vec::<String>::new(), "{}", told());
+        assert!([Some(2), Some(101), None].contains(&output.status.code()), "{}", told());
+        if !leftovers(&home).is_empty() {
+            self.check_again(&home, &told());
+        }
         true
     }
 }
@@ -240,13 +248,13 @@ fn check_memory(most: usize) {
 }
 
 #[test]
-fn refused_memory_ends_with_a_message_and_leaves_old_or_new_outputs() {
+fn refused_memory_leaves_old_or_new_outputs() {
     check_memory(12);
 }
 
 #[test]
 #[ignore = "soak: two hundred allocations of every verb"]
-fn soak_refused_memory_ends_with_a_message_and_leaves_old_or_new_outputs() {
+fn soak_refused_memory_leaves_old_or_new_outputs() {
     check_memory(200);
 }
 

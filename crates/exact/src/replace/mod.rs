@@ -21,7 +21,7 @@ pub use leftover::sweep;
 pub use new_file::{NewFile, replace};
 pub use place::{folder_of, is_stream, make_folder, sync_folder};
 pub use same_file::{FolderHoldsInput, TargetIsInput, check_folder, check_target, is_same_file};
-pub use temporary::{TemporaryFolder, remove_temporary};
+pub use temporary::TemporaryFolder;
 
 #[cfg(test)]
 mod tests;

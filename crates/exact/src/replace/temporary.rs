@@ -2,15 +2,12 @@
 //!
 //! All system calls go through the standard library, so that `tests/harness/faults.c` can fail them one by one.
 
-use std::collections::BTreeSet;
 use std::collections::hash_map::RandomState;
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, File, OpenOptions};
 use std::hash::BuildHasher as _;
 use std::io;
-use std::mem;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
 
 use super::leftover;
 use super::place::{RANDOM, checksum};
@@ -18,24 +15,9 @@ use super::place::{RANDOM, checksum};
 /// The characters of random names: no capitals, since some file systems ignore case.
 const CHARACTERS: &[u8; 36] = b"abcdefghijklmnopqrstuvwxyz0123456789";
 
-/// The temporary files and folders of this process.
-static PRESENT: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
-
-fn forget(path: &Path) {
-    PRESENT.lock().unwrap_or_else(PoisonError::into_inner).remove(path);
-}
-
 fn remove(path: &Path) {
     // A later run sweeps what stays.
     let _ = if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
-}
-
-/// Removes the temporary files and folders of this process, for an exit that drops nothing.
-pub fn remove_temporary() {
-    // Another thread that holds the lock may be waiting for memory.
-    if let Ok(present) = PRESENT.try_lock() {
-        present.iter().for_each(|path| remove(path));
-    }
 }
 
 /// The path of a temporary file or folder, which is removed when this is dropped, unless it got another name.
@@ -44,7 +26,7 @@ struct Present(PathBuf);
 
 impl Present {
     fn keep(&mut self) {
-        forget(&mem::take(&mut self.0));
+        self.0 = PathBuf::new();
     }
 }
 
@@ -52,7 +34,6 @@ impl Drop for Present {
     fn drop(&mut self) {
         if !self.0.as_os_str().is_empty() {
             remove(&self.0);
-            forget(&self.0);
         }
     }
 }
@@ -147,7 +128,6 @@ fn make(
         };
         // Before it was locked, another process may have taken it for a leftover.
         if file.as_ref().is_none_or(|file| leftover::lock(file, &path)) {
-            PRESENT.lock().unwrap_or_else(PoisonError::into_inner).insert(path.clone());
             return Ok((Present(path), file));
         }
     }
